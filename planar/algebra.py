@@ -1,0 +1,95 @@
+"""Arithmetic that floats, arrays, symbols and jets share, so that a formula is written once.
+
+A *jet* is a quantity together with its time derivatives; running a formula on jets
+gives its velocity and acceleration by the rules of Leibniz and of the chain, without a
+second formula (A. Griewank, A. Walther, Evaluating Derivatives, SIAM 2008, ch. 13).
+"""
+
+from __future__ import annotations
+
+from math import comb
+from typing import Any
+
+import numpy as np
+
+Scalar = Any
+"""A float, a numpy array, a casadi SX or a Jet: whatever has + - *."""
+
+
+def _by_its_own(name: str, x: Scalar) -> Scalar:
+    method = getattr(x, name, None)
+    return getattr(np, name)(x) if method is None else method()
+
+
+def cos(x: Scalar) -> Scalar:
+    """Cosine of an angle in radians."""
+    return _by_its_own("cos", x)
+
+
+def sin(x: Scalar) -> Scalar:
+    """Sine of an angle in radians."""
+    return _by_its_own("sin", x)
+
+
+def sqrt(x: Scalar) -> Scalar:
+    """Square root."""
+    return _by_its_own("sqrt", x)
+
+
+def atan2(y: Scalar, x: Scalar) -> Scalar:
+    """The angle of the direction (x, y), between -pi and pi."""
+    method = getattr(y, "arctan2", None)
+    return np.arctan2(y, x) if method is None else method(x)
+
+
+class Jet:
+    """A value with its first, second, ... time derivatives, under + - * and cos, sin.
+
+    `parts[k]` is the k-th derivative: a float, or an array of any one shape.
+    """
+
+    __slots__ = ("parts",)
+    __array_ufunc__ = None  # an array times a jet is a jet, not an array of jets
+
+    def __init__(self, *parts: Scalar):
+        self.parts = parts
+
+    def _lifted(self, other: Scalar) -> tuple[Scalar, ...]:
+        if isinstance(other, Jet):
+            return other.parts
+        return (other,) + (0.0,) * (len(self.parts) - 1)
+
+    def __add__(self, other: Scalar) -> Jet:
+        return Jet(*(a + b for a, b in zip(self.parts, self._lifted(other), strict=True)))
+
+    def __neg__(self) -> Jet:
+        return Jet(*(-a for a in self.parts))
+
+    def __sub__(self, other: Scalar) -> Jet:
+        return Jet(*(a - b for a, b in zip(self.parts, self._lifted(other), strict=True)))
+
+    def __rsub__(self, other: Scalar) -> Jet:
+        return -self + other
+
+    def __mul__(self, other: Scalar) -> Jet:
+        a, b = self.parts, self._lifted(other)
+        return Jet(*(sum(comb(n, k) * a[k] * b[n - k] for k in range(n + 1)) for n in range(len(a))))
+
+    __radd__ = __add__
+    __rmul__ = __mul__
+
+    def _turned(self) -> tuple[list[Scalar], list[Scalar]]:
+        """Derivatives of cos and sin: c' = -s a', s' = c a', expanded by Leibniz."""
+        a = self.parts
+        c, s = [np.cos(a[0])], [np.sin(a[0])]
+        for n in range(1, len(a)):
+            terms = [(comb(n - 1, k) * a[n - k], k) for k in range(n)]
+            c.append(-sum(w * s[k] for w, k in terms))
+            s.append(sum(w * c[k] for w, k in terms))
+        return c, s
+
+    def cos(self) -> Jet:
+        return Jet(*self._turned()[0])
+
+    def sin(self) -> Jet:
+        return Jet(*self._turned()[1])

@@ -1,0 +1,234 @@
+"""A place in a JSON value that knows its path, its units, and how to refuse what stands there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from math import isfinite
+from typing import Any
+
+from planar.errors import BadInput
+from planar.mechanism import Units
+from planar.shapes import Link
+from planar.units import UnitError, example, quantity, unit
+
+FORBIDDEN = ".:,"
+
+
+@dataclass(frozen=True)
+class Whole:
+    """What every place of one file may need to know of the whole of it."""
+
+    units: Units = Units()
+    frame: str = ""
+    links: Mapping[str, Link] = None  # type: ignore[assignment]
+
+
+@dataclass(frozen=True)
+class Cursor:
+    """One value of the file. Every reading method returns SI data or raises BadInput with this place."""
+
+    value: Any
+    path: str = "$"
+    whole: Whole = Whole()
+
+    # refusing
+
+    def refuse(self, key: str | None, sentence: str) -> BadInput:
+        return BadInput(self.path if key is None else self._path(key), sentence)
+
+    def only(self, *keys: str) -> None:
+        for key in self.fields():
+            if key not in keys:
+                raise self.refuse(key, f"unknown key {key!r}{did_you_mean(key, keys)}")
+
+    # walking
+
+    def _path(self, key: str) -> str:
+        plain = key.split("[")[0].replace("_", "a").isalnum()
+        return f"{self.path}.{key}" if plain else f"{self.path}[{key!r}]"
+
+    def fields(self) -> Mapping[str, Any]:
+        if not isinstance(self.value, dict):
+            raise self.refuse(None, f"an object {{...}} is wanted here, not {called(self.value)}")
+        return self.value
+
+    def has(self, key: str) -> bool:
+        return key in self.fields()
+
+    def __getitem__(self, key: str) -> Cursor:
+        if key not in self.fields():
+            near = did_you_mean(key, self.value, "is written {!r} the key meant?")
+            raise self.refuse(None, f"the key {key!r} is missing{near}")
+        return replace(self, value=self.value[key], path=self._path(key))
+
+    def inside(self, key: str) -> Cursor:
+        found = self[key]
+        found.fields()
+        return found
+
+    def members(self) -> Iterator[tuple[str, Cursor]]:
+        """The named members of an object whose keys are names."""
+        for key in self.fields():
+            yield key, self[key]
+
+    def items(self) -> Iterator[Cursor]:
+        """The items of a list."""
+        if not isinstance(self.value, list):
+            raise self.refuse(None, f"a list [...] is wanted here, not {called(self.value)}")
+        for index, value in enumerate(self.value):
+            yield replace(self, value=value, path=f"{self.path}[{index}]")
+
+    def listed(self, key: str) -> tuple[Cursor, ...]:
+        return tuple(self[key].items()) if self.has(key) else ()
+
+    # plain values
+
+    def as_text(self) -> str:
+        if not isinstance(self.value, str):
+            raise self.refuse(None, f"a text is wanted here, not {called(self.value)}")
+        return self.value
+
+    def text(self, key: str, default: str | None = None) -> str | None:
+        return self[key].as_text() if self.has(key) else default
+
+    def name(self, key: str) -> str:
+        return self[key].as_name()
+
+    def as_name(self) -> str:
+        return self.checked_name(self.as_text())
+
+    def checked_name(self, name: str) -> str:
+        if not name.strip():
+            raise self.refuse(None, "a name cannot be empty")
+        found = [mark for mark in FORBIDDEN if mark in name]
+        if found:
+            raise self.refuse(None, f"the name {name!r} holds {found[0]!r}; names contain none of . : ,")
+        return name
+
+    def names(self, key: str, count: int) -> tuple[str, ...]:
+        found = tuple(item.as_name() for item in self[key].items())
+        if len(found) != count:
+            raise self.refuse(key, f"{count} names are wanted here, not {len(found)}")
+        return found
+
+    def one_of(self, key: str, words: tuple[str, ...]) -> str | None:
+        if not self.has(key):
+            return None
+        word = self[key].as_text()
+        if word not in words:
+            raise self.refuse(key, f"{word!r} is none of {', '.join(words)}{did_you_mean(word, words)}")
+        return word
+
+    # quantities
+
+    def as_quantity(self, kind: str) -> float:
+        if isinstance(self.value, str):
+            try:
+                found = quantity(self.value, kind)
+            except UnitError as problem:
+                raise self.refuse(None, str(problem)) from None
+        else:
+            found = self._bare(self.as_number(), kind)
+        if not isfinite(found):
+            raise self.refuse(None, "the number is too large")
+        return found
+
+    def as_number(self) -> float:
+        if isinstance(self.value, bool) or not isinstance(self.value, int | float):
+            raise self.refuse(None, f"a number is wanted here, not {called(self.value)}")
+        try:
+            return float(self.value)
+        except OverflowError:
+            raise self.refuse(None, "the number is too large") from None
+
+    def _bare(self, number: float, kind: str) -> float:
+        units = self.whole.units
+        if kind == "length":
+            return unit(units.length).to_si(number)
+        if kind == "angle":
+            return unit(units.angle).to_si(number)
+        if kind.startswith("angular") and units.angle != "rad" and number != 0.0:
+            rate = "rad/s, deg/s or rpm" if kind == "angular velocity" else "rad/s^2 or deg/s^2"
+            raise self.refuse(
+                None,
+                f"a bare rate {self.value} is unclear where the angle unit is {units.angle}; write {rate}, "
+                f"such as {example(kind)!r}",
+            )
+        return number
+
+    def quantity(self, key: str, kind: str, default: float | None = None) -> float:
+        if default is not None and not self.has(key):
+            return default
+        return self[key].as_quantity(kind)
+
+    def optional(self, key: str, kind: str) -> float | None:
+        return self[key].as_quantity(kind) if self.has(key) else None
+
+    def as_vector(self, kind: str) -> tuple[float, float]:
+        found = tuple(item.as_quantity(kind) for item in self.items())
+        if len(found) != 2:
+            raise self.refuse(None, f"two numbers [x, y] are wanted here, not {len(found)}")
+        return found
+
+    def positive(self, kind: str) -> float:
+        found = self.as_quantity(kind)
+        if found <= 0.0:
+            raise self.refuse(None, f"a {kind} above zero is wanted here, not {self.value}")
+        return found
+
+    # links and points
+
+    def carriers(self, point: str) -> tuple[str, ...]:
+        links = self.whole.links
+        found = [name for name, link in links.items() if point in link.names]
+        return tuple(sorted(found, key=lambda name: name != self.whole.frame))
+
+    def as_link(self) -> str:
+        name = self.as_text()
+        if name not in self.whole.links:
+            raise self.refuse(None, f"there is no link {name!r}{did_you_mean(name, self.whole.links)}")
+        return name
+
+    def links(self, key: str) -> tuple[str, ...]:
+        found = tuple(item.as_link() for item in self[key].items())
+        if len(found) < 2:
+            raise self.refuse(key, "a pair joins at least two links")
+        for name in found:
+            if found.count(name) > 1:
+                raise self.refuse(key, f"link {name!r} stands here twice; a pair joins different links")
+        return found
+
+    def carried(self, point: str, link: str, key: str) -> None:
+        known = self.whole.links[link].names
+        if point not in known:
+            raise self.refuse(key, f"link {link!r} has no point {point!r}{did_you_mean(point, known)}")
+
+    def point(self, key: str, link: str) -> str:
+        found = self[key].as_text()
+        self.carried(found, link, key)
+        return found
+
+    def place(self, key: str, link: str) -> str | tuple[float, float]:
+        if isinstance(self[key].value, list):
+            return self[key].as_vector("length")
+        return self.point(key, link)
+
+
+def called(value: Any) -> str:
+    """What a JSON value is called in a sentence."""
+    if value is None:
+        return "null"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    kinds: dict[type, str] = {dict: "an object", list: "a list", str: "a text", int: "a number", float: "a number"}
+    text = repr(value) if isinstance(value, str | int | float) else ""
+    name = next(name for kind, name in kinds.items() if isinstance(value, kind))
+    return f"the {name.split()[1]} {text}" if 0 < len(text) < 40 else name
+
+
+def did_you_mean(word: str, known: Any, sentence: str = "did you mean {!r}?") -> str:
+    """A clause that offers the nearest known word, or nothing."""
+    near = get_close_matches(word, list(known), 1) or [each for each in known if each.lower() == word.lower()]
+    return "; " + sentence.format(near[0]) if near else ""

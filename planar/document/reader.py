@@ -1,0 +1,392 @@
+"""A JSON value to a Mechanism, or BadInput with the place in the file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from planar.document.cursor import Cursor, Whole, called, did_you_mean
+from planar.mechanism import (
+    Along,
+    At,
+    Distances,
+    Drive,
+    Input,
+    Link,
+    Load,
+    Mechanism,
+    Place,
+    Point,
+    Published,
+    Units,
+    motions,
+    named_points,
+)
+from planar.pairs import Kind, Pair, pair_types
+from planar.shapes import Unplaced, shape
+from planar.units import UnitError, unit
+
+FORMAT = 1
+KEYS = (
+    "planar",
+    "name",
+    "ids",
+    "about",
+    "source",
+    "geometry",
+    "notes",
+    "units",
+    "frame",
+    "links",
+    "pairs",
+    "inputs",
+    "loads",
+    "sketch",
+    "published",
+)
+GEOMETRY = ("given", "recovered", "fitted", "underdetermined")
+QUANTITIES = {
+    "position": "length",
+    "velocity": "velocity",
+    "acceleration": "acceleration",
+    "centripetal acceleration": "acceleration",
+    "tangential acceleration": "acceleration",
+    "Coriolis acceleration": "acceleration",
+    "angular velocity": "angular velocity",
+    "angular acceleration": "angular acceleration",
+    "rubbing speed": "velocity",
+    "displacement": "length",
+    "sliding velocity": "velocity",
+    "sliding acceleration": "acceleration",
+    "input torque": "torque",
+}
+"""What a published value may be of, and what it is measured in."""
+SENSES = ("clockwise", "anticlockwise", "to the left", "to the right", "upwards", "downwards")
+
+
+def read(value: Any) -> Mechanism:
+    """The mechanism that a JSON value describes. Raises BadInput."""
+    top = Cursor(value)
+    top.only(*KEYS)
+    if top["planar"].value != FORMAT or isinstance(top["planar"].value, bool):
+        raise top.refuse("planar", f"this is format {called(top['planar'].value)}; planar reads format {FORMAT}")
+    units = _units(top)
+    top = replace(top, whole=Whole(units, "", {}))
+    full = _written_out(top)
+    links = {name: _link(name, cursor) for name, cursor in full["links"].members()}
+    frame = full["frame"].as_text()
+    if frame not in links:
+        raise full.refuse("frame", f"there is no link {frame!r} to be the frame{did_you_mean(frame, links)}")
+    full = replace(full, whole=Whole(units, frame, links))
+    pairs = _pairs(full)
+    bare = Mechanism(
+        name=full.text("name", "") or "mechanism",
+        frame=frame,
+        links=tuple(links.values()),
+        pairs=pairs,
+        units=units,
+        ids=tuple(item.as_text() for item in full.listed("ids")),
+        about=full.text("about"),
+        source=full.text("source"),
+        geometry=full.one_of("geometry", GEOMETRY),
+        notes=tuple(item.as_text() for item in full.listed("notes")),
+        loads=(),
+        remarks=_left_out(full, pairs),
+    )
+    driven = replace(bare, inputs=_inputs(full, motions(bare)))
+    points = _point_names(driven)
+    return replace(
+        driven,
+        loads=tuple(_load(item, points) for item in full.listed("loads")),
+        sketch=_sketch(full, points),
+        published=tuple(_published(item, driven, points) for item in full.listed("published")),
+    )
+
+
+def _units(top: Cursor) -> Units:
+    if not top.has("units"):
+        return Units()
+    units = top.inside("units")
+    units.only("length", "angle")
+    found = {}
+    for kind, default in (("length", "m"), ("angle", "rad")):
+        text = units.text(kind, default)
+        try:
+            fits = unit(text).kind == kind
+        except UnitError:
+            fits = False
+        if not fits:
+            raise units.refuse(kind, f"{text!r} is not a unit of {kind}, such as 'mm' or 'deg'")
+        found[kind] = text
+    return Units(**found)
+
+
+def _written_out(top: Cursor) -> Cursor:
+    """The file with the short forms of its pairs in full."""
+    value = dict(top.fields())
+    top["frame"].as_text()
+    links = dict(top.inside("links").fields())
+    entries = [dict(item.fields()) for item in top["pairs"].items()]
+    for index, entry in enumerate(entries):
+        kind = _type(Cursor(entry, f"$.pairs[{index}]", top.whole))
+        whole = kind.rewrite(entry, value)
+        if whole is None:
+            continue
+        for name, link in whole.links.items():
+            if name in links:
+                raise BadLink(f"$.pairs[{index}]", name)
+            links[name] = link
+        entries[index] = whole.entry
+        _pin_at(whole.pin, tuple(whole.links), entries)
+    return replace(top, value=value | {"links": links, "pairs": entries})
+
+
+def BadLink(path: str, name: str) -> Exception:  # noqa: N802 - reads as the error it makes
+    return Cursor(None, path).refuse(None, f"this makes a link {name!r}, but there is one of that name already")
+
+
+def _pin_at(point: str, links: tuple[str, ...], entries: list[dict[str, Any]]) -> None:
+    """See that the links are pinned to the others that carry the point."""
+    for entry in entries:
+        if entry.get("turning") == point:
+            if isinstance(entry.get("links"), list):
+                entry["links"] = [*entry["links"], *links]
+                if isinstance(entry.get("points"), list):
+                    entry["points"] = [*entry["points"], *(point for _ in links)]
+            return
+    entries.append({"turning": point})
+
+
+def _type(entry: Cursor) -> type[Pair]:
+    types = pair_types()
+    found = [keyword for keyword in types if entry.has(keyword)]
+    if len(found) != 1:
+        wanted = ", ".join(repr(keyword) for keyword in sorted(types))
+        told = "more than one" if found else "none"
+        near = did_you_mean(next(iter(entry.fields()), ""), types)
+        raise entry.refuse(None, f"a pair says its type by one of the keys {wanted}; {told} is here{near}")
+    return types[found[0]]
+
+
+def _link(name: str, cursor: Cursor) -> Link:
+    cursor.checked_name(name)
+    cursor.only("ends", "length", "points", "axis")
+    ends = cursor.names("ends", 2) if cursor.has("ends") else None
+    length = None
+    if ends is not None:
+        if ends[0] == ends[1]:
+            raise cursor.refuse("ends", f"both ends are {ends[0]!r}; a link has two different ends")
+        length = cursor["length"].positive("length")
+    elif cursor.has("length"):
+        raise cursor.refuse("length", "a 'length' needs the two 'ends' that it lies between")
+    points: list[Point] = []
+    if cursor.has("points"):
+        for point, place in cursor["points"].members():
+            place.checked_name(point)
+            if ends is not None and point in ends:
+                raise place.refuse(None, f"{point!r} is an end of this link already; its place follows from 'length'")
+            points.append(Point(point, _place(place)))
+    if ends is None and not points:
+        raise cursor.refuse(None, "a link needs points: 'ends' with a 'length', or 'points'")
+    axis = None
+    if cursor.has("axis"):
+        if ends is not None:
+            raise cursor.refuse("axis", "a link with 'ends' has its x-axis along them; leave 'axis' out")
+        axis = cursor.names("axis", 2)
+    link = Link(name, tuple(points), ends, length, axis)
+    for end in axis or ():
+        if end not in link.names:
+            raise cursor.refuse("axis", f"there is no point {end!r} on this link{did_you_mean(end, link.names)}")
+    if axis is not None and axis[0] == axis[1]:
+        raise cursor.refuse("axis", "the axis needs two different points")
+    try:
+        placed = shape(link)
+    except Unplaced as problem:
+        at = cursor["points"]
+        raise at.refuse(problem.point if at.has(problem.point) else None, str(problem)) from None
+    except ZeroDivisionError:
+        raise cursor.refuse("axis", "the two points of the axis coincide, so they give no direction") from None
+    del placed
+    return link
+
+
+def _place(cursor: Cursor) -> Place:
+    if isinstance(cursor.value, list):
+        return At(*cursor.as_vector("length"))
+    cursor.only("along", "distance", "angle", "distances", "left_of", "right_of")
+    if cursor.has("along"):
+        start, towards = cursor.names("along", 2)
+        if start == towards:
+            raise cursor.refuse("along", "a direction needs two different points")
+        return Along(start, towards, cursor.quantity("distance", "length"), cursor.quantity("angle", "angle", 0.0))
+    if not cursor.has("distances"):
+        raise cursor.refuse(None, "a point is [x, y], or has 'along' and 'distance', or 'distances' and a side")
+    distances = {name: place.positive("length") for name, place in cursor["distances"].members()}
+    if len(distances) != 2:
+        raise cursor.refuse("distances", f"distances from two points are wanted here, not {len(distances)}")
+    if cursor.has("left_of") == cursor.has("right_of"):
+        raise cursor.refuse(None, "a point by two distances lies either 'left_of' or 'right_of' the way between them")
+    side = "left_of" if cursor.has("left_of") else "right_of"
+    first, second = cursor.names(side, 2)
+    if {first, second} != set(distances):
+        raise cursor.refuse(side, f"the way must be between {' and '.join(distances)}, from which the distances are")
+    return Distances(first, second, distances[first], distances[second], side == "left_of")
+
+
+def _pairs(top: Cursor) -> tuple[Pair, ...]:
+    found: list[Pair] = []
+    named: dict[str, str] = {}
+    placed: dict[tuple[str, str], str] = {}
+    for entry in top["pairs"].items():
+        group = _type(entry).read(entry)
+        name = group[0].entry_name()
+        pinned = {member for pair in group for member in pair.coincident()}
+        shared = [member for member in pinned if member in placed]
+        if name in named or shared:
+            other = named.get(name) or placed[shared[0]]
+            if pinned:
+                raise entry.refuse(
+                    None, f"{name!r} is written at {other} already; write one pair that names all links of the pin"
+                )
+            raise entry.refuse(None, f"there is a pair {name!r} at {other} already; give this one another name")
+        named[name] = entry.path
+        placed |= dict.fromkeys(pinned, entry.path)
+        found += group
+    return tuple(found)
+
+
+def _left_out(top: Cursor, pairs: tuple[Pair, ...]) -> tuple[str, ...]:
+    """What is to be said of links that carry a pin's point but are not on the pin."""
+    pinned: dict[str, set[tuple[str, str]]] = {}
+    for pair in pairs:
+        pinned.setdefault(pair.entry_name(), set()).update(pair.coincident())
+    return tuple(
+        f"link {link!r} carries a point {name!r} but is not on the pin {name!r}; if it should be, name it there"
+        for name, members in pinned.items()
+        for link in top.carriers(name)
+        if members and (link, name) not in members and not any((link, name) in others for others in pinned.values())
+    )
+
+
+def _inputs(top: Cursor, known: Mapping[str, Pair]) -> tuple[Input, ...]:
+    found: dict[str, Input] = {}
+    for cursor in top.listed("inputs"):
+        cursor.only("pair", "position", "velocity", "acceleration")
+        pair = _motion(cursor["pair"], known)
+        if pair.name in found:
+            raise cursor.refuse("pair", f"pair {pair.name!r} has an input already; a pair takes one")
+        found[pair.name] = Input(
+            pair.name,
+            cursor.quantity("position", _kinds(pair)[0]),
+            cursor.quantity("velocity", _kinds(pair)[1], 0.0),
+            cursor.quantity("acceleration", _kinds(pair)[2], 0.0),
+        )
+    return tuple(found.values())
+
+
+def _kinds(pair: Pair) -> tuple[str, str, str]:
+    if pair.drive_kind is Kind.LENGTH:
+        return "length", "velocity", "acceleration"
+    return "angle", "angular velocity", "angular acceleration"
+
+
+def _motion(cursor: Cursor, known: Mapping[str, Pair]) -> Pair:
+    name = cursor.as_text()
+    if name in known:
+        return known[name]
+    parts = [other for other in known if other.startswith(f"{name}:")]
+    if parts:
+        raise cursor.refuse(None, f"{name!r} joins several links; say which two move: {' or '.join(map(repr, parts))}")
+    reverse = name.partition(":")[0] + ":" + ",".join(reversed(name.partition(":")[2].split(",")))
+    if reverse in known:
+        raise cursor.refuse(None, f"the links of {name!r} stand in the other order in the file; write {reverse!r}")
+    raise cursor.refuse(None, f"there is no pair {name!r}{did_you_mean(name, known)}")
+
+
+def _point_names(mechanism: Mechanism) -> dict[str, str]:
+    """Every way to write a point, and the name that results give it."""
+    named = named_points(mechanism)
+    return {f"{link}.{point}": each.name for each in named for link, point in each.members} | {
+        each.name: each.name for each in named
+    }
+
+
+def _result_point(cursor: Cursor, name: str, points: Mapping[str, str]) -> str:
+    if name in points:
+        return points[name]
+    several = [other for other in points if other.endswith(f".{name}")]
+    if several:
+        raise cursor.refuse(None, f"several points are called {name!r}; write {' or '.join(map(repr, several))}")
+    raise cursor.refuse(None, f"there is no point {name!r}{did_you_mean(name, points)}")
+
+
+def _load(cursor: Cursor, points: Mapping[str, str]) -> Load:
+    cursor.only("point", "force", "link", "torque")
+    if cursor.has("point") == cursor.has("link"):
+        raise cursor.refuse(None, "a load is a 'force' at a 'point' or a 'torque' on a 'link'")
+    if cursor.has("point"):
+        point = _result_point(cursor["point"], cursor["point"].as_text(), points)
+        return Load(point=point, force=cursor["force"].as_vector("force"))
+    return Load(link=cursor["link"].as_link(), torque=cursor.quantity("torque", "torque"))
+
+
+def _sketch(top: Cursor, points: Mapping[str, str]) -> tuple[tuple[str, float, float], ...]:
+    if not top.has("sketch"):
+        return ()
+    return tuple(
+        (_result_point(place, name, points), *place.as_vector("length")) for name, place in top["sketch"].members()
+    )
+
+
+def _drives(cursor: Cursor, key: str, mechanism: Mechanism) -> tuple[Drive, ...]:
+    if not cursor.has(key):
+        return ()
+    known = {given.pair: motions(mechanism)[given.pair] for given in mechanism.inputs}
+    found = []
+    for name, drive in cursor[key].members():
+        if name not in known:
+            raise drive.refuse(None, f"there is no input at {name!r}{did_you_mean(name, known)}")
+        drive.only("position", "velocity", "acceleration")
+        kinds = _kinds(known[name])
+        found.append(
+            Drive(
+                name,
+                drive.optional("position", kinds[0]),
+                drive.optional("velocity", kinds[1]),
+                drive.optional("acceleration", kinds[2]),
+            )
+        )
+    return tuple(found)
+
+
+def _published(cursor: Cursor, mechanism: Mechanism, points: Mapping[str, str]) -> Published:
+    cursor.only(*Published.__dataclass_fields__.keys() - {"start"}, "from")
+    quantity = cursor["quantity"].as_text()
+    if quantity not in QUANTITIES:
+        raise cursor.refuse("quantity", f"{quantity!r} is no quantity{did_you_mean(quantity, QUANTITIES)}")
+    kind = QUANTITIES[quantity]
+    of, relative_to = cursor["of"].as_text(), cursor.text("relative_to")
+    if quantity.startswith("angular"):
+        of = cursor["of"].as_link()
+    elif quantity in ("rubbing speed", "displacement", "sliding velocity", "sliding acceleration", "input torque"):
+        of = _motion(cursor["of"], motions(mechanism)).name
+    else:
+        of = _result_point(cursor["of"], of, points)
+        if relative_to is not None:
+            relative_to = _result_point(cursor["relative_to"], relative_to, points)
+    return Published(
+        symbol=cursor["symbol"].as_text(),
+        quantity=quantity,
+        of=of,
+        value=cursor.optional("value", kind) if cursor.has("value") and cursor["value"].value is not None else None,
+        tolerance=cursor["tolerance"].as_number() if cursor.has("tolerance") else Published.tolerance,
+        relative_to=relative_to,
+        component=cursor.one_of("component", ("x", "y")),
+        sense=cursor.one_of("sense", SENSES),
+        case=cursor.text("case"),
+        note=cursor.text("note"),
+        slip=cursor.text("slip"),
+        inputs=_drives(cursor, "inputs", mechanism),
+        start=_drives(cursor, "from", mechanism),
+    )

@@ -1,0 +1,109 @@
+"""The only room that opens files: mechanism files, and the models that come along."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from planar.document import read, write
+from planar.errors import BadInput
+from planar.mechanism import Mechanism
+
+LARGEST = 8 * 1024 * 1024
+"""Bytes; a mechanism of ten thousand links takes about two million."""
+
+
+def loads(text: str | bytes, place: str = "$") -> Mechanism:
+    """The mechanism in a JSON text. Raises BadInput."""
+    return read(_parsed(text, place))
+
+
+def from_dict(value: Any) -> Mechanism:
+    """The mechanism in a JSON value (dicts, lists, texts, numbers). Raises BadInput."""
+    return read(value)
+
+
+def to_dict(mechanism: Mechanism) -> dict[str, Any]:
+    """The JSON value of a mechanism; `from_dict` gives the same mechanism back, to the last bit."""
+    return write(mechanism)
+
+
+def dumps(mechanism: Mechanism) -> str:
+    """The JSON text of a mechanism."""
+    return json.dumps(write(mechanism), indent=2, ensure_ascii=False) + "\n"
+
+
+def load(model: str | Path) -> Mechanism:
+    """The mechanism in a file, or the model of that name or id that comes along. Raises BadInput."""
+    return loads(_content(found(model)))
+
+
+def found(model: str | Path) -> Path:
+    """The file that a MODEL argument means: a path, else the name or id of a model that comes along."""
+    path = Path(model)
+    if path.is_file():
+        return path
+    if path.is_dir():
+        raise BadInput(str(model), "this is a folder; name a mechanism file in it")
+    known = {file.stem: file for file in model_files()}
+    if str(model) in known:
+        return known[str(model)]
+    for file in known.values():
+        if str(model) in _parsed(_content(file), str(file)).get("ids", ()):
+            return file
+    from difflib import get_close_matches
+
+    near = get_close_matches(str(model), known, 1, 0.5)
+    meant = f"; did you mean the model {near[0]!r}?" if near else "; `planar models` lists the models that come along"
+    raise BadInput(str(model), f"there is no such file, and no model of that name{meant}")
+
+
+def model_files() -> tuple[Path, ...]:
+    """The files of the models that come along, in the order of their names."""
+    package = Path(__file__).parent
+    folder = package / "models" if (package / "models").is_dir() else package.parent / "models"
+    return tuple(sorted(folder.rglob("*.json"), key=lambda file: file.stem))
+
+
+def models() -> Iterator[tuple[Path, Mechanism]]:
+    """Every model that comes along, read."""
+    for file in model_files():
+        yield file, load(file)
+
+
+def _content(path: Path) -> bytes:
+    try:
+        if path.stat().st_size > LARGEST:
+            raise BadInput(str(path), f"the file is larger than the {LARGEST // 2**20} MiB that a mechanism may take")
+        return path.read_bytes()
+    except OSError as problem:
+        raise BadInput(str(path), f"the file cannot be read: {problem.strerror}") from None
+
+
+def _parsed(text: str | bytes, place: str) -> Any:
+    def constant(word: str) -> Any:
+        raise BadInput(place, f"{word} is not a number that a mechanism can have")
+
+    def once(members: list[tuple[str, Any]]) -> dict[str, Any]:
+        value = dict(members)
+        if len(value) < len(members):
+            names = [name for name, _ in members]
+            twice = next(name for name in names if names.count(name) > 1)
+            raise BadInput(place, f"the key {twice!r} stands twice in one object, so one of the two would be lost")
+        return value
+
+    try:
+        if isinstance(text, bytes):
+            text = text.decode("utf-8-sig")
+        return json.loads(text, parse_constant=constant, object_pairs_hook=once)
+    except UnicodeDecodeError as problem:
+        raise BadInput(place, f"the file is not UTF-8 text (byte {problem.start})") from None
+    except json.JSONDecodeError as problem:
+        where = f"line {problem.lineno}, column {problem.colno}"
+        raise BadInput(place, f"this is not JSON: {problem.msg} at {where}") from None
+    except RecursionError:
+        raise BadInput(place, "the file is nested too deeply to be a mechanism") from None
+    except ValueError as problem:
+        raise BadInput(place, f"this is not JSON that can be read: {problem}") from None

@@ -1,0 +1,169 @@
+"""A mechanism as immutable data, in SI units: links, pairs, inputs, loads, sketch, and what was published."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from planar.pairs.base import Pair
+from planar.shapes import Along, At, Distances, Link, Place, Point
+
+__all__ = [
+    "Along",
+    "At",
+    "Distances",
+    "Drive",
+    "Input",
+    "Link",
+    "Load",
+    "Mechanism",
+    "NamedPoint",
+    "Place",
+    "Point",
+    "Published",
+    "Units",
+    "motions",
+    "named_points",
+    "with_inputs",
+]
+
+
+@dataclass(frozen=True)
+class Input:
+    """A relative motion that is given: at a turning pair an angle, at a sliding pair a distance (rad or m, per s)."""
+
+    pair: str
+    position: float
+    velocity: float = 0.0
+    acceleration: float = 0.0
+
+
+@dataclass(frozen=True)
+class Load:
+    """A force (N, in the frame's axes) at a point, or a torque (N m, anticlockwise) on a link."""
+
+    point: str | None = None
+    force: tuple[float, float] | None = None
+    link: str | None = None
+    torque: float | None = None
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What an input is changed to for one published quantity; None leaves it as it is."""
+
+    pair: str
+    position: float | None = None
+    velocity: float | None = None
+    acceleration: float | None = None
+
+
+@dataclass(frozen=True)
+class Published:
+    """A value that a book prints for a quantity of this mechanism (SI), or None where it prints none.
+
+    `tolerance` is the part of the exact value by which a drawing may be off; `slip` says why a printed value
+    is wrong; `inputs` are changed inputs, and `start` those of the position that a displacement is measured from.
+    """
+
+    symbol: str
+    quantity: str
+    of: str
+    value: float | None = None
+    tolerance: float = 0.02
+    relative_to: str | None = None
+    component: str | None = None
+    sense: str | None = None
+    case: str | None = None
+    note: str | None = None
+    slip: str | None = None
+    inputs: tuple[Drive, ...] = ()
+    start: tuple[Drive, ...] = ()
+
+
+@dataclass(frozen=True)
+class Units:
+    """The units in which a mechanism's file is written and its positions are printed."""
+
+    length: str = "m"
+    angle: str = "rad"
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """Links joined by pairs, one of them the frame.
+
+    `pairs` are binary: a pin of n links is n - 1 of them. `remarks` are what the reader of the file has to say.
+    """
+
+    name: str
+    frame: str
+    links: tuple[Link, ...]
+    pairs: tuple[Pair, ...]
+    inputs: tuple[Input, ...] = ()
+    loads: tuple[Load, ...] = ()
+    sketch: tuple[tuple[str, float, float], ...] = ()
+    units: Units = Units()
+    ids: tuple[str, ...] = ()
+    about: str | None = None
+    source: str | None = None
+    geometry: str | None = None
+    notes: tuple[str, ...] = ()
+    published: tuple[Published, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class NamedPoint:
+    """A point under the name that results give it, and the (link, point) that lie there."""
+
+    name: str
+    members: tuple[tuple[str, str], ...]
+
+
+def with_inputs(mechanism: Mechanism, drives: tuple[Drive, ...]) -> Mechanism:
+    """The same mechanism with some of its inputs changed."""
+    changes = {drive.pair: drive for drive in drives}
+
+    def changed(given: Input) -> Input:
+        drive = changes.get(given.pair)
+        if drive is None:
+            return given
+        told = {"position": drive.position, "velocity": drive.velocity, "acceleration": drive.acceleration}
+        return replace(given, **{key: value for key, value in told.items() if value is not None})
+
+    return replace(mechanism, inputs=tuple(changed(given) for given in mechanism.inputs))
+
+
+def entries(mechanism: Mechanism) -> tuple[tuple[Pair, ...], ...]:
+    """The pairs grouped as a file's entries have them: a pin of n links is one entry of n - 1 pairs."""
+    grouped: dict[str, list[Pair]] = {}
+    for pair in mechanism.pairs:
+        grouped.setdefault(pair.entry_name(), []).append(pair)
+    return tuple(tuple(group) for group in grouped.values())
+
+
+def motions(mechanism: Mechanism) -> Mapping[str, Pair]:
+    """Every relative motion that has a name: each pair, and at a pin of n links each two of them."""
+    return {pair.name: pair for group in entries(mechanism) for pair in type(group[0]).motions(group)}
+
+
+def named_points(mechanism: Mechanism) -> tuple[NamedPoint, ...]:
+    """Every point under its result name.
+
+    Points that a pair keeps together stand once under the pair's name; any other under its own name where that
+    is unique, else as `link.point`.
+    """
+    together: dict[tuple[str, str], str] = {}
+    for pair in mechanism.pairs:
+        for member in pair.coincident():
+            together[member] = pair.entry_name()
+    carried = dict.fromkeys((link.name, point) for link in mechanism.links for point in link.names)
+    names = set(together.values())
+    alone = Counter(point for link, point in carried if (link, point) not in together)
+    grouped: dict[str, list[tuple[str, str]]] = {}
+    for link, point in carried:
+        own = point if alone[point] == 1 and point not in names else f"{link}.{point}"
+        grouped.setdefault(together.get((link, point), own), []).append((link, point))
+    return tuple(NamedPoint(name, tuple(members)) for name, members in grouped.items())

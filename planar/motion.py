@@ -1,0 +1,221 @@
+"""Solved positions as arrays with names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from planar.algebra import Jet
+from planar.mechanism import Mechanism, NamedPoint, motions, named_points
+from planar.plane import Frame, Vector
+from planar.shapes import Shape
+from planar.words import heading, hurrying, turning
+
+Array = np.ndarray
+
+
+class Unknown(KeyError):
+    """A name that the mechanism does not have."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+@dataclass(frozen=True)
+class PointState:
+    """A point's position (m), velocity (m/s) and acceleration (m/s^2), each (2,), in the frame's axes."""
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+
+    @property
+    def sense(self) -> str:
+        """Which way it moves, and whether it speeds up, in words."""
+        return _sense(heading(self.velocity), float(self.velocity @ self.acceleration))
+
+
+@dataclass(frozen=True)
+class LinkState:
+    """A link's angle (rad), angular velocity (rad/s) and angular acceleration (rad/s^2), anticlockwise positive."""
+
+    angle: float
+    angular_velocity: float
+    angular_acceleration: float
+
+    @property
+    def sense(self) -> str:
+        """Which way it turns, and whether it speeds up, in words."""
+        return _sense(turning(self.angular_velocity), self.angular_velocity * self.angular_acceleration)
+
+
+@dataclass(frozen=True)
+class InputState:
+    """An input's position, velocity and acceleration: rad or m, and per second."""
+
+    position: float
+    velocity: float
+    acceleration: float
+
+
+@dataclass(frozen=True)
+class RelativeState:
+    """How one point moves against another, as seen from the axes of a link that carries the other (each (2,), SI).
+
+    velocity = rotation + sliding, acceleration = centripetal + tangential + coriolis + sliding_acceleration,
+    where for two points of one link both sliding parts and the Coriolis part vanish.
+    """
+
+    axes: str
+    position: Array
+    velocity: Array
+    rotation: Array
+    sliding: Array
+    acceleration: Array
+    centripetal: Array
+    tangential: Array
+    coriolis: Array
+    sliding_acceleration: Array
+
+
+def _sense(way: str, power: float) -> str:
+    return way if way == "at rest" else f"{way}, {hurrying(power)}"
+
+
+@dataclass(frozen=True)
+class State:
+    """One position of a mechanism, solved.
+
+    `mobility` is the true one, by rank; `residual` is what the worst constraint leaves open, in lengths of the
+    mechanism's size; `remarks` are what there is to say of how the position was found.
+    """
+
+    mechanism: Mechanism
+    mobility: int
+    residual: float
+    remarks: tuple[str, ...]
+    frames: Mapping[str, Frame]
+    "of every link, as jets: each entry with its first and second time derivative (m, rad, s)"
+    own: Mapping[str, tuple[Jet, ...]]
+    "every pair's own coordinates, as jets"
+    shapes: Mapping[str, Shape]
+
+    @property
+    def points(self) -> dict[str, PointState]:
+        """Every point under its result name."""
+        return {each.name: self._point(each) for each in named_points(self.mechanism)}
+
+    @property
+    def links(self) -> dict[str, LinkState]:
+        """Every link, the frame among them."""
+        return {link.name: self.link(link.name) for link in self.mechanism.links}
+
+    @property
+    def inputs(self) -> dict[str, InputState]:
+        return {given.pair: InputState(given.position, given.velocity, given.acceleration) for given in self.mechanism.inputs}
+
+    @property
+    def pairs(self) -> dict[str, dict[str, float | None]]:
+        """What every pair reports, by name; of a pin of n links, every two of them."""
+        return {name: self.pair(name) for name in motions(self.mechanism)}
+
+    def point(self, name: str) -> PointState:
+        """A point by its result name, or as `link.point`. Raises Unknown."""
+        return self._point(self._named(name))
+
+    def link(self, name: str) -> LinkState:
+        """A link by name; its angle between -pi and pi. Raises Unknown."""
+        if name not in self.frames:
+            raise Unknown(f"there is no link {name!r}; links are {', '.join(self.frames)}")
+        angle, velocity, acceleration = _parts(self.frames[name].angle)
+        return LinkState(float(np.arctan2(np.sin(angle), np.cos(angle))), velocity, acceleration)
+
+    def pair(self, name: str) -> dict[str, float | None]:
+        """What a pair reports of its relative motion (SI). Raises Unknown."""
+        return self._motion(name)[0].report(*self._motion(name)[1])
+
+    def _motion(self, name: str) -> tuple[Any, tuple[float, float, float]]:
+        known = motions(self.mechanism)
+        if name not in known:
+            raise Unknown(f"there is no pair {name!r}; pairs are {', '.join(known)}")
+        pair = known[name]
+        first, second = (self.frames[link] for link in pair.links)
+        numbers = pair.measure(*(self.shapes[link] for link in pair.links))
+        return pair, _parts(pair.drive(first, second, numbers, self.own.get(pair.name, ())))
+
+    def relative(self, point: str, other: str, axes: str | None = None) -> RelativeState:
+        """How `point` moves against `other`, in the axes of a link.
+
+        `axes` left out: the link that carries both points, else the link on whose line one of them slides while it
+        carries the other. Raises Unknown where there is no such link and none is named.
+        """
+        p, q = self._named(point), self._named(other)
+        axes = axes or self._between(p, q)
+        if axes not in self.frames:
+            raise Unknown(f"there is no link {axes!r}; links are {', '.join(self.frames)}")
+        frame = self.frames[axes]
+        at, base = self._carried(p), self._carried(q)
+        apart = at - base
+        r = np.array(_parts_of(apart))
+        _, omega, alpha = _parts(frame.angle)
+        _, v_local, a_local = np.array(_parts_of(frame.local(at) - frame.local(base)))
+        cos, sin = _parts(frame.cos)[0], _parts(frame.sin)[0]
+        world = np.array([[cos, -sin], [sin, cos]])
+        quarter = np.array([[0.0, -1.0], [1.0, 0.0]])
+        sliding, sliding_acceleration = world @ v_local, world @ a_local
+        return RelativeState(
+            axes=axes,
+            position=r[0],
+            velocity=r[1],
+            rotation=omega * quarter @ r[0],
+            sliding=sliding,
+            acceleration=r[2],
+            centripetal=-(omega**2) * r[0],
+            tangential=alpha * quarter @ r[0],
+            coriolis=2.0 * omega * quarter @ sliding,
+            sliding_acceleration=sliding_acceleration,
+        )
+
+    def _between(self, p: NamedPoint, q: NamedPoint) -> str:
+        carrying = [link for link, _ in p.members if any(link == other for other, _ in q.members)]
+        moving = [link for link in carrying if link != self.mechanism.frame]
+        if carrying:
+            return (moving or carrying)[0]
+        for pair in self.mechanism.pairs:
+            rides = pair.rides()
+            if rides is not None:
+                for rider, base in ((p, q), (q, p)):
+                    if rides[0] in rider.members and any(link == rides[1] for link, _ in base.members):
+                        return rides[1]
+        raise Unknown(
+            f"no link carries both {p.name!r} and {q.name!r}, and neither slides on a link that carries the other; "
+            f"name the link whose axes are meant"
+        )
+
+    def _named(self, name: str) -> NamedPoint:
+        for each in named_points(self.mechanism):
+            if each.name == name or any(f"{link}.{point}" == name for link, point in each.members):
+                return each
+        known = ", ".join(each.name for each in named_points(self.mechanism))
+        raise Unknown(f"there is no point {name!r}; points are {known}")
+
+    def _carried(self, named: NamedPoint) -> Vector:
+        link, point = named.members[0]
+        return self.frames[link].carry(self.shapes[link].at(point))
+
+    def _point(self, named: NamedPoint) -> PointState:
+        return PointState(*(np.array(part) for part in _parts_of(self._carried(named))))
+
+
+def _parts(value: Any) -> tuple[float, float, float]:
+    """Value, rate and second rate of a jet; a plain number is at rest."""
+    if isinstance(value, Jet):
+        return tuple(float(part) for part in value.parts)  # type: ignore[return-value]
+    return float(value), 0.0, 0.0
+
+
+def _parts_of(vector: Vector) -> list[tuple[float, float]]:
+    return list(zip(_parts(vector.x), _parts(vector.y), strict=True))

@@ -1,0 +1,17 @@
+"""The pair types, found by looking in this folder: a new type is a new file."""
+
+from functools import cache
+from importlib import import_module
+from pkgutil import iter_modules
+
+from planar.pairs.base import Entry, Kind, Pair, Quantity, Rewritten, Sample
+
+__all__ = ["Entry", "Kind", "Pair", "Quantity", "Rewritten", "Sample", "pair_types"]
+
+
+@cache
+def pair_types() -> dict[str, type[Pair]]:
+    """Every pair type by its keyword."""
+    modules = [import_module(f"{__name__}.{found.name}") for found in iter_modules(__path__) if found.name != "base"]
+    types = (value for module in modules for value in vars(module).values() if isinstance(value, type))
+    return {kind.keyword: kind for kind in types if issubclass(kind, Pair) and kind is not Pair}

@@ -1,0 +1,187 @@
+"""Equations as something that runs: casadi functions over the symbols z, u, p of the equations."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property, lru_cache
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from planar.equations import Equations, Stage, build
+from planar.mechanism import Input, Link, Mechanism, motions
+from planar.pairs import Kind
+from planar.shapes import Shape, shape
+
+Array = np.ndarray
+
+NEWTON_STEPS = 4
+"""Unrolled steps of a position within a run: from a start a degree or so away, four square the error away."""
+
+
+class Motion(NamedTuple):
+    """What `Program.kinematics` returns: F and w with their first and second time derivatives, and dF/dz, dF/du."""
+
+    F: Array
+    F1: Array
+    F2: Array
+    w: Array
+    w1: Array
+    w2: Array
+    slope: Array
+    "(rows, unknowns)"
+    drive_slope: Array
+    "(rows, inputs)"
+
+
+class Program:
+    """The casadi functions of one structure, each built when it is first asked for."""
+
+    def __init__(self, equations: Equations):
+        self.equations = equations
+
+    def closing(self, stage: Stage) -> ca.Function:
+        """(z, u, p) -> F of this stage (rows,) and its slope in the stage's own unknowns (rows, unknowns)."""
+        return self._closing[stage.level]
+
+    @cached_property
+    def _closing(self) -> dict[int, ca.Function]:
+        e = self.equations
+        slopes = ca.jacobian(e.F, e.z)
+        return {
+            stage.level: ca.Function(
+                "closing", [e.z, e.u, e.p], [e.F[stage.rows], ca.densify(slopes[stage.rows, stage.unknowns])]
+            )
+            for stage in e.stages
+        }
+
+    @cached_property
+    def positions(self) -> ca.Function:
+        """(z, u, p) -> w."""
+        e = self.equations
+        return ca.Function("positions", [e.z, e.u, e.p], [ca.densify(e.w)])
+
+    @cached_property
+    def _kinematics(self) -> ca.Function:
+        e = self.equations
+        y, both = ca.vertcat(e.z, e.u), ca.vertcat(e.F, e.w)
+        y1, y2 = ca.SX.sym("y1", y.numel()), ca.SX.sym("y2", y.numel())
+        # the chain rule twice: d/dt = (d/dy) y1, d2/dt2 = (d/dy)(d/dt) y1 + (d/dy) y2
+        first = ca.jtimes(both, y, y1)
+        second = ca.jtimes(first, y, y1) + ca.jtimes(both, y, y2)
+        slopes = ca.jacobian(e.F, y)
+        outputs = [both, first, second, slopes[:, : e.z.numel()], slopes[:, e.z.numel() :]]
+        return ca.Function("kinematics", [y, y1, y2, e.p], [ca.densify(output) for output in outputs])
+
+    def kinematics(self, y: Array, y1: Array, y2: Array, p: Array) -> Motion:
+        """Everything at one position: y = (z, u) with its first and second derivatives."""
+        both, first, second, slope, drive_slope = (each.full() for each in self._kinematics(y, y1, y2, p))
+        rows = self.equations.F.numel()
+        parts = (each.ravel() for each in (both, first, second))
+        F, w, F1, w1, F2, w2 = (half for part in parts for half in (part[:rows], part[rows:]))
+        return Motion(F, F1, F2, w, w1, w2, slope, drive_slope)
+
+    @cached_property
+    def advance(self) -> ca.Function:
+        """(z, u, p) -> z: Newton group after group, unrolled.
+
+        Only for structures whose every group has as many constraints as unknowns.
+        """
+        e = self.equations
+        z, u, p = (ca.SX.sym(name, each.numel()) for name, each in (("z", e.z), ("u", e.u), ("p", e.p)))
+        now = ca.vertsplit(z)
+        for stage in e.stages:
+            for _ in range(NEWTON_STEPS if length(stage.unknowns) else 0):
+                left, slope = self.closing(stage)(ca.vertcat(*now), u, p)
+                now[stage.unknowns] = ca.vertsplit(ca.vertcat(*now[stage.unknowns]) - _solved(slope, left))
+        return ca.Function("advance", [z, u, p], [ca.vertcat(*now)])
+
+    @property
+    def square(self) -> bool:
+        """Whether every group has as many constraints as unknowns."""
+        return all(length(stage.rows) == length(stage.unknowns) and not stage.free for stage in self.equations.stages)
+
+
+def length(part: slice) -> int:
+    """How many entries a part of z or F has."""
+    return part.stop - part.start
+
+
+def _solved(slope: ca.SX, left: ca.SX) -> ca.SX:
+    """slope^-1 left; two by two by the adjugate, larger by QR, neither of which needs a pivot to be chosen."""
+    if slope.numel() == 1:
+        return left / slope
+    if slope.numel() == 4:
+        a, b, c, d = slope[0, 0], slope[0, 1], slope[1, 0], slope[1, 1]
+        return ca.vertcat(d * left[0] - b * left[1], a * left[1] - c * left[0]) / (a * d - b * c)
+    q, r = ca.qr(slope)
+    return ca.solve(r, ca.mtimes(q.T, left))
+
+
+def program(mechanism: Mechanism) -> Program:
+    """The program of a mechanism's structure; mechanisms that differ in their links' dimensions share one."""
+    return _program(structure(mechanism))
+
+
+@lru_cache(maxsize=64)
+def _program(structure: Mechanism) -> Program:
+    return Program(build(structure))
+
+
+def structure(mechanism: Mechanism) -> Mechanism:
+    """All of a mechanism that its equations depend on: names of links, pairs, which motions are driven."""
+    return Mechanism(
+        name="",
+        frame=mechanism.frame,
+        links=tuple(Link(link.name) for link in mechanism.links),
+        pairs=mechanism.pairs,
+        inputs=tuple(Input(given.pair, 0.0) for given in mechanism.inputs),
+    )
+
+
+def shapes(mechanism: Mechanism) -> dict[str, Shape]:
+    """The shape of every link (m)."""
+    return {link.name: shape(link) for link in mechanism.links}
+
+
+def size(mechanism: Mechanism) -> float:
+    """The mechanism's size (m): the greatest distance between two points of one link, or of a slide's travel."""
+    spans = [extent(link) for link in mechanism.links]
+    named = motions(mechanism)
+    spans += [abs(g.position) for g in mechanism.inputs if named[g.pair].drive_kind is Kind.LENGTH]
+    return max(spans, default=0.0) or 1.0
+
+
+def extent(link: Link) -> float:
+    """The greatest distance between two points of a link (m)."""
+    points = list(shape(link).points.values())
+    spread = np.array(points, dtype=float)
+    return float(np.hypot(*(spread.max(axis=0) - spread.min(axis=0)))) if len(points) else 0.0
+
+
+def numbers(mechanism: Mechanism, unit: float) -> Array:
+    """p: the numbers of every pair, lengths divided by `unit`."""
+    placed = shapes(mechanism)
+    found: list[float] = []
+    for pair in mechanism.pairs:
+        measured = pair.measure(*(placed[link] for link in pair.links))
+        found += scaled(measured, pair.measures, unit)
+    return np.array(found, dtype=float)
+
+
+def positions(mechanism: Mechanism, unit: float) -> Array:
+    """u: the positions of the inputs, lengths divided by `unit`."""
+    return rates(mechanism, "position", unit)
+
+
+def rates(mechanism: Mechanism, order: str, unit: float) -> Array:
+    """Position, velocity or acceleration of the inputs, lengths divided by `unit`."""
+    named = motions(mechanism)
+    kinds = [named[given.pair].drive_kind for given in mechanism.inputs]
+    return np.array(scaled([getattr(given, order) for given in mechanism.inputs], kinds, unit), dtype=float)
+
+
+def scaled(values: Sequence[float], kinds: Sequence[Kind], unit: float) -> list[float]:
+    """Numbers with the lengths among them divided by `unit`."""
+    return [value / unit if kind is Kind.LENGTH else value for value, kind in zip(values, kinds, strict=True)]

@@ -1,0 +1,145 @@
+"""Quantities of files in SI, and SI numbers in the units of a file.
+
+The spellings that mechanism files use most stand in a table, so that reading them loads no library;
+every other unit is looked up in pint, and a test holds the table to pint's own answers.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import cache
+from math import pi
+
+SI = {
+    "length": "m",
+    "angle": "rad",
+    "angular velocity": "rad/s",
+    "angular acceleration": "rad/s^2",
+    "velocity": "m/s",
+    "acceleration": "m/s^2",
+    "force": "N",
+    "torque": "N m",
+}
+"""Every kind of quantity that a file holds, and its SI unit."""
+
+TABLE: dict[str, tuple[str, float, float]] = {
+    "m": ("length", 1.0, 1.0),
+    "mm": ("length", 1.0, 1e3),
+    "cm": ("length", 1.0, 1e2),
+    "km": ("length", 1e3, 1.0),
+    "um": ("length", 1.0, 1e6),
+    "in": ("length", 0.0254, 1.0),
+    "rad": ("angle", 1.0, 1.0),
+    "deg": ("angle", pi, 180.0),
+    "rad/s": ("angular velocity", 1.0, 1.0),
+    "deg/s": ("angular velocity", pi, 180.0),
+    "rpm": ("angular velocity", pi, 30.0),
+    "rad/s^2": ("angular acceleration", 1.0, 1.0),
+    "deg/s^2": ("angular acceleration", pi, 180.0),
+    "m/s": ("velocity", 1.0, 1.0),
+    "mm/s": ("velocity", 1.0, 1e3),
+    "m/s^2": ("acceleration", 1.0, 1.0),
+    "mm/s^2": ("acceleration", 1.0, 1e3),
+    "N": ("force", 1.0, 1.0),
+    "kN": ("force", 1e3, 1.0),
+    "N m": ("torque", 1.0, 1.0),
+}
+"""unit: (kind, numerator, denominator) of its size in SI."""
+
+_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.DOTALL)
+# a word, with one small exponent at most, joined by a space, a dot, * or /: nothing that could be an expression
+_UNIT = re.compile(r"[A-Za-zµμΩ]+(\^[+-]?\d)?((\s*/\s*|\s*\*\s*|\s*·\s*|\s+)[A-Za-zµμΩ]+(\^[+-]?\d)?){0,7}")
+_SPELLINGS = str.maketrans({"−": "-", "°": "deg", "²": "^2", "³": "^3", "µ": "u", "μ": "u", "⁻": "^-", "¹": "1"})
+
+
+class UnitError(ValueError):
+    """A text is no quantity, or one of another kind; its text says which and what would do."""
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit of one kind, `numerator / denominator` of the SI unit."""
+
+    kind: str
+    numerator: float
+    denominator: float
+
+    def to_si(self, value: float) -> float:
+        return value * self.numerator / self.denominator
+
+    def from_si(self, value: float) -> float:
+        return value * self.denominator / self.numerator
+
+
+def unit(text: str) -> Unit:
+    """The unit that a text names. Raises UnitError."""
+    spelled = re.sub(r"\s+", " ", text.strip().translate(_SPELLINGS).replace("^-^", "^-").replace("**", "^"))
+    spelled = re.sub(r"(?<=[A-Za-z])\^-(?=\^?\d)", "^-", spelled)
+    if spelled in TABLE:
+        return Unit(*TABLE[spelled])
+    if not _UNIT.fullmatch(spelled):
+        raise UnitError(f"{text!r} is not a unit")
+    return _looked_up(spelled)
+
+
+def quantity(text: str, kind: str) -> float:
+    """A text such as "10.5 rad/s" as an SI number of the kind asked for. Raises UnitError."""
+    match = _NUMBER.fullmatch(text)
+    if match is None:
+        raise UnitError(f"{text!r} is not a number with a unit, such as {example(kind)!r}")
+    number, written = match.groups()
+    if not written:
+        raise UnitError(f"{text!r} has no unit; write a number, or a text such as {example(kind)!r}")
+    found = unit(written)
+    if found.kind != kind:
+        raise UnitError(f"{text!r} is {_article(found.kind)}, but {_article(kind)} is wanted, such as {example(kind)!r}")
+    return found.to_si(float(number))
+
+
+def example(kind: str) -> str:
+    """A text that is a quantity of this kind."""
+    return {"angular velocity": "10.5 rad/s", "length": "50 mm", "angle": "60 deg"}.get(kind, f"2.5 {SI[kind]}")
+
+
+def shortest(value: float, written: Unit) -> float | str:
+    """The shortest number in `written` that reads back as exactly `value` (SI), or failing that an SI text."""
+    near = written.from_si(value)
+    for digits in range(1, 18):
+        candidate = float(f"{near:.{digits}g}")
+        if written.to_si(candidate) == value:
+            return int(candidate) if candidate.is_integer() and abs(candidate) < 1e15 else candidate
+    return f"{value!r} {SI[written.kind]}"
+
+
+def _article(kind: str) -> str:
+    return f"{'an' if kind[0] in 'aeiou' else 'a'} {kind}"
+
+
+@cache
+def _looked_up(spelled: str) -> Unit:
+    import pint  # slow to load, so only for a unit beyond the table
+
+    registry = _registry()
+    try:
+        one = registry.Quantity(1.0, spelled.replace("^", "**").replace("·", "*"))
+        kinds = {kind: registry.Quantity(1.0, si.replace("^", "**")) for kind, si in SI.items()}
+        if any(name in ("hertz", "counts_per_second") for name in one._units):
+            raise UnitError(f"{spelled!r} leaves open whether turns or radians are meant; write rad/s, deg/s or rpm")
+        # an angle is no dimension to pint, so what has one (or a turn) is told from what has none by its units
+        angular = any(registry.Quantity(1.0, name).check("[]") for name in one._units)
+        for kind, si in kinds.items():
+            if one.dimensionality == si.dimensionality and angular == ("rad" in SI[kind]):
+                return Unit(kind, float(one.to(si.units).magnitude), 1.0)
+    except (pint.PintError, AssertionError, ValueError, TypeError, AttributeError) as problem:
+        if isinstance(problem, UnitError):
+            raise
+        raise UnitError(f"{spelled!r} is not a known unit") from None
+    raise UnitError(f"{spelled!r} measures none of {', '.join(SI)}")
+
+
+@cache
+def _registry():  # noqa: ANN202 - pint's own type, which would load pint
+    import pint
+
+    return pint.UnitRegistry(cache_folder=None)

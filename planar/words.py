@@ -1,0 +1,50 @@
+"""Senses and amounts in words, as a textbook says them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import atan2, hypot, pi
+
+from planar.mechanism import Units
+from planar.units import unit
+
+STILL = 1e-9
+"""A rate below this part of the greatest of its kind is at rest."""
+
+
+def amount(value: float, kind: str, units: Units) -> str:
+    """A length or an angle in the units of a mechanism's file, with its unit."""
+    name = units.length if kind == "length" else units.angle
+    return f"{unit(name).from_si(value):.6g} {name}"
+
+
+def turning(rate: float, scale: float = 1.0) -> str:
+    """The sense of an angular rate."""
+    if abs(rate) <= STILL * scale:
+        return "at rest"
+    return "anticlockwise" if rate > 0.0 else "clockwise"
+
+
+def heading(vector: Sequence[float], scale: float = 1.0) -> str:
+    """The sense of a vector: one of four ways where it lies along an axis, else two of them together."""
+    x, y = float(vector[0]), float(vector[1])
+    if hypot(x, y) <= STILL * scale:
+        return "at rest"
+    sector = round(atan2(y, x) / (pi / 4)) % 8
+    across = "to the right" if x > 0 else "to the left"
+    along = "upwards" if y > 0 else "downwards"
+    if min(abs(x), abs(y)) <= 1e-6 * max(abs(x), abs(y)):
+        return (across, "", along, "", across, "", along, "")[sector]
+    return f"{along}, {across}" if abs(y) > abs(x) else f"{across}, {along}"
+
+
+def hurrying(power: float, scale: float = 1.0) -> str:
+    """Whether speed grows, from the product of velocity and acceleration."""
+    if abs(power) <= STILL * scale:
+        return "steady"
+    return "speeding up" if power > 0.0 else "slowing down"
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names in a sentence: a, b and c."""
+    return " and ".join(filter(None, (", ".join(names[:-1]), names[-1]))) if names else "none"
