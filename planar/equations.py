@@ -166,7 +166,7 @@ def _coordinates(mechanism: Mechanism) -> _Symbols:
 
 
 def _numbers(mechanism: Mechanism) -> tuple[ca.SX, dict[str, list[ca.SX]]]:
-    """A symbol for each number of each pair, in the order in which `program.numbers` fills them."""
+    """A symbol for each number of each pair, in the order in which `program.fitted` fills them."""
     numbers = {pair.name: [ca.SX.sym(pair.name) for _ in pair.measures] for pair in mechanism.pairs}
     return ca.vertcat(*(symbol for each in numbers.values() for symbol in each)), numbers
 

@@ -10,6 +10,7 @@ from planar.pairs.base import Pair
 from planar.shapes import Along, At, Distances, Link, Place, Point
 
 __all__ = [
+    "QUANTITIES",
     "Along",
     "At",
     "Distances",
@@ -27,6 +28,24 @@ __all__ = [
     "named_points",
     "with_inputs",
 ]
+
+
+QUANTITIES = {
+    "position": "length",
+    "velocity": "velocity",
+    "acceleration": "acceleration",
+    "centripetal acceleration": "acceleration",
+    "tangential acceleration": "acceleration",
+    "Coriolis acceleration": "acceleration",
+    "angular velocity": "angular velocity",
+    "angular acceleration": "angular acceleration",
+    "rubbing speed": "velocity",
+    "displacement": "length",
+    "sliding velocity": "velocity",
+    "sliding acceleration": "acceleration",
+    "input torque": "torque",
+}
+"""What a published value may be of, and what it is measured in."""
 
 
 @dataclass(frozen=True)

@@ -161,7 +161,7 @@ class State:
         apart = at - base
         r = np.array(_parts_of(apart))
         _, omega, alpha = _parts(frame.angle)
-        _, v_local, a_local = np.array(_parts_of(frame.local(at) - frame.local(base)))
+        _, v_local, a_local = np.array(_parts_of(self._local(p, axes) - self._local(q, axes)))
         cos, sin = _parts(frame.cos)[0], _parts(frame.sin)[0]
         world = np.array([[cos, -sin], [sin, cos]])
         quarter = np.array([[0.0, -1.0], [1.0, 0.0]])
@@ -178,6 +178,11 @@ class State:
             coriolis=2.0 * omega * quarter @ sliding,
             sliding_acceleration=sliding_acceleration,
         )
+
+    def _local(self, named: NamedPoint, link: str) -> Vector:
+        """Where a point lies in a link's axes; exactly at rest there if the link carries it."""
+        point = dict(named.members).get(link)
+        return self.frames[link].local(self._carried(named)) if point is None else self.shapes[link].at(point)
 
     def _between(self, p: NamedPoint, q: NamedPoint) -> str:
         carrying = [link for link, _ in p.members if any(link == other for other, _ in q.members)]

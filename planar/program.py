@@ -97,6 +97,31 @@ class Program:
                 now[stage.unknowns] = ca.vertsplit(ca.vertcat(*now[stage.unknowns]) - _solved(slope, left))
         return ca.Function("advance", [z, u, p], [ca.vertcat(*now)])
 
+    def runs(self, samples: int) -> ca.Function:
+        """(z, u of every sample, p of every sample) -> z of every sample, each from the one before."""
+        if samples not in self._runs:
+            self._runs[samples] = self.advance.mapaccum("runs", samples)
+        return self._runs[samples]
+
+    @cached_property
+    def _runs(self) -> dict[int, ca.Function]:
+        return {}
+
+    @cached_property
+    def _slopes(self) -> ca.Function:
+        e = self.equations
+        slopes = ca.jacobian(e.F, ca.vertcat(e.z, e.u))
+        return ca.Function("slopes", [e.z, e.u, e.p], [ca.densify(slopes)])
+
+    def slopes(self, z: Array, u: Array, p: Array) -> tuple[Array, Array]:
+        """dF/dz (samples, rows, unknowns) and dF/du (samples, rows, inputs) at z (samples, unknowns), u alike."""
+        samples, unknowns = z.shape
+        rows, inputs = self.equations.F.numel(), u.shape[1]
+        if rows == 0:
+            return np.zeros((samples, 0, unknowns)), np.zeros((samples, 0, inputs))
+        both = self._slopes(z.T, u.T, p).full().reshape(rows, samples, unknowns + inputs).transpose(1, 0, 2)
+        return both[:, :, :unknowns], both[:, :, unknowns:]
+
     @property
     def square(self) -> bool:
         """Whether every group has as many constraints as unknowns."""
@@ -146,11 +171,10 @@ def shapes(mechanism: Mechanism) -> dict[str, Shape]:
 
 
 def size(mechanism: Mechanism) -> float:
-    """The mechanism's size (m): the greatest distance between two points of one link, or of a slide's travel."""
-    spans = [extent(link) for link in mechanism.links]
+    """The mechanism's size (m): the greatest distance between two points of one link, else of a slide's travel."""
     named = motions(mechanism)
-    spans += [abs(g.position) for g in mechanism.inputs if named[g.pair].drive_kind is Kind.LENGTH]
-    return max(spans, default=0.0) or 1.0
+    slides = [abs(g.position) for g in mechanism.inputs if named[g.pair].drive_kind is Kind.LENGTH]
+    return max((extent(link) for link in mechanism.links), default=0.0) or max(slides, default=0.0) or 1.0
 
 
 def extent(link: Link) -> float:
@@ -160,7 +184,7 @@ def extent(link: Link) -> float:
     return float(np.hypot(*(spread.max(axis=0) - spread.min(axis=0)))) if len(points) else 0.0
 
 
-def numbers(mechanism: Mechanism, unit: float) -> Array:
+def fitted(mechanism: Mechanism, unit: float) -> Array:
     """p: the numbers of every pair, lengths divided by `unit`."""
     placed = shapes(mechanism)
     found: list[float] = []

@@ -1,6 +1,6 @@
 """Mechanism files: JSON value to Mechanism and back."""
 
-from planar.document.reader import read
+from planar.document.reader import read, read_drive
 from planar.document.writer import write
 
-__all__ = ["read", "write"]
+__all__ = ["read", "read_drive", "write"]

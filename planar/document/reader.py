@@ -8,6 +8,7 @@ from typing import Any
 
 from planar.document.cursor import Cursor, Whole, called, did_you_mean
 from planar.mechanism import (
+    QUANTITIES,
     Along,
     At,
     Distances,
@@ -46,22 +47,6 @@ KEYS = (
     "published",
 )
 GEOMETRY = ("given", "recovered", "fitted", "underdetermined")
-QUANTITIES = {
-    "position": "length",
-    "velocity": "velocity",
-    "acceleration": "acceleration",
-    "centripetal acceleration": "acceleration",
-    "tangential acceleration": "acceleration",
-    "Coriolis acceleration": "acceleration",
-    "angular velocity": "angular velocity",
-    "angular acceleration": "angular acceleration",
-    "rubbing speed": "velocity",
-    "displacement": "length",
-    "sliding velocity": "velocity",
-    "sliding acceleration": "acceleration",
-    "input torque": "torque",
-}
-"""What a published value may be of, and what it is measured in."""
 SENSES = ("clockwise", "anticlockwise", "to the left", "to the right", "upwards", "downwards")
 
 
@@ -337,6 +322,19 @@ def _sketch(top: Cursor, points: Mapping[str, str]) -> tuple[tuple[str, float, f
     return tuple(
         (_result_point(place, name, points), *place.as_vector("length")) for name, place in top["sketch"].members()
     )
+
+
+def read_drive(mechanism: Mechanism, pair: str, position: str) -> Drive:
+    """An input moved to a position written as text: a number in the file's units, or a quantity. Raises BadInput."""
+    known = {given.pair: motions(mechanism)[given.pair] for given in mechanism.inputs}
+    if pair not in known:
+        told = f"there is no input at {pair!r}; inputs are at {', '.join(known) or 'no pair'}"
+        raise Cursor(pair, pair).refuse(None, told)
+    try:
+        value: Any = float(position)
+    except ValueError:
+        value = position
+    return Drive(pair, Cursor(value, pair, Whole(mechanism.units)).as_quantity(_kinds(known[pair])[0]))
 
 
 def _drives(cursor: Cursor, key: str, mechanism: Mechanism) -> tuple[Drive, ...]:

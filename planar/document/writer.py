@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from planar.document.reader import FORMAT, QUANTITIES
-from planar.mechanism import Drive, Link, Mechanism, Published, entries, motions
+from planar.document.reader import FORMAT
+from planar.mechanism import QUANTITIES, Drive, Link, Mechanism, Published, entries, motions
 from planar.pairs import Kind, Quantity
 from planar.shapes import Along, At, Place
 from planar.units import SI, Unit, shortest, unit

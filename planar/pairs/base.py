@@ -43,6 +43,8 @@ class Pair(ABC):
     """Coordinates of its own that the residual needs beside the two frames."""
     measures: ClassVar[tuple[Kind, ...]]
     """What each number that `measure` takes from the two shapes is."""
+    reports: ClassVar[Mapping[str, str]]
+    """The names of its results, in order, and the kind of quantity that each is."""
     drive_kind: ClassVar[Kind]
     """Whether its input is an angle or a length."""
 

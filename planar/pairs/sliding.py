@@ -33,6 +33,11 @@ class Sliding(Pair):
     constrains: ClassVar[tuple[Kind, ...]] = (Kind.LENGTH, Kind.LENGTH, Kind.ANGLE)
     coordinates: ClassVar[tuple[tuple[str, Kind], ...]] = (("displacement", Kind.LENGTH),)
     measures: ClassVar[tuple[Kind, ...]] = (*(Kind.LENGTH,) * 4, *(Kind.PURE,) * 2, Kind.ANGLE)
+    reports: ClassVar[Mapping[str, str]] = {
+        "displacement": "length",
+        "velocity": "velocity",
+        "acceleration": "acceleration",
+    }
     drive_kind: ClassVar[Kind] = Kind.LENGTH
 
     def measure(self, first: Shape, second: Shape) -> Sequence[Scalar]:
@@ -57,7 +62,7 @@ class Sliding(Pair):
         return own[0]
 
     def report(self, position: float, rate: float, second: float) -> dict[str, float | None]:
-        return {"displacement": position, "velocity": rate, "acceleration": second}
+        return dict(zip(self.reports, (position, rate, second), strict=True))
 
     def rides(self) -> tuple[tuple[str, str], str] | None:
         return (self.links[1], self.point), self.links[0]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any, ClassVar, Self
@@ -24,6 +24,12 @@ class Turning(Pair):
     keyword: ClassVar[str] = "turning"
     constrains: ClassVar[tuple[Kind, ...]] = (Kind.LENGTH, Kind.LENGTH)
     measures: ClassVar[tuple[Kind, ...]] = (Kind.LENGTH,) * 4
+    reports: ClassVar[Mapping[str, str]] = {
+        "relative_angle": "angle",
+        "relative_angular_velocity": "angular velocity",
+        "relative_angular_acceleration": "angular acceleration",
+        "rubbing_speed": "velocity",
+    }
     drive_kind: ClassVar[Kind] = Kind.ANGLE
 
     def measure(self, first: Shape, second: Shape) -> Sequence[Scalar]:
@@ -40,12 +46,7 @@ class Turning(Pair):
 
     def report(self, position: float, rate: float, second: float) -> dict[str, float | None]:
         rubbing = None if self.radius is None else abs(rate) * self.radius
-        return {
-            "relative_angle": position,
-            "relative_angular_velocity": rate,
-            "relative_angular_acceleration": second,
-            "rubbing_speed": rubbing,
-        }
+        return dict(zip(self.reports, (position, rate, second, rubbing), strict=True))
 
     def coincident(self) -> tuple[tuple[str, str], ...]:
         return tuple(zip(self.links, self.points, strict=True))

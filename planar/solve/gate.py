@@ -7,6 +7,7 @@ parts, since the residual of a flipped linkage is zero too: is everything closed
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from planar.algebra import Jet
 from planar.mechanism import Mechanism, motions
 from planar.pairs import Kind, Pair
 from planar.plane import Frame
+from planar.program import Program
 from planar.shapes import Shape
 
 Array = np.ndarray
@@ -35,22 +37,22 @@ class Gate:
         )
         # an entry of a residual is a sum of a few terms as long as the mechanism reaches, after one step of rounding
         # for each link on the way round a loop
+        self.names = [pair.name for pair in mechanism.pairs for _ in pair.constrains]
+        self.names += [given.pair for given in mechanism.inputs]
+        """The pair of every constraint, the inputs' last."""
         self.tolerance = 16.0 * EPS * (4 + len(mechanism.links)) * max(1.0, reach / unit)
 
     def _measured(self) -> list[tuple[str, Pair]]:
         return [(pair.name, pair) for pair in self.mechanism.pairs]
 
-    def open(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[float]]) -> tuple[float, str]:
-        """How far the worst constraint is open (lengths of the size, or rad), and its pair.
+    def open(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Array]], u: Array | None = None) -> Array:
+        """How far every constraint is open (constraints, ...): lengths of the size, or rad; see `names`.
 
-        Frames with cos and sin made from their angles; a value that is not a number counts as infinitely open.
+        Frames with cos and sin made from their angles, floats or arrays alike. `u` (inputs, ...) are the positions
+        of the inputs, else the mechanism's own. What is not a number counts as infinitely open.
         """
-        worst, where = 0.0, ""
-        for name, kind, left, _ in self._rows(frames, own):
-            gap = _gap(left, kind, self.unit)
-            if not gap <= worst:
-                worst, where = (gap if gap == gap else float("inf")), name
-        return worst, where
+        gaps = [_gap(left, kind, self.unit) for kind, left in self._closures(frames, own, u)]
+        return np.nan_to_num(np.array(np.broadcast_arrays(*gaps) if gaps else [0.0]), nan=np.inf, posinf=np.inf)
 
     def open_rates(
         self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Jet]], order: int
@@ -58,11 +60,12 @@ class Gate:
         """How far velocities (order 1) or accelerations (2) break the worst constraint, as a part of the greatest."""
         greatest = max((self._rate(frame, order) for frame in frames.values() if not frame.fixed), default=0.0)
         greatest = max([greatest, *(abs(x.parts[order]) / self.unit for each in own.values() for x in each)])
+        rates = [(0.0, given.velocity, given.acceleration)[order] for given in self.mechanism.inputs]
+        wanted = [0.0] * (len(self.names) - len(rates)) + rates
         worst, where = 0.0, ""
-        for name, kind, left, given in self._rows(frames, own):
-            wanted = given[order] if given is not None else 0.0
-            rate = left.parts[order] if isinstance(left, Jet) else 0.0
-            gap = abs(rate - wanted) / (self.unit if kind is Kind.LENGTH else 1.0) / (greatest or 1.0)
+        for name, (kind, left), rate in zip(self.names, self._closures(frames, own), wanted, strict=True):
+            found = left.parts[order] if isinstance(left, Jet) else 0.0
+            gap = abs(found - rate) / (self.unit if kind is Kind.LENGTH else 1.0) / (greatest or 1.0)
             if not gap <= worst:
                 worst, where = (gap if gap == gap else float("inf")), name
         return worst, where
@@ -71,55 +74,102 @@ class Gate:
         angular = max(abs(frame.angle.parts[k]) ** (order / k) for k in range(1, order + 1))
         return max(angular, *(abs(value.parts[order]) / self.unit for value in (frame.x, frame.y)))
 
-    def _rows(self, frames, own):  # noqa: ANN001, ANN202 - floats or jets alike
-        """(pair, kind, what is left open, rates that are given) of every constraint and input."""
+    def _closures(self, frames, own, u=None):  # noqa: ANN001, ANN202 - floats, arrays or jets alike
+        """(kind, what is left open) of every constraint, then of every input."""
         for pair in self.mechanism.pairs:
             first, second = (frames[link] for link in pair.links)
             left = pair.residual(first, second, self.numbers[pair.name], own[pair.name])
-            for kind, value in zip(pair.constrains, left, strict=True):
-                yield pair.name, kind, value, None
-        for given in self.mechanism.inputs:
+            yield from zip(pair.constrains, left, strict=True)
+        for index, given in enumerate(self.mechanism.inputs):
             pair = self.motions[given.pair]
             first, second = (frames[link] for link in pair.links)
             drive = pair.drive(first, second, self.numbers[pair.name], own.get(pair.name, ()))
-            rates = (0.0, given.velocity, given.acceleration)
-            yield pair.name, pair.drive_kind, drive - given.position, rates
+            yield pair.drive_kind, drive - (given.position if u is None else u[index])
 
 
 def _lengths(pair: Pair, numbers: Sequence[float]) -> list[float]:
     return [value for value, kind in zip(numbers, pair.measures, strict=True) if kind is Kind.LENGTH]
 
 
-def _gap(left: float, kind: Kind, unit: float) -> float:
+def _gap(left: Array, kind: Kind, unit: float) -> Array:
     if kind is Kind.LENGTH:
-        return abs(left) / unit
+        return np.abs(left) / unit
     if kind is Kind.ANGLE:
-        return abs(float(np.arctan2(np.sin(left), np.cos(left))))
-    return abs(left)
+        return np.abs(np.arctan2(np.sin(left), np.cos(left)))
+    return np.abs(left)
 
 
-def same_branch(
-    slopes: Sequence[tuple[Array, Array]], before: tuple[Array, Array], after: tuple[Array, Array], step: float
-) -> bool:
-    """Whether two positions of a run can lie on one branch.
+@dataclass(frozen=True)
+class Place:
+    """A position of a run: unknowns, their first and second rates along it, and the sign of each group's slope."""
 
-    `slopes`: each group's square slope at both; no determinant may have changed its sign. `before`, `after`: the
-    unknowns with their rates against the run's parameter, `step` apart: the move must be what the rates allow.
+    z: Array
+    rates: Array
+    second: Array
+    signs: Array
+
+
+class Branch:
+    """The second part of the gate: can two positions of a run lie on one branch?
+
+    They can if no group's determinant has changed its sign, and if every unknown has moved as its rates allow.
     """
-    for first, second in slopes:
-        if first.shape[0] == first.shape[1] and first.size:
-            if np.linalg.slogdet(first)[0] != np.linalg.slogdet(second)[0]:
-                return False
-    return bool(np.all(allowed(before, after, step)))
+
+    def __init__(self, program: Program, p: Array):
+        self.program, self.p = program, p
+
+    def at(self, z: Array, u: Array, way: Array) -> Place:
+        """The position at unknowns z and inputs u, with rates against the parameter whose unit is `way` of u."""
+        y, still = np.concatenate([z, u]), np.zeros_like(z)
+        none = np.zeros_like(way)
+        rest = self.program.kinematics(y, np.concatenate([still, way]), np.concatenate([still, none]), self.p)
+        rates = _cancelling(rest.slope, rest.F1[:, None])[:, 0]
+        moving = self.program.kinematics(y, np.concatenate([rates, way]), np.concatenate([still, none]), self.p)
+        return Place(z, rates, _cancelling(rest.slope, moving.F2[:, None])[:, 0], self._signs(rest.slope))
+
+    def same(self, before: Place, after: Place, step: float) -> bool:
+        """Whether two positions, a step of the parameter apart, can lie on one branch."""
+        if np.any(before.signs * after.signs < 0.0):
+            return False
+        return bool(np.all(allowed(after.z - before.z, before.rates * step, after.rates * step)))
+
+    def along(self, z: Array, u: Array) -> Array:
+        """For each step of a run, z (samples, unknowns) and u (samples, inputs), whether it keeps to the branch."""
+        slopes, drives = self.program.slopes(z, u, self.p)
+        signs = self._signs(slopes)
+        gains = _cancelling(slopes, drives)
+        way = np.diff(u, axis=0)[:, :, None]
+        before, after = (gains[:-1] @ way)[..., 0], (gains[1:] @ way)[..., 0]
+        smooth = np.all(allowed(np.diff(z, axis=0), before, after), axis=1)
+        return smooth & np.all(signs[:-1] * signs[1:] >= 0.0, axis=1)
+
+    def _signs(self, slopes: Array) -> Array:
+        """The sign of every square group's determinant (..., groups), of slopes (..., rows, unknowns)."""
+        groups = [slopes[..., stage.rows, stage.unknowns] for stage in self.program.equations.stages]
+        signs = [np.linalg.slogdet(group)[0] for group in groups if group.shape[-1] == group.shape[-2] and group.size]
+        return np.stack(signs, axis=-1) if signs else np.zeros((*slopes.shape[:-2], 0))
 
 
-def allowed(before: tuple[Array, Array], after: tuple[Array, Array], step: float) -> Array:
-    """For each unknown whether its move lies within what the rates at both ends allow.
+def _cancelling(slopes: Array, known: Array) -> Array:
+    """The rates of the unknowns that cancel what known rates open; slopes (..., rows, unknowns), known (..., rows, k).
 
-    A smooth move differs from the mean rate times the step by no more than the rates themselves differ, with
-    room for the curvature between (a quarter of the greater move, and a floor for unknowns that hardly move).
+    Where a square slope is singular, NaN: no rate is allowed there.
     """
-    move = after[0] - before[0]
-    mean = 0.5 * (before[1] + after[1]) * step
-    room = np.abs(after[1] - before[1]) * abs(step) + 0.25 * np.maximum(np.abs(before[1]), np.abs(after[1])) * abs(step)
-    return np.abs(move - mean) <= room + 1e-9
+    if slopes.shape[-1] != slopes.shape[-2]:
+        return -np.linalg.pinv(slopes, rcond=1e-12) @ known
+    try:
+        return -np.linalg.solve(slopes, known)
+    except np.linalg.LinAlgError:
+        if slopes.ndim > 2:
+            return np.stack([_cancelling(slope, each) for slope, each in zip(slopes, known, strict=True)])
+        return np.full((slopes.shape[-1], known.shape[-1]), np.nan)
+
+
+def allowed(move: Array, before: Array, after: Array) -> Array:
+    """Whether a move is one that the rates at its two ends allow, each as a move over the whole step.
+
+    A smooth move differs from the mean of the two by no more than they differ from one another, with room for the
+    curvature between (a quarter of the greater) and a floor of round-off for what hardly moves.
+    """
+    room = np.abs(after - before) + 0.25 * np.maximum(np.abs(before), np.abs(after)) + 1e-9
+    return np.abs(move - 0.5 * (before + after)) <= room

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,12 +11,13 @@ from planar.algebra import Jet
 from planar.equations import Stage
 from planar.errors import NoAnswer, Outcome
 from planar.graph import detached
-from planar.mechanism import Mechanism
+from planar.mechanism import Drive, Input, Mechanism, motions, with_inputs
 from planar.motion import State
 from planar.pairs import Kind
 from planar.plane import GROUND, frame_at
-from planar.program import Motion, Program, extent, length, numbers, positions, program, rates, shapes, size
-from planar.solve.assemble import Assembler, Failure, placed
+from planar.program import Motion, Program, extent, fitted, length, positions, program, rates, shapes, size
+from planar.solve.assemble import Assembler, Assembly, Failure, placed
+from planar.solve.follow import follow
 from planar.solve.gate import Gate
 from planar.words import amount, listed
 
@@ -29,13 +31,22 @@ part in 1e16 becomes one in 1e16 / slope^2 in the velocity: at 1e-5 six digits r
 """
 
 
-def solve(mechanism: Mechanism) -> State:
+def solve(mechanism: Mechanism, drives: Sequence[Drive] = ()) -> State:
     """The position at the mechanism's inputs, of the assembly nearest to its sketch, with its rates.
+
+    `drives` change inputs: the position then is the one to which the assembly of the file's own inputs leads when
+    they are moved there together.
 
     Raises NoAnswer, whose outcome says whether the mechanism cannot be assembled, stands on a dead point or a change
     point, or has too few or too many inputs; its text names links, pairs, position and remedy.
     """
-    return Solver(mechanism).solve()
+    here = Solver(mechanism)
+    found = here.assembly()
+    if not drives:
+        return here.state(found.z, found.remarks)
+    there = Solver(with_inputs(mechanism, tuple(drives)))
+    z = follow(there, there.station.p, found.z, here.station.u, there.station.u)
+    return there.state(z, found.remarks)
 
 
 @dataclass(frozen=True)
@@ -60,21 +71,32 @@ class Solver:
         self.gate = Gate(mechanism, self.shapes, self.unit)
         self.column = {(c.owner, c.part): index for index, c in enumerate(self.equations.coordinates)}
         self.pairs = {pair.name: pair for pair in mechanism.pairs}
+        self.named = motions(mechanism)
+        self.scale = np.array([self.unit if c.kind is Kind.LENGTH else 1.0 for c in self.equations.coordinates])
         self.reach = {link.name: extent(link) / self.unit for link in mechanism.links}
         self.station = Station(
             positions(mechanism, self.unit),
             rates(mechanism, "velocity", self.unit),
             rates(mechanism, "acceleration", self.unit),
-            numbers(mechanism, self.unit),
+            fitted(mechanism, self.unit),
         )
 
-    def solve(self) -> State:
-        """See the function of this name."""
+    def assembly(self) -> Assembly:
+        """The assembly nearest to the sketch. Raises NoAnswer."""
         self._refuse_freedom()
         found = Assembler(self.mechanism, self.program, self.station.u, self.station.p, self.unit).search()
         if isinstance(found, Failure):
             raise self._not_assembled(found)
-        return self.state(found.z, (*self.mechanism.remarks, *found.remarks))
+        return Assembly(found.z, (*self.mechanism.remarks, *found.remarks))
+
+    def at(self, state: State) -> State:
+        """The state in the same position as another's, with this mechanism's own rates."""
+        parts = {(link, part): getattr(frame, part) for link, frame in state.frames.items() for part in ("x", "y", "angle")}
+        for name, own in state.own.items():
+            parts |= {(name, part): jet for (part, _), jet in zip(self.pairs[name].coordinates, own, strict=True)}
+        coordinates = [self.equations.coordinates[column] for column in self.equations.unknowns]
+        w = [(parts[c.owner, c.part].parts[0], self.unit if c.kind is Kind.LENGTH else 1.0) for c in coordinates]
+        return self.state(np.array([value / by for value, by in w]), state.remarks)
 
     def state(self, z: Array, remarks: tuple[str, ...] = ()) -> State:
         """The state at given unknowns, once they and their rates have passed the gate."""
@@ -94,16 +116,36 @@ class Solver:
     # positions
 
     def _gated(self, z: Array) -> None:
-        w = self.program.positions(z, self.station.u, self.station.p).full().ravel()
-        scale = np.array([self.unit if c.kind is Kind.LENGTH else 1.0 for c in self.equations.coordinates])
-        frames, own = placed(w * scale, self.column, self.shapes, self.pairs)
-        gap, pair = self.gate.open(frames, own)
+        gaps = self._open(z[None], self.station.u[None])[:, 0]
+        worst = int(np.argmax(gaps))
+        gap, pair = float(gaps[worst]), self.gate.names[worst] if self.gate.names else ""
         if gap > self.gate.tolerance:
             raise NoAnswer(
                 Outcome.CANNOT_BE_ASSEMBLED,
                 f"{self._at()}, the nearest position leaves pair {pair!r} open by {gap:.2g} of the mechanism's size "
                 f"where rounding explains {self.gate.tolerance:.2g}; change a length or the input a little",
             )
+
+    def _open(self, z: Array, u: Array) -> Array:
+        """What every constraint leaves open (constraints, samples); z (samples, unknowns), u (samples, inputs)."""
+        w = self.program.positions(z.T, u.T, self.station.p).full()
+        lengths = [given for given in self.mechanism.inputs if self._slides(given)]
+        scale = np.array([self.unit if given in lengths else 1.0 for given in self.mechanism.inputs])
+        with np.errstate(invalid="ignore"):  # what is not a number counts as open, and is refused as such
+            frames, own = placed(w * self.scale[:, None], self.column, self.shapes, self.pairs)
+            return self.gate.open(frames, own, u.T * scale[:, None])
+
+    def _slides(self, given: Input) -> bool:
+        return self.named[given.pair].drive_kind is Kind.LENGTH
+
+    def open_along(self, z: Array, u: Array) -> Array:
+        """What the worst constraint leaves open at every sample (samples,)."""
+        return self._open(z, u).max(axis=0)
+
+    @property
+    def tolerance(self) -> float:
+        """What the gate lets pass: round-off of the residual, in lengths of the size."""
+        return self.gate.tolerance
 
     def _refuse_freedom(self) -> None:
         loose = detached(self.mechanism)
@@ -150,8 +192,6 @@ class Solver:
         )
 
     def _redundant_without_inputs(self) -> bool:
-        from dataclasses import replace
-
         bare = program(replace(self.mechanism, inputs=())).equations
         return any(length(stage.rows) > length(stage.unknowns) for stage in bare.stages)
 
@@ -168,10 +208,9 @@ class Solver:
         square = all(length(stage.rows) == length(stage.unknowns) for stage in stages)
         if not weak and square:
             return inputs
-        scaled, driven = self._scaled(motion)
-        rank = _rank(np.hstack([scaled, driven]))
+        rank = _rank(np.hstack([motion.slope, motion.drive_slope]))
         mobility = z.size + inputs - rank
-        if _rank(scaled) == z.size and not weak:
+        if _rank(motion.slope) == z.size and not weak:
             if mobility < inputs and not self._agree(motion):
                 names = listed([repr(given.pair) for given in self.mechanism.inputs])
                 raise NoAnswer(
@@ -179,11 +218,11 @@ class Solver:
                     f"the mobility is {mobility}, and the velocities of the inputs at {names} do not agree; leave one out",
                 )
             return mobility
-        raise self._singular(scaled, mobility, weak)
+        raise self._singular(motion.slope, mobility, weak)
 
-    def _singular(self, scaled: Array, mobility: int, weak: list[Stage]) -> NoAnswer:
+    def _singular(self, slope: Array, mobility: int, weak: list[Stage]) -> NoAnswer:
         inputs = self.station.u.size
-        moving = self._moving_at_rest(scaled)
+        moving = self._moving_at_rest(slope)
         names = listed([repr(given.pair) for given in self.mechanism.inputs]) or "none"
         links = _links(moving or [link for stage in weak for link in stage.links])
         if mobility <= inputs:
@@ -193,15 +232,31 @@ class Solver:
                 f"{self._at()} the input at {names} cannot move {links}, whose velocity is not determined; "
                 f"move the input away from here, or drive {' or '.join(map(repr, others[:4])) or 'another pair'}",
             )
+        freedoms = f"{mobility} freedom{'s' * (mobility != 1)} for {inputs} input{'s' * (inputs != 1)}"
+        if self._always_weak():
+            return NoAnswer(
+                Outcome.TOO_FEW_INPUTS,
+                f"the mechanism has {freedoms}: {links} can still move, while other links hold each other more than "
+                f"once; give an input at a pair of {links}",
+            )
         return NoAnswer(
             Outcome.CHANGE_POINT,
-            f"{self._at()} the mechanism has {mobility} freedoms for {inputs} input{'s' * (inputs != 1)}: {links} may "
-            f"move in more than one way from here; move the input, or give a further input",
+            f"{self._at()} the mechanism has {freedoms}: {links} may move in more than one way from here; "
+            f"move the input, or give a further input",
         )
 
-    def _moving_at_rest(self, scaled: Array) -> list[str]:
+    def _always_weak(self) -> bool:
+        """Whether the constraints leave freedom wherever the links may stand, so that it is no matter of position."""
+        for seed in range(3):
+            y = np.random.default_rng(seed).uniform(-np.pi, np.pi, self.equations.z.numel() + self.station.u.size)
+            anywhere = self.program.kinematics(y, 0.0 * y, 0.0 * y, self.station.p)
+            if _rank(anywhere.slope) == self.equations.z.numel():
+                return False
+        return True
+
+    def _moving_at_rest(self, slope: Array) -> list[str]:
         """The links that can move while the inputs are held, from the slope's null vectors."""
-        _, s, vt = np.linalg.svd(scaled)
+        _, s, vt = np.linalg.svd(slope)
         null = vt[int(np.sum(s > SINGULAR * max(1.0, s[0] if s.size else 1.0))) :] if s.size else vt
         if null.size == 0:
             null = vt[-1:]
@@ -211,8 +266,8 @@ class Solver:
             for column, size_of in zip(self.equations.unknowns, strength, strict=True)
             if size_of > 1e-3 * (strength.max() or 1.0)
         ]
-        joined = [link for name in found for link in (self.pairs[name].links[1:] if name in self.pairs else (name,))]
-        return list(dict.fromkeys(joined))
+        joined = [link for name in found for link in (self.pairs[name].links if name in self.pairs else (name,))]
+        return [link for link in dict.fromkeys(joined) if link != self.mechanism.frame]
 
     def _weakness(self, stage: Stage, slope: Array) -> float:
         """The least singular value of a group's slope, each column by what its links could reach at best."""
@@ -231,10 +286,6 @@ class Solver:
         s = np.linalg.svd(own, compute_uv=False)
         return float(s[-1] / max(1.0, s[0])) if len(s) == length(stage.unknowns) else 0.0
 
-    def _scaled(self, motion: Motion) -> tuple[Array, Array]:
-        rows = np.array([1.0 for _ in self.equations.rows])[:, None]
-        return motion.slope * rows, motion.drive_slope * rows
-
     def _agree(self, motion: Motion) -> bool:
         z1 = self._rate(motion.slope, motion.F1)
         left = motion.slope @ z1 + motion.F1
@@ -248,11 +299,8 @@ class Solver:
         return np.linalg.lstsq(slope, -known, rcond=1e-12)[0]
 
     def _stated(self, motion: Motion, mobility: int, remarks: tuple[str, ...]) -> State:
-        scale = [self.unit if c.kind is Kind.LENGTH else 1.0 for c in self.equations.coordinates]
-        jets = [
-            Jet(*(float(part) * by for part in parts))
-            for by, *parts in zip(scale, motion.w, motion.w1, motion.w2, strict=True)
-        ]
+        parts = np.stack([motion.w, motion.w1, motion.w2], axis=1) * self.scale[:, None]
+        jets = [Jet(*each) for each in parts.tolist()]
         frames = {
             link: frame_at(*(jets[self.column[link, part]] for part in ("x", "y", "angle")))
             if (link, "x") in self.column
@@ -272,18 +320,19 @@ class Solver:
             for link, frame in frames.items()
         }
         values = {name: tuple(float(each.parts[0]) for each in each_own) for name, each_own in own.items()}
-        return State(self.mechanism, mobility, self.gate.open(still, values)[0], remarks, frames, own, self.shapes)
+        return State(self.mechanism, mobility, float(self.gate.open(still, values).max()), remarks, frames, own, self.shapes)
 
     def _at(self) -> str:
-        """The position in words: at A = 60 deg."""
-        from planar.mechanism import motions
+        """The position in words."""
+        return f"at {self.where(self.station.u)}" if self.mechanism.inputs else "as drawn"
 
-        named = motions(self.mechanism)
-        told = [
-            f"{given.pair} = {amount(given.position, 'length' if named[given.pair].drive_kind is Kind.LENGTH else 'angle', self.mechanism.units)}"
-            for given in self.mechanism.inputs
-        ]
-        return f"at {listed(told)}" if told else "as drawn"
+    def where(self, u: Array) -> str:
+        """A position of the inputs in words: A = 60 deg."""
+        told = []
+        for given, position in zip(self.mechanism.inputs, u, strict=True):
+            kind, by = ("length", self.unit) if self._slides(given) else ("angle", 1.0)
+            told.append(f"{given.pair} = {amount(position * by, kind, self.mechanism.units)}")
+        return listed(told)
 
 
 def _links(names: list[str] | tuple[str, ...]) -> str:

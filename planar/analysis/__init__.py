@@ -1,0 +1,1 @@
+"""Questions about solved positions, one file each."""

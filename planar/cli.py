@@ -1,0 +1,143 @@
+"""The command line: words to calls."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from planar.errors import BadInput, NoAnswer
+
+if TYPE_CHECKING:
+    from planar.mechanism import Drive, Mechanism
+
+DONE, NO_ANSWER, BAD_INPUT = 0, 1, 2
+"""Exit statuses."""
+
+
+class Commands(click.Group):
+    """Every command ends with the same sentences and exit statuses."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except BadInput as problem:
+            _refuse(str(problem), "bad input", problem.sentence, BAD_INPUT)
+        except NoAnswer as problem:
+            _refuse(str(problem), problem.outcome.value, problem.reason, NO_ANSWER)
+
+
+def _refuse(sentence: str, outcome: str, reason: str, status: int) -> None:
+    if "--json" in sys.argv:
+        click.echo(json.dumps({"outcome": outcome, "reason": reason}, ensure_ascii=False))
+    click.echo(f"planar: {sentence}", err=True)
+    sys.exit(status)
+
+
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="planar", message="planar %(version)s")
+def main() -> None:
+    """How any planar linkage moves.
+
+    MODEL is a mechanism file (JSON), or the name of a model that comes along.
+    """
+
+
+as_json = click.option("--json", "as_json", is_flag=True, help="Print machine-readable SI values.")
+
+
+@main.command()
+@click.argument("model")
+@as_json
+@click.option(
+    "--at", "at", multiple=True, metavar="PAIR=POSITION",
+    help="Move an input there first, along its branch: A=75deg, stroke=20mm, or a number in the file's units.",
+)
+@click.option("-o", "output", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
+              help="Write the tables to a .txt, .svg or .html file.")
+def solve(model: str, as_json: bool, at: tuple[str, ...], output: Path | None) -> None:
+    """This position: mobility, all positions, velocities, accelerations, rubbing speeds."""
+    from planar.analysis.published import compare
+    from planar.files import load
+    from planar.solve import solve as solved
+
+    mechanism = load(model)
+    drives = _drives(mechanism, at)
+    state = solved(mechanism, drives)
+    comparisons = compare(state) if not drives else ()
+    if as_json:
+        from planar.views.record import record
+
+        click.echo(json.dumps(record(state, comparisons), ensure_ascii=False, indent=1, allow_nan=False))
+        return
+    from planar.views.table import solution
+
+    _show(solution(state, comparisons), output)
+
+
+@main.command()
+@as_json
+def models(as_json: bool) -> None:
+    """The models that come along."""
+    from planar.files import models as known
+
+    rows = [(file.stem, [name for name in m.ids if name != file.stem], m.about or m.name) for file, m in known()]
+    if as_json:
+        click.echo(json.dumps([{"model": n, "ids": ids, "about": about} for n, ids, about in rows], ensure_ascii=False))
+        return
+    from planar.views.table import models as table
+
+    _show(table((name, ", ".join(ids), about) for name, ids, about in rows), None)
+
+
+@main.command()
+@click.argument("model", required=False)
+@as_json
+def bench(model: str | None, as_json: bool) -> None:
+    """Solver speed on this machine: assembly, one warm position, a position of a 360-step run."""
+    from planar.analysis.speed import measure
+    from planar.files import load
+
+    speeds = [measure(load(name)) for name in ([model] if model else ["four-bar", "slider-crank", "double-butterfly"])]
+    if as_json:
+        click.echo(json.dumps([speed.record() for speed in speeds], ensure_ascii=False))
+        return
+    from planar.views.table import speeds as table
+
+    _show(table(speeds), None)
+
+
+def _drives(mechanism: Mechanism, told: tuple[str, ...]) -> tuple[Drive, ...]:
+    """The inputs that `--at` moves."""
+    if not told:
+        return ()
+    from planar.document import read_drive
+
+    drives = []
+    for text in told:
+        pair, equals, position = text.partition("=")
+        if not equals:
+            raise BadInput("--at", f"{text!r} is not of the form PAIR=POSITION, such as A=75deg")
+        drives.append(read_drive(mechanism, pair.strip(), position.strip()))
+    return tuple(drives)
+
+
+def _show(renderable: Any, output: Path | None) -> None:
+    """Print a table, or write it to a file in the format that its name says."""
+    from rich.console import Console
+
+    if output is None:
+        console = Console()
+        # what is not a terminal has no width: lines are not to be broken for a file or another program
+        (console if console.is_terminal else Console(width=140, soft_wrap=False)).print(renderable)
+        return
+    from planar.views.saved import save
+
+    save(renderable, output)
+
+
+if __name__ == "__main__":
+    main()

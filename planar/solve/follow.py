@@ -1,0 +1,132 @@
+"""From one position to others along the branch on which it lies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from planar.errors import NoAnswer, Outcome
+from planar.program import Program, length
+from planar.solve.gate import Branch
+
+Array = np.ndarray
+
+STRIDE = 0.1
+"""Greatest first step of an input: rad, or lengths of the mechanism's size."""
+SHORTEST = 1e-7
+"""A step below this part of the way says that the branch ends."""
+CORRECTIONS = 8
+
+
+class Followed(Protocol):
+    """What following needs of a solver."""
+
+    program: Program
+
+    def open_along(self, z: Array, u: Array) -> Array:
+        """What the worst constraint leaves open at every sample; z (samples, unknowns), u (samples, inputs)."""
+
+    @property
+    def tolerance(self) -> float:
+        """What the gate lets pass."""
+
+    def where(self, u: Array) -> str:
+        """A position of the inputs in words."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """Unknowns at every sample (samples, unknowns), and how many samples the general path had to solve."""
+
+    z: Array
+    general: int
+
+
+def follow(solver: Followed, p: Array, z: Array, start: Array, stop: Array) -> Array:
+    """The unknowns at inputs `stop`, followed from those at `start` along the straight line between them.
+
+    A predictor of second order, Newton's corrector, and both parts of the gate at every step; steps shrink where
+    either objects. Raises NoAnswer where the branch ends on the way.
+    """
+    way = stop - start
+    branch = Branch(solver.program, p)
+    t, step = 0.0, min(1.0, STRIDE / (np.max(np.abs(way), initial=0.0) or 1.0))
+    here = branch.at(z, start, way)
+    while t < 1.0:
+        step = min(step, 1.0 - t)
+        inputs = stop if t + step >= 1.0 else start + (t + step) * way
+        tried = _corrected(solver.program, p, z + step * here.rates + 0.5 * step**2 * here.second, inputs)
+        there = branch.at(tried, inputs, way) if tried is not None else None
+        if there is not None and branch.same(here, there, step) and solver.open_along(tried[None], inputs[None])[0] <= solver.tolerance:
+            z, here, t, step = tried, there, t + step, 1.5 * step
+            continue
+        step *= 0.5
+        if step < SHORTEST:
+            raise NoAnswer(
+                Outcome.BRANCH_LOST,
+                f"this assembly can be followed only to {solver.where(start + t * way)} on the way from "
+                f"{solver.where(start)} to {solver.where(stop)}; a limit of its motion is there",
+            )
+    return z
+
+
+def run(solver: Followed, p: Array, z: Array, u: Array) -> Run:
+    """The unknowns at every sample of a run of inputs u (samples, inputs), from those of the first.
+
+    The whole run is one call of the compiled program; every sample then passes both parts of the gate, and from
+    one that does not the general path goes on to the next.
+    """
+    samples = len(u)
+    found = np.empty((samples, z.size))
+    found[0] = z
+    done, general = 1, 0
+    while done < samples:
+        if solver.program.square:
+            rest = u[done:]
+            found[done:] = _accumulated(solver.program, p, found[done - 1], rest)
+            done += _passing(solver, p, found[done - 1 :], u[done - 1 :])
+        if done < samples:
+            found[done] = follow(solver, p, found[done - 1], u[done - 1], u[done])
+            done, general = done + 1, general + 1
+    return Run(found, general)
+
+
+def _accumulated(program: Program, p: Array, z: Array, u: Array) -> Array:
+    if z.size == 0:
+        return np.zeros((len(u), 0))
+    function = program.runs(len(u))
+    return function(z, u.T, np.repeat(p[:, None], len(u), axis=1)).full().T
+
+
+def _passing(solver: Followed, p: Array, z: Array, u: Array) -> int:
+    """How many samples after the first pass both parts of the gate, up to the first that does not."""
+    closed = solver.open_along(z, u) <= solver.tolerance
+    whole = len(closed) if closed.all() else int(np.argmin(closed))
+    if whole < 2:
+        return 0
+    keeps = Branch(solver.program, p).along(z[:whole], u[:whole])
+    return len(keeps) if keeps.all() else int(np.argmin(keeps))
+
+
+def _corrected(program: Program, p: Array, z: Array, u: Array) -> Array | None:
+    """Newton's corrector, group after group; None where one does not close."""
+    z = z.copy()
+    for stage in program.equations.stages:
+        if not length(stage.rows):
+            continue
+        closing = program.closing(stage)
+        before = np.inf
+        for _ in range(CORRECTIONS):
+            left, slope = (each.full() for each in closing(z, u, p))
+            gap = float(np.max(np.abs(left), initial=0.0))
+            if not gap < before:
+                break
+            before = gap
+            if slope.size:
+                z[stage.unknowns] -= np.linalg.lstsq(slope, left, rcond=1e-12)[0].ravel()
+        if not before <= 1e-10:
+            return None
+    return z
+

@@ -1,0 +1,1 @@
+"""Solved mechanisms as people see them."""

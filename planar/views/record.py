@@ -1,0 +1,45 @@
+"""Results as JSON values, in SI units."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict
+from typing import Any
+
+from planar.analysis.published import Comparison
+from planar.motion import State
+
+
+def record(state: State, comparisons: Iterable[Comparison] = ()) -> dict[str, Any]:
+    """A solved position: every link, point and pair by name."""
+    found: dict[str, Any] = {
+        "mechanism": state.mechanism.name,
+        "outcome": "solved",
+        "mobility": state.mobility,
+        "residual": state.residual,
+        "inputs": {name: asdict(given) for name, given in state.inputs.items()},
+        "links": {name: asdict(link) | {"sense": link.sense} for name, link in state.links.items()},
+        "points": {
+            name: {
+                "position": point.position.tolist(),
+                "velocity": point.velocity.tolist(),
+                "acceleration": point.acceleration.tolist(),
+                "sense": point.sense,
+            }
+            for name, point in state.points.items()
+        },
+        "pairs": state.pairs,
+        "remarks": list(state.remarks),
+    }
+    published = [
+        {
+            "symbol": each.published.symbol,
+            "quantity": each.published.quantity,
+            "of": each.published.of,
+            "solved": each.solved,
+            "published": each.published.value,
+            "verdict": each.verdict,
+        }
+        for each in comparisons
+    ]
+    return found | ({"published": published} if published else {})

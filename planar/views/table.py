@@ -1,0 +1,218 @@
+"""Results as tables for a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from rich.box import SIMPLE_HEAD
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from planar.analysis.published import Comparison
+from planar.analysis.speed import Speed
+from planar.mechanism import QUANTITIES, motions
+from planar.motion import PointState, State
+from planar.pairs import Pair
+from planar.units import SI, Unit, unit
+from planar.words import amount, heading, hurrying, listed, turning
+
+DIGITS = 6
+"""Significant digits printed; `--json` has all of them."""
+_UNITS = {"rad/s^2": "rad/s²", "m/s^2": "m/s²", "N m": "N·m"}
+
+
+def solution(state: State, comparisons: Iterable[Comparison]) -> RenderableType:
+    """A solved position: links, points, pairs, and the published values beside the solved ones."""
+    parts: list[RenderableType] = [_heading(state), _links(state), _points(state), _pairs(state)]
+    comparisons = tuple(comparisons)
+    if comparisons:
+        parts.append(published(comparisons))
+    notes = [*state.remarks, *state.mechanism.notes]
+    if notes:
+        parts.append(Text("Notes", style="bold"))
+        parts += [Text(f"  - {note}") for note in notes]
+    return Group(*parts)
+
+
+def published(comparisons: Iterable[Comparison]) -> RenderableType:
+    """Solved values beside those that a book prints."""
+    table = _table("Published values", "", "solved", "printed", "unit", "off", "", left=(0, 1, 4, 6))
+    table.columns[1].header = "quantity"
+    reasons: list[RenderableType] = []
+    for each in comparisons:
+        item = each.published
+        kind = QUANTITIES[item.quantity]
+        off = "" if each.apart is None else f"{100.0 * each.apart:+.1f} %"
+        style = {"differs": "bold red", "sense differs": "bold red", "slip in the book": "yellow"}.get(each.verdict, "")
+        printed = "-" if item.value is None else _number(item.value)
+        table.add_row(
+            item.symbol,
+            _quantity(each),
+            _number(each.solved),
+            printed,
+            _UNITS.get(SI[kind], SI[kind]),
+            off,
+            Text(each.verdict, style),
+        )
+        why = item.slip or item.note
+        if why:
+            reasons.append(Text(f"  {item.symbol}: {why}"))
+    return Group(table, *reasons)
+
+
+def models(rows: Iterable[tuple[str, str, str]]) -> RenderableType:
+    """The models that come along: name, other ids, what each is."""
+    table = _table(None, "model", "also", "what it is", left=(0, 1, 2))
+    for row in rows:
+        table.add_row(*row)
+    return table
+
+
+def speeds(measured: Iterable[Speed]) -> RenderableType:
+    """How long the steps of solving take on this machine."""
+    headings = ("mechanism", "links", "unknowns", "equations", "assembly", "one position, with rates", "a position of a run")
+    table = _table(None, *headings)
+    for each in measured:
+        times = (each.equations, each.assembly, each.position, each.run)
+        table.add_row(each.name, str(each.links), str(each.unknowns), *(_time(seconds) for seconds in times))
+    note = "run: 360 steps through the gate; equations are built once for a structure"
+    return Group(table, Text(note, style="italic"))
+
+
+def _time(seconds: float) -> str:
+    for size, name in ((1.0, "s"), (1e-3, "ms"), (1e-6, "us")):
+        if seconds >= size:
+            return f"{seconds / size:.3g} {name}"
+    return f"{seconds / 1e-9:.3g} ns"
+
+
+def _heading(state: State) -> RenderableType:
+    mechanism = state.mechanism
+    lines = [Text(mechanism.name, style="bold")]
+    if mechanism.source:
+        lines.append(Text(mechanism.source, style="italic"))
+    named = motions(mechanism)
+    inputs = [
+        f"{name} = {amount(given.position, named[name].drive_kind.value, mechanism.units)}"
+        for name, given in state.inputs.items()
+    ]
+    at = f"at {listed(inputs)}" if inputs else "without inputs"
+    lines.append(Text(f"{at}; mobility {state.mobility}; residual {state.residual:.1e} of the mechanism's size"))
+    return Group(*lines)
+
+
+def _links(state: State) -> RenderableType:
+    units = state.mechanism.units
+    table = _table("Links", "link", f"angle, {units.angle}", "angular velocity, rad/s", "angular acceleration, rad/s²", "sense")
+    angle = unit(units.angle)
+    for name, link in state.links.items():
+        if name != state.mechanism.frame:
+            table.add_row(
+                name,
+                _number(angle.from_si(link.angle)),
+                _number(link.angular_velocity),
+                _number(link.angular_acceleration),
+                _sense(turning(link.angular_velocity), link.angular_velocity * link.angular_acceleration),
+            )
+    return table
+
+
+def _points(state: State) -> RenderableType:
+    units = state.mechanism.units
+    degree = units.angle
+    table = _table(
+        "Points",
+        "point",
+        f"x, {units.length}",
+        f"y, {units.length}",
+        "velocity, m/s",
+        f"at, {degree}",
+        "acceleration, m/s²",
+        f"at, {degree}",
+        "sense",
+    )
+    length, angle = unit(units.length), unit(units.angle)
+    points = state.points
+    scale = max((float(np.hypot(*point.position)) for point in points.values()), default=1.0) or 1.0
+
+    def placed(value: float) -> str:
+        return _number(length.from_si(value if abs(value) > 1e-13 * scale else 0.0))
+
+    def at(vector: np.ndarray) -> str:
+        return _number(angle.from_si(float(np.arctan2(vector[1], vector[0])))) if np.hypot(*vector) else ""
+
+    for name, point in points.items():
+        table.add_row(
+            name,
+            placed(point.position[0]),
+            placed(point.position[1]),
+            _number(float(np.hypot(*point.velocity))),
+            at(point.velocity),
+            _number(float(np.hypot(*point.acceleration))),
+            at(point.acceleration),
+            _moving(point),
+        )
+    return table
+
+
+def _moving(point: PointState) -> str:
+    return _sense(heading(point.velocity), float(point.velocity @ point.acceleration))
+
+
+def _sense(way: str, power: float) -> str:
+    return way if way == "at rest" else f"{way}, {hurrying(power)}"
+
+
+def _pairs(state: State) -> RenderableType:
+    kinds: dict[type[Pair], list[Pair]] = {}
+    for pair in motions(state.mechanism).values():
+        kinds.setdefault(type(pair), []).append(pair)
+    tables = []
+    for kind, pairs in kinds.items():
+        titles = [f"{name.replace('_', ' ')}, {_shown(of, state)[0]}" for name, of in kind.reports.items()]
+        table = _table(f"{kind.keyword.capitalize()} pairs", "pair", "links", *titles, left=(0, 1))
+        for pair in pairs:
+            report = state.pair(pair.name)
+            values = [_reported(report[name], of, state) for name, of in kind.reports.items()]
+            table.add_row(pair.name, " - ".join(pair.links), *values)
+        tables.append(table)
+    return Group(*tables)
+
+
+def _shown(kind: str, state: State) -> tuple[str, Unit]:
+    """The unit in which a kind of quantity is printed: positions in the file's own, rates in SI."""
+    units = state.mechanism.units
+    name = {"angle": units.angle, "length": units.length}.get(kind, SI[kind])
+    return _UNITS.get(name, name), unit(name)
+
+
+def _reported(value: float | None, kind: str, state: State) -> str:
+    return "-" if value is None else _number(_shown(kind, state)[1].from_si(value))
+
+
+def _quantity(each: Comparison) -> str:
+    item = each.published
+    text = f"{item.component + ' of ' if item.component else ''}{item.quantity} of {item.of}"
+    text += f" against {item.relative_to}" if item.relative_to else ""
+    changed = [drive.pair for drive in item.inputs]
+    return f"{text} (other input at {listed(changed)})" if changed else text
+
+
+def _number(value: float) -> str:
+    if value == 0.0 or abs(value) < 1e-14:
+        return "0"
+    if 1e-3 <= abs(value) < 1e6:
+        whole = len(str(int(abs(value)))) if abs(value) >= 1.0 else 1 - int(np.ceil(-np.log10(abs(value))))
+        return f"{value:.{max(0, DIGITS - max(whole, 1) if abs(value) >= 1 else DIGITS)}f}"
+    return f"{value:.{DIGITS - 1}e}"
+
+
+def _table(title: str | None, *headings: str, left: tuple[int, ...] = (0,)) -> Table:
+    table = Table(title=title, title_justify="left", title_style="bold", box=SIMPLE_HEAD, pad_edge=False)
+    last = len(headings) - 1
+    for index, text in enumerate(headings):
+        words = index in left or (index == last and text == "sense")
+        table.add_column(text, justify="left" if words else "right", overflow="fold")
+    return table

@@ -1,0 +1,231 @@
+"""What has no answer ends with an outcome and a sentence that names the pairs."""
+
+import copy
+
+import numpy as np
+import pytest
+
+from planar import files
+from planar.errors import NoAnswer, Outcome
+from planar.mechanism import Drive
+from planar.solve import solve
+
+FOUR_BAR = {
+    "planar": 1,
+    "units": {"length": "mm", "angle": "deg"},
+    "frame": "AD",
+    "links": {
+        "AD": {"points": {"A": [0, 0], "D": [100, 0]}},
+        "AB": {"ends": ["A", "B"], "length": 50},
+        "BC": {"ends": ["B", "C"], "length": 66},
+        "DC": {"ends": ["D", "C"], "length": 56},
+    },
+    "pairs": [{"turning": name} for name in "ABCD"],
+    "inputs": [{"pair": "A", "position": 60, "velocity": "10 rad/s"}],
+    "sketch": {"C": [80, 50]},
+}
+
+
+def changed(**top):
+    return files.from_dict(copy.deepcopy(FOUR_BAR) | top)
+
+
+def refused(mechanism, drives=()):
+    with pytest.raises(NoAnswer) as caught:
+        solve(mechanism, drives)
+    return caught.value
+
+
+def driven(position, pair="A"):
+    return changed(inputs=[{"pair": pair, "position": position, "velocity": "10 rad/s"}])
+
+
+def test_what_cannot_be_joined_says_where_and_by_how_much():
+    problem = refused(driven(150))
+    assert problem.outcome is Outcome.CANNOT_BE_ASSEMBLED
+    # B is |B - D| from D, and BC + DC = 122 mm reach no further
+    gap = np.hypot(100 - 50 * np.cos(np.radians(150)), 50 * np.sin(np.radians(150))) - 122
+    assert f"by {gap:.6g} mm" in problem.reason
+    assert "A = 150 deg" in problem.reason
+    assert "'BC' and 'DC'" in problem.reason
+    assert "pair '" in problem.reason
+
+
+LIMIT = np.degrees(np.arccos((50**2 + 100**2 - 122**2) / (2 * 50 * 100)))
+"""The input at which BC and DC lie in one line (law of cosines)."""
+
+
+@pytest.mark.parametrize("within", [0.0, 1e-13, 1e-12, 1e-11, 1e-10])
+def test_at_the_dead_point_no_velocity_is_given(within):
+    problem = refused(driven(float(LIMIT - within)))
+    assert problem.outcome in (Outcome.DEAD_POINT, Outcome.CANNOT_BE_ASSEMBLED)
+    if within >= 1e-12:
+        assert problem.outcome is Outcome.DEAD_POINT
+        assert "'A'" in problem.reason
+        assert "'BC' and 'DC'" in problem.reason
+        assert "drive 'B' or 'C' or 'D'" in problem.reason
+
+
+@pytest.mark.parametrize("within", [1e-7, 1e-5, 1e-2])
+def test_near_the_dead_point_the_velocity_is_right_to_what_rounding_leaves(within):
+    """omega of DC by the closed form of the coupler's angle, evaluated in long double."""
+    state = solve(driven(float(LIMIT - within)))
+    theta = np.longdouble(np.radians(np.longdouble(LIMIT - within)))
+    b, d = np.array([50 * np.cos(theta), 50 * np.sin(theta)]), np.array([np.longdouble(100), 0])
+    r = np.hypot(*(d - b))
+    cosine = (np.longdouble(56) ** 2 + r**2 - np.longdouble(66) ** 2) / (2 * 56 * r)
+    bend = np.arctan2(np.sqrt((1 - cosine) * (1 + cosine)), cosine)
+    back = np.arctan2(*(b - d)[::-1])
+    angle = back - bend
+    c = d + 56 * np.array([np.cos(angle), np.sin(angle)])
+    arm_b, arm_c = c - b, c - d
+    velocity_b = 10 * np.array([-b[1], b[0]])
+    omega = (velocity_b @ arm_b) / (np.array([-arm_c[1], arm_c[0]]) @ arm_b)
+    slope = np.sqrt(np.radians(within))  # the group's slope is of this order: rounding grows by its square
+    assert state.link("DC").angular_velocity == pytest.approx(float(omega), rel=1e-15 / slope**2 + 1e-12)
+
+
+def test_too_few_inputs_names_the_links_that_stay_free_and_where_to_drive():
+    problem = refused(changed(inputs=[]))
+    assert problem.outcome is Outcome.TOO_FEW_INPUTS
+    assert "0 inputs" in problem.reason
+    assert all(f"'{name}'" in problem.reason for name in ("AB", "BC", "DC", "A", "B", "C", "D"))
+
+
+def test_too_many_inputs_that_do_not_agree():
+    two = [{"pair": "A", "position": 60}, {"pair": "D", "position": 120}]
+    problem = refused(changed(inputs=two))
+    assert problem.outcome is Outcome.TOO_MANY_INPUTS
+    assert "'A' and 'D'" in problem.reason
+
+
+def test_too_many_inputs_that_agree_in_position_but_not_in_velocity():
+    angle = float(np.degrees(solve(changed()).link("DC").angle))
+    two = [{"pair": "A", "position": 60, "velocity": "10 rad/s"}, {"pair": "D", "position": angle}]
+    problem = refused(changed(inputs=two))
+    assert problem.outcome is Outcome.TOO_MANY_INPUTS
+    assert "velocities" in problem.reason
+
+
+def test_two_inputs_that_agree_in_everything_are_no_error():
+    state = solve(changed())
+    link = state.link("DC")
+    second = {
+        "pair": "D",
+        "position": f"{link.angle!r} rad",
+        "velocity": f"{link.angular_velocity!r} rad/s",
+        "acceleration": f"{link.angular_acceleration!r} rad/s^2",
+    }
+    both = solve(changed(inputs=[*FOUR_BAR["inputs"], second]))
+    assert both.mobility == 1
+    np.testing.assert_allclose(both.point("C").acceleration, state.point("C").acceleration, rtol=1e-9)
+
+
+def test_a_link_that_nothing_joins_to_the_frame_is_named():
+    links = FOUR_BAR["links"] | {"X": {"points": {"P": [0, 0]}}}
+    problem = refused(changed(links=links))
+    assert problem.outcome is Outcome.TOO_FEW_INPUTS
+    assert "'X'" in problem.reason
+
+
+PARALLELOGRAM = {
+    "links": {
+        "AD": {"points": {"A": [0, 0], "D": [100, 0]}},
+        "AB": {"ends": ["A", "B"], "length": 50},
+        "BC": {"ends": ["B", "C"], "length": 100},
+        "DC": {"ends": ["D", "C"], "length": 50},
+    }
+}
+
+
+@pytest.mark.parametrize("position", [0, 180])
+def test_the_flat_parallelogram_is_a_change_point(position):
+    problem = refused(changed(**PARALLELOGRAM, inputs=[{"pair": "A", "position": position, "velocity": "1 rad/s"}], sketch={"C": [150, 0]}))
+    assert problem.outcome is Outcome.CHANGE_POINT
+    assert "'BC' and 'DC'" in problem.reason
+
+
+@pytest.mark.parametrize("crank", [37.0, 90.0, 143.0])
+def test_a_parallelogram_with_a_third_crank_moves_in_spite_of_its_redundant_pair(crank):
+    links = {
+        "AD": {"points": {"A": [0, 0], "D": [100, 0], "E": [40, 0]}},
+        "AB": {"ends": ["A", "B"], "length": 50},
+        "BC": {"ends": ["B", "C"], "length": 100, "points": {"F": {"along": ["B", "C"], "distance": 40}}},
+        "DC": {"ends": ["D", "C"], "length": 50},
+        "EF": {"ends": ["E", "F"], "length": 50},
+    }
+    turn = np.array([np.cos(np.radians(crank)), np.sin(np.radians(crank))])
+    sketch = {"C": list(np.array([100, 0]) + 50 * turn), "F": list(np.array([40, 0]) + 50 * turn)}
+    inputs = [{"pair": "A", "position": crank, "velocity": "3 rad/s", "acceleration": "2 rad/s^2"}]
+    pairs = [{"turning": name} for name in "ABCDEF"]
+    state = solve(changed(links=links, pairs=pairs, sketch=sketch, inputs=inputs))
+    assert state.mobility == 1
+    for name in ("AB", "DC", "EF"):
+        assert state.link(name).angle == pytest.approx(np.radians(crank), abs=1e-12)
+        assert state.link(name).angular_velocity == pytest.approx(3.0, rel=1e-12)
+        assert state.link(name).angular_acceleration == pytest.approx(2.0, rel=1e-11)
+
+
+def test_a_third_crank_of_another_length_cannot_be_assembled():
+    links = {
+        "AD": {"points": {"A": [0, 0], "D": [100, 0], "E": [40, 0]}},
+        "AB": {"ends": ["A", "B"], "length": 50},
+        "BC": {"ends": ["B", "C"], "length": 100, "points": {"F": {"along": ["B", "C"], "distance": 40}}},
+        "DC": {"ends": ["D", "C"], "length": 50},
+        "EF": {"ends": ["E", "F"], "length": 49},
+    }
+    problem = refused(changed(links=links, pairs=[{"turning": name} for name in "ABCDEF"]))
+    assert problem.outcome is Outcome.CANNOT_BE_ASSEMBLED
+    assert "mm" in problem.reason
+
+
+def test_three_parallel_guides_are_redundant_and_solved():
+    links = {
+        "frame": {"points": {"O": [0, 0], "P": [0, 100], "Q": [0, -100]}},
+        "table": {"points": {"a": [0, 0], "b": [0, 100], "c": [0, -100]}},
+    }
+    pairs = [
+        {"sliding": f"s{k}", "links": ["frame", "table"], "line": {"through": p}, "point": q}
+        for k, (p, q) in enumerate(zip("OPQ", "abc", strict=True))
+    ]
+    state = solve(changed(frame="frame", links=links, pairs=pairs, inputs=[{"pair": "s0", "position": 30, "velocity": "2 m/s"}], sketch={}))
+    assert state.mobility == 1
+    assert state.pair("s2") == pytest.approx({"displacement": 0.03, "velocity": 2.0, "acceleration": 0.0}, abs=1e-15)
+
+
+def test_wedges_close_in_angle_whatever_whole_turns_their_author_wrote():
+    """Three links on three slides: the angles close by themselves, once round or not at all."""
+
+    def wedge(turn):
+        links = {
+            "frame": {"points": {"O": [0, 0]}},
+            "wedge": {"points": {"A": [0, 0]}},
+            "rod": {"points": {"B": [0, 0]}},
+        }
+        pairs = [
+            {"sliding": "floor", "links": ["frame", "wedge"], "line": {"through": "O"}, "point": "A"},
+            {"sliding": "face", "links": ["wedge", "rod"], "line": {"through": "A", "angle": 30}, "point": "B", "turn": turn},
+            {"sliding": "lift", "links": ["frame", "rod"], "line": {"through": "O", "angle": 90}, "point": "B", "turn": -90},
+        ]
+        return changed(frame="frame", links=links, pairs=pairs, sketch={}, inputs=[{"pair": "floor", "position": -50, "velocity": "2 m/s"}])
+
+    for turn in (-30, 330):
+        state = solve(wedge(turn))
+        rise = 0.05 * np.tan(np.radians(30))
+        assert state.pair("lift")["displacement"] == pytest.approx(rise, rel=1e-12)
+        assert state.pair("lift")["velocity"] == pytest.approx(-2.0 * np.tan(np.radians(30)), rel=1e-12)
+    assert refused(wedge(-29)).outcome is Outcome.CANNOT_BE_ASSEMBLED
+
+
+def test_a_branch_that_ends_on_the_way_says_where():
+    problem = refused(changed(), [Drive("A", np.radians(140.0))])
+    assert problem.outcome is Outcome.BRANCH_LOST
+    assert f"A = {LIMIT:.6g} deg" in problem.reason
+
+
+def test_a_frame_alone_with_a_rigid_truss_needs_no_input():
+    links = {"g": {"points": {"A": [0, 0], "B": [100, 0]}}, "a": {"ends": ["A", "C"], "length": 80}, "b": {"ends": ["B", "C"], "length": 60}}
+    state = solve(changed(frame="g", links=links, pairs=[{"turning": n} for n in "ABC"], inputs=[], sketch={"C": [60, 50]}))
+    assert state.mobility == 0
+    np.testing.assert_allclose(state.point("C").position, [0.064, 0.048], atol=1e-15)
+    np.testing.assert_array_equal(state.point("C").velocity, [0, 0])
