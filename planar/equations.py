@@ -64,7 +64,7 @@ class Equations:
     rows: tuple[Row, ...]
     stages: tuple[Stage, ...]
     known_from: tuple[int, ...]
-    """For every coordinate the stage after which it is known."""
+    """For every coordinate the stage after which it is known; -1 for one that follows from the inputs alone."""
     z: ca.SX
     u: ca.SX
     p: ca.SX
@@ -111,41 +111,81 @@ def build(mechanism: Mechanism) -> Equations:
     groups = decompose(depends, len(symbols.coordinates))
 
     solved: list[tuple[int, _Line]] = []
-    known_from = [0] * len(symbols.coordinates)
     unknowns: list[int] = []
     left: list[int] = []
-    stages: list[Stage] = []
-    for level, group in enumerate(groups):
+    for group in groups:
         remaining_rows, remaining = _eliminate(group.rows, group.columns, lines, solved)
-        for column in group.columns:
-            known_from[column] = level
-        named_links = [symbols.coordinates[c].owner for c in group.columns if symbols.coordinates[c].of_link]
+        unknowns += remaining
+        left += remaining_rows
+    symbol = ca.SX.sym("z", len(unknowns))
+    F, w = _written_in(symbol, unknowns, left, [rows[row] for row in left], lines, solved, symbols)
+    return _staged(mechanism, tuple(symbols.coordinates), unknowns, [rows[row] for row in left], symbol, u, p, w, F)
+
+
+def _staged(
+    mechanism: Mechanism,
+    coordinates: tuple[Coordinate, ...],
+    unknowns: list[int],
+    rows: list[Row],
+    z: ca.SX,
+    u: ca.SX,
+    p: ca.SX,
+    w: ca.SX,
+    F: ca.SX,
+) -> Equations:
+    """The shortened equations split once more, in the order in which they are solved.
+
+    Only now does it show where constraints hold each other twice: angles that a ring of slides closes by itself
+    have dropped out, and what was matched with them is free.
+    """
+    groups = [group for group in decompose(_touched(F, z), len(unknowns)) if group.rows or group.columns]
+    level_of = {column: level for level, group in enumerate(groups) for column in group.columns}
+    known_from = tuple(max((level_of[column] for column in held), default=-1) for held in _touched(w, z))
+    stages, first_unknown, first_row = [], 0, 0
+    level_of_link: dict[str, int] = {}
+    for coordinate, level in zip(coordinates, known_from, strict=True):
+        if coordinate.of_link:
+            level_of_link[coordinate.owner] = max(level, level_of_link.get(coordinate.owner, -1))
+    for level, group in enumerate(groups):
+        placed = {c.owner: None for c, known in zip(coordinates, known_from, strict=True) if c.of_link and known == level}
+        joined = [
+            pair.name
+            for pair in mechanism.pairs
+            if max(level_of_link.get(link, -1) for link in pair.links) == level
+        ]
         stages.append(
             Stage(
-                slice(len(unknowns), len(unknowns) + len(remaining)),
-                slice(len(left), len(left) + len(remaining_rows)),
-                tuple(dict.fromkeys(named_links)),
-                tuple(dict.fromkeys(rows[row].pair for row in group.rows)),
+                slice(first_unknown, first_unknown + len(group.columns)),
+                slice(first_row, first_row + len(group.rows)),
+                tuple(placed),
+                tuple(joined),
                 group.free,
                 level,
             )
         )
-        unknowns += remaining
-        left += remaining_rows
-    z = ca.SX.sym("z", len(unknowns))
-    F, w = _written_in(z, unknowns, left, [rows[row] for row in left], lines, solved, symbols)
+        first_unknown, first_row = stages[-1].unknowns.stop, stages[-1].rows.stop
+    columns = [column for group in groups for column in group.columns]
+    order = [row for group in groups for row in group.rows]
     return Equations(
-        tuple(symbols.coordinates),
-        tuple(unknowns),
-        tuple(rows[row] for row in left),
+        coordinates,
+        tuple(unknowns[column] for column in columns),
+        tuple(rows[row] for row in order),
         tuple(stages),
-        tuple(known_from),
-        z,
+        known_from,
+        z[columns],
         u,
         p,
         w,
-        F,
+        F[order],
     )
+
+
+def _touched(expressions: ca.SX, z: ca.SX) -> list[set[int]]:
+    """The entries of z on which each expression depends."""
+    held: list[set[int]] = [set() for _ in range(expressions.numel())]
+    for row, column in zip(*ca.jacobian_sparsity(expressions, z).get_triplet(), strict=True):
+        held[row].add(column)
+    return held
 
 
 def _coordinates(mechanism: Mechanism) -> _Symbols:

@@ -56,7 +56,6 @@ class Assembler:
         }
         self.points = {each.name: each.members for each in named_points(mechanism)}
         self.sketch = {name: Vector(x / unit, y / unit) for name, x, y in mechanism.sketch}
-        self.stages = [stage for stage in self.equations.stages if length(stage.rows) or length(stage.unknowns)]
         self.level_of = {link.name: self._level(link.name) for link in mechanism.links}
 
     def _level(self, link: str) -> int:
@@ -84,12 +83,12 @@ class Assembler:
             cost, behind, ranks, _, z = node
             if chosen is not None and (cost > chosen[0] or expansions > EXPANSIONS):
                 break
-            if len(ranks) == len(self.stages):
+            if len(ranks) == len(self.equations.stages):
                 if chosen is not None:
                     return Assembly(chosen[2], (self._tie(chosen[1], ranks),))
                 chosen = cost, ranks, z
                 continue
-            stage = self.stages[len(ranks)]
+            stage = self.equations.stages[len(ranks)]
             found, gap = self.candidates(stage, z)
             if not found and (worst is None or stage.level > worst.stage.level):
                 worst = Failure(stage, gap)
@@ -103,7 +102,7 @@ class Assembler:
 
     def _tie(self, ranks: tuple[int, ...], others: tuple[int, ...]) -> str:
         first = next(index for index, (a, b) in enumerate(zip(ranks, others, strict=True)) if a != b)
-        links = ", ".join(self.stages[first].links)
+        links = ", ".join(self.equations.stages[first].links)
         return (
             f"the sketch fits more than one assembly alike; taken is the one with its sliding points ahead of "
             f"'through', else the upper one: sketch a point of {links} to choose"
@@ -208,17 +207,10 @@ class Assembler:
         total = 0.0
         for name, at in self.sketch.items():
             link, point = min(self.points[name], key=lambda member: self.level_of[member[0]])
-            if self._placed_by(stage, self.level_of[link]):
+            if self.level_of[link] == stage.level:
                 gap = frames[link].carry(self.local[link][point]) - at
                 total += float(gap.dot(gap))
         return total
-
-    def _placed_by(self, stage: Stage, level: int) -> bool:
-        """Whether what is known from a level on is known from this stage on and not from an earlier one."""
-        here = self.stages.index(stage)
-        before = self.stages[here - 1].level if here else -1
-        last = here == len(self.stages) - 1
-        return before < level <= stage.level or (last and level > stage.level)
 
     def _behind(self, stage: Stage, frames: Mapping[str, Frame], own: Mapping[str, tuple[float, ...]]) -> int:
         late = 0

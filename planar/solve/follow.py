@@ -57,7 +57,7 @@ def follow(solver: Followed, p: Array, z: Array, start: Array, stop: Array) -> A
     while t < 1.0:
         step = min(step, 1.0 - t)
         inputs = stop if t + step >= 1.0 else start + (t + step) * way
-        tried = _corrected(solver.program, p, z + step * here.rates + 0.5 * step**2 * here.second, inputs)
+        tried = corrected(solver.program, p, z + step * here.rates + 0.5 * step**2 * here.second, inputs)
         there = branch.at(tried, inputs, way) if tried is not None else None
         if there is not None and branch.same(here, there, step) and solver.open_along(tried[None], inputs[None])[0] <= solver.tolerance:
             z, here, t, step = tried, there, t + step, 1.5 * step
@@ -110,8 +110,8 @@ def _passing(solver: Followed, p: Array, z: Array, u: Array) -> int:
     return len(keeps) if keeps.all() else int(np.argmin(keeps))
 
 
-def _corrected(program: Program, p: Array, z: Array, u: Array) -> Array | None:
-    """Newton's corrector, group after group; None where one does not close."""
+def corrected(program: Program, p: Array, z: Array, u: Array) -> Array | None:
+    """Newton's corrector, group after group, from unknowns near by; None where one does not close."""
     z = z.copy()
     for stage in program.equations.stages:
         if not length(stage.rows):

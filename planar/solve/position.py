@@ -17,7 +17,7 @@ from planar.pairs import Kind
 from planar.plane import GROUND, frame_at
 from planar.program import Motion, Program, extent, fitted, length, positions, program, rates, shapes, size
 from planar.solve.assemble import Assembler, Assembly, Failure, placed
-from planar.solve.follow import follow
+from planar.solve.follow import corrected, follow
 from planar.solve.gate import Gate
 from planar.words import amount, listed
 
@@ -29,6 +29,9 @@ SINGULAR = 1e-5
 Near a dead point the slope falls with the square root of the distance to it, so that round-off in the input of one
 part in 1e16 becomes one in 1e16 / slope^2 in the velocity: at 1e-5 six digits remain, below they are lost.
 """
+
+NEAR_BY = 1e-2
+"""How far (rad, or lengths of the size) a position is moved to see whether what holds there holds elsewhere."""
 
 
 def solve(mechanism: Mechanism, drives: Sequence[Drive] = ()) -> State:
@@ -203,7 +206,7 @@ class Solver:
         With the inputs' positions counted as unknowns, what the pairs leave free is unknowns + inputs - rank.
         """
         inputs = self.station.u.size
-        stages = [stage for stage in self.equations.stages if length(stage.rows) or length(stage.unknowns)]
+        stages = self.equations.stages
         weak = [stage for stage in stages if self._weakness(stage, motion.slope) < SINGULAR]
         square = all(length(stage.rows) == length(stage.unknowns) for stage in stages)
         if not weak and square:
@@ -218,9 +221,9 @@ class Solver:
                     f"the mobility is {mobility}, and the velocities of the inputs at {names} do not agree; leave one out",
                 )
             return mobility
-        raise self._singular(motion.slope, mobility, weak)
+        raise self._singular(z, motion.slope, mobility, weak)
 
-    def _singular(self, slope: Array, mobility: int, weak: list[Stage]) -> NoAnswer:
+    def _singular(self, z: Array, slope: Array, mobility: int, weak: list[Stage]) -> NoAnswer:
         inputs = self.station.u.size
         moving = self._moving_at_rest(slope)
         names = listed([repr(given.pair) for given in self.mechanism.inputs]) or "none"
@@ -233,7 +236,7 @@ class Solver:
                 f"move the input away from here, or drive {' or '.join(map(repr, others[:4])) or 'another pair'}",
             )
         freedoms = f"{mobility} freedom{'s' * (mobility != 1)} for {inputs} input{'s' * (inputs != 1)}"
-        if self._always_weak():
+        if self._always_weak(z):
             return NoAnswer(
                 Outcome.TOO_FEW_INPUTS,
                 f"the mechanism has {freedoms}: {links} can still move, while other links hold each other more than "
@@ -245,13 +248,17 @@ class Solver:
             f"move the input, or give a further input",
         )
 
-    def _always_weak(self) -> bool:
-        """Whether the constraints leave freedom wherever the links may stand, so that it is no matter of position."""
+    def _always_weak(self, z: Array) -> bool:
+        """Whether the velocity is undetermined in closed positions near by too, so that it is no matter of this one."""
+        u, p = self.station.u, self.station.p
         for seed in range(3):
-            y = np.random.default_rng(seed).uniform(-np.pi, np.pi, self.equations.z.numel() + self.station.u.size)
-            anywhere = self.program.kinematics(y, 0.0 * y, 0.0 * y, self.station.p)
-            if _rank(anywhere.slope) == self.equations.z.numel():
-                return False
+            rng = np.random.default_rng(seed)
+            near = u + rng.uniform(-NEAR_BY, NEAR_BY, u.size)
+            moved = corrected(self.program, p, z + rng.uniform(-NEAR_BY, NEAR_BY, z.size), near)
+            if moved is not None:
+                y = np.concatenate([moved, near])
+                if _rank(self.program.kinematics(y, 0.0 * y, 0.0 * y, p).slope) == z.size:
+                    return False
         return True
 
     def _moving_at_rest(self, slope: Array) -> list[str]:

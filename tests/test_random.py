@@ -1,0 +1,161 @@
+"""Random linkages of up to twelve moving links, in any loops, of turning and sliding pairs, built closed."""
+
+import numpy as np
+from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import strategies as st
+
+from planar import files
+from planar.errors import NoAnswer, Outcome
+from planar.mechanism import Drive, Mechanism
+from planar.motion import State
+from planar.solve import solve
+from planar.solve.position import Solver
+from tests.linkages import Built, conditioning, random_linkage
+
+seeds = st.integers(0, 10**6)
+sizes = st.integers(1, 12)
+many = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow])
+
+
+def assembled(built: Built, least: float) -> tuple[Mechanism, State]:
+    """The linkage solved; assumed to have determinate rates, with some distance from dead points."""
+    mechanism = files.from_dict(built.value)
+    try:
+        state = solve(mechanism)
+    except NoAnswer as problem:
+        # loops drawn at random may hold each other twice, or leave freedom: then that is what must be said
+        assert problem.outcome in (Outcome.TOO_FEW_INPUTS, Outcome.DEAD_POINT)
+        assume(False)
+        raise
+    solver = Solver(mechanism)
+    assume(conditioning(solver, solver.assembly().z) > least)
+    return mechanism, state
+
+
+def distance(mechanism: Mechanism, state: State, place) -> float:
+    """Sum of squared distances of the sketched points to where `place` has them."""
+    return sum(float(np.sum((place(name) - np.array([x, y])) ** 2)) for name, x, y in mechanism.sketch)
+
+
+@many
+@given(seeds, sizes)
+def test_assembles_from_a_sketch_disturbed_by_one_percent(seed, links):
+    built = random_linkage(seed, links, blur=0.01)
+    mechanism, state = assembled(built, 1e-3)
+    assert state.mobility == len(mechanism.inputs)
+    assert state.residual < 1e-13
+
+    def as_built(name):
+        link, point = state._named(name).members[0]
+        return np.array(built.frames[link].carry(state.shapes[link].at(point)))
+
+    found, drawn = (distance(mechanism, state, place) for place in (lambda n: state.point(n).position, as_built))
+    # the nearest assembly is taken: the one that was built, or one nearer still to the disturbed sketch
+    assert found <= drawn + 1e-9
+
+
+@many
+@given(seeds, sizes)
+def test_velocities_and_accelerations_are_the_derivatives_at_order_two(seed, links):
+    built = random_linkage(seed, links)
+    mechanism, here = assembled(built, 0.05)
+
+    def at(t: float) -> State:
+        drives = [
+            Drive(g.pair, g.position + g.velocity * t + g.acceleration * t * t / 2, g.velocity + g.acceleration * t)
+            for g in mechanism.inputs
+        ]
+        return solve(mechanism, drives)
+
+    errors = []
+    for step in (2e-3, 1e-3):
+        ahead, behind = at(step), at(-step)
+        gaps = [0.0, 0.0]
+        for name in built.frames:
+            for part in ("x", "y", "angle") if name != "frame" else ():
+                a, b, c = (getattr(state.frames[name], part).parts for state in (ahead, here, behind))
+                for order in (0, 1):
+                    gap = abs((a[order] - c[order]) / (2 * step) - b[order + 1])
+                    gaps[order] = max(gaps[order], gap)
+        errors.append(gaps)
+    for coarse, fine in zip(*errors, strict=True):
+        # halving the step quarters the error, until rounding (1e-15 of positions of order one, through a condition
+        # of at most 20 and its square in the rates, divided by the step) is what remains
+        assert fine < 1e-9 or 1.7 < np.log2(coarse / fine) < 2.3
+
+
+@many
+@given(seeds, sizes, st.sampled_from([1e-6, 1e-3, 1e3]))
+def test_micrometres_or_kilometres_give_the_same_numbers(seed, links, factor):
+    built = random_linkage(seed, links)
+    mechanism, state = assembled(built, 0.01)
+    value = built.value | {"units": {"length": f"{factor:g} m"[2:] if factor == 1 else {1e-6: "um", 1e-3: "mm", 1e3: "km"}[factor]}}
+    slides = {pair.name for pair in mechanism.pairs if pair.coordinates}
+    value["inputs"] = [
+        given | {key: given[key] * factor for key in ("velocity", "acceleration") if given["pair"] in slides}
+        for given in value["inputs"]
+    ]
+    other = solve(files.from_dict(value))
+    condition = 1.0 / conditioning(Solver(mechanism), Solver(mechanism).assembly().z)
+    for name, point in state.points.items():
+        twin = other.point(name)
+        for part in ("position", "velocity", "acceleration"):
+            a, b = getattr(point, part), getattr(twin, part) / factor
+            scale = max(1.0, *(float(np.abs(getattr(p, part)).max()) for p in state.points.values()))
+            # 1e-12, times what a linkage near a dead point does to the last digit of its own dimensions
+            np.testing.assert_allclose(b, a, rtol=0, atol=1e-14 * scale * max(100.0, condition**2))
+
+
+@many
+@given(seeds, sizes)
+def test_power_balances_for_any_load(seed, links):
+    """Inputs against loads: sum of T_i du_i + sum of F . v vanishes at the state's own rates, whatever they are."""
+    from planar.analysis.efforts import efforts
+
+    built = random_linkage(seed, links)
+    rng = np.random.default_rng(seed)
+    value = built.value | {
+        "loads": [{"point": name, "force": rng.uniform(-5, 5, 2).tolist()} for name in list(built.value["sketch"])[:4]]
+        + [{"link": next(name for name in built.frames if name != "frame"), "torque": 3.0}]
+    }
+    _, state = assembled(Built(value, built.frames), 0.01)
+    drive = sum(effort * state.inputs[name].velocity for name, effort in efforts(state).items())
+    load = sum(np.dot(each.force, state.point(each.point).velocity) for each in state.mechanism.loads if each.force)
+    load += sum(each.torque * state.link(each.link).angular_velocity for each in state.mechanism.loads if each.torque)
+    parts = [abs(e * state.inputs[n].velocity) for n, e in efforts(state).items()]
+    # velocities carry the rounding of one solve: 1e-16 times the condition, at most 1e2 here squared in the positions
+    assert drive + load == 0 or abs(drive + load) < 1e-11 * max(1.0, *parts)
+
+
+@many
+@given(seeds, sizes)
+def test_turning_and_shifting_the_whole_turns_and_shifts_every_result(seed, links):
+    """The frame's points moved rigidly (with an input that counts from the frame's axis turned along)."""
+    built = random_linkage(seed, links)
+    mechanism, state = assembled(built, 0.01)
+    turn, shift = 1.1, np.array([3.0, -2.0])
+    rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+
+    def moved(point):
+        return (rotation @ np.array(point) + shift).tolist()
+
+    value = files.to_dict(mechanism)
+    frame = value["links"]["frame"]
+    value["links"] = value["links"] | {"frame": {"points": {n: moved(p) for n, p in frame["points"].items()}}}
+    value["sketch"] = {name: moved(at) for name, at in value["sketch"].items()}
+    for entry in value["pairs"]:
+        if "sliding" in entry and entry["links"][0] == "frame":
+            entry["line"] = entry["line"] | {"angle": entry["line"]["angle"] + turn}
+        elif "sliding" in entry and entry["links"][1] == "frame":
+            entry["turn"] = entry.get("turn", 0.0) - turn
+    for given_input in value["inputs"]:
+        entry = next(e for e in value["pairs"] if given_input["pair"] in (e.get("turning"), e.get("sliding")))
+        if "turning" in entry and "frame" in entry["links"]:
+            given_input["position"] = float(given_input["position"]) + turn
+    other = solve(files.from_dict(value))
+    for name, point in state.points.items():
+        twin = other.point(name)
+        scale = 1.0 + max(float(np.abs(p.acceleration).max()) for p in state.points.values())
+        np.testing.assert_allclose(twin.position, moved(point.position), atol=1e-9)
+        np.testing.assert_allclose(twin.velocity, rotation @ point.velocity, atol=1e-8 * scale)
+        np.testing.assert_allclose(twin.acceleration, rotation @ point.acceleration, atol=1e-8 * scale)
