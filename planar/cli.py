@@ -53,11 +53,19 @@ as_json = click.option("--json", "as_json", is_flag=True, help="Print machine-re
 @click.argument("model")
 @as_json
 @click.option(
-    "--at", "at", multiple=True, metavar="PAIR=POSITION",
+    "--at",
+    "at",
+    multiple=True,
+    metavar="PAIR=POSITION",
     help="Move an input there first, along its branch: A=75deg, stroke=20mm, or a number in the file's units.",
 )
-@click.option("-o", "output", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
-              help="Write the tables to a .txt, .svg or .html file.")
+@click.option(
+    "-o",
+    "output",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Write the tables to a .txt, .svg or .html file.",
+)
 def solve(model: str, as_json: bool, at: tuple[str, ...], output: Path | None) -> None:
     """This position: mobility, all positions, velocities, accelerations, rubbing speeds."""
     from planar.analysis.published import compare

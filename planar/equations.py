@@ -14,7 +14,7 @@ F     what the remaining constraints leave open, group after group              
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import casadi as ca
 
@@ -119,39 +119,36 @@ def build(mechanism: Mechanism) -> Equations:
         left += remaining_rows
     symbol = ca.SX.sym("z", len(unknowns))
     F, w = _written_in(symbol, unknowns, left, [rows[row] for row in left], lines, solved, symbols)
-    return _staged(mechanism, tuple(symbols.coordinates), unknowns, [rows[row] for row in left], symbol, u, p, w, F)
+    whole = Equations(
+        tuple(symbols.coordinates), tuple(unknowns), tuple(rows[row] for row in left), (), (), symbol, u, p, w, F
+    )
+    return _staged(mechanism, whole)
 
 
-def _staged(
-    mechanism: Mechanism,
-    coordinates: tuple[Coordinate, ...],
-    unknowns: list[int],
-    rows: list[Row],
-    z: ca.SX,
-    u: ca.SX,
-    p: ca.SX,
-    w: ca.SX,
-    F: ca.SX,
-) -> Equations:
+def _staged(mechanism: Mechanism, whole: Equations) -> Equations:
     """The shortened equations split once more, in the order in which they are solved.
 
     Only now does it show where constraints hold each other twice: angles that a ring of slides closes by itself
     have dropped out, and what was matched with them is free.
     """
-    groups = [group for group in decompose(_touched(F, z), len(unknowns)) if group.rows or group.columns]
+    groups = [
+        group for group in decompose(_touched(whole.F, whole.z), len(whole.unknowns)) if group.rows or group.columns
+    ]
     level_of = {column: level for level, group in enumerate(groups) for column in group.columns}
-    known_from = tuple(max((level_of[column] for column in held), default=-1) for held in _touched(w, z))
+    known_from = tuple(max((level_of[column] for column in held), default=-1) for held in _touched(whole.w, whole.z))
     stages, first_unknown, first_row = [], 0, 0
     level_of_link: dict[str, int] = {}
-    for coordinate, level in zip(coordinates, known_from, strict=True):
+    for coordinate, level in zip(whole.coordinates, known_from, strict=True):
         if coordinate.of_link:
             level_of_link[coordinate.owner] = max(level, level_of_link.get(coordinate.owner, -1))
     for level, group in enumerate(groups):
-        placed = {c.owner: None for c, known in zip(coordinates, known_from, strict=True) if c.of_link and known == level}
+        placed = {
+            c.owner: None
+            for c, known in zip(whole.coordinates, known_from, strict=True)
+            if c.of_link and known == level
+        }
         joined = [
-            pair.name
-            for pair in mechanism.pairs
-            if max(level_of_link.get(link, -1) for link in pair.links) == level
+            pair.name for pair in mechanism.pairs if max(level_of_link.get(link, -1) for link in pair.links) == level
         ]
         stages.append(
             Stage(
@@ -166,17 +163,14 @@ def _staged(
         first_unknown, first_row = stages[-1].unknowns.stop, stages[-1].rows.stop
     columns = [column for group in groups for column in group.columns]
     order = [row for group in groups for row in group.rows]
-    return Equations(
-        coordinates,
-        tuple(unknowns[column] for column in columns),
-        tuple(rows[row] for row in order),
-        tuple(stages),
-        known_from,
-        z[columns],
-        u,
-        p,
-        w,
-        F[order],
+    return replace(
+        whole,
+        unknowns=tuple(whole.unknowns[column] for column in columns),
+        rows=tuple(whole.rows[row] for row in order),
+        stages=tuple(stages),
+        known_from=known_from,
+        z=whole.z[columns],
+        F=whole.F[order],
     )
 
 
@@ -258,10 +252,9 @@ def _lines(closures: list[ca.SX], symbols: _Symbols) -> tuple[list[_Line], list[
     rest = ca.vertsplit(ca.substitute(stacked, zeroed, ca.SX.zeros(len(straight))))
     lines = []
     for row, expression in enumerate(rest):
-        for column in factors[row]:
-            if column in crooked:
-                expression = ca.substitute(expression, symbols.values[column], 0.0)
-        lines.append(_Line(factors[row], expression, set(bent[row]), set(bent[row])))
+        bends = [symbols.values[column] for column in factors[row] if column in crooked]
+        straightened = ca.substitute(expression, ca.vertcat(*bends), ca.SX.zeros(len(bends))) if bends else expression
+        lines.append(_Line(factors[row], straightened, set(bent[row]), set(bent[row])))
     return lines, [set(line.factors) | line.bent for line in lines]
 
 

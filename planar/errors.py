@@ -1,9 +1,9 @@
 """What can go wrong, and the sentence in which it is said."""
 
-from enum import Enum
+from enum import StrEnum
 
 
-class Outcome(str, Enum):
+class Outcome(StrEnum):
     """How an attempt at a mechanism ended; the value is the phrase shown."""
 
     SOLVED = "solved"

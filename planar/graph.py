@@ -44,7 +44,7 @@ def decompose(rows: Sequence[AbstractSet[int]], columns: int) -> tuple[Group, ..
     for column, row in sorted(row_of.items()):
         needs.add_edges_from((other, column) for other in sorted(rows[row]) if other != column and other in row_of)
     loose = [column for column in range(columns) if column not in row_of]
-    free = _reached_from(loose, rows, row_of, needs)
+    free = _reached_from(loose, rows, row_of)
 
     blocks = nx.condensation(needs)
     order = list(nx.lexicographical_topological_sort(blocks, key=lambda block: min(blocks.nodes[block]["members"])))
@@ -68,9 +68,7 @@ def decompose(rows: Sequence[AbstractSet[int]], columns: int) -> tuple[Group, ..
     return tuple(groups)
 
 
-def _reached_from(
-    loose: Sequence[int], rows: Sequence[AbstractSet[int]], row_of: dict[int, int], needs: nx.DiGraph
-) -> set[int]:
+def _reached_from(loose: Sequence[int], rows: Sequence[AbstractSet[int]], row_of: dict[int, int]) -> set[int]:
     """The columns that stay free: the loose ones, and those whose constraints touch a free one."""
     touching: dict[int, list[int]] = {}
     column_of = {row: column for column, row in row_of.items()}

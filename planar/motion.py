@@ -115,7 +115,10 @@ class State:
 
     @property
     def inputs(self) -> dict[str, InputState]:
-        return {given.pair: InputState(given.position, given.velocity, given.acceleration) for given in self.mechanism.inputs}
+        return {
+            given.pair: InputState(given.position, given.velocity, given.acceleration)
+            for given in self.mechanism.inputs
+        }
 
     @property
     def pairs(self) -> dict[str, dict[str, float | None]]:

@@ -181,7 +181,7 @@ def extent(link: Link) -> float:
     """The greatest distance between two points of a link (m)."""
     points = list(shape(link).points.values())
     spread = np.array(points, dtype=float)
-    return float(np.hypot(*(spread.max(axis=0) - spread.min(axis=0)))) if len(points) else 0.0
+    return float(np.hypot(*(spread.max(axis=0) - spread.min(axis=0)))) if points else 0.0
 
 
 def fitted(mechanism: Mechanism, unit: float) -> Array:

@@ -126,7 +126,7 @@ def _place(name: str, places: Mapping[str, Place], drawn: dict[str, Vector], abo
     if isinstance(place, At):
         drawn[name] = Vector(place.x, place.y)
         return drawn[name]
-    base, other = ((place.start, place.towards) if isinstance(place, Along) else (place.first, place.second))
+    base, other = (place.start, place.towards) if isinstance(place, Along) else (place.first, place.second)
     p, q = (_place(rest, places, drawn, (*above, name)) for rest in (base, other))
     way = q - p
     length = sqrt(way.dot(way))

@@ -93,7 +93,9 @@ def quantity(text: str, kind: str) -> float:
         raise UnitError(f"{text!r} has no unit; write a number, or a text such as {example(kind)!r}")
     found = unit(written)
     if found.kind != kind:
-        raise UnitError(f"{text!r} is {_article(found.kind)}, but {_article(kind)} is wanted, such as {example(kind)!r}")
+        raise UnitError(
+            f"{text!r} is {_article(found.kind)}, but {_article(kind)} is wanted, such as {example(kind)!r}"
+        )
     return found.to_si(float(number))
 
 

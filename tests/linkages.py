@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from planar.plane import Frame, Vector, direction, frame_at
+from planar.solve.freedom import strength
 from planar.solve.position import Solver
 
 
@@ -126,7 +127,7 @@ def _joints(rng: np.random.Generator, placed: list[str], new: list[str]) -> list
         joints: set[tuple[str, str]] = set()
         for _ in range(200):
             first = new[int(rng.integers(len(new)))]
-            pool = new + placed[-4:] if rng.random() < 0.8 else new + ["frame"]
+            pool = new + placed[-4:] if rng.random() < 0.8 else [*new, "frame"]
             second = pool[int(rng.integers(len(pool)))]
             if first != second and (second, first) not in joints:
                 joints.add((first, second))
@@ -143,4 +144,4 @@ def conditioning(solver: Solver, z: np.ndarray) -> float:
     """The least singular value of any group at a position, as the solver judges it."""
     y = np.concatenate([z, solver.station.u])
     slope = solver.program.kinematics(y, 0.0 * y, 0.0 * y, solver.station.p).slope
-    return min((solver._weakness(stage, slope) for stage in solver.equations.stages if stage.links), default=1.0)
+    return min((strength(solver, stage, slope) for stage in solver.equations.stages if stage.links), default=1.0)

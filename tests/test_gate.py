@@ -6,6 +6,7 @@ import pytest
 
 from planar import files
 from planar.errors import NoAnswer, Outcome
+from planar.solve import position
 from planar.solve.follow import follow, run
 from planar.solve.gate import Branch, allowed
 from planar.solve.position import Solver
@@ -120,7 +121,7 @@ def test_samples_with_a_wrong_or_missing_value_go_to_the_general_path(solver, mo
 
 def test_wrong_velocities_and_accelerations_are_refused(solver, monkeypatch):
     z = solver.assembly().z
-    real = Solver._rate
+    real = position.cancelled
     for order in (1, 2):
         calls = []
 
@@ -128,7 +129,7 @@ def test_wrong_velocities_and_accelerations_are_refused(solver, monkeypatch):
             calls.append(1)
             return real(slope, known) * (1.0 + (1e-7 if len(calls) == order else 0.0))
 
-        monkeypatch.setattr(Solver, "_rate", staticmethod(wrong))
+        monkeypatch.setattr(position, "cancelled", wrong)
         with pytest.raises(NoAnswer) as refused:
             solver.state(z)
         assert ("velocities" if order == 1 else "accelerations") in refused.value.reason
@@ -136,7 +137,7 @@ def test_wrong_velocities_and_accelerations_are_refused(solver, monkeypatch):
 
 def test_residual_is_judged_with_cos_and_sin_made_afresh_from_the_angle(solver):
     """A program that carries a wrong sine beside the right angle closes its own equations, not the gate's."""
-    frames, own = solver.state(solver.assembly().z).frames, {name: () for name in solver.pairs}
+    frames, own = solver.state(solver.assembly().z).frames, dict.fromkeys(solver.pairs, ())
     still = {n: f if f.fixed else type(f)(*(x.parts[0] for x in f[:5])) for n, f in frames.items()}
     assert solver.gate.open(still, own).max() < solver.tolerance
     bent = still["BC"]

@@ -140,7 +140,11 @@ PARALLELOGRAM = {
 
 @pytest.mark.parametrize("position", [0, 180])
 def test_the_flat_parallelogram_is_a_change_point(position):
-    problem = refused(changed(**PARALLELOGRAM, inputs=[{"pair": "A", "position": position, "velocity": "1 rad/s"}], sketch={"C": [150, 0]}))
+    problem = refused(
+        changed(
+            **PARALLELOGRAM, inputs=[{"pair": "A", "position": position, "velocity": "1 rad/s"}], sketch={"C": [150, 0]}
+        )
+    )
     assert problem.outcome is Outcome.CHANGE_POINT
     assert "'BC' and 'DC'" in problem.reason
 
@@ -188,7 +192,15 @@ def test_three_parallel_guides_are_redundant_and_solved():
         {"sliding": f"s{k}", "links": ["frame", "table"], "line": {"through": p}, "point": q}
         for k, (p, q) in enumerate(zip("OPQ", "abc", strict=True))
     ]
-    state = solve(changed(frame="frame", links=links, pairs=pairs, inputs=[{"pair": "s0", "position": 30, "velocity": "2 m/s"}], sketch={}))
+    state = solve(
+        changed(
+            frame="frame",
+            links=links,
+            pairs=pairs,
+            inputs=[{"pair": "s0", "position": 30, "velocity": "2 m/s"}],
+            sketch={},
+        )
+    )
     assert state.mobility == 1
     assert state.pair("s2") == pytest.approx({"displacement": 0.03, "velocity": 2.0, "acceleration": 0.0}, abs=1e-15)
 
@@ -204,10 +216,28 @@ def test_wedges_close_in_angle_whatever_whole_turns_their_author_wrote():
         }
         pairs = [
             {"sliding": "floor", "links": ["frame", "wedge"], "line": {"through": "O"}, "point": "A"},
-            {"sliding": "face", "links": ["wedge", "rod"], "line": {"through": "A", "angle": 30}, "point": "B", "turn": turn},
-            {"sliding": "lift", "links": ["frame", "rod"], "line": {"through": "O", "angle": 90}, "point": "B", "turn": -90},
+            {
+                "sliding": "face",
+                "links": ["wedge", "rod"],
+                "line": {"through": "A", "angle": 30},
+                "point": "B",
+                "turn": turn,
+            },
+            {
+                "sliding": "lift",
+                "links": ["frame", "rod"],
+                "line": {"through": "O", "angle": 90},
+                "point": "B",
+                "turn": -90,
+            },
         ]
-        return changed(frame="frame", links=links, pairs=pairs, sketch={}, inputs=[{"pair": "floor", "position": -50, "velocity": "2 m/s"}])
+        return changed(
+            frame="frame",
+            links=links,
+            pairs=pairs,
+            sketch={},
+            inputs=[{"pair": "floor", "position": -50, "velocity": "2 m/s"}],
+        )
 
     for turn in (-30, 330):
         state = solve(wedge(turn))
@@ -224,8 +254,14 @@ def test_a_branch_that_ends_on_the_way_says_where():
 
 
 def test_a_frame_alone_with_a_rigid_truss_needs_no_input():
-    links = {"g": {"points": {"A": [0, 0], "B": [100, 0]}}, "a": {"ends": ["A", "C"], "length": 80}, "b": {"ends": ["B", "C"], "length": 60}}
-    state = solve(changed(frame="g", links=links, pairs=[{"turning": n} for n in "ABC"], inputs=[], sketch={"C": [60, 50]}))
+    links = {
+        "g": {"points": {"A": [0, 0], "B": [100, 0]}},
+        "a": {"ends": ["A", "C"], "length": 80},
+        "b": {"ends": ["B", "C"], "length": 60},
+    }
+    state = solve(
+        changed(frame="g", links=links, pairs=[{"turning": n} for n in "ABC"], inputs=[], sketch={"C": [60, 50]})
+    )
     assert state.mobility == 0
     np.testing.assert_allclose(state.point("C").position, [0.064, 0.048], atol=1e-15)
     np.testing.assert_array_equal(state.point("C").velocity, [0, 0])

@@ -27,12 +27,12 @@ def coordinates(sample: Sample) -> np.ndarray:
     return np.array([*(c for f in sample.frames for c in (f.x, f.y, f.angle)), *sample.own])
 
 
-def residual(sample: Sample, at) -> list:  # noqa: ANN001
+def residual(sample: Sample, at) -> list:
     first, second = frame_at(*at[:3]), frame_at(*at[3:6])
     return list(sample.pair.residual(first, second, numbers(sample), at[6:]))
 
 
-def drive(sample: Sample, at):  # noqa: ANN001, ANN201
+def drive(sample: Sample, at):
     return sample.pair.drive(frame_at(*at[:3]), frame_at(*at[3:6]), numbers(sample), at[6:])
 
 
@@ -124,7 +124,7 @@ def test_jets_give_the_derivatives_of_residual_and_drive(sample):
     jets = [Jet(*parts) for parts in zip(at, rate, second, strict=True)]
     found = [*residual(sample, jets), drive(sample, jets)]
 
-    def along(t):  # noqa: ANN001, ANN202
+    def along(t):
         place = at + rate * t + 0.5 * second * t * t
         return np.array([*residual(sample, place), drive(sample, place)])
 

@@ -14,7 +14,9 @@ from tests.linkages import Built, conditioning, random_linkage
 
 seeds = st.integers(0, 10**6)
 sizes = st.integers(1, 12)
-many = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow])
+many = settings(
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow]
+)
 
 
 def assembled(built: Built, least: float) -> tuple[Mechanism, State]:
@@ -89,7 +91,9 @@ def test_velocities_and_accelerations_are_the_derivatives_at_order_two(seed, lin
 def test_micrometres_or_kilometres_give_the_same_numbers(seed, links, factor):
     built = random_linkage(seed, links)
     mechanism, state = assembled(built, 0.01)
-    value = built.value | {"units": {"length": f"{factor:g} m"[2:] if factor == 1 else {1e-6: "um", 1e-3: "mm", 1e3: "km"}[factor]}}
+    value = built.value | {
+        "units": {"length": f"{factor:g} m"[2:] if factor == 1 else {1e-6: "um", 1e-3: "mm", 1e3: "km"}[factor]}
+    }
     slides = {pair.name for pair in mechanism.pairs if pair.coordinates}
     value["inputs"] = [
         given | {key: given[key] * factor for key in ("velocity", "acceleration") if given["pair"] in slides}

@@ -36,7 +36,7 @@ lengths = st.floats(0.2, 2.0)
 
 @given(lengths, lengths, lengths, lengths, st.floats(-3.1, 3.1), st.booleans())
 def test_four_bar_satisfies_freudenstein_and_its_derivatives(a, b, c, d, theta, up):
-    """K1 cos(phi) - K2 cos(theta) + K3 = cos(theta - phi) (F. Freudenstein, Trans. ASME 77, 1955), for both assemblies."""
+    """K1 cos(phi) - K2 cos(theta) + K3 = cos(theta - phi) (F. Freudenstein, Trans. ASME 77, 1955), both assemblies."""
     r = np.hypot(d - a * np.cos(theta), a * np.sin(theta))
     assume(abs(b - c) + 0.05 < r < b + c - 0.05)
     # the closed form: the triangle BCD on the diagonal r from B to D (law of cosines)
@@ -95,14 +95,18 @@ def whitworth(theta, r=0.1, d=0.04):
         "OA": {"ends": ["O", "A"], "length": r},
         "CS": {"ends": ["C", "S"], "length": 0.3},
     }
-    pairs = [{"turning": "O"}, {"turning": "C"}, {"sliding": "slot", "on": "CS", "block": "A", "line": {"through": "C"}}]
+    pairs = [
+        {"turning": "O"},
+        {"turning": "C"},
+        {"sliding": "slot", "on": "CS", "block": "A", "line": {"through": "C"}},
+    ]
     inputs = [{"pair": "O", "position": theta / DEG, "velocity": "5 rad/s", "acceleration": "2 rad/s^2"}]
     return mechanism(links, pairs, inputs)
 
 
 @given(st.floats(-3.1, 3.1))
 def test_slotted_link_with_its_coriolis_part(theta):
-    """The block in polar coordinates about C: rho e^(i psi) = r e^(i theta) + i d, differentiated as complex numbers."""
+    """The block in polar coordinates about C: rho e^(i psi) = r e^(i theta) + i d, differentiated."""
     r, d, w, al = 0.1, 0.04, 5.0, 2.0
     z = r * np.exp(1j * theta) + 1j * d
     z1 = 1j * w * r * np.exp(1j * theta)
@@ -239,7 +243,11 @@ def test_an_input_between_moving_links_of_a_pin_of_three():
         "b": {"ends": ["P", "Q"], "length": 1},
         "c": {"ends": ["P", "R"], "length": 1},
     }
-    inputs = [{"pair": "O", "position": 10}, {"pair": "P:a,b", "position": 20}, {"pair": "P:b,c", "position": 30, "velocity": "2 rad/s"}]
+    inputs = [
+        {"pair": "O", "position": 10},
+        {"pair": "P:a,b", "position": 20},
+        {"pair": "P:b,c", "position": 30, "velocity": "2 rad/s"},
+    ]
     state = planar.solve(mechanism(links, [{"turning": "O"}, {"turning": "P"}], inputs))
     assert [state.link(name).angle / DEG for name in "abc"] == pytest.approx([10, 30, 60])
     assert state.pair("P:a,c")["relative_angular_velocity"] == pytest.approx(2.0)
@@ -268,7 +276,10 @@ def test_a_turned_slide_keeps_its_angle():
 
 
 def test_a_link_drawn_in_place_has_its_angle_along_its_axis():
-    links = {"frame": {"points": {"O": [1, 1]}}, "t": {"points": {"O": [1, 1], "P": [2, 2], "Q": [1, 3]}, "axis": ["O", "P"]}}
+    links = {
+        "frame": {"points": {"O": [1, 1]}},
+        "t": {"points": {"O": [1, 1], "P": [2, 2], "Q": [1, 3]}, "axis": ["O", "P"]},
+    }
     state = planar.solve(mechanism(links, [{"turning": "O"}], [{"pair": "O", "position": 45}]))
     assert state.point("Q").position == pytest.approx([1, 3])
     assert state.link("t").angle / DEG == pytest.approx(45)
@@ -295,7 +306,11 @@ def test_a_sketched_point_far_down_the_chain_decides_what_lies_before_it():
         "frame": {"points": {"A": [0, 0], "D": [4, 0], "G": [9, 0]}},
         "AB": {"ends": ["A", "B"], "length": 1.0},
         "BC": {"ends": ["B", "C"], "length": 3.5},
-        "DC": {"ends": ["D", "C"], "length": 2.5, "points": {"E": {"along": ["D", "C"], "distance": 2.0, "angle": -30}}},
+        "DC": {
+            "ends": ["D", "C"],
+            "length": 2.5,
+            "points": {"E": {"along": ["D", "C"], "distance": 2.0, "angle": -30}},
+        },
         "EF": {"ends": ["E", "F"], "length": 4.0},
         "GF": {"ends": ["G", "F"], "length": 2.5},
     }
@@ -320,7 +335,9 @@ def test_moving_an_input_keeps_to_the_branch_where_the_sketch_would_mislead():
         b, c, d = (state.point(name).position for name in "BCD")
         assert np.cross(np.append(c - b, 0), np.append(d - b, 0))[2] < 0
     np.testing.assert_allclose(
-        planar.solve(start, [Drive("A", 0.8 + 2 * np.pi)]).point("C").position, planar.solve(start).point("C").position, atol=1e-13
+        planar.solve(start, [Drive("A", 0.8 + 2 * np.pi)]).point("C").position,
+        planar.solve(start).point("C").position,
+        atol=1e-13,
     )
 
 
@@ -337,18 +354,24 @@ def test_a_long_chain_of_dyads_is_solved_in_its_order(links):
     """Rhombic dyads in a row, each link one metre: the k-th pins are known in closed form as sums of two directions."""
     count = (links - 2) // 2
     tilt, flat = 1.1, 0.1
-    members = {"frame": {"points": {"A0": [0, 0], **{f"G{k}": [k * np.cos(flat), k * np.sin(flat)] for k in range(1, count + 1)}}}}
+    members = {
+        "frame": {
+            "points": {"A0": [0, 0], **{f"G{k}": [k * np.cos(flat), k * np.sin(flat)] for k in range(1, count + 1)}}
+        }
+    }
     members["c0"] = {"ends": ["A0", "B0"], "length": 1.0}
     pairs = [{"turning": "A0"}, {"turning": "B0"}]
     sketch = {}
     for k in range(1, count + 1):
         members[f"r{k}"] = {"ends": [f"B{k - 1}", f"B{k}"], "length": 1.0}
         members[f"c{k}"] = {"ends": [f"G{k}", f"B{k}"], "length": 1.0}
-        pairs += [{"turning": f"G{k}"}] + ([{"turning": f"B{k}"}])
+        pairs += [{"turning": f"G{k}"}, {"turning": f"B{k}"}]
         sketch[f"B{k}"] = [k * np.cos(flat) + 0.9 * np.cos(tilt), k * np.sin(flat) + 1.1 * np.sin(tilt)]
     inputs = [{"pair": "A0", "position": tilt / DEG, "velocity": "2 rad/s"}]
     state = planar.solve(mechanism(members, pairs, inputs, sketch))
     end = state.point(f"B{count}")
-    assert end.position == pytest.approx([count * np.cos(flat) + np.cos(tilt), count * np.sin(flat) + np.sin(tilt)], abs=1e-12)
+    assert end.position == pytest.approx(
+        [count * np.cos(flat) + np.cos(tilt), count * np.sin(flat) + np.sin(tilt)], abs=1e-12
+    )
     assert end.velocity == pytest.approx([-2 * np.sin(tilt), 2 * np.cos(tilt)], abs=1e-11)
     assert end.acceleration == pytest.approx([-4 * np.cos(tilt), -4 * np.sin(tilt)], abs=1e-10)

@@ -20,7 +20,7 @@ def efforts(state: State) -> dict[str, float]:
     found = {}
     for given in state.mechanism.inputs:
         alone = tuple(Input(each.pair, each.position, float(each is given)) for each in state.mechanism.inputs)
-        unit = Solver(replace(state.mechanism, inputs=alone)).at(state)
+        unit = Solver(replace(state.mechanism, inputs=alone)).at_rates_of(state)
         power = 0.0
         for load in state.mechanism.loads:
             if load.point is not None and load.force is not None:

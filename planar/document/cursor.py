@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from math import isfinite
 from typing import Any
@@ -20,9 +20,9 @@ FORBIDDEN = ".:,"
 class Whole:
     """What every place of one file may need to know of the whole of it."""
 
-    units: Units = Units()
+    units: Units = field(default_factory=Units)
     frame: str = ""
-    links: Mapping[str, Link] = None  # type: ignore[assignment]
+    links: Mapping[str, Link] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Cursor:
 
     value: Any
     path: str = "$"
-    whole: Whole = Whole()
+    whole: Whole = field(default_factory=Whole)
 
     # refusing
 
@@ -46,7 +46,7 @@ class Cursor:
     # walking
 
     def _path(self, key: str) -> str:
-        plain = key.split("[")[0].replace("_", "a").isalnum()
+        plain = key.split("[", maxsplit=1)[0].replace("_", "a").isalnum()
         return f"{self.path}.{key}" if plain else f"{self.path}[{key!r}]"
 
     def fields(self) -> Mapping[str, Any]:

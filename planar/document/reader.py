@@ -115,32 +115,30 @@ def _written_out(top: Cursor) -> Cursor:
     entries = [dict(item.fields()) for item in top["pairs"].items()]
     for index, entry in enumerate(entries):
         kind = _type(Cursor(entry, f"$.pairs[{index}]", top.whole))
-        whole = kind.rewrite(entry, value)
+        whole = kind.rewrite(entry)
         if whole is None:
             continue
         for name, link in whole.links.items():
             if name in links:
-                raise BadLink(f"$.pairs[{index}]", name)
+                told = f"this makes a link {name!r}, but there is one of that name already"
+                raise Cursor(entry, f"$.pairs[{index}]").refuse(None, told)
             links[name] = link
         entries[index] = whole.entry
-        _pin_at(whole.pin, tuple(whole.links), entries)
+        _join(whole.joined_by, tuple(whole.links), entries)
     return replace(top, value=value | {"links": links, "pairs": entries})
 
 
-def BadLink(path: str, name: str) -> Exception:  # noqa: N802 - reads as the error it makes
-    return Cursor(None, path).refuse(None, f"this makes a link {name!r}, but there is one of that name already")
-
-
-def _pin_at(point: str, links: tuple[str, ...], entries: list[dict[str, Any]]) -> None:
-    """See that the links are pinned to the others that carry the point."""
+def _join(by: dict[str, Any], links: tuple[str, ...], entries: list[dict[str, Any]]) -> None:
+    """See that an entry of this type and name joins the links too."""
+    keyword, name = next(iter(by.items()))
     for entry in entries:
-        if entry.get("turning") == point:
+        if entry.get(keyword) == name:
             if isinstance(entry.get("links"), list):
                 entry["links"] = [*entry["links"], *links]
                 if isinstance(entry.get("points"), list):
-                    entry["points"] = [*entry["points"], *(point for _ in links)]
+                    entry["points"] = [*entry["points"], *(name for _ in links)]
             return
-    entries.append({"turning": point})
+    entries.append(by)
 
 
 def _type(entry: Cursor) -> type[Pair]:
@@ -157,43 +155,49 @@ def _type(entry: Cursor) -> type[Pair]:
 def _link(name: str, cursor: Cursor) -> Link:
     cursor.checked_name(name)
     cursor.only("ends", "length", "points", "axis")
-    ends = cursor.names("ends", 2) if cursor.has("ends") else None
-    length = None
-    if ends is not None:
-        if ends[0] == ends[1]:
-            raise cursor.refuse("ends", f"both ends are {ends[0]!r}; a link has two different ends")
-        length = cursor["length"].positive("length")
-    elif cursor.has("length"):
-        raise cursor.refuse("length", "a 'length' needs the two 'ends' that it lies between")
+    ends, length = _ends(cursor)
     points: list[Point] = []
-    if cursor.has("points"):
-        for point, place in cursor["points"].members():
-            place.checked_name(point)
-            if ends is not None and point in ends:
-                raise place.refuse(None, f"{point!r} is an end of this link already; its place follows from 'length'")
-            points.append(Point(point, _place(place)))
+    for point, place in cursor["points"].members() if cursor.has("points") else ():
+        place.checked_name(point)
+        if point in (ends or ()):
+            raise place.refuse(None, f"{point!r} is an end of this link already; its place follows from 'length'")
+        points.append(Point(point, _place(place)))
     if ends is None and not points:
         raise cursor.refuse(None, "a link needs points: 'ends' with a 'length', or 'points'")
-    axis = None
-    if cursor.has("axis"):
-        if ends is not None:
-            raise cursor.refuse("axis", "a link with 'ends' has its x-axis along them; leave 'axis' out")
-        axis = cursor.names("axis", 2)
-    link = Link(name, tuple(points), ends, length, axis)
-    for end in axis or ():
-        if end not in link.names:
-            raise cursor.refuse("axis", f"there is no point {end!r} on this link{did_you_mean(end, link.names)}")
-    if axis is not None and axis[0] == axis[1]:
-        raise cursor.refuse("axis", "the axis needs two different points")
+    link = Link(name, tuple(points), ends, length, _axis(cursor, (*(ends or ()), *(point.name for point in points))))
     try:
-        placed = shape(link)
+        shape(link)
     except Unplaced as problem:
         at = cursor["points"]
         raise at.refuse(problem.point if at.has(problem.point) else None, str(problem)) from None
     except ZeroDivisionError:
         raise cursor.refuse("axis", "the two points of the axis coincide, so they give no direction") from None
-    del placed
     return link
+
+
+def _ends(cursor: Cursor) -> tuple[tuple[str, str] | None, float | None]:
+    if not cursor.has("ends"):
+        if cursor.has("length"):
+            raise cursor.refuse("length", "a 'length' needs the two 'ends' that it lies between")
+        return None, None
+    first, second = cursor.names("ends", 2)
+    if first == second:
+        raise cursor.refuse("ends", f"both ends are {first!r}; a link has two different ends")
+    return (first, second), cursor["length"].positive("length")
+
+
+def _axis(cursor: Cursor, points: tuple[str, ...]) -> tuple[str, str] | None:
+    if not cursor.has("axis"):
+        return None
+    if cursor.has("ends"):
+        raise cursor.refuse("axis", "a link with 'ends' has its x-axis along them; leave 'axis' out")
+    first, second = cursor.names("axis", 2)
+    for end in (first, second):
+        if end not in points:
+            raise cursor.refuse("axis", f"there is no point {end!r} on this link{did_you_mean(end, points)}")
+    if first == second:
+        raise cursor.refuse("axis", "the axis needs two different points")
+    return first, second
 
 
 def _place(cursor: Cursor) -> Place:

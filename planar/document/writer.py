@@ -29,8 +29,10 @@ def write(mechanism: Mechanism) -> dict[str, Any]:
     value["pairs"] = [type(group[0]).write(group, quantity) for group in entries(mechanism)]
     value |= _told(
         inputs=[_drive_entry(mechanism, given, quantity) for given in mechanism.inputs],
-        loads=[_told(point=load.point, force=_list(load.force), link=load.link, torque=load.torque)
-               for load in mechanism.loads],
+        loads=[
+            _told(point=load.point, force=_list(load.force), link=load.link, torque=load.torque)
+            for load in mechanism.loads
+        ],
         sketch={point: [quantity(x, "length"), quantity(y, "length")] for point, x, y in mechanism.sketch},
         published=[_published(item, mechanism, quantity) for item in mechanism.published],
     )
@@ -52,7 +54,7 @@ def _quantities(mechanism: Mechanism) -> Quantity:
 
 def _told(**fields: Any) -> dict[str, Any]:
     """Only the fields that say something."""
-    return {key: value for key, value in fields.items() if value is not None and value != [] and value != {}}
+    return {key: value for key, value in fields.items() if value not in (None, [], {})}
 
 
 def _list(values: Iterable[float] | None) -> list[float] | None:

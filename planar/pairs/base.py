@@ -79,8 +79,8 @@ class Pair(ABC):
         return True
 
     @classmethod
-    def rewrite(cls, entry: Mapping[str, Any], document: Mapping[str, Any]) -> Rewritten | None:
-        """A short form of the entry in full: links to add, the entry itself, a pin to have; None if there is none."""
+    def rewrite(cls, entry: Mapping[str, Any]) -> Rewritten | None:
+        """A short form of the entry in full; None where it is no short form."""
         return None
 
     @classmethod
@@ -110,11 +110,14 @@ class Pair(ABC):
 
 @dataclass(frozen=True)
 class Rewritten:
-    """A short entry in full: the entry, the links that it brings, and the point at which they are pinned."""
+    """A short entry in full, the links that it brings, and the entry of the pair that is to join these.
+
+    Where the file has an entry of that type and name already, the links are added to it instead.
+    """
 
     entry: dict[str, Any]
     links: dict[str, Any]
-    pin: str
+    joined_by: dict[str, Any]
 
 
 @dataclass(frozen=True)

@@ -71,7 +71,7 @@ class Sliding(Pair):
         return drive >= 0.0
 
     @classmethod
-    def rewrite(cls, entry: Mapping[str, Any], document: Mapping[str, Any]) -> Rewritten | None:
+    def rewrite(cls, entry: Mapping[str, Any]) -> Rewritten | None:
         """`"on": link, "block": point`: a block of its own, pinned at the point to the links that carry it."""
         point = entry.get("block")
         if not isinstance(point, str):
@@ -79,7 +79,7 @@ class Sliding(Pair):
         block = f"block {point}"
         full = {key: value for key, value in entry.items() if key not in ("on", "block")}
         full |= {"links": [entry.get("on"), block], "point": point}
-        return Rewritten(full, {block: {"points": {point: [0, 0]}}}, point)
+        return Rewritten(full, {block: {"points": {point: [0, 0]}}}, {"turning": point})
 
     @classmethod
     def read(cls, entry: Entry) -> tuple[Sliding, ...]:

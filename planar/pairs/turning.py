@@ -75,10 +75,7 @@ class Turning(Pair):
                 raise entry.refuse(
                     "turning", f"a turning pair needs two links, but {told} a point {pin!r}; name its 'links'"
                 )
-        if entry.has("points"):
-            points = entry.names("points", len(links))
-        else:
-            points = (pin,) * len(links)
+        points = entry.names("points", len(links)) if entry.has("points") else (pin,) * len(links)
         for index, (link, point) in enumerate(zip(links, points, strict=True)):
             entry.carried(point, link, f"points[{index}]" if entry.has("points") else "turning")
         if entry.has("pin_radius") and entry.has("pin_diameter"):

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count
 
 import numpy as np
 
+from planar.algebra import Scalar
 from planar.equations import Stage
 from planar.mechanism import Mechanism, named_points
-from planar.pairs import Kind
+from planar.pairs import Kind, Pair
 from planar.plane import GROUND, Frame, Vector, frame_at
 from planar.program import Program, length, shapes
 from planar.solve.newton import Closing, newton, polished
@@ -127,7 +128,9 @@ class Assembler:
             whole = z.copy()
             whole[stage.unknowns] = root
             frames, own = self._placed(whole)
-            found.append((self._distance(stage, frames), self._behind(stage, frames, own), whole, self._height(stage, frames)))
+            found.append(
+                (self._distance(stage, frames), self._behind(stage, frames, own), whole, self._height(stage, frames))
+            )
         found.sort(key=lambda each: (each[1], -round(each[3], 9), *np.round(each[2], 6)))
         return [each[:3] for each in found], closing(best)[0][0]
 
@@ -227,14 +230,14 @@ class Assembler:
 
 
 def placed(
-    w: Array, column: Mapping[tuple[str, str], int], links: Mapping[str, object], pairs: Mapping[str, object]
-) -> tuple[dict[str, Frame], dict[str, tuple[float, ...]]]:
-    """Frames of links and own coordinates of pairs from w."""
+    w: Sequence[Scalar], column: Mapping[tuple[str, str], int], links: Iterable[str], pairs: Mapping[str, Pair]
+) -> tuple[dict[str, Frame], dict[str, tuple[Scalar, ...]]]:
+    """Frames of links and own coordinates of pairs from w, whose entries may be floats, arrays or jets."""
     frames = {
         link: frame_at(*(w[column[link, part]] for part in ("x", "y", "angle"))) if (link, "x") in column else GROUND
         for link in links
     }
-    own = {name: tuple(w[column[name, part]] for part, _ in pair.coordinates) for name, pair in pairs.items()}  # type: ignore[attr-defined]
+    own = {name: tuple(w[column[name, part]] for part, _ in pair.coordinates) for name, pair in pairs.items()}
     return frames, own
 
 

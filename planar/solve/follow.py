@@ -59,7 +59,11 @@ def follow(solver: Followed, p: Array, z: Array, start: Array, stop: Array) -> A
         inputs = stop if t + step >= 1.0 else start + (t + step) * way
         tried = corrected(solver.program, p, z + step * here.rates + 0.5 * step**2 * here.second, inputs)
         there = branch.at(tried, inputs, way) if tried is not None else None
-        if there is not None and branch.same(here, there, step) and solver.open_along(tried[None], inputs[None])[0] <= solver.tolerance:
+        if (
+            there is not None
+            and branch.same(here, there, step)
+            and solver.open_along(tried[None], inputs[None])[0] <= solver.tolerance
+        ):
             z, here, t, step = tried, there, t + step, 1.5 * step
             continue
         step *= 0.5
@@ -129,4 +133,3 @@ def corrected(program: Program, p: Array, z: Array, u: Array) -> Array | None:
         if not before <= 1e-10:
             return None
     return z
-

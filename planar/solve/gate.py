@@ -67,7 +67,7 @@ class Gate:
             found = left.parts[order] if isinstance(left, Jet) else 0.0
             gap = abs(found - rate) / (self.unit if kind is Kind.LENGTH else 1.0) / (greatest or 1.0)
             if not gap <= worst:
-                worst, where = (gap if gap == gap else float("inf")), name
+                worst, where = (float("inf") if np.isnan(gap) else gap), name
         return worst, where
 
     def _rate(self, frame: Frame, order: int) -> float:

@@ -20,7 +20,7 @@ def save(renderable: RenderableType, path: Path) -> None:
     console = Console(record=True, width=WIDTH, file=io.StringIO(), force_terminal=True)
     console.print(renderable)
     formats = {
-        ".txt": lambda: console.export_text(),
+        ".txt": console.export_text,
         ".html": lambda: console.export_html(theme=DEFAULT_TERMINAL_THEME),
         ".svg": lambda: _without_fonts(console.export_svg(title="planar", theme=DEFAULT_TERMINAL_THEME)),
     }

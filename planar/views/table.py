@@ -31,22 +31,21 @@ def solution(state: State, comparisons: Iterable[Comparison]) -> RenderableType:
         parts.append(published(comparisons))
     notes = [*state.remarks, *state.mechanism.notes]
     if notes:
-        parts.append(Text("Notes", style="bold"))
-        parts += [Text(f"  - {note}") for note in notes]
+        parts += [Text("Notes", style="bold"), _paragraphs(("-", note) for note in notes)]
     return Group(*parts)
 
 
 def published(comparisons: Iterable[Comparison]) -> RenderableType:
     """Solved values beside those that a book prints."""
-    table = _table("Published values", "", "solved", "printed", "unit", "off", "", left=(0, 1, 4, 6))
-    table.columns[1].header = "quantity"
-    reasons: list[RenderableType] = []
+    headings = ("", "quantity", "solved", "printed", "unit", "off", "")
+    table = _table("Published values", *headings, left=(0, 1, 4, 6))
+    reasons: list[tuple[str, str]] = []
     for each in comparisons:
         item = each.published
         kind = QUANTITIES[item.quantity]
         off = "" if each.apart is None else f"{100.0 * each.apart:+.1f} %"
         style = {"differs": "bold red", "sense differs": "bold red", "slip in the book": "yellow"}.get(each.verdict, "")
-        printed = "-" if item.value is None else _number(item.value)
+        printed = "-" if item.value is None else f"{item.value:.6g}"
         table.add_row(
             item.symbol,
             _quantity(each),
@@ -58,8 +57,16 @@ def published(comparisons: Iterable[Comparison]) -> RenderableType:
         )
         why = item.slip or item.note
         if why:
-            reasons.append(Text(f"  {item.symbol}: {why}"))
-    return Group(table, *reasons)
+            reasons.append((item.symbol, why))
+    return Group(table, _paragraphs(reasons))
+
+
+def _paragraphs(rows: Iterable[tuple[str, str]]) -> Table:
+    """Paragraphs with what they are about before them."""
+    grid = Table.grid(padding=(0, 1))
+    for about, text in rows:
+        grid.add_row("", Text(about), Text(text))
+    return grid
 
 
 def models(rows: Iterable[tuple[str, str, str]]) -> RenderableType:
@@ -72,7 +79,15 @@ def models(rows: Iterable[tuple[str, str, str]]) -> RenderableType:
 
 def speeds(measured: Iterable[Speed]) -> RenderableType:
     """How long the steps of solving take on this machine."""
-    headings = ("mechanism", "links", "unknowns", "equations", "assembly", "one position, with rates", "a position of a run")
+    headings = (
+        "mechanism",
+        "links",
+        "unknowns",
+        "equations",
+        "assembly",
+        "one position, with rates",
+        "a position of a run",
+    )
     table = _table(None, *headings)
     for each in measured:
         times = (each.equations, each.assembly, each.position, each.run)
@@ -105,7 +120,9 @@ def _heading(state: State) -> RenderableType:
 
 def _links(state: State) -> RenderableType:
     units = state.mechanism.units
-    table = _table("Links", "link", f"angle, {units.angle}", "angular velocity, rad/s", "angular acceleration, rad/s²", "sense")
+    table = _table(
+        "Links", "link", f"angle, {units.angle}", "angular velocity, rad/s", "angular acceleration, rad/s²", "sense"
+    )
     angle = unit(units.angle)
     for name, link in state.links.items():
         if name != state.mechanism.frame:

@@ -1,0 +1,118 @@
+"""How a mechanism can move from a position: its mobility by rank, and whether its inputs determine its motion."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planar.equations import Stage
+from planar.pairs import Kind
+from planar.program import Motion, length
+from planar.solve import refusals
+from planar.solve.follow import corrected
+from planar.solve.setup import Setup
+
+Array = np.ndarray
+
+SINGULAR = 1e-5
+"""A group's slope is singular where its least singular value is below this part of its links' own reach.
+
+Near a dead point the slope falls with the square root of the distance to it, so that round-off in the input of one
+part in 1e16 becomes one in 1e16 / slope^2 in the velocity: at 1e-5 six digits remain, below they are lost.
+"""
+NEAR_BY = 1e-2
+"""How far (rad, or lengths of the size) a position is moved to see whether what holds there holds elsewhere."""
+
+
+def mobility(setup: Setup, z: Array, motion: Motion) -> int:
+    """The mobility at a position by rank; raises NoAnswer where the velocity is not determined, or contradicted.
+
+    With the inputs' positions counted as unknowns, what the pairs leave free is unknowns + inputs - rank.
+    """
+    inputs = setup.station.u.size
+    weak = [stage for stage in setup.equations.stages if strength(setup, stage, motion.slope) < SINGULAR]
+    square = all(length(stage.rows) == length(stage.unknowns) for stage in setup.equations.stages)
+    if not weak and square:
+        return inputs
+    found = z.size + inputs - _rank(np.hstack([motion.slope, motion.drive_slope]))
+    if not weak:
+        if found < inputs and not _agree(setup, motion):
+            raise refusals.disagreeing(setup, found, "velocities")
+        return found
+    links = _moving_at_rest(setup, motion.slope) or list(dict.fromkeys(link for stage in weak for link in stage.links))
+    if found <= inputs:
+        raise refusals.dead_point(setup, links)
+    raise (refusals.ever_free if _always_weak(setup, z) else refusals.change_point)(setup, links, found)
+
+
+def strength(setup: Setup, stage: Stage, slope: Array) -> float:
+    """The least singular value of a group's slope, each column by what its links could reach at best.
+
+    Zero at a dead point or a change point; lengths are divided by the reach of the group's links, so that neither
+    their size nor that of the whole matters.
+    """
+    if not length(stage.unknowns):
+        return 1.0
+    reach = max((setup.reach[link] for link in stage.links), default=0.0) or 1.0
+    own = slope[stage.rows, stage.unknowns].copy()
+    own[[row.kind is Kind.LENGTH for row in setup.equations.rows[stage.rows]], :] /= reach
+    for index, column in enumerate(setup.equations.unknowns[stage.unknowns]):
+        coordinate = setup.equations.coordinates[column]
+        natural = 1.0
+        if coordinate.kind is Kind.LENGTH:
+            own[:, index] *= reach
+        else:
+            natural = setup.reach.get(coordinate.owner, reach) / reach or 1.0
+        own[:, index] /= max(float(np.linalg.norm(own[:, index])), natural)
+    values = np.linalg.svd(own, compute_uv=False)
+    return float(values[-1] / max(1.0, values[0])) if len(values) == length(stage.unknowns) else 0.0
+
+
+def cancelled(slope: Array, known: Array) -> Array:
+    """The rates of the unknowns (unknowns,) that cancel what known rates open (rows,)."""
+    if slope.shape[0] == slope.shape[1]:
+        return np.linalg.solve(slope, -known) if known.size else np.zeros(0)
+    return np.linalg.lstsq(slope, -known, rcond=1e-12)[0]
+
+
+def _agree(setup: Setup, motion: Motion) -> bool:
+    """Whether rates of the inputs that are more than the freedom do not contradict one another."""
+    left = motion.slope @ cancelled(motion.slope, motion.F1) + motion.F1
+    scale = np.max(np.abs(setup.station.u1), initial=0.0) or 1.0
+    return bool(np.max(np.abs(left), initial=0.0) <= 1e-9 * scale)
+
+
+def _always_weak(setup: Setup, z: Array) -> bool:
+    """Whether the velocity is undetermined in closed positions near by too, so that it is no matter of this one."""
+    u, p = setup.station.u, setup.station.p
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        near = u + rng.uniform(-NEAR_BY, NEAR_BY, u.size)
+        moved = corrected(setup.program, p, z + rng.uniform(-NEAR_BY, NEAR_BY, z.size), near)
+        if moved is not None:
+            y = np.concatenate([moved, near])
+            if _rank(setup.program.kinematics(y, 0.0 * y, 0.0 * y, p).slope) == z.size:
+                return False
+    return True
+
+
+def _moving_at_rest(setup: Setup, slope: Array) -> list[str]:
+    """The links that can move while the inputs are held, from the slope's null vectors."""
+    _, values, vectors = np.linalg.svd(slope)
+    null = vectors[int(np.sum(values > SINGULAR * max(1.0, values[0]))) :]
+    if null.size == 0:
+        return []
+    share = np.max(np.abs(null), axis=0)
+    moved = [
+        setup.equations.coordinates[column].owner
+        for column, part in zip(setup.equations.unknowns, share, strict=True)
+        if part > 1e-3 * share.max()
+    ]
+    joined = [link for name in moved for link in (setup.pairs[name].links if name in setup.pairs else (name,))]
+    return [link for link in dict.fromkeys(joined) if link != setup.mechanism.frame]
+
+
+def _rank(matrix: Array) -> int:
+    if matrix.size == 0:
+        return 0
+    values = np.linalg.svd(matrix, compute_uv=False)
+    return int(np.sum(values > SINGULAR * max(1.0, values[0])))

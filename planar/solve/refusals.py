@@ -1,0 +1,136 @@
+"""The sentences in which a mechanism that has no answer is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from planar.errors import NoAnswer, Outcome
+from planar.pairs import Kind
+from planar.program import length
+from planar.solve.assemble import Failure
+from planar.solve.setup import Setup
+from planar.words import amount, listed
+
+
+def apart(setup: Setup, links: Sequence[str]) -> NoAnswer:
+    """Links that nothing joins to the frame."""
+    return NoAnswer(
+        Outcome.TOO_FEW_INPUTS,
+        f"no chain of pairs joins {_links(links)} to the frame {setup.mechanism.frame!r}; add a pair",
+    )
+
+
+def free(setup: Setup) -> NoAnswer:
+    """Links that the inputs leave free whatever the dimensions."""
+    stages = [stage for stage in setup.equations.stages if stage.free]
+    links = list(dict.fromkeys(link for stage in stages for link in stage.links))
+    ways = sum(length(stage.unknowns) - length(stage.rows) for stage in stages)
+    inputs = len(setup.mechanism.inputs)
+    return NoAnswer(
+        Outcome.TOO_FEW_INPUTS,
+        f"with {_many(inputs, 'input')} {_links(links)} can still move in {_many(ways, 'way')}; "
+        f"give an input at {_pairs_of(setup, links, 6)}",
+    )
+
+
+def ever_free(setup: Setup, links: Sequence[str], mobility: int) -> NoAnswer:
+    """Links that stay free while others hold each other more than once."""
+    return NoAnswer(
+        Outcome.TOO_FEW_INPUTS,
+        f"the mechanism has {_freedoms(setup, mobility)}: {_links(links)} can still move, while other links hold each "
+        f"other more than once; give an input at {_pairs_of(setup, links, 6)}",
+    )
+
+
+def change_point(setup: Setup, links: Sequence[str], mobility: int) -> NoAnswer:
+    """A position from which the mechanism may go on in several ways."""
+    return NoAnswer(
+        Outcome.CHANGE_POINT,
+        f"{setup.at()} the mechanism has {_freedoms(setup, mobility)}: {_links(links)} may move in more than one way "
+        f"from here; move the input, or give a further input",
+    )
+
+
+def dead_point(setup: Setup, links: Sequence[str]) -> NoAnswer:
+    """A position in which the inputs cannot move some links."""
+    return NoAnswer(
+        Outcome.DEAD_POINT,
+        f"{setup.at()} {_inputs(setup)} cannot move {_links(links)}, whose velocity is not determined; "
+        f"move the input away from here, or drive {_pairs_of(setup, links, 4)}",
+    )
+
+
+def not_closed(setup: Setup, pair: str, gap: float) -> NoAnswer:
+    """A position that the gate does not let pass."""
+    return NoAnswer(
+        Outcome.CANNOT_BE_ASSEMBLED,
+        f"{setup.at()} the nearest position leaves pair {pair!r} open by {gap:.2g} of the mechanism's size where "
+        f"rounding explains {setup.tolerance:.2g}; change a length or the input a little",
+    )
+
+
+def not_assembled(setup: Setup, failure: Failure) -> NoAnswer:
+    """A group that cannot be joined: by how much, and at which pair."""
+    stage = failure.stage
+    gaps: dict[str, float] = {}
+    for row, left in zip(setup.equations.rows[stage.rows], failure.open, strict=True):
+        gaps[row.pair] = float(np.hypot(gaps.get(row.pair, 0.0), left))
+    pair = max(gaps, key=lambda name: gaps[name])
+    kind = next(row.kind for row in setup.equations.rows[stage.rows] if row.pair == pair)
+    by, what = (setup.unit, "length") if kind is Kind.LENGTH else (1.0, "angle")
+    links = _links(stage.links) if stage.links else "the links"
+    return NoAnswer(
+        Outcome.CANNOT_BE_ASSEMBLED,
+        f"{setup.at()} {links} cannot be joined: at the nearest, pair {pair!r} stays open by "
+        f"{amount(gaps[pair] * by, what, setup.mechanism.units)}; change the input or a dimension of {links}",
+    )
+
+
+def too_many(setup: Setup) -> NoAnswer:
+    """Inputs that the pairs leave no freedom for, at positions that do not agree."""
+    return NoAnswer(
+        Outcome.TOO_MANY_INPUTS,
+        f"{_inputs(setup)} ask for more than the mechanism's freedom and do not agree {setup.at()}; leave one out",
+    )
+
+
+def disagreeing(setup: Setup, mobility: int, what: str) -> NoAnswer:
+    """Inputs whose positions agree but whose rates do not."""
+    return NoAnswer(
+        Outcome.TOO_MANY_INPUTS,
+        f"the mobility is {mobility}, and the {what} of {_inputs(setup)} do not agree; leave one out",
+    )
+
+
+def broken_rates(setup: Setup, what: str, pair: str, gap: float) -> NoAnswer:
+    """Rates that the gate does not let pass."""
+    return NoAnswer(
+        Outcome.DEAD_POINT,
+        f"{setup.at()} the {what} break pair {pair!r} by {gap:.2g} of the greatest; move the input",
+    )
+
+
+def _links(names: Sequence[str]) -> str:
+    return f"link{'s' * (len(names) != 1)} {listed([repr(name) for name in names])}"
+
+
+def _inputs(setup: Setup) -> str:
+    names = [repr(given.pair) for given in setup.mechanism.inputs]
+    return f"the input{'s' * (len(names) != 1)} at {listed(names)}"
+
+
+def _many(count: int, what: str) -> str:
+    return f"{count} {what}{'s' * (count != 1)}"
+
+
+def _freedoms(setup: Setup, mobility: int) -> str:
+    return f"{_many(mobility, 'freedom')} for {_many(len(setup.mechanism.inputs), 'input')}"
+
+
+def _pairs_of(setup: Setup, links: Sequence[str], most: int) -> str:
+    """Pairs of these links that have no input, to be offered."""
+    taken = {given.pair for given in setup.mechanism.inputs}
+    offered = [name for name, pair in setup.pairs.items() if set(pair.links) & set(links) and name not in taken]
+    return " or ".join(map(repr, offered[:most])) or "another pair"

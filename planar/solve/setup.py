@@ -1,0 +1,81 @@
+"""One mechanism made ready to be solved and judged: its program, its numbers, its gate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planar.mechanism import Input, Mechanism, motions
+from planar.pairs import Kind
+from planar.program import Program, extent, fitted, positions, program, rates, shapes, size
+from planar.solve.assemble import placed
+from planar.solve.gate import Gate
+from planar.words import amount, listed
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Station:
+    """The numbers of one position: inputs u with their rates (scaled), and the numbers p of the pairs."""
+
+    u: Array
+    u1: Array
+    u2: Array
+    p: Array
+
+
+class Setup:
+    """What does not change from one position of a mechanism to the next, and what the file's own inputs are."""
+
+    def __init__(self, mechanism: Mechanism):
+        self.mechanism = mechanism
+        self.unit = size(mechanism)
+        self.shapes = shapes(mechanism)
+        self.program: Program = program(mechanism)
+        self.equations = self.program.equations
+        self.gate = Gate(mechanism, self.shapes, self.unit)
+        self.column = {(c.owner, c.part): index for index, c in enumerate(self.equations.coordinates)}
+        self.pairs = {pair.name: pair for pair in mechanism.pairs}
+        self.named = motions(mechanism)
+        self.scale = np.array([self.unit if c.kind is Kind.LENGTH else 1.0 for c in self.equations.coordinates])
+        self.reach = {link.name: extent(link) / self.unit for link in mechanism.links}
+        self.station = Station(
+            positions(mechanism, self.unit),
+            rates(mechanism, "velocity", self.unit),
+            rates(mechanism, "acceleration", self.unit),
+            fitted(mechanism, self.unit),
+        )
+
+    @property
+    def tolerance(self) -> float:
+        """What the gate lets pass: round-off of the residual, in lengths of the size."""
+        return self.gate.tolerance
+
+    def open(self, z: Array, u: Array) -> Array:
+        """What every constraint leaves open (constraints, samples); z (samples, unknowns), u (samples, inputs)."""
+        w = self.program.positions(z.T, u.T, self.station.p).full()
+        scale = np.array([self.unit if self._slides(given) else 1.0 for given in self.mechanism.inputs])
+        with np.errstate(invalid="ignore"):  # what is not a number counts as open, and is refused as such
+            frames, own = placed(w * self.scale[:, None], self.column, self.shapes, self.pairs)
+            return self.gate.open(frames, own, u.T * scale[:, None])
+
+    def open_along(self, z: Array, u: Array) -> Array:
+        """What the worst constraint leaves open at every sample (samples,)."""
+        return self.open(z, u).max(axis=0)
+
+    def at(self) -> str:
+        """The file's own position in words: at A = 60 deg."""
+        return f"at {self.where(self.station.u)}" if self.mechanism.inputs else "as drawn"
+
+    def where(self, u: Array) -> str:
+        """A position of the inputs in words: A = 60 deg."""
+        told = []
+        for given, position in zip(self.mechanism.inputs, u, strict=True):
+            kind, by = ("length", self.unit) if self._slides(given) else ("angle", 1.0)
+            told.append(f"{given.pair} = {amount(position * by, kind, self.mechanism.units)}")
+        return listed(told)
+
+    def _slides(self, given: Input) -> bool:
+        return self.named[given.pair].drive_kind is Kind.LENGTH
