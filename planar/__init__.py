@@ -1,8 +1,26 @@
 """planar: how any planar linkage moves."""
 
-from planar.errors import BadInput, NoAnswer, Outcome, PlanarError
-from planar.files import dumps, from_dict, load, loads, to_dict
-from planar.solve import solve
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from planar.errors import BadInput, NoAnswer, Outcome, PlanarError
+    from planar.files import dumps, from_dict, load, loads, to_dict
+    from planar.solving.position import solve
+
+_ROOMS = {
+    "BadInput": "errors",
+    "NoAnswer": "errors",
+    "Outcome": "errors",
+    "PlanarError": "errors",
+    "dumps": "files",
+    "from_dict": "files",
+    "load": "files",
+    "loads": "files",
+    "solve": "solving.position",
+    "to_dict": "files",
+}
+"""Where each public name lives: it is loaded when it is first used."""
 
 __all__ = [
     "BadInput",
@@ -16,3 +34,13 @@ __all__ = [
     "solve",
     "to_dict",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _ROOMS:
+        raise AttributeError(f"module 'planar' has no attribute {name!r}")
+    return getattr(import_module(f"planar.{_ROOMS[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

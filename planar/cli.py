@@ -70,7 +70,7 @@ def solve(model: str, as_json: bool, at: tuple[str, ...], output: Path | None) -
     """This position: mobility, all positions, velocities, accelerations, rubbing speeds."""
     from planar.analysis.published import compare
     from planar.files import load
-    from planar.solve import solve as solved
+    from planar.solving.position import solve as solved
 
     mechanism = load(model)
     drives = _drives(mechanism, at)

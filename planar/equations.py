@@ -15,17 +15,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import casadi as ca
 
-from planar.graph import decompose
+from planar.groups import decompose
 from planar.mechanism import Mechanism, motions
 from planar.pairs import Kind, Pair
 from planar.plane import GROUND, Frame
 
 
-@dataclass(frozen=True)
-class Coordinate:
+class Coordinate(NamedTuple):
     """One entry of w: a part of a link's frame ("x", "y", "angle"), or a coordinate of a pair's own."""
 
     owner: str
@@ -34,8 +34,7 @@ class Coordinate:
     of_link: bool
 
 
-@dataclass(frozen=True)
-class Row:
+class Row(NamedTuple):
     """One constraint: of a pair, or of an input at it."""
 
     pair: str
@@ -43,8 +42,7 @@ class Row:
     is_input: bool
 
 
-@dataclass(frozen=True)
-class Stage:
+class Stage(NamedTuple):
     """A group after elimination: which entries of z and of F it has, and the links and pairs that it is about."""
 
     unknowns: slice

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 from planar.pairs.base import Pair
 from planar.shapes import Along, At, Distances, Link, Place, Point
@@ -48,8 +49,7 @@ QUANTITIES = {
 """What a published value may be of, and what it is measured in."""
 
 
-@dataclass(frozen=True)
-class Input:
+class Input(NamedTuple):
     """A relative motion that is given: at a turning pair an angle, at a sliding pair a distance (rad or m, per s)."""
 
     pair: str
@@ -58,8 +58,7 @@ class Input:
     acceleration: float = 0.0
 
 
-@dataclass(frozen=True)
-class Load:
+class Load(NamedTuple):
     """A force (N, in the frame's axes) at a point, or a torque (N m, anticlockwise) on a link."""
 
     point: str | None = None
@@ -68,8 +67,7 @@ class Load:
     torque: float | None = None
 
 
-@dataclass(frozen=True)
-class Drive:
+class Drive(NamedTuple):
     """What an input is changed to for one published quantity; None leaves it as it is."""
 
     pair: str
@@ -78,8 +76,7 @@ class Drive:
     acceleration: float | None = None
 
 
-@dataclass(frozen=True)
-class Published:
+class Published(NamedTuple):
     """A value that a book prints for a quantity of this mechanism (SI), or None where it prints none.
 
     `tolerance` is the part of the exact value by which a drawing may be off; `slip` says why a printed value
@@ -101,8 +98,7 @@ class Published:
     start: tuple[Drive, ...] = ()
 
 
-@dataclass(frozen=True)
-class Units:
+class Units(NamedTuple):
     """The units in which a mechanism's file is written and its positions are printed."""
 
     length: str = "m"
@@ -123,7 +119,7 @@ class Mechanism:
     inputs: tuple[Input, ...] = ()
     loads: tuple[Load, ...] = ()
     sketch: tuple[tuple[str, float, float], ...] = ()
-    units: Units = Units()
+    units: Units = field(default_factory=Units)
     ids: tuple[str, ...] = ()
     about: str | None = None
     source: str | None = None
@@ -133,8 +129,7 @@ class Mechanism:
     remarks: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class NamedPoint:
+class NamedPoint(NamedTuple):
     """A point under the name that results give it, and the (link, point) that lie there."""
 
     name: str
@@ -150,7 +145,7 @@ def with_inputs(mechanism: Mechanism, drives: tuple[Drive, ...]) -> Mechanism:
         if drive is None:
             return given
         told = {"position": drive.position, "velocity": drive.velocity, "acceleration": drive.acceleration}
-        return replace(given, **{key: value for key, value in told.items() if value is not None})
+        return given._replace(**{key: value for key, value in told.items() if value is not None})
 
     return replace(mechanism, inputs=tuple(changed(given) for given in mechanism.inputs))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,8 +24,7 @@ class Unknown(KeyError):
         return str(self.args[0])
 
 
-@dataclass(frozen=True)
-class PointState:
+class PointState(NamedTuple):
     """A point's position (m), velocity (m/s) and acceleration (m/s^2), each (2,), in the frame's axes."""
 
     position: Array
@@ -38,8 +37,7 @@ class PointState:
         return _sense(heading(self.velocity), float(self.velocity @ self.acceleration))
 
 
-@dataclass(frozen=True)
-class LinkState:
+class LinkState(NamedTuple):
     """A link's angle (rad), angular velocity (rad/s) and angular acceleration (rad/s^2), anticlockwise positive."""
 
     angle: float
@@ -52,8 +50,7 @@ class LinkState:
         return _sense(turning(self.angular_velocity), self.angular_velocity * self.angular_acceleration)
 
 
-@dataclass(frozen=True)
-class InputState:
+class InputState(NamedTuple):
     """An input's position, velocity and acceleration: rad or m, and per second."""
 
     position: float
@@ -61,8 +58,7 @@ class InputState:
     acceleration: float
 
 
-@dataclass(frozen=True)
-class RelativeState:
+class RelativeState(NamedTuple):
     """How one point moves against another, as seen from the axes of a link that carries the other (each (2,), SI).
 
     velocity = rotation + sliding, acceleration = centripetal + tangential + coriolis + sliding_acceleration,

@@ -4,21 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from planar.algebra import Scalar, sqrt
 from planar.plane import Vector, direction
 
 
-@dataclass(frozen=True)
-class At:
+class At(NamedTuple):
     """A point by its coordinates (m) in the axes in which the link was drawn."""
 
     x: Scalar
     y: Scalar
 
 
-@dataclass(frozen=True)
-class Along:
+class Along(NamedTuple):
     """A point at a signed distance (m) from `start` on the way to `towards`, that way turned by `angle` (rad)."""
 
     start: str
@@ -27,8 +26,7 @@ class Along:
     angle: Scalar = 0.0
 
 
-@dataclass(frozen=True)
-class Distances:
+class Distances(NamedTuple):
     """A point by its distances (m) from two points, to the left of the way from the first to the second, or right."""
 
     first: str
@@ -41,8 +39,7 @@ class Distances:
 Place = At | Along | Distances
 
 
-@dataclass(frozen=True)
-class Point:
+class Point(NamedTuple):
     """A named point of a link."""
 
     name: str

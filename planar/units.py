@@ -7,9 +7,9 @@ every other unit is looked up in pint, and a test holds the table to pint's own 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from functools import cache
 from math import pi
+from typing import NamedTuple
 
 SI = {
     "length": "m",
@@ -57,8 +57,7 @@ class UnitError(ValueError):
     """A text is no quantity, or one of another kind; its text says which and what would do."""
 
 
-@dataclass(frozen=True)
-class Unit:
+class Unit(NamedTuple):
     """A unit of one kind, `numerator / denominator` of the SI unit."""
 
     kind: str

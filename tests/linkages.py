@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from planar.plane import Frame, Vector, direction, frame_at
-from planar.solve.freedom import strength
-from planar.solve.position import Solver
+from planar.solving.freedom import strength
+from planar.solving.position import Solver
 
 
 @dataclass(frozen=True)

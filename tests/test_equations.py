@@ -11,11 +11,12 @@ from scipy.sparse.csgraph import structural_rank
 
 from planar import files
 from planar.equations import build
-from planar.graph import decompose, detached, linkage
+from planar.graph import detached, linkage
+from planar.groups import decompose
 from planar.pairs import Kind
 from planar.program import fitted, length, program, structure
 from planar.program import shapes as shapes_of
-from planar.solve.assemble import placed
+from planar.solving.assemble import placed
 from tests.linkages import random_linkage
 
 

@@ -6,10 +6,10 @@ import pytest
 
 from planar import files
 from planar.errors import NoAnswer, Outcome
-from planar.solve import position
-from planar.solve.follow import follow, run
-from planar.solve.gate import Branch, allowed
-from planar.solve.position import Solver
+from planar.solving import position
+from planar.solving.follow import follow, run
+from planar.solving.gate import Branch, allowed
+from planar.solving.position import Solver
 
 CRANK = {
     "planar": 1,

@@ -8,7 +8,7 @@ import pytest
 from planar import files
 from planar.errors import NoAnswer, Outcome
 from planar.mechanism import Drive
-from planar.solve import solve
+from planar.solving.position import solve
 
 FOUR_BAR = {
     "planar": 1,

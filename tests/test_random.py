@@ -8,8 +8,7 @@ from planar import files
 from planar.errors import NoAnswer, Outcome
 from planar.mechanism import Drive, Mechanism
 from planar.motion import State
-from planar.solve import solve
-from planar.solve.position import Solver
+from planar.solving.position import Solver, solve
 from tests.linkages import Built, conditioning, random_linkage
 
 seeds = st.integers(0, 10**6)

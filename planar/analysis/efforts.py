@@ -8,7 +8,7 @@ import numpy as np
 
 from planar.mechanism import Input
 from planar.motion import State
-from planar.solve.position import Solver
+from planar.solving.position import Solver
 
 
 def efforts(state: State) -> dict[str, float]:

@@ -9,7 +9,7 @@ import numpy as np
 from planar.analysis.efforts import efforts
 from planar.mechanism import Drive, Published
 from planar.motion import State
-from planar.solve import solve
+from planar.solving.position import solve
 from planar.words import heading, turning
 
 

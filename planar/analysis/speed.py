@@ -12,8 +12,8 @@ import numpy as np
 from planar.errors import NoAnswer
 from planar.mechanism import Mechanism
 from planar.program import Program, structure
-from planar.solve.follow import run
-from planar.solve.position import Solver
+from planar.solving.follow import run
+from planar.solving.position import Solver
 
 STEPS = 360
 

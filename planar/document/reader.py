@@ -363,7 +363,7 @@ def _drives(cursor: Cursor, key: str, mechanism: Mechanism) -> tuple[Drive, ...]
 
 
 def _published(cursor: Cursor, mechanism: Mechanism, points: Mapping[str, str]) -> Published:
-    cursor.only(*Published.__dataclass_fields__.keys() - {"start"}, "from")
+    cursor.only(*(set(Published._fields) - {"start"}), "from")
     quantity = cursor["quantity"].as_text()
     if quantity not in QUANTITIES:
         raise cursor.refuse("quantity", f"{quantity!r} is no quantity{did_you_mean(quantity, QUANTITIES)}")

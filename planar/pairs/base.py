@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, ClassVar, Protocol, Self
+from typing import Any, ClassVar, NamedTuple, Protocol, Self
 
 from planar.algebra import Scalar
 from planar.plane import Frame
@@ -108,8 +108,7 @@ class Pair(ABC):
         """Small closed configurations, in general position, on which every law is tried."""
 
 
-@dataclass(frozen=True)
-class Rewritten:
+class Rewritten(NamedTuple):
     """A short entry in full, the links that it brings, and the entry of the pair that is to join these.
 
     Where the file has an entry of that type and name already, the links are added to it instead.
@@ -120,8 +119,7 @@ class Rewritten:
     joined_by: dict[str, Any]
 
 
-@dataclass(frozen=True)
-class Sample:
+class Sample(NamedTuple):
     """A pair closed between two links, with everything that its formulas need."""
 
     pair: Pair

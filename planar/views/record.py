@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import asdict
 from typing import Any
 
 from planar.analysis.published import Comparison
@@ -17,8 +16,8 @@ def record(state: State, comparisons: Iterable[Comparison] = ()) -> dict[str, An
         "outcome": "solved",
         "mobility": state.mobility,
         "residual": state.residual,
-        "inputs": {name: asdict(given) for name, given in state.inputs.items()},
-        "links": {name: asdict(link) | {"sense": link.sense} for name, link in state.links.items()},
+        "inputs": {name: given._asdict() for name, given in state.inputs.items()},
+        "links": {name: link._asdict() | {"sense": link.sense} for name, link in state.links.items()},
         "points": {
             name: {
                 "position": point.position.tolist(),

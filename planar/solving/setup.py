@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from planar.mechanism import Input, Mechanism, motions
 from planar.pairs import Kind
 from planar.program import Program, extent, fitted, positions, program, rates, shapes, size
-from planar.solve.assemble import placed
-from planar.solve.gate import Gate
+from planar.solving.assemble import placed
+from planar.solving.gate import Gate
 from planar.words import amount, listed
 
 Array = np.ndarray
 
 
-@dataclass(frozen=True)
-class Station:
+class Station(NamedTuple):
     """The numbers of one position: inputs u with their rates (scaled), and the numbers p of the pairs."""
 
     u: Array

@@ -9,21 +9,21 @@ import numpy as np
 from planar.errors import NoAnswer, Outcome
 from planar.pairs import Kind
 from planar.program import length
-from planar.solve.assemble import Failure
-from planar.solve.setup import Setup
+from planar.solving.assemble import Failure
+from planar.solving.setup import Setup
 from planar.words import amount, listed
 
 
-def apart(setup: Setup, links: Sequence[str]) -> NoAnswer:
-    """Links that nothing joins to the frame."""
-    return NoAnswer(
-        Outcome.TOO_FEW_INPUTS,
-        f"no chain of pairs joins {_links(links)} to the frame {setup.mechanism.frame!r}; add a pair",
-    )
-
-
 def free(setup: Setup) -> NoAnswer:
-    """Links that the inputs leave free whatever the dimensions."""
+    """Links that the inputs leave free whatever the dimensions, or that nothing joins to the frame."""
+    from planar.graph import detached  # the graph library is slow to load, and only needed here
+
+    apart = detached(setup.mechanism)
+    if apart:
+        return NoAnswer(
+            Outcome.TOO_FEW_INPUTS,
+            f"no chain of pairs joins {_links(apart)} to the frame {setup.mechanism.frame!r}; add a pair",
+        )
     stages = [stage for stage in setup.equations.stages if stage.free]
     links = list(dict.fromkeys(link for stage in stages for link in stage.links))
     ways = sum(length(stage.unknowns) - length(stage.rows) for stage in stages)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import count
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from planar.mechanism import Mechanism, named_points
 from planar.pairs import Kind, Pair
 from planar.plane import GROUND, Frame, Vector, frame_at
 from planar.program import Program, length, shapes
-from planar.solve.newton import Closing, newton, polished
+from planar.solving.newton import Closing, newton, polished
 
 Array = np.ndarray
 
@@ -27,16 +27,14 @@ EXPANSIONS = 2000
 """Groups solved before the search stops looking for a nearer assembly and takes the best way to an end."""
 
 
-@dataclass(frozen=True)
-class Assembly:
+class Assembly(NamedTuple):
     """The unknowns of an assembly, and what is to be said of how it was chosen."""
 
     z: Array
     remarks: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class Failure:
+class Failure(NamedTuple):
     """The group at which every way to assemble ends, and how far its constraints stay open at the best (rows,)."""
 
     stage: Stage

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,8 +17,7 @@ LONGEST = 200
 """Iterations. A double root halves its error each time, so 27 take it from 1 to the square root of round-off."""
 
 
-@dataclass(frozen=True)
-class Found:
+class Found(NamedTuple):
     """Where each start ended: the unknowns, the greatest part left open, and whether that closes the group."""
 
     unknowns: Array

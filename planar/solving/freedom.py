@@ -7,9 +7,9 @@ import numpy as np
 from planar.equations import Stage
 from planar.pairs import Kind
 from planar.program import Motion, length
-from planar.solve import refusals
-from planar.solve.follow import corrected
-from planar.solve.setup import Setup
+from planar.solving import refusals
+from planar.solving.follow import corrected
+from planar.solving.setup import Setup
 
 Array = np.ndarray
 

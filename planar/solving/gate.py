@@ -7,7 +7,7 @@ parts, since the residual of a flipped linkage is zero too: is everything closed
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -99,8 +99,7 @@ def _gap(left: Array, kind: Kind, unit: float) -> Array:
     return np.abs(left)
 
 
-@dataclass(frozen=True)
-class Place:
+class Place(NamedTuple):
     """A position of a run: unknowns, their first and second rates along it, and the sign of each group's slope."""
 
     z: Array

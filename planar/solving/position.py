@@ -8,15 +8,14 @@ from dataclasses import replace
 import numpy as np
 
 from planar.algebra import Jet
-from planar.graph import detached
 from planar.mechanism import Drive, Mechanism, with_inputs
 from planar.motion import State
 from planar.program import Motion, length, program
-from planar.solve import refusals
-from planar.solve.assemble import Assembler, Assembly, Failure, placed
-from planar.solve.follow import follow
-from planar.solve.freedom import cancelled, mobility
-from planar.solve.setup import Setup
+from planar.solving import refusals
+from planar.solving.assemble import Assembler, Assembly, Failure, placed
+from planar.solving.follow import follow
+from planar.solving.freedom import cancelled, mobility
+from planar.solving.setup import Setup
 
 Array = np.ndarray
 
@@ -44,9 +43,6 @@ class Solver(Setup):
 
     def assembly(self) -> Assembly:
         """The assembly nearest to the sketch. Raises NoAnswer."""
-        loose = detached(self.mechanism)
-        if loose:
-            raise refusals.apart(self, loose)
         if any(stage.free for stage in self.equations.stages):
             raise refusals.free(self)
         found = Assembler(self.mechanism, self.program, self.station.u, self.station.p, self.unit).search()
@@ -55,11 +51,14 @@ class Solver(Setup):
         return Assembly(found.z, (*self.mechanism.remarks, *found.remarks))
 
     def _contradicted(self, failure: Failure) -> bool:
-        """Whether what does not close is held twice only because of the inputs."""
+        """Whether what does not close is held more than once because the inputs are more than the pairs leave free.
+
+        Where the pairs leave nothing free by count, it is their dimensions that have to agree.
+        """
         if length(failure.stage.rows) <= length(failure.stage.unknowns):
             return False
         bare = program(replace(self.mechanism, inputs=())).equations
-        return all(length(stage.rows) <= length(stage.unknowns) for stage in bare.stages)
+        return 0 < bare.z.numel() - bare.F.numel() < len(self.mechanism.inputs)
 
     def state(self, z: Array, remarks: tuple[str, ...] = ()) -> State:
         """The state at given unknowns, once they and their rates have passed the gate. Raises NoAnswer."""

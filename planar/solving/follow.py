@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from planar.errors import NoAnswer, Outcome
 from planar.program import Program, length
-from planar.solve.gate import Branch
+from planar.solving.gate import Branch
 
 Array = np.ndarray
 
@@ -36,8 +35,7 @@ class Followed(Protocol):
         """A position of the inputs in words."""
 
 
-@dataclass(frozen=True)
-class Run:
+class Run(NamedTuple):
     """Unknowns at every sample (samples, unknowns), and how many samples the general path had to solve."""
 
     z: Array

@@ -1,0 +1,73 @@
+"""How the time of each step of solving grows with the number of links."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+import planar
+from benchmarks import chain
+from benchmarks.comparison import error
+from benchmarks.timing import best
+from benchmarks.ways.trial import CRANK
+from planar.equations import build
+from planar.program import Program, structure
+from planar.solving.follow import run
+from planar.solving.position import Solver
+
+Array = np.ndarray
+
+LINKS = (4, 10, 20, 40)
+
+
+@dataclass(frozen=True)
+class Growth:
+    """Seconds of each step for one number of links, and the greatest errors of the last rocker (see `error`).
+
+    `equations`: the mechanism to its equations; `program`: these to the program of a run; `assembly`: the sketch to an
+    assembly; `position`: a known assembly to a gated state with its rates; `run`: a position of a gated run of a turn.
+    """
+
+    links: int
+    equations: float
+    program: float
+    assembly: float
+    position: float
+    position_error: float
+    run: float
+    run_error: float
+
+
+def grow(links: int) -> Growth:
+    """Time a row of four-bars."""
+    mechanism = planar.from_dict(chain.document(links))
+    solver = Solver(mechanism)
+    z, u, p = solver.assembly().z, CRANK[:, None], solver.station.p
+    steps = len(u) - 1
+    equations = build(structure(mechanism))
+    times = best(
+        {
+            "equations": lambda: build(structure(mechanism)),
+            "program": lambda: Program(equations).runs(steps),
+            "assembly": solver.assembly,
+            "position": lambda: solver.state(z),
+            "run": lambda: run(solver, p, z, u),
+        }
+    )
+    exact = np.array(chain.motion(np, links, CRANK.astype(np.longdouble)))[..., None]
+    rocker = chain.last_rocker(links)
+    column = solver.column[rocker, "angle"]
+    found = solver.program.positions(run(solver, p, z, u).z.T, u.T, p).full()[column]
+    state = solver.state(z).link(rocker)
+    rates = np.array([state.angle, state.angular_velocity, state.angular_acceleration])
+    return Growth(
+        links=links,
+        equations=times["equations"],
+        program=times["program"],
+        assembly=times["assembly"],
+        position=times["position"],
+        position_error=error(rates[:, None, None], exact[:, :1], [True], exact),
+        run=times["run"] / steps,
+        run_error=error(found[None, :, None], exact[:1], [True], exact),
+    )

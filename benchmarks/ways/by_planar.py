@@ -1,0 +1,119 @@
+"""planar: its general path, its run through the gate, the run's program without it, and single positions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+import planar
+from benchmarks.linkages import Linkage
+from benchmarks.ways.trial import CRANK, Array, Trial
+from planar.mechanism import Drive, with_inputs
+from planar.motion import State
+from planar.solving.follow import follow, run
+from planar.solving.position import Solver, solve
+
+
+class Turn:
+    """A linkage over a turn of its crank, in planar's unknowns z (samples, unknowns) and inputs u (samples, 1)."""
+
+    def __init__(self, linkage: Linkage):
+        self.mechanism = planar.from_dict(linkage.document())
+        self.solver = Solver(self.mechanism)
+        self.start = self.solver.assembly().z
+        self.u = CRANK[:, None]
+        self.numbers = self.solver.station.p
+        self._columns = [self.solver.column[name] for name in linkage.answers]
+        self._scale = [1.0 if part == "angle" else self.solver.unit for _, part in linkage.answers]
+
+    def general(self) -> Array:
+        """z by the general path, sample by sample, both parts of the gate at each."""
+        z = np.empty((len(self.u), self.start.size))
+        z[0] = self.start
+        for index in range(1, len(self.u)):
+            z[index] = follow(self.solver, self.numbers, z[index - 1], self.u[index - 1], self.u[index])
+        return z
+
+    def gated(self) -> Array:
+        """z by one call of the run's program, then both parts of the gate for all samples."""
+        return run(self.solver, self.numbers, self.start, self.u).z
+
+    def bare(self) -> Array:
+        """z by one call of the run's program alone."""
+        steps = len(self.u) - 1
+        found = self.solver.program.runs(steps)(
+            self.start, self.u[1:].T, np.repeat(self.numbers[:, None], steps, axis=1)
+        )
+        return np.vstack([self.start, found.full().T])
+
+    def rates(self, z: Array) -> tuple[Array, Array, Array]:
+        """z with its first and second rates: two calls of the program and two small systems a sample, ungated."""
+        station, kinematics = self.solver.station, self.solver.program.kinematics
+        still, z1, z2 = np.zeros_like(self.start), np.empty_like(z), np.empty_like(z)
+        for index, (at, u) in enumerate(zip(z, self.u, strict=True)):
+            y, y2 = np.concatenate([at, u]), np.concatenate([still, station.u2])
+            rest = kinematics(y, np.concatenate([still, station.u1]), y2, station.p)
+            z1[index] = -np.linalg.solve(rest.slope, rest.F1)
+            moving = kinematics(y, np.concatenate([z1[index], station.u1]), y2, station.p)
+            z2[index] = -np.linalg.solve(rest.slope, moving.F2)
+        return z, z1, z2
+
+    def stations(self) -> list[tuple[Solver, Array]]:
+        """A solver for every sample, with the unknowns there."""
+        pair = self.mechanism.inputs[0].pair
+        moved = (with_inputs(self.mechanism, (Drive(pair, position=float(u[0])),)) for u in self.u)
+        return [(Solver(mechanism), z) for mechanism, z in zip(moved, self.gated(), strict=True)]
+
+    def answers(self, z: Array) -> Array:
+        """The linkage's answers (1, samples, 2) at z."""
+        w = self.solver.program.positions(z.T, self.u.T, self.numbers).full()
+        return (w[self._columns].T * self._scale)[None]
+
+    def answers_with_rates(self, found: tuple[Array, Array, Array]) -> Array:
+        """The linkage's answers (3, samples, 2) at z with its rates."""
+        station = self.solver.station
+        answers = np.empty((3, len(self.u), 2))
+        for index, (z, z1, z2, u) in enumerate(zip(*found, self.u, strict=True)):
+            y1, y2 = np.concatenate([z1, station.u1]), np.concatenate([z2, station.u2])
+            motion = self.solver.program.kinematics(np.concatenate([z, u]), y1, y2, station.p)
+            for order, w in enumerate((motion.w, motion.w1, motion.w2)):
+                answers[order, index] = w[self._columns] * self._scale
+        return answers
+
+
+def trials(linkage: Linkage) -> tuple[Trial, ...]:
+    """planar's ways, the most guarded first."""
+    turn = Turn(linkage)
+    stations = turn.stations()
+    samples = len(CRANK)
+
+    def with_rates(positions: Callable[[], Array]) -> Callable[[], tuple[Array, Array, Array]]:
+        return lambda: turn.rates(positions())
+
+    def states(found: list[State]) -> Array:
+        return np.stack([_answers(linkage, state) for state in found], axis=1)
+
+    ways = (
+        ("planar, general path", turn.general),
+        ("planar, run through the gate", turn.gated),
+        ("planar, the run's program alone", turn.bare),
+    )
+    return (
+        Trial("planar.solve, from the sketch", True, 1, lambda: [solve(turn.mechanism)], states),
+        Trial("planar Solver.state, z known", True, samples, lambda: [s.state(z) for s, z in stations], states),
+        *(Trial(way, False, samples, positions, turn.answers) for way, positions in ways),
+        *(Trial(way, True, samples, with_rates(positions), turn.answers_with_rates) for way, positions in ways),
+    )
+
+
+def _answers(linkage: Linkage, state: State) -> Array:
+    """The linkage's answers (3, 2) in one state."""
+    found = []
+    for name, part in linkage.answers:
+        if part == "angle":
+            link = state.link(name)
+            found.append((link.angle, link.angular_velocity, link.angular_acceleration))
+        else:
+            found.append(tuple(state.pair(name).values()))
+    return np.array(found).T

@@ -1,0 +1,89 @@
+"""Constraints split into the smallest groups that can be solved one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
+from typing import NamedTuple
+
+import casadi as ca
+
+
+class Group(NamedTuple):
+    """Constraints and coordinates that are solved together: `rows` close them, given all earlier groups.
+
+    More rows than columns: some are redundant or in conflict. `free`: the constraints leave the columns free.
+    """
+
+    rows: tuple[int, ...]
+    columns: tuple[int, ...]
+    free: bool = False
+
+
+def decompose(rows: Sequence[AbstractSet[int]], columns: int) -> tuple[Group, ...]:
+    """Split constraints into groups, in an order in which they can be solved.
+
+    `rows[i]` holds the columns (coordinates) on which constraint i depends. Dulmage and Mendelsohn: a maximum matching
+    parts the whole into an over-, a well- and an under-determined part, and the strong components of the matched
+    columns are the smallest groups (A. Pothen, C.-J. Fan, ACM Trans. Math. Softw. 16, 1990; both steps as in
+    T. Davis' CSparse, which casadi carries). A constraint left unmatched joins the last group that it touches, which
+    then has more rows than columns; columns left unmatched come last, and what rests on them is free.
+    """
+    row_of = _matching(rows, columns)
+    free = _resting_on([column for column in range(columns) if column not in row_of], rows, row_of)
+    blocks = _components(rows, row_of)
+    place = {column: index for index, block in enumerate(blocks) for column in block}
+    held_by = [[row_of[column] for column in block] for block in blocks]
+    idle: list[int] = []
+    matched = set(row_of.values())
+    for row in range(len(rows)):
+        if row not in matched:
+            touched = [place[column] for column in rows[row]]
+            (held_by[max(touched)] if touched else idle).append(row)
+    groups = [
+        Group(tuple(sorted(held)), tuple(block), not free.isdisjoint(block))
+        for held, block in zip(held_by, blocks, strict=True)
+    ]
+    loose = tuple(column for column in range(columns) if column not in row_of)
+    if idle:
+        groups.append(Group(tuple(idle), ()))
+    if loose:
+        groups.append(Group((), loose, free=True))
+    return tuple(groups)
+
+
+def _matching(rows: Sequence[AbstractSet[int]], columns: int) -> dict[int, int]:
+    """A maximum matching: the row of every matched column."""
+    pattern = ca.Sparsity.triplet(
+        len(rows), columns, [row for row, held in enumerate(rows) for _ in held], [c for held in rows for c in held]
+    )
+    _, p, q, _, _, coarse_rows, coarse_columns = pattern.btf()
+    # unmatched rows come first, then three parts in which rows and columns stand in matched order, then loose columns
+    return dict(zip(q[: coarse_columns[3]], p[coarse_rows[1] :], strict=True))
+
+
+def _components(rows: Sequence[AbstractSet[int]], row_of: dict[int, int]) -> list[list[int]]:
+    """The strong components of the matched columns, each after those whose values its rows need."""
+    order = sorted(row_of)
+    index = {column: position for position, column in enumerate(order)}
+    needs = [(index[column], index[other]) for column in order for other in rows[row_of[column]] if other in index]
+    pattern = ca.Sparsity.triplet(len(order), len(order), [a for a, _ in needs], [b for _, b in needs])
+    blocks, p, starts = pattern.scc()
+    return [sorted(order[k] for k in p[starts[b] : starts[b + 1]]) for b in reversed(range(blocks))]
+
+
+def _resting_on(loose: Sequence[int], rows: Sequence[AbstractSet[int]], row_of: dict[int, int]) -> set[int]:
+    """The columns that stay free: the loose ones, and those whose constraints touch a free one."""
+    touching: dict[int, list[int]] = {}
+    column_of = {row: column for column, row in row_of.items()}
+    for row, held in enumerate(rows):
+        for column in held:
+            touching.setdefault(column, []).append(row)
+    free, waiting = set(loose), list(loose)
+    while waiting:
+        for row in touching.get(waiting.pop(), ()):
+            column = column_of.get(row)
+            if column is not None and column not in free:
+                free.add(column)
+                waiting.append(column)
+    return free
