@@ -48,18 +48,14 @@ def growth(measured: Iterable[Growth]) -> RenderableType:
     )
     first = measured[0]
     for each in measured:
-
-        def step(seconds: float, least: float) -> str:
-            return f"{_time(seconds)} ({_ratio(seconds / least)})"
-
         table.add_row(
             str(each.links),
-            step(each.equations, first.equations),
-            step(each.program, first.program),
-            step(each.assembly, first.assembly),
-            step(each.position, first.position),
+            _step(each.equations, first.equations),
+            _step(each.program, first.program),
+            _step(each.assembly, first.assembly),
+            _step(each.position, first.position),
             _error(each.position_error),
-            step(each.run, first.run),
+            _step(each.run, first.run),
             _error(each.run_error),
         )
     return table
@@ -84,9 +80,10 @@ def costs(measured: Iterable[Cost]) -> RenderableType:
 def notes() -> RenderableType:
     """What the numbers are."""
     return Text(
-        "Times are the best of several rounds run in turn, processes the median of their runs; ratios are to the "
-        "closed form in Python floats. Ways over a turn of the crank: 360 steps, time a position. Errors are against "
-        "the closed form in longer arithmetic, as a part of the greatest value that a quantity takes in the turn. "
+        "Only ratios mean anything on a shared machine; those of the ways are to the closed form in Python floats. "
+        "Times are the best of several rounds run in turn, processes the median of their runs. The ways solve a turn "
+        "of the crank in 360 steps, and their time is that of one position. Errors are against the closed form in "
+        "longer arithmetic, as a part of the greatest value that a quantity takes in the turn. "
         "Rates of planar's runs come sample by sample from the program and are ungated: planar has no rates of a "
         "whole run yet.",
         style="italic",
@@ -98,6 +95,10 @@ def _time(seconds: float) -> str:
         if seconds >= size:
             return f"{seconds / size:.3g} {name}"
     return f"{seconds / 1e-9:.3g} ns"
+
+
+def _step(seconds: float, first: float) -> str:
+    return f"{_time(seconds)} ({_ratio(seconds / first)})"
 
 
 def _ratio(ratio: float) -> str:

@@ -8,27 +8,30 @@ from typing import Any, TypeVar
 
 Name = TypeVar("Name", bound=Hashable)
 
-ROUNDS = 40
-"""Most rounds of a task."""
-FEWEST = 4
-"""Rounds of a task that are run however long they take."""
-BUDGET = 0.6
-"""Seconds after which a task that has had its fewest rounds is run no more."""
+ROUNDS = 8
+SLICE = 0.02
+"""Seconds that a task has in each round; it is called at least once, however long that takes."""
 
 
 def best(tasks: Mapping[Name, Callable[[], Any]]) -> dict[Name, float]:
-    """Seconds of one call of each task, the least over the rounds.
+    """Seconds of one call of each task, the least of all its calls.
 
-    Every round calls each task once, so that what else the machine does meanwhile falls on all of them alike; a call
-    before the first round, whose time does not count, fills the caches.
+    The tasks take turns, so that what else the machine does meanwhile falls on all of them alike; a call before the
+    first round, whose time does not count, fills the caches.
     """
     for task in tasks.values():
         task()
-    times: dict[Name, list[float]] = {name: [] for name in tasks}
+    least = dict.fromkeys(tasks, float("inf"))
     for _ in range(ROUNDS):
         for name, task in tasks.items():
-            if len(times[name]) < FEWEST or sum(times[name]) < BUDGET:
-                start = perf_counter()
-                task()
-                times[name].append(perf_counter() - start)
-    return {name: min(seconds) for name, seconds in times.items()}
+            least[name] = min(least[name], _least(task))
+    return least
+
+
+def _least(task: Callable[[], Any]) -> float:
+    """The least time of the calls that fit into a slice."""
+    least, end = float("inf"), perf_counter() + SLICE
+    while (start := perf_counter()) < end:
+        task()
+        least = min(least, perf_counter() - start)
+    return least

@@ -142,9 +142,10 @@ def _show(renderable: Any, output: Path | None) -> None:
         # what is not a terminal has no width: lines are not to be broken for a file or another program
         (console if console.is_terminal else Console(width=140, soft_wrap=False)).print(renderable)
         return
-    from planar.views.saved import save
+    from planar.files import save
+    from planar.views.saved import written
 
-    save(renderable, output)
+    save(output, written(renderable, output.suffix))
 
 
 if __name__ == "__main__":

@@ -40,6 +40,14 @@ def load(model: str | Path) -> Mechanism:
     return loads(_content(found(model)))
 
 
+def save(path: Path, text: str) -> None:
+    """Write a text to a file. Raises BadInput."""
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as problem:
+        raise BadInput(str(path), f"the file cannot be written: {problem.strerror}") from None
+
+
 def found(model: str | Path) -> Path:
     """The file that a MODEL argument means: a path, else the name or id of a model that comes along."""
     path = Path(model)

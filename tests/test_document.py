@@ -283,7 +283,7 @@ def test_links_left_out_are_all_that_carry_the_point_the_frame_first() -> None:
 
 
 def test_a_pin_of_n_links_is_n_minus_1_pairs_and_every_relative_motion_has_a_name() -> None:
-    m = read((["pairs", 2], {"turning": "C", "links": ["link", "rod", "rocker"]}), of="two dyads")
+    m = read((["pairs", 2, "links"], ["link", "rod", "rocker"]), of="two dyads")
     assert pins(m)[2:4] == [("C:link,rod", ("link", "rod")), ("C:link,rocker", ("link", "rocker"))]
     assert len(m.pairs) == 7
     about_c = [name for name in motions(m) if name.startswith("C")]
@@ -573,7 +573,7 @@ MISTAKES = [
     mistake("units/length", "x" * 100_000, "$.units.length", "unit"),
     # frame
     mistake("frame", GONE, "$", "'frame'", "missing"),
-    mistake("frame", "BD", "$.frame", "no link 'BD'", "'AD'"),
+    mistake("frame", "Ad", "$.frame", "no link 'Ad'", "'AD'"),
     mistake("frame", ["AD"], "$.frame", "text", "a list"),
     mistake("frame", "nothing like it", "$.frame", "no link 'nothing like it'"),
     # links
@@ -614,7 +614,7 @@ MISTAKES = [
     mistake("links/A:B", {"points": {"A": [0, 0]}}, "$.links['A:B']", "'A:B'", "':'"),
     mistake("links/A,B", {"points": {"A": [0, 0]}}, "$.links['A,B']", "'A,B'", "','"),
     mistake("links/ ", {"points": {"A": [0, 0]}}, "$.links[' ']", "empty"),
-    mistake("links/x[\nfoo", 5, r"$.links['x[\nfoo']", "object"),
+    mistake("links/x[\nfoo", 5, r"$.links['x[\nfoo']", "name"),
     # points of links
     mistake("links/AD/points", [[0, 0]], "$.links.AD.points", "object", "a list"),
     mistake("links/AD/points/D", [100], "$.links.AD.points.D", "two numbers", "1"),
@@ -636,11 +636,12 @@ MISTAKES = [
     mistake(f"{ALONG}/left_of", ["B", "C"], "$.links.BC.points.E.left_of", "'left_of'"),
     mistake(f"{ALONG}/distances", {"B": 1, "C": 1}, "$.links.BC.points.E.distances", "'distances'"),
     mistake(f"{TRIANGLE}/distances", {"B": 5, "C": 5}, "$.links.BC.points.F", "does not close", "B-C-F"),
-    mistake(f"{TRIANGLE}/distances", {"B": 5, "C": 1e200}, "$.links.BC.points.F", "C"),
+    mistake(f"{TRIANGLE}/distances", {"B": 5, "C": 1e99}, "$.links.BC.points.F", "does not close"),
+    mistake(f"{TRIANGLE}/distances", {"B": 5, "C": 1e200}, "$.links.BC.points.F.distances.C", "too large"),
     mistake(f"{TRIANGLE}/distances", {"B": 45}, "$.links.BC.points.F.distances", "two points", "1"),
     mistake(f"{TRIANGLE}/distances", {"B": 45, "C": 0}, "$.links.BC.points.F.distances.C", "above zero"),
     mistake(f"{TRIANGLE}/distances", {"B": 45, "E": 30}, "$.links.BC.points.F.right_of", "B and E"),
-    mistake(f"{TRIANGLE}/distances", {"B\nX": 45, "C": 30}, "$.links.BC.points.F.right_of", "C"),
+    mistake(f"{TRIANGLE}/distances", {"B\nX": 45, "C": 30}, r"$.links.BC.points.F.distances['B\nX']", "name"),
     mistake(f"{TRIANGLE}/distances", [45, 30], "$.links.BC.points.F.distances", "object", "a list"),
     mistake(f"{TRIANGLE}/right_of", GONE, "$.links.BC.points.F", "'left_of'", "'right_of'"),
     mistake(f"{TRIANGLE}/left_of", ["B", "C"], "$.links.BC.points.F", "'left_of'", "'right_of'"),
@@ -666,7 +667,7 @@ MISTAKES = [
     mistake("pairs/0/turning", "Z", "$.pairs[0].turning", "'AD'", "no point 'Z'"),
     mistake("pairs/0", {"turning": "Z"}, "$.pairs[0].turning", "no link", "'Z'"),
     mistake("pairs/0", {"turning": "E"}, "$.pairs[0].turning", "two links", "only link 'BC'", "'links'"),
-    mistake("pairs/0/links", ["AD", "BA"], "$.pairs[0].links[1]", "no link 'BA'", "did you mean"),
+    mistake("pairs/0/links", ["AD", "Ab"], "$.pairs[0].links[1]", "no link 'Ab'", "did you mean 'AB'"),
     mistake("pairs/0/links", ["AD"], "$.pairs[0].links", "two links"),
     mistake("pairs/0/links", ["AD", "AB", "AD"], "$.pairs[0].links", "'AD'", "twice"),
     mistake("pairs/0/links", "AD", "$.pairs[0].links", "list", "'AD'"),

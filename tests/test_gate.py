@@ -139,11 +139,11 @@ def test_residual_is_judged_with_cos_and_sin_made_afresh_from_the_angle(solver):
     """A program that carries a wrong sine beside the right angle closes its own equations, not the gate's."""
     frames, own = solver.state(solver.assembly().z).frames, dict.fromkeys(solver.pairs, ())
     still = {n: f if f.fixed else type(f)(*(x.parts[0] for x in f[:5])) for n, f in frames.items()}
-    assert solver.gate.open(still, own).max() < solver.tolerance
+    assert solver.gate.gaps(still, own).max() < solver.tolerance
     bent = still["BC"]
     still["BC"] = bent._replace(angle=bent.angle + 0.1)
     afresh = {n: f if f.fixed else f._replace(cos=np.cos(f.angle), sin=np.sin(f.angle)) for n, f in still.items()}
-    assert solver.gate.open(afresh, own).max() > 0.01
+    assert solver.gate.gaps(afresh, own).max() > 0.01
 
 
 def test_a_move_is_allowed_if_the_rates_at_its_ends_explain_it():

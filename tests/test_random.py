@@ -66,7 +66,13 @@ def test_velocities_and_accelerations_are_the_derivatives_at_order_two(seed, lin
             Drive(g.pair, g.position + g.velocity * t + g.acceleration * t * t / 2, g.velocity + g.acceleration * t)
             for g in mechanism.inputs
         ]
-        return solve(mechanism, drives)
+        try:
+            return solve(mechanism, drives)
+        except NoAnswer as problem:
+            # a limit may lie within the step where one group drives the next much faster than it moves itself
+            assert problem.outcome is Outcome.BRANCH_LOST
+            assume(False)
+            raise
 
     errors = []
     for step in (2e-3, 1e-3):
@@ -90,9 +96,7 @@ def test_velocities_and_accelerations_are_the_derivatives_at_order_two(seed, lin
 def test_micrometres_or_kilometres_give_the_same_numbers(seed, links, factor):
     built = random_linkage(seed, links)
     mechanism, state = assembled(built, 0.01)
-    value = built.value | {
-        "units": {"length": f"{factor:g} m"[2:] if factor == 1 else {1e-6: "um", 1e-3: "mm", 1e3: "km"}[factor]}
-    }
+    value = built.value | {"units": {"length": {1e-6: "um", 1e-3: "mm", 1e3: "km"}[factor]}}
     slides = {pair.name for pair in mechanism.pairs if pair.coordinates}
     value["inputs"] = [
         given | {key: given[key] * factor for key in ("velocity", "acceleration") if given["pair"] in slides}

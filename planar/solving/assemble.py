@@ -35,10 +35,12 @@ class Assembly(NamedTuple):
 
 
 class Failure(NamedTuple):
-    """The group at which every way to assemble ends, and how far its constraints stay open at the best (rows,)."""
+    """The group at which every way to assemble ends, how far its constraints stay open at the best (rows,), and the
+    unknowns with those of the earlier groups filled in."""
 
     stage: Stage
     open: Array
+    z: Array
 
 
 class Assembler:
@@ -90,7 +92,7 @@ class Assembler:
             stage = self.equations.stages[len(ranks)]
             found, gap = self.candidates(stage, z)
             if not found and (worst is None or stage.level > worst.stage.level):
-                worst = Failure(stage, gap)
+                worst = Failure(stage, gap, z)
             for rank, (more, late, unknowns) in enumerate(found):
                 total = round((cost + more) / ALIKE) * ALIKE
                 heapq.heappush(heap, (total, behind + late, (*ranks, rank), next(number), unknowns))

@@ -112,11 +112,11 @@ def _passing(solver: Followed, p: Array, z: Array, u: Array) -> int:
     return len(keeps) if keeps.all() else int(np.argmin(keeps))
 
 
-def corrected(program: Program, p: Array, z: Array, u: Array) -> Array | None:
-    """Newton's corrector, group after group, from unknowns near by; None where one does not close."""
+def corrected(program: Program, p: Array, z: Array, u: Array, last: int | None = None) -> Array | None:
+    """Newton's corrector, group after group (to the `last`), from unknowns near by; None where one does not close."""
     z = z.copy()
     for stage in program.equations.stages:
-        if not length(stage.rows):
+        if not length(stage.rows) or (last is not None and stage.level > last):
             continue
         closing = program.closing(stage)
         before = np.inf

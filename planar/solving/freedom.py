@@ -41,7 +41,8 @@ def mobility(setup: Setup, z: Array, motion: Motion) -> int:
     links = _moving_at_rest(setup, motion.slope) or list(dict.fromkeys(link for stage in weak for link in stage.links))
     if found <= inputs:
         raise refusals.dead_point(setup, links)
-    raise (refusals.ever_free if _always_weak(setup, z) else refusals.change_point)(setup, links, found)
+    free = any(always_weak(setup, stage, z) for stage in weak)
+    raise refusals.ever_free(setup, links) if free else refusals.change_point(setup, links, found)
 
 
 def strength(setup: Setup, stage: Stage, slope: Array) -> float:
@@ -81,18 +82,21 @@ def _agree(setup: Setup, motion: Motion) -> bool:
     return bool(np.max(np.abs(left), initial=0.0) <= 1e-9 * scale)
 
 
-def _always_weak(setup: Setup, z: Array) -> bool:
-    """Whether the velocity is undetermined in closed positions near by too, so that it is no matter of this one."""
+def always_weak(setup: Setup, stage: Stage, z: Array) -> bool:
+    """Whether a group is singular in closed positions near by too, so that it is no matter of this one."""
     u, p = setup.station.u, setup.station.p
     for seed in range(3):
         rng = np.random.default_rng(seed)
         near = u + rng.uniform(-NEAR_BY, NEAR_BY, u.size)
-        moved = corrected(setup.program, p, z + rng.uniform(-NEAR_BY, NEAR_BY, z.size), near)
-        if moved is not None:
-            y = np.concatenate([moved, near])
-            if _rank(setup.program.kinematics(y, 0.0 * y, 0.0 * y, p).slope) == z.size:
-                return False
+        moved = corrected(setup.program, p, z + rng.uniform(-NEAR_BY, NEAR_BY, z.size), near, stage.level)
+        if moved is not None and strength(setup, stage, slope_at(setup, moved, near)) > SINGULAR:
+            return False
     return True
+
+
+def slope_at(setup: Setup, z: Array, u: Array) -> Array:
+    """dF/dz (rows, unknowns) at unknowns z and inputs u."""
+    return setup.program.slopes(z[None], u[None], setup.station.p)[0][0]
 
 
 def _moving_at_rest(setup: Setup, slope: Array) -> list[str]:

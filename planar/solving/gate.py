@@ -45,7 +45,7 @@ class Gate:
     def _measured(self) -> list[tuple[str, Pair]]:
         return [(pair.name, pair) for pair in self.mechanism.pairs]
 
-    def open(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Array]], u: Array | None = None) -> Array:
+    def gaps(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Array]], u: Array | None = None) -> Array:
         """How far every constraint is open (constraints, ...): lengths of the size, or rad; see `names`.
 
         Frames with cos and sin made from their angles, floats or arrays alike. `u` (inputs, ...) are the positions
@@ -54,9 +54,7 @@ class Gate:
         gaps = [_gap(left, kind, self.unit) for kind, left in self._closures(frames, own, u)]
         return np.nan_to_num(np.array(np.broadcast_arrays(*gaps) if gaps else [0.0]), nan=np.inf, posinf=np.inf)
 
-    def open_rates(
-        self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Jet]], order: int
-    ) -> tuple[float, str]:
+    def rate_gap(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Jet]], order: int) -> tuple[float, str]:
         """How far velocities (order 1) or accelerations (2) break the worst constraint, as a part of the greatest."""
         greatest = max((self._rate(frame, order) for frame in frames.values() if not frame.fixed), default=0.0)
         greatest = max([greatest, *(abs(x.parts[order]) / self.unit for each in own.values() for x in each)])

@@ -8,13 +8,14 @@ from dataclasses import replace
 import numpy as np
 
 from planar.algebra import Jet
+from planar.errors import NoAnswer
 from planar.mechanism import Drive, Mechanism, with_inputs
 from planar.motion import State
 from planar.program import Motion, length, program
 from planar.solving import refusals
 from planar.solving.assemble import Assembler, Assembly, Failure, placed
 from planar.solving.follow import follow
-from planar.solving.freedom import cancelled, mobility
+from planar.solving.freedom import SINGULAR, always_weak, cancelled, mobility, slope_at, strength
 from planar.solving.setup import Setup
 
 Array = np.ndarray
@@ -47,8 +48,16 @@ class Solver(Setup):
             raise refusals.free(self)
         found = Assembler(self.mechanism, self.program, self.station.u, self.station.p, self.unit).search()
         if isinstance(found, Failure):
-            raise refusals.too_many(self) if self._contradicted(found) else refusals.not_assembled(self, found)
+            raise self._unassembled(found)
         return Assembly(found.z, (*self.mechanism.remarks, *found.remarks))
+
+    def _unassembled(self, failure: Failure) -> NoAnswer:
+        slope = slope_at(self, failure.z, self.station.u)
+        for stage in self.equations.stages[: failure.stage.level]:
+            # a group that could stand anywhere was put somewhere, and what comes after it need not fit there
+            if strength(self, stage, slope) < SINGULAR and always_weak(self, stage, failure.z):
+                return refusals.ever_free(self, stage.links)
+        return refusals.too_many(self) if self._contradicted(failure) else refusals.not_assembled(self, failure)
 
     def _contradicted(self, failure: Failure) -> bool:
         """Whether what does not close is held more than once because the inputs are more than the pairs leave free.
@@ -62,7 +71,7 @@ class Solver(Setup):
 
     def state(self, z: Array, remarks: tuple[str, ...] = ()) -> State:
         """The state at given unknowns, once they and their rates have passed the gate. Raises NoAnswer."""
-        gaps = self.open(z[None], self.station.u[None])[:, 0]
+        gaps = self.gaps(z[None], self.station.u[None])[:, 0]
         worst = int(np.argmax(gaps))
         if gaps[worst] > self.tolerance:
             raise refusals.not_closed(self, self.gate.names[worst], float(gaps[worst]))
@@ -92,7 +101,7 @@ class Solver(Setup):
         parts = np.stack([motion.w, motion.w1, motion.w2], axis=1) * self.scale[:, None]
         frames, own = placed([Jet(*each) for each in parts.tolist()], self.column, self.shapes, self.pairs)
         for order, what in ((1, "velocities"), (2, "accelerations")):
-            gap, pair = self.gate.open_rates(frames, own, order)
+            gap, pair = self.gate.rate_gap(frames, own, order)
             if gap > 1e3 * self.tolerance:
                 if self.station.u.size > found:
                     raise refusals.disagreeing(self, found, what)

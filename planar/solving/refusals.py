@@ -35,12 +35,12 @@ def free(setup: Setup) -> NoAnswer:
     )
 
 
-def ever_free(setup: Setup, links: Sequence[str], mobility: int) -> NoAnswer:
+def ever_free(setup: Setup, links: Sequence[str]) -> NoAnswer:
     """Links that stay free while others hold each other more than once."""
     return NoAnswer(
         Outcome.TOO_FEW_INPUTS,
-        f"the mechanism has {_freedoms(setup, mobility)}: {_links(links)} can still move, while other links hold each "
-        f"other more than once; give an input at {_pairs_of(setup, links, 6)}",
+        f"with {_many(len(setup.mechanism.inputs), 'input')} {_links(links)} can still move, while some of the links "
+        f"hold each other more than once; give an input at {_pairs_of(setup, links, 6)}",
     )
 
 

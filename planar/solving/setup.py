@@ -52,17 +52,17 @@ class Setup:
         """What the gate lets pass: round-off of the residual, in lengths of the size."""
         return self.gate.tolerance
 
-    def open(self, z: Array, u: Array) -> Array:
+    def gaps(self, z: Array, u: Array) -> Array:
         """What every constraint leaves open (constraints, samples); z (samples, unknowns), u (samples, inputs)."""
         w = self.program.positions(z.T, u.T, self.station.p).full()
         scale = np.array([self.unit if self._slides(given) else 1.0 for given in self.mechanism.inputs])
         with np.errstate(invalid="ignore"):  # what is not a number counts as open, and is refused as such
             frames, own = placed(w * self.scale[:, None], self.column, self.shapes, self.pairs)
-            return self.gate.open(frames, own, u.T * scale[:, None])
+            return self.gate.gaps(frames, own, u.T * scale[:, None])
 
     def open_along(self, z: Array, u: Array) -> Array:
         """What the worst constraint leaves open at every sample (samples,)."""
-        return self.open(z, u).max(axis=0)
+        return self.gaps(z, u).max(axis=0)
 
     def at(self) -> str:
         """The file's own position in words: at A = 60 deg."""

@@ -1,0 +1,140 @@
+"""The floors of the house: no import goes up, libraries stay in their rooms, no pair type is named outside its file."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import networkx as nx
+import pytest
+
+import planar
+from planar.pairs import pair_types
+
+ROOT = Path(planar.__file__).parent
+FLOORS = [
+    {"errors", "algebra"},
+    {"plane", "units"},
+    {"shapes"},
+    {"pairs"},
+    {"mechanism"},
+    {"document", "graph", "groups", "words"},
+    {"equations", "files"},
+    {"program", "motion"},
+    {"solving"},
+    {"analysis"},
+    {"views"},
+    {"cli", "__init__"},
+    {"__main__"},
+]
+LIBRARIES = {
+    "numpy": {"algebra", "program", "motion", "solving", "analysis", "views"},
+    "casadi": {"groups", "equations", "program"},
+    "networkx": {"graph"},
+    "pint": {"units"},
+    "rich": {"views", "cli"},
+    "click": {"cli"},
+}
+FILES = sorted(ROOT.rglob("*.py"))
+
+
+def room(path: Path) -> str:
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return parts[0]
+
+
+def imports(path: Path) -> list[tuple[str, ...]]:
+    """Every module that a file imports, lazily or not."""
+    found = []
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            found += [tuple(alias.name.split(".")) for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import"
+            base = tuple((node.module or "").split("."))
+            whole = [(*base, alias.name) for alias in node.names]
+            found += [name if (ROOT.parent.joinpath(*name).with_suffix(".py")).exists() else base for name in whole]
+    return found
+
+
+def level(name: str) -> int:
+    return next(index for index, rooms in enumerate(FLOORS) if name in rooms)
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_no_import_goes_up_or_along(path):
+    here = room(path)
+    for module in imports(path):
+        if module[0] == "planar" and len(module) > 1 and module[1] != here:
+            assert level(module[1]) < level(here), f"{here} imports {'.'.join(module)}"
+
+
+def test_there_are_no_circles_inside_a_room():
+    graph = nx.DiGraph()
+    for path in FILES:
+        name = (planar.__name__, *path.relative_to(ROOT).with_suffix("").parts)
+        graph.add_edges_from((name, module) for module in imports(path) if module[0] == "planar" and module != name)
+    assert [sorted(part) for part in nx.strongly_connected_components(graph) if len(part) > 1] == []
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_libraries_stay_in_their_rooms(path):
+    for module in imports(path):
+        if module[0] != "planar" and module[0] not in sys.stdlib_module_names:
+            assert room(path) in LIBRARIES[module[0]], f"{room(path)} imports {module[0]}"
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_no_pair_type_is_named_outside_the_pairs(path):
+    if room(path) == "pairs":
+        return
+    tree = ast.parse(path.read_text())
+    names = {kind.__name__ for kind in pair_types().values()}
+    said = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+    texts = {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)}
+    assert not said & names
+    assert not texts & set(pair_types())
+
+
+def test_only_the_files_room_opens_mechanism_files():
+    opening = {"open", "read_text", "read_bytes", "write_text", "write_bytes"}
+    for path in FILES:
+        called = {
+            node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+            for node in ast.walk(ast.parse(path.read_text()))
+            if isinstance(node, ast.Call)
+        }
+        if called & opening:
+            assert room(path) == "files"
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_files_are_small_and_say_their_job_first(path):
+    tree = ast.parse(path.read_text())
+    text = ast.get_docstring(tree)
+    assert text
+    assert len(text.splitlines()[0]) < 130
+    assert len(path.read_text().splitlines()) <= 420
+
+
+def loaded_by(code: str) -> set[str]:
+    run = [sys.executable, "-c", f"{code}\nimport sys; print(*sys.modules)"]
+    return set(subprocess.run(run, check=True, capture_output=True, text=True).stdout.split())
+
+
+def test_solving_loads_neither_scipy_nor_networkx_nor_what_only_pictures_need():
+    loaded = loaded_by("import planar; planar.solve(planar.load('000-P1'))")
+    assert not loaded & {"scipy", "networkx", "rich", "click", "pint", "matplotlib"}
+    assert "casadi" in loaded
+
+
+def test_importing_planar_loads_no_library_at_all():
+    assert not loaded_by("import planar") & {"numpy", "casadi", "scipy", "networkx", "rich", "click", "pint"}
+
+
+def test_public_names_are_all_there():
+    assert set(planar.__all__) == set(dir(planar))
+    for name in planar.__all__:
+        assert getattr(planar, name).__doc__
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = planar.nothing
