@@ -18,6 +18,7 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import casadi as ca
+import numpy as np
 
 from planar.groups import decompose
 from planar.mechanism import Mechanism, motions
@@ -129,9 +130,7 @@ def _staged(mechanism: Mechanism, whole: Equations) -> Equations:
     Only now does it show where constraints hold each other twice: angles that a ring of slides closes by itself
     have dropped out, and what was matched with them is free.
     """
-    groups = [
-        group for group in decompose(_touched(whole.F, whole.z), len(whole.unknowns)) if group.rows or group.columns
-    ]
+    groups = [group for group in decompose(_moved(whole), len(whole.unknowns)) if group.rows or group.columns]
     level_of = {column: level for level, group in enumerate(groups) for column in group.columns}
     known_from = tuple(max((level_of[column] for column in held), default=-1) for held in _touched(whole.w, whole.z))
     stages, first_unknown, first_row = [], 0, 0
@@ -170,6 +169,21 @@ def _staged(mechanism: Mechanism, whole: Equations) -> Equations:
         z=whole.z[columns],
         F=whole.F[order],
     )
+
+
+def _moved(whole: Equations) -> list[set[int]]:
+    """The unknowns that really move each remaining constraint.
+
+    What cancels in a sum shows in numbers only: an entry of the slope that vanishes at random places is none.
+    """
+    touched = _touched(whole.F, whole.z)
+    if not any(touched):
+        return touched
+    slope = ca.Function("slope", [whole.z, whole.u, whole.p], [ca.densify(ca.jacobian(whole.F, whole.z))])
+    rng = np.random.default_rng(0)
+    sizes = [symbol.numel() for symbol in (whole.z, whole.u, whole.p)]
+    seen = sum(np.abs(slope(*(rng.uniform(0.5, 2.0, size) for size in sizes)).full()) for _ in range(2))
+    return [{column for column in held if seen[row, column] > 1e-12} for row, held in enumerate(touched)]
 
 
 def _touched(expressions: ca.SX, z: ca.SX) -> list[set[int]]:

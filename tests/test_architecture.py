@@ -28,7 +28,7 @@ FLOORS = [
     {"__main__"},
 ]
 LIBRARIES = {
-    "numpy": {"algebra", "program", "motion", "solving", "analysis", "views"},
+    "numpy": {"algebra", "equations", "program", "motion", "solving", "analysis", "views"},
     "casadi": {"groups", "equations", "program"},
     "networkx": {"graph"},
     "pint": {"units"},

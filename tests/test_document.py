@@ -113,6 +113,9 @@ TWO_DYADS = """
 
 EXAMPLES = {"four-bar": FOUR_BAR, "slider-crank": SLIDER_CRANK, "two dyads": TWO_DYADS}
 
+STEADY = settings(deadline=None)
+"""No example is timed: the first one may load a library."""
+
 EPS4 = 1e-15
 """Numbers of files are converted by two roundings, each of 1.1e-16."""
 
@@ -971,7 +974,7 @@ def documents(draw: Any) -> Any:
     return value
 
 
-@settings(max_examples=150, suppress_health_check=[HealthCheck.too_slow])
+@settings(STEADY, max_examples=150, suppress_health_check=[HealthCheck.too_slow])
 @given(documents())
 def test_any_mechanism_written_and_read_again_is_the_same_to_the_last_bit(value: Any) -> None:
     m = planar.from_dict(value)
@@ -1031,7 +1034,7 @@ def mutilated(value: Any, draw: Callable[..., Any]) -> Any:
     return place
 
 
-@settings(max_examples=600, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
+@settings(STEADY, max_examples=600, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
 @given(st.sampled_from(sorted(EXAMPLES)), st.integers(1, 3), st.data())
 def test_a_mutilated_file_is_read_or_refused_and_nothing_else(name: str, times: int, data: st.DataObject) -> None:
     value = base(name)
@@ -1049,7 +1052,7 @@ def test_a_mutilated_file_is_read_or_refused_and_nothing_else(name: str, times: 
     assert planar.loads(planar.dumps(m)) == m
 
 
-@settings(max_examples=200)
+@settings(STEADY, max_examples=200)
 @given(PIECES)
 def test_any_value_at_all_is_refused_and_nothing_else(value: Any) -> None:
     with pytest.raises(BadInput):

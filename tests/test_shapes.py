@@ -6,11 +6,14 @@ from math import cos, hypot, pi, sin
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from planar.plane import Vector
 from planar.shapes import Along, At, Distances, Link, Place, Point, Unplaced, shape
+
+STEADY = settings(deadline=None)
+"""No example is timed: the first one may load a library."""
 
 ROUND_OFF = 1e-14
 """A point is a dozen operations on numbers up to 10, each rounded to 1.1e-16 of itself."""
@@ -83,6 +86,7 @@ def test_along_goes_a_signed_distance_on_the_way_turned_anticlockwise(place: Alo
     assert shape(bar(("P", place))).points["P"] == near(x, y)
 
 
+@STEADY
 @given(PLACE, PLACE, st.floats(-10.0, 10.0), ANGLE)
 def test_along_holds_its_distance_and_angle_between_any_two_points(
     p: tuple[float, float], q: tuple[float, float], distance: float, angle: float
@@ -112,6 +116,7 @@ def test_a_triangle_of_3_4_5_lies_to_the_left_or_right_of_its_way() -> None:
         assert shape(bar(("P", place), length=5.0)).points["P"] == near(1.8, y), place
 
 
+@STEADY
 @given(PLACE, PLACE, PLACE)
 def test_distances_hold_and_the_side_is_the_one_asked_for(
     p: tuple[float, float], q: tuple[float, float], r: tuple[float, float]
@@ -129,6 +134,7 @@ def test_distances_hold_and_the_side_is_the_one_asked_for(
         assert side >= -1e-11 if left else side <= 1e-11
 
 
+@STEADY
 @given(PLACE, PLACE, PLACE)
 def test_a_point_by_its_distances_is_the_point_that_they_were_measured_from(
     p: tuple[float, float], q: tuple[float, float], r: tuple[float, float]
@@ -143,6 +149,7 @@ def test_a_point_by_its_distances_is_the_point_that_they_were_measured_from(
     assert found == near(*r, tolerance=1e-8)
 
 
+@STEADY
 @given(st.floats(1e-3, 1e3), st.floats(0.01, 0.99), st.booleans())
 def test_a_flat_triangle_closes_however_its_sides_are_rounded(length: float, part: float, left: bool) -> None:
     inside = Distances("A", "B", part * length, length - part * length, left)
@@ -237,6 +244,7 @@ def test_an_axis_turns_the_drawing_about_its_first_point() -> None:
     assert found.axis == near(0.0, -1.0)
 
 
+@STEADY
 @given(PLACE, PLACE, PLACE)
 def test_an_axis_keeps_all_distances_and_handedness(
     p: tuple[float, float], q: tuple[float, float], r: tuple[float, float]
@@ -254,6 +262,7 @@ def test_an_axis_keeps_all_distances_and_handedness(
     assert turned.points["Q"].y == pytest.approx(0.0, abs=1e-13)
 
 
+@STEADY
 @given(PLACE)
 def test_coordinates_are_taken_in_the_axes_of_the_drawing(at: tuple[float, float]) -> None:
     link = drawn(("O", At(3.0, 4.0)), ("P", At(1.0, 1.0)), ("Q", At(*at)), axis=("O", "P"))

@@ -12,10 +12,11 @@ from planar.mechanism import Drive
 from planar.solving.position import Solver
 
 TEXTBOOK = [file for file in files.model_files() if file.parent.name == "textbook"]
-IDS = (
-    "000-P1 000-P2 000-P3 000-P4 000-P4-BC480 000-P5 002-E3.1 002-E3.2 002-E3.3 002-E3.4 002-E3.5 002-S3.5 004-COS "
-    "004-EX-P 004-EX-piston 004-FORM 004-IC 004-OABQ 004-QR 004-SC12 004-TOGGLE"
-).split()
+IDS = [
+    *("000-P1", "000-P2", "000-P3", "000-P4", "000-P4-BC480", "000-P5"),
+    *("002-E3.1", "002-E3.2", "002-E3.3", "002-E3.4", "002-E3.5", "002-S3.5"),
+    *("004-COS", "004-EX-P", "004-EX-piston", "004-FORM", "004-IC", "004-OABQ", "004-QR", "004-SC12", "004-TOGGLE"),
+]
 every_example = pytest.mark.parametrize("file", TEXTBOOK, ids=lambda file: file.stem)
 
 

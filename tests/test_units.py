@@ -13,10 +13,13 @@ from pathlib import Path
 import numpy as np
 import pint
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planar.units import SI, TABLE, Unit, UnitError, example, quantity, shortest, unit
+
+STEADY = settings(deadline=None)
+"""No example is timed: the first one may load a library."""
 
 EPS = sys.float_info.epsilon
 ULPS = 4 * EPS
@@ -67,6 +70,7 @@ def test_table_has_the_size_and_kind_that_pint_gives(spelled: str, registry: pin
 
 
 @pytest.mark.parametrize("spelled", TABLE)
+@STEADY
 @given(value=st.floats(-1e9, 1e9).map(lambda x: float(f"{x:.9g}")))
 def test_table_reads_numbers_as_pint_does(spelled: str, value: float, registry: pint.UnitRegistry) -> None:
     kind = TABLE[spelled][0]
@@ -286,6 +290,7 @@ def test_a_very_long_text_is_refused_in_a_short_sentence(text: str) -> None:
     refused(text, "length")
 
 
+@STEADY
 @given(st.text(max_size=30))
 def test_any_text_is_a_finite_quantity_or_is_refused(text: str) -> None:
     try:
@@ -301,6 +306,7 @@ POWERS = st.sampled_from(["", "", "^2", "^-1", "^0", "^-9", "^9"])
 JOINTS = st.sampled_from([" ", "/", "*", " / ", "·"])
 
 
+@STEADY
 @given(st.lists(st.tuples(JOINTS, WORDS, POWERS), min_size=1, max_size=8))
 def test_any_product_of_units_has_a_size_or_is_refused(parts: list[tuple[str, str, str]]) -> None:
     spelled = "".join("".join(part) for part in parts)[len(parts[0][0]) :]
@@ -323,6 +329,7 @@ def again(written: float | str, of: Unit) -> float:
 
 
 @pytest.mark.parametrize("spelled", TABLE)
+@STEADY
 @given(value=st.floats(allow_nan=False, allow_infinity=False))
 def test_shortest_reads_back_to_the_last_bit(spelled: str, value: float) -> None:
     of = unit(spelled)
@@ -330,6 +337,7 @@ def test_shortest_reads_back_to_the_last_bit(spelled: str, value: float) -> None
 
 
 @pytest.mark.parametrize("spelled", [*TABLE, "ft", "grad", "mile/h"])
+@STEADY
 @given(value=SIMPLE)
 def test_shortest_is_no_longer_than_what_an_author_wrote(spelled: str, value: float) -> None:
     of = unit(spelled)
@@ -355,6 +363,7 @@ def test_shortest_writes_numbers_of_numpy_as_numbers() -> None:
 
 
 @pytest.mark.parametrize("spelled", [*TABLE, "ft", "grad"])
+@STEADY
 @given(value=SIMPLE)
 def test_from_si_undoes_to_si(spelled: str, value: float) -> None:
     of = unit(spelled)

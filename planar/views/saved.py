@@ -30,4 +30,4 @@ def written(renderable: RenderableType, suffix: str) -> str:
 
 def _without_fonts(svg: str) -> str:
     """The picture without fonts from the network: the viewer's own monospaced one serves."""
-    return re.sub(r"@font-face\s*\{[^}]*\}", "", svg)
+    return re.sub(r"@font-face\s*\{[^}]*\}|<!--.*?-->", "", svg, flags=re.DOTALL)

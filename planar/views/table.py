@@ -25,13 +25,13 @@ _UNITS = {"rad/s^2": "rad/s²", "m/s^2": "m/s²", "N m": "N·m"}
 
 def solution(state: State, comparisons: Iterable[Comparison]) -> RenderableType:
     """A solved position: links, points, pairs, and the published values beside the solved ones."""
-    parts: list[RenderableType] = [_heading(state), _links(state), _points(state), _pairs(state)]
+    parts: list[RenderableType] = [_heading(state), Text(), _links(state), _points(state), _pairs(state)]
     comparisons = tuple(comparisons)
     if comparisons:
         parts.append(published(comparisons))
     notes = [*state.remarks, *state.mechanism.notes]
     if notes:
-        parts += [Text("Notes", style="bold"), _paragraphs(("-", note) for note in notes)]
+        parts += [Text(), Text("Notes", style="bold"), _paragraphs(("-", note) for note in notes)]
     return Group(*parts)
 
 

@@ -1,0 +1,111 @@
+"""README's commands and snippets, run as a reader would."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def blocks(kind: str) -> list[str]:
+    return re.findall(rf"```{kind}\n(.*?)```", README, re.DOTALL)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    name, text = re.search(r"<!-- file: (\S+) -->\n```json\n(.*?)```", README, re.DOTALL).groups()
+    (tmp_path / name).write_text(text, encoding="utf-8")
+    return tmp_path
+
+
+def run(command: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONWARNINGS": "error"}
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, env=environment, check=False)
+
+
+COMMANDS = [
+    line.split("#")[0].split() for text in blocks("sh") for line in text.splitlines() if line.startswith("planar ")
+]
+
+
+@pytest.mark.parametrize("words", COMMANDS, ids=" ".join)
+def test_commands_of_the_tour_run(words, folder):
+    done = run([sys.executable, "-m", "planar", *words[1:]], folder)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    assert len(done.stdout) > 100
+
+
+def test_the_python_snippet_runs(folder):
+    (snippet,) = blocks("python")
+    done = run([sys.executable, "-c", snippet], folder)
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_readme_names_every_room():
+    rooms = {path.relative_to(ROOT / "planar").with_suffix("").parts[0] for path in (ROOT / "planar").rglob("*.py")}
+    rooms -= {"__init__", "__main__"}
+    table = README.split("## How it works")[1]
+    small = {"errors", "algebra", "plane", "words", "files", "cli"}
+    assert all(re.search(rf"\b{room}\b", table) for room in rooms - small)
+
+
+def test_the_first_screen_has_a_sentence_a_picture_and_two_commands():
+    first = README.splitlines()[:24]
+    assert any(re.fullmatch(r"!\[.+\]\(\.pictures/solve\.svg\)", line) for line in first)
+    assert sum(line == "```sh" for line in first) == 2
+
+
+def test_the_picture_is_what_the_tool_makes_now(tmp_path):
+    done = run([sys.executable, "-m", "planar", "solve", "002-E3.1", "-o", "solve.svg"], tmp_path)
+    assert done.returncode == 0, done.stderr
+
+    def words(path: Path) -> list[str]:
+        return re.findall(r">([^<>]+)</text>", path.read_text(encoding="utf-8"))
+
+    assert words(tmp_path / "solve.svg") == words(ROOT / ".pictures" / "solve.svg")
+    assert "http://www.w3.org/2000/svg" in (tmp_path / "solve.svg").read_text()
+    assert "https://" not in (tmp_path / "solve.svg").read_text()  # it needs nothing from a network
+
+
+def test_the_checks_run_exactly_the_readmes_test_command():
+    script = (ROOT / ".ci" / "run").read_text()
+    assert "README.md" in script
+    assert "pip install" not in script
+    shell = shutil.which("bash")
+    found = subprocess.run(
+        [shell, "-c", re.search(r"command=\$\((.*)\)\n", script).group(1)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
+    assert found.strip() == next(text for text in blocks("sh") if "pytest" in text).strip()
+
+
+def test_the_wheel_brings_the_models_and_works_from_another_folder(tmp_path):
+    """Built once, unpacked into an empty folder, and run from there with the libraries of this environment alone."""
+    build = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "-o", str(tmp_path / "wheel"), str(ROOT)]
+    done = subprocess.run(build, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    (wheel,) = (tmp_path / "wheel").glob("*.whl")
+    place = tmp_path / "site"
+    shutil.unpack_archive(wheel, place, "zip")
+    code = "import planar, json; print(json.dumps([planar.__file__, planar.solve(planar.load('000-P1')).mobility]))"
+    environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"} | {"PYTHONPATH": str(place)}
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, env=environment, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    file, mobility = json.loads(done.stdout)
+    assert Path(file).is_relative_to(place)
+    assert mobility == 1
+    names = {path.stem for path in (place / "planar" / "models").rglob("*.json")}
+    assert names == {path.stem for path in (ROOT / "models").rglob("*.json")}
