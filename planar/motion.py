@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from planar.algebra import Jet
 from planar.mechanism import Mechanism, NamedPoint, motions, named_points
+from planar.pairs import Pair
 from planar.plane import Frame, Vector
 from planar.shapes import Shape
 from planar.words import heading, hurrying, turning
@@ -99,10 +101,24 @@ class State:
     "every pair's own coordinates, as jets"
     shapes: Mapping[str, Shape]
 
+    @cached_property
+    def _points(self) -> tuple[NamedPoint, ...]:
+        return named_points(self.mechanism)
+
+    @cached_property
+    def _point_names(self) -> dict[str, NamedPoint]:
+        """Every way to write a point: as `link.point`, or by the name that results give it."""
+        under_links = {f"{link}.{point}": each for each in self._points for link, point in each.members}
+        return under_links | {each.name: each for each in self._points}
+
+    @cached_property
+    def _motions(self) -> Mapping[str, Pair]:
+        return motions(self.mechanism)
+
     @property
     def points(self) -> dict[str, PointState]:
         """Every point under its result name."""
-        return {each.name: self._point(each) for each in named_points(self.mechanism)}
+        return {each.name: self._point(each) for each in self._points}
 
     @property
     def links(self) -> dict[str, LinkState]:
@@ -119,7 +135,7 @@ class State:
     @property
     def pairs(self) -> dict[str, dict[str, float | None]]:
         """What every pair reports, by name; of a pin of n links, every two of them."""
-        return {name: self.pair(name) for name in motions(self.mechanism)}
+        return {name: self.pair(name) for name in self._motions}
 
     def point(self, name: str) -> PointState:
         """A point by its result name, or as `link.point`. Raises Unknown."""
@@ -134,13 +150,13 @@ class State:
 
     def pair(self, name: str) -> dict[str, float | None]:
         """What a pair reports of its relative motion (SI). Raises Unknown."""
-        return self._motion(name)[0].report(*self._motion(name)[1])
+        pair, parts = self._motion(name)
+        return pair.report(*parts)
 
-    def _motion(self, name: str) -> tuple[Any, tuple[float, float, float]]:
-        known = motions(self.mechanism)
-        if name not in known:
-            raise Unknown(f"there is no pair {name!r}; pairs are {', '.join(known)}")
-        pair = known[name]
+    def _motion(self, name: str) -> tuple[Pair, tuple[float, float, float]]:
+        if name not in self._motions:
+            raise Unknown(f"there is no pair {name!r}; pairs are {', '.join(self._motions)}")
+        pair = self._motions[name]
         first, second = (self.frames[link] for link in pair.links)
         numbers = pair.measure(*(self.shapes[link] for link in pair.links))
         return pair, _parts(pair.drive(first, second, numbers, self.own.get(pair.name, ())))
@@ -200,11 +216,9 @@ class State:
         )
 
     def _named(self, name: str) -> NamedPoint:
-        for each in named_points(self.mechanism):
-            if each.name == name or any(f"{link}.{point}" == name for link, point in each.members):
-                return each
-        known = ", ".join(each.name for each in named_points(self.mechanism))
-        raise Unknown(f"there is no point {name!r}; points are {known}")
+        if name in self._point_names:
+            return self._point_names[name]
+        raise Unknown(f"there is no point {name!r}; points are {', '.join(each.name for each in self._points)}")
 
     def _carried(self, named: NamedPoint) -> Vector:
         link, point = named.members[0]

@@ -16,7 +16,7 @@ from planar.groups import decompose
 from planar.pairs import Kind
 from planar.program import fitted, length, program, structure
 from planar.program import shapes as shapes_of
-from planar.solving.assemble import placed
+from planar.solving.candidates import placed
 from tests.linkages import random_linkage
 
 

@@ -13,7 +13,8 @@ from planar.mechanism import Drive, Mechanism, with_inputs
 from planar.motion import State
 from planar.program import Motion, length, program
 from planar.solving import refusals
-from planar.solving.assemble import Assembler, Assembly, Failure, placed
+from planar.solving.assemble import Assembly, Failure, search
+from planar.solving.candidates import Candidates, placed
 from planar.solving.follow import follow
 from planar.solving.freedom import SINGULAR, always_weak, cancelled, mobility, slope_at, strength
 from planar.solving.setup import Setup
@@ -46,7 +47,7 @@ class Solver(Setup):
         """The assembly nearest to the sketch. Raises NoAnswer."""
         if any(stage.free for stage in self.equations.stages):
             raise refusals.free(self)
-        found = Assembler(self.mechanism, self.program, self.station.u, self.station.p, self.unit).search()
+        found = search(Candidates(self.mechanism, self.program, self.station.u, self.station.p, self.unit))
         if isinstance(found, Failure):
             raise self._unassembled(found)
         return Assembly(found.z, (*self.mechanism.remarks, *found.remarks))

@@ -9,7 +9,7 @@ import numpy as np
 from planar.mechanism import Input, Mechanism, motions
 from planar.pairs import Kind
 from planar.program import Program, extent, fitted, positions, program, rates, shapes, size
-from planar.solving.assemble import placed
+from planar.solving.candidates import placed
 from planar.solving.gate import Gate
 from planar.words import amount, listed
 

@@ -1,0 +1,200 @@
+"""The ways in which one group of links can be assembled, once all earlier groups stand."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from planar.algebra import Scalar
+from planar.equations import Stage
+from planar.mechanism import Mechanism, named_points
+from planar.pairs import Kind, Pair
+from planar.plane import GROUND, Frame, Vector, frame_at
+from planar.program import Program, length, shapes
+from planar.solving.newton import Closing, newton, polished
+
+Array = np.ndarray
+
+SAME = 1e-6
+"""Unknowns closer than this are one assembly: within it two would be a dead point to working precision."""
+MOST_STARTS = 160
+
+
+class Candidate(NamedTuple):
+    """One assembly of a group: all unknowns with this group's filled in, and how it lies.
+
+    `distance`: squared distance to the sketch of the points that the group places (sizes squared); `behind`: how many
+    slides are not ahead of their `through`; `height`: mean y of the group's points.
+    """
+
+    z: Array
+    distance: float
+    behind: int
+    height: float
+
+
+class Candidates:
+    """Assemblies of the groups of one mechanism, at one set of inputs (u, p scaled)."""
+
+    def __init__(self, mechanism: Mechanism, program: Program, u: Array, p: Array, unit: float):
+        self.program, self.u, self.p = program, u, p
+        self.equations = program.equations
+        self.pairs = {pair.name: pair for pair in mechanism.pairs}
+        self.column = {(c.owner, c.part): index for index, c in enumerate(self.equations.coordinates)}
+        self.local = {
+            name: {point: Vector(at.x / unit, at.y / unit) for point, at in shape.points.items()}
+            for name, shape in shapes(mechanism).items()
+        }
+        self.sketch = {name: Vector(x / unit, y / unit) for name, x, y in mechanism.sketch}
+        level = {link.name: self._level(link.name) for link in mechanism.links}
+        # each point by the first of its links to be placed, and the points of each link
+        self.first: dict[str, tuple[int, str, str]] = {}
+        self.points_of: dict[str, list[tuple[str, str]]] = {link.name: [] for link in mechanism.links}
+        for each in named_points(mechanism):
+            self.first[each.name] = min((level[link], link, point) for link, point in each.members)
+            for link, point in each.members:
+                self.points_of[link].append((point, each.name))
+        self.sketched_at: dict[int, list[str]] = {}
+        for name in self.sketch:
+            self.sketched_at.setdefault(self.first[name][0], []).append(name)
+
+    def _level(self, link: str) -> int:
+        """The stage after which a link's position is known; -1 for the frame and links that follow from the inputs."""
+        columns = [self.column.get((link, part)) for part in ("x", "y", "angle")]
+        return max((self.equations.known_from[c] for c in columns if c is not None), default=-1)
+
+    def of(self, stage: Stage, z: Array) -> tuple[list[Candidate], Array]:
+        """All assemblies of a group that its starts lead to, the ones that an author would mean first.
+
+        With what the best start leaves open (rows,).
+        """
+        closing = self._closing(stage, z)
+        ended = newton(closing, self._starts(stage, z, closing))
+        roots: list[Array] = []
+        for root in ended.unknowns[ended.closed]:
+            if not any(self._same(stage, root, other) for other in roots):
+                roots.append(polished(closing, root))
+        found = sorted(
+            (self._candidate(stage, z, root) for root in roots),
+            key=lambda each: (each.behind, -round(each.height, 9), *np.round(each.z, 6)),
+        )
+        best = ended.unknowns[int(np.argmin(ended.open))]
+        return found, closing(best[None, :])[0][0]
+
+    def _candidate(self, stage: Stage, z: Array, root: Array) -> Candidate:
+        whole = z.copy()
+        whole[stage.unknowns] = root
+        sketched = {name: self.first[name] for name in self.sketched_at.get(stage.level, ())}
+        pairs = {name: self.pairs[name] for name in stage.pairs}
+        links = {*stage.links, *(link for pair in pairs.values() for link in pair.links)}
+        links |= {link for _, link, _ in sketched.values()}
+        frames, own = placed(self._w(whole), self.column, links, pairs)
+        gaps = [
+            frames[link].carry(self.local[link][point]) - self.sketch[name]
+            for name, (_, link, point) in sketched.items()
+        ]
+        drives = [
+            (pair, float(pair.drive(*(frames[link] for link in pair.links), (), own[name])))
+            for name, pair in pairs.items()
+            if pair.coordinates
+        ]
+        heights = [frames[link].carry(at).y for link in stage.links for at in self.local[link].values()]
+        return Candidate(
+            whole,
+            sum(float(gap.dot(gap)) for gap in gaps),
+            sum(not pair.ahead(drive) for pair, drive in drives),
+            float(np.mean(heights)) if heights else 0.0,
+        )
+
+    def _w(self, z: Array) -> Array:
+        return self.program.positions(z, self.u, self.p).full().ravel()
+
+    def _closing(self, stage: Stage, z: Array) -> Closing:
+        function = self.program.closing(stage)
+        rows, unknowns = length(stage.rows), length(stage.unknowns)
+
+        def closing(tried: Array) -> tuple[Array, Array]:
+            count = len(tried)
+            whole = np.repeat(z[:, None], count, axis=1)
+            whole[stage.unknowns] = tried.T
+            left, slope = function(whole, self.u, self.p) if count > 1 else function(whole[:, 0], self.u, self.p)
+            slopes = slope.full().reshape(rows, count, unknowns, order="C") if unknowns else np.zeros((rows, count, 0))
+            return left.full().reshape(rows, count).T.copy(), slopes.transpose(1, 0, 2).copy()
+
+        return closing
+
+    def _is_angle(self, stage: Stage) -> Array:
+        columns = self.equations.unknowns[stage.unknowns]
+        return np.array([self.equations.coordinates[c].kind is not Kind.LENGTH for c in columns], dtype=bool)
+
+    def _same(self, stage: Stage, a: Array, b: Array) -> bool:
+        apart = np.where(self._is_angle(stage), np.abs(np.exp(1j * a) - np.exp(1j * b)), np.abs(a - b))
+        return bool(np.all(apart < SAME))
+
+    def _starts(self, stage: Stage, z: Array, closing: Closing) -> Array:
+        """Starts for a group: angles as in the sketch where it shows them, others spread evenly over the circle."""
+        unknowns = length(stage.unknowns)
+        if unknowns == 0:
+            return np.zeros((1, 0))
+        angles = self._is_angle(stage)
+        many = min(6 * unknowns**2, MOST_STARTS)
+        spread = 2.0 * np.pi * (np.arange(many)[:, None] * _irrationals(unknowns) % 1.0)
+        shown = self._shown(stage, z)
+        near = spread[: max(4, many // 4)].copy()
+        for index, column in enumerate(self.equations.unknowns[stage.unknowns]):
+            coordinate = self.equations.coordinates[column]
+            if coordinate.of_link and coordinate.part == "angle" and coordinate.owner in shown:
+                near[:, index] = shown[coordinate.owner]
+        starts = np.vstack([near, spread])
+        starts[:, ~angles] = 0.0
+        if not angles.all():
+            # lengths enter linearly, so for given angles they follow from least squares
+            left, slope = closing(starts)
+            along = slope[:, :, ~angles]
+            starts[:, ~angles] = -np.einsum("krm,km->kr", np.linalg.pinv(along), left)
+        return starts
+
+    def _shown(self, stage: Stage, z: Array) -> dict[str, float]:
+        """The angle at which the sketch, and the points that are known already, show a link of the group."""
+        names = {name for link in stage.links for _, name in self.points_of[link]}
+        known = {name: self.first[name] for name in names if self.first[name][0] < stage.level}
+        frames, _ = placed(self._w(z), self.column, {link for _, link, _ in known.values()}, {})
+        located = {name: self.sketch[name] for name in names if name in self.sketch}
+        located |= {name: frames[link].carry(self.local[link][point]) for name, (_, link, point) in known.items()}
+        angles = {}
+        for link in stage.links:
+            ends = [(self.local[link][point], located[name]) for point, name in self.points_of[link] if name in located]
+            angle = _turn_between(ends) if len(ends) > 1 else None
+            if angle is not None:
+                angles[link] = angle
+        return angles
+
+
+def placed(
+    w: Sequence[Scalar], column: Mapping[tuple[str, str], int], links: Iterable[str], pairs: Mapping[str, Pair]
+) -> tuple[dict[str, Frame], dict[str, tuple[Scalar, ...]]]:
+    """Frames of links and own coordinates of pairs from w, whose entries may be floats, arrays or jets."""
+    frames = {
+        link: frame_at(*(w[column[link, part]] for part in ("x", "y", "angle"))) if (link, "x") in column else GROUND
+        for link in links
+    }
+    own = {name: tuple(w[column[name, part]] for part, _ in pair.coordinates) for name, pair in pairs.items()}
+    return frames, own
+
+
+def _irrationals(dimensions: int) -> Array:
+    """Steps of an evenly spread sequence: powers of the root of x^(d+1) = x + 1 (M. Roberts' R-sequence)."""
+    root = 2.0
+    for _ in range(40):
+        root = (1.0 + root) ** (1.0 / (dimensions + 1))
+    return (1.0 / root) ** np.arange(1, dimensions + 1)
+
+
+def _turn_between(ends: list[tuple[Vector, Vector]]) -> float | None:
+    """The angle that turns local points nearest to where they are shown (orthogonal Procrustes in the plane)."""
+    local = np.array([complex(*at) for at, _ in ends])
+    shown = np.array([complex(*at) for _, at in ends])
+    turn = np.vdot(local - local.mean(), shown - shown.mean())
+    return None if abs(turn) < 1e-12 else float(np.angle(turn))
