@@ -13,7 +13,7 @@ F     what the remaining constraints leave open, group after group              
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -194,6 +194,11 @@ def _touched(expressions: ca.SX, z: ca.SX) -> list[set[int]]:
     return held
 
 
+def stack(expressions: Iterable[ca.SX]) -> ca.SX:
+    """Expressions one below the other, symbolic though there be none."""
+    return ca.vertcat(ca.SX(0, 1), *expressions)
+
+
 def _coordinates(mechanism: Mechanism) -> _Symbols:
     symbols = _Symbols(mechanism)
     for link in mechanism.links:
@@ -214,7 +219,7 @@ def _coordinates(mechanism: Mechanism) -> _Symbols:
 def _numbers(mechanism: Mechanism) -> tuple[ca.SX, dict[str, list[ca.SX]]]:
     """A symbol for each number of each pair, in the order in which `program.fitted` fills them."""
     numbers = {pair.name: [ca.SX.sym(pair.name) for _ in pair.measures] for pair in mechanism.pairs}
-    return ca.vertcat(*(symbol for each in numbers.values() for symbol in each)), numbers
+    return stack(symbol for each in numbers.values() for symbol in each), numbers
 
 
 def _closures(
@@ -244,8 +249,8 @@ def _lines(closures: list[ca.SX], symbols: _Symbols) -> tuple[list[_Line], list[
     count = len(symbols.values)
     both = [symbol for pair in symbols.turned.values() for symbol in pair]
     owner = [index for index in symbols.turned for _ in range(2)]
-    everything = ca.vertcat(*symbols.values, *both)
-    stacked = ca.vertcat(*closures)
+    everything = stack([*symbols.values, *both])
+    stacked = stack(closures)
     slopes = ca.jacobian(stacked, everything)
     factors: list[dict[int, float]] = [{} for _ in closures]
     bent: list[set[int]] = [set() for _ in closures]
@@ -260,7 +265,7 @@ def _lines(closures: list[ca.SX], symbols: _Symbols) -> tuple[list[_Line], list[
                 crooked.add(column)
     # a symbol that is linear wherever it stands is taken out of all constraints at once, any other one by one
     straight = [column for column in range(count) if column not in crooked]
-    zeroed = ca.vertcat(*(symbols.values[column] for column in straight))
+    zeroed = stack(symbols.values[index] for index in straight)
     rest = ca.vertsplit(ca.substitute(stacked, zeroed, ca.SX.zeros(len(straight))))
     lines = []
     for row, expression in enumerate(rest):
@@ -351,7 +356,7 @@ def _written_in(
     for index, row in enumerate(rows):
         if row.kind is Kind.ANGLE and not row.is_input:
             left_over[index] = ca.atan2(ca.sin(left_over[index]), ca.cos(left_over[index]))
-    F, w = ca.vertcat(*left_over, ca.SX(0, 1)), ca.vertcat(*symbols.values, ca.SX(0, 1))
+    F, w = stack(left_over), stack(symbols.values)
     return tuple(ca.substitute_inplace(replaced, by, [F, w])[1]) if replaced else (F, w)
 
 

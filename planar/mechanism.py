@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
+from planar.errors import BadInput
 from planar.pairs.base import Pair
 from planar.shapes import Along, At, Distances, Link, Place, Point
 
@@ -137,8 +138,11 @@ class NamedPoint(NamedTuple):
 
 
 def with_inputs(mechanism: Mechanism, drives: tuple[Drive, ...]) -> Mechanism:
-    """The same mechanism with some of its inputs changed."""
+    """The same mechanism with some of its inputs changed. Raises BadInput where it has no such input."""
     changes = {drive.pair: drive for drive in drives}
+    for pair in changes.keys() - {given.pair for given in mechanism.inputs}:
+        known = ", ".join(given.pair for given in mechanism.inputs) or "none"
+        raise BadInput(pair, f"there is no input at {pair!r}; the inputs are at {known}")
 
     def changed(given: Input) -> Input:
         drive = changes.get(given.pair)

@@ -73,7 +73,7 @@ def test_a_run_whose_program_flips_half_way_is_put_right_and_counted(solver, mon
         def function(start, u, p):
             found = real(samples)(start, u, p).full()
             for k in range(samples):
-                if 30 <= len(inputs) - samples + k < 34:
+                if inputs[30, 0] <= u[0, k] < inputs[34, 0]:
                     other = CRANK | {"inputs": [{"pair": "A", "position": float(u[0, k])}]}
                     found[:, k] = mirrored(Solver(files.from_dict(other)), found[:, k])
             return ca.DM(found)
@@ -104,11 +104,8 @@ def test_samples_with_a_wrong_or_missing_value_go_to_the_general_path(solver, mo
     def spoiled(samples):
         def function(start, u, p):
             found = real(samples)(start, u, p).full()
-            first = len(inputs) - samples
-            if first <= 50:
-                found[0, 50 - first] += 1e-6
-            if first <= 70:
-                found[1, 70 - first] = np.nan
+            found[0, u[0] == inputs[50, 0]] += 1e-6
+            found[1, u[0] == inputs[70, 0]] = np.nan
             return ca.DM(found)
 
         return function

@@ -86,8 +86,7 @@ def run(solver: Followed, p: Array, z: Array, u: Array) -> Run:
     done, general = 1, 0
     while done < samples:
         if solver.program.square:
-            rest = u[done:]
-            found[done:] = _accumulated(solver.program, p, found[done - 1], rest)
+            found[done:] = _accumulated(solver.program, p, found[done - 1], u[done:], samples - 1)
             done += _passing(solver, p, found[done - 1 :], u[done - 1 :])
         if done < samples:
             found[done] = follow(solver, p, found[done - 1], u[done - 1], u[done])
@@ -95,11 +94,12 @@ def run(solver: Followed, p: Array, z: Array, u: Array) -> Run:
     return Run(found, general)
 
 
-def _accumulated(program: Program, p: Array, z: Array, u: Array) -> Array:
+def _accumulated(program: Program, p: Array, z: Array, u: Array, steps: int) -> Array:
+    """The unknowns at inputs u, by the program's one run of so many steps: a shorter one waits at its end."""
     if z.size == 0:
         return np.zeros((len(u), 0))
-    function = program.runs(len(u))
-    return function(z, u.T, np.repeat(p[:, None], len(u), axis=1)).full().T
+    inputs = np.concatenate([u, np.repeat(u[-1:], steps - len(u), axis=0)])
+    return program.runs(steps)(z, inputs.T, np.repeat(p[:, None], steps, axis=1)).full().T[: len(u)]
 
 
 def _passing(solver: Followed, p: Array, z: Array, u: Array) -> int:

@@ -52,7 +52,7 @@ class Gate:
         of the inputs, else the mechanism's own. What is not a number counts as infinitely open.
         """
         gaps = [_gap(left, kind, self.unit) for kind, left in self._closures(frames, own, u)]
-        return np.nan_to_num(np.array(np.broadcast_arrays(*gaps) if gaps else [0.0]), nan=np.inf, posinf=np.inf)
+        return np.nan_to_num(np.array(np.broadcast_arrays(*gaps)), nan=np.inf, posinf=np.inf)
 
     def rate_gap(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Jet]], order: int) -> tuple[float, str]:
         """How far velocities (order 1) or accelerations (2) break the worst constraint, as a part of the greatest."""

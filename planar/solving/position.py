@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,15 +22,17 @@ from planar.solving.setup import Setup
 Array = np.ndarray
 
 
-def solve(mechanism: Mechanism, drives: Sequence[Drive] = ()) -> State:
+def solve(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = ()) -> State:
     """The position at the mechanism's inputs, of the assembly nearest to its sketch, with its rates.
 
-    `drives` change inputs: the position then is the one to which the assembly of the file's own inputs leads when
-    they are moved there together.
+    `drives` change inputs, as {pair: position} (rad or m) or with rates as well: the position then is the one to which
+    the assembly of the file's own inputs leads when they are moved there together.
 
     Raises NoAnswer, whose outcome says whether the mechanism cannot be assembled, stands on a dead point or a change
     point, or has too few or too many inputs; its text names links, pairs, position and remedy.
     """
+    if isinstance(drives, Mapping):
+        drives = [Drive(pair, position) for pair, position in drives.items()]
     here = Solver(mechanism)
     found = here.assembly()
     if not drives:
@@ -73,9 +75,9 @@ class Solver(Setup):
     def state(self, z: Array, remarks: tuple[str, ...] = ()) -> State:
         """The state at given unknowns, once they and their rates have passed the gate. Raises NoAnswer."""
         gaps = self.gaps(z[None], self.station.u[None])[:, 0]
-        worst = int(np.argmax(gaps))
-        if gaps[worst] > self.tolerance:
-            raise refusals.not_closed(self, self.gate.names[worst], float(gaps[worst]))
+        residual = float(gaps.max(initial=0.0))
+        if residual > self.tolerance:
+            raise refusals.not_closed(self, self.gate.names[int(np.argmax(gaps))], residual)
         s, rest = self.station, np.zeros_like(z)
         y, given = np.concatenate([z, s.u]), np.concatenate([rest, s.u2])
         still = self.program.kinematics(y, np.concatenate([rest, s.u1]), given, s.p)
@@ -83,7 +85,7 @@ class Solver(Setup):
         y1 = np.concatenate([cancelled(still.slope, still.F1), s.u1])
         moving = self.program.kinematics(y, y1, given, s.p)
         y2 = np.concatenate([cancelled(moving.slope, moving.F2), s.u2])
-        return self._stated(self.program.kinematics(y, y1, y2, s.p), found, float(gaps[worst]), remarks)
+        return self._stated(self.program.kinematics(y, y1, y2, s.p), found, residual, remarks)
 
     def at_rates_of(self, state: State) -> State:
         """The state in the same position as another's, with this mechanism's own rates."""

@@ -58,11 +58,11 @@ class Setup:
         scale = np.array([self.unit if self._slides(given) else 1.0 for given in self.mechanism.inputs])
         with np.errstate(invalid="ignore"):  # what is not a number counts as open, and is refused as such
             frames, own = placed(w * self.scale[:, None], self.column, self.shapes, self.pairs)
-            return self.gate.gaps(frames, own, u.T * scale[:, None])
+            return self.gate.gaps(frames, own, u.T * scale[:, None]).reshape(-1, len(z))
 
     def open_along(self, z: Array, u: Array) -> Array:
         """What the worst constraint leaves open at every sample (samples,)."""
-        return self.gaps(z, u).max(axis=0)
+        return self.gaps(z, u).max(axis=0, initial=0.0)
 
     def at(self) -> str:
         """The file's own position in words: at A = 60 deg."""
