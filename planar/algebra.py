@@ -72,8 +72,16 @@ class Jet:
         return -self + other
 
     def __mul__(self, other: Scalar) -> Jet:
-        a, b = self.parts, self._lifted(other)
-        return Jet(*(sum(comb(n, k) * a[k] * b[n - k] for k in range(n + 1)) for n in range(len(a))))
+        if not isinstance(other, Jet):
+            return Jet(*[a * other for a in self.parts])
+        a, b = self.parts, other.parts
+        parts = [a[0] * b[0]]
+        for n in range(1, len(a)):
+            total = a[0] * b[n] + a[n] * b[0]
+            for k in range(1, n):
+                total = total + comb(n, k) * a[k] * b[n - k]
+            parts.append(total)
+        return Jet(*parts)
 
     __radd__ = __add__
     __rmul__ = __mul__

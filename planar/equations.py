@@ -13,13 +13,14 @@ F     what the remaining constraints leave open, group after group              
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
+from planar.elimination import Solved, Symbols, eliminate, expressed, lines_of, stack
 from planar.groups import decompose
 from planar.mechanism import Mechanism, motions
 from planar.pairs import Kind, Pair
@@ -71,57 +72,41 @@ class Equations:
     F: ca.SX
 
 
-@dataclass
-class _Line:
-    """A constraint under elimination: sum of factor * coordinate, plus a rest that is not linear in them."""
+class _Unknown(NamedTuple):
+    """A mechanism's coordinates as symbols, and as the frames and own coordinates that the pairs' formulas take."""
 
-    factors: dict[int, float]
-    rest: ca.SX
-    in_rest: set[int]
-    "coordinates whose symbols stand in `rest`"
-    bent: set[int]
-    "coordinates that the constraint depends on, through others or not, other than by its factors"
-
-
-@dataclass
-class _Symbols:
-    mechanism: Mechanism
-    coordinates: list[Coordinate] = field(default_factory=list)
-    values: list[ca.SX] = field(default_factory=list)
-    turned: dict[int, tuple[ca.SX, ca.SX]] = field(default_factory=dict)
-    "cos and sin of each angle coordinate"
-    frames: dict[str, Frame] = field(default_factory=dict)
-    own: dict[str, list[ca.SX]] = field(default_factory=dict)
-
-    def add(self, owner: str, part: str, kind: Kind, of_link: bool) -> ca.SX:
-        symbol = ca.SX.sym(f"{owner}.{part}")
-        self.coordinates.append(Coordinate(owner, part, kind, of_link))
-        self.values.append(symbol)
-        return symbol
+    coordinates: list[Coordinate]
+    symbols: Symbols
+    frames: dict[str, Frame]
+    own: dict[str, list[ca.SX]]
 
 
 def build(mechanism: Mechanism) -> Equations:
     """The equations of a mechanism; only its structure matters, its numbers are `p` and `u`."""
-    symbols = _coordinates(mechanism)
+    unknown = _coordinates(mechanism)
     p, numbers = _numbers(mechanism)
     u = ca.SX.sym("u", len(mechanism.inputs))
-    closures, rows = _closures(mechanism, symbols, numbers, u)
-    lines, depends = _lines(closures, symbols)
-    groups = decompose(depends, len(symbols.coordinates))
+    closures, rows = _closures(mechanism, unknown, numbers, u)
+    lines = lines_of(closures, unknown.symbols)
 
-    solved: list[tuple[int, _Line]] = []
-    unknowns: list[int] = []
+    solved: Solved = []
+    columns: list[int] = []
     left: list[int] = []
-    for group in groups:
-        remaining_rows, remaining = _eliminate(group.rows, group.columns, lines, solved)
-        unknowns += remaining
+    for group in decompose([line.depends for line in lines], len(unknown.coordinates)):
+        remaining_rows, remaining = eliminate(group.rows, group.columns, lines, solved)
+        columns += remaining
         left += remaining_rows
-    symbol = ca.SX.sym("z", len(unknowns))
-    F, w = _written_in(symbol, unknowns, left, [rows[row] for row in left], lines, solved, symbols)
-    whole = Equations(
-        tuple(symbols.coordinates), tuple(unknowns), tuple(rows[row] for row in left), (), (), symbol, u, p, w, F
-    )
-    return _staged(mechanism, whole)
+    z = ca.SX.sym("z", len(columns))
+    open_ones = [_wrapped(lines[row].whole(unknown.symbols), rows[row].kind) for row in left]
+    wanted = [stack(open_ones), stack(unknown.symbols.values)]
+    F, w = expressed(dict(zip(columns, ca.vertsplit(z), strict=True)), solved, unknown.symbols, wanted)
+    kept = tuple(rows[row] for row in left)
+    return _staged(mechanism, Equations(tuple(unknown.coordinates), tuple(columns), kept, (), (), z, u, p, w, F))
+
+
+def _wrapped(left: ca.SX, kind: Kind) -> ca.SX:
+    """What a constraint leaves open; an angle that closes modulo a turn, between half a turn and minus that."""
+    return ca.atan2(ca.sin(left), ca.cos(left)) if kind is Kind.ANGLE else left
 
 
 def _staged(mechanism: Mechanism, whole: Equations) -> Equations:
@@ -194,26 +179,27 @@ def _touched(expressions: ca.SX, z: ca.SX) -> list[set[int]]:
     return held
 
 
-def stack(expressions: Iterable[ca.SX]) -> ca.SX:
-    """Expressions one below the other, symbolic though there be none."""
-    return ca.vertcat(ca.SX(0, 1), *expressions)
+def _coordinates(mechanism: Mechanism) -> _Unknown:
+    coordinates: list[Coordinate] = []
+    values: list[ca.SX] = []
+    turned: dict[int, tuple[ca.SX, ca.SX]] = {}
+    frames: dict[str, Frame] = {}
 
+    def add(owner: str, part: str, kind: Kind, of_link: bool) -> ca.SX:
+        coordinates.append(Coordinate(owner, part, kind, of_link))
+        values.append(ca.SX.sym(f"{owner}.{part}"))
+        return values[-1]
 
-def _coordinates(mechanism: Mechanism) -> _Symbols:
-    symbols = _Symbols(mechanism)
     for link in mechanism.links:
         if link.name == mechanism.frame:
-            symbols.frames[link.name] = GROUND
+            frames[link.name] = GROUND
             continue
-        x = symbols.add(link.name, "x", Kind.LENGTH, True)
-        y = symbols.add(link.name, "y", Kind.LENGTH, True)
-        angle = symbols.add(link.name, "angle", Kind.ANGLE, True)
-        turned = ca.SX.sym(f"cos {link.name}"), ca.SX.sym(f"sin {link.name}")
-        symbols.turned[len(symbols.values) - 1] = turned
-        symbols.frames[link.name] = Frame(x, y, *turned, angle)
-    for pair in mechanism.pairs:
-        symbols.own[pair.name] = [symbols.add(pair.name, part, kind, False) for part, kind in pair.coordinates]
-    return symbols
+        x, y = (add(link.name, part, Kind.LENGTH, True) for part in ("x", "y"))
+        angle = add(link.name, "angle", Kind.ANGLE, True)
+        both = turned[len(values) - 1] = ca.SX.sym(f"cos {link.name}"), ca.SX.sym(f"sin {link.name}")
+        frames[link.name] = Frame(x, y, *both, angle)
+    own = {pair.name: [add(pair.name, *each, False) for each in pair.coordinates] for pair in mechanism.pairs}
+    return _Unknown(coordinates, Symbols(values, turned), frames, own)
 
 
 def _numbers(mechanism: Mechanism) -> tuple[ca.SX, dict[str, list[ca.SX]]]:
@@ -223,15 +209,15 @@ def _numbers(mechanism: Mechanism) -> tuple[ca.SX, dict[str, list[ca.SX]]]:
 
 
 def _closures(
-    mechanism: Mechanism, symbols: _Symbols, numbers: dict[str, list[ca.SX]], u: ca.SX
+    mechanism: Mechanism, unknown: _Unknown, numbers: dict[str, list[ca.SX]], u: ca.SX
 ) -> tuple[list[ca.SX], list[Row]]:
     """Every constraint that must vanish: the residuals of all pairs, then drive minus position of all inputs."""
     closures: list[ca.SX] = []
     rows: list[Row] = []
 
     def applied(formula: str, pair: Pair) -> ca.SX | Sequence[ca.SX]:
-        first, second = (symbols.frames[link] for link in pair.links)
-        return getattr(pair, formula)(first, second, numbers.get(pair.name), symbols.own.get(pair.name))
+        first, second = (unknown.frames[link] for link in pair.links)
+        return getattr(pair, formula)(first, second, numbers.get(pair.name), unknown.own.get(pair.name))
 
     for pair in mechanism.pairs:
         closures += applied("residual", pair)
@@ -242,155 +228,3 @@ def _closures(
         closures.append(applied("drive", pair) - u[index])
         rows.append(Row(pair.name, pair.drive_kind, True))
     return closures, rows
-
-
-def _lines(closures: list[ca.SX], symbols: _Symbols) -> tuple[list[_Line], list[set[int]]]:
-    """The constraints with their constant factors taken out, and the coordinates on which each depends."""
-    count = len(symbols.values)
-    both = [symbol for pair in symbols.turned.values() for symbol in pair]
-    owner = [index for index in symbols.turned for _ in range(2)]
-    everything = stack([*symbols.values, *both])
-    stacked = stack(closures)
-    slopes = ca.jacobian(stacked, everything)
-    factors: list[dict[int, float]] = [{} for _ in closures]
-    bent: list[set[int]] = [set() for _ in closures]
-    crooked: set[int] = set()
-    rows, columns = slopes.sparsity().get_triplet()
-    for row, column, slope in zip(rows, columns, slopes.nonzeros(), strict=True):
-        if column < count and slope.is_constant():
-            factors[row][column] = float(slope)
-        else:
-            bent[row].add(column if column < count else owner[column - count])
-            if column < count:
-                crooked.add(column)
-    # a symbol that is linear wherever it stands is taken out of all constraints at once, any other one by one
-    straight = [column for column in range(count) if column not in crooked]
-    zeroed = stack(symbols.values[index] for index in straight)
-    rest = ca.vertsplit(ca.substitute(stacked, zeroed, ca.SX.zeros(len(straight))))
-    lines = []
-    for row, expression in enumerate(rest):
-        bends = [symbols.values[column] for column in factors[row] if column in crooked]
-        straightened = ca.substitute(expression, ca.vertcat(*bends), ca.SX.zeros(len(bends))) if bends else expression
-        lines.append(_Line(factors[row], straightened, set(bent[row]), set(bent[row])))
-    return lines, [set(line.factors) | line.bent for line in lines]
-
-
-def _eliminate(
-    rows: Sequence[int], columns: Sequence[int], lines: list[_Line], solved: list[tuple[int, _Line]]
-) -> tuple[list[int], list[int]]:
-    """Solve constraints with constant factors for one coordinate each, the shortest first.
-
-    x and y of a link enter a turning pair with factor one, so this leaves the loop equations by itself.
-    Returns the rows and columns of the group that remain.
-    """
-    remaining_rows, remaining = list(rows), set(columns)
-    while True:
-        best: tuple[tuple[int, int, int], int, int] | None = None
-        for row in remaining_rows:
-            line = lines[row]
-            inside = [column for column in line.factors if column in remaining]
-            size = len(inside) + len(line.bent & remaining)
-            for column in inside:
-                if column not in line.bent and (best is None or (size, row, column) < best[0]):
-                    best = (size, row, column), row, column
-        if best is None:
-            return remaining_rows, sorted(remaining)
-        _, pivot_row, pivot = best
-        remaining_rows.remove(pivot_row)
-        remaining.discard(pivot)
-        by = lines[pivot_row]
-        solved.append((pivot, by))
-        for row in remaining_rows:
-            _replace(lines[row], pivot, by)
-
-
-def _replace(line: _Line, pivot: int, by: _Line) -> None:
-    """Put the solution of `by` for the pivot into another constraint."""
-    if pivot in line.bent:
-        line.bent.discard(pivot)
-        line.bent |= (set(by.factors) | by.bent) - {pivot}
-    factor = line.factors.pop(pivot, 0.0)
-    if factor == 0.0:
-        return
-    ratio = factor / by.factors[pivot]
-    for column, slope in by.factors.items():
-        if column != pivot:
-            total = line.factors.get(column, 0.0) - ratio * slope
-            if total == 0.0:
-                line.factors.pop(column, None)
-            else:
-                line.factors[column] = total
-    line.rest = line.rest - ratio * by.rest
-    line.in_rest |= by.in_rest
-    line.bent |= by.bent
-
-
-def _written_in(
-    z: ca.SX,
-    unknowns: list[int],
-    left: list[int],
-    rows: list[Row],
-    lines: list[_Line],
-    solved: list[tuple[int, _Line]],
-    symbols: _Symbols,
-) -> tuple[ca.SX, ca.SX]:
-    """The remaining constraints and all coordinates as expressions of z, u and p alone."""
-    replaced: list[ca.SX] = []
-    by: list[ca.SX] = []
-    for index, column in enumerate(unknowns):
-        replaced.append(symbols.values[column])
-        by.append(z[index])
-        if column in symbols.turned:
-            replaced += symbols.turned[column]
-            by += [ca.cos(z[index]), ca.sin(z[index])]
-    for column, line in _in_order(solved):
-        factor = line.factors[column]
-        others = {other: -slope / factor for other, slope in line.factors.items() if other != column}
-        rest = -line.rest / factor
-        replaced.append(symbols.values[column])
-        by.append(sum((slope * symbols.values[other] for other, slope in others.items()), rest))
-        if column in symbols.turned:
-            replaced += symbols.turned[column]
-            by += _turned(by[-1], others, rest, symbols)
-    left_over = [_total(lines[row], symbols) for row in left]
-    for index, row in enumerate(rows):
-        if row.kind is Kind.ANGLE and not row.is_input:
-            left_over[index] = ca.atan2(ca.sin(left_over[index]), ca.cos(left_over[index]))
-    F, w = stack(left_over), stack(symbols.values)
-    return tuple(ca.substitute_inplace(replaced, by, [F, w])[1]) if replaced else (F, w)
-
-
-def _total(line: _Line, symbols: _Symbols) -> ca.SX:
-    return sum((slope * symbols.values[column] for column, slope in line.factors.items()), line.rest)
-
-
-def _turned(angle: ca.SX, others: dict[int, float], rest: ca.SX, symbols: _Symbols) -> list[ca.SX]:
-    """cos and sin of an angle that is a sum of angles, from theirs where that needs no new sine of an unknown."""
-    if not all(abs(slope) == 1.0 and other in symbols.turned for other, slope in others.items()):
-        return [ca.cos(angle), ca.sin(angle)]
-    cosine, sine = (ca.cos(rest), ca.sin(rest)) if not rest.is_zero() else (ca.SX(1), ca.SX(0))
-    for other, slope in others.items():
-        c, s = symbols.turned[other][0], slope * symbols.turned[other][1]
-        cosine, sine = cosine * c - sine * s, sine * c + cosine * s
-    return [cosine, sine]
-
-
-def _in_order(solved: list[tuple[int, _Line]]) -> list[tuple[int, _Line]]:
-    """The solved coordinates, each after those in which it is expressed."""
-    line_of = dict(solved)
-    done: dict[int, _Line] = {}
-    for start in line_of:
-        waiting = [start]
-        while waiting:
-            column = waiting[-1]
-            line = line_of[column]
-            open_ones = [
-                other
-                for other in (set(line.factors) | line.in_rest) - {column}
-                if other in line_of and other not in done
-            ]
-            if open_ones:
-                waiting += sorted(open_ones)
-            else:
-                done.setdefault(waiting.pop(), line)
-    return list(done.items())

@@ -18,7 +18,7 @@ FLOORS = [
     {"shapes"},
     {"pairs"},
     {"mechanism"},
-    {"document", "graph", "groups", "words"},
+    {"document", "elimination", "graph", "groups", "words"},
     {"equations", "files"},
     {"program", "motion"},
     {"solving"},
@@ -29,7 +29,7 @@ FLOORS = [
 ]
 LIBRARIES = {
     "numpy": {"algebra", "equations", "program", "motion", "solving", "analysis", "views"},
-    "casadi": {"groups", "equations", "program"},
+    "casadi": {"elimination", "groups", "equations", "program"},
     "networkx": {"graph"},
     "pint": {"units"},
     "rich": {"views", "cli"},

@@ -83,7 +83,8 @@ def test_eliminated_coordinates_close_their_pairs_wherever_the_remaining_unknown
     for given_input, position in zip(mechanism.inputs, u, strict=True):
         pair = pairs[given_input.pair]
         ends = [frames[link] for link in pair.links]
-        opened.append(pair.drive(*ends, (), own[pair.name]) - position)
+        gap = pair.drive(*ends, (), own[pair.name]) - position
+        opened.append(wrapped(gap) if pair.drive_kind is Kind.ANGLE else gap)
     opened = np.array([value for value in opened if abs(value) > 1e-12])
     left = np.array([value for value in left if abs(value) > 1e-12])
     # every constraint that stays open is one of F's, with its value up to the sign and the mix of its own pair

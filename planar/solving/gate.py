@@ -54,19 +54,26 @@ class Gate:
         gaps = [_gap(left, kind, self.unit) for kind, left in self._closures(frames, own, u)]
         return np.nan_to_num(np.array(np.broadcast_arrays(*gaps)), nan=np.inf, posinf=np.inf)
 
-    def rate_gap(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Jet]], order: int) -> tuple[float, str]:
-        """How far velocities (order 1) or accelerations (2) break the worst constraint, as a part of the greatest."""
-        greatest = max((self._rate(frame, order) for frame in frames.values() if not frame.fixed), default=0.0)
-        greatest = max([greatest, *(abs(x.parts[order]) / self.unit for each in own.values() for x in each)])
-        rates = [(0.0, given.velocity, given.acceleration)[order] for given in self.mechanism.inputs]
-        wanted = [0.0] * (len(self.names) - len(rates)) + rates
-        worst, where = 0.0, ""
-        for name, (kind, left), rate in zip(self.names, self._closures(frames, own), wanted, strict=True):
-            found = left.parts[order] if isinstance(left, Jet) else 0.0
-            gap = abs(found - rate) / (self.unit if kind is Kind.LENGTH else 1.0) / (greatest or 1.0)
-            if not gap <= worst:
-                worst, where = (float("inf") if np.isnan(gap) else gap), name
-        return worst, where
+    def rate_gaps(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Jet]]) -> list[tuple[float, str]]:
+        """How far velocities, then accelerations, break the worst constraint, as a part of the greatest; its pair."""
+        closures = [(kind, left) for kind, left in self._closures(frames, own) if isinstance(left, Jet)]
+        units = np.array([self.unit if kind is Kind.LENGTH else 1.0 for kind, _ in closures])
+        found = []
+        for order in (1, 2):
+            rates = [(given.velocity, given.acceleration)[order - 1] for given in self.mechanism.inputs]
+            wanted = np.zeros(len(closures))
+            wanted[len(closures) - len(rates) :] = rates
+            broken = np.array([left.parts[order] for _, left in closures]) - wanted
+            gaps = np.nan_to_num(np.abs(broken) / units / self._greatest(frames, own, order), nan=np.inf)
+            worst = int(np.argmax(gaps)) if len(gaps) else 0
+            found.append((float(gaps.max(initial=0.0)), self.names[worst] if len(gaps) else ""))
+        return found
+
+    def _greatest(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Jet]], order: int) -> float:
+        """The greatest rate of an order (lengths of the size), what a velocity makes of itself in an arc included."""
+        rates = [self._rate(frame, order) for frame in frames.values() if not frame.fixed]
+        rates += [abs(jet.parts[order]) / self.unit for each in own.values() for jet in each]
+        return max(rates, default=0.0) or 1.0
 
     def _rate(self, frame: Frame, order: int) -> float:
         angular = max(abs(frame.angle.parts[k]) ** (order / k) for k in range(1, order + 1))

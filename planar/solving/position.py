@@ -103,8 +103,8 @@ class Solver(Setup):
     def _stated(self, motion: Motion, found: int, residual: float, remarks: tuple[str, ...]) -> State:
         parts = np.stack([motion.w, motion.w1, motion.w2], axis=1) * self.scale[:, None]
         frames, own = placed([Jet(*each) for each in parts.tolist()], self.column, self.shapes, self.pairs)
-        for order, what in ((1, "velocities"), (2, "accelerations")):
-            gap, pair = self.gate.rate_gap(frames, own, order)
+        gaps = self.gate.rate_gaps(frames, own)
+        for (gap, pair), what in zip(gaps, ("velocities", "accelerations"), strict=True):
             if gap > 1e3 * self.tolerance:
                 if self.station.u.size > found:
                     raise refusals.disagreeing(self, found, what)
