@@ -215,16 +215,16 @@ def _closures(
     closures: list[ca.SX] = []
     rows: list[Row] = []
 
-    def applied(formula: str, pair: Pair) -> ca.SX | Sequence[ca.SX]:
-        first, second = (unknown.frames[link] for link in pair.links)
-        return getattr(pair, formula)(first, second, numbers.get(pair.name), unknown.own.get(pair.name))
+    def of(pair: Pair) -> tuple[Frame, Frame, Sequence[ca.SX], Sequence[ca.SX]]:
+        first, second = pair.links
+        return unknown.frames[first], unknown.frames[second], numbers.get(pair.name, []), unknown.own.get(pair.name, [])
 
     for pair in mechanism.pairs:
-        closures += applied("residual", pair)
+        closures += pair.residual(*of(pair))
         rows += [Row(pair.name, kind, False) for kind in pair.constrains]
     named = motions(mechanism)
     for index, given in enumerate(mechanism.inputs):
         pair = named[given.pair]
-        closures.append(applied("drive", pair) - u[index])
+        closures.append(pair.drive(*of(pair)) - u[index])
         rows.append(Row(pair.name, pair.drive_kind, True))
     return closures, rows

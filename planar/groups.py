@@ -82,8 +82,7 @@ def _resting_on(loose: Sequence[int], rows: Sequence[AbstractSet[int]], row_of: 
     free, waiting = set(loose), list(loose)
     while waiting:
         for row in touching.get(waiting.pop(), ()):
-            column = column_of.get(row)
-            if column is not None and column not in free:
-                free.add(column)
-                waiting.append(column)
+            if row in column_of and column_of[row] not in free:
+                free.add(column_of[row])
+                waiting.append(column_of[row])
     return free

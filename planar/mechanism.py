@@ -148,8 +148,8 @@ def with_inputs(mechanism: Mechanism, drives: tuple[Drive, ...]) -> Mechanism:
         drive = changes.get(given.pair)
         if drive is None:
             return given
-        told = {"position": drive.position, "velocity": drive.velocity, "acceleration": drive.acceleration}
-        return given._replace(**{key: value for key, value in told.items() if value is not None})
+        told = zip(given, drive, strict=True)
+        return Input(*(old if new is None else new for old, new in told))
 
     return replace(mechanism, inputs=tuple(changed(given) for given in mechanism.inputs))
 

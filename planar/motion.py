@@ -11,7 +11,7 @@ import numpy as np
 
 from planar.algebra import Jet
 from planar.mechanism import Mechanism, NamedPoint, motions, named_points
-from planar.pairs import Pair
+from planar.pairs import Kind, Pair
 from planar.plane import Frame, Vector
 from planar.shapes import Shape
 from planar.words import heading, hurrying, turning
@@ -146,7 +146,7 @@ class State:
         if name not in self.frames:
             raise Unknown(f"there is no link {name!r}; links are {', '.join(self.frames)}")
         angle, velocity, acceleration = _parts(self.frames[name].angle)
-        return LinkState(float(np.arctan2(np.sin(angle), np.cos(angle))), velocity, acceleration)
+        return LinkState(_wrapped(angle), velocity, acceleration)
 
     def pair(self, name: str) -> dict[str, float | None]:
         """What a pair reports of its relative motion (SI). Raises Unknown."""
@@ -159,7 +159,8 @@ class State:
         pair = self._motions[name]
         first, second = (self.frames[link] for link in pair.links)
         numbers = pair.measure(*(self.shapes[link] for link in pair.links))
-        return pair, _parts(pair.drive(first, second, numbers, self.own.get(pair.name, ())))
+        position, rate, second_rate = _parts(pair.drive(first, second, numbers, self.own.get(pair.name, ())))
+        return pair, (_wrapped(position) if pair.drive_kind is Kind.ANGLE else position, rate, second_rate)
 
     def relative(self, point: str, other: str, axes: str | None = None) -> RelativeState:
         """How `point` moves against `other`, in the axes of a link.
@@ -226,6 +227,11 @@ class State:
 
     def _point(self, named: NamedPoint) -> PointState:
         return PointState(*(np.array(part) for part in _parts_of(self._carried(named))))
+
+
+def _wrapped(angle: float) -> float:
+    """The same direction as an angle between -pi and pi."""
+    return float(np.arctan2(np.sin(angle), np.cos(angle))) if abs(angle) > np.pi else angle
 
 
 def _parts(value: Any) -> tuple[float, float, float]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import atan2, hypot, pi
 
+import numpy as np
+
 from planar.mechanism import Units
 from planar.units import unit
 
@@ -25,7 +27,7 @@ def turning(rate: float, scale: float = 1.0) -> str:
     return "anticlockwise" if rate > 0.0 else "clockwise"
 
 
-def heading(vector: Sequence[float], scale: float = 1.0) -> str:
+def heading(vector: Sequence[float] | np.ndarray, scale: float = 1.0) -> str:
     """The sense of a vector: one of four ways where it lies along an axis, else two of them together."""
     x, y = float(vector[0]), float(vector[1])
     if hypot(x, y) <= STILL * scale:

@@ -28,7 +28,7 @@ FLOORS = [
     {"__main__"},
 ]
 LIBRARIES = {
-    "numpy": {"algebra", "equations", "program", "motion", "solving", "analysis", "views"},
+    "numpy": {"algebra", "equations", "program", "motion", "solving", "analysis", "views", "words"},
     "casadi": {"elimination", "groups", "equations", "program"},
     "networkx": {"graph"},
     "pint": {"units"},

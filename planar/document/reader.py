@@ -94,9 +94,9 @@ def _units(top: Cursor) -> Units:
         return Units()
     units = top.inside("units")
     units.only("length", "angle")
-    found = {}
-    for kind, default in (("length", "m"), ("angle", "rad")):
-        text = units.text(kind, default)
+    found = Units()._asdict()
+    for kind in found:
+        text = units[kind].as_text() if units.has(kind) else found[kind]
         try:
             fits = unit(text).kind == kind
         except UnitError:

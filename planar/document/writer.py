@@ -57,7 +57,7 @@ def _told(**fields: Any) -> dict[str, Any]:
     return {key: value for key, value in fields.items() if value not in (None, [], {})}
 
 
-def _list(values: Iterable[float] | None) -> list[float] | None:
+def _list(values: Iterable[Any] | None) -> list[Any] | None:
     return None if values is None else list(values)
 
 

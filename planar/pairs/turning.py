@@ -60,10 +60,26 @@ class Turning(Pair):
         if len(group) == 1:
             return tuple(group)
         ends = [(group[0].links[0], group[0].points[0])] + [(pair.links[1], pair.points[1]) for pair in group]
-        return _between(group[0].pin, ends, list(combinations(range(len(ends)), 2)), group[0].radius)
+        return cls._between(group[0].pin, ends, list(combinations(range(len(ends)), 2)), group[0].radius)
 
     @classmethod
-    def read(cls, entry: Entry) -> tuple[Turning, ...]:
+    def _between(
+        cls, pin: str, ends: Sequence[tuple[str, str]], which: Sequence[tuple[int, int]], radius: float | None
+    ) -> tuple[Self, ...]:
+        """Turning pairs between chosen ends (link, point) of one pin."""
+        return tuple(
+            cls(
+                pin if len(ends) == 2 else f"{pin}:{ends[i][0]},{ends[j][0]}",
+                (ends[i][0], ends[j][0]),
+                (ends[i][1], ends[j][1]),
+                pin,
+                radius,
+            )
+            for i, j in which
+        )
+
+    @classmethod
+    def read(cls, entry: Entry) -> tuple[Self, ...]:
         entry.only("turning", "links", "points", "pin_radius", "pin_diameter")
         pin = entry.name("turning")
         if entry.has("links"):
@@ -90,7 +106,7 @@ class Turning(Pair):
                 "pin_radius" if entry.has("pin_radius") else "pin_diameter", "a pin must have a size above zero"
             )
         ends = list(zip(links, points, strict=True))
-        return _between(pin, ends, [(0, k) for k in range(1, len(ends))], radius)
+        return cls._between(pin, ends, [(0, k) for k in range(1, len(ends))], radius)
 
     @classmethod
     def write(cls, group: Sequence[Self], quantity: Quantity) -> dict[str, Any]:
@@ -120,19 +136,3 @@ class Turning(Pair):
             sample(Vector(0.3, -0.2), Vector(-0.5, 0.4), (frame_at(0.1, 0.7, 0.6), frame_at(0.0, 0.0, -1.9)), 0.02),
             sample(Vector(1.3, 0.0), Vector(0.0, 0.0), (frame_at(-2.0, 0.4, 2.8), frame_at(0.0, 0.0, 4.0)), None),
         )
-
-
-def _between(
-    pin: str, ends: Sequence[tuple[str, str]], which: Sequence[tuple[int, int]], radius: float | None
-) -> tuple[Turning, ...]:
-    """Turning pairs between chosen ends (link, point) of one pin."""
-    return tuple(
-        Turning(
-            pin if len(ends) == 2 else f"{pin}:{ends[i][0]},{ends[j][0]}",
-            (ends[i][0], ends[j][0]),
-            (ends[i][1], ends[j][1]),
-            pin,
-            radius,
-        )
-        for i, j in which
-    )

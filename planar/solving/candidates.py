@@ -12,7 +12,7 @@ from planar.equations import Stage
 from planar.mechanism import Mechanism, named_points
 from planar.pairs import Kind, Pair
 from planar.plane import GROUND, Frame, Vector, frame_at
-from planar.program import Program, length, shapes
+from planar.program import Program, length, scaled, shapes
 from planar.solving.newton import Closing, newton, polished
 
 Array = np.ndarray
@@ -43,9 +43,14 @@ class Candidates:
         self.equations = program.equations
         self.pairs = {pair.name: pair for pair in mechanism.pairs}
         self.column = {(c.owner, c.part): index for index, c in enumerate(self.equations.coordinates)}
+        placed_in = shapes(mechanism)
+        self.numbers = {
+            pair.name: scaled(pair.measure(*(placed_in[link] for link in pair.links)), pair.measures, unit)
+            for pair in mechanism.pairs
+        }
         self.local = {
             name: {point: Vector(at.x / unit, at.y / unit) for point, at in shape.points.items()}
-            for name, shape in shapes(mechanism).items()
+            for name, shape in placed_in.items()
         }
         self.sketch = {name: Vector(x / unit, y / unit) for name, x, y in mechanism.sketch}
         level = {link.name: self._level(link.name) for link in mechanism.links}
@@ -96,7 +101,7 @@ class Candidates:
             for name, (_, link, point) in sketched.items()
         ]
         drives = [
-            (pair, float(pair.drive(*(frames[link] for link in pair.links), (), own[name])))
+            (pair, float(pair.drive(frames[pair.links[0]], frames[pair.links[1]], self.numbers[name], own[name])))
             for name, pair in pairs.items()
             if pair.coordinates
         ]
@@ -173,7 +178,7 @@ class Candidates:
 
 
 def placed(
-    w: Sequence[Scalar], column: Mapping[tuple[str, str], int], links: Iterable[str], pairs: Mapping[str, Pair]
+    w: Sequence[Scalar] | Array, column: Mapping[tuple[str, str], int], links: Iterable[str], pairs: Mapping[str, Pair]
 ) -> tuple[dict[str, Frame], dict[str, tuple[Scalar, ...]]]:
     """Frames of links and own coordinates of pairs from w, whose entries may be floats, arrays or jets."""
     frames = {

@@ -56,14 +56,11 @@ def follow(solver: Followed, p: Array, z: Array, start: Array, stop: Array) -> A
         step = min(step, 1.0 - t)
         inputs = stop if t + step >= 1.0 else start + (t + step) * way
         tried = corrected(solver.program, p, z + step * here.rates + 0.5 * step**2 * here.second, inputs)
-        there = branch.at(tried, inputs, way) if tried is not None else None
-        if (
-            there is not None
-            and branch.same(here, there, step)
-            and solver.open_along(tried[None], inputs[None])[0] <= solver.tolerance
-        ):
-            z, here, t, step = tried, there, t + step, 1.5 * step
-            continue
+        if tried is not None and solver.open_along(tried[None], inputs[None])[0] <= solver.tolerance:
+            there = branch.at(tried, inputs, way)
+            if branch.same(here, there, step):
+                z, here, t, step = tried, there, t + step, 1.5 * step
+                continue
         step *= 0.5
         if step < SHORTEST:
             raise NoAnswer(

@@ -1,0 +1,386 @@
+"""The command line, as real processes: what they print, where, and how they end."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import planar
+from planar.files import models
+
+ROOT = Path(__file__).parent.parent
+FAR = 1e-12
+"""A result printed in full and read again is the same number; one solved again is so to round-off."""
+
+FOUR_BAR: dict[str, Any] = {
+    "planar": 1,
+    "name": "Four-bar chain",
+    "units": {"length": "mm", "angle": "deg"},
+    "frame": "AD",
+    "links": {
+        "AD": {"points": {"A": [0, 0], "D": [100, 0]}},
+        "AB": {"ends": ["A", "B"], "length": 50},
+        "BC": {"ends": ["B", "C"], "length": 66, "points": {"E": {"along": ["B", "C"], "distance": 40}}},
+        "DC": {"ends": ["D", "C"], "length": 56},
+    },
+    "pairs": [{"turning": "A"}, {"turning": "B", "pin_radius": 40}, {"turning": "C"}, {"turning": "D"}],
+    "inputs": [{"pair": "A", "position": 60, "velocity": "10.5 rad/s", "acceleration": "-26 rad/s^2"}],
+    "sketch": {"C": [80, 50]},
+}
+
+SLIDER_CRANK: dict[str, Any] = {
+    "planar": 1,
+    "name": "Slider-crank",
+    "units": {"length": "mm", "angle": "deg"},
+    "frame": "frame",
+    "links": {
+        "frame": {"points": {"O": [0, 0]}},
+        "crank": {"ends": ["O", "A"], "length": 480},
+        "rod": {"ends": ["A", "B"], "length": 1600},
+    },
+    "pairs": [
+        {"turning": "O"},
+        {"turning": "A"},
+        {"sliding": "stroke", "on": "frame", "block": "B", "line": {"through": "O"}},
+    ],
+    "inputs": [{"pair": "O", "position": 60, "velocity": "20 rad/s"}],
+    "sketch": {"B": [1780, 0]},
+}
+
+
+class Ended:
+    """A finished process: status, and the text of its two streams."""
+
+    def __init__(self, status: int, out: bytes, err: bytes):
+        self.status, self.out, self.err = status, out.decode("utf-8"), err.decode("utf-8")
+
+    def refused(self, status: int) -> str:
+        """The sentence of a failure: one printable line on stderr."""
+        assert self.status == status, self.err
+        assert self.err.startswith("planar: ")
+        assert self.err.endswith("\n")
+        assert self.err[:-1].isprintable()
+        return self.err[len("planar: ") : -1]
+
+    def done(self) -> str:
+        assert (self.status, self.err) == (0, "")
+        return self.out
+
+
+def run(folder: Path, *words: str, **environment: str) -> Ended:
+    """The command `planar` in a folder, its output piped."""
+    inherited = {key: value for key, value in os.environ.items() if key not in ("COLUMNS", "FORCE_COLOR", "NO_COLOR")}
+    told = {"PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "utf-8", "PYTHONWARNINGS": "error"} | environment
+    process = subprocess.run(
+        [sys.executable, "-m", "planar", *words],
+        cwd=folder,
+        env=inherited | told,
+        capture_output=True,
+        check=False,
+        stdin=subprocess.DEVNULL,
+    )
+    ended = Ended(process.returncode, process.stdout, process.stderr)
+    assert "Traceback" not in ended.err, ended.err
+    return ended
+
+
+def changed(value: dict[str, Any], **names: str) -> dict[str, Any]:
+    """A mechanism with some of its texts replaced wherever they stand."""
+    text = json.dumps(value)
+    for old, new in names.items():
+        text = text.replace(json.dumps(old.replace("_", " ")), json.dumps(new))
+    return json.loads(text)
+
+
+def written(folder: Path, value: Any, name: str = "m.json") -> str:
+    (folder / name).write_text(value if isinstance(value, str) else json.dumps(value), encoding="utf-8")
+    return name
+
+
+def row(table: str, first: str) -> list[str]:
+    """The cells of the row that begins with a word."""
+    line = next(line for line in table.splitlines() if line.split()[:1] == [first])
+    return re.split(r"\s{2,}", line.strip())
+
+
+# solve
+
+
+def test_solve_prints_every_link_point_and_pair(tmp_path: Path) -> None:
+    out = run(tmp_path, "solve", written(tmp_path, FOUR_BAR)).done()
+    state = planar.solve(planar.from_dict(FOUR_BAR))
+    assert "Four-bar chain" in out
+    assert "A = 60 deg" in out
+    assert "mobility 1" in out
+    link = state.link("BC")
+    numbers = [float(cell) for cell in row(out, "BC")[1:4]]
+    # six digits are printed
+    assert numbers == pytest.approx(
+        [57.29577951 * link.angle, link.angular_velocity, link.angular_acceleration], rel=1e-5
+    )
+    point = state.point("E")
+    cells = row(out, "E")
+    assert [float(cell) for cell in cells[1:3]] == pytest.approx(1e3 * point.position, rel=1e-5)
+    assert float(cells[3]) == pytest.approx(float((point.velocity @ point.velocity) ** 0.5), rel=1e-5)
+    assert cells[-1] == point.sense
+    assert "mm" in out
+    rubbing = state.pair("B")["rubbing_speed"]
+    assert any(f"{rubbing:.4f}" in line for line in out.splitlines() if line.split()[:1] == ["B"])
+    assert out.isascii() or "²" in out
+    assert "\x1b" not in out
+
+
+def test_solve_as_json_has_the_keys_and_values_of_the_contract(tmp_path: Path) -> None:
+    def strict(word: str) -> None:
+        raise AssertionError(f"{word} is no JSON")
+
+    out = run(tmp_path, "solve", written(tmp_path, FOUR_BAR), "--json").done()
+    told = json.loads(out, parse_constant=strict)
+    state = planar.solve(planar.from_dict(FOUR_BAR))
+    assert {"mechanism", "mobility", "residual", "inputs", "links", "points", "pairs"} <= told.keys()
+    assert (told["mechanism"], told["mobility"]) == ("Four-bar chain", 1)
+    assert 0.0 <= told["residual"] < FAR
+    assert told["inputs"] == {
+        "A": {"position": pytest.approx(1.0471975511965976), "velocity": 10.5, "acceleration": -26}
+    }
+    assert set(told["links"]) == {"AD", "AB", "BC", "DC"}
+    for name, link in told["links"].items():
+        for key in ("angle", "angular_velocity", "angular_acceleration"):
+            assert link[key] == pytest.approx(getattr(state.link(name), key), abs=FAR, rel=FAR)
+    assert set(told["points"]) == {"A", "B", "C", "D", "E"}
+    for name, point in told["points"].items():
+        for key in ("position", "velocity", "acceleration"):
+            assert point[key] == pytest.approx(getattr(state.point(name), key), abs=FAR, rel=FAR)
+    assert set(told["pairs"]) == {"A", "B", "C", "D"}
+    for name, pair in told["pairs"].items():
+        assert {"relative_angular_velocity", "rubbing_speed"} <= pair.keys()
+        assert pair["rubbing_speed"] == (pytest.approx(state.pair(name)["rubbing_speed"]) if name == "B" else None)
+
+
+def test_a_sliding_pair_reports_displacement_velocity_and_acceleration(tmp_path: Path) -> None:
+    told = json.loads(run(tmp_path, "solve", written(tmp_path, SLIDER_CRANK), "--json").done())
+    stroke, b = told["pairs"]["stroke"], told["points"]["B"]
+    assert set(stroke) == {"displacement", "velocity", "acceleration"}
+    assert stroke["displacement"] == pytest.approx(b["position"][0], rel=FAR)
+    assert stroke["velocity"] == pytest.approx(b["velocity"][0], rel=FAR)
+    assert stroke["acceleration"] == pytest.approx(b["acceleration"][0], rel=FAR)
+    assert "block B" in told["links"]
+
+
+def test_at_moves_an_input_in_its_own_unit_or_the_units_of_the_file(tmp_path: Path) -> None:
+    name = written(tmp_path, FOUR_BAR)
+    there = json.loads(json.dumps(FOUR_BAR))
+    there["inputs"][0]["position"] = 75
+    wanted = planar.solve(planar.from_dict(there)).link("BC").angle
+    for word in ("A=75", "A = 75 deg"):
+        told = json.loads(run(tmp_path, "solve", name, "--json", "--at", word).done())
+        assert told["links"]["BC"]["angle"] == pytest.approx(wanted, abs=1e-10)  # another start, the same assembly
+        assert told["inputs"]["A"]["velocity"] == 10.5
+
+
+@pytest.mark.parametrize(
+    ("word", "words"),
+    [
+        ("A", ["'A'", "PAIR=POSITION"]),
+        ("B=75", ["no input at 'B'", "A"]),
+        ("A=75mm", ["an angle is wanted"]),
+        ("A=nan", ["A", "number"]),
+    ],
+)
+def test_at_refuses_what_is_no_position_of_an_input(word: str, words: list[str], tmp_path: Path) -> None:
+    ended = run(tmp_path, "solve", written(tmp_path, FOUR_BAR), "--at", word)
+    sentence = ended.refused(2)
+    assert ended.out == ""
+    for each in words:
+        assert each in sentence
+
+
+# other commands
+
+
+def test_models_lists_every_model_that_comes_along(tmp_path: Path) -> None:
+    out = run(tmp_path, "models").done()
+    told = json.loads(run(tmp_path, "models", "--json").done())
+    known = list(models())
+    assert [each["model"] for each in told] == [file.stem for file, _ in known]
+    for each, (file, mechanism) in zip(told, known, strict=True):
+        assert set(each) == {"model", "ids", "about"}
+        assert file.stem in out
+        assert set(mechanism.ids) <= {file.stem, *each["ids"]}
+
+
+def test_a_model_that_comes_along_solves_from_any_folder(tmp_path: Path) -> None:
+    for file, mechanism in list(models())[:1]:
+        told = json.loads(run(tmp_path, "solve", file.stem, "--json").done())
+        assert told["mechanism"] == mechanism.name
+
+
+def test_help_and_version_are_printed(tmp_path: Path) -> None:
+    out = run(tmp_path, "--help").done()
+    assert "solve" in out
+    assert "models" in out
+    assert re.fullmatch(r"planar \d+\.\d+\.\d+\S*\n", run(tmp_path, "--version").done())
+
+
+# failures
+
+
+def test_a_mechanism_without_an_answer_ends_with_1_and_the_reason(tmp_path: Path) -> None:
+    value = json.loads(json.dumps(FOUR_BAR))
+    value["links"]["AB"]["length"] = 500
+    name = written(tmp_path, value)
+    ended = run(tmp_path, "solve", name)
+    sentence = ended.refused(1)
+    assert ended.out == ""
+    for word in ("cannot be assembled", "BC", "DC", "A = 60 deg"):
+        assert word in sentence
+    ended = run(tmp_path, "solve", name, "--json")
+    assert ended.refused(1) == sentence
+    told = json.loads(ended.out)
+    assert set(told) == {"outcome", "reason"}
+    assert told["outcome"] == "cannot be assembled"
+    assert told["reason"] in sentence
+
+
+def test_bad_input_ends_with_2_and_names_the_place(tmp_path: Path) -> None:
+    value = json.loads(json.dumps(FOUR_BAR))
+    value["links"]["AB"]["lenght"] = value["links"]["AB"].pop("length")
+    name = written(tmp_path, value)
+    ended = run(tmp_path, "solve", name)
+    sentence = ended.refused(2)
+    assert ended.out == ""
+    for word in ("$.links.AB.lenght", "'lenght'", "'length'"):
+        assert word in sentence
+    ended = run(tmp_path, "solve", name, "--json")
+    assert ended.refused(2) == sentence
+    told = json.loads(ended.out)
+    assert set(told) == {"outcome", "reason"}
+    assert told["outcome"] == "bad input"
+    assert "$.links.AB.lenght" in told["reason"]
+
+
+@pytest.mark.parametrize(
+    ("model", "words"),
+    [("none.json", ["none.json", "no such file"]), (".", ["folder"]), ("a\nb\x1b[31m", ["no such file"])],
+    ids=["missing", "folder", "screen"],
+)
+def test_what_is_no_file_ends_with_2(model: str, words: list[str], tmp_path: Path) -> None:
+    sentence = run(tmp_path, "solve", model).refused(2)
+    for word in words:
+        assert word in sentence
+
+
+@pytest.mark.parametrize("words", [["solv"], ["solve"]], ids=" ".join)
+def test_a_wrong_command_line_ends_with_2(words: list[str], tmp_path: Path) -> None:
+    ended = run(tmp_path, *words)
+    assert ended.status == 2
+    assert ended.out == ""
+    assert "Error" in ended.err
+
+
+def test_a_frame_alone_is_solved_or_refused_in_a_sentence(tmp_path: Path) -> None:
+    value = {"planar": 1, "frame": "f", "links": {"f": {"points": {"A": [0, 0]}}}, "pairs": []}
+    ended = run(tmp_path, "solve", written(tmp_path, value))
+    assert ended.done() if ended.status == 0 else ended.refused(1)
+
+
+# tables to files
+
+
+def test_tables_are_written_in_the_format_of_the_file(tmp_path: Path) -> None:
+    name = written(tmp_path, changed(FOUR_BAR, Four_bar="", AB="crank<1>") | {"name": "A <b>&amp;</b> [i]B[/i]"})
+    beginnings = {"t.txt": "A <b>", "t.svg": "<svg", "t.html": "<!DOCTYPE html>"}
+    for output, beginning in beginnings.items():
+        assert run(tmp_path, "solve", name, "-o", output).done() == ""
+        text = (tmp_path / output).read_text(encoding="utf-8")
+        assert text.startswith(beginning)
+        assert "\x1b" not in text
+        if output == "t.txt":
+            assert "A <b>&amp;</b> [i]B[/i]" in text
+            assert row(text, "crank<1>")[1] == "60.0000"
+        else:
+            shown = re.sub(r"<[^>]*>|&#160;", " ", text)
+            assert "<b>" not in text
+            assert "&lt;b&gt;" in shown
+            assert "[i]B[/i]" in shown
+            assert "crank&lt;1&gt;" in shown
+            assert "https://" not in re.sub(
+                r"https?://www\.w3\.org|https://rich\.readthedocs\S*|https://www\.textual\S*", "", text
+            )
+
+
+@pytest.mark.parametrize(
+    ("output", "words"), [("t.pdf", [".txt", ".svg", ".html", ".pdf"]), ("no/t.txt", ["t.txt", "cannot be written"])]
+)
+def test_a_file_that_cannot_be_written_ends_with_2(output: str, words: list[str], tmp_path: Path) -> None:
+    sentence = run(tmp_path, "solve", written(tmp_path, FOUR_BAR), "-o", output).refused(2)
+    for word in words:
+        assert word in sentence
+
+
+def test_a_file_asked_for_beside_json_is_not_forgotten(tmp_path: Path) -> None:
+    ended = run(tmp_path, "solve", written(tmp_path, FOUR_BAR), "--json", "-o", "t.txt")
+    assert ended.status == 2 or (tmp_path / "t.txt").is_file()
+
+
+# texts of authors
+
+
+def test_markup_in_names_is_printed_as_it_is_written(tmp_path: Path) -> None:
+    value = changed(FOUR_BAR, AB="[red]x[/red]", B="[bold]p[/bold]", E="[/]", D="[link]")
+    value |= {"name": "[bold]x[/bold]", "source": "[i]y[/i]", "notes": ["[u]n[/u] [/]"]}
+    value["published"] = [{"symbol": "[b]v[/b] &c", "quantity": "velocity", "of": "C", "value": 1, "slip": "[s]"}]
+    out = run(tmp_path, "solve", written(tmp_path, value)).done()
+    for word in ("[bold]x[/bold]", "[i]y[/i]", "[u]n[/u] [/]", "[b]v[/b] &c", "[s]", "[link]", "[/]"):
+        assert word in out
+    assert row(out, "[red]x[/red]")[1] == "60.0000"
+    assert row(out, "[bold]p[/bold]")[1] == "25.0000"
+    assert "[red]x[/red] - BC" in out
+
+
+def test_words_between_colons_are_no_pictures(tmp_path: Path) -> None:
+    value = FOUR_BAR | {"name": "a :smile: b", "notes": [":x:"]}
+    value["published"] = [{"symbol": ":smile:", "quantity": "velocity", "of": "C", "value": 1, "note": ":x:"}]
+    out = run(tmp_path, "solve", written(tmp_path, value)).done()
+    assert "a :smile: b" in out
+    assert row(out, ":smile:")[1] == "velocity of C"
+    assert out.count(":x:") == 2
+
+
+@pytest.mark.parametrize("where", ["name", "AB"])
+def test_no_text_of_a_file_commands_the_terminal(where: str, tmp_path: Path) -> None:
+    text = "\x1b]0;title\x07\x1b[31mred\x9b2J"
+    value = changed(FOUR_BAR, AB=text) if where == "AB" else FOUR_BAR | {"name": text, "notes": [text]}
+    ended = run(tmp_path, "solve", written(tmp_path, value))
+    for sign in ("\x1b", "\x07", "\x9b"):
+        assert sign not in ended.out + ended.err
+    assert ended.status in (0, 2)
+
+
+def test_half_a_character_is_no_traceback(tmp_path: Path) -> None:
+    name = written(tmp_path, json.dumps(changed(FOUR_BAR, AB="x\ud800") | {"name": "half \udc00"}))
+    assert run(tmp_path, "solve", name).status in (0, 2)
+
+
+def test_names_and_files_in_any_language_are_printed(tmp_path: Path) -> None:
+    value = changed(FOUR_BAR, AB="曲柄", C="Ä") | {"name": "Träger 连杆 🦾"}
+    name = written(tmp_path, value, "Träger 连杆.json")
+    out = run(tmp_path, "solve", name).done()
+    assert "Träger 连杆 🦾" in out
+    assert row(out, "曲柄")[1] == "60.0000"
+    told = json.loads(run(tmp_path, "solve", name, "--json").done())
+    assert told["mechanism"] == "Träger 连杆 🦾"
+    assert "曲柄" in told["links"]
+
+
+def test_a_screen_without_the_characters_is_no_traceback(tmp_path: Path) -> None:
+    value = changed(FOUR_BAR, AB="曲柄") | {"name": "连杆"}
+    ended = run(tmp_path, "solve", written(tmp_path, value, "连杆.json"), PYTHONIOENCODING="ascii")
+    assert "60.0000" in ended.done()
