@@ -8,6 +8,8 @@ if TYPE_CHECKING:
     from planar.files import dumps, from_dict, load, loads, to_dict
     from planar.solving.position import solve
 
+__version__ = "0.1.0"
+
 _ROOMS = {
     "BadInput": "errors",
     "NoAnswer": "errors",

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from planar import __version__
 from planar.errors import BadInput, NoAnswer
 
 if TYPE_CHECKING:
@@ -22,10 +23,13 @@ class Commands(click.Group):
     """Every command ends with the same sentences and exit statuses."""
 
     def invoke(self, ctx: click.Context) -> Any:
+        for stream in (sys.stdout, sys.stderr):
+            if hasattr(stream, "reconfigure"):
+                stream.reconfigure(errors="backslashreplace")  # what the screen's alphabet lacks
         try:
             return super().invoke(ctx)
         except BadInput as problem:
-            _refuse(str(problem), "bad input", problem.sentence, BAD_INPUT)
+            _refuse(str(problem), "bad input", str(problem), BAD_INPUT)
         except NoAnswer as problem:
             _refuse(str(problem), problem.outcome.value, problem.reason, NO_ANSWER)
 
@@ -33,12 +37,13 @@ class Commands(click.Group):
 def _refuse(sentence: str, outcome: str, reason: str, status: int) -> None:
     if "--json" in sys.argv:
         click.echo(json.dumps({"outcome": outcome, "reason": reason}, ensure_ascii=False))
-    click.echo(f"planar: {sentence}", err=True)
+    shown = "".join(each if each.isprintable() else repr(each)[1:-1] for each in sentence)
+    click.echo(f"planar: {shown}", err=True)
     sys.exit(status)
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(package_name="planar", message="planar %(version)s")
+@click.version_option(__version__, message="planar %(version)s")
 def main() -> None:
     """How any planar linkage moves.
 
@@ -72,6 +77,8 @@ def solve(model: str, as_json: bool, at: tuple[str, ...], output: Path | None) -
     from planar.files import load
     from planar.solving.position import solve as solved
 
+    if as_json and output is not None:
+        raise BadInput("-o", "tables go to a file or SI values are printed with --json; give one of the two")
     mechanism = load(model)
     drives = _drives(mechanism, at)
     state = solved(mechanism, drives)
@@ -138,9 +145,10 @@ def _show(renderable: Any, output: Path | None) -> None:
     from rich.console import Console
 
     if output is None:
-        console = Console()
+        plain = {"markup": False, "emoji": False, "highlight": False}  # a name is text, whatever it looks like
+        console = Console(**plain)
         # what is not a terminal has no width: lines are not to be broken for a file or another program
-        (console if console.is_terminal else Console(width=140, soft_wrap=False)).print(renderable)
+        (console if console.is_terminal else Console(width=140, soft_wrap=False, **plain)).print(renderable)
         return
     from planar.files import save
     from planar.views.saved import written

@@ -187,7 +187,7 @@ def _coordinates(mechanism: Mechanism) -> _Unknown:
 
     def add(owner: str, part: str, kind: Kind, of_link: bool) -> ca.SX:
         coordinates.append(Coordinate(owner, part, kind, of_link))
-        values.append(ca.SX.sym(f"{owner}.{part}"))
+        values.append(ca.SX.sym(f"of {owner}.{part}"))
         return values[-1]
 
     for link in mechanism.links:
@@ -204,7 +204,7 @@ def _coordinates(mechanism: Mechanism) -> _Unknown:
 
 def _numbers(mechanism: Mechanism) -> tuple[ca.SX, dict[str, list[ca.SX]]]:
     """A symbol for each number of each pair, in the order in which `program.fitted` fills them."""
-    numbers = {pair.name: [ca.SX.sym(pair.name) for _ in pair.measures] for pair in mechanism.pairs}
+    numbers = {pair.name: [ca.SX.sym(f"of {pair.name}") for _ in pair.measures] for pair in mechanism.pairs}
     return stack(symbol for each in numbers.values() for symbol in each), numbers
 
 

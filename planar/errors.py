@@ -15,6 +15,13 @@ class Outcome(StrEnum):
     BRANCH_LOST = "branch lost"
 
 
+def _shown(text: str, longest: int) -> str:
+    """The text as one line that a screen can show, whatever a file put into it."""
+    if len(text) > longest:
+        text = f"{text[: longest * 3 // 5]} … {text[-longest * 3 // 10 :]}"
+    return "".join(each if each.isprintable() else repr(each)[1:-1] for each in text)
+
+
 class PlanarError(Exception):
     """Anything that planar refuses; its text is one sentence for a person."""
 
@@ -26,9 +33,9 @@ class BadInput(PlanarError):
     """
 
     def __init__(self, place: str, sentence: str):
-        super().__init__(f"{place}: {sentence}")
-        self.place = place
-        self.sentence = sentence
+        self.place = _shown(place, 200)
+        self.sentence = _shown(sentence, 300)
+        super().__init__(f"{self.place}: {self.sentence}")
 
 
 class NoAnswer(PlanarError):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -51,10 +52,14 @@ def save(path: Path, text: str) -> None:
 def found(model: str | Path) -> Path:
     """The file that a MODEL argument means: a path, else the name or id of a model that comes along."""
     path = Path(model)
-    if path.is_file():
-        return path
-    if path.is_dir():
-        raise BadInput(str(model), "this is a folder; name a mechanism file in it")
+    try:
+        if path.is_file():
+            return path
+        if path.is_dir():
+            raise BadInput(str(model), "this is a folder; name a mechanism file in it")
+    except OSError as problem:
+        told = f"{str(model)[:60]}…" if len(str(model)) > 100 else str(model)
+        raise BadInput(told, f"this cannot be the name of a file: {problem.strerror}") from None
     known = {file.stem: file for file in model_files()}
     if str(model) in known:
         return known[str(model)]
@@ -97,8 +102,7 @@ def _parsed(text: str | bytes, place: str) -> Any:
     def once(members: list[tuple[str, Any]]) -> dict[str, Any]:
         value = dict(members)
         if len(value) < len(members):
-            names = [name for name, _ in members]
-            twice = next(name for name in names if names.count(name) > 1)
+            twice = Counter(name for name, _ in members).most_common(1)[0][0]
             raise BadInput(place, f"the key {twice!r} stands twice in one object, so one of the two would be lost")
         return value
 
@@ -113,5 +117,5 @@ def _parsed(text: str | bytes, place: str) -> Any:
         raise BadInput(place, f"this is not JSON: {problem.msg} at {where}") from None
     except RecursionError:
         raise BadInput(place, "the file is nested too deeply to be a mechanism") from None
-    except ValueError as problem:
-        raise BadInput(place, f"this is not JSON that can be read: {problem}") from None
+    except ValueError:
+        raise BadInput(place, "a whole number has more digits than can be read") from None

@@ -67,9 +67,9 @@ class Link:
 
 
 class Unplaced(Exception):
-    """A point cannot be placed; `point` names it, the text says why."""
+    """A point cannot be placed; `point` names it (None: the axis), the text says why."""
 
-    def __init__(self, point: str, why: str):
+    def __init__(self, point: str | None, why: str):
         super().__init__(why)
         self.point = point
 
@@ -101,54 +101,74 @@ def shape(link: Link) -> Shape:
         drawn[link.ends[1]] = Vector(link.length, 0.0)
     places = {point.name: point.place for point in link.points}
     for name in places:
-        _place(name, places, drawn, ())
+        if name not in drawn:
+            _place(name, places, drawn)
     if link.axis is None:
         return Shape(drawn, Vector(0.0, 0.0), Vector(1.0, 0.0))
     origin, towards = (drawn[name] for name in link.axis)
     way = towards - origin
     length = sqrt(way.dot(way))
+    if isinstance(length, float) and length == 0.0:
+        raise Unplaced(None, f"points {link.axis[0]!r} and {link.axis[1]!r} coincide, so they give no axis")
     axis = Vector(way.x / length, way.y / length)
     back = Vector(axis.x, -axis.y)
     return Shape({name: (p - origin).turned(back) for name, p in drawn.items()}, origin, axis)
 
 
-def _place(name: str, places: Mapping[str, Place], drawn: dict[str, Vector], above: tuple[str, ...]) -> Vector:
-    if name in drawn:
-        return drawn[name]
-    if name in above:
-        raise Unplaced(name, f"point {name!r} rests on itself: {' on '.join((*above, name))}")
-    if name not in places:
-        raise Unplaced(name, f"there is no point {name!r} on this link")
-    place = places[name]
+def _place(name: str, places: Mapping[str, Place], drawn: dict[str, Vector]) -> None:
+    """Place a point after those that it rests on; a chain of them may be as long as it likes."""
+    way = {name: None}
+    while way:
+        name = next(reversed(way))
+        if name not in places:
+            raise Unplaced([*way][-2], f"there is no point {name!r} on this link")
+        place = places[name]
+        open_ones = [other for other in _rests_on(place) if other not in drawn]
+        if not open_ones:
+            drawn[name] = _placed(name, place, drawn)
+            del way[name]
+            continue
+        if open_ones[0] in way:
+            circle = " on ".join((*way, open_ones[0]))
+            raise Unplaced(name, f"point {name!r} rests on itself: {circle}")
+        way[open_ones[0]] = None
+
+
+def _rests_on(place: Place) -> tuple[str, ...]:
     if isinstance(place, At):
-        drawn[name] = Vector(place.x, place.y)
-        return drawn[name]
-    base, other = (place.start, place.towards) if isinstance(place, Along) else (place.first, place.second)
-    p, q = (_place(rest, places, drawn, (*above, name)) for rest in (base, other))
+        return ()
+    return (place.start, place.towards) if isinstance(place, Along) else (place.first, place.second)
+
+
+def _placed(name: str, place: Place, drawn: Mapping[str, Vector]) -> Vector:
+    if isinstance(place, At):
+        return Vector(place.x, place.y)
+    base, other = _rests_on(place)
+    p, q = drawn[base], drawn[other]
     way = q - p
     length = sqrt(way.dot(way))
     if isinstance(length, float) and length == 0.0:
         raise Unplaced(name, f"points {base!r} and {other!r} coincide, so they give no direction")
     unit = Vector(way.x / length, way.y / length)
     if isinstance(place, Along):
-        drawn[name] = p + unit.turned(direction(place.angle)) * place.distance
-    else:
-        drawn[name] = p + _apex(name, place, length).turned(unit)
-    return drawn[name]
+        return p + unit.turned(direction(place.angle)) * place.distance
+    return p + _apex(name, place, length).turned(unit)
 
 
 def _apex(name: str, place: Distances, base: Scalar) -> Vector:
     """The apex of a triangle on the x-axis from its three sides (law of cosines)."""
     a, b = place.from_first, place.from_second
-    along = (a * a - b * b + base * base) / (2.0 * base)
-    height = a * a - along * along
-    if isinstance(height, float) and height < 0.0:
-        if height < -1e-12 * max(a, b, base) ** 2:
+    if isinstance(a + b + base, float):
+        longest = max(a, b, base)
+        if 2.0 * longest - (a + b + base) > 1e-12 * longest:
             raise Unplaced(
                 name,
                 f"the triangle {place.first}-{place.second}-{name} does not close: sides "
                 f"{base:.6g}, {a:.6g} and {b:.6g} m (no side may exceed the sum of the others)",
             )
-        height = 0.0
+    along = (a * a - b * b + base * base) / (2.0 * base)
+    height = a * a - along * along
+    if isinstance(height, float):
+        height = max(height, 0.0)  # a flat triangle, but for rounding
     root = sqrt(height)
     return Vector(along, root if place.left else -root)

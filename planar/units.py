@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from functools import cache
-from math import pi
+from math import isfinite, pi
 from typing import NamedTuple
 
 SI = {
@@ -47,6 +47,9 @@ TABLE: dict[str, tuple[str, float, float]] = {
 }
 """unit: (kind, numerator, denominator) of its size in SI."""
 
+LONGEST = 64
+"""Characters of a quantity; the longest that `shortest` writes takes 33."""
+
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.DOTALL)
 # a word, with one small exponent at most, joined by a space, a dot, * or /: nothing that could be an expression
 _UNIT = re.compile(r"[A-Za-zµμΩ]+(\^[+-]?\d)?((\s*/\s*|\s*\*\s*|\s*·\s*|\s+)[A-Za-zµμΩ]+(\^[+-]?\d)?){0,7}")
@@ -73,6 +76,8 @@ class Unit(NamedTuple):
 
 def unit(text: str) -> Unit:
     """The unit that a text names. Raises UnitError."""
+    if len(text) > LONGEST:
+        raise UnitError(f"a unit takes at most {LONGEST} characters, not {len(text)}")
     spelled = re.sub(r"\s+", " ", text.strip().translate(_SPELLINGS).replace("^-^", "^-").replace("**", "^"))
     spelled = re.sub(r"(?<=[A-Za-z])\^-(?=\^?\d)", "^-", spelled)
     if spelled in TABLE:
@@ -84,6 +89,8 @@ def unit(text: str) -> Unit:
 
 def quantity(text: str, kind: str) -> float:
     """A text such as "10.5 rad/s" as an SI number of the kind asked for. Raises UnitError."""
+    if len(text) > LONGEST:
+        raise UnitError(f"a number with a unit takes at most {LONGEST} characters, not {len(text)}")
     match = _NUMBER.fullmatch(text)
     if match is None:
         raise UnitError(f"{text!r} is not a number with a unit, such as {example(kind)!r}")
@@ -95,7 +102,10 @@ def quantity(text: str, kind: str) -> float:
         raise UnitError(
             f"{text!r} is {_article(found.kind)}, but {_article(kind)} is wanted, such as {example(kind)!r}"
         )
-    return found.to_si(float(number))
+    value = found.to_si(float(number))
+    if not isfinite(value):
+        raise UnitError("the number is too large")
+    return value
 
 
 def example(kind: str) -> str:
@@ -105,6 +115,7 @@ def example(kind: str) -> str:
 
 def shortest(value: float, written: Unit) -> float | str:
     """The shortest number in `written` that reads back as exactly `value` (SI), or failing that an SI text."""
+    value = float(value)  # a number of numpy would write its type
     near = written.from_si(value)
     for digits in range(1, 18):
         candidate = float(f"{near:.{digits}g}")
@@ -124,19 +135,25 @@ def _looked_up(spelled: str) -> Unit:
     registry = _registry()
     try:
         one = registry.Quantity(1.0, spelled.replace("^", "**").replace("·", "*"))
-        kinds = {kind: registry.Quantity(1.0, si.replace("^", "**")) for kind, si in SI.items()}
-        if any(name in ("hertz", "counts_per_second") for name in one._units):
+        if any(name.endswith(("hertz", "counts_per_second")) for name in one._units):
             raise UnitError(f"{spelled!r} leaves open whether turns or radians are meant; write rad/s, deg/s or rpm")
-        # an angle is no dimension to pint, so what has one (or a turn) is told from what has none by its units
-        angular = any(registry.Quantity(1.0, name).check("[]") for name in one._units)
-        for kind, si in kinds.items():
-            if one.dimensionality == si.dimensionality and angular == ("rad" in SI[kind]):
-                return Unit(kind, float(one.to(si.units).magnitude), 1.0)
-    except (pint.PintError, AssertionError, ValueError, TypeError, AttributeError) as problem:
-        if isinstance(problem, UnitError):
-            raise
+        # compared in root units, not by dimension: an angle is no dimension to pint, but the radian is a root unit
+        root = one.to_root_units().units
+        for kind, si in SI.items():
+            ours = registry.Quantity(1.0, si.replace("^", "**"))
+            if root == ours.to_root_units().units:
+                return _of_size(spelled, kind, float(one.to(ours.units).magnitude))
+    except UnitError:
+        raise
+    except (pint.PintError, ArithmeticError, AssertionError, LookupError, ValueError, TypeError, AttributeError):
         raise UnitError(f"{spelled!r} is not a known unit") from None
     raise UnitError(f"{spelled!r} measures none of {', '.join(SI)}")
+
+
+def _of_size(spelled: str, kind: str, factor: float) -> Unit:
+    if not 1e-100 < factor < 1e100:
+        raise UnitError(f"{spelled!r} is too large or too small a unit")
+    return Unit(kind, factor, 1.0)
 
 
 @cache

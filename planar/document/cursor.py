@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
-from math import isfinite
+from math import isnan
 from typing import Any
 
 from planar.errors import BadInput
 from planar.mechanism import Units
-from planar.shapes import Link
+from planar.shapes import Link, shape
 from planar.units import UnitError, example, quantity, unit
 
 FORBIDDEN = ".:,"
+HUGE = 10**100
+"""SI; beyond it squares, and squares of squares, overflow."""
+_UNSHOWN = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff]")  # control characters, halves of characters
 
 
 @dataclass(frozen=True)
@@ -46,8 +50,33 @@ class Cursor:
     # walking
 
     def _path(self, key: str) -> str:
-        plain = key.split("[", maxsplit=1)[0].replace("_", "a").isalnum()
-        return f"{self.path}.{key}" if plain else f"{self.path}[{key!r}]"
+        return f"{self.path}.{key}" if re.fullmatch(r"\w+(\[\d+\])?", key) else f"{self.path}[{key!r}]"
+
+    def only_json(self) -> None:
+        """Refuse what no JSON file holds, and what no screen shows."""
+        waiting = [self]
+        while waiting:
+            each = waiting.pop()
+            value = each.value
+            if isinstance(value, dict):
+                for key in value:
+                    if not isinstance(key, str):
+                        raise each.refuse(None, f"keys are texts, but here is {type(key).__name__} {key!r:.40}")
+                    replace(each, path=each._path(key))._shown(key)
+                waiting += reversed([each[key] for key in value])
+            elif isinstance(value, list):
+                waiting += reversed(list(each.items()))
+            elif isinstance(value, str):
+                each._shown(value)
+            elif isinstance(value, int) and abs(value) >= HUGE:
+                raise each.refuse(None, "the number is too large")
+            elif not (value is None or isinstance(value, int | float)):
+                raise each.refuse(None, f"a Python {type(value).__name__} is no value that a mechanism file can have")
+
+    def _shown(self, text: str) -> None:
+        bad = _UNSHOWN.search(text)
+        if bad is not None:
+            raise self.refuse(None, f"the text holds {bad[0]!r}, which is no character that can be shown")
 
     def fields(self) -> Mapping[str, Any]:
         if not isinstance(self.value, dict):
@@ -105,6 +134,8 @@ class Cursor:
         found = [mark for mark in FORBIDDEN if mark in name]
         if found:
             raise self.refuse(None, f"the name {name!r} holds {found[0]!r}; names contain none of . : ,")
+        if not name.isprintable():
+            raise self.refuse(None, f"the name {name!r} holds a character that cannot be shown")
         return name
 
     def names(self, key: str, count: int) -> tuple[str, ...]:
@@ -131,7 +162,9 @@ class Cursor:
                 raise self.refuse(None, str(problem)) from None
         else:
             found = self._bare(self.as_number(), kind)
-        if not isfinite(found):
+        if isnan(found):
+            raise self.refuse(None, "this is not a number")
+        if not abs(found) < HUGE:
             raise self.refuse(None, "the number is too large")
         return found
 
@@ -175,7 +208,7 @@ class Cursor:
     def positive(self, kind: str) -> float:
         found = self.as_quantity(kind)
         if found <= 0.0:
-            raise self.refuse(None, f"a {kind} above zero is wanted here, not {self.value}")
+            raise self.refuse(None, f"a {kind} above zero is wanted here, not {self.value!r}")
         return found
 
     # links and points
@@ -190,6 +223,9 @@ class Cursor:
         if name not in self.whole.links:
             raise self.refuse(None, f"there is no link {name!r}{did_you_mean(name, self.whole.links)}")
         return name
+
+    def link(self, key: str) -> str:
+        return self[key].as_link()
 
     def links(self, key: str) -> tuple[str, ...]:
         found = tuple(item.as_link() for item in self[key].items())
@@ -209,6 +245,13 @@ class Cursor:
         found = self[key].as_text()
         self.carried(found, link, key)
         return found
+
+    def distinct(
+        self, key: str, link: str, first: str | tuple[float, float], second: str | tuple[float, float]
+    ) -> None:
+        placed = shape(self.whole.links[link])
+        if placed.at(first) == placed.at(second):
+            raise self.refuse(key, "the two points coincide, so they give no direction")
 
     def place(self, key: str, link: str) -> str | tuple[float, float]:
         if isinstance(self[key].value, list):

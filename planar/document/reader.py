@@ -53,17 +53,18 @@ SENSES = ("clockwise", "anticlockwise", "to the left", "to the right", "upwards"
 def read(value: Any) -> Mechanism:
     """The mechanism that a JSON value describes. Raises BadInput."""
     top = Cursor(value)
+    top.only_json()
     top.only(*KEYS)
     if top["planar"].value != FORMAT or isinstance(top["planar"].value, bool):
         raise top.refuse("planar", f"this is format {called(top['planar'].value)}; planar reads format {FORMAT}")
     units = _units(top)
     top = replace(top, whole=Whole(units, "", {}))
-    full = _written_out(top)
-    links = {name: _link(name, cursor) for name, cursor in full["links"].members()}
-    frame = full["frame"].as_text()
+    frame = top["frame"].as_text()
+    links = {name: _link(name, cursor) for name, cursor in top["links"].members()}
     if frame not in links:
-        raise full.refuse("frame", f"there is no link {frame!r} to be the frame{did_you_mean(frame, links)}")
-    full = replace(full, whole=Whole(units, frame, links))
+        raise top.refuse("frame", f"there is no link {frame!r} to be the frame{did_you_mean(frame, links)}")
+    full = _written_out(replace(top, whole=Whole(units, frame, links)))
+    links = dict(full.whole.links)
     pairs = _pairs(full)
     bare = Mechanism(
         name=full.text("name", "") or "mechanism",
@@ -102,30 +103,30 @@ def _units(top: Cursor) -> Units:
         except UnitError:
             fits = False
         if not fits:
-            raise units.refuse(kind, f"{text!r} is not a unit of {kind}, such as 'mm' or 'deg'")
+            such = {"length": "mm", "angle": "deg"}[kind]
+            raise units.refuse(kind, f"{text!r:.70} is not a unit of {kind}, such as {such!r}")
         found[kind] = text
     return Units(**found)
 
 
 def _written_out(top: Cursor) -> Cursor:
     """The file with the short forms of its pairs in full."""
-    value = dict(top.fields())
-    top["frame"].as_text()
-    links = dict(top.inside("links").fields())
+    links = dict(top.whole.links)
     entries = [dict(item.fields()) for item in top["pairs"].items()]
     for index, entry in enumerate(entries):
-        kind = _type(Cursor(entry, f"$.pairs[{index}]", top.whole))
-        whole = kind.rewrite(entry)
+        cursor = Cursor(entry, f"$.pairs[{index}]", top.whole)
+        whole = _type(cursor).rewrite(cursor)
         if whole is None:
             continue
         for name, link in whole.links.items():
             if name in links:
                 told = f"this makes a link {name!r}, but there is one of that name already"
-                raise Cursor(entry, f"$.pairs[{index}]").refuse(None, told)
-            links[name] = link
+                raise cursor.refuse(None, told)
+            links[name] = _link(name, Cursor(link, cursor.path, top.whole))
         entries[index] = whole.entry
         _join(whole.joined_by, tuple(whole.links), entries)
-    return replace(top, value=value | {"links": links, "pairs": entries})
+    whole = replace(top.whole, links=links)
+    return replace(top, value=dict(top.fields()) | {"pairs": entries}, whole=whole)
 
 
 def _join(by: dict[str, Any], links: tuple[str, ...], entries: list[dict[str, Any]]) -> None:
@@ -147,7 +148,7 @@ def _type(entry: Cursor) -> type[Pair]:
     if len(found) != 1:
         wanted = ", ".join(repr(keyword) for keyword in sorted(types))
         told = "more than one" if found else "none"
-        near = did_you_mean(next(iter(entry.fields()), ""), types)
+        near = "" if found else next(filter(None, (did_you_mean(key, types) for key in entry.fields())), "")
         raise entry.refuse(None, f"a pair says its type by one of the keys {wanted}; {told} is here{near}")
     return types[found[0]]
 
@@ -168,10 +169,9 @@ def _link(name: str, cursor: Cursor) -> Link:
     try:
         shape(link)
     except Unplaced as problem:
-        at = cursor["points"]
-        raise at.refuse(problem.point if at.has(problem.point) else None, str(problem)) from None
-    except ZeroDivisionError:
-        raise cursor.refuse("axis", "the two points of the axis coincide, so they give no direction") from None
+        if problem.point is None:
+            raise cursor.refuse("axis", str(problem)) from None
+        raise cursor["points"].refuse(problem.point, str(problem)) from None
     return link
 
 
@@ -203,15 +203,17 @@ def _axis(cursor: Cursor, points: tuple[str, ...]) -> tuple[str, str] | None:
 def _place(cursor: Cursor) -> Place:
     if isinstance(cursor.value, list):
         return At(*cursor.as_vector("length"))
-    cursor.only("along", "distance", "angle", "distances", "left_of", "right_of")
     if cursor.has("along"):
+        cursor.only("along", "distance", "angle")
         start, towards = cursor.names("along", 2)
         if start == towards:
             raise cursor.refuse("along", "a direction needs two different points")
         return Along(start, towards, cursor.quantity("distance", "length"), cursor.quantity("angle", "angle", 0.0))
+    cursor.only("distances", "left_of", "right_of")
     if not cursor.has("distances"):
         raise cursor.refuse(None, "a point is [x, y], or has 'along' and 'distance', or 'distances' and a side")
-    distances = {name: place.positive("length") for name, place in cursor["distances"].members()}
+    given = cursor["distances"].members()
+    distances = {place.checked_name(name): place.positive("length") for name, place in given}
     if len(distances) != 2:
         raise cursor.refuse("distances", f"distances from two points are wanted here, not {len(distances)}")
     if cursor.has("left_of") == cursor.has("right_of"):
@@ -311,9 +313,9 @@ def _result_point(cursor: Cursor, name: str, points: Mapping[str, str]) -> str:
 
 
 def _load(cursor: Cursor, points: Mapping[str, str]) -> Load:
-    cursor.only("point", "force", "link", "torque")
     if cursor.has("point") == cursor.has("link"):
         raise cursor.refuse(None, "a load is a 'force' at a 'point' or a 'torque' on a 'link'")
+    cursor.only(*(("point", "force") if cursor.has("point") else ("link", "torque")))
     if cursor.has("point"):
         point = _result_point(cursor["point"], cursor["point"].as_text(), points)
         return Load(point=point, force=cursor["force"].as_vector("force"))
@@ -323,9 +325,13 @@ def _load(cursor: Cursor, points: Mapping[str, str]) -> Load:
 def _sketch(top: Cursor, points: Mapping[str, str]) -> tuple[tuple[str, float, float], ...]:
     if not top.has("sketch"):
         return ()
-    return tuple(
-        (_result_point(place, name, points), *place.as_vector("length")) for name, place in top["sketch"].members()
-    )
+    found: dict[str, tuple[str, float, float]] = {}
+    for name, place in top["sketch"].members():
+        point = _result_point(place, name, points)
+        if point in found:
+            raise place.refuse(None, f"the point {point!r} is sketched already, under another of its names")
+        found[point] = (point, *place.as_vector("length"))
+    return tuple(found.values())
 
 
 def read_drive(mechanism: Mechanism, pair: str, position: str) -> Drive:
@@ -382,7 +388,7 @@ def _published(cursor: Cursor, mechanism: Mechanism, points: Mapping[str, str]) 
         quantity=quantity,
         of=of,
         value=cursor.optional("value", kind) if cursor.has("value") and cursor["value"].value is not None else None,
-        tolerance=cursor["tolerance"].as_number() if cursor.has("tolerance") else Published.tolerance,
+        tolerance=_tolerance(cursor),
         relative_to=relative_to,
         component=cursor.one_of("component", ("x", "y")),
         sense=cursor.one_of("sense", SENSES),
@@ -392,3 +398,12 @@ def _published(cursor: Cursor, mechanism: Mechanism, points: Mapping[str, str]) 
         inputs=_drives(cursor, "inputs", mechanism),
         start=_drives(cursor, "from", mechanism),
     )
+
+
+def _tolerance(cursor: Cursor) -> float:
+    if not cursor.has("tolerance"):
+        return Published._field_defaults["tolerance"]
+    found = cursor["tolerance"].as_number()
+    if not 0.0 <= found < 1e100:
+        raise cursor.refuse("tolerance", f"a number from zero on is wanted here, not {found!r}")
+    return found

@@ -43,6 +43,7 @@ def _quantities(mechanism: Mechanism) -> Quantity:
     declared = {"length": unit(mechanism.units.length), "angle": unit(mechanism.units.angle)}
 
     def quantity(value: float, kind: str) -> float | str:
+        value = float(value)  # a number of numpy would write its type
         if kind in declared:
             return shortest(value, declared[kind])
         if kind.startswith("angular") and value != 0.0:
@@ -54,7 +55,11 @@ def _quantities(mechanism: Mechanism) -> Quantity:
 
 def _told(**fields: Any) -> dict[str, Any]:
     """Only the fields that say something."""
-    return {key: value for key, value in fields.items() if value not in (None, [], {})}
+    return {
+        key: value
+        for key, value in fields.items()
+        if value is not None and (value or not isinstance(value, list | dict))
+    }
 
 
 def _list(values: Iterable[Any] | None) -> list[Any] | None:
@@ -108,7 +113,7 @@ def _drives(mechanism: Mechanism, drives: tuple[Drive, ...], quantity: Quantity)
 
 
 def _published(item: Published, mechanism: Mechanism, quantity: Quantity) -> dict[str, Any]:
-    value = None if item.value is None else f"{item.value!r} {SI[QUANTITIES[item.quantity]]}"
+    value = None if item.value is None else f"{float(item.value)!r} {SI[QUANTITIES[item.quantity]]}"
     return {"symbol": item.symbol, "quantity": item.quantity, "of": item.of, "value": value} | _told(
         tolerance=item.tolerance,
         relative_to=item.relative_to,

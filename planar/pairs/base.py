@@ -79,7 +79,7 @@ class Pair(ABC):
         return True
 
     @classmethod
-    def rewrite(cls, entry: Mapping[str, Any]) -> Rewritten | None:
+    def rewrite(cls, entry: Entry) -> Rewritten | None:
         """A short form of the entry in full; None where it is no short form."""
         return None
 
@@ -168,6 +168,17 @@ class Entry(Protocol):
 
     def place(self, key: str, link: str) -> str | tuple[float, float]:
         """A point of the link by name, or by coordinates."""
+
+    def fields(self) -> Mapping[str, Any]:
+        """The members of the object."""
+
+    def link(self, key: str) -> str:
+        """A link of the mechanism."""
+
+    def distinct(
+        self, key: str, link: str, first: str | tuple[float, float], second: str | tuple[float, float]
+    ) -> None:
+        """Refuse, at the key, two places of a link that coincide."""
 
     def inside(self, key: str) -> Entry:
         """The object under this key."""

@@ -71,14 +71,19 @@ class Sliding(Pair):
         return drive >= 0.0
 
     @classmethod
-    def rewrite(cls, entry: Mapping[str, Any]) -> Rewritten | None:
+    def rewrite(cls, entry: Entry) -> Rewritten | None:
         """`"on": link, "block": point`: a block of its own, pinned at the point to the links that carry it."""
-        point = entry.get("block")
-        if not isinstance(point, str):
+        if not entry.has("block"):
+            if entry.has("on"):
+                raise entry.refuse("on", "'on' goes with a 'block'; without one name two 'links' and a 'point'")
             return None
+        entry.only("sliding", "on", "block", "line", "turn")
+        on, point = entry.link("on"), entry.name("block")
+        if not entry.carriers(point):
+            raise entry.refuse("block", f"no link carries a point {point!r}, at which the block would be pinned")
         block = f"block {point}"
-        full = {key: value for key, value in entry.items() if key not in ("on", "block")}
-        full |= {"links": [entry.get("on"), block], "point": point}
+        full = {key: value for key, value in entry.fields().items() if key not in ("on", "block")}
+        full |= {"links": [on, block], "point": point}
         return Rewritten(full, {block: {"points": {point: [0, 0]}}}, {"turning": point})
 
     @classmethod
@@ -98,6 +103,7 @@ class Sliding(Pair):
             to = line.place("to", links[0])
             if to == through:
                 raise line.refuse("to", "the line needs two different points")
+            line.distinct("to", links[0], through, to)
         angle = line.quantity("angle", "angle", 0.0)
         point = entry.point("point", links[1])
         return (cls(name, (links[0], links[1]), through, to, angle, point, entry.quantity("turn", "angle", 0.0)),)

@@ -16,7 +16,9 @@ WIDTH = 124
 
 def written(renderable: RenderableType, suffix: str) -> str:
     """Tables in the format that a file's suffix names. Raises BadInput."""
-    console = Console(record=True, width=WIDTH, file=io.StringIO(), force_terminal=True)
+    console = Console(
+        record=True, width=WIDTH, file=io.StringIO(), force_terminal=True, markup=False, emoji=False, highlight=False
+    )
     console.print(renderable)
     formats = {
         ".txt": console.export_text,
