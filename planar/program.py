@@ -71,16 +71,14 @@ class Program:
         first = ca.jtimes(both, y, y1)
         second = ca.jtimes(first, y, y1) + ca.jtimes(both, y, y2)
         slopes = ca.jacobian(e.F, y)
-        outputs = [both, first, second, slopes[:, : e.z.numel()], slopes[:, e.z.numel() :]]
+        outputs = [ca.horzcat(both, first, second), slopes]
         return ca.Function("kinematics", [y, y1, y2, e.p], [ca.densify(output) for output in outputs])
 
     def kinematics(self, y: Array, y1: Array, y2: Array, p: Array) -> Motion:
         """Everything at one position: y = (z, u) with its first and second derivatives."""
-        both, first, second, slope, drive_slope = (each.full() for each in self._kinematics(y, y1, y2, p))
-        rows = self.equations.F.numel()
-        parts = (each.ravel() for each in (both, first, second))
-        F, w, F1, w1, F2, w2 = (half for part in parts for half in (part[:rows], part[rows:]))
-        return Motion(F, F1, F2, w, w1, w2, slope, drive_slope)
+        parts, slopes = (each.full() for each in self._kinematics(y, y1, y2, p))
+        rows, unknowns = self.equations.F.numel(), self.equations.z.numel()
+        return Motion(*parts[:rows].T, *parts[rows:].T, slopes[:, :unknowns], slopes[:, unknowns:])
 
     @cached_property
     def advance(self) -> ca.Function:

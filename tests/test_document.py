@@ -435,6 +435,32 @@ def test_a_block_joins_the_turning_pair_that_is_written_already(entry: Any) -> N
     assert planar.from_dict(planar.to_dict(m)) == m
 
 
+def test_a_block_joins_a_pin_whose_links_call_it_differently() -> None:
+    value = base("two dyads")
+    value["links"]["link"]["ends"] = ["K", "D"]
+    value["pairs"][2] = {"turning": "C", "links": ["rocker", "rod", "link"], "points": ["C", "C", "K"]}
+    value["pairs"].append({"sliding": "guide", "on": "rocker", "block": "C", "line": {"through": "Q", "to": "C"}})
+    about_c = [pair for pair in planar.from_dict(value).pairs if pair.entry_name() == "C"]
+    assert [pair.links for pair in about_c] == [("rocker", "rod"), ("rocker", "link"), ("rocker", "block C")]
+    assert [pair.points for pair in about_c] == [("C", "C"), ("C", "K"), ("C", "C")]
+
+
+def test_a_block_of_the_name_of_a_link_is_refused() -> None:
+    value = put(base("two dyads"), ["links", "block D"], {"points": {"Z": [0, 0]}})
+    problem = refused(value)
+    assert problem.place == "$.pairs[4]"
+    assert "'block D'" in problem.sentence
+
+
+def test_a_file_without_a_sketch_inputs_or_a_name_reads() -> None:
+    value = base()
+    for key in ("sketch", "inputs", "name", "source"):
+        del value[key]
+    m = planar.from_dict(value)
+    assert (m.sketch, m.inputs, m.source) == ((), (), None)
+    assert planar.loads(planar.dumps(m)) == m
+
+
 def test_an_input_at_a_sliding_pair_is_a_length() -> None:
     given = [{"pair": "stroke", "position": 1780, "velocity": "200 mm/s", "acceleration": "1 m/s^2"}]
     assert read((["inputs"], given), of="slider-crank").inputs == (Input("stroke", 1.78, 0.2, 1.0),)

@@ -55,7 +55,7 @@ def _compared(item: Published, state: State, start: State) -> Comparison:
         verdict = "slip in the book"
     elif abs(printed - reference) > item.tolerance * abs(reference):
         verdict = "differs"
-    elif item.sense is not None and item.sense not in sense:
+    elif item.sense is not None and item.sense not in sense.split(", "):
         verdict = "sense differs"
     else:
         verdict = "agrees"
