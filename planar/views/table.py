@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from textwrap import wrap
 
 import numpy as np
 from rich.box import SIMPLE_HEAD
@@ -18,6 +19,8 @@ from planar.pairs import Pair
 from planar.units import SI, Unit, unit
 from planar.words import amount, heading, hurrying, listed, turning
 
+HEADING = 13
+"""Characters: longer headings stand in several lines, so that the tables of a textbook mechanism fit 80 columns."""
 DIGITS = 6
 """Significant digits printed; `--json` has all of them."""
 _UNITS = {"rad/s^2": "rad/s²", "m/s^2": "m/s²", "N m": "N·m"}
@@ -43,7 +46,7 @@ def published(comparisons: Iterable[Comparison]) -> RenderableType:
     for each in comparisons:
         item = each.published
         kind = QUANTITIES[item.quantity]
-        off = "" if each.apart is None else f"{100.0 * each.apart:+.1f} %"
+        off = "" if each.apart is None else f"{round(100.0 * each.apart, 1) + 0.0:+.1f} %"
         style = {"differs": "bold red", "sense differs": "bold red", "slip in the book": "yellow"}.get(each.verdict, "")
         printed = "-" if item.value is None else f"{item.value:.6g}"
         table.add_row(
@@ -121,7 +124,7 @@ def _heading(state: State) -> RenderableType:
 def _links(state: State) -> RenderableType:
     units = state.mechanism.units
     table = _table(
-        "Links", "link", f"angle, {units.angle}", "angular velocity, rad/s", "angular acceleration, rad/s²", "sense"
+        "Links", "link", f"angle, {units.angle}", "ang. velocity, rad/s", "ang. acceleration, rad/s²", "sense"
     )
     angle = unit(units.angle)
     for name, link in state.links.items():
@@ -188,7 +191,10 @@ def _pairs(state: State) -> RenderableType:
         kinds.setdefault(type(pair), []).append(pair)
     tables = []
     for kind, pairs in kinds.items():
-        titles = [f"{name.replace('_', ' ')}, {_shown(of, state)[0]}" for name, of in kind.reports.items()]
+        titles = [
+            f"{name.replace('_', ' ').replace('angular', 'ang.')}, {_shown(of, state)[0]}"
+            for name, of in kind.reports.items()
+        ]
         table = _table(f"{kind.keyword.capitalize()} pairs", "pair", "links", *titles, left=(0, 1))
         for pair in pairs:
             report = state.pair(pair.name)
@@ -218,18 +224,22 @@ def _quantity(each: Comparison) -> str:
 
 
 def _number(value: float) -> str:
-    if value == 0.0 or abs(value) < 1e-14:
-        return "0"
-    if 1e-3 <= abs(value) < 1e6:
-        whole = len(str(int(abs(value)))) if abs(value) >= 1.0 else 1 - int(np.ceil(-np.log10(abs(value))))
-        return f"{value:.{max(0, DIGITS - max(whole, 1) if abs(value) >= 1 else DIGITS)}f}"
-    return f"{value:.{DIGITS - 1}e}"
+    return "0" if abs(value) < 1e-14 else f"{value:#.{DIGITS}g}".rstrip(".")
 
 
 def _table(title: str | None, *headings: str, left: tuple[int, ...] = (0,)) -> Table:
-    table = Table(title=title, title_justify="left", title_style="bold", box=SIMPLE_HEAD, pad_edge=False)
-    last = len(headings) - 1
+    """An empty table; of a heading "name, unit" the unit stands below the name. Numbers are never broken."""
+    table = Table(
+        title=title,
+        title_justify="left",
+        title_style="bold",
+        box=SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
+        pad_edge=False,
+    )
     for index, text in enumerate(headings):
-        words = index in left or (index == last and text == "sense")
-        table.add_column(text, justify="left" if words else "right", overflow="fold")
+        words = index in left or text == "sense"
+        name, _, unit_name = text.partition(", ")
+        heading = "\n".join(filter(None, (*wrap(name, HEADING), unit_name)))
+        table.add_column(heading, justify="left" if words else "right", overflow="fold", no_wrap=not words, min_width=5)
     return table
