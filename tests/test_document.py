@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import json
 from collections.abc import Callable
-from math import inf, isfinite, nan, pi
+from math import cos, inf, isfinite, nan, pi, sin
 from typing import Any
 
 import numpy as np
@@ -400,14 +400,16 @@ def sliding(m: Mechanism) -> Any:
         ({"through": "O"}, "O", None, 0.0),
         ({"through": "O", "angle": 180}, "O", None, pi),
         ({"through": [5, "1 cm"], "angle": "0.5 rad"}, (0.005, 0.01), None, 0.5),
-        ({"through": "O", "to": [10, 0]}, "O", (0.01, 0.0), 0.0),
-        ({"through": [10, 0], "to": "O"}, (0.01, 0.0), "O", 0.0),
+        ({"through": "O", "to": [10, 10]}, "O", (0.01, 0.01), pi / 4.0),
+        ({"through": [10, 0], "to": "O"}, (0.01, 0.0), "O", pi),
     ],
 )
 def test_a_line_goes_through_a_place_at_an_angle_or_to_another(line: Any, through: Any, to: Any, angle: float) -> None:
-    slide = sliding(read((["pairs", 3, "line"], line), of="slider-crank"))
+    m = read((["pairs", 3, "line"], line), of="slider-crank")
+    slide = sliding(m)
     assert (slide.through, slide.to) == (through, to)
-    assert slide.angle == pytest.approx(angle, rel=EPS4)
+    *_, cosine, sine, turned = slide.measure(shape(m.links[0]), shape(m.links[3]))
+    assert (cosine, sine, turned) == pytest.approx((cos(angle), sin(angle), angle), rel=EPS4, abs=EPS4)
 
 
 def test_turn_is_the_fixed_angle_from_the_line_to_the_second_link() -> None:
@@ -463,7 +465,9 @@ def test_a_file_without_a_sketch_inputs_or_a_name_reads() -> None:
 
 def test_an_input_at_a_sliding_pair_is_a_length() -> None:
     given = [{"pair": "stroke", "position": 1780, "velocity": "200 mm/s", "acceleration": "1 m/s^2"}]
-    assert read((["inputs"], given), of="slider-crank").inputs == (Input("stroke", 1.78, 0.2, 1.0),)
+    m = read((["inputs"], given), of="slider-crank")
+    assert m.inputs == (Input("stroke", 1.78, 0.2, 1.0),)
+    assert planar.to_dict(m)["inputs"] == [{"pair": "stroke", "position": 1780, "velocity": 0.2, "acceleration": 1}]
 
 
 # rates
@@ -525,6 +529,15 @@ def test_a_published_value_has_the_unit_of_its_quantity() -> None:
     turning = {"symbol": "w", "quantity": "angular velocity", "of": "rod", "value": "60 rpm", "sense": "clockwise"}
     (item,) = read((["published"], [turning]), of="two dyads").published
     assert item.value == pytest.approx(2.0 * pi, rel=EPS4)
+
+
+def test_a_published_value_may_be_of_one_point_against_another() -> None:
+    relative = {"symbol": "v", "quantity": "velocity", "of": "rod.C", "relative_to": "rod.A", "value": 1}
+    (item,) = read((["published"], [relative]), of="two dyads").published
+    assert (item.of, item.relative_to) == ("C", "A")
+    problem = refused(put(base("two dyads"), ["published"], [relative | {"relative_to": "rod.Z"}]))
+    assert problem.place == "$.published[0].relative_to"
+    assert "'rod.Z'" in problem.sentence
 
 
 # numbers of numpy
@@ -635,7 +648,7 @@ MISTAKES = [
     mistake("links/AB/length", "50 parsnips", "$.links.AB.length", "'parsnips'"),
     mistake("links/AB/length", "1e999 m", "$.links.AB.length", "too large"),
     mistake("links/AB/length", inf, "$.links.AB.length", "too large"),
-    mistake("links/AB/length", nan, "$.links.AB.length", "number"),
+    mistake("links/AB/length", nan, "$.links.AB.length", "not a number"),
     mistake("links/AB/length", 10**400, "$.links.AB.length", "too large"),
     mistake("links/AB/length", "x" * 100_000, "$.links.AB.length", "number with a unit"),
     mistake("links/AB/length", "9**9**9 m", "$.links.AB.length", "unit"),

@@ -288,6 +288,9 @@ def test_nothing_that_a_text_says_is_executed(text: str, tmp_path: Path, monkeyp
 )
 def test_a_very_long_text_is_refused_in_a_short_sentence(text: str) -> None:
     refused(text, "length")
+    with watched(), pytest.raises(UnitError) as caught:
+        unit(text)
+    assert len(str(caught.value)) < 300
 
 
 @STEADY

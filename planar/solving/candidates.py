@@ -13,13 +13,17 @@ from planar.mechanism import Mechanism, named_points
 from planar.pairs import Kind, Pair
 from planar.plane import GROUND, Frame, Vector, frame_at
 from planar.program import Program, length, scaled, shapes
-from planar.solving.newton import Closing, newton, polished
+from planar.solving.newton import Closing, Found, newton, polished
 
 Array = np.ndarray
 
 SAME = 1e-6
 """Unknowns closer than this are one assembly: within it two would be a dead point to working precision."""
 MOST_STARTS = 160
+BLUR = 0.3
+"""Radians: how far about the angles of a sketch starts are spread, so that near twins are both found."""
+CLEAR = 0.03
+"""An assembly whose points lie this near to the sketch on average (lengths of the size) is the one that is meant."""
 
 
 class Candidate(NamedTuple):
@@ -76,17 +80,26 @@ class Candidates:
         With what the best start leaves open (rows,).
         """
         closing = self._closing(stage, z)
-        ended = newton(closing, self._starts(stage, z, closing))
+        near, shown = self._near(stage, z)
+        ended = newton(closing, self._with_lengths(stage, closing, near))
+        found = self._candidates(stage, z, closing, ended.unknowns[ended.closed])
+        sketched = len(self.sketched_at.get(stage.level, ()))
+        if not (shown and found and min(each.distance for each in found) <= sketched * CLEAR**2):
+            more = newton(closing, self._with_lengths(stage, closing, _spread(length(stage.unknowns))))
+            ended = Found(*(np.concatenate(both) for both in zip(ended, more, strict=True)))
+            found = self._candidates(stage, z, closing, ended.unknowns[ended.closed])
+        best = ended.unknowns[int(np.argmin(ended.open))]
+        return found, closing(best[None, :])[0][0]
+
+    def _candidates(self, stage: Stage, z: Array, closing: Closing, closed: Array) -> list[Candidate]:
         roots: list[Array] = []
-        for root in ended.unknowns[ended.closed]:
+        for root in closed:
             if not any(self._same(stage, root, other) for other in roots):
                 roots.append(polished(closing, root))
-        found = sorted(
+        return sorted(
             (self._candidate(stage, z, root) for root in roots),
             key=lambda each: (each.behind, -round(each.height, 9), *np.round(each.z, 6)),
         )
-        best = ended.unknowns[int(np.argmin(ended.open))]
-        return found, closing(best[None, :])[0][0]
 
     def _candidate(self, stage: Stage, z: Array, root: Array) -> Candidate:
         whole = z.copy()
@@ -138,27 +151,35 @@ class Candidates:
         apart = np.where(self._is_angle(stage), np.abs(np.exp(1j * a) - np.exp(1j * b)), np.abs(a - b))
         return bool(np.all(apart < SAME))
 
-    def _starts(self, stage: Stage, z: Array, closing: Closing) -> Array:
-        """Starts for a group: angles as in the sketch where it shows them, others spread evenly over the circle."""
+    def _near(self, stage: Stage, z: Array) -> tuple[Array, bool]:
+        """Starts about the angles that the sketch shows, and whether it shows a large group whole.
+
+        Of a large group that is shown whole only the surroundings of the sketch are searched, if an assembly lies
+        there: its assemblies may be many, and the nearest is wanted.
+        """
         unknowns = length(stage.unknowns)
-        if unknowns == 0:
-            return np.zeros((1, 0))
-        angles = self._is_angle(stage)
-        many = min(6 * unknowns**2, MOST_STARTS)
-        spread = 2.0 * np.pi * (np.arange(many)[:, None] * _irrationals(unknowns) % 1.0)
+        spread = _spread(unknowns)
         shown = self._shown(stage, z)
-        near = spread[: max(4, many // 4)].copy()
+        near = spread[: 4 * unknowns + 4].copy()
+        blur = BLUR * (near / np.pi - 1.0)
+        blur[: min(1, len(blur))] = 0.0
+        whole = unknowns > 2
         for index, column in enumerate(self.equations.unknowns[stage.unknowns]):
             coordinate = self.equations.coordinates[column]
-            if coordinate.of_link and coordinate.part == "angle" and coordinate.owner in shown:
-                near[:, index] = shown[coordinate.owner]
-        starts = np.vstack([near, spread])
-        starts[:, ~angles] = 0.0
-        if not angles.all():
-            # lengths enter linearly, so for given angles they follow from least squares
+            if coordinate.of_link and coordinate.part == "angle":
+                if coordinate.owner in shown:
+                    near[:, index] = shown[coordinate.owner] + blur[:, index]
+                else:
+                    whole = False
+        return near, whole
+
+    def _with_lengths(self, stage: Stage, closing: Closing, starts: Array) -> Array:
+        """Starts whose lengths follow from their angles: lengths enter linearly, so by least squares."""
+        lengths = ~self._is_angle(stage)
+        if lengths.any():
+            starts[:, lengths] = 0.0
             left, slope = closing(starts)
-            along = slope[:, :, ~angles]
-            starts[:, ~angles] = -np.einsum("krm,km->kr", np.linalg.pinv(along), left)
+            starts[:, lengths] = -np.einsum("krm,km->kr", np.linalg.pinv(slope[:, :, lengths]), left)
         return starts
 
     def _shown(self, stage: Stage, z: Array) -> dict[str, float]:
@@ -189,12 +210,17 @@ def placed(
     return frames, own
 
 
-def _irrationals(dimensions: int) -> Array:
-    """Steps of an evenly spread sequence: powers of the root of x^(d+1) = x + 1 (M. Roberts' R-sequence)."""
+def _spread(unknowns: int) -> Array:
+    """Angles spread evenly over the circles (starts, unknowns), the same each time.
+
+    Multiples of powers of the root of x^(d+1) = x + 1, modulo a turn (M. Roberts' R-sequence).
+    """
     root = 2.0
     for _ in range(40):
-        root = (1.0 + root) ** (1.0 / (dimensions + 1))
-    return (1.0 / root) ** np.arange(1, dimensions + 1)
+        root = (1.0 + root) ** (1.0 / (unknowns + 1))
+    steps = (1.0 / root) ** np.arange(1, unknowns + 1)
+    many = min(6 * unknowns**2, MOST_STARTS) or 1
+    return 2.0 * np.pi * (np.arange(many)[:, None] * steps % 1.0)
 
 
 def _turn_between(ends: list[tuple[Vector, Vector]]) -> float | None:
