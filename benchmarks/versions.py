@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 import platform
-import tomllib
 from importlib.metadata import version
 from os import cpu_count
 from pathlib import Path
+
+import planar
 
 
 def versions() -> str:
     """One line: planar, Python, the libraries that do the work, the processor."""
     libraries = ", ".join(f"{name} {version(name)}" for name in ("numpy", "casadi", "scipy", "networkx"))
-    return f"planar {_planar()}, Python {platform.python_version()}, {libraries}; {_processor()}, {cpu_count()} cores"
-
-
-def _planar() -> str:
-    """The version in the project file beside this folder, which is the one that is measured, installed or not."""
-    project = Path(__file__).parents[1] / "pyproject.toml"
-    return tomllib.loads(project.read_text())["project"]["version"]
+    machine = f"{_processor()}, {cpu_count()} cores"
+    return f"planar {planar.__version__}, Python {platform.python_version()}, {libraries}; {machine}"
 
 
 def _processor() -> str:
