@@ -137,6 +137,8 @@ def _drives(mechanism: Mechanism, told: tuple[str, ...]) -> tuple[Drive, ...]:
         if not equals:
             raise BadInput("--at", f"{text!r} is not of the form PAIR=POSITION, such as A=75deg")
         drives.append(read_drive(mechanism, pair.strip(), position.strip()))
+        if drives[-1].pair in (drive.pair for drive in drives[:-1]):
+            raise BadInput("--at", f"the input at {drives[-1].pair!r} is moved twice; say once where to")
     return tuple(drives)
 
 

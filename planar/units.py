@@ -91,7 +91,7 @@ def quantity(text: str, kind: str) -> float:
     """A text such as "10.5 rad/s" as an SI number of the kind asked for. Raises UnitError."""
     if len(text) > LONGEST:
         raise UnitError(f"a number with a unit takes at most {LONGEST} characters, not {len(text)}")
-    match = _NUMBER.fullmatch(text)
+    match = _NUMBER.fullmatch(text.replace("−", "-"))
     if match is None:
         raise UnitError(f"{text!r} is not a number with a unit, such as {example(kind)!r}")
     number, written = match.groups()

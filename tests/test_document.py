@@ -837,7 +837,13 @@ def test_half_a_character_in_a_text_is_refused() -> None:
     assert refused(put(base(), ["notes"], ["half \ud800"])).place == "$.notes[0]"
 
 
-@pytest.mark.parametrize("name", ["连杆", "Träger 2", "l’axe", "[bold]x[/bold]", "a b", "x[0]", "a/b", "😀", "e\u0301"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("连杆", "Träger 2", "l’axe", "[bold]x[/bold]", "a b", "x[0]", "a/b", "😀", "e\u0301"),
+        "\u0645\u06cc\u200c\u0631\u0648\u062f",  # a Persian word, written with a joiner that itself has no width
+    ],
+)
 def test_names_in_any_language_are_names(name: str) -> None:
     text = FOUR_BAR.replace('"AB"', json.dumps(name))
     m = planar.loads(text)

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
+from functools import cached_property
 from math import isnan
 from typing import Any
 
@@ -17,6 +18,7 @@ from planar.units import UnitError, example, quantity, unit
 FORBIDDEN = ".:,"
 HUGE = 10**100
 """SI; beyond it squares, and squares of squares, overflow."""
+_JOINERS = {0x200C: None, 0x200D: None}  # invisible, but letters of some scripts need them
 _UNSHOWN = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff]")  # control characters, halves of characters
 
 
@@ -27,6 +29,15 @@ class Whole:
     units: Units = field(default_factory=Units)
     frame: str = ""
     links: Mapping[str, Link] = field(default_factory=dict)
+
+    @cached_property
+    def carried_by(self) -> Mapping[str, list[str]]:
+        """The links that carry each point."""
+        found: dict[str, list[str]] = {}
+        for name, link in self.links.items():
+            for point in dict.fromkeys(link.names):
+                found.setdefault(point, []).append(name)
+        return found
 
 
 @dataclass(frozen=True)
@@ -134,7 +145,7 @@ class Cursor:
         found = [mark for mark in FORBIDDEN if mark in name]
         if found:
             raise self.refuse(None, f"the name {name!r} holds {found[0]!r}; names contain none of . : ,")
-        if not name.isprintable():
+        if not name.translate(_JOINERS).isprintable():
             raise self.refuse(None, f"the name {name!r} holds a character that cannot be shown")
         return name
 
@@ -182,7 +193,7 @@ class Cursor:
             return unit(units.length).to_si(number)
         if kind == "angle":
             return unit(units.angle).to_si(number)
-        if kind.startswith("angular") and units.angle != "rad" and number != 0.0:
+        if kind.startswith("angular") and unit(units.angle).to_si(1.0) != 1.0 and number != 0.0:
             rate = "rad/s, deg/s or rpm" if kind == "angular velocity" else "rad/s^2 or deg/s^2"
             raise self.refuse(
                 None,
@@ -214,8 +225,7 @@ class Cursor:
     # links and points
 
     def carriers(self, point: str) -> tuple[str, ...]:
-        links = self.whole.links
-        found = [name for name, link in links.items() if point in link.names]
+        found = self.whole.carried_by.get(point, ())
         return tuple(sorted(found, key=lambda name: name != self.whole.frame))
 
     def as_link(self) -> str:
