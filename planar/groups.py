@@ -26,30 +26,45 @@ def decompose(rows: Sequence[AbstractSet[int]], columns: int) -> tuple[Group, ..
     `rows[i]` holds the columns (coordinates) on which constraint i depends. Dulmage and Mendelsohn: a maximum matching
     parts the whole into an over-, a well- and an under-determined part, and the strong components of the matched
     columns are the smallest groups (A. Pothen, C.-J. Fan, ACM Trans. Math. Softw. 16, 1990; both steps as in
-    T. Davis' CSparse, which casadi carries). A constraint left unmatched joins the last group that it touches, which
-    then has more rows than columns; columns left unmatched come last, and what rests on them is free.
+    T. Davis' CSparse, which casadi carries). What a constraint left unmatched reaches stays one group, with more rows
+    than columns, and comes first; columns left unmatched come last, and what rests on them is free.
     """
     row_of = _matching(rows, columns)
-    free = _resting_on([column for column in range(columns) if column not in row_of], rows, row_of)
-    blocks = _components(rows, row_of)
-    place = {column: index for index, block in enumerate(blocks) for column in block}
-    held_by = [[row_of[column] for column in block] for block in blocks]
-    idle: list[int] = []
-    matched = set(row_of.values())
-    for row in range(len(rows)):
-        if row not in matched:
-            touched = [place[column] for column in rows[row]]
-            (held_by[max(touched)] if touched else idle).append(row)
-    groups = [
-        Group(tuple(sorted(held)), tuple(block), not free.isdisjoint(block))
-        for held, block in zip(held_by, blocks, strict=True)
-    ]
     loose = tuple(column for column in range(columns) if column not in row_of)
-    if idle:
-        groups.append(Group(tuple(idle), ()))
+    matched = set(row_of.values())
+    surplus = [row for row in range(len(rows)) if row not in matched]
+    free = _resting_on(loose, rows, row_of)
+    groups = [Group(tuple(sorted(held)), tuple(sorted(block))) for held, block in _held_twice(surplus, rows, row_of)]
+    taken = {column for group in groups for column in group.columns}
+    for block in _components(rows, {column: row for column, row in row_of.items() if column not in taken}):
+        held = tuple(sorted(row_of[column] for column in block))
+        groups.append(Group(held, tuple(block), not free.isdisjoint(block)))
     if loose:
         groups.append(Group((), loose, free=True))
     return tuple(groups)
+
+
+def _held_twice(
+    surplus: Sequence[int], rows: Sequence[AbstractSet[int]], row_of: dict[int, int]
+) -> list[tuple[set[int], set[int]]]:
+    """The parts that are held more than once: each (rows, columns) joined to some unmatched row.
+
+    All that an unmatched row reaches has to be solved together with it: any of these rows may be the superfluous one.
+    """
+    parts: list[tuple[set[int], set[int]]] = []
+    for row in surplus:
+        held, reached, waiting = {row}, set(), [row]
+        while waiting:
+            for column in rows[waiting.pop()] - reached:
+                reached.add(column)
+                held.add(row_of[column])
+                waiting.append(row_of[column])
+        for other in [part for part in parts if not part[1].isdisjoint(reached)]:
+            parts.remove(other)
+            held |= other[0]
+            reached |= other[1]
+        parts.append((held, reached))
+    return parts
 
 
 def _matching(rows: Sequence[AbstractSet[int]], columns: int) -> dict[int, int]:
