@@ -265,3 +265,53 @@ def test_a_frame_alone_with_a_rigid_truss_needs_no_input():
     assert state.mobility == 0
     np.testing.assert_allclose(state.point("C").position, [0.064, 0.048], atol=1e-15)
     np.testing.assert_array_equal(state.point("C").velocity, [0, 0])
+
+
+@pytest.mark.parametrize("start", np.linspace(21.3, 158.7, 40))
+def test_a_flat_parallelogram_is_never_passed_without_a_word(start):
+    """Beyond it the linkage may be a parallelogram or cross its bars: which, only its user can say."""
+    turn = np.radians(start)
+    sketch = {"C": [100 + 50 * np.cos(turn), 50 * np.sin(turn)]}
+    mechanism = changed(
+        **PARALLELOGRAM, inputs=[{"pair": "A", "position": start, "velocity": "1 rad/s"}], sketch=sketch
+    )
+    short_of_it = solve(mechanism, {"A": np.radians(175.0)})
+    assert short_of_it.link("BC").angle == pytest.approx(0.0, abs=1e-10)
+    for beyond in (185.0 + start / 3, -5.0 - start / 3):
+        assert refused(mechanism, {"A": np.radians(beyond)}).outcome is Outcome.BRANCH_LOST
+
+
+@pytest.mark.parametrize("start", np.linspace(20.7, 70.1, 15))
+def test_a_slider_crank_of_equal_lengths_does_not_change_over_by_itself(start):
+    links = {
+        "f": {"points": {"O": [0, 0]}},
+        "crank": {"ends": ["O", "A"], "length": 50},
+        "rod": {"ends": ["A", "B"], "length": 50},
+    }
+    pairs = [{"turning": "O"}, {"turning": "A"}, {"sliding": "s", "on": "f", "block": "B", "line": {"through": "O"}}]
+    inputs = [{"pair": "O", "position": start, "velocity": "1 rad/s"}]
+    mechanism = changed(frame="f", links=links, pairs=pairs, inputs=inputs, sketch={})
+    assert solve(mechanism, {"O": np.radians(80)}).point("B").position[0] == pytest.approx(0.1 * np.cos(np.radians(80)))
+    assert refused(mechanism, {"O": np.radians(90 + start)}).outcome is Outcome.BRANCH_LOST
+
+
+@pytest.mark.parametrize("position", [0, 30, 90, 179.9, 179.999, 180])
+def test_three_cranks_not_in_line_carry_each_other_over_their_dead_points(position):
+    """A coupled locomotive with a third crank off the line: any two cranks stand on a dead point at 0 and 180 degrees."""
+    links = {
+        "f": {"points": {"A": [0, 0], "B": [100, 0], "C": [100, 100]}},
+        "a": {"ends": ["A", "P"], "length": 50},
+        "b": {"ends": ["B", "Q"], "length": 50},
+        "c": {"ends": ["C", "R"], "length": 50},
+        "k": {"points": {"P": [0, 0], "Q": [100, 0], "R": [100, 100]}},
+    }
+    inputs = [{"pair": "A", "position": position, "velocity": "2 rad/s", "acceleration": "1 rad/s^2"}]
+    mechanism = changed(frame="f", links=links, pairs=[{"turning": n} for n in "ABCPQR"], inputs=inputs, sketch={})
+    state = solve(mechanism)
+    assert state.mobility == 1
+    for name in "abc":
+        assert np.exp(1j * state.link(name).angle) == pytest.approx(np.exp(1j * np.radians(position)), abs=1e-12)
+        assert state.link(name).angular_velocity == pytest.approx(2.0, rel=1e-12)
+        assert state.link(name).angular_acceleration == pytest.approx(1.0, rel=1e-11)
+    turned = solve(mechanism, {"A": np.radians(position + 200.0)})
+    assert turned.link("k").angle == pytest.approx(0.0, abs=1e-12)

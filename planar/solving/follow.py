@@ -14,8 +14,12 @@ Array = np.ndarray
 
 STRIDE = 0.1
 """Greatest first step of an input: rad, or lengths of the mechanism's size."""
-SHORTEST = 1e-7
-"""A step below this part of the way says that the branch ends."""
+SHORTEST = 3e-7
+"""A step of the inputs (rad, or lengths of the size) below this says that the branch ends.
+
+So near to a crossing of branches rounding (1e-16 over the distance) moves a position by less than a hundredth of what
+the branches are apart; nearer, it could carry it from one to the other.
+"""
 CORRECTIONS = 8
 
 
@@ -49,8 +53,9 @@ def follow(solver: Followed, p: Array, z: Array, start: Array, stop: Array) -> A
     either objects. Raises NoAnswer where the branch ends on the way.
     """
     way = stop - start
+    reach = float(np.max(np.abs(way), initial=0.0)) or 1.0
     branch = Branch(solver.program, p)
-    t, step = 0.0, min(1.0, STRIDE / (np.max(np.abs(way), initial=0.0) or 1.0))
+    t, step = 0.0, min(1.0, STRIDE / reach)
     here = branch.at(z, start, way)
     while t < 1.0:
         step = min(step, 1.0 - t)
@@ -62,11 +67,11 @@ def follow(solver: Followed, p: Array, z: Array, start: Array, stop: Array) -> A
                 z, here, t, step = tried, there, t + step, 1.5 * step
                 continue
         step *= 0.5
-        if step < SHORTEST:
+        if step * reach < SHORTEST:
             raise NoAnswer(
                 Outcome.BRANCH_LOST,
                 f"this assembly can be followed only to {solver.where(start + t * way)} on the way from "
-                f"{solver.where(start)} to {solver.where(stop)}; a limit of its motion is there",
+                f"{solver.where(start)} to {solver.where(stop)}: there its motion ends, or branches",
             )
     return z
 
