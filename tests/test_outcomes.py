@@ -297,7 +297,7 @@ def test_a_slider_crank_of_equal_lengths_does_not_change_over_by_itself(start):
 
 @pytest.mark.parametrize("position", [0, 30, 90, 179.9, 179.999, 180])
 def test_three_cranks_not_in_line_carry_each_other_over_their_dead_points(position):
-    """A coupled locomotive with a third crank off the line: any two cranks stand on a dead point at 0 and 180 degrees."""
+    """A coupled locomotive with a third crank off the line: any two cranks alone have dead points at 0 and 180."""
     links = {
         "f": {"points": {"A": [0, 0], "B": [100, 0], "C": [100, 100]}},
         "a": {"ends": ["A", "P"], "length": 50},

@@ -19,6 +19,8 @@ SINGULAR = 1e-5
 Near a dead point the slope falls with the square root of the distance to it, so that round-off in the input of one
 part in 1e16 becomes one in 1e16 / slope^2 in the velocity: at 1e-5 six digits remain, below they are lost.
 """
+NOTHING = 1e-9
+"""A strength below this is zero but for rounding."""
 NEAR_BY = 1e-2
 """How far (rad, or lengths of the size) a position is moved to see whether what holds there holds elsewhere."""
 
@@ -33,16 +35,28 @@ def mobility(setup: Setup, z: Array, motion: Motion) -> int:
     square = all(length(stage.rows) == length(stage.unknowns) for stage in setup.equations.stages)
     if not weak and square:
         return inputs
-    found = z.size + inputs - _rank(np.hstack([motion.slope, motion.drive_slope]))
     if not weak:
+        # the unknowns are determined; each independent way in which the inputs break the rest is a freedom less
+        found = inputs - _broken_ways(motion)
         if found < inputs and not _agree(setup, motion):
             raise refusals.disagreeing(setup, found, "velocities")
         return found
+    found = z.size + inputs - _rank(_scaled(setup, np.hstack([motion.slope, motion.drive_slope])))
     links = _moving_at_rest(setup, motion.slope) or list(dict.fromkeys(link for stage in weak for link in stage.links))
     if found <= inputs:
         raise refusals.dead_point(setup, links)
     free = any(always_weak(setup, stage, z) for stage in weak)
     raise refusals.ever_free(setup, links) if free else refusals.change_point(setup, links, found)
+
+
+def _broken_ways(motion: Motion) -> int:
+    """The rank of what unit rates of the inputs leave open after the unknowns have done all they can."""
+    if motion.slope.shape[0] == motion.slope.shape[1]:
+        return 0
+    sizes = np.maximum(np.linalg.norm(motion.drive_slope, axis=0), 1e-300)
+    rates = np.linalg.lstsq(motion.slope, motion.drive_slope, rcond=1e-12)[0]
+    left = (motion.drive_slope - motion.slope @ rates) / sizes
+    return int(np.sum(np.linalg.svd(left, compute_uv=False) > SINGULAR))
 
 
 def strength(setup: Setup, stage: Stage, slope: Array) -> float:
@@ -53,19 +67,36 @@ def strength(setup: Setup, stage: Stage, slope: Array) -> float:
     """
     if not length(stage.unknowns):
         return 1.0
-    reach = max((setup.reach[link] for link in stage.links), default=0.0) or 1.0
-    own = slope[stage.rows, stage.unknowns].copy()
-    own[[row.kind is Kind.LENGTH for row in setup.equations.rows[stage.rows]], :] /= reach
-    for index, column in enumerate(setup.equations.unknowns[stage.unknowns]):
-        coordinate = setup.equations.coordinates[column]
-        natural = 1.0
-        if coordinate.kind is Kind.LENGTH:
-            own[:, index] *= reach
-        else:
-            natural = setup.reach.get(coordinate.owner, reach) / reach or 1.0
-        own[:, index] /= max(float(np.linalg.norm(own[:, index])), natural)
+    own = _scaled(setup, slope)[stage.rows, stage.unknowns]
     values = np.linalg.svd(own, compute_uv=False)
     return float(values[-1] / max(1.0, values[0])) if len(values) == length(stage.unknowns) else 0.0
+
+
+def _scaled(setup: Setup, slope: Array) -> Array:
+    """A slope (rows, unknowns and inputs) with every group's lengths in units of its reach, and columns of one size.
+
+    A column that could reach further than it does now keeps what it lacks: it is that which vanishes.
+    """
+    scaled = slope.copy()
+    natural = np.ones(slope.shape[1])
+    for stage in setup.equations.stages:
+        reach = _reach(setup, stage)
+        kinds = [row.kind for row in setup.equations.rows[stage.rows]]
+        scaled[stage.rows] /= np.array([[reach if kind is Kind.LENGTH else 1.0] for kind in kinds]).reshape(-1, 1)
+        for index in range(stage.unknowns.start, stage.unknowns.stop):
+            coordinate = setup.equations.coordinates[setup.equations.unknowns[index]]
+            if coordinate.kind is Kind.LENGTH:
+                scaled[:, index] *= reach
+            else:
+                natural[index] = setup.reach.get(coordinate.owner, reach) / reach or 1.0
+    return scaled / np.maximum(np.linalg.norm(scaled, axis=0), natural)
+
+
+def _reach(setup: Setup, stage: Stage) -> float:
+    """The reach of a group's links (sizes); where they have but one point each, of the least link beside them."""
+    own = max((setup.reach[link] for link in stage.links), default=0.0)
+    beside = (setup.reach[link] for pair in stage.pairs for link in setup.pairs[pair].links)
+    return own or min((reach for reach in beside if reach > 0.0), default=1.0)
 
 
 def cancelled(slope: Array, known: Array) -> Array:
@@ -89,7 +120,7 @@ def always_weak(setup: Setup, stage: Stage, z: Array) -> bool:
         rng = np.random.default_rng(seed)
         near = u + rng.uniform(-NEAR_BY, NEAR_BY, u.size)
         moved = corrected(setup.program, p, z + rng.uniform(-NEAR_BY, NEAR_BY, z.size), near, stage.level)
-        if moved is not None and strength(setup, stage, slope_at(setup, moved, near)) > SINGULAR:
+        if moved is not None and strength(setup, stage, slope_at(setup, moved, near)) > NOTHING:
             return False
     return True
 
@@ -101,7 +132,7 @@ def slope_at(setup: Setup, z: Array, u: Array) -> Array:
 
 def _moving_at_rest(setup: Setup, slope: Array) -> list[str]:
     """The links that can move while the inputs are held, from the slope's null vectors."""
-    _, values, vectors = np.linalg.svd(slope)
+    _, values, vectors = np.linalg.svd(_scaled(setup, slope))
     null = vectors[int(np.sum(values > SINGULAR * max(1.0, values[0]))) :]
     if null.size == 0:
         return []
