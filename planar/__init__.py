@@ -6,15 +6,25 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from planar.errors import BadInput, NoAnswer, Outcome, PlanarError
     from planar.files import dumps, from_dict, load, loads, to_dict
+    from planar.mechanism import Along, At, Distances, Drive, Input, Link, Load, Mechanism, Point
     from planar.solving.position import solve
 
 __version__ = "0.1.0"
 
 _ROOMS = {
+    "Along": "mechanism",
+    "At": "mechanism",
     "BadInput": "errors",
+    "Distances": "mechanism",
+    "Drive": "mechanism",
+    "Input": "mechanism",
+    "Link": "mechanism",
+    "Load": "mechanism",
+    "Mechanism": "mechanism",
     "NoAnswer": "errors",
     "Outcome": "errors",
     "PlanarError": "errors",
+    "Point": "mechanism",
     "dumps": "files",
     "from_dict": "files",
     "load": "files",
@@ -25,10 +35,19 @@ _ROOMS = {
 """Where each public name lives: it is loaded when it is first used."""
 
 __all__ = [
+    "Along",
+    "At",
     "BadInput",
+    "Distances",
+    "Drive",
+    "Input",
+    "Link",
+    "Load",
+    "Mechanism",
     "NoAnswer",
     "Outcome",
     "PlanarError",
+    "Point",
     "dumps",
     "from_dict",
     "load",

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from math import isfinite
+from numbers import Real
 from typing import NamedTuple
 
 from planar.errors import BadInput
@@ -137,8 +139,18 @@ class NamedPoint(NamedTuple):
     members: tuple[tuple[str, str], ...]
 
 
+FARTHEST = 1e4
+"""rad or m: to where a position is followed step by step."""
+
+
 def with_inputs(mechanism: Mechanism, drives: tuple[Drive, ...]) -> Mechanism:
     """The same mechanism with some of its inputs changed. Raises BadInput where it has no such input."""
+    for drive in drives:
+        for value in drive[1:]:
+            if value is not None and (isinstance(value, bool) or not isinstance(value, Real) or not isfinite(value)):
+                raise BadInput(drive.pair, f"an input moves to a finite number (rad or m), not {value!r:.60}")
+            if value is not None and abs(value) > FARTHEST:
+                raise BadInput(drive.pair, f"an input moves to {FARTHEST:g} rad or m at most")
     changes = {drive.pair: drive for drive in drives}
     for pair in changes.keys() - {given.pair for given in mechanism.inputs}:
         known = ", ".join(given.pair for given in mechanism.inputs) or "none"

@@ -27,29 +27,27 @@ class Unknown(KeyError):
 
 
 class PointState(NamedTuple):
-    """A point's position (m), velocity (m/s) and acceleration (m/s^2), each (2,), in the frame's axes."""
+    """A point's position (m), velocity (m/s) and acceleration (m/s^2), each (2,), in the frame's axes.
+
+    `sense` says in words which way it moves and whether it speeds up.
+    """
 
     position: Array
     velocity: Array
     acceleration: Array
-
-    @property
-    def sense(self) -> str:
-        """Which way it moves, and whether it speeds up, in words."""
-        return _sense(heading(self.velocity), float(self.velocity @ self.acceleration))
+    sense: str
 
 
 class LinkState(NamedTuple):
-    """A link's angle (rad), angular velocity (rad/s) and angular acceleration (rad/s^2), anticlockwise positive."""
+    """A link's angle (rad), angular velocity (rad/s) and angular acceleration (rad/s^2), anticlockwise positive.
+
+    `sense` says in words which way it turns and whether it speeds up.
+    """
 
     angle: float
     angular_velocity: float
     angular_acceleration: float
-
-    @property
-    def sense(self) -> str:
-        """Which way it turns, and whether it speeds up, in words."""
-        return _sense(turning(self.angular_velocity), self.angular_velocity * self.angular_acceleration)
+    sense: str
 
 
 class InputState(NamedTuple):
@@ -79,8 +77,8 @@ class RelativeState(NamedTuple):
     sliding_acceleration: Array
 
 
-def _sense(way: str, power: float) -> str:
-    return way if way == "at rest" else f"{way}, {hurrying(power)}"
+def _sense(way: str, power: float, scale: float) -> str:
+    return way if way == "at rest" else f"{way}, {hurrying(power, scale)}"
 
 
 @dataclass(frozen=True)
@@ -146,7 +144,9 @@ class State:
         if name not in self.frames:
             raise Unknown(f"there is no link {name!r}; links are {', '.join(self.frames)}")
         angle, velocity, acceleration = _parts(self.frames[name].angle)
-        return LinkState(_wrapped(angle), velocity, acceleration)
+        fastest, hardest = self._greatest_of_links
+        sense = _sense(turning(velocity, fastest), velocity * acceleration, abs(velocity) * hardest)
+        return LinkState(_wrapped(angle), velocity, acceleration, sense)
 
     def pair(self, name: str) -> dict[str, float | None]:
         """What a pair reports of its relative motion (SI). Raises Unknown."""
@@ -226,7 +226,25 @@ class State:
         return self.frames[link].carry(self.shapes[link].at(point))
 
     def _point(self, named: NamedPoint) -> PointState:
-        return PointState(*(np.array(part) for part in _parts_of(self._carried(named))))
+        position, velocity, acceleration = (np.array(part) for part in _parts_of(self._carried(named)))
+        fastest, hardest = self._greatest_of_points
+        scale = float(np.hypot(*velocity)) * hardest
+        sense = _sense(heading(velocity, fastest), float(velocity @ acceleration), scale)
+        return PointState(position, velocity, acceleration, sense)
+
+    @cached_property
+    def _greatest_of_points(self) -> tuple[float, float]:
+        """The greatest velocity and acceleration of any point (m/s, m/s^2): rates are at rest beside these."""
+        parts = np.array([_parts_of(self._carried(each)) for each in self._points])
+        speeds = np.hypot(parts[:, :, 0], parts[:, :, 1]).max(axis=0, initial=0.0)
+        return float(speeds[1]), float(speeds[2])
+
+    @cached_property
+    def _greatest_of_links(self) -> tuple[float, float]:
+        """The greatest angular velocity and acceleration of any link; what turns at omega is good for omega^2 too."""
+        parts = np.array([_parts(frame.angle) for frame in self.frames.values()])
+        fastest, hardest = np.abs(parts[:, 1:]).max(axis=0, initial=0.0)
+        return float(fastest), float(max(hardest, fastest**2))
 
 
 def _wrapped(angle: float) -> float:

@@ -20,15 +20,15 @@ def amount(value: float, kind: str, units: Units) -> str:
     return f"{unit(name).from_si(value):.6g} {name}"
 
 
-def turning(rate: float, scale: float = 1.0) -> str:
-    """The sense of an angular rate."""
+def turning(rate: float, scale: float = 0.0) -> str:
+    """The sense of an angular rate, beside the greatest of its kind."""
     if abs(rate) <= STILL * scale:
         return "at rest"
     return "anticlockwise" if rate > 0.0 else "clockwise"
 
 
-def heading(vector: Sequence[float] | np.ndarray, scale: float = 1.0) -> str:
-    """The sense of a vector: one of four ways where it lies along an axis, else two of them together."""
+def heading(vector: Sequence[float] | np.ndarray, scale: float = 0.0) -> str:
+    """The sense of a vector, beside the greatest of its kind: one of four ways along an axis, else two together."""
     x, y = float(vector[0]), float(vector[1])
     if hypot(x, y) <= STILL * scale:
         return "at rest"
@@ -40,8 +40,8 @@ def heading(vector: Sequence[float] | np.ndarray, scale: float = 1.0) -> str:
     return f"{along}, {across}" if abs(y) > abs(x) else f"{across}, {along}"
 
 
-def hurrying(power: float, scale: float = 1.0) -> str:
-    """Whether speed grows, from the product of velocity and acceleration."""
+def hurrying(power: float, scale: float = 0.0) -> str:
+    """Whether speed grows, from the product of velocity and acceleration, beside the greatest that it could be."""
     if abs(power) <= STILL * scale:
         return "steady"
     return "speeding up" if power > 0.0 else "slowing down"

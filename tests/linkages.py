@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from planar.mechanism import Mechanism
+from planar.pairs import Pair
 from planar.plane import Frame, Vector, direction, frame_at
+from planar.shapes import shape
 from planar.solving.freedom import strength
 from planar.solving.position import Solver
 
@@ -145,3 +149,45 @@ def conditioning(solver: Solver, z: np.ndarray) -> float:
     y = np.concatenate([z, solver.station.u])
     slope = solver.program.kinematics(y, 0.0 * y, 0.0 * y, solver.station.p).slope
     return min((strength(solver, stage, slope) for stage in solver.equations.stages if stage.links), default=1.0)
+
+
+def determinate(mechanism: Mechanism, built: Built) -> bool:
+    """Whether pairs and inputs determine every rate at the place where the linkage was built.
+
+    By the rank of all constraints in all coordinates, nothing eliminated; each column by the complex step.
+    """
+    shapes = {link.name: shape(link) for link in mechanism.links}
+    moving = [name for name in built.frames if name != mechanism.frame]
+    numbers = {pair.name: pair.measure(*(shapes[link] for link in pair.links)) for pair in mechanism.pairs}
+    pairs = {pair.name: pair for pair in mechanism.pairs}
+    place = np.array([part for name in moving for part in _frame(built, name)], dtype=complex)
+    own = [(pair.name, k) for pair in mechanism.pairs for k in range(len(pair.coordinates))]
+    place = np.concatenate([place, [_displacement(built, pairs[name], numbers[name]) for name, _ in own]])
+
+    def left(at: np.ndarray) -> np.ndarray:
+        frames = {name: frame_at(*at[3 * k : 3 * k + 3]) for k, name in enumerate(moving)}
+        frames[mechanism.frame] = built.frames[mechanism.frame]
+        slides = {name: at[len(place) - len(own) + k] for k, (name, _) in enumerate(own)}
+        found = []
+        for pair in mechanism.pairs:
+            ends = [frames[link] for link in pair.links]
+            found += pair.residual(*ends, numbers[pair.name], [slides.get(pair.name)])
+        for given in mechanism.inputs:
+            pair = pairs[given.pair]
+            found.append(pair.drive(*(frames[link] for link in pair.links), (), [slides.get(pair.name)]))
+        return np.array(found)
+
+    step = 1e-30
+    columns = [np.imag(left(place + step * 1j * unit)) / step for unit in np.eye(len(place))]
+    return bool(np.linalg.matrix_rank(np.array(columns).T, tol=1e-6) == len(place))
+
+
+def _frame(built: Built, name: str) -> tuple[float, float, float]:
+    frame = built.frames[name]
+    return frame.x, frame.y, frame.angle
+
+
+def _displacement(built: Built, pair: Pair, numbers: Sequence[float]) -> float:
+    first, second = (built.frames[link] for link in pair.links)
+    way = second.carry(Vector(*numbers[2:4])) - first.carry(Vector(*numbers[0:2]))
+    return way.dot(first.turn(Vector(*numbers[4:6])))

@@ -133,3 +133,44 @@ def test_states_say_their_senses():
     assert state.link("BC").sense == "clockwise, slowing down"
     assert state.point("D").sense == "at rest"
     assert state.point("C").sense == "to the left, downwards, speeding up"
+
+
+@pytest.mark.parametrize(("length", "rate"), [(1e-6, 1e-6), (1e-6, 1.0), (1.0, 1e-9), (1e3, 1e2), (1e3, 1e5)])
+def test_senses_are_the_same_at_any_size_and_speed(length, rate):
+    def solved(size: float, speed: float):
+        links = {
+            "f": {"points": {"A": [0, 0], "D": [0.1 * size, 0]}},
+            "a": {"ends": ["A", "B"], "length": 0.05 * size},
+            "b": {"ends": ["B", "C"], "length": 0.066 * size},
+            "c": {"ends": ["D", "C"], "length": 0.056 * size},
+        }
+        given = {"pair": "A", "position": 1.0471975511965976, "velocity": speed, "acceleration": -0.2 * speed**2}
+        value = {"planar": 1, "frame": "f", "links": links, "pairs": [{"turning": n} for n in "ABCD"]}
+        return planar.solve(planar.from_dict(value | {"inputs": [given], "sketch": {"C": [0.09 * size, 0.05 * size]}}))
+
+    here, there = solved(1.0, 1.0), solved(length, rate)
+    assert {name: point.sense for name, point in here.points.items()} == {n: p.sense for n, p in there.points.items()}
+    assert {name: link.sense for name, link in here.links.items()} == {n: k.sense for n, k in there.links.items()}
+    assert here.point("B").sense == "to the left, upwards, slowing down"
+
+
+@pytest.mark.parametrize("degrees", range(0, 360, 23))
+def test_a_pin_at_constant_speed_is_steady_at_any_size(degrees):
+    link = {"ends": ["O", "P"], "length": 2e3}
+    value = {
+        "planar": 1,
+        "frame": "f",
+        "links": {"f": {"points": {"O": [0, 0]}}, "a": link},
+        "pairs": [{"turning": "O"}],
+    }
+    given = {"pair": "O", "position": np.radians(degrees), "velocity": 100.0}
+    state = planar.solve(planar.from_dict(value | {"inputs": [given]}))
+    assert state.point("P").sense.endswith("steady")
+    assert state.link("a").sense == "anticlockwise, steady"
+
+
+def test_bare_bench_measures_models_that_come_along():
+    command = [sys.executable, "-m", "planar", "bench", "--json"]
+    records = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+    assert len(records) == 3
+    assert all(record["run"] > 0 for record in records)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from planar import files
-from planar.errors import NoAnswer, Outcome
+from planar.errors import BadInput, NoAnswer, Outcome
 from planar.mechanism import Drive
 from planar.solving.position import solve
 
@@ -315,3 +315,72 @@ def test_three_cranks_not_in_line_carry_each_other_over_their_dead_points(positi
         assert state.link(name).angular_acceleration == pytest.approx(1.0, rel=1e-11)
     turned = solve(mechanism, {"A": np.radians(position + 200.0)})
     assert turned.link("k").angle == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), "60 deg", [1.0], 1j, True, 1e9])
+def test_an_input_moves_only_to_a_finite_number(value):
+    with pytest.raises(BadInput, match="an input moves to"):
+        solve(changed(), {"A": value})
+
+
+def test_an_input_that_is_not_there_is_named_with_those_that_are():
+    with pytest.raises(BadInput, match="there is no input at 'B'; the inputs are at A"):
+        solve(changed(), {"B": 1.0})
+
+
+@pytest.mark.parametrize("size", [1e-4, 1e-6, 1e-8])
+def test_a_small_linkage_beside_a_large_one_is_judged_by_its_own_size(size):
+    """A redundant parallelogram of a metre, and on the same frame a four-bar and a slotted lever many times smaller."""
+    links = {
+        "f": {
+            "points": {
+                **{"A": [0, 0], "D": [1, 0], "E": [0.4, 0]},
+                **{"U": [0, 0], "V": [size, 0], "O": [0, 0], "Q": [0, -2 * size]},
+            }
+        },
+        "a": {"ends": ["A", "B"], "length": 0.5},
+        "k": {"ends": ["B", "C"], "length": 1, "points": {"F": {"along": ["B", "C"], "distance": 0.4}}},
+        "d": {"ends": ["D", "C"], "length": 0.5},
+        "e": {"ends": ["E", "F"], "length": 0.5},
+        "p": {"ends": ["U", "P"], "length": 0.3 * size},
+        "q": {"ends": ["P", "R"], "length": 0.9 * size},
+        "r": {"ends": ["V", "R"], "length": 0.7 * size},
+        "c": {"ends": ["O", "T"], "length": size},
+        "l": {"points": {"Q": [0, 0]}},
+    }
+    pairs = [{"turning": name} for name in "ABCDEFUVPROQ"]
+    pairs.append({"sliding": "s", "on": "l", "block": "T", "line": {"through": "Q"}})
+    inputs = [{"pair": "A", "position": 70}, {"pair": "U", "position": 50}, {"pair": "O", "position": 60}]
+    inputs = [given | {"velocity": "1 rad/s"} for given in inputs]
+    sketch = {"C": [1.17, 0.47], "F": [0.57, 0.47], "R": [0.9 * size, 0.7 * size]}
+    state = solve(changed(units={"angle": "deg"}, frame="f", links=links, pairs=pairs, inputs=inputs, sketch=sketch))
+    assert state.mobility == 3
+    assert state.link("e").angular_velocity == pytest.approx(1.0, rel=1e-12)
+    pin = np.exp(1j * np.radians(60)) + 2j
+    assert state.link("l").angular_velocity == pytest.approx((1j * np.exp(1j * np.radians(60)) / pin).imag, rel=1e-9)
+
+
+def test_a_search_that_stops_early_says_so(monkeypatch):
+    from planar.solving import assemble
+
+    monkeypatch.setattr(assemble, "EXPANSIONS", 5)
+    count = 6
+    links = {"f": {"points": {f"G{k}": [100 * k, 0] for k in range(count + 1)}}}
+    links["c"] = {"ends": ["G0", "B0"], "length": 60}
+    for k in range(1, count + 1):
+        links[f"k{k}"] = {"ends": [f"B{k - 1}", f"B{k}"], "length": 104}
+        links[f"r{k}"] = {"ends": [f"G{k}", f"B{k}"], "length": 62}
+    pairs = [{"turning": f"{letter}{k}"} for k in range(count + 1) for letter in "GB"]
+    inputs = [{"pair": "G0", "position": 80}]
+    state = solve(changed(frame="f", links=links, pairs=pairs, inputs=inputs, sketch={f"B{count}": [100 * count, -60]}))
+    assert any("stopped after 5 groups" in remark for remark in state.remarks)
+
+
+def test_every_group_that_the_sketch_leaves_open_is_named():
+    links = FOUR_BAR["links"] | {
+        "AD": {"points": {"A": [0, 0], "D": [100, 0], "G": [200, 0]}},
+        "CF": {"ends": ["C", "F"], "length": 110},
+        "GF": {"ends": ["G", "F"], "length": 60},
+    }
+    state = solve(changed(links=links, pairs=[{"turning": name} for name in "ABCDFG"], sketch={}))
+    assert "sketch a point of BC, DC; of CF, GF to choose" in state.remarks[0]

@@ -9,7 +9,7 @@ from planar.errors import NoAnswer, Outcome
 from planar.mechanism import Drive, Mechanism
 from planar.motion import State
 from planar.solving.position import Solver, solve
-from tests.linkages import Built, conditioning, random_linkage
+from tests.linkages import Built, conditioning, determinate, random_linkage
 
 seeds = st.integers(0, 10**6)
 sizes = st.integers(1, 12)
@@ -24,8 +24,10 @@ def assembled(built: Built, least: float) -> tuple[Mechanism, State]:
     try:
         state = solve(mechanism)
     except NoAnswer as problem:
-        # loops drawn at random may hold each other twice, or leave freedom: then that is what must be said
+        # loops drawn at random may hold each other twice, or leave freedom: then that is what must be said, and only
+        # then
         assert problem.outcome in (Outcome.TOO_FEW_INPUTS, Outcome.DEAD_POINT)
+        assert not determinate(mechanism, built)
         assume(False)
         raise
     solver = Solver(mechanism)

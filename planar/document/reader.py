@@ -120,7 +120,8 @@ def _written_out(top: Cursor) -> Cursor:
             continue
         for name, link in whole.links.items():
             if name in links:
-                told = f"this makes a link {name!r}, but there is one of that name already"
+                told = f"this makes a link {name!r}, but there is one of that name already; write the second one as "
+                told += "a link of its own, with 'links' and 'point'"
                 raise cursor.refuse(None, told)
             links[name] = _link(name, Cursor(link, cursor.path, top.whole))
         entries[index] = whole.entry
@@ -236,7 +237,7 @@ def _pairs(top: Cursor) -> tuple[Pair, ...]:
         shared = [member for member in pinned if member in placed]
         if name in named or shared:
             other = named.get(name) or placed[shared[0]]
-            if pinned:
+            if shared:
                 raise entry.refuse(
                     None, f"{name!r} is written at {other} already; write one pair that names all links of the pin"
                 )

@@ -38,49 +38,80 @@ class Failure(NamedTuple):
     z: Array
 
 
+class _Node(NamedTuple):
+    """A partial assembly, in the order in which the search takes them up."""
+
+    cost: float
+    behind: int
+    ranks: tuple[int, ...]
+    number: int
+    z: Array
+    ties: tuple[int, ...]
+    "groups in which another choice lies as near to the sketch"
+
+
 def search(candidates: Candidates) -> Assembly | Failure:
     """Best first: of all assemblies the one with the least sum of squared distances to the sketch.
 
-    The cost of a partial assembly never falls as it grows, so the first whole one is the nearest.
+    The cost of a partial assembly never falls as it grows, so the first whole one is the nearest. After EXPANSIONS
+    groups the search only goes on to an end, and says so.
     """
     stages = candidates.equations.stages
     number = count()
-    start = np.zeros(len(candidates.equations.unknowns))
-    heap: list[tuple[float, int, tuple[int, ...], int, Array]] = [(0.0, 0, (), next(number), start)]
+    heap = [_Node(0.0, 0, (), next(number), np.zeros(len(candidates.equations.unknowns)), ())]
     worst: Failure | None = None
-    chosen: tuple[float, tuple[int, ...], Array] | None = None
+    chosen: _Node | None = None
     for expansions in count():
-        if not heap:
+        if not heap or (chosen is not None and expansions > EXPANSIONS):
             break
         if expansions < EXPANSIONS:
             node = heapq.heappop(heap)
         else:
-            node = heap.pop(min(range(len(heap)), key=lambda index: (-len(heap[index][2]), *heap[index][:4])))
-        cost, behind, ranks, _, z = node
-        if chosen is not None and (cost > chosen[0] or expansions > EXPANSIONS):
-            break
-        if len(ranks) == len(stages):
+            node = heap.pop(min(range(len(heap)), key=lambda index: (-len(heap[index].ranks), *heap[index][:4])))
+        if chosen is not None and node.cost > chosen.cost:
+            return Assembly(chosen.z)
+        if len(node.ranks) == len(stages):
             if chosen is not None:
-                return Assembly(chosen[2], (_tie(stages, chosen[1], ranks),))
-            chosen = cost, ranks, z
+                return Assembly(chosen.z, (_tie(stages, chosen.ties),))
+            chosen = node
             continue
-        stage = stages[len(ranks)]
-        found, gap = candidates.of(stage, z)
-        if not found and (worst is None or stage.level > worst.stage.level):
-            worst = Failure(stage, gap, z)
+        found, gap = candidates.of(stages[len(node.ranks)], node.z)
+        if not found and (worst is None or stages[len(node.ranks)].level > worst.stage.level):
+            worst = Failure(stages[len(node.ranks)], gap, node.z)
         for rank, each in enumerate(found):
-            total = round((cost + each.distance) / ALIKE) * ALIKE
-            heapq.heappush(heap, (total, behind + each.behind, (*ranks, rank), next(number), each.z))
+            alike = sum(abs(other.distance - each.distance) <= ALIKE for other in found) > 1
+            heapq.heappush(
+                heap,
+                _Node(
+                    round((node.cost + each.distance) / ALIKE) * ALIKE,
+                    node.behind + each.behind,
+                    (*node.ranks, rank),
+                    next(number),
+                    each.z,
+                    (*node.ties, len(node.ranks)) if alike else node.ties,
+                ),
+            )
     if chosen is None:
         assert worst is not None
         return worst
-    return Assembly(chosen[2])
+    return Assembly(chosen.z, (_stopped(stages, chosen.ties),) if expansions >= EXPANSIONS else ())
 
 
-def _tie(stages: Sequence[Stage], ranks: tuple[int, ...], others: tuple[int, ...]) -> str:
-    first = next(index for index, (a, b) in enumerate(zip(ranks, others, strict=True)) if a != b)
-    links = ", ".join(stages[first].links)
+def _tie(stages: Sequence[Stage], ties: Sequence[int]) -> str:
     return (
         f"the sketch fits more than one assembly alike; taken is the one with its sliding points ahead of "
-        f"'through', else the upper one: sketch a point of {links} to choose"
+        f"'through', else the upper one: sketch a point of {_open(stages, ties)} to choose"
     )
+
+
+def _stopped(stages: Sequence[Stage], ties: Sequence[int]) -> str:
+    return (
+        f"the search for the assembly nearest to the sketch stopped after {EXPANSIONS} groups and took the nearest on "
+        f"its way; sketch a point of {_open(stages, ties)} to be sure of the one that is meant"
+    )
+
+
+def _open(stages: Sequence[Stage], ties: Sequence[int]) -> str:
+    """The links of the groups whose place the sketch leaves open."""
+    named = [", ".join(stages[index].links) for index in ties] or ["further links"]
+    return "; of ".join(named[:6]) + ("; and of the others" if len(named) > 6 else "")

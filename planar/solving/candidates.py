@@ -84,7 +84,9 @@ class Candidates:
         ended = newton(closing, self._with_lengths(stage, closing, near))
         found = self._candidates(stage, z, closing, ended.unknowns[ended.closed])
         sketched = len(self.sketched_at.get(stage.level, ()))
-        if not (shown and found and min(each.distance for each in found) <= sketched * CLEAR**2):
+        dyad = length(stage.unknowns) == 2 and len(stage.pairs) == 3 and len(found) == 2  # it has no third assembly
+        clear = shown and found and min(each.distance for each in found) <= sketched * CLEAR**2
+        if not (dyad or clear):
             more = newton(closing, self._with_lengths(stage, closing, _spread(length(stage.unknowns))))
             ended = Found(*(np.concatenate(both) for both in zip(ended, more, strict=True)))
             found = self._candidates(stage, z, closing, ended.unknowns[ended.closed])

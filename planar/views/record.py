@@ -17,7 +17,7 @@ def record(state: State, comparisons: Iterable[Comparison] = ()) -> dict[str, An
         "mobility": state.mobility,
         "residual": state.residual,
         "inputs": {name: given._asdict() for name, given in state.inputs.items()},
-        "links": {name: link._asdict() | {"sense": link.sense} for name, link in state.links.items()},
+        "links": {name: link._asdict() for name, link in state.links.items()},
         "points": {
             name: {
                 "position": point.position.tolist(),

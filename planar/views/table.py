@@ -14,10 +14,10 @@ from rich.text import Text
 from planar.analysis.published import Comparison
 from planar.analysis.speed import Speed
 from planar.mechanism import QUANTITIES, motions
-from planar.motion import PointState, State
+from planar.motion import State
 from planar.pairs import Pair
 from planar.units import SI, Unit, unit
-from planar.words import amount, heading, hurrying, listed, turning
+from planar.words import amount, listed
 
 HEADING = 13
 """Characters: longer headings stand in several lines, so that the tables of a textbook mechanism fit 80 columns."""
@@ -134,7 +134,7 @@ def _links(state: State) -> RenderableType:
                 _number(angle.from_si(link.angle)),
                 _number(link.angular_velocity),
                 _number(link.angular_acceleration),
-                _sense(turning(link.angular_velocity), link.angular_velocity * link.angular_acceleration),
+                link.sense,
             )
     return table
 
@@ -172,17 +172,9 @@ def _points(state: State) -> RenderableType:
             at(point.velocity),
             _number(float(np.hypot(*point.acceleration))),
             at(point.acceleration),
-            _moving(point),
+            point.sense,
         )
     return table
-
-
-def _moving(point: PointState) -> str:
-    return _sense(heading(point.velocity), float(point.velocity @ point.acceleration))
-
-
-def _sense(way: str, power: float) -> str:
-    return way if way == "at rest" else f"{way}, {hurrying(power)}"
 
 
 def _pairs(state: State) -> RenderableType:
