@@ -16,7 +16,7 @@ Array = np.ndarray
 
 ALIKE = 1e-9
 """Assemblies whose sums of squared distances to the sketch (sizes squared) agree to this fit alike."""
-EXPANSIONS = 2000
+EXPANSIONS = 1000
 """Groups solved before the search stops looking for a nearer assembly and takes the best way to an end."""
 
 

@@ -162,7 +162,7 @@ class Candidates:
         unknowns = length(stage.unknowns)
         spread = _spread(unknowns)
         shown = self._shown(stage, z)
-        near = spread[: 4 * unknowns + 4].copy()
+        near = spread[: 2 * unknowns + 2].copy()
         blur = BLUR * (near / np.pi - 1.0)
         blur[: min(1, len(blur))] = 0.0
         whole = unknowns > 2
