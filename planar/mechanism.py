@@ -28,6 +28,7 @@ __all__ = [
     "Point",
     "Published",
     "Units",
+    "check",
     "motions",
     "named_points",
     "with_inputs",
@@ -164,6 +165,28 @@ def with_inputs(mechanism: Mechanism, drives: tuple[Drive, ...]) -> Mechanism:
         return Input(*(old if new is None else new for old, new in told))
 
     return replace(mechanism, inputs=tuple(changed(given) for given in mechanism.inputs))
+
+
+def check(mechanism: Mechanism) -> None:
+    """Refuse a mechanism made in Python that names what it does not have. Raises BadInput.
+
+    What comes from a file has been checked at its place there.
+    """
+    points = {link.name: set(link.names) for link in mechanism.links}
+    if mechanism.frame not in points:
+        raise BadInput("frame", f"there is no link {mechanism.frame!r} to be the frame")
+    for pair in mechanism.pairs:
+        for link in pair.links:
+            if link not in points:
+                raise BadInput(pair.name, f"there is no link {link!r}; links are {', '.join(points)}")
+        rides = pair.rides()
+        for link, point in (*pair.coincident(), *((rides[0],) if rides else ())):
+            if point not in points[link]:
+                raise BadInput(pair.name, f"link {link!r} has no point {point!r}")
+    named = motions(mechanism)
+    for given in mechanism.inputs:
+        if given.pair not in named:
+            raise BadInput(given.pair, f"there is no pair {given.pair!r} to be driven; pairs are {', '.join(named)}")
 
 
 def entries(mechanism: Mechanism) -> tuple[tuple[Pair, ...], ...]:

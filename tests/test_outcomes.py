@@ -1,13 +1,16 @@
 """What has no answer ends with an outcome and a sentence that names the pairs."""
 
 import copy
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+import planar
 from planar import files
 from planar.errors import BadInput, NoAnswer, Outcome
 from planar.mechanism import Drive
+from planar.pairs import pair_types
 from planar.solving.position import solve
 
 FOUR_BAR = {
@@ -384,3 +387,43 @@ def test_every_group_that_the_sketch_leaves_open_is_named():
     }
     state = solve(changed(links=links, pairs=[{"turning": name} for name in "ABCDFG"], sketch={}))
     assert "sketch a point of BC, DC; of CF, GF to choose" in state.remarks[0]
+
+
+def made(**changes):
+    """A four-bar made in Python of the public classes."""
+    turning = pair_types()["turning"]
+    links = (
+        planar.Link("AD", (planar.Point("A", planar.At(0, 0)), planar.Point("D", planar.At(0.1, 0)))),
+        planar.Link("AB", ends=("A", "B"), length=0.05),
+        planar.Link("BC", ends=("B", "C"), length=0.066),
+        planar.Link("DC", ends=("D", "C"), length=0.056),
+    )
+    ends = {"A": ("AD", "AB"), "B": ("AB", "BC"), "C": ("BC", "DC"), "D": ("AD", "DC")}
+    pairs = tuple(turning(name, both, (name, name), name) for name, both in ends.items())
+    given = {"links": links, "pairs": pairs, "inputs": (planar.Input("A", np.radians(60), 10.0),)}
+    return planar.Mechanism("made", **{"frame": "AD"} | given | {"sketch": (("C", 0.08, 0.05),)} | changes)
+
+
+def test_a_mechanism_made_in_python_is_solved_as_one_from_a_file():
+    np.testing.assert_allclose(solve(made()).point("C").velocity, solve(changed()).point("C").velocity, rtol=1e-13)
+    assert files.from_dict(files.to_dict(made())) == made()
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"frame": "X"}, "no link 'X' to be the frame"),
+        ({"inputs": (planar.Input("Q", 1.0),)}, "no pair 'Q' to be driven; pairs are A, B, C, D"),
+        ({"links": ()}, "no link 'AD' to be the frame"),
+        ({"links": (planar.Link("AD", (planar.Point("A", planar.At(0, 0)),)),)}, "there is no link 'AB'"),
+    ],
+)
+def test_a_mechanism_made_in_python_that_names_what_it_lacks_is_refused(changes, words):
+    with pytest.raises(BadInput, match=words):
+        solve(made(**changes))
+
+
+def test_a_pair_of_a_point_that_its_link_lacks_is_refused():
+    pairs = tuple(replace(pair, points=("A", "Z")) if pair.name == "A" else pair for pair in made().pairs)
+    with pytest.raises(BadInput, match="link 'AB' has no point 'Z'"):
+        solve(made(pairs=pairs))

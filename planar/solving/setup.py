@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.mechanism import Input, Mechanism, motions
+from planar.mechanism import Input, Mechanism, check, motions
 from planar.pairs import Kind
 from planar.program import Program, extent, fitted, positions, program, rates, shapes, size
 from planar.solving.candidates import placed
@@ -29,6 +29,7 @@ class Setup:
     """What does not change from one position of a mechanism to the next, and what the file's own inputs are."""
 
     def __init__(self, mechanism: Mechanism):
+        check(mechanism)
         self.mechanism = mechanism
         self.unit = size(mechanism)
         self.shapes = shapes(mechanism)
