@@ -14,6 +14,7 @@ from planar.errors import BadInput, NoAnswer
 
 if TYPE_CHECKING:
     from planar.mechanism import Drive, Mechanism
+    from planar.motion import RelativeState, State
 
 DONE, NO_ANSWER, BAD_INPUT = 0, 1, 2
 """Exit statuses."""
@@ -65,13 +66,20 @@ as_json = click.option("--json", "as_json", is_flag=True, help="Print machine-re
     help="Move an input there first, along its branch: A=75deg, stroke=20mm, or a number in the file's units.",
 )
 @click.option(
+    "--relative",
+    "relative",
+    multiple=True,
+    metavar="POINT,POINT[,LINK]",
+    help="Also how the first point moves against the second, in parts, in the axes of a link that carries the second.",
+)
+@click.option(
     "-o",
     "output",
     type=click.Path(dir_okay=False, path_type=Path),
     metavar="FILE",
     help="Write the tables to a .txt, .svg or .html file.",
 )
-def solve(model: str, as_json: bool, at: tuple[str, ...], output: Path | None) -> None:
+def solve(model: str, as_json: bool, at: tuple[str, ...], relative: tuple[str, ...], output: Path | None) -> None:
     """This position: mobility, all positions, velocities, accelerations, rubbing speeds."""
     from planar.analysis.published import compare
     from planar.files import load
@@ -83,14 +91,15 @@ def solve(model: str, as_json: bool, at: tuple[str, ...], output: Path | None) -
     drives = _drives(mechanism, at)
     state = solved(mechanism, drives)
     comparisons = compare(state) if not drives else ()
+    relatives = {text: _relative(state, text) for text in relative}
     if as_json:
         from planar.views.record import record
 
-        click.echo(json.dumps(record(state, comparisons), ensure_ascii=False, indent=1, allow_nan=False))
+        click.echo(json.dumps(record(state, comparisons, relatives), ensure_ascii=False, indent=1, allow_nan=False))
         return
     from planar.views.table import solution
 
-    _show(solution(state, comparisons), output)
+    _show(solution(state, comparisons, relatives), output)
 
 
 @main.command()
@@ -123,6 +132,19 @@ def bench(model: str | None, as_json: bool) -> None:
     from planar.views.table import speeds as table
 
     _show(table(speeds), None)
+
+
+def _relative(state: State, text: str) -> RelativeState:
+    """The relative motion that `--relative` asks for."""
+    from planar.motion import Unknown
+
+    names = [name.strip() for name in text.split(",")]
+    if len(names) not in (2, 3):
+        raise BadInput("--relative", f"{text!r} is not of the form POINT,POINT or POINT,POINT,LINK, such as C,B")
+    try:
+        return state.relative(*names)
+    except Unknown as problem:
+        raise BadInput("--relative", str(problem)) from None
 
 
 def _drives(mechanism: Mechanism, told: tuple[str, ...]) -> tuple[Drive, ...]:

@@ -174,3 +174,29 @@ def test_bare_bench_measures_models_that_come_along():
     records = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
     assert len(records) == 3
     assert all(record["run"] > 0 for record in records)
+
+
+def test_relative_motion_in_the_table_and_the_record():
+    command = [sys.executable, "-m", "planar", "solve", "004-QR", "--relative", "A,C"]
+    table = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert "A against C, in the axes of CD" in table
+    assert "Coriolis" in table
+    record = json.loads(subprocess.run([*command, "--json"], capture_output=True, text=True, check=True).stdout)
+    parts = record["relative"]["A,C"]
+    whole = [
+        sum(each)
+        for each in zip(
+            *(parts[n] for n in ("centripetal", "tangential", "coriolis", "sliding_acceleration")), strict=True
+        )
+    ]
+    assert whole == pytest.approx(parts["acceleration"])
+    assert np.hypot(*parts["coriolis"]) > 1.0
+
+
+@pytest.mark.parametrize(("asked", "words"), [("A", "POINT,POINT"), ("A,Z", "no point 'Z'"), ("R,A", "name the link")])
+def test_a_relative_motion_that_cannot_be_had_is_refused(asked, words):
+    command = [sys.executable, "-m", "planar", "solve", "004-QR", "--relative", asked]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert words in done.stderr
+    assert done.stderr.count("\n") == 1

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from planar.analysis.published import Comparison
-from planar.motion import State
+from planar.motion import RelativeState, State
 
 
-def record(state: State, comparisons: Iterable[Comparison] = ()) -> dict[str, Any]:
-    """A solved position: every link, point and pair by name."""
+def record(
+    state: State, comparisons: Iterable[Comparison] = (), relatives: Mapping[str, RelativeState] | None = None
+) -> dict[str, Any]:
+    """A solved position: every link, point and pair by name, and the relative motions that are asked for."""
     found: dict[str, Any] = {
         "mechanism": state.mechanism.name,
         "outcome": "solved",
@@ -41,4 +43,8 @@ def record(state: State, comparisons: Iterable[Comparison] = ()) -> dict[str, An
         }
         for each in comparisons
     ]
-    return found | ({"published": published} if published else {})
+    relative = {
+        text: {name: part if isinstance(part, str) else part.tolist() for name, part in each._asdict().items()}
+        for text, each in (relatives or {}).items()
+    }
+    return found | ({"published": published} if published else {}) | ({"relative": relative} if relative else {})

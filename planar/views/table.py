@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from textwrap import wrap
 
 import numpy as np
@@ -14,7 +14,7 @@ from rich.text import Text
 from planar.analysis.published import Comparison
 from planar.analysis.speed import Speed
 from planar.mechanism import QUANTITIES, motions
-from planar.motion import State
+from planar.motion import RelativeState, State
 from planar.pairs import Pair
 from planar.units import SI, Unit, unit
 from planar.words import amount, listed
@@ -26,9 +26,12 @@ DIGITS = 6
 _UNITS = {"rad/s^2": "rad/s²", "m/s^2": "m/s²", "N m": "N·m"}
 
 
-def solution(state: State, comparisons: Iterable[Comparison]) -> RenderableType:
-    """A solved position: links, points, pairs, and the published values beside the solved ones."""
+def solution(
+    state: State, comparisons: Iterable[Comparison], relatives: Mapping[str, RelativeState] | None = None
+) -> RenderableType:
+    """A solved position: links, points, pairs, relative motions, and the published values beside the solved ones."""
     parts: list[RenderableType] = [_heading(state), Text(), _links(state), _points(state), _pairs(state)]
+    parts += [_relative(text, each, state) for text, each in (relatives or {}).items()]
     comparisons = tuple(comparisons)
     if comparisons:
         parts.append(published(comparisons))
@@ -194,6 +197,30 @@ def _pairs(state: State) -> RenderableType:
             table.add_row(pair.name, " - ".join(pair.links), *values)
         tables.append(table)
     return Group(*tables)
+
+
+def _relative(text: str, relative: RelativeState, state: State) -> RenderableType:
+    """How one point moves against another, part by part."""
+    point, other = text.split(",")[:2]
+    degree = state.mechanism.units.angle
+    title = f"{point.strip()} against {other.strip()}, in the axes of {relative.axes}"
+    table = _table(title, "part", "magnitude", "unit", f"at, {degree}", "x", "y", left=(0, 2))
+    parts = {
+        "velocity": ("m/s", relative.velocity),
+        "  by rotation": ("m/s", relative.rotation),
+        "  by sliding": ("m/s", relative.sliding),
+        "acceleration": ("m/s²", relative.acceleration),
+        "  centripetal": ("m/s²", relative.centripetal),
+        "  tangential": ("m/s²", relative.tangential),
+        "  Coriolis": ("m/s²", relative.coriolis),
+        "  by sliding ": ("m/s²", relative.sliding_acceleration),
+    }
+    angle = unit(degree)
+    for name, (measure, part) in parts.items():
+        size = float(np.hypot(*part))
+        at = _number(angle.from_si(float(np.arctan2(part[1], part[0])))) if size > 1e-14 else ""
+        table.add_row(name, _number(size), measure, at, *(_number(float(each)) for each in part))
+    return table
 
 
 def _shown(kind: str, state: State) -> tuple[str, Unit]:
