@@ -38,7 +38,8 @@ def dumps(mechanism: Mechanism) -> str:
 
 def load(model: str | Path) -> Mechanism:
     """The mechanism in a file, or the model of that name or id that comes along. Raises BadInput."""
-    return loads(_content(found(model)))
+    path = found(model)
+    return loads(_content(path), str(path))
 
 
 def save(path: Path, text: str) -> None:
