@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from planar.mechanism import Drive, Mechanism
     from planar.motion import RelativeState, State
 
-DONE, NO_ANSWER, BAD_INPUT = 0, 1, 2
-"""Exit statuses."""
+NO_ANSWER, BAD_INPUT = 1, 2
+"""Exit statuses; 0 is done."""
 
 
 class Commands(click.Group):

@@ -41,7 +41,6 @@ class Row(NamedTuple):
 
     pair: str
     kind: Kind
-    is_input: bool
 
 
 class Stage(NamedTuple):
@@ -221,10 +220,10 @@ def _closures(
 
     for pair in mechanism.pairs:
         closures += pair.residual(*of(pair))
-        rows += [Row(pair.name, kind, False) for kind in pair.constrains]
+        rows += [Row(pair.name, kind) for kind in pair.constrains]
     named = motions(mechanism)
     for index, given in enumerate(mechanism.inputs):
         pair = named[given.pair]
         closures.append(pair.drive(*of(pair)) - u[index])
-        rows.append(Row(pair.name, pair.drive_kind, True))
+        rows.append(Row(pair.name, pair.drive_kind))
     return closures, rows

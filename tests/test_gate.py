@@ -7,8 +7,8 @@ import pytest
 from planar import files
 from planar.errors import NoAnswer, Outcome
 from planar.solving import position
+from planar.solving.branch import Branch, allowed
 from planar.solving.follow import follow, run
-from planar.solving.gate import Branch, allowed
 from planar.solving.position import Solver
 
 CRANK = {

@@ -26,10 +26,6 @@ class Comparison:
     apart: float | None
     verdict: str
 
-    @property
-    def agrees(self) -> bool:
-        return self.verdict in ("agrees", "not printed")
-
 
 def compare(state: State) -> tuple[Comparison, ...]:
     """Every quantity that the mechanism's file says was published, with its solved value."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from planar.errors import NoAnswer, Outcome
 from planar.program import Program, length
-from planar.solving.gate import Branch
+from planar.solving.branch import Branch
 
 Array = np.ndarray
 

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from planar.analysis.published import Comparison
+from planar.errors import Outcome
 from planar.motion import RelativeState, State
 
 
@@ -15,7 +16,7 @@ def record(
     """A solved position: every link, point and pair by name, and the relative motions that are asked for."""
     found: dict[str, Any] = {
         "mechanism": state.mechanism.name,
-        "outcome": "solved",
+        "outcome": Outcome.SOLVED.value,
         "mobility": state.mobility,
         "residual": state.residual,
         "inputs": {name: given._asdict() for name, given in state.inputs.items()},
