@@ -169,10 +169,11 @@ def _show(renderable: Any, output: Path | None) -> None:
     from rich.console import Console
 
     if output is None:
-        plain = {"markup": False, "emoji": False, "highlight": False}  # a name is text, whatever it looks like
-        console = Console(**plain)
-        # what is not a terminal has no width: lines are not to be broken for a file or another program
-        (console if console.is_terminal else Console(width=140, soft_wrap=False, **plain)).print(renderable)
+        console = Console(markup=False, emoji=False, highlight=False)  # a name is text, whatever it looks like
+        if not console.is_terminal:
+            # a file or another program has no width: lines are not to be broken for it
+            console.width = 140
+        console.print(renderable)
         return
     from planar.files import save
     from planar.views.saved import written
