@@ -12,7 +12,7 @@ from planar.mechanism import Mechanism
 from planar.pairs import Pair
 from planar.plane import Frame, Vector, direction, frame_at
 from planar.shapes import shape
-from planar.solving.freedom import strength
+from planar.solving.freedom import strengths
 from planar.solving.position import Solver
 
 
@@ -148,7 +148,7 @@ def conditioning(solver: Solver, z: np.ndarray) -> float:
     """The least singular value of any group at a position, as the solver judges it."""
     y = np.concatenate([z, solver.station.u])
     slope = solver.program.kinematics(y, 0.0 * y, 0.0 * y, solver.station.p).slope
-    return min((strength(solver, stage, slope) for stage in solver.equations.stages if stage.links), default=1.0)
+    return float(strengths(solver, slope).min(initial=1.0))
 
 
 def determinate(mechanism: Mechanism, built: Built) -> bool:

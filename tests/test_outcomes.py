@@ -427,3 +427,34 @@ def test_a_pair_of_a_point_that_its_link_lacks_is_refused():
     pairs = tuple(replace(pair, points=("A", "Z")) if pair.name == "A" else pair for pair in made().pairs)
     with pytest.raises(BadInput, match="link 'AB' has no point 'Z'"):
         solve(made(pairs=pairs))
+
+
+@pytest.mark.parametrize("size", [1e-3, 1e-5, 1e-6])
+def test_a_small_dyad_hung_on_a_large_linkage_does_not_weaken_it(size):
+    """Between the coupler of a four-bar of a metre and a pin of the frame close by hangs a dyad many times smaller."""
+    links = {
+        "f": {"points": {"A": [0, 0], "D": [1, 0]}},
+        "a": {"ends": ["A", "B"], "length": 0.3},
+        "b": {"ends": ["B", "C"], "length": 0.9, "points": {"U": [0.45, 0.5]}},
+        "c": {"ends": ["D", "C"], "length": 0.7},
+    }
+    given = {
+        "units": {"angle": "deg"},
+        "frame": "f",
+        "inputs": [{"pair": "A", "position": 50, "velocity": "2 rad/s"}],
+    }
+    sketch = {"C": [0.9, 0.7]}
+    bare = solve(changed(links=links, pairs=[{"turning": name} for name in "ABCD"], sketch=sketch, **given))
+    pin = np.add(bare.point("U").position, (size, 0)).tolist()
+    links |= {"f": {"points": {"A": [0, 0], "D": [1, 0], "V": pin}}}
+    links |= {"q": {"ends": ["U", "R"], "length": 0.6 * size}, "r": {"ends": ["V", "R"], "length": 0.7 * size}}
+    sketch |= {"R": [pin[0] - size / 2, pin[1] + size / 2]}
+    state = solve(changed(links=links, pairs=[{"turning": name} for name in "ABCDUVR"], sketch=sketch, **given))
+    assert state.mobility == 1
+    # law of cosines: r of the dyad against its base, and the speed with which U leaves V along q
+    bend = np.pi - np.arccos((1 + 0.7**2 - 0.6**2) / (2 * 0.7))
+    assert state.link("r").angle == pytest.approx(bend, abs=1e-14 / size)
+    arm = state.point("R").position - state.point("U").position
+    rate = state.point("R").velocity - state.point("U").velocity
+    assert arm @ rate == pytest.approx(0.0, abs=1e-9 * size)
+    assert state.link("b").angular_velocity == pytest.approx(bare.link("b").angular_velocity, rel=1e-12)

@@ -31,7 +31,8 @@ def mobility(setup: Setup, z: Array, motion: Motion) -> int:
     With the inputs' positions counted as unknowns, what the pairs leave free is unknowns + inputs - rank.
     """
     inputs = setup.station.u.size
-    weak = [stage for stage in setup.equations.stages if strength(setup, stage, motion.slope) < SINGULAR]
+    found_weak = strengths(setup, motion.slope) < SINGULAR
+    weak = [stage for stage, is_weak in zip(setup.equations.stages, found_weak, strict=True) if is_weak]
     square = all(length(stage.rows) == length(stage.unknowns) for stage in setup.equations.stages)
     if not weak and square:
         return inputs
@@ -59,37 +60,43 @@ def _broken_ways(motion: Motion) -> int:
     return int(np.sum(np.linalg.svd(left, compute_uv=False) > SINGULAR))
 
 
-def strength(setup: Setup, stage: Stage, slope: Array) -> float:
-    """The least singular value of a group's slope, each column by what its links could reach at best.
+def strengths(setup: Setup, slope: Array) -> Array:
+    """The least singular value of every group's slope (stages,), each column by what its links could reach at best.
 
     Zero at a dead point or a change point; lengths are divided by the reach of the group's links, so that neither
     their size nor that of the whole matters.
     """
-    if not length(stage.unknowns):
+    scaled = _scaled(setup, slope)
+    return np.array([_least(scaled[stage.rows, stage.unknowns]) for stage in setup.equations.stages])
+
+
+def _least(own: Array) -> float:
+    if not own.shape[1]:
         return 1.0
-    own = _scaled(setup, slope)[stage.rows, stage.unknowns]
     values = np.linalg.svd(own, compute_uv=False)
-    return float(values[-1] / max(1.0, values[0])) if len(values) == length(stage.unknowns) else 0.0
+    return float(values[-1] / max(1.0, values[0])) if len(values) == own.shape[1] else 0.0
 
 
 def _scaled(setup: Setup, slope: Array) -> Array:
     """A slope (rows, unknowns and inputs) with every group's lengths in units of its reach, and columns of one size.
 
+    The size of an unknown's column is that in its own group, whatever large or small things later groups hang on it.
     A column that could reach further than it does now keeps what it lacks: it is that which vanishes.
     """
     scaled = slope.copy()
-    natural = np.ones(slope.shape[1])
+    sizes = np.maximum(np.linalg.norm(slope, axis=0), 1.0)
     for stage in setup.equations.stages:
         reach = _reach(setup, stage)
         kinds = [row.kind for row in setup.equations.rows[stage.rows]]
         scaled[stage.rows] /= np.array([[reach if kind is Kind.LENGTH else 1.0] for kind in kinds]).reshape(-1, 1)
         for index in range(stage.unknowns.start, stage.unknowns.stop):
             coordinate = setup.equations.coordinates[setup.equations.unknowns[index]]
+            own = float(np.linalg.norm(scaled[stage.rows, index]))
             if coordinate.kind is Kind.LENGTH:
-                scaled[:, index] *= reach
+                sizes[index] = max(own, 1.0 / reach)
             else:
-                natural[index] = setup.reach.get(coordinate.owner, reach) / reach or 1.0
-    return scaled / np.maximum(np.linalg.norm(scaled, axis=0), natural)
+                sizes[index] = max(own, setup.reach.get(coordinate.owner, reach) / reach or 1.0)
+    return scaled / sizes
 
 
 def _reach(setup: Setup, stage: Stage) -> float:
@@ -120,7 +127,7 @@ def always_weak(setup: Setup, stage: Stage, z: Array) -> bool:
         rng = np.random.default_rng(seed)
         near = u + rng.uniform(-NEAR_BY, NEAR_BY, u.size)
         moved = corrected(setup.program, p, z + rng.uniform(-NEAR_BY, NEAR_BY, z.size), near, stage.level)
-        if moved is not None and strength(setup, stage, slope_at(setup, moved, near)) > NOTHING:
+        if moved is not None and strengths(setup, slope_at(setup, moved, near))[stage.level] > NOTHING:
             return False
     return True
 

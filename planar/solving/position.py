@@ -16,7 +16,7 @@ from planar.solving import refusals
 from planar.solving.assemble import Assembly, Failure, search
 from planar.solving.candidates import Candidates, placed
 from planar.solving.follow import follow
-from planar.solving.freedom import SINGULAR, always_weak, cancelled, mobility, slope_at, strength
+from planar.solving.freedom import SINGULAR, always_weak, cancelled, mobility, slope_at, strengths
 from planar.solving.setup import Setup
 
 Array = np.ndarray
@@ -55,10 +55,10 @@ class Solver(Setup):
         return Assembly(found.z, (*self.mechanism.remarks, *found.remarks))
 
     def _unassembled(self, failure: Failure) -> NoAnswer:
-        slope = slope_at(self, failure.z, self.station.u)
+        found = strengths(self, slope_at(self, failure.z, self.station.u))
         for stage in self.equations.stages[: failure.stage.level]:
             # a group that could stand anywhere was put somewhere, and what comes after it need not fit there
-            if strength(self, stage, slope) < SINGULAR and always_weak(self, stage, failure.z):
+            if found[stage.level] < SINGULAR and always_weak(self, stage, failure.z):
                 return refusals.ever_free(self, stage.links)
         return refusals.too_many(self) if self._contradicted(failure) else refusals.not_assembled(self, failure)
 
