@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
+from planar.algebra import Scalar
 from planar.equations import Equations, Stage, build
 from planar.mechanism import Input, Link, Mechanism, motions
-from planar.pairs import Kind
+from planar.pairs import Kind, Pair
+from planar.plane import GROUND, Frame, frame_at
 from planar.shapes import Shape, shape
 
 Array = np.ndarray
@@ -168,27 +170,24 @@ def shapes(mechanism: Mechanism) -> dict[str, Shape]:
     return {link.name: shape(link) for link in mechanism.links}
 
 
-def size(mechanism: Mechanism) -> float:
+def size(mechanism: Mechanism, shapes: Mapping[str, Shape]) -> float:
     """The mechanism's size (m): the greatest distance between two points of one link, else of a slide's travel."""
     named = motions(mechanism)
     slides = [abs(g.position) for g in mechanism.inputs if named[g.pair].drive_kind is Kind.LENGTH]
-    return max((extent(link) for link in mechanism.links), default=0.0) or max(slides, default=0.0) or 1.0
+    return max(map(extent, shapes.values()), default=0.0) or max(slides, default=0.0) or 1.0
 
 
-def extent(link: Link) -> float:
+def extent(shape: Shape) -> float:
     """The greatest distance between two points of a link (m)."""
-    points = list(shape(link).points.values())
-    spread = np.array(points, dtype=float)
-    return float(np.hypot(*(spread.max(axis=0) - spread.min(axis=0)))) if points else 0.0
+    spread = np.array(list(shape.points.values()), dtype=float)
+    return float(np.hypot(*(spread.max(axis=0) - spread.min(axis=0)))) if len(spread) else 0.0
 
 
-def fitted(mechanism: Mechanism, unit: float) -> Array:
+def fitted(mechanism: Mechanism, shapes: Mapping[str, Shape], unit: float) -> Array:
     """p: the numbers of every pair, lengths divided by `unit`."""
-    placed = shapes(mechanism)
     found: list[float] = []
     for pair in mechanism.pairs:
-        measured = pair.measure(*(placed[link] for link in pair.links))
-        found += scaled(measured, pair.measures, unit)
+        found += scaled(pair.measure(*(shapes[link] for link in pair.links)), pair.measures, unit)
     return np.array(found, dtype=float)
 
 
@@ -207,3 +206,15 @@ def rates(mechanism: Mechanism, order: str, unit: float) -> Array:
 def scaled(values: Sequence[float], kinds: Sequence[Kind], unit: float) -> list[float]:
     """Numbers with the lengths among them divided by `unit`."""
     return [value / unit if kind is Kind.LENGTH else value for value, kind in zip(values, kinds, strict=True)]
+
+
+def placed(
+    w: Sequence[Scalar] | Array, column: Mapping[tuple[str, str], int], links: Iterable[str], pairs: Mapping[str, Pair]
+) -> tuple[dict[str, Frame], dict[str, tuple[Scalar, ...]]]:
+    """Frames of links and own coordinates of pairs from w, whose entries may be floats, arrays or jets."""
+    frames = {
+        link: frame_at(*(w[column[link, part]] for part in ("x", "y", "angle"))) if (link, "x") in column else GROUND
+        for link in links
+    }
+    own = {name: tuple(w[column[name, part]] for part, _ in pair.coordinates) for name, pair in pairs.items()}
+    return frames, own

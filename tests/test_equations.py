@@ -14,9 +14,8 @@ from planar.equations import build
 from planar.graph import detached, linkage
 from planar.groups import decompose
 from planar.pairs import Kind
-from planar.program import fitted, length, program, structure
+from planar.program import fitted, length, placed, program, structure
 from planar.program import shapes as shapes_of
-from planar.solving.candidates import placed
 from tests.linkages import random_linkage
 
 
@@ -66,14 +65,14 @@ def test_eliminated_coordinates_close_their_pairs_wherever_the_remaining_unknown
     mechanism = files.from_dict(random_linkage(seed, 1 + seed % 12).value)
     equations = build(structure(mechanism))
     rng = np.random.default_rng(seed)
-    p = fitted(mechanism, 1.0)
+    shapes = shapes_of(mechanism)
+    p = fitted(mechanism, shapes, 1.0)
     z, u = rng.uniform(-2, 2, equations.z.numel()), rng.uniform(-2, 2, equations.u.numel())
     function = ca.Function("both", [equations.z, equations.u, equations.p], [equations.F, equations.w])
     left, w = (each.full().ravel() for each in function(z, u, p))
     columns = {(c.owner, c.part): index for index, c in enumerate(equations.coordinates)}
     pairs = {pair.name: pair for pair in mechanism.pairs}
     frames, own = placed(w, columns, {link.name: None for link in mechanism.links}, pairs)
-    shapes = shapes_of(mechanism)
     opened = []
     for pair in mechanism.pairs:
         ends = [frames[link] for link in pair.links]

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from planar.algebra import Scalar
 from planar.equations import Stage
-from planar.mechanism import Mechanism, named_points
-from planar.pairs import Kind, Pair
-from planar.plane import GROUND, Frame, Vector, frame_at
-from planar.program import Program, length, scaled, shapes
+from planar.mechanism import named_points
+from planar.pairs import Kind
+from planar.plane import Vector
+from planar.program import length, placed
 from planar.solving.newton import Closing, Found, newton, polished
+from planar.solving.setup import Setup
 
 Array = np.ndarray
 
@@ -40,21 +39,17 @@ class Candidate(NamedTuple):
 
 
 class Candidates:
-    """Assemblies of the groups of one mechanism, at one set of inputs (u, p scaled)."""
+    """Assemblies of the groups of one mechanism, at its own inputs."""
 
-    def __init__(self, mechanism: Mechanism, program: Program, u: Array, p: Array, unit: float):
-        self.program, self.u, self.p = program, u, p
-        self.equations = program.equations
-        self.pairs = {pair.name: pair for pair in mechanism.pairs}
-        self.column = {(c.owner, c.part): index for index, c in enumerate(self.equations.coordinates)}
-        placed_in = shapes(mechanism)
-        self.numbers = {
-            pair.name: scaled(pair.measure(*(placed_in[link] for link in pair.links)), pair.measures, unit)
-            for pair in mechanism.pairs
-        }
+    def __init__(self, setup: Setup):
+        mechanism, unit = setup.mechanism, setup.unit
+        self.program, self.u, self.p = setup.program, setup.station.u, setup.station.p
+        self.equations, self.pairs, self.column = setup.equations, setup.pairs, setup.column
+        ends = np.cumsum([len(pair.measures) for pair in mechanism.pairs])
+        self.numbers = dict(zip(self.pairs, np.split(self.p, ends[:-1]), strict=True)) if self.pairs else {}
         self.local = {
             name: {point: Vector(at.x / unit, at.y / unit) for point, at in shape.points.items()}
-            for name, shape in placed_in.items()
+            for name, shape in setup.shapes.items()
         }
         self.sketch = {name: Vector(x / unit, y / unit) for name, x, y in mechanism.sketch}
         level = {link.name: self._level(link.name) for link in mechanism.links}
@@ -198,18 +193,6 @@ class Candidates:
             if angle is not None:
                 angles[link] = angle
         return angles
-
-
-def placed(
-    w: Sequence[Scalar] | Array, column: Mapping[tuple[str, str], int], links: Iterable[str], pairs: Mapping[str, Pair]
-) -> tuple[dict[str, Frame], dict[str, tuple[Scalar, ...]]]:
-    """Frames of links and own coordinates of pairs from w, whose entries may be floats, arrays or jets."""
-    frames = {
-        link: frame_at(*(w[column[link, part]] for part in ("x", "y", "angle"))) if (link, "x") in column else GROUND
-        for link in links
-    }
-    own = {name: tuple(w[column[name, part]] for part, _ in pair.coordinates) for name, pair in pairs.items()}
-    return frames, own
 
 
 def _spread(unknowns: int) -> Array:

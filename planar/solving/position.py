@@ -11,10 +11,10 @@ from planar.algebra import Jet
 from planar.errors import NoAnswer
 from planar.mechanism import Drive, Mechanism, with_inputs
 from planar.motion import State
-from planar.program import Motion, length, program
+from planar.program import Motion, length, placed, program
 from planar.solving import refusals
 from planar.solving.assemble import Assembly, Failure, search
-from planar.solving.candidates import Candidates, placed
+from planar.solving.candidates import Candidates
 from planar.solving.follow import follow
 from planar.solving.freedom import SINGULAR, always_weak, cancelled, mobility, slope_at, strengths
 from planar.solving.setup import Setup
@@ -49,7 +49,7 @@ class Solver(Setup):
         """The assembly nearest to the sketch. Raises NoAnswer."""
         if any(stage.free for stage in self.equations.stages):
             raise refusals.free(self)
-        found = search(Candidates(self.mechanism, self.program, self.station.u, self.station.p, self.unit))
+        found = search(Candidates(self))
         if isinstance(found, Failure):
             raise self._unassembled(found)
         return Assembly(found.z, (*self.mechanism.remarks, *found.remarks))

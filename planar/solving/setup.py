@@ -8,8 +8,7 @@ import numpy as np
 
 from planar.mechanism import Input, Mechanism, check, motions
 from planar.pairs import Kind
-from planar.program import Program, extent, fitted, positions, program, rates, shapes, size
-from planar.solving.candidates import placed
+from planar.program import Program, extent, fitted, placed, positions, program, rates, shapes, size
 from planar.solving.gate import Gate
 from planar.words import amount, listed
 
@@ -31,8 +30,8 @@ class Setup:
     def __init__(self, mechanism: Mechanism):
         check(mechanism)
         self.mechanism = mechanism
-        self.unit = size(mechanism)
         self.shapes = shapes(mechanism)
+        self.unit = size(mechanism, self.shapes)
         self.program: Program = program(mechanism)
         self.equations = self.program.equations
         self.gate = Gate(mechanism, self.shapes, self.unit)
@@ -40,12 +39,12 @@ class Setup:
         self.pairs = {pair.name: pair for pair in mechanism.pairs}
         self.named = motions(mechanism)
         self.scale = np.array([self.unit if c.kind is Kind.LENGTH else 1.0 for c in self.equations.coordinates])
-        self.reach = {link.name: extent(link) / self.unit for link in mechanism.links}
+        self.reach = {name: extent(shape) / self.unit for name, shape in self.shapes.items()}
         self.station = Station(
             positions(mechanism, self.unit),
             rates(mechanism, "velocity", self.unit),
             rates(mechanism, "acceleration", self.unit),
-            fitted(mechanism, self.unit),
+            fitted(mechanism, self.shapes, self.unit),
         )
 
     @property
