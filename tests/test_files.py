@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import json
-import signal
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +11,7 @@ import pytest
 import planar
 from planar.errors import BadInput
 from planar.files import LARGEST, found, model_files, models
+from tests.watchdog import watched
 
 CRANK: dict[str, Any] = {
     "planar": 1,
@@ -25,22 +23,6 @@ CRANK: dict[str, Any] = {
     "inputs": [{"pair": "O", "position": 60, "velocity": "210 rpm"}],
 }
 TEXT = json.dumps(CRANK)
-
-
-@contextmanager
-def watched(seconds: int = 30) -> Iterator[None]:
-    """Ends what would hang. No speed is tested: what is watched takes milliseconds when right, minutes when wrong."""
-
-    def ring(*_: object) -> None:
-        raise AssertionError(f"not done in {seconds} s")
-
-    before = signal.signal(signal.SIGALRM, ring)
-    signal.alarm(seconds)
-    try:
-        yield
-    finally:
-        signal.alarm(0)
-        signal.signal(signal.SIGALRM, before)
 
 
 def refused(model: str | Path) -> BadInput:

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import signal
 import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from math import isfinite, pi
 from pathlib import Path
 
@@ -17,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planar.units import SI, TABLE, Unit, UnitError, example, quantity, shortest, unit
+from tests.watchdog import watched
 
 STEADY = settings(deadline=None)
 """No example is timed: the first one may load a library."""
@@ -29,22 +27,6 @@ ULPS = 4 * EPS
 @pytest.fixture(scope="module")
 def registry() -> pint.UnitRegistry:
     return pint.UnitRegistry(cache_folder=None)
-
-
-@contextmanager
-def watched(seconds: int = 30) -> Iterator[None]:
-    """Ends what would hang. No speed is tested: what is watched takes milliseconds when right, minutes when wrong."""
-
-    def ring(*_: object) -> None:
-        raise AssertionError(f"not done in {seconds} s")
-
-    before = signal.signal(signal.SIGALRM, ring)
-    signal.alarm(seconds)
-    try:
-        yield
-    finally:
-        signal.alarm(0)
-        signal.signal(signal.SIGALRM, before)
 
 
 def refused(text: str, kind: str) -> str:
