@@ -129,7 +129,7 @@ def _staged(mechanism: Mechanism, whole: Equations) -> Equations:
             if c.of_link and known == level
         }
         joined = [
-            pair.name for pair in mechanism.pairs if max(level_of_link.get(link, -1) for link in pair.links) == level
+            pair.name for pair in mechanism.pairs if max(level_of_link.get(link, -1) for link in pair.bodies) == level
         ]
         stages.append(
             Stage(
@@ -214,9 +214,9 @@ def _closures(
     closures: list[ca.SX] = []
     rows: list[Row] = []
 
-    def of(pair: Pair) -> tuple[Frame, Frame, Sequence[ca.SX], Sequence[ca.SX]]:
-        first, second = pair.links
-        return unknown.frames[first], unknown.frames[second], numbers.get(pair.name, []), unknown.own.get(pair.name, [])
+    def of(pair: Pair) -> tuple[Sequence[Frame], Sequence[ca.SX], Sequence[ca.SX]]:
+        frames = [unknown.frames[link] for link in pair.bodies]
+        return frames, numbers.get(pair.name, []), unknown.own.get(pair.name, [])
 
     for pair in mechanism.pairs:
         closures += pair.residual(*of(pair))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import isfinite
 from numbers import Real
@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from planar.errors import BadInput
 from planar.pairs.base import Pair
-from planar.shapes import Along, At, Distances, Link, Place, Point
+from planar.shapes import Along, At, Distances, Link, Place, Point, Shape
 
 __all__ = [
     "QUANTITIES",
@@ -29,6 +29,9 @@ __all__ = [
     "Published",
     "Units",
     "check",
+    "counting",
+    "entries",
+    "misfits",
     "motions",
     "named_points",
     "with_inputs",
@@ -176,7 +179,7 @@ def check(mechanism: Mechanism) -> None:
     if mechanism.frame not in points:
         raise BadInput("frame", f"there is no link {mechanism.frame!r} to be the frame")
     for pair in mechanism.pairs:
-        for link in pair.links:
+        for link in pair.bodies:
             if link not in points:
                 raise BadInput(pair.name, f"there is no link {link!r}; links are {', '.join(points)}")
         rides = pair.rides()
@@ -187,6 +190,19 @@ def check(mechanism: Mechanism) -> None:
     for given in mechanism.inputs:
         if given.pair not in named:
             raise BadInput(given.pair, f"there is no pair {given.pair!r} to be driven; pairs are {', '.join(named)}")
+
+
+def misfits(pairs: Sequence[Pair], shapes: Mapping[str, Shape]) -> Iterator[tuple[Pair, str]]:
+    """Pairs that do not go with the others, each with a sentence."""
+    for pair in pairs:
+        wrong = pair.misfit(pairs, shapes)
+        if wrong is not None:
+            yield pair, wrong
+
+
+def counting(mechanism: Mechanism) -> frozenset[str]:
+    """The links whose angles count turns."""
+    return frozenset(link for pair in mechanism.pairs if pair.counts_turns for link in pair.bodies)
 
 
 def entries(mechanism: Mechanism) -> tuple[tuple[Pair, ...], ...]:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planar.algebra import Jet
-from planar.mechanism import Mechanism, NamedPoint, motions, named_points
+from planar.mechanism import Mechanism, NamedPoint, counting, motions, named_points
 from planar.pairs import Kind, Pair
 from planar.plane import Frame, Vector
 from planar.shapes import Shape
@@ -110,6 +110,10 @@ class State:
         return under_links | {each.name: each for each in self._points}
 
     @cached_property
+    def _counting(self) -> frozenset[str]:
+        return counting(self.mechanism)
+
+    @cached_property
     def _motions(self) -> Mapping[str, Pair]:
         return motions(self.mechanism)
 
@@ -140,13 +144,13 @@ class State:
         return self._point(self._named(name))
 
     def link(self, name: str) -> LinkState:
-        """A link by name; its angle between -pi and pi. Raises Unknown."""
+        """A link by name; its angle between -pi and pi, or with its turns where a pair counts them. Raises Unknown."""
         if name not in self.frames:
             raise Unknown(f"there is no link {name!r}; links are {', '.join(self.frames)}")
         angle, velocity, acceleration = _parts(self.frames[name].angle)
         fastest, hardest = self._greatest_of_links
         sense = _sense(turning(velocity, fastest), velocity * acceleration, abs(velocity) * hardest)
-        return LinkState(_wrapped(angle), velocity, acceleration, sense)
+        return LinkState(angle if name in self._counting else _wrapped(angle), velocity, acceleration, sense)
 
     def pair(self, name: str) -> dict[str, float | None]:
         """What a pair reports of its relative motion (SI). Raises Unknown."""
@@ -157,10 +161,11 @@ class State:
         if name not in self._motions:
             raise Unknown(f"there is no pair {name!r}; pairs are {', '.join(self._motions)}")
         pair = self._motions[name]
-        first, second = (self.frames[link] for link in pair.links)
-        numbers = pair.measure(*(self.shapes[link] for link in pair.links))
-        position, rate, second_rate = _parts(pair.drive(first, second, numbers, self.own.get(pair.name, ())))
-        return pair, (_wrapped(position) if pair.drive_kind is Kind.ANGLE else position, rate, second_rate)
+        numbers = pair.measure([self.shapes[link] for link in pair.bodies])
+        frames = [self.frames[link] for link in pair.bodies]
+        position, rate, second_rate = _parts(pair.drive(frames, numbers, self.own.get(pair.name, ())))
+        wrapped = pair.drive_kind is Kind.ANGLE and not self._counting.issuperset(pair.links)
+        return pair, (_wrapped(position) if wrapped else position, rate, second_rate)
 
     def relative(self, point: str, other: str, axes: str | None = None) -> RelativeState:
         """How `point` moves against `other`, in the axes of a link.

@@ -187,7 +187,7 @@ def fitted(mechanism: Mechanism, shapes: Mapping[str, Shape], unit: float) -> Ar
     """p: the numbers of every pair, lengths divided by `unit`."""
     found: list[float] = []
     for pair in mechanism.pairs:
-        found += scaled(pair.measure(*(shapes[link] for link in pair.links)), pair.measures, unit)
+        found += scaled(pair.measure([shapes[link] for link in pair.bodies]), pair.measures, unit)
     return np.array(found, dtype=float)
 
 

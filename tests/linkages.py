@@ -158,7 +158,7 @@ def determinate(mechanism: Mechanism, built: Built) -> bool:
     """
     shapes = {link.name: shape(link) for link in mechanism.links}
     moving = [name for name in built.frames if name != mechanism.frame]
-    numbers = {pair.name: pair.measure(*(shapes[link] for link in pair.links)) for pair in mechanism.pairs}
+    numbers = {pair.name: pair.measure([shapes[link] for link in pair.bodies]) for pair in mechanism.pairs}
     pairs = {pair.name: pair for pair in mechanism.pairs}
     place = np.array([part for name in moving for part in _frame(built, name)], dtype=complex)
     own = [(pair.name, k) for pair in mechanism.pairs for k in range(len(pair.coordinates))]
@@ -170,11 +170,11 @@ def determinate(mechanism: Mechanism, built: Built) -> bool:
         slides = {name: at[len(place) - len(own) + k] for k, (name, _) in enumerate(own)}
         found = []
         for pair in mechanism.pairs:
-            ends = [frames[link] for link in pair.links]
-            found += pair.residual(*ends, numbers[pair.name], [slides.get(pair.name)])
+            ends = [frames[link] for link in pair.bodies]
+            found += pair.residual(ends, numbers[pair.name], [slides.get(pair.name)])
         for given in mechanism.inputs:
             pair = pairs[given.pair]
-            found.append(pair.drive(*(frames[link] for link in pair.links), (), [slides.get(pair.name)]))
+            found.append(pair.drive([frames[link] for link in pair.bodies], (), [slides.get(pair.name)]))
         return np.array(found)
 
     step = 1e-30
@@ -189,5 +189,5 @@ def _frame(built: Built, name: str) -> tuple[float, float, float]:
 
 def _displacement(built: Built, pair: Pair, numbers: Sequence[float]) -> float:
     first, second = (built.frames[link] for link in pair.links)
-    way = second.carry(Vector(*numbers[2:4])) - first.carry(Vector(*numbers[0:2]))
-    return way.dot(first.turn(Vector(*numbers[4:6])))
+    way = second.carry(Vector(*numbers[4:6])) - first.carry(Vector(*numbers[0:2]))
+    return way.dot(first.turn(Vector(*numbers[2:4])))

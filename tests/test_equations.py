@@ -75,14 +75,14 @@ def test_eliminated_coordinates_close_their_pairs_wherever_the_remaining_unknown
     frames, own = placed(w, columns, {link.name: None for link in mechanism.links}, pairs)
     opened = []
     for pair in mechanism.pairs:
-        ends = [frames[link] for link in pair.links]
-        measured = pair.measure(*(shapes[link] for link in pair.links))
-        residual = pair.residual(*ends, measured, own[pair.name])
+        ends = [frames[link] for link in pair.bodies]
+        measured = pair.measure([shapes[link] for link in pair.bodies])
+        residual = pair.residual(ends, measured, own[pair.name])
         opened += [wrapped(x) if kind is Kind.ANGLE else x for kind, x in zip(pair.constrains, residual, strict=True)]
     for given_input, position in zip(mechanism.inputs, u, strict=True):
         pair = pairs[given_input.pair]
-        ends = [frames[link] for link in pair.links]
-        gap = pair.drive(*ends, (), own[pair.name]) - position
+        ends = [frames[link] for link in pair.bodies]
+        gap = pair.drive(ends, (), own[pair.name]) - position
         opened.append(wrapped(gap) if pair.drive_kind is Kind.ANGLE else gap)
     opened = np.array([value for value in opened if abs(value) > 1e-12])
     left = np.array([value for value in left if abs(value) > 1e-12])

@@ -173,8 +173,6 @@ class Cursor:
                 raise self.refuse(None, str(problem)) from None
         else:
             found = self._bare(self.as_number(), kind)
-        if isnan(found):
-            raise self.refuse(None, "this is not a number")
         if not abs(found) < HUGE:
             raise self.refuse(None, "the number is too large")
         return found
@@ -183,9 +181,14 @@ class Cursor:
         if isinstance(self.value, bool) or not isinstance(self.value, int | float):
             raise self.refuse(None, f"a number is wanted here, not {called(self.value)}")
         try:
-            return float(self.value)
+            found = float(self.value)
         except OverflowError:
             raise self.refuse(None, "the number is too large") from None
+        if isnan(found):
+            raise self.refuse(None, "this is not a number")
+        if not abs(found) < HUGE:
+            raise self.refuse(None, "the number is too large")
+        return found
 
     def _bare(self, number: float, kind: str) -> float:
         units = self.whole.units
@@ -207,6 +210,31 @@ class Cursor:
             return default
         return self[key].as_quantity(kind)
 
+    def quantities(self, key: str, kind: str, count: int) -> tuple[float, ...]:
+        return tuple(item.as_quantity(kind) for item in self._counted(key, count))
+
+    def number(self, key: str) -> float:
+        return self[key].as_number()
+
+    def counts(self, key: str, count: int) -> tuple[float, ...]:
+        for item in self._counted(key, count):
+            if isinstance(item.value, bool) or not isinstance(item.value, int):
+                raise item.refuse(None, f"a whole number is wanted here, not {called(item.value)}")
+        return tuple(item.as_number() for item in self[key].items())
+
+    def _counted(self, key: str, count: int) -> tuple[Cursor, ...]:
+        found = tuple(self[key].items())
+        if len(found) != count:
+            raise self.refuse(key, f"{count} numbers are wanted here, not {len(found)}")
+        return found
+
+    def flag(self, key: str) -> bool:
+        if not self.has(key):
+            return False
+        if not isinstance(self[key].value, bool):
+            raise self.refuse(key, f"true or false is wanted here, not {called(self[key].value)}")
+        return self[key].value
+
     def optional(self, key: str, kind: str) -> float | None:
         return self[key].as_quantity(kind) if self.has(key) else None
 
@@ -223,6 +251,10 @@ class Cursor:
         return found
 
     # links and points
+
+    @property
+    def frame(self) -> str:
+        return self.whole.frame
 
     def carriers(self, point: str) -> tuple[str, ...]:
         found = self.whole.carried_by.get(point, ())
@@ -245,6 +277,12 @@ class Cursor:
             if found.count(name) > 1:
                 raise self.refuse(key, f"link {name!r} stands here twice; a pair joins different links")
         return found
+
+    def two_links(self, key: str) -> tuple[str, str]:
+        first, second, *more = self.links(key)
+        if more:
+            raise self.refuse(key, f"this pair joins two links, not {len(more) + 2}")
+        return first, second
 
     def carried(self, point: str, link: str, key: str) -> None:
         known = self.whole.links[link].names

@@ -21,6 +21,7 @@ from planar.mechanism import (
     Point,
     Published,
     Units,
+    misfits,
     motions,
     named_points,
 )
@@ -245,7 +246,14 @@ def _pairs(top: Cursor) -> tuple[Pair, ...]:
         named[name] = entry.path
         placed |= dict.fromkeys(pinned, entry.path)
         found += group
+    _fitting(top, found, named)
     return tuple(found)
+
+
+def _fitting(top: Cursor, pairs: list[Pair], places: Mapping[str, str]) -> None:
+    """Refuse a pair that does not go with the others."""
+    for pair, wrong in misfits(pairs, {name: shape(link) for name, link in top.whole.links.items()}):
+        raise replace(top, path=places[pair.entry_name()]).refuse(None, wrong)
 
 
 def _left_out(top: Cursor, pairs: tuple[Pair, ...]) -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 from functools import cache
 from importlib import import_module
+from inspect import isabstract
 from pkgutil import iter_modules
 
 from planar.pairs.base import Entry, Kind, Pair, Quantity, Rewritten, Sample
@@ -12,6 +13,6 @@ __all__ = ["Entry", "Kind", "Pair", "Quantity", "Rewritten", "Sample", "pair_typ
 @cache
 def pair_types() -> dict[str, type[Pair]]:
     """Every pair type by its keyword."""
-    modules = [import_module(f"{__name__}.{found.name}") for found in iter_modules(__path__) if found.name != "base"]
+    modules = [import_module(f"{__name__}.{found.name}") for found in iter_modules(__path__)]
     types = (value for module in modules for value in vars(module).values() if isinstance(value, type))
-    return {kind.keyword: kind for kind in types if issubclass(kind, Pair) and kind is not Pair}
+    return {kind.keyword: kind for kind in types if issubclass(kind, Pair) and not isabstract(kind)}

@@ -9,7 +9,7 @@ from enum import Enum
 from typing import Any, ClassVar, NamedTuple, Protocol, Self
 
 from planar.algebra import Scalar
-from planar.plane import Frame
+from planar.plane import Frame, Vector
 from planar.shapes import Shape
 
 
@@ -30,13 +30,23 @@ class Pair(ABC):
 
     A pair type is one file of this folder. Its `residual` is written with + - * alone, so the same lines
     serve floats, arrays, symbols and jets; Jacobian, velocity, acceleration and reactions are derived from it.
+    Its formulas take a frame, or a shape, for each of its `bodies`.
     """
 
     name: str
     links: tuple[str, str]
+    """The two links that touch."""
 
     keyword: ClassVar[str]
     """The key that marks the type in a mechanism file."""
+    members: ClassVar[Mapping[str, Schema]]
+    """The other keys of its entry, each with what JSON Schema says of its value."""
+    required: ClassVar[tuple[str, ...]] = ()
+    """Those of the keys that cannot be left out."""
+    lower: ClassVar[bool]
+    """Whether the links touch along a surface; higher pairs touch at a point or along a line."""
+    counts_turns: ClassVar[bool] = False
+    """Whether the angles of its bodies count whole turns."""
     constrains: ClassVar[tuple[Kind, ...]]
     """What each entry of the residual measures."""
     coordinates: ClassVar[tuple[tuple[str, Kind], ...]] = ()
@@ -48,18 +58,21 @@ class Pair(ABC):
     drive_kind: ClassVar[Kind]
     """Whether its input is an angle or a length."""
 
-    @abstractmethod
-    def measure(self, first: Shape, second: Shape) -> Sequence[Scalar]:
-        """The numbers of the two links that the residual needs (m, rad)."""
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """The links whose frames its formulas need: the two that touch, and those that they are seen from."""
+        return self.links
 
     @abstractmethod
-    def residual(
-        self, first: Frame, second: Frame, numbers: Sequence[Scalar], own: Sequence[Scalar]
-    ) -> Sequence[Scalar]:
+    def measure(self, shapes: Sequence[Shape]) -> Sequence[Scalar]:
+        """The numbers of the bodies that the residual needs (m, rad)."""
+
+    @abstractmethod
+    def residual(self, frames: Sequence[Frame], numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Sequence[Scalar]:
         """Zero where the pair is closed, an entry per constraint."""
 
     @abstractmethod
-    def drive(self, first: Frame, second: Frame, numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Scalar:
+    def drive(self, frames: Sequence[Frame], numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Scalar:
         """The relative motion that an input here prescribes (rad or m)."""
 
     @abstractmethod
@@ -77,6 +90,19 @@ class Pair(ABC):
     def ahead(self, drive: float) -> bool:
         """Whether this is the assembly that an author means who says nothing (a slide ahead of `through`)."""
         return True
+
+    @classmethod
+    def holds(cls) -> int:
+        """How many of the three relative motions of two links it prevents."""
+        return len(cls.constrains) - len(cls.coordinates)
+
+    def misfit(self, beside: Sequence[Pair], shapes: Mapping[str, Shape]) -> str | None:
+        """What is wrong with it beside all pairs of its mechanism, as a sentence."""
+        return None
+
+    def apart(self, numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Scalar:
+        """The gap (m) at a contact that other pairs have to keep closed."""
+        return 0.0
 
     @classmethod
     def rewrite(cls, entry: Entry) -> Rewritten | None:
@@ -120,14 +146,35 @@ class Rewritten(NamedTuple):
 
 
 class Sample(NamedTuple):
-    """A pair closed between two links, with everything that its formulas need."""
+    """A pair closed between its bodies, which are called a, b, c, with everything that its formulas need."""
 
     pair: Pair
-    shapes: tuple[Shape, Shape]
-    frames: tuple[Frame, Frame]
+    shapes: tuple[Shape, ...]
+    frames: tuple[Frame, ...]
     own: tuple[float, ...]
     entry: dict[str, Any]
     """The pair as a file has it."""
+    beside: tuple[dict[str, Any], ...] = ()
+    """Entries of other pairs without which it would be refused."""
+
+
+def plain(**points: Vector) -> Shape:
+    """A link of a sample, with these points in its own axes."""
+    return Shape(points, Vector(0.0, 0.0), Vector(1.0, 0.0))
+
+
+Schema = Mapping[str, Any]
+"""What JSON Schema says of a value."""
+
+
+def described(name: str) -> Schema:
+    """The schema of a kind of value that several entries have, such as "length" or "point"."""
+    return {"$ref": f"#/$defs/{name}"}
+
+
+def several(item: str, least: int, most: int | None = None) -> Schema:
+    """The schema of a list of so many values of one kind."""
+    return {"type": "array", "items": described(item), "minItems": least} | ({"maxItems": most} if most else {})
 
 
 class Quantity(Protocol):
@@ -139,8 +186,15 @@ class Quantity(Protocol):
 class Entry(Protocol):
     """An object of a mechanism file under a reader that knows its place and units."""
 
+    @property
+    def frame(self) -> str:
+        """The link that is the mechanism's frame."""
+
     def has(self, key: str) -> bool:
         """Whether the object has this key."""
+
+    def number(self, key: str) -> float:
+        """A number without a unit."""
 
     def only(self, *keys: str) -> None:
         """Refuse any key but these."""
@@ -156,6 +210,18 @@ class Entry(Protocol):
 
     def links(self, key: str) -> tuple[str, ...]:
         """Two or more different links of the mechanism."""
+
+    def two_links(self, key: str) -> tuple[str, str]:
+        """Two different links of the mechanism."""
+
+    def quantities(self, key: str, kind: str, count: int) -> tuple[float, ...]:
+        """So many numbers in SI."""
+
+    def counts(self, key: str, count: int) -> tuple[float, ...]:
+        """So many whole numbers."""
+
+    def flag(self, key: str) -> bool:
+        """True or false; false where the key is left out."""
 
     def carriers(self, point: str) -> tuple[str, ...]:
         """All links that carry a point of this name, the frame first."""

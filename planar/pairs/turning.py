@@ -8,7 +8,7 @@ from itertools import combinations
 from typing import Any, ClassVar, Self
 
 from planar.algebra import Scalar
-from planar.pairs.base import Entry, Kind, Pair, Quantity, Sample
+from planar.pairs.base import Entry, Kind, Pair, Quantity, Sample, Schema, described, plain, several
 from planar.plane import Frame, Vector, frame_at
 from planar.shapes import Shape
 
@@ -22,6 +22,13 @@ class Turning(Pair):
     radius: float | None = None
 
     keyword: ClassVar[str] = "turning"
+    members: ClassVar[Mapping[str, Schema]] = {
+        "links": several("name", 2),
+        "points": several("name", 2),
+        "pin_radius": described("size"),
+        "pin_diameter": described("size"),
+    }
+    lower: ClassVar[bool] = True
     constrains: ClassVar[tuple[Kind, ...]] = (Kind.LENGTH, Kind.LENGTH)
     measures: ClassVar[tuple[Kind, ...]] = (Kind.LENGTH,) * 4
     reports: ClassVar[Mapping[str, str]] = {
@@ -32,16 +39,17 @@ class Turning(Pair):
     }
     drive_kind: ClassVar[Kind] = Kind.ANGLE
 
-    def measure(self, first: Shape, second: Shape) -> Sequence[Scalar]:
+    def measure(self, shapes: Sequence[Shape]) -> Sequence[Scalar]:
+        first, second = shapes
         return (*first.at(self.points[0]), *second.at(self.points[1]))
 
-    def residual(
-        self, first: Frame, second: Frame, numbers: Sequence[Scalar], own: Sequence[Scalar]
-    ) -> Sequence[Scalar]:
+    def residual(self, frames: Sequence[Frame], numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Sequence[Scalar]:
+        first, second = frames
         return second.carry(Vector(*numbers[2:])) - first.carry(Vector(*numbers[:2]))
 
-    def drive(self, first: Frame, second: Frame, numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Scalar:
+    def drive(self, frames: Sequence[Frame], numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Scalar:
         """The angle of the second link against the first; at a pin on the frame, of the other link."""
+        first, second = frames
         return first.angle - second.angle if second.fixed else second.angle - first.angle
 
     def report(self, position: float, rate: float, second: float) -> dict[str, float | None]:
@@ -80,7 +88,7 @@ class Turning(Pair):
 
     @classmethod
     def read(cls, entry: Entry) -> tuple[Self, ...]:
-        entry.only("turning", "links", "points", "pin_radius", "pin_diameter")
+        entry.only(cls.keyword, *cls.members)
         pin = entry.name("turning")
         if entry.has("links"):
             links = entry.links("links")
@@ -121,10 +129,7 @@ class Turning(Pair):
     @classmethod
     def samples(cls) -> tuple[Sample, ...]:
         def sample(first: Vector, second: Vector, frames: tuple[Frame, Frame], radius: float | None) -> Sample:
-            shapes = (
-                Shape({"P": first}, Vector(0.0, 0.0), Vector(1.0, 0.0)),
-                Shape({"P": second}, Vector(0.0, 0.0), Vector(1.0, 0.0)),
-            )
+            shapes = plain(P=first), plain(P=second)
             pair = cls("P", ("a", "b"), ("P", "P"), "P", radius)
             entry: dict[str, Any] = {"turning": "P", "links": ["a", "b"]}
             if radius is not None:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.equations import Stage
-from planar.mechanism import named_points
+from planar.mechanism import counting, named_points
 from planar.pairs import Kind
 from planar.plane import Vector
 from planar.program import length, placed
@@ -52,6 +52,7 @@ class Candidates:
             for name, shape in setup.shapes.items()
         }
         self.sketch = {name: Vector(x / unit, y / unit) for name, x, y in mechanism.sketch}
+        self.counts = bool(counting(mechanism))
         level = {link.name: self._level(link.name) for link in mechanism.links}
         # each point by the first of its links to be placed, and the points of each link
         self.first: dict[str, tuple[int, str, str]] = {}
@@ -79,7 +80,8 @@ class Candidates:
         ended = newton(closing, self._with_lengths(stage, closing, near))
         found = self._candidates(stage, z, closing, ended.unknowns[ended.closed])
         sketched = len(self.sketched_at.get(stage.level, ()))
-        dyad = length(stage.unknowns) == 2 and len(stage.pairs) == 3 and len(found) == 2  # it has no third assembly
+        lower = all(self.pairs[name].lower for name in stage.pairs)
+        dyad = length(stage.unknowns) == 2 and len(stage.pairs) == 3 and lower and len(found) == 2  # there is no third
         clear = shown and found and min(each.distance for each in found) <= sketched * CLEAR**2
         if not (dyad or clear):
             more = newton(closing, self._with_lengths(stage, closing, _spread(length(stage.unknowns))))
@@ -89,9 +91,12 @@ class Candidates:
         return found, closing(best[None, :])[0][0]
 
     def _candidates(self, stage: Stage, z: Array, closing: Closing, closed: Array) -> list[Candidate]:
+        if self.counts:
+            # of angles that differ by turns alone, and leave everything where it is, those nearest to none
+            closed = closed[np.argsort(np.abs(closed).sum(axis=1), kind="stable")]
         roots: list[Array] = []
         for root in closed:
-            if not any(self._same(stage, root, other) for other in roots):
+            if not any(self._same(stage, z, root, other) for other in roots):
                 roots.append(polished(closing, root))
         return sorted(
             (self._candidate(stage, z, root) for root in roots),
@@ -103,7 +108,7 @@ class Candidates:
         whole[stage.unknowns] = root
         sketched = {name: self.first[name] for name in self.sketched_at.get(stage.level, ())}
         pairs = {name: self.pairs[name] for name in stage.pairs}
-        links = {*stage.links, *(link for pair in pairs.values() for link in pair.links)}
+        links = {*stage.links, *(link for pair in pairs.values() for link in pair.bodies)}
         links |= {link for _, link, _ in sketched.values()}
         frames, own = placed(self._w(whole), self.column, links, pairs)
         gaps = [
@@ -111,7 +116,7 @@ class Candidates:
             for name, (_, link, point) in sketched.items()
         ]
         drives = [
-            (pair, float(pair.drive(frames[pair.links[0]], frames[pair.links[1]], self.numbers[name], own[name])))
+            (pair, float(pair.drive([frames[link] for link in pair.bodies], self.numbers[name], own[name])))
             for name, pair in pairs.items()
             if pair.coordinates
         ]
@@ -144,9 +149,16 @@ class Candidates:
         columns = self.equations.unknowns[stage.unknowns]
         return np.array([self.equations.coordinates[c].kind is not Kind.LENGTH for c in columns], dtype=bool)
 
-    def _same(self, stage: Stage, a: Array, b: Array) -> bool:
-        apart = np.where(self._is_angle(stage), np.abs(np.exp(1j * a) - np.exp(1j * b)), np.abs(a - b))
-        return bool(np.all(apart < SAME))
+    def _same(self, stage: Stage, z: Array, a: Array, b: Array) -> bool:
+        """Whether two roots of a group are one assembly; where turns count, they are if all that hangs on them is."""
+        if not np.all(_apart(self._is_angle(stage), a, b) < SAME):
+            return False
+        if not self.counts:
+            return True
+        both = np.repeat(z[:, None], 2, axis=1)
+        both[stage.unknowns] = np.stack([a, b], axis=1)
+        angles = np.array([c.kind is not Kind.LENGTH for c in self.equations.coordinates])
+        return bool(np.all(_apart(angles, *self.program.positions(both, self.u, self.p).full().T) < SAME))
 
     def _near(self, stage: Stage, z: Array) -> tuple[Array, bool]:
         """Starts about the angles that the sketch shows, and whether it shows a large group whole.
@@ -193,6 +205,11 @@ class Candidates:
             if angle is not None:
                 angles[link] = angle
         return angles
+
+
+def _apart(angles: Array, a: Array, b: Array) -> Array:
+    """How far numbers are apart, those that are angles modulo a turn."""
+    return np.where(angles, np.abs(np.exp(1j * a) - np.exp(1j * b)), np.abs(a - b))
 
 
 def _spread(unknowns: int) -> Array:

@@ -10,13 +10,15 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from planar.algebra import Jet
+from planar.algebra import Jet, Scalar
 from planar.mechanism import Mechanism, motions
 from planar.pairs import Kind, Pair
 from planar.plane import Frame
 from planar.shapes import Shape
 
 Array = np.ndarray
+TOUCHING = 1e-6
+"""Sizes: dimensions in files are rounded, so a contact that guides keep closed may be open by as much."""
 EPS = float(np.finfo(float).eps)
 
 
@@ -27,7 +29,7 @@ class Gate:
         self.mechanism, self.unit = mechanism, unit
         self.motions = motions(mechanism)
         self.numbers = {
-            pair.name: pair.measure(*(shapes[link] for link in pair.links))
+            pair.name: pair.measure([shapes[link] for link in pair.bodies])
             for pair in (*mechanism.pairs, *(self.motions[given.pair] for given in mechanism.inputs))
         }
         self.names = [pair.name for pair in mechanism.pairs for _ in pair.constrains]
@@ -47,7 +49,20 @@ class Gate:
         of the inputs, else the mechanism's own. What is not a number counts as infinitely open.
         """
         gaps = [_gap(left, kind, self.unit) for kind, left in self._closures(frames, own, u)]
-        return np.nan_to_num(np.array(np.broadcast_arrays(*gaps)), nan=np.inf, posinf=np.inf)
+        if not gaps:
+            return np.zeros((0, 1))
+        # the round-off of an angle, and of where its cos and sin put things, grows with the turns that it counts
+        counted = [np.abs(frame.angle) for frame in frames.values()]
+        counted += [np.abs(length) / self.unit for lengths in own.values() for length in lengths]
+        many = np.fmax.reduce(np.broadcast_arrays(2.0 * np.pi, *counted)) / (2.0 * np.pi)
+        many = np.where(np.isfinite(many), many, 1.0)
+        return np.nan_to_num(np.array(np.broadcast_arrays(*gaps)) / many, nan=np.inf, posinf=np.inf)
+
+    def apart(self, own: Mapping[str, Sequence[Scalar]]) -> tuple[float, str] | None:
+        """The widest gap (m) at a contact that guides have to keep closed and do not, with its pair."""
+        gaps = [(_value(pair.apart(self.numbers[pair.name], own[pair.name])), pair) for pair in self.mechanism.pairs]
+        widest, pair = max(((float(np.max(np.abs(gap))), pair.name) for gap, pair in gaps), default=(0.0, ""))
+        return (widest, pair) if widest > TOUCHING * self.unit else None
 
     def rate_gaps(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Jet]]) -> list[tuple[float, str]]:
         """How far velocities, then accelerations, break the worst constraint, as a part of the greatest; its pair."""
@@ -77,14 +92,16 @@ class Gate:
     def _closures(self, frames, own, u=None):  # noqa: ANN001, ANN202 - floats, arrays or jets alike
         """(kind, what is left open) of every constraint, then of every input."""
         for pair in self.mechanism.pairs:
-            first, second = (frames[link] for link in pair.links)
-            left = pair.residual(first, second, self.numbers[pair.name], own[pair.name])
+            left = pair.residual([frames[link] for link in pair.bodies], self.numbers[pair.name], own[pair.name])
             yield from zip(pair.constrains, left, strict=True)
         for index, given in enumerate(self.mechanism.inputs):
             pair = self.motions[given.pair]
-            first, second = (frames[link] for link in pair.links)
-            drive = pair.drive(first, second, self.numbers[pair.name], own.get(pair.name, ()))
+            drive = pair.drive([frames[link] for link in pair.bodies], self.numbers[pair.name], own.get(pair.name, ()))
             yield pair.drive_kind, drive - (given.position if u is None else u[index])
+
+
+def _value(gap: Scalar) -> Scalar:
+    return gap.parts[0] if isinstance(gap, Jet) else gap
 
 
 def _lengths(pair: Pair, numbers: Sequence[float]) -> list[float]:

@@ -109,4 +109,7 @@ class Solver(Setup):
                 if self.station.u.size > found:
                     raise refusals.disagreeing(self, found, what)
                 raise refusals.broken_rates(self, what, pair, gap)
+        gap = self.gate.apart(own)
+        if gap is not None:
+            raise refusals.no_contact(self, *gap)
         return State(self.mechanism, found, residual, remarks, frames, own, self.shapes)

@@ -71,6 +71,15 @@ def not_closed(setup: Setup, pair: str, gap: float) -> NoAnswer:
     )
 
 
+def no_contact(setup: Setup, gap: float, pair: str) -> NoAnswer:
+    """A contact that the pair does not keep closed by itself, and that nothing else does."""
+    return NoAnswer(
+        Outcome.CANNOT_BE_ASSEMBLED,
+        f"{setup.at()} the two links of pair {pair!r} stand {amount(gap, 'length', setup.mechanism.units)} apart from "
+        f"where they touch; let pins or guides keep {listed([repr(link) for link in setup.pairs[pair].links])} in contact",
+    )
+
+
 def not_assembled(setup: Setup, failure: Failure) -> NoAnswer:
     """A group that cannot be joined: by how much, and at which pair."""
     stage = failure.stage

@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.mechanism import Input, Mechanism, check, motions
+from planar.errors import BadInput
+from planar.mechanism import Input, Mechanism, check, misfits, motions
 from planar.pairs import Kind
 from planar.program import Program, extent, fitted, placed, positions, program, rates, shapes, size
 from planar.solving.gate import Gate
@@ -31,6 +32,8 @@ class Setup:
         check(mechanism)
         self.mechanism = mechanism
         self.shapes = shapes(mechanism)
+        for pair, wrong in misfits(mechanism.pairs, self.shapes):
+            raise BadInput(pair.name, wrong)
         self.unit = size(mechanism, self.shapes)
         self.program: Program = program(mechanism)
         self.equations = self.program.equations

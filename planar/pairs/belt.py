@@ -1,0 +1,67 @@
+"""The belt or chain: two wheels tied by a loop that does not slip, open or crossed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+from planar.algebra import Scalar
+from planar.pairs.base import Entry, Quantity, Sample, Schema
+from planar.pairs.wheels import Wheels
+
+
+@dataclass(frozen=True)
+class Belt(Wheels):
+    """Pulleys: ratio r/s of radii (or teeth, of a toothed belt), -r/s where the belt is crossed."""
+
+    crossed: bool = False
+
+    keyword: ClassVar[str] = "belt"
+    members: ClassVar[Mapping[str, Schema]] = {**Wheels.members, "crossed": {"type": "boolean"}}
+
+    def ratio(self) -> Scalar:
+        if self.by == "ratio":
+            return self.sizes[0]
+        return (-1.0 if self.crossed else 1.0) * self.sizes[0] / self.sizes[1]
+
+    def _misplaced(self, apart: float) -> str | None:
+        r, s = self.sizes
+        least = r + s if self.crossed else abs(r - s)
+        if apart > least:
+            return None
+        how = "crossed" if self.crossed else "open"
+        return f"the centres are {apart:.6g} m apart; wheels of these radii need more than {least:.6g} m ({how})"
+
+    @classmethod
+    def read(cls, entry: Entry) -> tuple[Self, ...]:
+        entry.only(cls.keyword, *cls.members)
+        name, links, carrier, by, sizes, meet = cls._common(entry)
+        crossed = entry.flag("crossed")
+        if by == "ratio" and entry.has("crossed"):
+            raise entry.refuse("crossed", "the sign of 'ratio' says whether the wheels turn alike; leave 'crossed' out")
+        if by != "ratio" and min(sizes) < 0.0:
+            raise entry.refuse(by, "wheels that a loop runs round have sizes above zero")
+        return (cls(name, links, carrier, by, sizes, meet, crossed),)
+
+    @classmethod
+    def write(cls, group: Sequence[Self], quantity: Quantity) -> dict[str, Any]:
+        return super().write(group, quantity) | ({"crossed": True} if group[0].crossed else {})
+
+    @classmethod
+    def samples(cls) -> tuple[Sample, ...]:
+        links = ("a", "b")
+        return (
+            cls("loop", links, "c", "radii", (0.3, 0.5))._sample(-1.2, 7.4, {"radii": [0.3, 0.5]}, 1.1),
+            cls("loop", links, "c", "radii", (0.4, 0.1), (0.2, 0.6), True)._sample(
+                0.7, 2.5, {"radii": [0.4, 0.1], "mesh": {"a": 0.2, "b": 0.6}, "crossed": True}, 0.9
+            ),
+            cls("loop", links, "c", "teeth", (20.0, 31.0))._sample(2.0, 0.3, {"teeth": [20, 31]}),
+        )
+
+
+@dataclass(frozen=True)
+class Chain(Belt):
+    """Sprockets: ratio of their teeth or radii."""
+
+    keyword: ClassVar[str] = "chain"

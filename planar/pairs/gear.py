@@ -1,0 +1,48 @@
+"""The gear pair: two toothed wheels in mesh, external or internal, on a fixed or a moving carrier."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from planar.algebra import Scalar
+from planar.pairs.base import Entry, Sample
+from planar.pairs.wheels import NEAR, Wheels
+
+
+@dataclass(frozen=True)
+class Gear(Wheels):
+    """Wheels in mesh: ratio -r/s of radii or teeth; an internal wheel's is negative."""
+
+    keyword: ClassVar[str] = "gear"
+
+    def ratio(self) -> Scalar:
+        return self.sizes[0] if self.by == "ratio" else -self.sizes[0] / self.sizes[1]
+
+    def _misplaced(self, apart: float) -> str | None:
+        wanted = abs(self.sizes[0] + self.sizes[1])
+        if abs(apart - wanted) <= NEAR * max(apart, wanted):
+            return None
+        return f"wheels of these radii mesh with centres {wanted:.6g} m apart, but theirs are {apart:.6g} m apart"
+
+    @classmethod
+    def read(cls, entry: Entry) -> tuple[Gear, ...]:
+        entry.only(cls.keyword, *cls.members)
+        name, links, carrier, by, sizes, meet = cls._common(entry)
+        if by != "ratio" and sum(sizes) == 0.0:
+            raise entry.refuse(by, "a wheel and an internal wheel of the same size coincide; they cannot mesh")
+        if by != "ratio" and max(sizes) < 0.0:
+            raise entry.refuse(by, "both wheels are internal (negative); one at least has teeth on its outside")
+        return (cls(name, links, carrier, by, sizes, meet),)
+
+    @classmethod
+    def samples(cls) -> tuple[Sample, ...]:
+        links = ("a", "b")
+        return (
+            cls("mesh", links, "c", "ratio", (-2.122,), (1.3, 3.7))._sample(
+                0.0, 0.9, {"ratio": -2.122, "mesh": {"a": 1.3, "b": 3.7}}
+            ),
+            cls("mesh", links, "c", "radii", (0.3, 0.5))._sample(-1.2, 7.4, {"radii": [0.3, 0.5]}, 0.8),
+            cls("mesh", links, "c", "radii", (-0.6, 0.2))._sample(0.8, -2.5, {"radii": [-0.6, 0.2]}, 0.4),
+            cls("mesh", links, "c", "teeth", (20.0, 31.0))._sample(2.0, 0.3, {"teeth": [20, 31]}),
+        )

@@ -1,0 +1,157 @@
+"""What the pairs have in common that tie the turning of one wheel to that of another, both seen from a carrier."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import hypot
+from typing import Any, ClassVar, Self
+
+from planar.algebra import Scalar
+from planar.pairs.base import Entry, Kind, Pair, Quantity, Sample, Schema, described, plain, several
+from planar.plane import Frame, Vector, frame_at
+from planar.shapes import Shape
+
+SIZES = ("radii", "teeth", "ratio")
+NEAR = 1e-6
+"""Centres are where the radii put them within this part of their distance: dimensions in files are rounded."""
+
+
+@dataclass(frozen=True)
+class Wheels(Pair):
+    """Two wheels whose angles a and b against the carrier obey b - b0 = ratio (a - a0); the angles count turns.
+
+    `by` says what `sizes` are: two "radii" (m) or numbers of "teeth", or one "ratio". `meet` is (a0, b0) in rad.
+    """
+
+    carrier: str
+    by: str
+    sizes: tuple[float, ...]
+    meet: tuple[float, float] = (0.0, 0.0)
+
+    members: ClassVar[Mapping[str, Schema]] = {
+        "links": several("name", 2, 2),
+        "carrier": described("name"),
+        "radii": several("length", 2, 2),
+        "teeth": {"type": "array", "items": {"type": "integer", "not": {"const": 0}}, "minItems": 2, "maxItems": 2},
+        "ratio": {"type": "number", "not": {"const": 0}},
+        "mesh": {
+            "type": "object",
+            "additionalProperties": described("angle"),
+            "minProperties": 2,
+            "maxProperties": 2,
+        },
+    }
+    required: ClassVar[tuple[str, ...]] = ("links",)
+    lower: ClassVar[bool] = False
+    counts_turns: ClassVar[bool] = True
+    constrains: ClassVar[tuple[Kind, ...]] = (Kind.TURNS,)
+    measures: ClassVar[tuple[Kind, ...]] = (Kind.PURE, Kind.TURNS, Kind.TURNS)
+    reports: ClassVar[Mapping[str, str]] = {
+        "angle": "angle",
+        "angular_velocity": "angular velocity",
+        "angular_acceleration": "angular acceleration",
+    }
+    drive_kind: ClassVar[Kind] = Kind.TURNS
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        return (*self.links, self.carrier)
+
+    @abstractmethod
+    def ratio(self) -> Scalar:
+        """The angular velocity of the second wheel by that of the first, both against the carrier."""
+
+    def measure(self, shapes: Sequence[Shape]) -> Sequence[Scalar]:
+        return (self.ratio(), *self.meet)
+
+    def residual(self, frames: Sequence[Frame], numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Sequence[Scalar]:
+        first, second, carrier = (frame.angle for frame in frames)
+        ratio, a0, b0 = numbers
+        return (second - carrier - b0 - (first - carrier - a0) * ratio,)
+
+    def drive(self, frames: Sequence[Frame], numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Scalar:
+        """The angle of the second wheel against the carrier."""
+        return frames[1].angle - frames[2].angle
+
+    def report(self, position: float, rate: float, second: float) -> dict[str, float | None]:
+        return dict(zip(self.reports, (position, rate, second), strict=True))
+
+    def misfit(self, beside: Sequence[Pair], shapes: Mapping[str, Shape]) -> str | None:
+        if self.by != "radii":
+            return None
+        centres = []
+        for wheel in self.links:
+            pins = (dict(pair.coincident()) for pair in beside)
+            centre = next((pin[self.carrier] for pin in pins if wheel in pin and self.carrier in pin), None)
+            if centre is None:
+                return f"wheels with radii turn in their carrier, but link {wheel!r} is not pinned to {self.carrier!r}"
+            centres.append(shapes[self.carrier].at(centre))
+        apart = centres[1] - centres[0]
+        return self._misplaced(hypot(apart.x, apart.y))
+
+    @abstractmethod
+    def _misplaced(self, apart: float) -> str | None:
+        """What is wrong with wheels of these radii whose centres are so far apart (m)."""
+
+    @classmethod
+    def _sizes(cls, entry: Entry) -> tuple[str, tuple[float, ...]]:
+        given = [key for key in SIZES if entry.has(key)]
+        if len(given) != 1:
+            told = f"; here are {' and '.join(given)}" if given else ""
+            raise entry.refuse(None, f"wheels are given by one of 'radii', 'teeth' and 'ratio'{told}")
+        (by,) = given
+        if by == "ratio":
+            sizes: tuple[float, ...] = (entry.number("ratio"),)
+        elif by == "radii":
+            sizes = entry.quantities("radii", "length", 2)
+        else:
+            sizes = entry.counts("teeth", 2)
+        if not all(sizes):
+            raise entry.refuse(by, "zero is no size of a wheel")
+        return by, sizes
+
+    @classmethod
+    def _common(cls, entry: Entry) -> tuple[str, tuple[str, str], str, str, tuple[float, ...], tuple[float, float]]:
+        """name, links, carrier, by, sizes and meet of an entry."""
+        name, links = entry.name(cls.keyword), entry.two_links("links")
+        carrier = entry.link("carrier") if entry.has("carrier") else entry.frame
+        if carrier in links and entry.has("carrier"):
+            raise entry.refuse("carrier", f"{carrier!r} is one of the wheels; the carrier is a third link")
+        if carrier in links:
+            told = f"{carrier!r} is one of the wheels, so a third link is their 'carrier'; name it"
+            raise entry.refuse(None, told)
+        by, sizes = cls._sizes(entry)
+        meet = (0.0, 0.0)
+        if entry.has("mesh"):
+            mesh = entry.inside("mesh")
+            mesh.only(*links)
+            meet = (mesh.quantity(links[0], "angle"), mesh.quantity(links[1], "angle"))
+        return name, links, carrier, by, sizes, meet
+
+    @classmethod
+    def write(cls, group: Sequence[Self], quantity: Quantity) -> dict[str, Any]:
+        (pair,) = group
+        entry: dict[str, Any] = {cls.keyword: pair.name, "links": list(pair.links), "carrier": pair.carrier}
+        if pair.by == "ratio":
+            entry["ratio"] = pair.sizes[0]
+        elif pair.by == "radii":
+            entry["radii"] = [quantity(radius, "length") for radius in pair.sizes]
+        else:
+            entry["teeth"] = [int(teeth) for teeth in pair.sizes]
+        if pair.meet != (0.0, 0.0):
+            both = zip(pair.links, pair.meet, strict=True)
+            entry["mesh"] = {link: quantity(angle, "angle") for link, angle in both}
+        return entry
+
+    def _sample(self, carrier: float, first: float, more: Mapping[str, Any], apart: float | None = None) -> Sample:
+        """The pair with its carrier and first wheel at these angles; wheels with radii pinned so far apart."""
+        second = self.ratio() * (first - carrier - self.meet[0]) + carrier + self.meet[1]
+        frames = frame_at(0.2, 0.5, first), frame_at(-0.7, 0.1, second), frame_at(0.3, -0.4, carrier)
+        shapes, beside = (plain(A=Vector(0.0, 0.0)), plain(B=Vector(0.0, 0.0)), plain(C=Vector(0.0, 0.0))), ()
+        if apart is not None:
+            shapes = (*shapes[:2], plain(A=Vector(0.0, 0.0), B=Vector(apart, 0.0)))
+            beside = {"turning": "A", "links": ["c", "a"]}, {"turning": "B", "links": ["c", "b"]}
+        entry = {self.keyword: self.name, "links": ["a", "b"], "carrier": "c", **more}
+        return Sample(self, shapes, frames, (), entry, beside)
