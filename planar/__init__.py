@@ -7,6 +7,8 @@ if TYPE_CHECKING:
     from planar.errors import BadInput, NoAnswer, Outcome, PlanarError
     from planar.files import dumps, from_dict, load, loads, to_dict
     from planar.mechanism import Along, At, Distances, Drive, Input, Link, Load, Mechanism, Point
+    from planar.motion import Motion, State
+    from planar.solving.cycle import cycle
     from planar.solving.position import solve
 
 __version__ = "0.1.0"
@@ -21,10 +23,13 @@ _ROOMS = {
     "Link": "mechanism",
     "Load": "mechanism",
     "Mechanism": "mechanism",
+    "Motion": "motion",
     "NoAnswer": "errors",
     "Outcome": "errors",
     "PlanarError": "errors",
     "Point": "mechanism",
+    "State": "motion",
+    "cycle": "solving.cycle",
     "dumps": "files",
     "from_dict": "files",
     "load": "files",
@@ -44,10 +49,13 @@ __all__ = [
     "Link",
     "Load",
     "Mechanism",
+    "Motion",
     "NoAnswer",
     "Outcome",
     "PlanarError",
     "Point",
+    "State",
+    "cycle",
     "dumps",
     "from_dict",
     "load",

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planar.algebra import Jet
+from planar.errors import Outcome
 from planar.mechanism import Mechanism, NamedPoint, counting, motions, named_points
 from planar.pairs import Kind, Pair
 from planar.plane import Frame, Vector
@@ -58,8 +59,34 @@ class InputState(NamedTuple):
     acceleration: float
 
 
+class PointMotion(NamedTuple):
+    """A point's position (m), velocity (m/s) and acceleration (m/s^2) at every position of a motion, each (n, 2)."""
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+
+
+class LinkMotion(NamedTuple):
+    """A link's angle (rad, counted on from turn to turn) with its first and second rate, each (n,)."""
+
+    angle: Array
+    angular_velocity: Array
+    angular_acceleration: Array
+
+
+class InputMotion(NamedTuple):
+    """An input's position, velocity and acceleration (rad or m, and per second), each (n,)."""
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+
+
 class RelativeState(NamedTuple):
-    """How one point moves against another, as seen from the axes of a link that carries the other (each (2,), SI).
+    """How one point moves against another, as seen from the axes of a link that carries the other.
+
+    Vectors (2,), of a motion (n, 2); SI.
 
     velocity = rotation + sliding, acceleration = centripetal + tangential + coriolis + sliding_acceleration,
     where for two points of one link both sliding parts and the Coriolis part vanish.
@@ -77,26 +104,12 @@ class RelativeState(NamedTuple):
     sliding_acceleration: Array
 
 
-def _sense(way: str, power: float, scale: float) -> str:
-    return way if way == "at rest" else f"{way}, {hurrying(power, scale)}"
-
-
-@dataclass(frozen=True)
-class State:
-    """One position of a mechanism, solved.
-
-    `mobility` is the true one, by rank; `residual` is what the worst constraint leaves open, in lengths of the
-    mechanism's size; `remarks` are what there is to say of how the position was found.
-    """
+class Moving:
+    """What a position and a motion have in common: links, points and pairs by name, from frames that are jets."""
 
     mechanism: Mechanism
-    mobility: int
-    residual: float
-    remarks: tuple[str, ...]
     frames: Mapping[str, Frame]
-    "of every link, as jets: each entry with its first and second time derivative (m, rad, s)"
     own: Mapping[str, tuple[Jet, ...]]
-    "every pair's own coordinates, as jets"
     shapes: Mapping[str, Shape]
 
     @cached_property
@@ -118,54 +131,23 @@ class State:
         return motions(self.mechanism)
 
     @property
-    def points(self) -> dict[str, PointState]:
-        """Every point under its result name."""
-        return {each.name: self._point(each) for each in self._points}
+    def point_names(self) -> tuple[str, ...]:
+        """The names that results give the points."""
+        return tuple(each.name for each in self._points)
 
-    @property
-    def links(self) -> dict[str, LinkState]:
-        """Every link, the frame among them."""
-        return {link.name: self.link(link.name) for link in self.mechanism.links}
+    def _frame(self, link: str) -> Frame:
+        if link not in self.frames:
+            raise Unknown(f"there is no link {link!r}; links are {', '.join(self.frames)}")
+        return self.frames[link]
 
-    @property
-    def inputs(self) -> dict[str, InputState]:
-        return {
-            given.pair: InputState(given.position, given.velocity, given.acceleration)
-            for given in self.mechanism.inputs
-        }
-
-    @property
-    def pairs(self) -> dict[str, dict[str, float | None]]:
-        """What every pair reports, by name; of a pin of n links, every two of them."""
-        return {name: self.pair(name) for name in self._motions}
-
-    def point(self, name: str) -> PointState:
-        """A point by its result name, or as `link.point`. Raises Unknown."""
-        return self._point(self._named(name))
-
-    def link(self, name: str) -> LinkState:
-        """A link by name; its angle between -pi and pi, or with its turns where a pair counts them. Raises Unknown."""
-        if name not in self.frames:
-            raise Unknown(f"there is no link {name!r}; links are {', '.join(self.frames)}")
-        angle, velocity, acceleration = _parts(self.frames[name].angle)
-        fastest, hardest = self._greatest_of_links
-        sense = _sense(turning(velocity, fastest), velocity * acceleration, abs(velocity) * hardest)
-        return LinkState(angle if name in self._counting else _wrapped(angle), velocity, acceleration, sense)
-
-    def pair(self, name: str) -> dict[str, float | None]:
-        """What a pair reports of its relative motion (SI). Raises Unknown."""
-        pair, parts = self._motion(name)
-        return pair.report(*parts)
-
-    def _motion(self, name: str) -> tuple[Pair, tuple[float, float, float]]:
+    def _motion(self, name: str) -> tuple[Pair, Parts]:
+        """A pair, and the relative motion that its results are of."""
         if name not in self._motions:
             raise Unknown(f"there is no pair {name!r}; pairs are {', '.join(self._motions)}")
         pair = self._motions[name]
         numbers = pair.measure([self.shapes[link] for link in pair.bodies])
         frames = [self.frames[link] for link in pair.bodies]
-        position, rate, second_rate = _parts(pair.drive(frames, numbers, self.own.get(pair.name, ())))
-        wrapped = pair.drive_kind is Kind.ANGLE and not self._counting.issuperset(pair.links)
-        return pair, (_wrapped(position) if wrapped else position, rate, second_rate)
+        return pair, _parts(pair.drive(frames, numbers, self.own.get(pair.name, ())))
 
     def relative(self, point: str, other: str, axes: str | None = None) -> RelativeState:
         """How `point` moves against `other`, in the axes of a link.
@@ -175,28 +157,22 @@ class State:
         """
         p, q = self._named(point), self._named(other)
         axes = axes or self._between(p, q)
-        if axes not in self.frames:
-            raise Unknown(f"there is no link {axes!r}; links are {', '.join(self.frames)}")
-        frame = self.frames[axes]
-        at, base = self._carried(p), self._carried(q)
-        apart = at - base
-        r = np.array(_parts_of(apart))
-        _, omega, alpha = _parts(frame.angle)
-        _, v_local, a_local = np.array(_parts_of(self._local(p, axes) - self._local(q, axes)))
-        cos, sin = _parts(frame.cos)[0], _parts(frame.sin)[0]
-        world = np.array([[cos, -sin], [sin, cos]])
-        quarter = np.array([[0.0, -1.0], [1.0, 0.0]])
-        sliding, sliding_acceleration = world @ v_local, world @ a_local
+        frame = self._frame(axes)
+        r = [_both(*parts) for parts in _parts_of(self._carried(p) - self._carried(q))]
+        _, omega, alpha = (np.asarray(part)[..., None] for part in _parts(frame.angle))
+        local = [_both(*parts) for parts in _parts_of(self._local(p, axes) - self._local(q, axes))]
+        cos, sin = (np.asarray(_parts(each)[0])[..., None] for each in (frame.cos, frame.sin))
+        sliding, sliding_acceleration = (cos * each + sin * _quarter(each) for each in local[1:])
         return RelativeState(
             axes=axes,
             position=r[0],
             velocity=r[1],
-            rotation=omega * quarter @ r[0],
+            rotation=omega * _quarter(r[0]),
             sliding=sliding,
             acceleration=r[2],
             centripetal=-(omega**2) * r[0],
-            tangential=alpha * quarter @ r[0],
-            coriolis=2.0 * omega * quarter @ sliding,
+            tangential=alpha * _quarter(r[0]),
+            coriolis=2.0 * omega * _quarter(sliding),
             sliding_acceleration=sliding_acceleration,
         )
 
@@ -224,14 +200,75 @@ class State:
     def _named(self, name: str) -> NamedPoint:
         if name in self._point_names:
             return self._point_names[name]
-        raise Unknown(f"there is no point {name!r}; points are {', '.join(each.name for each in self._points)}")
+        raise Unknown(f"there is no point {name!r}; points are {', '.join(self.point_names)}")
 
     def _carried(self, named: NamedPoint) -> Vector:
         link, point = named.members[0]
         return self.frames[link].carry(self.shapes[link].at(point))
 
+
+@dataclass(frozen=True)
+class State(Moving):
+    """One position of a mechanism, solved.
+
+    `mobility` is the true one, by rank; `residual` is what the worst constraint leaves open, in lengths of the
+    mechanism's size; `remarks` are what there is to say of how the position was found.
+    """
+
+    mechanism: Mechanism
+    mobility: int
+    residual: float
+    remarks: tuple[str, ...]
+    frames: Mapping[str, Frame]
+    "of every link, as jets: each entry with its first and second time derivative (m, rad, s)"
+    own: Mapping[str, tuple[Jet, ...]]
+    "every pair's own coordinates, as jets"
+    shapes: Mapping[str, Shape]
+
+    @property
+    def points(self) -> dict[str, PointState]:
+        """Every point under its result name."""
+        return {each.name: self._point(each) for each in self._points}
+
+    @property
+    def links(self) -> dict[str, LinkState]:
+        """Every link, the frame among them."""
+        return {link.name: self.link(link.name) for link in self.mechanism.links}
+
+    @property
+    def inputs(self) -> dict[str, InputState]:
+        """Every input by its pair."""
+        return {
+            given.pair: InputState(given.position, given.velocity, given.acceleration)
+            for given in self.mechanism.inputs
+        }
+
+    @property
+    def pairs(self) -> dict[str, dict[str, float | None]]:
+        """What every pair reports, by name; of a pin of n links, every two of them."""
+        return {name: self.pair(name) for name in self._motions}
+
+    def point(self, name: str) -> PointState:
+        """A point by its result name, or as `link.point`. Raises Unknown."""
+        return self._point(self._named(name))
+
+    def link(self, name: str) -> LinkState:
+        """A link by name; its angle between -pi and pi, or with its turns where a pair counts them. Raises Unknown."""
+        angle, velocity, acceleration = map(float, _parts(self._frame(name).angle))
+        fastest, hardest = self._greatest_of_links
+        sense = _sense(turning(velocity, fastest), velocity * acceleration, abs(velocity) * hardest)
+        return LinkState(angle if name in self._counting else _wrapped(angle), velocity, acceleration, sense)
+
+    def pair(self, name: str) -> dict[str, float | None]:
+        """What a pair reports of its relative motion (SI). Raises Unknown."""
+        pair, parts = self._motion(name)
+        position, rate, second = map(float, parts)
+        if pair.drive_kind is Kind.ANGLE and not self._counting.issuperset(pair.links):
+            position = _wrapped(position)
+        return pair.report(position, rate, second)
+
     def _point(self, named: NamedPoint) -> PointState:
-        position, velocity, acceleration = (np.array(part) for part in _parts_of(self._carried(named)))
+        position, velocity, acceleration = (_both(*part) for part in _parts_of(self._carried(named)))
         fastest, hardest = self._greatest_of_points
         scale = float(np.hypot(*velocity)) * hardest
         sense = _sense(heading(velocity, fastest), float(velocity @ acceleration), scale)
@@ -252,17 +289,94 @@ class State:
         return float(fastest), float(max(hardest, fastest**2))
 
 
+@dataclass(frozen=True)
+class Motion(Moving):
+    """A run of positions of a mechanism, n of them, in the order in which its inputs run through them.
+
+    `outcome` is solved where the run came to its end, else why it stopped, which `reason` says in a sentence;
+    `residual` is what the worst constraint leaves open at any position, in lengths of the mechanism's size.
+    """
+
+    mechanism: Mechanism
+    inputs: Mapping[str, InputMotion]
+    outcome: Outcome
+    reason: str
+    residual: float
+    remarks: tuple[str, ...]
+    frames: Mapping[str, Frame]
+    "of every link, as jets of arrays (n,)"
+    own: Mapping[str, tuple[Jet, ...]]
+    shapes: Mapping[str, Shape]
+
+    def __len__(self) -> int:
+        return len(next(iter(self.inputs.values())).position)
+
+    @property
+    def points(self) -> dict[str, PointMotion]:
+        """Every point under its result name."""
+        return {each.name: self._point(each) for each in self._points}
+
+    @property
+    def links(self) -> dict[str, LinkMotion]:
+        """Every link, the frame among them."""
+        return {link.name: self.link(link.name) for link in self.mechanism.links}
+
+    @property
+    def pairs(self) -> dict[str, dict[str, Array | None]]:
+        """What every pair reports, by name."""
+        return {name: self.pair(name) for name in self._motions}
+
+    def point(self, name: str) -> PointMotion:
+        """A point by its result name, or as `link.point`. Raises Unknown."""
+        return self._point(self._named(name))
+
+    def link(self, name: str) -> LinkMotion:
+        """A link by name. Its angle starts between -pi and pi unless a pair counts its turns. Raises Unknown."""
+        angle, velocity, acceleration = self._rows(_parts(self._frame(name).angle))
+        if name not in self._counting:
+            angle = angle - (angle[0] - _wrapped(float(angle[0])))
+        return LinkMotion(angle, velocity, acceleration)
+
+    def pair(self, name: str) -> dict[str, Array | None]:
+        """What a pair reports of its relative motion at every position, each (n,) (SI). Raises Unknown."""
+        pair, parts = self._motion(name)
+        return pair.report(*self._rows(parts))
+
+    def _rows(self, parts: Parts) -> tuple[Array, ...]:
+        return tuple(np.broadcast_to(part, (len(self),)).copy() for part in parts)
+
+    def _point(self, named: NamedPoint) -> PointMotion:
+        x, y = (self._rows(_parts(each)) for each in self._carried(named))
+        return PointMotion(*(np.stack(both, axis=1) for both in zip(x, y, strict=True)))
+
+
+def _sense(way: str, power: float, scale: float) -> str:
+    return way if way == "at rest" else f"{way}, {hurrying(power, scale)}"
+
+
 def _wrapped(angle: float) -> float:
     """The same direction as an angle between -pi and pi."""
     return float(np.arctan2(np.sin(angle), np.cos(angle))) if abs(angle) > np.pi else angle
 
 
-def _parts(value: Any) -> tuple[float, float, float]:
+Parts = tuple[Any, Any, Any]
+"""A number with its first and second rate: floats, or arrays over a motion."""
+
+
+def _parts(value: Any) -> Parts:
     """Value, rate and second rate of a jet; a plain number is at rest."""
-    if isinstance(value, Jet):
-        return tuple(float(part) for part in value.parts)  # type: ignore[return-value]
-    return float(value), 0.0, 0.0
+    return value.parts if isinstance(value, Jet) else (value, 0.0, 0.0)
 
 
-def _parts_of(vector: Vector) -> list[tuple[float, float]]:
+def _parts_of(vector: Vector) -> list[tuple[Any, Any]]:
     return list(zip(_parts(vector.x), _parts(vector.y), strict=True))
+
+
+def _both(x: Any, y: Any) -> Array:
+    """x and y as vectors (..., 2)."""
+    return np.stack(np.broadcast_arrays(np.asarray(x, dtype=float), y), axis=-1)
+
+
+def _quarter(vectors: Array) -> Array:
+    """Vectors (..., 2) turned a quarter anticlockwise."""
+    return np.stack([-vectors[..., 1], vectors[..., 0]], axis=-1)

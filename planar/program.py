@@ -22,8 +22,11 @@ NEWTON_STEPS = 4
 """Unrolled steps of a position within a run: from a start a degree or so away, four square the error away."""
 
 
-class Motion(NamedTuple):
-    """What `Program.kinematics` returns: F and w with their first and second time derivatives, and dF/dz, dF/du."""
+class Rates(NamedTuple):
+    """What `Program.kinematics` returns: F and w with their first and second time derivatives, and dF/dz, dF/du.
+
+    Each with a first axis for the samples, if there is one.
+    """
 
     F: Array
     F1: Array
@@ -76,11 +79,17 @@ class Program:
         outputs = [ca.horzcat(both, first, second), slopes]
         return ca.Function("kinematics", [y, y1, y2, e.p], [ca.densify(output) for output in outputs])
 
-    def kinematics(self, y: Array, y1: Array, y2: Array, p: Array) -> Motion:
-        """Everything at one position: y = (z, u) with its first and second derivatives."""
-        parts, slopes = (each.full() for each in self._kinematics(y, y1, y2, p))
+    def kinematics(self, y: Array, y1: Array, y2: Array, p: Array) -> Rates:
+        """Everything at one position, y = (z, u) with its first and second derivatives, or at samples (samples, y)."""
         rows, unknowns = self.equations.F.numel(), self.equations.z.numel()
-        return Motion(*parts[:rows].T, *parts[rows:].T, slopes[:, :unknowns], slopes[:, unknowns:])
+        if y.ndim == 1:
+            parts, slopes = (each.full() for each in self._kinematics(y, y1, y2, p))
+            return Rates(*parts[:rows].T, *parts[rows:].T, slopes[:, :unknowns], slopes[:, unknowns:])
+        samples, width = y.shape
+        parts, slopes = (each.full() for each in self._kinematics(y.T, y1.T, y2.T, p))
+        parts = parts.reshape(-1, samples, 3).transpose(2, 1, 0)
+        slopes = slopes.reshape(rows, samples, width).transpose(1, 0, 2)
+        return Rates(*parts[..., :rows], *parts[..., rows:], slopes[..., :unknowns], slopes[..., unknowns:])
 
     @cached_property
     def advance(self) -> ca.Function:

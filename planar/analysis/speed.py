@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from planar.errors import NoAnswer
 from planar.mechanism import Mechanism
 from planar.program import Program, structure
 from planar.solving.follow import run
@@ -63,9 +62,7 @@ def _inputs(solver: Solver, z: np.ndarray) -> tuple[float, np.ndarray]:
             inputs = np.repeat(start[None], STEPS + 1, axis=0)
             if start.size:
                 inputs[:, 0] += sign * 2.0 * np.pi / 2.0**halvings * np.linspace(0.0, 1.0, STEPS + 1)
-            try:
-                run(solver, solver.station.p, z, inputs)
-            except NoAnswer:
+            if run(solver, solver.station.p, z, inputs).stopped is not None:
                 continue
             return sign * 2.0 * np.pi / 2.0**halvings, inputs
     return 0.0, np.empty((0, start.size))

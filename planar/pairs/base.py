@@ -76,8 +76,8 @@ class Pair(ABC):
         """The relative motion that an input here prescribes (rad or m)."""
 
     @abstractmethod
-    def report(self, position: float, rate: float, second: float) -> dict[str, float | None]:
-        """Its results by name, from its drive and the drive's derivatives (SI)."""
+    def report(self, position: Scalar, rate: Scalar, second: Scalar) -> dict[str, Scalar | None]:
+        """Its results by name, from its drive and the drive's derivatives (SI), numbers or arrays."""
 
     def coincident(self) -> tuple[tuple[str, str], ...]:
         """The (link, point) that lie on one another in this pair, so that they bear its name."""

@@ -103,7 +103,7 @@ class Guided(Pair):
         """The distance from `through` to the point along the line."""
         return own[0]
 
-    def report(self, position: float, rate: float, second: float) -> dict[str, float | None]:
+    def report(self, position: Scalar, rate: Scalar, second: Scalar) -> dict[str, Scalar | None]:
         return dict(zip(self.reports, (position, rate, second), strict=True))
 
     def rides(self) -> tuple[tuple[str, str], str] | None:

@@ -52,7 +52,7 @@ class Turning(Pair):
         first, second = frames
         return first.angle - second.angle if second.fixed else second.angle - first.angle
 
-    def report(self, position: float, rate: float, second: float) -> dict[str, float | None]:
+    def report(self, position: Scalar, rate: Scalar, second: Scalar) -> dict[str, Scalar | None]:
         rubbing = None if self.radius is None else abs(rate) * self.radius
         return dict(zip(self.reports, (position, rate, second, rubbing), strict=True))
 

@@ -75,7 +75,7 @@ class Wheels(Pair):
         """The angle of the second wheel against the carrier."""
         return frames[1].angle - frames[2].angle
 
-    def report(self, position: float, rate: float, second: float) -> dict[str, float | None]:
+    def report(self, position: Scalar, rate: Scalar, second: Scalar) -> dict[str, Scalar | None]:
         return dict(zip(self.reports, (position, rate, second), strict=True))
 
     def misfit(self, beside: Sequence[Pair], shapes: Mapping[str, Shape]) -> str | None:

@@ -12,13 +12,14 @@ Array = np.ndarray
 
 
 class Place(NamedTuple):
-    """A position of a run: unknowns, their first and second rates along it, and each group's distance (stages,) from
-    the nearest position in which it could be singular, in units of the run's parameter."""
+    """A position of a run: unknowns, their first and second rates along it, each group's distance (stages,) from the
+    nearest position in which it could be singular, in units of the run's parameter, and the way of the inputs."""
 
     z: Array
     rates: Array
     second: Array
     safe: Array
+    way: Array
 
 
 CLOSE = 1.5
@@ -45,26 +46,38 @@ class Branch:
         y, still = np.concatenate([z, u]), np.zeros_like(z)
         none = np.zeros_like(way)
         rest = self.program.kinematics(y, np.concatenate([still, way]), np.concatenate([still, none]), self.p)
-        rates = _cancelling(rest.slope, rest.F1[:, None])[:, 0]
+        rates = cancelling(rest.slope, rest.F1[:, None])[:, 0]
         moving = self.program.kinematics(y, np.concatenate([rates, way]), np.concatenate([still, none]), self.p)
-        second = _cancelling(rest.slope, moving.F2[:, None])[:, 0]
-        return Place(z, rates, second, self._safe(z[None], u[None], rest.slope[None], rates[None], way[None])[0])
+        second = cancelling(rest.slope, moving.F2[:, None])[:, 0]
+        return Place(z, rates, second, self._safe(z[None], u[None], rest.slope[None], rates[None], way[None])[0], way)
 
     def same(self, before: Place, after: Place, step: float) -> bool:
         """Whether two positions, a step of the parameter apart, can lie on one branch."""
         smooth = np.all(allowed(after.z - before.z, before.rates * step, after.rates * step))
+        smooth &= np.all(self._onwards(before.rates[None], after.rates[None], before.way[None]))
         return bool(smooth and np.all(CLOSE * step < before.safe + after.safe))
 
     def along(self, z: Array, u: Array) -> Array:
         """For each step of a run, z (samples, unknowns) and u (samples, inputs), whether it keeps to the branch."""
         slopes, drives = self.program.slopes(z, u, self.p)
-        gains = _cancelling(slopes, drives)
+        gains = cancelling(slopes, drives)
         way = np.diff(u, axis=0)
         before, after = ((gain @ way[:, :, None])[..., 0] for gain in (gains[:-1], gains[1:]))
         smooth = np.all(allowed(np.diff(z, axis=0), before, after), axis=1)
+        smooth &= self._onwards(before, after, way)
         first = self._safe(z[:-1], u[:-1], slopes[:-1], before, way)
         second = self._safe(z[1:], u[1:], slopes[1:], after, way)
         return smooth & np.all(first + second > CLOSE, axis=1)
+
+    def _onwards(self, before: Array, after: Array, way: Array) -> Array:
+        """For each step whether every group goes on as it came (steps,): less than a right angle between the tangents.
+
+        Beside a limit both ends of a step may be closed, and any move allowed by rates that grow beyond all bounds
+        there; but on the branch that comes back from the limit they have the other sign.
+        """
+        both, straight = before * after, np.sum(way * way, axis=1)
+        turns = [np.sum(both[:, stage.unknowns], axis=1) for stage in self.program.equations.stages]
+        return np.all([turn + straight >= 0.0 for turn in turns], axis=0) if turns else np.ones(len(way), dtype=bool)
 
     def _safe(self, z: Array, u: Array, slopes: Array, rates: Array, way: Array) -> Array:
         """How far each group is from where it could be singular (samples, stages), in steps of rates and way."""
@@ -82,7 +95,7 @@ class Branch:
         return np.nan_to_num(distances, nan=0.0, posinf=np.inf)
 
 
-def _cancelling(slopes: Array, known: Array) -> Array:
+def cancelling(slopes: Array, known: Array) -> Array:
     """The rates of the unknowns that cancel what known rates open; slopes (..., rows, unknowns), known (..., rows, k).
 
     Where a square slope is singular, NaN: no rate is allowed there.
@@ -93,7 +106,7 @@ def _cancelling(slopes: Array, known: Array) -> Array:
         return -np.linalg.solve(slopes, known)
     except np.linalg.LinAlgError:
         if slopes.ndim > 2:
-            return np.stack([_cancelling(slope, each) for slope, each in zip(slopes, known, strict=True)])
+            return np.stack([cancelling(slope, each) for slope, each in zip(slopes, known, strict=True)])
         return np.full((slopes.shape[-1], known.shape[-1]), np.nan)
 
 

@@ -40,19 +40,43 @@ class Followed(Protocol):
 
 
 class Run(NamedTuple):
-    """Unknowns at every sample (samples, unknowns), and how many samples the general path had to solve."""
+    """Unknowns at every sample that was reached (samples, unknowns), how many of them the general path had to solve,
+    and why the rest was not reached, if not."""
 
     z: Array
     general: int
+    stopped: NoAnswer | None = None
 
 
 def follow(solver: Followed, p: Array, z: Array, start: Array, stop: Array) -> Array:
     """The unknowns at inputs `stop`, followed from those at `start` along the straight line between them.
 
-    A predictor of second order, Newton's corrector, and both parts of the gate at every step; steps shrink where
-    either objects. Raises NoAnswer where the branch ends on the way.
+    Raises NoAnswer where the branch ends on the way.
     """
-    way = stop - start
+    found = _followed(solver, p, z, start, stop - start)
+    if found.t < 1.0:
+        raise NoAnswer(
+            Outcome.BRANCH_LOST,
+            f"this assembly can be followed only to {solver.where(start + found.t * (stop - start))} on the way from "
+            f"{solver.where(start)} to {solver.where(stop)}: there its motion ends, or branches",
+        )
+    return found.z
+
+
+class _Followed(NamedTuple):
+    """How far a branch was followed: the unknowns there, and the part of the way."""
+
+    z: Array
+    t: float
+
+
+def _followed(solver: Followed, p: Array, z: Array, start: Array, way: Array) -> _Followed:
+    """As far along the way as the branch goes.
+
+    A predictor of second order, Newton's corrector, and both parts of the gate at every step; steps shrink where
+    either objects.
+    """
+    stop = start + way
     reach = float(np.max(np.abs(way), initial=0.0)) or 1.0
     branch = Branch(solver.program, p)
     t, step = 0.0, min(1.0, STRIDE / reach)
@@ -68,12 +92,8 @@ def follow(solver: Followed, p: Array, z: Array, start: Array, stop: Array) -> A
                 continue
         step *= 0.5
         if step * reach < SHORTEST:
-            raise NoAnswer(
-                Outcome.BRANCH_LOST,
-                f"this assembly can be followed only to {solver.where(start + t * way)} on the way from "
-                f"{solver.where(start)} to {solver.where(stop)}: there its motion ends, or branches",
-            )
-    return z
+            return _Followed(z, t)
+    return _Followed(z, 1.0)
 
 
 def run(solver: Followed, p: Array, z: Array, u: Array) -> Run:
@@ -91,9 +111,18 @@ def run(solver: Followed, p: Array, z: Array, u: Array) -> Run:
             found[done:] = _accumulated(solver.program, p, found[done - 1], u[done:], samples - 1)
             done += _passing(solver, p, found[done - 1 :], u[done - 1 :])
         if done < samples:
-            found[done] = follow(solver, p, found[done - 1], u[done - 1], u[done])
+            try:
+                found[done] = follow(solver, p, found[done - 1], u[done - 1], u[done])
+            except NoAnswer as stopped:
+                return Run(found[:done], general, stopped)
             done, general = done + 1, general + 1
     return Run(found, general)
+
+
+def reach(solver: Followed, p: Array, z: Array, start: Array, way: Array) -> tuple[Array, float]:
+    """The unknowns at the end of the branch from `start` along `way`, and how many of `way` it is away; 1 at most."""
+    found = _followed(solver, p, z, start, way)
+    return found.z, found.t
 
 
 def _accumulated(program: Program, p: Array, z: Array, u: Array, steps: int) -> Array:

@@ -6,7 +6,7 @@ import numpy as np
 
 from planar.equations import Stage
 from planar.pairs import Kind
-from planar.program import Motion, length
+from planar.program import Rates, length
 from planar.solving import refusals
 from planar.solving.follow import corrected
 from planar.solving.setup import Setup
@@ -25,7 +25,7 @@ NEAR_BY = 1e-2
 """How far (rad, or lengths of the size) a position is moved to see whether what holds there holds elsewhere."""
 
 
-def mobility(setup: Setup, z: Array, motion: Motion) -> int:
+def mobility(setup: Setup, z: Array, motion: Rates) -> int:
     """The mobility at a position by rank; raises NoAnswer where the velocity is not determined, or contradicted.
 
     With the inputs' positions counted as unknowns, what the pairs leave free is unknowns + inputs - rank.
@@ -50,7 +50,7 @@ def mobility(setup: Setup, z: Array, motion: Motion) -> int:
     raise refusals.ever_free(setup, links) if free else refusals.change_point(setup, links, found)
 
 
-def _broken_ways(motion: Motion) -> int:
+def _broken_ways(motion: Rates) -> int:
     """The rank of what unit rates of the inputs leave open after the unknowns have done all they can."""
     if motion.slope.shape[0] == motion.slope.shape[1]:
         return 0
@@ -113,7 +113,7 @@ def cancelled(slope: Array, known: Array) -> Array:
     return np.linalg.lstsq(slope, -known, rcond=1e-12)[0]
 
 
-def _agree(setup: Setup, motion: Motion) -> bool:
+def _agree(setup: Setup, motion: Rates) -> bool:
     """Whether rates of the inputs that are more than the freedom do not contradict one another."""
     left = motion.slope @ cancelled(motion.slope, motion.F1) + motion.F1
     scale = np.max(np.abs(setup.station.u1), initial=0.0) or 1.0

@@ -64,8 +64,11 @@ class Gate:
         widest, pair = max(((float(np.max(np.abs(gap))), pair.name) for gap, pair in gaps), default=(0.0, ""))
         return (widest, pair) if widest > TOUCHING * self.unit else None
 
-    def rate_gaps(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Jet]]) -> list[tuple[float, str]]:
-        """How far velocities, then accelerations, break the worst constraint, as a part of the greatest; its pair."""
+    def rate_gaps(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Jet]]) -> list[tuple[Array, str]]:
+        """How far velocities, then accelerations, break the worst constraint, as a part of the greatest; its pair.
+
+        Of jets of arrays, an array.
+        """
         closures = [(kind, left) for kind, left in self._closures(frames, own) if isinstance(left, Jet)]
         units = np.array([self.unit if kind is Kind.LENGTH else 1.0 for kind, _ in closures])
         found = []
@@ -73,21 +76,25 @@ class Gate:
             rates = [(given.velocity, given.acceleration)[order - 1] for given in self.mechanism.inputs]
             wanted = np.zeros(len(closures))
             wanted[len(closures) - len(rates) :] = rates
-            broken = np.array([left.parts[order] for _, left in closures]) - wanted
-            gaps = np.nan_to_num(np.abs(broken) / units / self._greatest(frames, own, order), nan=np.inf)
-            worst = int(np.argmax(gaps)) if len(gaps) else 0
-            found.append((float(gaps.max(initial=0.0)), self.names[worst] if len(gaps) else ""))
+            if not closures:
+                found.append((np.zeros(1), ""))
+                continue
+            broken = np.array(np.broadcast_arrays(*(left.parts[order] for _, left in closures))).T - wanted
+            gaps = np.nan_to_num((np.abs(broken) / units).T / self._greatest(frames, own, order), nan=np.inf)
+            worst = int(np.argmax(gaps.reshape(len(closures), -1).max(axis=1)))
+            found.append((gaps.max(axis=0), self.names[worst]))
         return found
 
-    def _greatest(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Jet]], order: int) -> float:
+    def _greatest(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Jet]], order: int) -> Array:
         """The greatest rate of an order (lengths of the size), what a velocity makes of itself in an arc included."""
-        rates = [self._rate(frame, order) for frame in frames.values() if not frame.fixed]
-        rates += [abs(jet.parts[order]) / self.unit for each in own.values() for jet in each]
-        return max(rates, default=0.0) or 1.0
-
-    def _rate(self, frame: Frame, order: int) -> float:
-        angular = max(abs(frame.angle.parts[k]) ** (order / k) for k in range(1, order + 1))
-        return max(angular, *(abs(value.parts[order]) / self.unit for value in (frame.x, frame.y)))
+        rates = [np.zeros(1)]
+        for frame in frames.values():
+            if not frame.fixed:
+                rates += [np.abs(frame.angle.parts[k]) ** (order / k) for k in range(1, order + 1)]
+                rates += [np.abs(value.parts[order]) / self.unit for value in (frame.x, frame.y)]
+        rates += [np.abs(jet.parts[order]) / self.unit for each in own.values() for jet in each]
+        greatest = np.maximum.reduce(np.broadcast_arrays(*rates))
+        return np.where(greatest == 0.0, 1.0, greatest)
 
     def _closures(self, frames, own, u=None):  # noqa: ANN001, ANN202 - floats, arrays or jets alike
         """(kind, what is left open) of every constraint, then of every input."""

@@ -11,7 +11,7 @@ from planar.algebra import Jet
 from planar.errors import NoAnswer
 from planar.mechanism import Drive, Mechanism, with_inputs
 from planar.motion import State
-from planar.program import Motion, length, placed, program
+from planar.program import Rates, length, placed, program
 from planar.solving import refusals
 from planar.solving.assemble import Assembly, Failure, search
 from planar.solving.candidates import Candidates
@@ -100,16 +100,20 @@ class Solver(Setup):
         w = np.array([parts[c.owner, c.part].parts[0] for c in self.equations.coordinates]) / self.scale
         return self.state(w[list(self.equations.unknowns)], state.remarks)
 
-    def _stated(self, motion: Motion, found: int, residual: float, remarks: tuple[str, ...]) -> State:
+    def refuse_gap(self, own: Mapping[str, Sequence[Jet]]) -> None:
+        """Raise NoAnswer where a contact is open that guides should keep closed."""
+        gap = self.gate.apart(own)
+        if gap is not None:
+            raise refusals.no_contact(self, *gap)
+
+    def _stated(self, motion: Rates, found: int, residual: float, remarks: tuple[str, ...]) -> State:
         parts = np.stack([motion.w, motion.w1, motion.w2], axis=1) * self.scale[:, None]
         frames, own = placed([Jet(*each) for each in parts.tolist()], self.column, self.shapes, self.pairs)
         gaps = self.gate.rate_gaps(frames, own)
         for (gap, pair), what in zip(gaps, ("velocities", "accelerations"), strict=True):
-            if gap > 1e3 * self.tolerance:
+            if float(np.max(gap)) > 1e3 * self.tolerance:
                 if self.station.u.size > found:
                     raise refusals.disagreeing(self, found, what)
-                raise refusals.broken_rates(self, what, pair, gap)
-        gap = self.gate.apart(own)
-        if gap is not None:
-            raise refusals.no_contact(self, *gap)
+                raise refusals.broken_rates(self, what, pair, float(np.max(gap)))
+        self.refuse_gap(own)
         return State(self.mechanism, found, residual, remarks, frames, own, self.shapes)

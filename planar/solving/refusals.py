@@ -75,8 +75,8 @@ def no_contact(setup: Setup, gap: float, pair: str) -> NoAnswer:
     """A contact that the pair does not keep closed by itself, and that nothing else does."""
     return NoAnswer(
         Outcome.CANNOT_BE_ASSEMBLED,
-        f"{setup.at()} the two links of pair {pair!r} stand {amount(gap, 'length', setup.mechanism.units)} apart from "
-        f"where they touch; let pins or guides keep {listed([repr(link) for link in setup.pairs[pair].links])} in contact",
+        f"{setup.at()} {_links(setup.pairs[pair].links)} of pair {pair!r} are "
+        f"{amount(gap, 'length', setup.mechanism.units)} from touching; let pins or guides keep them in contact",
     )
 
 
