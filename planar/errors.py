@@ -12,6 +12,7 @@ class Outcome(StrEnum):
     CHANGE_POINT = "change point"
     TOO_FEW_INPUTS = "too few inputs"
     TOO_MANY_INPUTS = "too many inputs"
+    INPUT_JAMMED = "input jammed"
     BRANCH_LOST = "branch lost"
 
 

@@ -25,3 +25,11 @@ def detached(mechanism: Mechanism) -> tuple[str, ...]:
     """Links that no chain of pairs joins to the frame."""
     joined = nx.node_connected_component(linkage(mechanism), ("link", mechanism.frame))
     return tuple(link.name for link in mechanism.links if ("link", link.name) not in joined)
+
+
+def farthest_first(mechanism: Mechanism, name: str) -> tuple[str, ...]:
+    """The other pairs, those first that are most links and pairs away from this one."""
+    entry_of = {pair.name: pair.entry_name() for pair in mechanism.pairs}
+    away = nx.single_source_shortest_path_length(linkage(mechanism), ("pair", entry_of[name]))
+    others = [other for other in entry_of if other != name]
+    return tuple(sorted(others, key=lambda other: -away.get(("pair", entry_of[other]), 0)))

@@ -47,6 +47,11 @@ def hurrying(power: float, scale: float = 0.0) -> str:
     return "speeding up" if power > 0.0 else "slowing down"
 
 
+def many(count: int, what: str) -> str:
+    """So many of something: 1 way, 2 ways."""
+    return f"{count} {what}{'s' * (count != 1)}"
+
+
 def listed(names: Sequence[str]) -> str:
     """Names in a sentence: a, b and c."""
     return " and ".join(filter(None, (", ".join(names[:-1]), names[-1]))) if names else "none"

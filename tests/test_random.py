@@ -26,7 +26,7 @@ def assembled(built: Built, least: float) -> tuple[Mechanism, State]:
     except NoAnswer as problem:
         # loops drawn at random may hold each other twice, or leave freedom: then that is what must be said, and only
         # then
-        assert problem.outcome in (Outcome.TOO_FEW_INPUTS, Outcome.DEAD_POINT)
+        assert problem.outcome in (Outcome.TOO_FEW_INPUTS, Outcome.INPUT_JAMMED, Outcome.DEAD_POINT)
         assert not determinate(mechanism, built)
         assume(False)
         raise

@@ -123,13 +123,15 @@ def _agree(setup: Setup, motion: Rates) -> bool:
 def always_weak(setup: Setup, stage: Stage, z: Array) -> bool:
     """Whether a group is singular in closed positions near by too, so that it is no matter of this one."""
     u, p = setup.station.u, setup.station.p
+    tried = False
     for seed in range(3):
         rng = np.random.default_rng(seed)
         near = u + rng.uniform(-NEAR_BY, NEAR_BY, u.size)
         moved = corrected(setup.program, p, z + rng.uniform(-NEAR_BY, NEAR_BY, z.size), near, stage.level)
         if moved is not None and strengths(setup, slope_at(setup, moved, near))[stage.level] > NOTHING:
             return False
-    return True
+        tried = tried or moved is not None
+    return tried
 
 
 def slope_at(setup: Setup, z: Array, u: Array) -> Array:

@@ -10,8 +10,9 @@ from planar.errors import NoAnswer, Outcome
 from planar.pairs import Kind
 from planar.program import length
 from planar.solving.assemble import Failure
+from planar.solving.dependence import conflicting, stuck
 from planar.solving.setup import Setup
-from planar.words import amount, listed
+from planar.words import amount, listed, many
 
 
 def free(setup: Setup) -> NoAnswer:
@@ -24,24 +25,50 @@ def free(setup: Setup) -> NoAnswer:
             Outcome.TOO_FEW_INPUTS,
             f"no chain of pairs joins {_links(apart)} to the frame {setup.mechanism.frame!r}; add a pair",
         )
+    jam = _jammed(setup)
+    if jam is not None:
+        return jam
     stages = [stage for stage in setup.equations.stages if stage.free]
     links = list(dict.fromkeys(link for stage in stages for link in stage.links))
     ways = sum(length(stage.unknowns) - length(stage.rows) for stage in stages)
     inputs = len(setup.mechanism.inputs)
     return NoAnswer(
         Outcome.TOO_FEW_INPUTS,
-        f"with {_many(inputs, 'input')} {_links(links)} can still move in {_many(ways, 'way')}; "
+        f"with {many(inputs, 'input')} {_links(links)} can still move in {many(ways, 'way')}; "
         f"give an input at {_pairs_of(setup, links, 6)}",
     )
 
 
 def ever_free(setup: Setup, links: Sequence[str]) -> NoAnswer:
     """Links that stay free while others hold each other more than once."""
+    jam = _jammed(setup)
+    if jam is not None:
+        return jam
     return NoAnswer(
         Outcome.TOO_FEW_INPUTS,
-        f"with {_many(len(setup.mechanism.inputs), 'input')} {_links(links)} can still move, while some of the links "
+        f"with {many(len(setup.mechanism.inputs), 'input')} {_links(links)} can still move, while some of the links "
         f"hold each other more than once; give an input at {_pairs_of(setup, links, 6)}",
     )
+
+
+def _jammed(setup: Setup) -> NoAnswer | None:
+    """Inputs at pairs that the others hold fast, while something else is free."""
+    found = stuck(setup)
+    if found is None:
+        return None
+    names, links = found
+    one = len(names) == 1
+    return NoAnswer(
+        Outcome.INPUT_JAMMED,
+        f"{_at(names)} cannot move: the pairs hold {_links(_ends(setup, names))} fast, while {_links(links)} "
+        f"{'is' if len(links) == 1 else 'are'} free; drive {_pairs_of(setup, links, 4)} instead"
+        f"{'' if one else ', with one input for each way'}",
+    )
+
+
+def _ends(setup: Setup, names: Sequence[str]) -> list[str]:
+    """The links at these pairs."""
+    return list(dict.fromkeys(link for name in names for link in setup.named[name].links))
 
 
 def change_point(setup: Setup, links: Sequence[str], mobility: int) -> NoAnswer:
@@ -101,15 +128,28 @@ def too_many(setup: Setup) -> NoAnswer:
     """Inputs that the pairs leave no freedom for, at positions that do not agree."""
     return NoAnswer(
         Outcome.TOO_MANY_INPUTS,
-        f"{_inputs(setup)} ask for more than the mechanism's freedom and do not agree {setup.at()}; leave one out",
+        f"{_inputs(setup)} ask for more than the mechanism's freedom and do not agree {setup.at()}{_leave_out(setup)}",
     )
+
+
+def _leave_out(setup: Setup) -> str:
+    """Which inputs conflict, and what to do about it."""
+    sets = conflicting(setup)
+    if not sets:
+        return "; leave one out"
+    told = [
+        f"the input at {each[0]!r} cannot move" if len(each) == 1 else f"those at {_named(each)} move one another"
+        for each in sets[:3]
+    ]
+    which = "one of each" if len(sets) > 1 else "it" if len(sets[0]) == 1 else "one of them"
+    return f": {listed(told)}; leave {which} out"
 
 
 def disagreeing(setup: Setup, mobility: int, what: str) -> NoAnswer:
     """Inputs whose positions agree but whose rates do not."""
     return NoAnswer(
         Outcome.TOO_MANY_INPUTS,
-        f"the mobility is {mobility}, and the {what} of {_inputs(setup)} do not agree; leave one out",
+        f"the mobility is {mobility}, and the {what} of {_inputs(setup)} do not agree{_leave_out(setup)}",
     )
 
 
@@ -121,21 +161,24 @@ def broken_rates(setup: Setup, what: str, pair: str, gap: float) -> NoAnswer:
     )
 
 
+def _named(names: Sequence[str]) -> str:
+    return listed([repr(name) for name in names])
+
+
 def _links(names: Sequence[str]) -> str:
-    return f"link{'s' * (len(names) != 1)} {listed([repr(name) for name in names])}"
+    return f"link{'s' * (len(names) != 1)} {_named(names)}"
 
 
 def _inputs(setup: Setup) -> str:
-    names = [repr(given.pair) for given in setup.mechanism.inputs]
-    return f"the input{'s' * (len(names) != 1)} at {listed(names)}"
+    return _at([given.pair for given in setup.mechanism.inputs])
 
 
-def _many(count: int, what: str) -> str:
-    return f"{count} {what}{'s' * (count != 1)}"
+def _at(pairs: Sequence[str]) -> str:
+    return f"the input{'s' * (len(pairs) != 1)} at {_named(pairs)}"
 
 
 def _freedoms(setup: Setup, mobility: int) -> str:
-    return f"{_many(mobility, 'freedom')} for {_many(len(setup.mechanism.inputs), 'input')}"
+    return f"{many(mobility, 'freedom')} for {many(len(setup.mechanism.inputs), 'input')}"
 
 
 def _pairs_of(setup: Setup, links: Sequence[str], most: int) -> str:

@@ -1,0 +1,140 @@
+"""How many ways a mechanism can move: by count, here, and in general; and where pairs hold more than they need to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planar.errors import NoAnswer, Outcome
+from planar.graph import farthest_first
+from planar.mechanism import Mechanism
+from planar.solving.constraints import Constraints, joined, moved, null_space, rank
+from planar.solving.dependence import smallest_sets
+from planar.solving.position import Solver
+from planar.words import listed, many
+
+Array = np.ndarray
+
+AWAY = 0.02
+"""How far (sizes, rad) a position is moved along what it allows, to see whether the motion goes on."""
+NEAR = 1e-3
+"""How far its neighbours are from a position whose motions are counted; what bends back within it is none."""
+
+
+@dataclass(frozen=True)
+class Mobility:
+    """The three mobilities of a mechanism, inputs left aside.
+
+    `gruebler`: 3 (links - 1) less what the pairs hold, by count (Gruebler, Kutzbach); `instantaneous`: by the rank of
+    the constraints in this position; `finite`: the dimension of the motion that leads away from it. `surplus`
+    constraints of the motion follow from the others; each of `redundant` is a smallest set of pairs of which one
+    constraint is superfluous. `why` says in sentences where the three differ.
+    """
+
+    gruebler: int
+    instantaneous: int
+    finite: int
+    surplus: int
+    redundant: tuple[tuple[str, ...], ...]
+    why: tuple[str, ...]
+
+
+def mobility(mechanism: Mechanism) -> Mobility:
+    """The mobility of a mechanism in the position of its file. Raises NoAnswer where it cannot be assembled."""
+    setup = Solver(mechanism)
+    constraints = Constraints(setup)
+    return measured(constraints, standing(setup, constraints))
+
+
+def gruebler(mechanism: Mechanism) -> int:
+    """3 (links - 1) less what the pairs hold: three for each link that moves, none for what is held twice.
+
+    M. Gruebler 1883, K. Kutzbach 1929; two for a lower pair in the plane, one for a higher one.
+    """
+    return 3 * (len(mechanism.links) - 1) - sum(pair.holds() for pair in mechanism.pairs)
+
+
+def measured(constraints: Constraints, w: Array) -> Mobility:
+    """The mobility at a position w (coordinates,)."""
+    mechanism = constraints.setup.mechanism
+    count = gruebler(mechanism)
+    slope = constraints.slope(w)
+    here = w.size - rank(slope)
+    finite, place = here, w
+    if here != count:
+        finite, place = _motion_from(constraints, w)
+    left = null_space(constraints.slope(place).T)
+    surplus = max(0, finite - count)
+    sets = ()
+    if surplus and left.shape[1] == surplus:
+        sets = smallest_sets(left, constraints.pair_of_row, lambda name: farthest_first(mechanism, name))
+    return Mobility(count, here, finite, surplus, sets, tuple(_why(count, here, finite, sets)))
+
+
+def _motion_from(constraints: Constraints, w: Array) -> tuple[int, Array]:
+    """The dimension of the motion that leads away from a position, and a position on it."""
+    free = null_space(constraints.slope(w))
+    found, place = 0, w
+    for seed in range(4 if free.size else 0):
+        rng = np.random.default_rng(seed)
+        away = constraints.closed(w + moved(free, rng, AWAY))
+        if away is not None:
+            ways = _ways(constraints, away, rng)
+            if ways > found:
+                found, place = ways, away
+    return found, place
+
+
+def _ways(constraints: Constraints, w: Array, rng: np.random.Generator) -> int:
+    """In how many directions the closed positions next to one spread."""
+    free = null_space(constraints.slope(w))
+    many = 2 * free.shape[1] + 2
+    moves = []
+    for _ in range(many if free.size else 0):
+        beside = constraints.closed(w + moved(free, rng, NEAR))
+        if beside is not None:
+            moves.append((beside - w) / NEAR)
+    if not moves:
+        return 0
+    values = np.linalg.svd(np.array(moves), compute_uv=False)
+    return int(np.sum(values > 0.1 * np.sqrt(len(moves) / free.shape[1])))
+
+
+def standing(setup: Solver, constraints: Constraints) -> Array:
+    """A closed position w of a mechanism, the one of its inputs if they determine one. Raises NoAnswer."""
+    try:
+        z = setup.assembly().z
+    except NoAnswer as problem:
+        if problem.outcome is Outcome.CANNOT_BE_ASSEMBLED:
+            raise
+        found = joined(constraints)
+        if found is None:
+            raise
+        return found
+    return setup.program.positions(z, setup.station.u, setup.station.p).full().ravel()
+
+
+def _why(count: int, here: int, finite: int, sets: tuple[tuple[str, ...], ...]) -> list[str]:
+    told = []
+    if here > finite:
+        what = "nothing moves on from it" if finite == 0 else "branches of the motion cross here, or it turns back"
+        told.append(
+            f"in this position the pairs also allow {many(here - finite, 'more way')} to first order, in which the "
+            f"links cannot go on: {what}"
+        )
+    if finite > count:
+        follows = "follows" if finite - count == 1 else "follow"
+        told.append(
+            f"{many(finite - count, 'constraint')} of the pairs {follows} from the others, so the links move in "
+            f"{many(finite, 'way')} where the count gives {count}"
+        )
+        told += [
+            f"of the pairs {listed([repr(name) for name in each])} one holds what the others hold" for each in sets
+        ]
+    if finite < count:
+        told.append(
+            f"the count gives {count}, but from here the links move in {many(finite, 'way')}: their dimensions only "
+            f"just allow this position, or some of them hold others fast while the rest is freer"
+        )
+    return told

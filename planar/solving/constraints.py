@@ -1,0 +1,159 @@
+"""All constraints of a mechanism in all its coordinates, nothing eliminated: what its pairs hold, inputs or not.
+
+Lengths are divided by the mechanism's size. Columns by the complex step, so the pairs' own formulas are the only ones:
+W. Squire, G. Trapp, Using Complex Variables to Estimate Derivatives of Real Functions, SIAM Review 40, 1998.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planar.pairs import Kind, Pair
+from planar.plane import Frame, frame_at
+from planar.program import scaled
+from planar.solving.setup import Setup
+
+Array = np.ndarray
+
+STEP = 1e-30
+CLOSED, ROUNDED = 1e-10, 1e-15
+LONGEST = 100
+"""Iterations: where constraints only just touch, the error halves each time."""
+TRIES = 24
+"""Starts from which a linkage is joined that its inputs do not determine."""
+SINGULAR = 1e-6
+"""A singular value below this part of the greatest is zero: where constraints touch, rounding leaves about 1e-8."""
+
+
+class Constraints:
+    """The residuals of all pairs at coordinates w (coordinates,), as `Equations.coordinates` has them."""
+
+    def __init__(self, setup: Setup):
+        self.setup = setup
+        self.pairs = tuple(setup.mechanism.pairs)
+        self.coordinates = setup.equations.coordinates
+        self.pair_of_row = tuple(pair.name for pair in self.pairs for _ in pair.constrains)
+        self._numbers = {
+            pair.name: scaled(pair.measure([setup.shapes[link] for link in pair.bodies]), pair.measures, setup.unit)
+            for pair in (*self.pairs, *setup.named.values())
+        }
+        is_angle = [coordinate.kind is not Kind.LENGTH for coordinate in self.coordinates]
+        self._angles = np.array(is_angle, dtype=bool)
+
+    def gaps(self, w: Array) -> Array:
+        """What every constraint leaves open (rows,), of w (coordinates, many) of each (rows, many)."""
+        left = []
+        for pair in self.pairs:
+            for kind, value in zip(pair.constrains, pair.residual(*self._of(pair, w)), strict=True):
+                left.append(np.arctan2(np.sin(value), np.cos(value)) if self._wraps(kind, w) else value)
+        return np.array(np.broadcast_arrays(*left)) if left else np.zeros((0, *w.shape[1:]))
+
+    @staticmethod
+    def _wraps(kind: Kind, w: Array) -> bool:
+        return kind is Kind.ANGLE and not np.iscomplexobj(w)
+
+    def slope(self, w: Array) -> Array:
+        """(rows, coordinates)"""
+        return np.imag(self.gaps(self._nudged(w))) / STEP
+
+    def drives(self, names: tuple[str, ...], w: Array) -> Array:
+        """The drives of these relative motions (names,)."""
+        return np.array([self._drive(name, w) for name in names])
+
+    def drive_slope(self, names: tuple[str, ...], w: Array) -> Array:
+        """(names, coordinates)"""
+        nudged = self._nudged(w)
+        rows = [np.broadcast_to(np.imag(self._drive(name, nudged)), (w.size,)) for name in names]
+        return np.array(rows).reshape(len(names), w.size) / STEP
+
+    def _drive(self, name: str, w: Array) -> Array:
+        pair = self.setup.named[name]
+        return pair.drive(*self._of(pair, w))
+
+    def _nudged(self, w: Array) -> Array:
+        return np.repeat(w[:, None].astype(complex), w.size, axis=1) + 1j * STEP * np.eye(w.size)
+
+    def _of(self, pair: Pair, w: Array) -> tuple[list[Frame], list[float], list[Array]]:
+        column = self.setup.column
+        frames = [
+            frame_at(*(w[column[link, part]] for part in ("x", "y", "angle")))
+            if (link, "x") in column
+            else Frame(0.0, 0.0, 1.0, 0.0, 0.0, True)
+            for link in pair.bodies
+        ]
+        own = [w[column[pair.name, part]] for part, _ in pair.coordinates if (pair.name, part) in column]
+        return frames, self._numbers[pair.name], own
+
+    def closed(self, w: Array, drives: tuple[str, ...] = (), at: Array | None = None) -> Array | None:
+        """The nearest closed position by Gauss and Newton's method, some drives held; None where there is none."""
+        left, slope = self._held(w, drives, at)
+        damping = 1e-3
+        for _ in range(LONGEST):
+            if np.max(np.abs(left), initial=0.0) < ROUNDED or damping > 1e8:
+                break
+            tried = w + _damped(slope, left, damping)
+            new = self._held(tried, drives, at)
+            if np.sum(new[0] ** 2) < np.sum(left**2):
+                w, (left, slope), damping = tried, new, 0.1 * damping
+            else:
+                damping *= 10.0
+        return w if np.max(np.abs(left), initial=0.0) <= CLOSED else None
+
+    def _held(self, w: Array, drives: tuple[str, ...], at: Array | None) -> tuple[Array, Array]:
+        left, slope = self.gaps(w), self.slope(w)
+        if drives and at is not None:
+            left = np.concatenate([left, self.drives(drives, w) - at])
+            slope = np.vstack([slope, self.drive_slope(drives, w)])
+        return left, slope
+
+
+def _damped(slope: Array, left: Array, damping: float) -> Array:
+    u, s, vt = np.linalg.svd(slope, full_matrices=False)
+    top = s[0] if s.size else 1.0
+    gain = np.where(s > 1e-13 * top, s / np.maximum(s * s + (damping * top) ** 2, 1e-300), 0.0)
+    return -vt.T @ (gain * (u.T @ left))
+
+
+def rank(slope: Array) -> int:
+    """The rank of a slope, rounding apart."""
+    values = np.linalg.svd(slope, compute_uv=False) if slope.size else np.zeros(0)
+    return int(np.sum(values > SINGULAR * max(values[0], 1e-300))) if values.size else 0
+
+
+def null_space(slope: Array) -> Array:
+    """Orthonormal columns that the slope takes to zero (columns, nullity)."""
+    if not slope.size:
+        return np.eye(slope.shape[1])
+    return np.linalg.svd(slope)[2][rank(slope) :].T
+
+
+def moved(free: Array, rng: np.random.Generator, far: float) -> Array:
+    """A random move of a length within the columns of `free`."""
+    way = free @ rng.normal(size=free.shape[1])
+    return way * (far / np.linalg.norm(way))
+
+
+def joined(constraints: Constraints) -> Array | None:
+    """A closed position near the sketch, with the inputs where they are if that can be; None where none is found."""
+    setup = constraints.setup
+    names = tuple(given.pair for given in setup.mechanism.inputs)
+    for held, at in ((names, setup.station.u), ((), None)):
+        for seed in range(TRIES):
+            found = constraints.closed(_sketched(setup, seed), held, at)
+            if found is not None:
+                return found
+        if not names:
+            break
+    return None
+
+
+def _sketched(setup: Setup, seed: int) -> Array:
+    """Coordinates that are spread about the points of the sketch."""
+    rng = np.random.default_rng(seed)
+    shown = {name: np.array([x, y]) / setup.unit for name, x, y in setup.mechanism.sketch}
+    w = rng.uniform(-1.0, 1.0, len(setup.equations.coordinates))
+    for link, shape in setup.shapes.items():
+        at = [shown[name] for point in shape.points for name in (point, f"{link}.{point}") if name in shown]
+        if at and (link, "x") in setup.column:
+            w[[setup.column[link, "x"], setup.column[link, "y"]]] = np.mean(at, axis=0)
+    return w
