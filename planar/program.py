@@ -70,14 +70,39 @@ class Program:
     @cached_property
     def _kinematics(self) -> ca.Function:
         e = self.equations
-        y, both = ca.vertcat(e.z, e.u), ca.vertcat(e.F, e.w)
-        y1, y2 = ca.SX.sym("y1", y.numel()), ca.SX.sym("y2", y.numel())
-        # the chain rule twice: d/dt = (d/dy) y1, d2/dt2 = (d/dy)(d/dt) y1 + (d/dy) y2
-        first = ca.jtimes(both, y, y1)
-        second = ca.jtimes(first, y, y1) + ca.jtimes(both, y, y2)
+        both = ca.vertcat(e.F, e.w)
+        y, y1, y2, first, second = _derivatives(e, both)
         slopes = ca.jacobian(e.F, y)
         outputs = [ca.horzcat(both, first, second), slopes]
         return ca.Function("kinematics", [y, y1, y2, e.p], [ca.densify(output) for output in outputs])
+
+    @cached_property
+    def _third(self) -> ca.Function:
+        e = self.equations
+        y, y1, y2, _, second = _derivatives(e, e.F)
+        third = ca.jtimes(second, y, y1) + ca.jtimes(second, y1, y2)
+        return ca.Function("third", [y, y1, y2, e.p], [ca.densify(third)])
+
+    def third(self, y: Array, y1: Array, y2: Array, p: Array) -> Array:
+        """The third time derivative of F (rows,), that of y left out."""
+        return self._third(y, y1, y2, p).full().ravel()
+
+    @cached_property
+    def _deflated(self) -> ca.Function:
+        e = self.equations
+        z1, u1 = ca.SX.sym("z1", e.z.numel()), ca.SX.sym("u1", e.u.numel())
+        both = ca.vertcat(e.F, ca.jtimes(e.F, ca.vertcat(e.z, e.u), ca.vertcat(z1, u1)))
+        slopes = ca.jacobian(both, ca.vertcat(e.z, z1))
+        return ca.Function("deflated", [e.z, z1, e.u, u1, e.p], [ca.densify(both), ca.densify(slopes)])
+
+    def deflated(self, z: Array, z1: Array, u: Array, u1: Array, p: Array) -> tuple[Array, Array]:
+        """F and its first time derivative (2 rows,), and their slope in z and z1 (2 rows, 2 unknowns).
+
+        A. Leykin, J. Verschelde, A. Zhao, Newton's method with deflation for isolated singularities, Theor. Comp. Sci.
+        359, 2006.
+        """
+        both, slopes = self._deflated(z, z1, u, u1, p)
+        return both.full().ravel(), slopes.full()
 
     def kinematics(self, y: Array, y1: Array, y2: Array, p: Array) -> Rates:
         """Everything at one position, y = (z, u) with its first and second derivatives, or at samples (samples, y)."""
@@ -135,6 +160,17 @@ class Program:
     def square(self) -> bool:
         """Whether every group has as many constraints as unknowns."""
         return all(length(stage.rows) == length(stage.unknowns) and not stage.free for stage in self.equations.stages)
+
+
+def _derivatives(e: Equations, value: ca.SX) -> tuple[ca.SX, ...]:
+    """y = (z, u) with symbols for its derivatives, and those of an expression in y.
+
+    The chain rule twice: d/dt = (d/dy) y1, d2/dt2 = (d/dy)(d/dt) y1 + (d/dy) y2.
+    """
+    y = ca.vertcat(e.z, e.u)
+    y1, y2 = ca.SX.sym("y1", y.numel()), ca.SX.sym("y2", y.numel())
+    first = ca.jtimes(value, y, y1)
+    return y, y1, y2, first, ca.jtimes(first, y, y1) + ca.jtimes(value, y, y2)
 
 
 def length(part: slice) -> int:

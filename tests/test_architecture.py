@@ -18,7 +18,7 @@ FLOORS = [
     {"shapes"},
     {"pairs"},
     {"mechanism"},
-    {"document", "elimination", "graph", "groups", "words"},
+    {"dimensions", "document", "elimination", "graph", "groups", "words"},
     {"equations", "files"},
     {"program", "motion"},
     {"solving"},

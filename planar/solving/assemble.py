@@ -30,11 +30,10 @@ class Assembly(NamedTuple):
 class Failure(NamedTuple):
     """The group at which every way to assemble ends.
 
-    `open`: how far its constraints stay open at the best (rows,); `z`: the unknowns, those of earlier groups filled in.
+    `z`: the unknowns where it is nearest to closing, those of earlier groups filled in.
     """
 
     stage: Stage
-    open: Array
     z: Array
 
 
@@ -75,9 +74,9 @@ def search(candidates: Candidates) -> Assembly | Failure:
                 return Assembly(chosen.z, (_tie(stages, chosen.ties),))
             chosen = node
             continue
-        found, gap = candidates.of(stages[len(node.ranks)], node.z)
+        found, nearest = candidates.of(stages[len(node.ranks)], node.z)
         if not found and (worst is None or stages[len(node.ranks)].level > worst.stage.level):
-            worst = Failure(stages[len(node.ranks)], gap, node.z)
+            worst = Failure(stages[len(node.ranks)], nearest)
         for rank, each in enumerate(found):
             alike = sum(abs(other.distance - each.distance) <= ALIKE for other in found) > 1
             heapq.heappush(

@@ -73,9 +73,9 @@ class Candidates:
     def of(self, stage: Stage, z: Array) -> tuple[list[Candidate], Array]:
         """All assemblies of a group that its starts lead to, the ones that an author would mean first.
 
-        With what the best start leaves open (rows,).
+        With all unknowns at the end of the best start, whether it closes the group or not.
         """
-        closing = self._closing(stage, z)
+        closing = self.closing(stage, z, self.p)
         near, shown = self._near(stage, z)
         ended = newton(closing, self._with_lengths(stage, closing, near))
         found = self._candidates(stage, z, closing, ended.unknowns[ended.closed])
@@ -87,8 +87,9 @@ class Candidates:
             more = newton(closing, self._with_lengths(stage, closing, _spread(length(stage.unknowns))))
             ended = Found(*(np.concatenate(both) for both in zip(ended, more, strict=True)))
             found = self._candidates(stage, z, closing, ended.unknowns[ended.closed])
-        best = ended.unknowns[int(np.argmin(ended.open))]
-        return found, closing(best[None, :])[0][0]
+        nearest = z.copy()
+        nearest[stage.unknowns] = ended.unknowns[int(np.argmin(ended.open))]
+        return found, nearest
 
     def _candidates(self, stage: Stage, z: Array, closing: Closing, closed: Array) -> list[Candidate]:
         if self.counts:
@@ -131,7 +132,8 @@ class Candidates:
     def _w(self, z: Array) -> Array:
         return self.program.positions(z, self.u, self.p).full().ravel()
 
-    def _closing(self, stage: Stage, z: Array) -> Closing:
+    def closing(self, stage: Stage, z: Array, p: Array) -> Closing:
+        """A group's constraints at tries of its own unknowns, those of earlier groups and the pairs' numbers given."""
         function = self.program.closing(stage)
         rows, unknowns = length(stage.rows), length(stage.unknowns)
 
@@ -139,7 +141,7 @@ class Candidates:
             count = len(tried)
             whole = np.repeat(z[:, None], count, axis=1)
             whole[stage.unknowns] = tried.T
-            left, slope = function(whole, self.u, self.p) if count > 1 else function(whole[:, 0], self.u, self.p)
+            left, slope = function(whole, self.u, p) if count > 1 else function(whole[:, 0], self.u, p)
             slopes = slope.full().reshape(rows, count, unknowns, order="C") if unknowns else np.zeros((rows, count, 0))
             return left.full().reshape(rows, count).T.copy(), slopes.transpose(1, 0, 2).copy()
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from planar.equations import Stage
+from planar.errors import NoAnswer
 from planar.pairs import Kind
 from planar.program import Rates, length
 from planar.solving import refusals
@@ -25,8 +26,18 @@ NEAR_BY = 1e-2
 """How far (rad, or lengths of the size) a position is moved to see whether what holds there holds elsewhere."""
 
 
+class Crossing(Exception):
+    """A position with one freedom more than inputs, to first order; `refusal` is what to say if it is so in truth."""
+
+    def __init__(self, refusal: NoAnswer):
+        super().__init__()
+        self.refusal = refusal
+
+
 def mobility(setup: Setup, z: Array, motion: Rates) -> int:
     """The mobility at a position by rank; raises NoAnswer where the velocity is not determined, or contradicted.
+
+    Raises Crossing where the next orders have to tell whether it is determined.
 
     With the inputs' positions counted as unknowns, what the pairs leave free is unknowns + inputs - rank.
     """
@@ -47,6 +58,8 @@ def mobility(setup: Setup, z: Array, motion: Rates) -> int:
     if found <= inputs:
         raise refusals.dead_point(setup, links)
     free = any(always_weak(setup, stage, z) for stage in weak)
+    if not free and found == inputs + 1:
+        raise Crossing(refusals.change_point(setup, links, found))
     raise refusals.ever_free(setup, links) if free else refusals.change_point(setup, links, found)
 
 

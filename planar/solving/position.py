@@ -15,8 +15,9 @@ from planar.program import Rates, length, placed, program
 from planar.solving import refusals
 from planar.solving.assemble import Assembly, Failure, search
 from planar.solving.candidates import Candidates
+from planar.solving.crossing import Passing, passing
 from planar.solving.follow import follow
-from planar.solving.freedom import SINGULAR, always_weak, cancelled, mobility, slope_at, strengths
+from planar.solving.freedom import SINGULAR, Crossing, always_weak, cancelled, mobility, slope_at, strengths
 from planar.solving.setup import Setup
 
 Array = np.ndarray
@@ -81,11 +82,25 @@ class Solver(Setup):
         s, rest = self.station, np.zeros_like(z)
         y, given = np.concatenate([z, s.u]), np.concatenate([rest, s.u2])
         still = self.program.kinematics(y, np.concatenate([rest, s.u1]), given, s.p)
-        found = mobility(self, z, still)
+        try:
+            found = mobility(self, z, still)
+        except Crossing as crossing:
+            through = passing(self, z)
+            if through is None:
+                raise crossing.refusal from None
+            return self._passed(through, remarks)
         y1 = np.concatenate([cancelled(still.slope, still.F1), s.u1])
         moving = self.program.kinematics(y, y1, given, s.p)
         y2 = np.concatenate([cancelled(moving.slope, moving.F2), s.u2])
         return self._stated(self.program.kinematics(y, y1, y2, s.p), found, residual, remarks)
+
+    def _passed(self, through: Passing, remarks: tuple[str, ...]) -> State:
+        """The state where more than the inputs could move to first order, but only one motion goes on."""
+        s = self.station
+        residual = float(self.open_along(through.z[None], s.u[None])[0])
+        y, y1, y2 = (np.concatenate(both) for both in ((through.z, s.u), (through.z1, s.u1), (through.z2, s.u2)))
+        told = "to first order there is one more motion here; the rates are those of the only one that goes on"
+        return self._stated(self.program.kinematics(y, y1, y2, s.p), s.u.size, residual, (*remarks, told))
 
     def at_rates_of(self, state: State) -> State:
         """The state in the same position as another's, with this mechanism's own rates."""

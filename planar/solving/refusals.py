@@ -11,6 +11,7 @@ from planar.pairs import Kind
 from planar.program import length
 from planar.solving.assemble import Failure
 from planar.solving.dependence import conflicting, stuck
+from planar.solving.remedy import remedy
 from planar.solving.setup import Setup
 from planar.words import amount, listed, many
 
@@ -111,7 +112,8 @@ def not_assembled(setup: Setup, failure: Failure) -> NoAnswer:
     """A group that cannot be joined: by how much, and at which pair."""
     stage = failure.stage
     gaps: dict[str, float] = {}
-    for row, left in zip(setup.equations.rows[stage.rows], failure.open, strict=True):
+    still = setup.program.closing(stage)(failure.z, setup.station.u, setup.station.p)[0].full().ravel()
+    for row, left in zip(setup.equations.rows[stage.rows], still, strict=True):
         gaps[row.pair] = float(np.hypot(gaps.get(row.pair, 0.0), left))
     pair = max(gaps, key=lambda name: gaps[name])
     kind = next(row.kind for row in setup.equations.rows[stage.rows] if row.pair == pair)
@@ -120,7 +122,8 @@ def not_assembled(setup: Setup, failure: Failure) -> NoAnswer:
     return NoAnswer(
         Outcome.CANNOT_BE_ASSEMBLED,
         f"{setup.at()} {links} cannot be joined: at the nearest, pair {pair!r} stays open by "
-        f"{amount(gaps[pair] * by, what, setup.mechanism.units)}; change the input or a dimension of {links}",
+        f"{amount(gaps[pair] * by, what, setup.mechanism.units)}; "
+        f"{remedy(setup, failure) or f'change the input or a dimension of {links}'}",
     )
 
 
