@@ -4,6 +4,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from planar.analysis.mobility import Mobility, mobility
+    from planar.document import schema
     from planar.errors import BadInput, NoAnswer, Outcome, PlanarError
     from planar.files import dumps, from_dict, load, loads, to_dict
     from planar.mechanism import Along, At, Distances, Drive, Input, Link, Load, Mechanism, Point
@@ -24,6 +26,7 @@ _ROOMS = {
     "Load": "mechanism",
     "Mechanism": "mechanism",
     "Motion": "motion",
+    "Mobility": "analysis.mobility",
     "NoAnswer": "errors",
     "Outcome": "errors",
     "PlanarError": "errors",
@@ -34,6 +37,8 @@ _ROOMS = {
     "from_dict": "files",
     "load": "files",
     "loads": "files",
+    "mobility": "analysis.mobility",
+    "schema": "document",
     "solve": "solving.position",
     "to_dict": "files",
 }
@@ -49,6 +54,7 @@ __all__ = [
     "Link",
     "Load",
     "Mechanism",
+    "Mobility",
     "Motion",
     "NoAnswer",
     "Outcome",
@@ -60,6 +66,8 @@ __all__ = [
     "from_dict",
     "load",
     "loads",
+    "mobility",
+    "schema",
     "solve",
     "to_dict",
 ]

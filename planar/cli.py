@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import sys
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from planar import __version__
-from planar.errors import BadInput, NoAnswer
+from planar.errors import BadInput, NoAnswer, Outcome
 
 if TYPE_CHECKING:
     from planar.mechanism import Drive, Mechanism
@@ -100,6 +101,80 @@ def solve(model: str, as_json: bool, at: tuple[str, ...], relative: tuple[str, .
     from planar.views.table import solution
 
     _show(solution(state, comparisons, relatives), output)
+
+
+@main.command()
+@click.argument("model")
+@as_json
+@click.option("--steps", default=360, show_default=True, metavar="N", help="Parts that the range is divided into.")
+@click.option("--input", "pair", metavar="PAIR", help="The input that runs, where there are several.")
+@click.option("--from", "start", metavar="POSITION", help="Where the range starts: 30deg, 20mm, or a bare number.")
+@click.option("--to", "stop", metavar="POSITION", help="Where it stops; left out, a turn on, or from limit to limit.")
+@click.option(
+    "-o",
+    "output",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Write all positions, velocities and accelerations to a .csv, .json or .npz file.",
+)
+def cycle(
+    model: str, as_json: bool, steps: int, pair: str | None, start: str | None, stop: str | None, output: Path | None
+) -> None:
+    """The whole motion: position to position through the range of an input."""
+    from planar.files import load, save
+    from planar.solving.cycle import cycle as run
+
+    if as_json and output is not None:
+        raise BadInput("-o", "a run goes to a file or is printed with --json; give one of the two")
+    mechanism = load(model)
+    names = [given.pair for given in mechanism.inputs]
+    pair = pair if pair is not None or len(names) != 1 else names[0]
+    ends = [_position(mechanism, pair, text, option) for option, text in (("--from", start), ("--to", stop))]
+    with _busy(f"{mechanism.name}: {steps} steps"):
+        motion = run(mechanism, steps, ends[0], ends[1], pair)
+    if as_json:
+        from planar.views.run import record
+
+        click.echo(json.dumps(record(motion), ensure_ascii=False, allow_nan=False))
+    elif output is not None:
+        from planar.views.run import written
+
+        save(output, written(motion, output.suffix))
+    else:
+        from planar.views.table import run as table
+
+        _show(table(motion), None)
+    if motion.outcome is not Outcome.SOLVED:
+        click.echo(f"planar: {motion.outcome.value}: {motion.reason}", err=True)
+        sys.exit(NO_ANSWER)
+
+
+def _position(mechanism: Mechanism, pair: str | None, text: str | None, option: str) -> float | None:
+    """An end of a run's range."""
+    from planar.document import read_drive
+
+    if text is None:
+        return None
+    if pair is None:
+        raise BadInput(option, "there are several inputs; name the one that runs with --input")
+    return read_drive(mechanism, pair, text).position
+
+
+def _busy(doing: str) -> AbstractContextManager[Any]:
+    """A sign on a terminal that work is under way."""
+    if not sys.stderr.isatty():
+        return nullcontext()
+    from rich.console import Console
+
+    return Console(stderr=True, markup=False).status(doing)
+
+
+@main.command()
+def schema() -> None:
+    """The JSON schema of mechanism files, which editors can use."""
+    from planar.document import schema as published
+
+    click.echo(json.dumps(published(), ensure_ascii=False, indent=2))
 
 
 @main.command()

@@ -42,10 +42,10 @@ def load(model: str | Path) -> Mechanism:
     return loads(_content(path), str(path))
 
 
-def save(path: Path, text: str) -> None:
-    """Write a text to a file. Raises BadInput."""
+def save(path: Path, content: str | bytes) -> None:
+    """Write a text, or bytes, to a file. Raises BadInput."""
     try:
-        path.write_text(text, encoding="utf-8")
+        path.write_bytes(content.encode() if isinstance(content, str) else content)
     except OSError as problem:
         raise BadInput(str(path), f"the file cannot be written: {problem.strerror}") from None
 

@@ -12,6 +12,7 @@ from typing import NamedTuple
 from planar.errors import BadInput
 from planar.pairs.base import Pair
 from planar.shapes import Along, At, Distances, Link, Place, Point, Shape
+from planar.units import unit
 
 __all__ = [
     "QUANTITIES",
@@ -54,6 +55,10 @@ QUANTITIES = {
     "input torque": "torque",
 }
 """What a published value may be of, and what it is measured in."""
+
+
+FARTHEST = 1e4
+"""rad or m: to where a position is followed step by step, and how far an angle may count."""
 
 
 class Input(NamedTuple):
@@ -143,10 +148,6 @@ class NamedPoint(NamedTuple):
     members: tuple[tuple[str, str], ...]
 
 
-FARTHEST = 1e4
-"""rad or m: to where a position is followed step by step."""
-
-
 def with_inputs(mechanism: Mechanism, drives: tuple[Drive, ...]) -> Mechanism:
     """The same mechanism with some of its inputs changed. Raises BadInput where it has no such input."""
     for drive in drives:
@@ -192,10 +193,10 @@ def check(mechanism: Mechanism) -> None:
             raise BadInput(given.pair, f"there is no pair {given.pair!r} to be driven; pairs are {', '.join(named)}")
 
 
-def misfits(pairs: Sequence[Pair], shapes: Mapping[str, Shape]) -> Iterator[tuple[Pair, str]]:
+def misfits(pairs: Sequence[Pair], shapes: Mapping[str, Shape], units: Units) -> Iterator[tuple[Pair, str]]:
     """Pairs that do not go with the others, each with a sentence."""
     for pair in pairs:
-        wrong = pair.misfit(pairs, shapes)
+        wrong = pair.misfit(pairs, shapes, lambda value: f"{unit(units.length).from_si(value):.6g} {units.length}")
         if wrong is not None:
             yield pair, wrong
 

@@ -342,6 +342,14 @@ class Motion(Moving):
         pair, parts = self._motion(name)
         return pair.report(*self._rows(parts))
 
+    def reported(self, name: str) -> Mapping[str, str]:
+        """What a pair reports, and the kind of quantity that each is."""
+        return self._motions[name].reports
+
+    def slides(self, name: str) -> bool:
+        """Whether the relative motion at a pair is a length."""
+        return self._motions[name].drive_kind is Kind.LENGTH
+
     def _rows(self, parts: Parts) -> tuple[Array, ...]:
         return tuple(np.broadcast_to(part, (len(self),)).copy() for part in parts)
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from planar.mechanism import Mechanism
-from planar.pairs import Pair
+from planar.pairs import Pair, pair_types
 from planar.plane import Frame, Vector, direction, frame_at
 from planar.shapes import shape
 from planar.solving.freedom import strengths
@@ -54,21 +54,66 @@ class Builder:
     def sliding(self, first: str, second: str) -> str:
         name = f"S{len(self.pairs)}"
         at = self._somewhere(first, second)
-        angle, slide = float(self.rng.uniform(-np.pi, np.pi)), float(self.rng.uniform(-0.8, 0.8))
-        through = at - direction(angle) * slide
-        self.links[first]["points"][f"{name}t"] = list(self.frames[first].local(through))
-        self.links[second]["points"][name] = list(self.frames[second].local(at))
-        self.pairs.append(
-            {
-                "sliding": name,
-                "links": [first, second],
-                "line": {"through": f"{name}t", "angle": angle - self.frames[first].angle},
-                "point": name,
-                "turn": self.frames[second].angle - angle,
-            }
-        )
+        self._line("sliding", name, first, second, at)
+        line = self.pairs[-1]["line"]["angle"] + self.frames[first].angle
+        self.pairs[-1]["turn"] = self.frames[second].angle - line
         self.sketch[name] = list(at)
         return name
+
+    def slot(self, first: str, second: str) -> str:
+        name = f"P{len(self.pairs)}"
+        at = self._somewhere(first, second)
+        self._line("slot", name, first, second, at)
+        self.sketch[name] = list(at)
+        return name
+
+    def rack(self, first: str, second: str) -> str:
+        name = f"R{len(self.pairs)}"
+        at = self._somewhere(first, second)
+        radius = float(self.rng.choice([-1.0, 1.0]) * self.rng.uniform(0.1, 0.5))
+        slide = self._line("rack", name, first, second, at, radius)
+        turn = self.frames[second].angle - self.frames[first].angle
+        self.pairs[-1] |= {"radius": radius, "mesh": {"displacement": slide, "angle": turn}}
+        return name
+
+    def _line(self, keyword: str, name: str, first: str, second: str, at: Vector, off: float = 0.0) -> float:
+        """A line of the first link, so far to the right of a point of the second; the point's place along it."""
+        angle, slide = float(self.rng.uniform(-np.pi, np.pi)), float(self.rng.uniform(-0.8, 0.8))
+        way = direction(angle)
+        through = at - way * slide - Vector(-way.y, way.x) * off
+        self.links[first]["points"][f"{name}t"] = list(self.frames[first].local(through))
+        self.links[second]["points"][name] = list(self.frames[second].local(at))
+        line = {"through": f"{name}t", "angle": angle - self.frames[first].angle}
+        self.pairs.append({keyword: name, "links": [first, second], "line": line, "point": name})
+        return slide
+
+    def _wheels(self, keyword: str, first: str, second: str) -> str:
+        name = f"W{len(self.pairs)}"
+        carrier = str(self.rng.choice([link for link in self.frames if link not in (first, second)]))
+        a, b = (self.frames[link].angle - self.frames[carrier].angle for link in (first, second))
+        ratio = float(self.rng.choice([-1.0, 1.0]) * self.rng.uniform(0.4, 2.5))
+        mesh = {first: a, second: b}
+        for link in (first, second, carrier):
+            self.links[link]["points"].setdefault("own", [0.1, 0.2])
+        entry = {keyword: name, "links": [first, second], "carrier": carrier, "ratio": ratio, "mesh": mesh}
+        self.pairs.append(entry)
+        return name
+
+    def gear(self, first: str, second: str) -> str:
+        return self._wheels("gear", first, second)
+
+    def belt(self, first: str, second: str) -> str:
+        return self._wheels("belt", first, second)
+
+    def chain(self, first: str, second: str) -> str:
+        return self._wheels("chain", first, second)
+
+    def higher(self, first: str, second: str) -> str:
+        """Any pair that prevents one motion only."""
+        kinds = [keyword for keyword, kind in pair_types().items() if kind.holds() == 1]
+        if len(self.frames) < 3:
+            kinds = [keyword for keyword in kinds if len(pair_types()[keyword].samples()[0].frames) == 2]
+        return getattr(self, str(self.rng.choice(kinds)))(first, second)
 
     def drive(self, pair: str, first: str, second: str, velocity: float, acceleration: float) -> None:
         if pair[0] == "T":
@@ -103,8 +148,11 @@ class Builder:
         return Built(value, {name: self.frames[name] for name in links})
 
 
-def random_linkage(seed: int, links: int, blur: float = 0.0) -> Built:
-    """A linkage of so many moving links: driven ones, then sets of 2, 4 or 6 links joined in any loops."""
+def random_linkage(seed: int, links: int, blur: float = 0.0, higher: float = 0.0) -> Built:
+    """A linkage of so many moving links: driven ones, then sets of 2, 4 or 6 links joined in any loops.
+
+    `higher` is the share of joints made of higher pairs.
+    """
     rng = np.random.default_rng(seed)
     builder = Builder(rng)
     placed = ["frame"]
@@ -120,7 +168,13 @@ def random_linkage(seed: int, links: int, blur: float = 0.0) -> Built:
         many = int(rng.choice([size for size in (2, 4, 6) if size <= room]))
         new = [builder.link() for _ in range(many)]
         for first, second in _joints(rng, placed, new):
-            (builder.sliding if rng.random() < 0.25 else builder.turning)(first, second)
+            if rng.random() < higher:
+                # in place of a pair that prevents two motions two that prevent one each
+                builder.higher(first, second)
+                other = new[int(rng.integers(len(new)))]
+                builder.higher(str(rng.choice([link for link in (*placed, *new) if link != other])), other)
+            else:
+                (builder.sliding if rng.random() < 0.25 else builder.turning)(first, second)
         placed += new
     return builder.built(blur)
 
@@ -162,19 +216,21 @@ def determinate(mechanism: Mechanism, built: Built) -> bool:
     pairs = {pair.name: pair for pair in mechanism.pairs}
     place = np.array([part for name in moving for part in _frame(built, name)], dtype=complex)
     own = [(pair.name, k) for pair in mechanism.pairs for k in range(len(pair.coordinates))]
-    place = np.concatenate([place, [_displacement(built, pairs[name], numbers[name]) for name, _ in own]])
+    place = np.concatenate([place, *(_own(built, pair, numbers[pair.name]) for pair in mechanism.pairs)])
 
     def left(at: np.ndarray) -> np.ndarray:
         frames = {name: frame_at(*at[3 * k : 3 * k + 3]) for k, name in enumerate(moving)}
         frames[mechanism.frame] = built.frames[mechanism.frame]
-        slides = {name: at[len(place) - len(own) + k] for k, (name, _) in enumerate(own)}
+        slides: dict[str, list] = {name: [] for name in pairs}
+        for k, (name, _) in enumerate(own):
+            slides[name].append(at[len(place) - len(own) + k])
         found = []
         for pair in mechanism.pairs:
             ends = [frames[link] for link in pair.bodies]
-            found += pair.residual(ends, numbers[pair.name], [slides.get(pair.name)])
+            found += pair.residual(ends, numbers[pair.name], slides[pair.name])
         for given in mechanism.inputs:
             pair = pairs[given.pair]
-            found.append(pair.drive([frames[link] for link in pair.bodies], (), [slides.get(pair.name)]))
+            found.append(pair.drive([frames[link] for link in pair.bodies], (), slides[pair.name]))
         return np.array(found)
 
     step = 1e-30
@@ -187,7 +243,10 @@ def _frame(built: Built, name: str) -> tuple[float, float, float]:
     return frame.x, frame.y, frame.angle
 
 
-def _displacement(built: Built, pair: Pair, numbers: Sequence[float]) -> float:
-    first, second = (built.frames[link] for link in pair.links)
-    way = second.carry(Vector(*numbers[4:6])) - first.carry(Vector(*numbers[0:2]))
-    return way.dot(first.turn(Vector(*numbers[2:4])))
+def _own(built: Built, pair: Pair, numbers: Sequence[float]) -> np.ndarray:
+    """The pair's own coordinates where the linkage was built: they enter its residual linearly."""
+    frames = [built.frames[link] for link in pair.bodies]
+    count = len(pair.coordinates)
+    still = np.array(pair.residual(frames, numbers, [0.0] * count))
+    slopes = [np.array(pair.residual(frames, numbers, list(unit))) - still for unit in np.eye(count)]
+    return np.linalg.lstsq(np.array(slopes).T, -still, rcond=None)[0] if count else np.zeros(0)

@@ -14,7 +14,7 @@ from planar.solving.position import Solver
 TEXTBOOK = [file for file in files.model_files() if file.parent.name == "textbook"]
 IDS = [
     *("000-P1", "000-P2", "000-P3", "000-P4", "000-P4-BC480", "000-P5"),
-    *("002-E3.1", "002-E3.2", "002-E3.3", "002-E3.4", "002-E3.5", "002-S3.5"),
+    *("002-E3.1", "002-E3.2", "002-E3.3", "002-E3.4", "002-E3.5", "002-E3.6a", "002-E3.6b", "002-S3.5"),
     *("004-COS", "004-EX-P", "004-EX-piston", "004-FORM", "004-IC", "004-OABQ", "004-QR", "004-SC12", "004-TOGGLE"),
 ]
 every_example = pytest.mark.parametrize("file", TEXTBOOK, ids=lambda file: file.stem)
@@ -127,6 +127,45 @@ def test_quick_return_in_closed_form():
     lever = state.link("CD")
     assert (lever.angular_velocity, lever.angular_acceleration) == pytest.approx((turn, bend), rel=1e-12)
     assert np.linalg.norm(state.relative("A", "C").coriolis) == pytest.approx(abs(2 * turn * slide), rel=1e-12)
+
+
+# The Andrew engine's layouts: Q, height of the guide, first angles of the cranks, side of AB on which C lies.
+ANDREW = {"002-E3.6a": (-0.158, 0.232, 79.2, 208.1, -1), "002-E3.6b": (0.156, 0.254, 99.3, 331.2, 1)}
+
+
+@pytest.mark.parametrize("name", ANDREW)
+@pytest.mark.parametrize("degrees", [0, 57, -200, 360, 1000])
+def test_the_andrew_engine_obeys_its_loop_equations(name, degrees):
+    """Circle intersections, and the loops differentiated by hand; the ratio being no whole number, turns count."""
+    q, guide, first, second, side = ANDREW[name]
+    w = 100 * 2 * np.pi / 60
+    speeds = np.array([w, -2.122 * w])
+    arms = np.array([0.09, 0.045]) * np.exp(1j * np.radians([first + degrees, second - 2.122 * degrees]))
+    (a, b), va, acc = arms + np.array([0, q]), 1j * speeds * arms, -(speeds**2) * arms
+    base = b - a
+    c = (a + b) / 2 + side * 1j * base / abs(base) * np.sqrt(0.185**2 - abs(base) ** 2 / 4)
+    rods = np.array([[1j * (c - a), -1j * (c - b)]])
+    matrix = np.vstack([rods.real, rods.imag])
+
+    def turning(gap):
+        return np.linalg.solve(matrix, [gap.real, gap.imag])
+
+    w_ac, w_bc = turning(va[1] - va[0])
+    e_ac, e_bc = turning(acc[1] - acc[0] + w_ac**2 * (c - a) - w_bc**2 * (c - b))
+    vc, ac = va[0] + 1j * w_ac * (c - a), acc[0] + (1j * e_ac - w_ac**2) * (c - a)
+    cd = np.sqrt(0.24**2 - (guide - c.imag) ** 2) + 1j * (guide - c.imag)
+    w_cd = -vc.imag / cd.real
+    e_cd = -(ac - w_cd**2 * cd).imag / cd.real
+
+    state = planar.solve(planar.load(name), {"O": np.radians(first + degrees)})
+    assert state.link("QB").angle == pytest.approx(np.radians(second - 2.122 * degrees), abs=1e-12)
+    for link, turn, bend in (("AC", w_ac, e_ac), ("BC", w_bc, e_bc), ("CD", w_cd, e_cd)):
+        assert state.link(link).angular_velocity == pytest.approx(turn, rel=1e-11)
+        assert state.link(link).angular_acceleration == pytest.approx(bend, rel=1e-11)
+    d = state.point("D")
+    np.testing.assert_allclose(d.position, [(c + cd).real, guide], atol=1e-14)
+    np.testing.assert_allclose(d.velocity, [(vc + 1j * w_cd * cd).real, 0], atol=1e-12)
+    np.testing.assert_allclose(d.acceleration, [(ac + (1j * e_cd - w_cd**2) * cd).real, 0], atol=1e-10)
 
 
 @pytest.mark.parametrize("file", files.model_files(), ids=lambda file: file.stem)

@@ -1,6 +1,7 @@
 """Mechanism files: JSON value to Mechanism and back."""
 
 from planar.document.reader import read, read_drive
+from planar.document.schema import schema
 from planar.document.writer import write
 
-__all__ = ["read", "read_drive", "write"]
+__all__ = ["read", "read_drive", "schema", "write"]

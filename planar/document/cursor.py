@@ -10,14 +10,12 @@ from functools import cached_property
 from math import isnan
 from typing import Any
 
+from planar.document.schema import FORBIDDEN, HUGE
 from planar.errors import BadInput
-from planar.mechanism import Units
+from planar.mechanism import FARTHEST, Units
 from planar.shapes import Link, shape
 from planar.units import UnitError, example, quantity, unit
 
-FORBIDDEN = ".:,"
-HUGE = 10**100
-"""SI; beyond it squares, and squares of squares, overflow."""
 _JOINERS = {0x200C: None, 0x200D: None}  # invisible, but letters of some scripts need them
 _UNSHOWN = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff]")  # control characters, halves of characters
 
@@ -99,7 +97,7 @@ class Cursor:
 
     def __getitem__(self, key: str) -> Cursor:
         if key not in self.fields():
-            near = did_you_mean(key, self.value, "is written {!r} the key meant?")
+            near = did_you_mean(key, self.value, "is written {!r} the key meant?", 0.75)
             raise self.refuse(None, f"the key {key!r} is missing{near}")
         return replace(self, value=self.value[key], path=self._path(key))
 
@@ -218,7 +216,8 @@ class Cursor:
 
     def counts(self, key: str, count: int) -> tuple[float, ...]:
         for item in self._counted(key, count):
-            if isinstance(item.value, bool) or not isinstance(item.value, int):
+            number = isinstance(item.value, int | float) and not isinstance(item.value, bool)
+            if not number or not item.as_number().is_integer():
                 raise item.refuse(None, f"a whole number is wanted here, not {called(item.value)}")
         return tuple(item.as_number() for item in self[key].items())
 
@@ -234,6 +233,12 @@ class Cursor:
         if not isinstance(self[key].value, bool):
             raise self.refuse(key, f"true or false is wanted here, not {called(self[key].value)}")
         return self[key].value
+
+    def turned(self, key: str) -> float:
+        found = self.quantity(key, "angle")
+        if abs(found) > FARTHEST:
+            raise self.refuse(key, f"an angle counts {FARTHEST:g} rad of turns at most")
+        return found
 
     def optional(self, key: str, kind: str) -> float | None:
         return self[key].as_quantity(kind) if self.has(key) else None
@@ -319,7 +324,7 @@ def called(value: Any) -> str:
     return f"the {name.split()[1]} {text}" if 0 < len(text) < 40 else name
 
 
-def did_you_mean(word: str, known: Any, sentence: str = "did you mean {!r}?") -> str:
+def did_you_mean(word: str, known: Any, sentence: str = "did you mean {!r}?", cutoff: float = 0.6) -> str:
     """A clause that offers the nearest known word, or nothing."""
-    near = get_close_matches(word, list(known), 1) or [each for each in known if each.lower() == word.lower()]
+    near = get_close_matches(word, list(known), 1, cutoff) or [each for each in known if each.lower() == word.lower()]
     return "; " + sentence.format(near[0]) if near else ""

@@ -7,6 +7,21 @@ from dataclasses import replace
 from typing import Any
 
 from planar.document.cursor import Cursor, Whole, called, did_you_mean
+from planar.document.schema import (
+    ALONG,
+    DISTANCES,
+    DRIVE,
+    FORCE,
+    FORMAT,
+    GEOMETRY,
+    INPUT,
+    LINK,
+    PUBLISHED,
+    SENSES,
+    TOP,
+    TORQUE,
+    UNITS,
+)
 from planar.mechanism import (
     QUANTITIES,
     Along,
@@ -29,33 +44,12 @@ from planar.pairs import Kind, Pair, pair_types
 from planar.shapes import Unplaced, shape
 from planar.units import UnitError, unit
 
-FORMAT = 1
-KEYS = (
-    "planar",
-    "name",
-    "ids",
-    "about",
-    "source",
-    "geometry",
-    "notes",
-    "units",
-    "frame",
-    "links",
-    "pairs",
-    "inputs",
-    "loads",
-    "sketch",
-    "published",
-)
-GEOMETRY = ("given", "recovered", "fitted", "underdetermined")
-SENSES = ("clockwise", "anticlockwise", "to the left", "to the right", "upwards", "downwards")
-
 
 def read(value: Any) -> Mechanism:
     """The mechanism that a JSON value describes. Raises BadInput."""
     top = Cursor(value)
     top.only_json()
-    top.only(*KEYS)
+    top.only(*TOP)
     if top["planar"].value != FORMAT or isinstance(top["planar"].value, bool):
         raise top.refuse("planar", f"this is format {called(top['planar'].value)}; planar reads format {FORMAT}")
     units = _units(top)
@@ -95,7 +89,7 @@ def _units(top: Cursor) -> Units:
     if not top.has("units"):
         return Units()
     units = top.inside("units")
-    units.only("length", "angle")
+    units.only(*UNITS)
     found = Units()._asdict()
     for kind in found:
         text = units[kind].as_text() if units.has(kind) else found[kind]
@@ -157,7 +151,7 @@ def _type(entry: Cursor) -> type[Pair]:
 
 def _link(name: str, cursor: Cursor) -> Link:
     cursor.checked_name(name)
-    cursor.only("ends", "length", "points", "axis")
+    cursor.only(*LINK)
     ends, length = _ends(cursor)
     points: list[Point] = []
     for point, place in cursor["points"].members() if cursor.has("points") else ():
@@ -206,12 +200,12 @@ def _place(cursor: Cursor) -> Place:
     if isinstance(cursor.value, list):
         return At(*cursor.as_vector("length"))
     if cursor.has("along"):
-        cursor.only("along", "distance", "angle")
+        cursor.only(*ALONG)
         start, towards = cursor.names("along", 2)
         if start == towards:
             raise cursor.refuse("along", "a direction needs two different points")
         return Along(start, towards, cursor.quantity("distance", "length"), cursor.quantity("angle", "angle", 0.0))
-    cursor.only("distances", "left_of", "right_of")
+    cursor.only(*DISTANCES)
     if not cursor.has("distances"):
         raise cursor.refuse(None, "a point is [x, y], or has 'along' and 'distance', or 'distances' and a side")
     given = cursor["distances"].members()
@@ -252,7 +246,8 @@ def _pairs(top: Cursor) -> tuple[Pair, ...]:
 
 def _fitting(top: Cursor, pairs: list[Pair], places: Mapping[str, str]) -> None:
     """Refuse a pair that does not go with the others."""
-    for pair, wrong in misfits(pairs, {name: shape(link) for name, link in top.whole.links.items()}):
+    shapes = {name: shape(link) for name, link in top.whole.links.items()}
+    for pair, wrong in misfits(pairs, shapes, top.whole.units):
         raise replace(top, path=places[pair.entry_name()]).refuse(None, wrong)
 
 
@@ -272,13 +267,13 @@ def _left_out(top: Cursor, pairs: tuple[Pair, ...]) -> tuple[str, ...]:
 def _inputs(top: Cursor, known: Mapping[str, Pair]) -> tuple[Input, ...]:
     found: dict[str, Input] = {}
     for cursor in top.listed("inputs"):
-        cursor.only("pair", "position", "velocity", "acceleration")
+        cursor.only(*INPUT)
         pair = _motion(cursor["pair"], known)
         if pair.name in found:
             raise cursor.refuse("pair", f"pair {pair.name!r} has an input already; a pair takes one")
         found[pair.name] = Input(
             pair.name,
-            cursor.quantity("position", _kinds(pair)[0]),
+            cursor.quantity("position", "length") if pair.drive_kind is Kind.LENGTH else cursor.turned("position"),
             cursor.quantity("velocity", _kinds(pair)[1], 0.0),
             cursor.quantity("acceleration", _kinds(pair)[2], 0.0),
         )
@@ -324,7 +319,7 @@ def _result_point(cursor: Cursor, name: str, points: Mapping[str, str]) -> str:
 def _load(cursor: Cursor, points: Mapping[str, str]) -> Load:
     if cursor.has("point") == cursor.has("link"):
         raise cursor.refuse(None, "a load is a 'force' at a 'point' or a 'torque' on a 'link'")
-    cursor.only(*(("point", "force") if cursor.has("point") else ("link", "torque")))
+    cursor.only(*(FORCE if cursor.has("point") else TORQUE))
     if cursor.has("point"):
         point = _result_point(cursor["point"], cursor["point"].as_text(), points)
         return Load(point=point, force=cursor["force"].as_vector("force"))
@@ -364,7 +359,7 @@ def _drives(cursor: Cursor, key: str, mechanism: Mechanism) -> tuple[Drive, ...]
     for name, drive in cursor[key].members():
         if name not in known:
             raise drive.refuse(None, f"there is no input at {name!r}{did_you_mean(name, known)}")
-        drive.only("position", "velocity", "acceleration")
+        drive.only(*DRIVE)
         kinds = _kinds(known[name])
         found.append(
             Drive(
@@ -378,7 +373,7 @@ def _drives(cursor: Cursor, key: str, mechanism: Mechanism) -> tuple[Drive, ...]
 
 
 def _published(cursor: Cursor, mechanism: Mechanism, points: Mapping[str, str]) -> Published:
-    cursor.only(*(set(Published._fields) - {"start"}), "from")
+    cursor.only(*PUBLISHED)
     quantity = cursor["quantity"].as_text()
     if quantity not in QUANTITIES:
         raise cursor.refuse("quantity", f"{quantity!r} is no quantity{did_you_mean(quantity, QUANTITIES)}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from planar.document.reader import FORMAT
+from planar.document.schema import FORMAT
 from planar.mechanism import QUANTITIES, Drive, Link, Mechanism, Published, entries, motions
 from planar.pairs import Kind, Quantity
 from planar.shapes import Along, At, Place

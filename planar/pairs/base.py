@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any, ClassVar, NamedTuple, Protocol, Self
@@ -11,6 +11,9 @@ from typing import Any, ClassVar, NamedTuple, Protocol, Self
 from planar.algebra import Scalar
 from planar.plane import Frame, Vector
 from planar.shapes import Shape
+
+Told = Callable[[float], str]
+"""Says an SI number in the units of a file."""
 
 
 class Kind(Enum):
@@ -43,8 +46,12 @@ class Pair(ABC):
     """The other keys of its entry, each with what JSON Schema says of its value."""
     required: ClassVar[tuple[str, ...]] = ()
     """Those of the keys that cannot be left out."""
+    rule: ClassVar[Schema] = {}
+    """What JSON Schema says of the keys together."""
     lower: ClassVar[bool]
     """Whether the links touch along a surface; higher pairs touch at a point or along a line."""
+    touching: ClassVar[str] = ""
+    """What to know of a contact that is open, see `apart`."""
     counts_turns: ClassVar[bool] = False
     """Whether the angles of its bodies count whole turns."""
     constrains: ClassVar[tuple[Kind, ...]]
@@ -96,7 +103,7 @@ class Pair(ABC):
         """How many of the three relative motions of two links it prevents."""
         return len(cls.constrains) - len(cls.coordinates)
 
-    def misfit(self, beside: Sequence[Pair], shapes: Mapping[str, Shape]) -> str | None:
+    def misfit(self, beside: Sequence[Pair], shapes: Mapping[str, Shape], length: Told) -> str | None:
         """What is wrong with it beside all pairs of its mechanism, as a sentence."""
         return None
 
@@ -219,6 +226,9 @@ class Entry(Protocol):
 
     def counts(self, key: str, count: int) -> tuple[float, ...]:
         """So many whole numbers."""
+
+    def turned(self, key: str) -> float:
+        """An angle (rad) that may count turns, not so many that nothing is left of the angle."""
 
     def flag(self, key: str) -> bool:
         """True or false; false where the key is left out."""

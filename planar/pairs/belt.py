@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 from planar.algebra import Scalar
-from planar.pairs.base import Entry, Quantity, Sample, Schema
+from planar.pairs.base import Entry, Quantity, Sample, Schema, Told
 from planar.pairs.wheels import Wheels
 
 
@@ -25,13 +25,13 @@ class Belt(Wheels):
             return self.sizes[0]
         return (-1.0 if self.crossed else 1.0) * self.sizes[0] / self.sizes[1]
 
-    def _misplaced(self, apart: float) -> str | None:
+    def _misplaced(self, apart: float, length: Told) -> str | None:
         r, s = self.sizes
         least = r + s if self.crossed else abs(r - s)
         if apart > least:
             return None
         how = "crossed" if self.crossed else "open"
-        return f"the centres are {apart:.6g} m apart; wheels of these radii need more than {least:.6g} m ({how})"
+        return f"the centres are {length(apart)} apart; wheels of these radii need more than {length(least)} ({how})"
 
     @classmethod
     def read(cls, entry: Entry) -> tuple[Self, ...]:

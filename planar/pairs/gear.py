@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from planar.algebra import Scalar
-from planar.pairs.base import Entry, Sample
+from planar.pairs.base import Entry, Sample, Told
 from planar.pairs.wheels import NEAR, Wheels
 
 
@@ -19,20 +19,20 @@ class Gear(Wheels):
     def ratio(self) -> Scalar:
         return self.sizes[0] if self.by == "ratio" else -self.sizes[0] / self.sizes[1]
 
-    def _misplaced(self, apart: float) -> str | None:
+    def _misplaced(self, apart: float, length: Told) -> str | None:
         wanted = abs(self.sizes[0] + self.sizes[1])
         if abs(apart - wanted) <= NEAR * max(apart, wanted):
             return None
-        return f"wheels of these radii mesh with centres {wanted:.6g} m apart, but theirs are {apart:.6g} m apart"
+        return f"wheels of these radii mesh with centres {length(wanted)} apart, but theirs are {length(apart)} apart"
 
     @classmethod
     def read(cls, entry: Entry) -> tuple[Gear, ...]:
         entry.only(cls.keyword, *cls.members)
         name, links, carrier, by, sizes, meet = cls._common(entry)
-        if by != "ratio" and sum(sizes) == 0.0:
-            raise entry.refuse(by, "a wheel and an internal wheel of the same size coincide; they cannot mesh")
         if by != "ratio" and max(sizes) < 0.0:
             raise entry.refuse(by, "both wheels are internal (negative); one at least has teeth on its outside")
+        if by != "ratio" and min(sizes) < 0.0 <= sum(sizes):
+            raise entry.refuse(by, "an internal wheel (negative) is larger than the wheel that runs in it")
         return (cls(name, links, carrier, by, sizes, meet),)
 
     @classmethod

@@ -27,7 +27,7 @@ class Rack(Guided):
 
     keyword: ClassVar[str] = "rack"
     members: ClassVar[Mapping[str, Schema]] = {
-        "links": several("name", 2, 2),
+        "links": several("name", 2, 2) | {"uniqueItems": True},
         "line": LINE,
         "point": described("name"),
         "radius": described("length"),
@@ -39,6 +39,9 @@ class Rack(Guided):
         },
     }
     required: ClassVar[tuple[str, ...]] = ("links", "line", "point", "radius")
+    touching: ClassVar[str] = (
+        "the centre lies left of the line for a radius above zero, right for one below"
+    )
     lower: ClassVar[bool] = False
     counts_turns: ClassVar[bool] = True
     constrains: ClassVar[tuple[Kind, ...]] = (Kind.LENGTH, Kind.LENGTH, Kind.LENGTH)
@@ -72,7 +75,7 @@ class Rack(Guided):
         if entry.has("mesh"):
             mesh = entry.inside("mesh")
             mesh.only("displacement", "angle")
-            meet = (mesh.quantity("displacement", "length"), mesh.quantity("angle", "angle"))
+            meet = (mesh.quantity("displacement", "length"), mesh.turned("angle"))
         return (cls(name, links, line, point, radius, meet),)
 
     @classmethod

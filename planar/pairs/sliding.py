@@ -25,7 +25,7 @@ class Sliding(Guided):
 
     keyword: ClassVar[str] = "sliding"
     members: ClassVar[Mapping[str, Schema]] = {
-        "links": several("name", 2, 2),
+        "links": several("name", 2, 2) | {"uniqueItems": True},
         "on": described("name"),
         "block": described("name"),
         "line": LINE,
@@ -33,6 +33,12 @@ class Sliding(Guided):
         "turn": described("angle"),
     }
     required: ClassVar[tuple[str, ...]] = ("line",)
+    rule: ClassVar[Schema] = {
+        "oneOf": [
+            {"required": ["on", "block"], "not": {"anyOf": [{"required": ["links"]}, {"required": ["point"]}]}},
+            {"required": ["links", "point"], "not": {"anyOf": [{"required": ["on"]}, {"required": ["block"]}]}},
+        ]
+    }
     lower: ClassVar[bool] = True
     constrains: ClassVar[tuple[Kind, ...]] = (Kind.LENGTH, Kind.LENGTH, Kind.ANGLE)
     measures: ClassVar[tuple[Kind, ...]] = (*MEASURES, Kind.LENGTH, Kind.LENGTH, Kind.ANGLE)

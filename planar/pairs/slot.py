@@ -19,7 +19,7 @@ class Slot(Guided):
 
     keyword: ClassVar[str] = "slot"
     members: ClassVar[Mapping[str, Schema]] = {
-        "links": several("name", 2, 2),
+        "links": several("name", 2, 2) | {"uniqueItems": True},
         "line": LINE,
         "point": described("name"),
     }

@@ -23,11 +23,12 @@ class Turning(Pair):
 
     keyword: ClassVar[str] = "turning"
     members: ClassVar[Mapping[str, Schema]] = {
-        "links": several("name", 2),
+        "links": several("name", 2) | {"uniqueItems": True},
         "points": several("name", 2),
         "pin_radius": described("size"),
         "pin_diameter": described("size"),
     }
+    rule: ClassVar[Schema] = {"not": {"required": ["pin_radius", "pin_diameter"]}}
     lower: ClassVar[bool] = True
     constrains: ClassVar[tuple[Kind, ...]] = (Kind.LENGTH, Kind.LENGTH)
     measures: ClassVar[tuple[Kind, ...]] = (Kind.LENGTH,) * 4

@@ -9,10 +9,11 @@ from math import hypot
 from typing import Any, ClassVar, Self
 
 from planar.algebra import Scalar
-from planar.pairs.base import Entry, Kind, Pair, Quantity, Sample, Schema, described, plain, several
+from planar.pairs.base import Entry, Kind, Pair, Quantity, Sample, Schema, Told, described, plain, several
 from planar.plane import Frame, Vector, frame_at
 from planar.shapes import Shape
 
+STEEPEST = 1e6
 SIZES = ("radii", "teeth", "ratio")
 NEAR = 1e-6
 """Centres are where the radii put them within this part of their distance: dimensions in files are rounded."""
@@ -31,7 +32,7 @@ class Wheels(Pair):
     meet: tuple[float, float] = (0.0, 0.0)
 
     members: ClassVar[Mapping[str, Schema]] = {
-        "links": several("name", 2, 2),
+        "links": several("name", 2, 2) | {"uniqueItems": True},
         "carrier": described("name"),
         "radii": several("length", 2, 2),
         "teeth": {"type": "array", "items": {"type": "integer", "not": {"const": 0}}, "minItems": 2, "maxItems": 2},
@@ -44,6 +45,7 @@ class Wheels(Pair):
         },
     }
     required: ClassVar[tuple[str, ...]] = ("links",)
+    rule: ClassVar[Schema] = {"oneOf": [{"required": [key]} for key in SIZES]}
     lower: ClassVar[bool] = False
     counts_turns: ClassVar[bool] = True
     constrains: ClassVar[tuple[Kind, ...]] = (Kind.TURNS,)
@@ -78,21 +80,24 @@ class Wheels(Pair):
     def report(self, position: Scalar, rate: Scalar, second: Scalar) -> dict[str, Scalar | None]:
         return dict(zip(self.reports, (position, rate, second), strict=True))
 
-    def misfit(self, beside: Sequence[Pair], shapes: Mapping[str, Shape]) -> str | None:
+    def misfit(self, beside: Sequence[Pair], shapes: Mapping[str, Shape], length: Told) -> str | None:
         if self.by != "radii":
             return None
+        pins: dict[str, dict[str, str]] = {}
+        for pair in beside:  # a pin of n links is several pairs
+            pins.setdefault(pair.entry_name(), {}).update(pair.coincident())
         centres = []
         for wheel in self.links:
-            pins = (dict(pair.coincident()) for pair in beside)
-            centre = next((pin[self.carrier] for pin in pins if wheel in pin and self.carrier in pin), None)
+            both = (pin for pin in pins.values() if wheel in pin and self.carrier in pin)
+            centre = next((pin[self.carrier] for pin in both), None)
             if centre is None:
                 return f"wheels with radii turn in their carrier, but link {wheel!r} is not pinned to {self.carrier!r}"
             centres.append(shapes[self.carrier].at(centre))
         apart = centres[1] - centres[0]
-        return self._misplaced(hypot(apart.x, apart.y))
+        return self._misplaced(hypot(apart.x, apart.y), length)
 
     @abstractmethod
-    def _misplaced(self, apart: float) -> str | None:
+    def _misplaced(self, apart: float, length: Told) -> str | None:
         """What is wrong with wheels of these radii whose centres are so far apart (m)."""
 
     @classmethod
@@ -110,6 +115,8 @@ class Wheels(Pair):
             sizes = entry.counts("teeth", 2)
         if not all(sizes):
             raise entry.refuse(by, "zero is no size of a wheel")
+        if not 1.0 / STEEPEST <= abs(sizes[0] / (sizes[1] if len(sizes) > 1 else 1.0)) <= STEEPEST:
+            raise entry.refuse(by, f"a ratio beyond {STEEPEST:g} is none that wheels have")
         return by, sizes
 
     @classmethod
@@ -126,8 +133,10 @@ class Wheels(Pair):
         meet = (0.0, 0.0)
         if entry.has("mesh"):
             mesh = entry.inside("mesh")
-            mesh.only(*links)
-            meet = (mesh.quantity(links[0], "angle"), mesh.quantity(links[1], "angle"))
+            for key in mesh.fields():
+                if key not in links:
+                    raise mesh.refuse(key, f"{key!r} is neither of the wheels {links[0]!r} and {links[1]!r}")
+            meet = (mesh.turned(links[0]), mesh.turned(links[1]))
         return name, links, carrier, by, sizes, meet
 
     @classmethod

@@ -11,7 +11,7 @@ from planar.mechanism import counting, named_points
 from planar.pairs import Kind
 from planar.plane import Vector
 from planar.program import length, placed
-from planar.solving.newton import Closing, Found, newton, polished
+from planar.solving.newton import CLOSED, Closing, Found, newton, polished
 from planar.solving.setup import Setup
 
 Array = np.ndarray
@@ -93,7 +93,10 @@ class Candidates:
 
     def _candidates(self, stage: Stage, z: Array, closing: Closing, closed: Array) -> list[Candidate]:
         if self.counts:
-            # of angles that differ by turns alone, and leave everything where it is, those nearest to none
+            # angles take the turn nearest to none, wherever Newton's method wandered, if that is closed too
+            least = np.where(self._is_angle(stage), np.arctan2(np.sin(closed), np.cos(closed)), closed)
+            still = np.abs(closing(least)[0]).max(axis=1, initial=0.0) < CLOSED if len(closed) else closed
+            closed = np.where(still[:, None], least, closed) if len(closed) else closed
             closed = closed[np.argsort(np.abs(closed).sum(axis=1), kind="stable")]
         roots: list[Array] = []
         for root in closed:

@@ -19,7 +19,7 @@ STEP = 1e-30
 CLOSED, ROUNDED = 1e-10, 1e-15
 LONGEST = 100
 """Iterations: where constraints only just touch, the error halves each time."""
-TRIES = 24
+TRIES = 8
 """Starts from which a linkage is joined that its inputs do not determine."""
 SINGULAR = 1e-6
 """A singular value below this part of the greatest is zero: where constraints touch, rounding leaves about 1e-8."""

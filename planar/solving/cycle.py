@@ -140,7 +140,7 @@ class _Runner:
                     f"on the way the {what} break pair {pair!r} by {broken:.2g} of the greatest; name a smaller range"
                 )
                 raise NoAnswer(Outcome.DEAD_POINT, told)
-        solver.refuse_gap(own)
+        solver.refuse_gap(frames, own)
         outcome, reason = Outcome.SOLVED, ""
         if found.stopped is not None:
             outcome, reason = found.stopped.outcome, found.stopped.reason

@@ -10,13 +10,15 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from planar.algebra import Jet, Scalar
+from planar.algebra import Jet
 from planar.mechanism import Mechanism, motions
 from planar.pairs import Kind, Pair
 from planar.plane import Frame
 from planar.shapes import Shape
 
 Array = np.ndarray
+MOST_TURNS = 1e6
+"""Turns, or sizes: beyond them rounding leaves too little of an angle to judge anything by."""
 TOUCHING = 1e-6
 """Sizes: dimensions in files are rounded, so a contact that guides keep closed may be open by as much."""
 EPS = float(np.finfo(float).eps)
@@ -56,13 +58,23 @@ class Gate:
         counted += [np.abs(length) / self.unit for lengths in own.values() for length in lengths]
         many = np.fmax.reduce(np.broadcast_arrays(2.0 * np.pi, *counted)) / (2.0 * np.pi)
         many = np.where(np.isfinite(many), many, 1.0)
+        many = np.where(many > MOST_TURNS, 1e-300, many)
         return np.nan_to_num(np.array(np.broadcast_arrays(*gaps)) / many, nan=np.inf, posinf=np.inf)
 
-    def apart(self, own: Mapping[str, Sequence[Scalar]]) -> tuple[float, str] | None:
-        """The widest gap (m) at a contact that guides have to keep closed and do not, with its pair."""
-        gaps = [(_value(pair.apart(self.numbers[pair.name], own[pair.name])), pair) for pair in self.mechanism.pairs]
-        widest, pair = max(((float(np.max(np.abs(gap))), pair.name) for gap, pair in gaps), default=(0.0, ""))
-        return (widest, pair) if widest > TOUCHING * self.unit else None
+    def apart(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Jet]]) -> tuple[str, float] | None:
+        """The first contact that guides have to keep closed and do not: its pair and the gap (m).
+
+        No gap but a rate of it: the contact is closed in passing only.
+        """
+        for pair in self.mechanism.pairs:
+            gap = pair.apart(self.numbers[pair.name], own[pair.name])
+            if not isinstance(gap, Jet):
+                continue
+            for order, part in enumerate(gap.parts):
+                scale = self.unit * (self._greatest(frames, own, order) if order else 1.0)
+                if np.nanmax(np.abs(part) / scale, initial=0.0) > TOUCHING:
+                    return pair.name, float(np.max(np.abs(gap.parts[0])))
+        return None
 
     def rate_gaps(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Jet]]) -> list[tuple[Array, str]]:
         """How far velocities, then accelerations, break the worst constraint, as a part of the greatest; its pair.
@@ -105,10 +117,6 @@ class Gate:
             pair = self.motions[given.pair]
             drive = pair.drive([frames[link] for link in pair.bodies], self.numbers[pair.name], own.get(pair.name, ()))
             yield pair.drive_kind, drive - (given.position if u is None else u[index])
-
-
-def _value(gap: Scalar) -> Scalar:
-    return gap.parts[0] if isinstance(gap, Jet) else gap
 
 
 def _lengths(pair: Pair, numbers: Sequence[float]) -> list[float]:

@@ -11,6 +11,7 @@ from planar.algebra import Jet
 from planar.errors import NoAnswer
 from planar.mechanism import Drive, Mechanism, with_inputs
 from planar.motion import State
+from planar.plane import Frame
 from planar.program import Rates, length, placed, program
 from planar.solving import refusals
 from planar.solving.assemble import Assembly, Failure, search
@@ -115,9 +116,9 @@ class Solver(Setup):
         w = np.array([parts[c.owner, c.part].parts[0] for c in self.equations.coordinates]) / self.scale
         return self.state(w[list(self.equations.unknowns)], state.remarks)
 
-    def refuse_gap(self, own: Mapping[str, Sequence[Jet]]) -> None:
+    def refuse_gap(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Jet]]) -> None:
         """Raise NoAnswer where a contact is open that guides should keep closed."""
-        gap = self.gate.apart(own)
+        gap = self.gate.apart(frames, own)
         if gap is not None:
             raise refusals.no_contact(self, *gap)
 
@@ -130,5 +131,5 @@ class Solver(Setup):
                 if self.station.u.size > found:
                     raise refusals.disagreeing(self, found, what)
                 raise refusals.broken_rates(self, what, pair, float(np.max(gap)))
-        self.refuse_gap(own)
+        self.refuse_gap(frames, own)
         return State(self.mechanism, found, residual, remarks, frames, own, self.shapes)

@@ -11,6 +11,7 @@ from planar.pairs import Kind
 from planar.program import length
 from planar.solving.assemble import Failure
 from planar.solving.dependence import conflicting, stuck
+from planar.solving.gate import TOUCHING
 from planar.solving.remedy import remedy
 from planar.solving.setup import Setup
 from planar.words import amount, listed, many
@@ -99,12 +100,15 @@ def not_closed(setup: Setup, pair: str, gap: float) -> NoAnswer:
     )
 
 
-def no_contact(setup: Setup, gap: float, pair: str) -> NoAnswer:
+def no_contact(setup: Setup, pair: str, gap: float) -> NoAnswer:
     """A contact that the pair does not keep closed by itself, and that nothing else does."""
+    apart = amount(gap, "length", setup.mechanism.units)
+    told = f"are {apart} from touching" if gap > TOUCHING * setup.unit else "touch in passing only"
+    known = setup.pairs[pair].touching
     return NoAnswer(
         Outcome.CANNOT_BE_ASSEMBLED,
-        f"{setup.at()} {_links(setup.pairs[pair].links)} of pair {pair!r} are "
-        f"{amount(gap, 'length', setup.mechanism.units)} from touching; let pins or guides keep them in contact",
+        f"{setup.at()} {_links(setup.pairs[pair].links)} of pair {pair!r} {told}; let pins or guides keep them in "
+        f"contact{f' ({known})' if known else ''}",
     )
 
 
@@ -118,7 +122,7 @@ def not_assembled(setup: Setup, failure: Failure) -> NoAnswer:
     pair = max(gaps, key=lambda name: gaps[name])
     kind = next(row.kind for row in setup.equations.rows[stage.rows] if row.pair == pair)
     by, what = (setup.unit, "length") if kind is Kind.LENGTH else (1.0, "angle")
-    links = _links(stage.links) if stage.links else "the links"
+    links = _links(stage.links or setup.pairs.get(pair, setup.named[pair]).links)
     return NoAnswer(
         Outcome.CANNOT_BE_ASSEMBLED,
         f"{setup.at()} {links} cannot be joined: at the nearest, pair {pair!r} stays open by "

@@ -32,7 +32,7 @@ class Setup:
         check(mechanism)
         self.mechanism = mechanism
         self.shapes = shapes(mechanism)
-        for pair, wrong in misfits(mechanism.pairs, self.shapes):
+        for pair, wrong in misfits(mechanism.pairs, self.shapes, mechanism.units):
             raise BadInput(pair.name, wrong)
         self.unit = size(mechanism, self.shapes)
         self.program: Program = program(mechanism)

@@ -14,7 +14,7 @@ from rich.text import Text
 from planar.analysis.published import Comparison
 from planar.analysis.speed import Speed
 from planar.mechanism import QUANTITIES, motions
-from planar.motion import RelativeState, State
+from planar.motion import Motion, RelativeState, State
 from planar.pairs import Pair
 from planar.units import SI, Unit, unit
 from planar.words import amount, listed
@@ -100,6 +100,28 @@ def speeds(measured: Iterable[Speed]) -> RenderableType:
         table.add_row(each.name, str(each.links), str(each.unknowns), *(_time(seconds) for seconds in times))
     note = "run: 360 steps through the gate; equations are built once for a structure"
     return Group(table, Text(note, style="italic"))
+
+
+def run(motion: Motion) -> RenderableType:
+    """A run: its range, and for every point where it went and how fast it was at the most, among the positions."""
+    units = motion.mechanism.units
+    lines = [Text(motion.mechanism.name, style="bold")]
+    for name, given in motion.inputs.items():
+        kind = "length" if motion.slides(name) else "angle"
+        first, last = (amount(float(given.position[k]), kind, units) for k in (0, -1))
+        lines.append(Text(f"{name} from {first} to {last}" if first != last else f"{name} = {first}, held"))
+    worst = f"worst residual {motion.residual:.1e} of the mechanism's size"
+    lines.append(Text(f"{len(motion)} positions; {worst}" + (f"; {motion.reason}" if motion.reason else "")))
+    heads = (f"x from, {units.length}", f"x to, {units.length}", f"y from, {units.length}", f"y to, {units.length}")
+    table = _table("Points, among these positions", "point", *heads, "velocity up to, m/s", "acceleration up to, m/s²")
+    length = unit(units.length)
+    for name, point in motion.points.items():
+        ends = [length.from_si(float(end)) for values in point.position.T for end in (values.min(), values.max())]
+        greatest = [np.hypot(*rate.T) for rate in (point.velocity, point.acceleration)]
+        rates = ["-" if np.isnan(rate).all() else _number(float(np.nanmax(rate))) for rate in greatest]
+        table.add_row(name, *map(_number, ends), *rates)
+    notes = [_paragraphs(("-", remark) for remark in motion.remarks)] if motion.remarks else []
+    return Group(*lines, Text(), table, *notes)
 
 
 def _time(seconds: float) -> str:
