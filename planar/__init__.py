@@ -4,6 +4,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from planar.analysis.inspection import Inspection, inspect
     from planar.analysis.mobility import Mobility, mobility
     from planar.document import schema
     from planar.errors import BadInput, NoAnswer, Outcome, PlanarError
@@ -22,6 +23,7 @@ _ROOMS = {
     "Distances": "mechanism",
     "Drive": "mechanism",
     "Input": "mechanism",
+    "Inspection": "analysis.inspection",
     "Link": "mechanism",
     "Load": "mechanism",
     "Mechanism": "mechanism",
@@ -35,6 +37,7 @@ _ROOMS = {
     "cycle": "solving.cycle",
     "dumps": "files",
     "from_dict": "files",
+    "inspect": "analysis.inspection",
     "load": "files",
     "loads": "files",
     "mobility": "analysis.mobility",
@@ -51,6 +54,7 @@ __all__ = [
     "Distances",
     "Drive",
     "Input",
+    "Inspection",
     "Link",
     "Load",
     "Mechanism",
@@ -64,6 +68,7 @@ __all__ = [
     "cycle",
     "dumps",
     "from_dict",
+    "inspect",
     "load",
     "loads",
     "mobility",

@@ -149,6 +149,27 @@ def cycle(
         sys.exit(NO_ANSWER)
 
 
+@main.command()
+@click.argument("model")
+@as_json
+def inspect(model: str, as_json: bool) -> None:
+    """What it is: links, pairs, chain, mobility, motions, names."""
+    from planar.analysis.inspection import inspect as inspected
+    from planar.files import load
+
+    mechanism = load(model)
+    with _busy(mechanism.name):
+        found = inspected(mechanism)
+    if as_json:
+        from dataclasses import asdict
+
+        click.echo(json.dumps(asdict(found), ensure_ascii=False))
+        return
+    from planar.views.inspected import inspection
+
+    _show(inspection(found), None)
+
+
 def _position(mechanism: Mechanism, pair: str | None, text: str | None, option: str) -> float | None:
     """An end of a run's range."""
     from planar.document import read_drive

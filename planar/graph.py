@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import combinations
+from typing import NamedTuple
+
 import networkx as nx
 
-from planar.mechanism import Mechanism, entries
+from planar.mechanism import Mechanism, entries, motions
+from planar.pairs import Kind, Pair
 
 
 def linkage(mechanism: Mechanism) -> nx.Graph:
@@ -33,3 +38,108 @@ def farthest_first(mechanism: Mechanism, name: str) -> tuple[str, ...]:
     away = nx.single_source_shortest_path_length(linkage(mechanism), ("pair", entry_of[name]))
     others = [other for other in entry_of if other != name]
     return tuple(sorted(others, key=lambda other: -away.get(("pair", entry_of[other]), 0)))
+
+
+class Figure(NamedTuple):
+    """A chain by its joints alone: of each its kind and the links that meet in it; the fixed link where it matters."""
+
+    joints: tuple[tuple[Kind, tuple[str, ...]], ...]
+    frame: str | None = None
+
+
+class Likeness(NamedTuple):
+    """Which link, and which joint by its index, of a second figure stands for each of a first one."""
+
+    links: Mapping[str, str]
+    joints: Mapping[int, int]
+
+
+def likenesses(first: Figure, second: Figure) -> Iterator[Likeness]:
+    """Every way in which two figures are the same but for names: joint for joint of one kind, frame for frame."""
+    if len(first.joints) != len(second.joints):
+        return
+    a, b = _marked(first), _marked(second)
+    marks = (sorted((graph.degree(node), mark) for node, mark in graph.nodes(data="mark")) for graph in (a, b))
+    if next(marks) != next(marks):
+        return
+    matcher = nx.isomorphism.GraphMatcher(a, b, node_match=lambda one, other: one["mark"] == other["mark"])
+    for found in matcher.isomorphisms_iter():
+        links = {name: found[what, name][1] for what, name in found if what == "link"}
+        yield Likeness(links, {index: found[what, index][1] for what, index in found if what == "pair"})
+
+
+def _marked(figure: Figure) -> nx.Graph:
+    graph = nx.Graph()
+    for index, (kind, links) in enumerate(figure.joints):
+        graph.add_node(("pair", index), mark=kind.value)
+        for link in links:
+            graph.add_node(("link", link), mark="frame" if link == figure.frame else "link")
+            graph.add_edge(("pair", index), ("link", link))
+    return graph
+
+
+def joined(figure: Figure, links: Sequence[str]) -> bool:
+    """Whether each of these links is joined to all the others."""
+    graph = _marked(figure)
+    return bool(graph) and nx.is_connected(graph) and all(("link", link) in graph for link in links)
+
+
+def loops(figure: Figure) -> int:
+    """How many independent loops the links make."""
+    graph = _marked(figure)
+    return graph.number_of_edges() - graph.number_of_nodes() + nx.number_connected_components(graph)
+
+
+def trees(links: Sequence[str]) -> tuple[tuple[tuple[str, str], ...], ...]:
+    """Every choice of n - 1 pairs that a pin of n links may stand for."""
+    choices = combinations(tuple(combinations(links, 2)), len(links) - 1)
+    return tuple(pairs for pairs in choices if len({*sum(pairs, ())}) == len(links) and nx.is_forest(nx.Graph(pairs)))
+
+
+def numbered(mechanism: Mechanism) -> dict[str, str]:
+    """The number of each link in the manner of textbooks: 1 drives, 2 is joined to it and so on; the frame is last.
+
+    Breadth first over the moving links, links alike in that in the order of the file. What drives is the link that
+    the first input moves: on the frame the other one, else the second; without inputs it is the file's first.
+    """
+    place = {link.name: index for index, link in enumerate(mechanism.links) if link.name != mechanism.frame}
+    graph = nx.Graph()
+    graph.add_nodes_from(place)
+    for group in entries(mechanism):
+        graph.add_edges_from(combinations(_meeting(group, place), 2))
+    named = motions(mechanism)
+    driven = [link for given in mechanism.inputs[:1] for link in reversed(named[given.pair].links) if link in place]
+    order: dict[str, None] = {}
+    for start in (*driven[:1], *place):
+        if start not in order:
+            ways = nx.bfs_edges(graph, start, sort_neighbors=lambda links: sorted(links, key=place.__getitem__))
+            order |= dict.fromkeys((start, *(link for _, link in ways)))
+    return {link: str(number) for number, link in enumerate((*order, mechanism.frame), start=1)}
+
+
+def pair_words(mechanism: Mechanism) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """The pairs of each type as textbooks list them: ("turning", ("O-1", "1-2", "2-3")), ("sliding", ("3-4",)).
+
+    A turning pair on the frame is written with its pin's name in place of the frame's number. A pin of n links
+    stands for n - 1 pairs: of the frame, else of its link of the lowest number, with each of the others.
+    """
+    number = {link: int(text) for link, text in numbered(mechanism).items()}
+    last = number[mechanism.frame]
+    found: dict[tuple[bool, str, str], list[tuple[tuple[int, int], str]]] = {}
+    for group in entries(mechanism):
+        pair = group[0]
+        hub, *others = sorted(number[link] for link in _meeting(group, number))
+        if others[-1] == last:
+            hub, others = last, [hub, *others[:-1]]
+        for other in others:
+            low, high = sorted((hub, other))
+            pinned = high == last and pair.lower and pair.drive_kind is Kind.ANGLE
+            key = (low, high) if high == last else (high, low)
+            text = f"{pair.entry_name()}-{low}" if pinned else f"{low}-{high}"
+            found.setdefault((not pair.lower, pair.drive_kind.value, pair.keyword), []).append((key, text))
+    return tuple((kind[-1], tuple(text for _, text in sorted(found[kind]))) for kind in sorted(found))
+
+
+def _meeting(group: Sequence[Pair], among: Mapping[str, int]) -> tuple[str, ...]:
+    """Those of some links that meet in an entry's pairs."""
+    return tuple(dict.fromkeys(link for pair in group for link in pair.links if link in among))

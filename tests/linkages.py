@@ -73,7 +73,12 @@ class Builder:
         radius = float(self.rng.choice([-1.0, 1.0]) * self.rng.uniform(0.1, 0.5))
         slide = self._line("rack", name, first, second, at, radius)
         turn = self.frames[second].angle - self.frames[first].angle
-        self.pairs[-1] |= {"radius": radius, "mesh": {"displacement": slide, "angle": turn}}
+        rack = self.pairs[-1]
+        rack |= {"radius": radius, "mesh": {"displacement": slide, "angle": turn}}
+        # a guide along the pitch line keeps the centre at its distance
+        local = list(self.frames[first].local(at))
+        guide = {"through": local, "angle": rack["line"]["angle"]}
+        self.pairs.append({"slot": f"{name}guide", "links": [first, second], "line": guide, "point": name})
         return name
 
     def _line(self, keyword: str, name: str, first: str, second: str, at: Vector, off: float = 0.0) -> float:
@@ -108,12 +113,14 @@ class Builder:
     def chain(self, first: str, second: str) -> str:
         return self._wheels("chain", first, second)
 
-    def higher(self, first: str, second: str) -> str:
-        """Any pair that prevents one motion only."""
+    def higher(self, first: str, second: str) -> int:
+        """Any pair that prevents one motion only, with what it needs beside it; how many motions they prevent."""
         kinds = [keyword for keyword, kind in pair_types().items() if kind.holds() == 1]
         if len(self.frames) < 3:
             kinds = [keyword for keyword in kinds if len(pair_types()[keyword].samples()[0].frames) == 2]
-        return getattr(self, str(self.rng.choice(kinds)))(first, second)
+        before = len(self.pairs)
+        getattr(self, str(self.rng.choice(kinds)))(first, second)
+        return len(self.pairs) - before
 
     def drive(self, pair: str, first: str, second: str, velocity: float, acceleration: float) -> None:
         if pair[0] == "T":
@@ -170,9 +177,9 @@ def random_linkage(seed: int, links: int, blur: float = 0.0, higher: float = 0.0
         for first, second in _joints(rng, placed, new):
             if rng.random() < higher:
                 # in place of a pair that prevents two motions two that prevent one each
-                builder.higher(first, second)
-                other = new[int(rng.integers(len(new)))]
-                builder.higher(str(rng.choice([link for link in (*placed, *new) if link != other])), other)
+                if builder.higher(first, second) == 1:
+                    other = new[int(rng.integers(len(new)))]
+                    builder.slot(str(rng.choice([link for link in (*placed, *new) if link != other])), other)
             else:
                 (builder.sliding if rng.random() < 0.25 else builder.turning)(first, second)
         placed += new

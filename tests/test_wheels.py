@@ -106,7 +106,7 @@ def mistake(entry, change, place, *words):
         mistake(RATIO, {"ratio": None}, ".ratio", "number", "null"),
         mistake(RATIO, {"ratio": -inf}, ".ratio", "too large"),
         mistake(BELT, {"radii": [30, -40]}, ".radii", "above zero"),
-        mistake(BELT, {"radii": [200, 50]}, "", "80 mm", "0.15 m", "open"),
+        mistake(BELT, {"radii": [200, 50]}, "", "80 mm", "150 mm", "open"),
         mistake(BELT, {"radii": [30, 50], "crossed": True}, "", "80 mm", "crossed"),
         mistake(BELT, {"crossed": "yes"}, ".crossed", "true or false", "'yes'"),
         mistake(BELT, {"radii": GONE, "ratio": -2, "crossed": True}, ".crossed", "sign of 'ratio'"),

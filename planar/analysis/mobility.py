@@ -9,17 +9,12 @@ import numpy as np
 from planar.errors import NoAnswer, Outcome
 from planar.graph import farthest_first
 from planar.mechanism import Mechanism
-from planar.solving.constraints import Constraints, joined, moved, null_space, rank
+from planar.solving.constraints import Constraints, joined, motion_from, null_space, rank
 from planar.solving.dependence import smallest_sets
 from planar.solving.position import Solver
 from planar.words import listed, many
 
 Array = np.ndarray
-
-AWAY = 0.02
-"""How far (sizes, rad) a position is moved along what it allows, to see whether the motion goes on."""
-NEAR = 1e-3
-"""How far its neighbours are from a position whose motions are counted; what bends back within it is none."""
 
 
 @dataclass(frozen=True)
@@ -63,42 +58,13 @@ def measured(constraints: Constraints, w: Array) -> Mobility:
     here = w.size - rank(slope)
     finite, place = here, w
     if here != count:
-        finite, place = _motion_from(constraints, w)
+        finite, place = motion_from(constraints, w)
     left = null_space(constraints.slope(place).T)
     surplus = max(0, finite - count)
     sets = ()
     if surplus and left.shape[1] == surplus:
         sets = smallest_sets(left, constraints.pair_of_row, lambda name: farthest_first(mechanism, name))
     return Mobility(count, here, finite, surplus, sets, tuple(_why(count, here, finite, sets)))
-
-
-def _motion_from(constraints: Constraints, w: Array) -> tuple[int, Array]:
-    """The dimension of the motion that leads away from a position, and a position on it."""
-    free = null_space(constraints.slope(w))
-    found, place = 0, w
-    for seed in range(4 if free.size else 0):
-        rng = np.random.default_rng(seed)
-        away = constraints.closed(w + moved(free, rng, AWAY))
-        if away is not None:
-            ways = _ways(constraints, away, rng)
-            if ways > found:
-                found, place = ways, away
-    return found, place
-
-
-def _ways(constraints: Constraints, w: Array, rng: np.random.Generator) -> int:
-    """In how many directions the closed positions next to one spread."""
-    free = null_space(constraints.slope(w))
-    many = 2 * free.shape[1] + 2
-    moves = []
-    for _ in range(many if free.size else 0):
-        beside = constraints.closed(w + moved(free, rng, NEAR))
-        if beside is not None:
-            moves.append((beside - w) / NEAR)
-    if not moves:
-        return 0
-    values = np.linalg.svd(np.array(moves), compute_uv=False)
-    return int(np.sum(values > 0.1 * np.sqrt(len(moves) / free.shape[1])))
 
 
 def standing(setup: Solver, constraints: Constraints) -> Array:

@@ -39,9 +39,7 @@ class Rack(Guided):
         },
     }
     required: ClassVar[tuple[str, ...]] = ("links", "line", "point", "radius")
-    touching: ClassVar[str] = (
-        "the centre lies left of the line for a radius above zero, right for one below"
-    )
+    touching: ClassVar[str] = "the centre lies left of the line for a radius above zero, right for one below"
     lower: ClassVar[bool] = False
     counts_turns: ClassVar[bool] = True
     constrains: ClassVar[tuple[Kind, ...]] = (Kind.LENGTH, Kind.LENGTH, Kind.LENGTH)

@@ -29,13 +29,15 @@ class Candidate(NamedTuple):
     """One assembly of a group: all unknowns with this group's filled in, and how it lies.
 
     `distance`: squared distance to the sketch of the points that the group places (sizes squared); `behind`: how many
-    slides are not ahead of their `through`; `height`: mean y of the group's points.
+    slides are not ahead of their `through`; `height`: mean y of the group's points; `far`: how far its slides are ahead
+    together.
     """
 
     z: Array
     distance: float
     behind: int
     height: float
+    far: float
 
 
 class Candidates:
@@ -104,7 +106,7 @@ class Candidates:
                 roots.append(polished(closing, root))
         return sorted(
             (self._candidate(stage, z, root) for root in roots),
-            key=lambda each: (each.behind, -round(each.height, 9), *np.round(each.z, 6)),
+            key=lambda each: (each.behind, -round(each.height, 9), -round(each.far, 9), *np.round(each.z, 6)),
         )
 
     def _candidate(self, stage: Stage, z: Array, root: Array) -> Candidate:
@@ -130,6 +132,7 @@ class Candidates:
             sum(float(gap.dot(gap)) for gap in gaps),
             sum(not pair.ahead(drive) for pair, drive in drives),
             float(np.mean(heights)) if heights else 0.0,
+            sum(drive for _, drive in drives),
         )
 
     def _w(self, z: Array) -> Array:
@@ -175,7 +178,7 @@ class Candidates:
         spread = _spread(unknowns)
         shown = self._shown(stage, z)
         near = spread[: 2 * unknowns + 2].copy()
-        blur = BLUR * (near / np.pi - 1.0)
+        blur = BLUR * near / np.pi
         blur[: min(1, len(blur))] = 0.0
         whole = unknowns > 2
         for index, column in enumerate(self.equations.unknowns[stage.unknowns]):
@@ -218,7 +221,7 @@ def _apart(angles: Array, a: Array, b: Array) -> Array:
 
 
 def _spread(unknowns: int) -> Array:
-    """Angles spread evenly over the circles (starts, unknowns), the same each time.
+    """Angles between -pi and pi spread evenly over the circles (starts, unknowns), the same each time.
 
     Multiples of powers of the root of x^(d+1) = x + 1, modulo a turn (M. Roberts' R-sequence).
     """
@@ -227,7 +230,8 @@ def _spread(unknowns: int) -> Array:
         root = (1.0 + root) ** (1.0 / (unknowns + 1))
     steps = (1.0 / root) ** np.arange(1, unknowns + 1)
     many = min(6 * unknowns**2, MOST_STARTS) or 1
-    return 2.0 * np.pi * (np.arange(many)[:, None] * steps % 1.0)
+    spread = np.arange(many)[:, None] * steps % 1.0
+    return 2.0 * np.pi * np.where(spread > 0.5, spread - 1.0, spread)
 
 
 def _turn_between(ends: list[tuple[Vector, Vector]]) -> float | None:

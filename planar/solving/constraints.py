@@ -21,6 +21,10 @@ LONGEST = 100
 """Iterations: where constraints only just touch, the error halves each time."""
 TRIES = 8
 """Starts from which a linkage is joined that its inputs do not determine."""
+AWAY = 0.02
+"""How far (sizes, rad) a position is moved along what it allows, to see whether the motion goes on."""
+NEAR = 1e-3
+"""How far its neighbours are from a position whose motions are counted; what bends back within it is none."""
 SINGULAR = 1e-6
 """A singular value below this part of the greatest is zero: where constraints touch, rounding leaves about 1e-8."""
 
@@ -157,3 +161,32 @@ def _sketched(setup: Setup, seed: int) -> Array:
         if at and (link, "x") in setup.column:
             w[[setup.column[link, "x"], setup.column[link, "y"]]] = np.mean(at, axis=0)
     return w
+
+
+def motion_from(constraints: Constraints, w: Array) -> tuple[int, Array]:
+    """The dimension of the motion that leads away from a position, and a position on it."""
+    free = null_space(constraints.slope(w))
+    found, place = 0, w
+    for seed in range(4 if free.size else 0):
+        rng = np.random.default_rng(seed)
+        away = constraints.closed(w + moved(free, rng, AWAY))
+        if away is not None:
+            ways = _ways(constraints, away, rng)
+            if ways > found:
+                found, place = ways, away
+    return found, place
+
+
+def _ways(constraints: Constraints, w: Array, rng: np.random.Generator) -> int:
+    """In how many directions the closed positions next to one spread."""
+    free = null_space(constraints.slope(w))
+    many = 2 * free.shape[1] + 2
+    moves = []
+    for _ in range(many if free.size else 0):
+        beside = constraints.closed(w + moved(free, rng, NEAR))
+        if beside is not None:
+            moves.append((beside - w) / NEAR)
+    if not moves:
+        return 0
+    values = np.linalg.svd(np.array(moves), compute_uv=False)
+    return int(np.sum(values > 0.1 * np.sqrt(len(moves) / free.shape[1])))

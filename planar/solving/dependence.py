@@ -6,17 +6,15 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from planar.solving.constraints import Constraints, joined, moved, null_space
+from planar.solving.constraints import AWAY, Constraints, joined, motion_from, moved, null_space
 from planar.solving.setup import Setup
 
 Array = np.ndarray
 
 NOTHING = 1e-7
 """A part of a unit vector that is zero but for rounding."""
-AWAY = 0.02
-"""Sizes or rad: beside one position, which may be a dead point of the input, holds what holds in general."""
 MOST = 600
-"""Coordinates: of a larger mechanism it is not searched which inputs are stuck."""
+"""Coordinates: a larger mechanism is not searched for inputs that are stuck, or for how it moves in general."""
 
 
 def smallest_sets(
@@ -75,6 +73,11 @@ def stuck(setup: Setup) -> tuple[list[str], list[str]] | None:
         if coordinate.of_link and part > 1e-4
     )
     return fast, list(links)
+
+
+def ways_on(setup: Setup, w: Array) -> int | None:
+    """In how many ways the mechanism can move on from a position w, inputs left aside; None where it is too large."""
+    return motion_from(Constraints(setup), w)[0] if w.size <= MOST else None
 
 
 def conflicting(setup: Setup) -> tuple[tuple[str, ...], ...]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from planar.equations import Stage
@@ -9,6 +11,7 @@ from planar.errors import NoAnswer
 from planar.pairs import Kind
 from planar.program import Rates, length
 from planar.solving import refusals
+from planar.solving.dependence import ways_on
 from planar.solving.follow import corrected
 from planar.solving.setup import Setup
 
@@ -27,11 +30,11 @@ NEAR_BY = 1e-2
 
 
 class Crossing(Exception):
-    """A position with one freedom more than inputs, to first order; `refusal` is what to say if it is so in truth."""
+    """A position with one freedom more than inputs, to first order; `refused` says what to say if it is so in truth."""
 
-    def __init__(self, refusal: NoAnswer):
+    def __init__(self, refused: Callable[[], NoAnswer]):
         super().__init__()
-        self.refusal = refusal
+        self.refused = refused
 
 
 def mobility(setup: Setup, z: Array, motion: Rates) -> int:
@@ -57,10 +60,13 @@ def mobility(setup: Setup, z: Array, motion: Rates) -> int:
     links = _moving_at_rest(setup, motion.slope) or list(dict.fromkeys(link for stage in weak for link in stage.links))
     if found <= inputs:
         raise refusals.dead_point(setup, links)
-    free = any(always_weak(setup, stage, z) for stage in weak)
-    if not free and found == inputs + 1:
-        raise Crossing(refusals.change_point(setup, links, found))
-    raise refusals.ever_free(setup, links) if free else refusals.change_point(setup, links, found)
+
+    def refused() -> NoAnswer:
+        ways = ways_on(setup, motion.w)
+        always = any(always_weak(setup, stage, z) for stage in weak) if ways is None else ways > inputs
+        return refusals.ever_free(setup, links) if always else refusals.change_point(setup, links, found)
+
+    raise Crossing(refused) if found == inputs + 1 else refused()
 
 
 def _broken_ways(motion: Rates) -> int:
@@ -136,15 +142,13 @@ def _agree(setup: Setup, motion: Rates) -> bool:
 def always_weak(setup: Setup, stage: Stage, z: Array) -> bool:
     """Whether a group is singular in closed positions near by too, so that it is no matter of this one."""
     u, p = setup.station.u, setup.station.p
-    tried = False
     for seed in range(3):
         rng = np.random.default_rng(seed)
         near = u + rng.uniform(-NEAR_BY, NEAR_BY, u.size)
         moved = corrected(setup.program, p, z + rng.uniform(-NEAR_BY, NEAR_BY, z.size), near, stage.level)
         if moved is not None and strengths(setup, slope_at(setup, moved, near))[stage.level] > NOTHING:
             return False
-        tried = tried or moved is not None
-    return tried
+    return True
 
 
 def slope_at(setup: Setup, z: Array, u: Array) -> Array:

@@ -88,7 +88,7 @@ class Solver(Setup):
         except Crossing as crossing:
             through = passing(self, z)
             if through is None:
-                raise crossing.refusal from None
+                raise crossing.refused() from None
             return self._passed(through, remarks)
         y1 = np.concatenate([cancelled(still.slope, still.F1), s.u1])
         moving = self.program.kinematics(y, y1, given, s.p)

@@ -27,7 +27,7 @@ def free(setup: Setup) -> NoAnswer:
             Outcome.TOO_FEW_INPUTS,
             f"no chain of pairs joins {_links(apart)} to the frame {setup.mechanism.frame!r}; add a pair",
         )
-    jam = _jammed(setup)
+    jam = jammed(setup)
     if jam is not None:
         return jam
     stages = [stage for stage in setup.equations.stages if stage.free]
@@ -43,7 +43,7 @@ def free(setup: Setup) -> NoAnswer:
 
 def ever_free(setup: Setup, links: Sequence[str]) -> NoAnswer:
     """Links that stay free while others hold each other more than once."""
-    jam = _jammed(setup)
+    jam = jammed(setup)
     if jam is not None:
         return jam
     return NoAnswer(
@@ -53,7 +53,7 @@ def ever_free(setup: Setup, links: Sequence[str]) -> NoAnswer:
     )
 
 
-def _jammed(setup: Setup) -> NoAnswer | None:
+def jammed(setup: Setup) -> NoAnswer | None:
     """Inputs at pairs that the others hold fast, while something else is free."""
     found = stuck(setup)
     if found is None:

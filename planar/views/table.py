@@ -37,14 +37,14 @@ def solution(
         parts.append(published(comparisons))
     notes = [*state.remarks, *state.mechanism.notes]
     if notes:
-        parts += [Text(), Text("Notes", style="bold"), _paragraphs(("-", note) for note in notes)]
+        parts += [Text(), Text("Notes", style="bold"), paragraphs(("-", note) for note in notes)]
     return Group(*parts)
 
 
 def published(comparisons: Iterable[Comparison]) -> RenderableType:
     """Solved values beside those that a book prints."""
     headings = ("", "quantity", "solved", "printed", "unit", "off", "")
-    table = _table("Published values", *headings, left=(0, 1, 4, 6))
+    table = plain_table("Published values", *headings, left=(0, 1, 4, 6))
     reasons: list[tuple[str, str]] = []
     for each in comparisons:
         item = each.published
@@ -64,10 +64,10 @@ def published(comparisons: Iterable[Comparison]) -> RenderableType:
         why = item.slip or item.note
         if why:
             reasons.append((item.symbol, why))
-    return Group(table, _paragraphs(reasons))
+    return Group(table, paragraphs(reasons))
 
 
-def _paragraphs(rows: Iterable[tuple[str, str]]) -> Table:
+def paragraphs(rows: Iterable[tuple[str, str]]) -> Table:
     """Paragraphs with what they are about before them."""
     grid = Table.grid(padding=(0, 1))
     for about, text in rows:
@@ -77,7 +77,7 @@ def _paragraphs(rows: Iterable[tuple[str, str]]) -> Table:
 
 def models(rows: Iterable[tuple[str, str, str]]) -> RenderableType:
     """The models that come along: name, other ids, what each is."""
-    table = _table(None, "model", "also", "what it is", left=(0, 1, 2))
+    table = plain_table(None, "model", "also", "what it is", left=(0, 1, 2))
     for row in rows:
         table.add_row(*row)
     return table
@@ -94,7 +94,7 @@ def speeds(measured: Iterable[Speed]) -> RenderableType:
         "one position, with rates",
         "a position of a run",
     )
-    table = _table(None, *headings)
+    table = plain_table(None, *headings)
     for each in measured:
         times = (each.equations, each.assembly, each.position, each.run)
         table.add_row(each.name, str(each.links), str(each.unknowns), *(_time(seconds) for seconds in times))
@@ -113,14 +113,15 @@ def run(motion: Motion) -> RenderableType:
     worst = f"worst residual {motion.residual:.1e} of the mechanism's size"
     lines.append(Text(f"{len(motion)} positions; {worst}" + (f"; {motion.reason}" if motion.reason else "")))
     heads = (f"x from, {units.length}", f"x to, {units.length}", f"y from, {units.length}", f"y to, {units.length}")
-    table = _table("Points, among these positions", "point", *heads, "velocity up to, m/s", "acceleration up to, m/s²")
+    rates = ("velocity up to, m/s", "acceleration up to, m/s²")
+    table = plain_table("Points, among these positions", "point", *heads, *rates)
     length = unit(units.length)
     for name, point in motion.points.items():
         ends = [length.from_si(float(end)) for values in point.position.T for end in (values.min(), values.max())]
         greatest = [np.hypot(*rate.T) for rate in (point.velocity, point.acceleration)]
         rates = ["-" if np.isnan(rate).all() else _number(float(np.nanmax(rate))) for rate in greatest]
         table.add_row(name, *map(_number, ends), *rates)
-    notes = [_paragraphs(("-", remark) for remark in motion.remarks)] if motion.remarks else []
+    notes = [paragraphs(("-", remark) for remark in motion.remarks)] if motion.remarks else []
     return Group(*lines, Text(), table, *notes)
 
 
@@ -148,7 +149,7 @@ def _heading(state: State) -> RenderableType:
 
 def _links(state: State) -> RenderableType:
     units = state.mechanism.units
-    table = _table(
+    table = plain_table(
         "Links", "link", f"angle, {units.angle}", "ang. velocity, rad/s", "ang. acceleration, rad/s²", "sense"
     )
     angle = unit(units.angle)
@@ -167,7 +168,7 @@ def _links(state: State) -> RenderableType:
 def _points(state: State) -> RenderableType:
     units = state.mechanism.units
     degree = units.angle
-    table = _table(
+    table = plain_table(
         "Points",
         "point",
         f"x, {units.length}",
@@ -212,7 +213,7 @@ def _pairs(state: State) -> RenderableType:
             f"{name.replace('_', ' ').replace('angular', 'ang.')}, {_shown(of, state)[0]}"
             for name, of in kind.reports.items()
         ]
-        table = _table(f"{kind.keyword.capitalize()} pairs", "pair", "links", *titles, left=(0, 1))
+        table = plain_table(f"{kind.keyword.capitalize()} pairs", "pair", "links", *titles, left=(0, 1))
         for pair in pairs:
             report = state.pair(pair.name)
             values = [_reported(report[name], of, state) for name, of in kind.reports.items()]
@@ -226,7 +227,7 @@ def _relative(text: str, relative: RelativeState, state: State) -> RenderableTyp
     point, other = text.split(",")[:2]
     degree = state.mechanism.units.angle
     title = f"{point.strip()} against {other.strip()}, in the axes of {relative.axes}"
-    table = _table(title, "part", "magnitude", "unit", f"at, {degree}", "x", "y", left=(0, 2))
+    table = plain_table(title, "part", "magnitude", "unit", f"at, {degree}", "x", "y", left=(0, 2))
     parts = {
         "velocity": ("m/s", relative.velocity),
         "  by rotation": ("m/s", relative.rotation),
@@ -268,7 +269,7 @@ def _number(value: float) -> str:
     return "0" if abs(value) < 1e-14 else f"{value:#.{DIGITS}g}".rstrip(".")
 
 
-def _table(title: str | None, *headings: str, left: tuple[int, ...] = (0,)) -> Table:
+def plain_table(title: str | None, *headings: str, left: tuple[int, ...] = (0,)) -> Table:
     """An empty table; of a heading "name, unit" the unit stands below the name. Numbers are never broken."""
     table = Table(
         title=title,
