@@ -518,7 +518,10 @@ def shuffled(value, random):
         links[name] = link | ({"points": dict(mixed(link["points"].items()))} if "points" in link else {})
     pairs = []
     for pair in mixed(value["pairs"]):
-        order = mixed(range(len(pair["links"]))) if "turning" in pair else range(2)
+        # an input at a pin of several names two of its links in their order there
+        driven = any(given["pair"].startswith(f"{pair.get('turning')}:") for given in value.get("inputs", ()))
+        free = "turning" in pair and not driven
+        order = mixed(range(len(pair["links"]))) if free else range(len(pair["links"]))
         turned = {key: [pair[key][k] for k in order] for key in ("links", "points") if key in pair}
         pairs.append(pair | turned)
     return value | {"links": links, "pairs": pairs}

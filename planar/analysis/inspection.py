@@ -146,7 +146,7 @@ def _motion(mechanism: Mechanism, link: str, runs: list[Motion]) -> str:
     if swing <= STILL:
         return "translates" if strays else "stands still"
     if not _pinned(mechanism, link):
-        return "moves generally"
+        return "general plane motion"
     return "turns fully" if any(_turns(run, link) for run in runs) else "rocks"
 
 
