@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Sequence
+from collections.abc import Callable
 from itertools import count
 from typing import NamedTuple
 
@@ -16,15 +16,18 @@ Array = np.ndarray
 
 ALIKE = 1e-9
 """Assemblies whose sums of squared distances to the sketch (sizes squared) agree to this fit alike."""
+MOST_TIED = 64
+"""Assemblies that fit alike among which one is looked for whose rates are determined."""
 EXPANSIONS = 1000
 """Groups solved before the search stops looking for a nearer assembly and takes the best way to an end."""
 
 
 class Assembly(NamedTuple):
-    """The unknowns of an assembly, and what is to be said of how it was chosen."""
+    """The unknowns of an assembly, the groups that may as well stand otherwise, and whether the search was cut off."""
 
     z: Array
-    remarks: tuple[str, ...] = ()
+    ties: tuple[int, ...] = ()
+    stopped: bool = False
 
 
 class Failure(NamedTuple):
@@ -49,17 +52,20 @@ class _Node(NamedTuple):
     "groups in which another choice lies as near to the sketch"
 
 
-def search(candidates: Candidates) -> Assembly | Failure:
+def search(candidates: Candidates, sound: Callable[[Array], bool] | None = None) -> Assembly | Failure:
     """Best first: of all assemblies the one with the least sum of squared distances to the sketch.
 
-    The cost of a partial assembly never falls as it grows, so the first whole one is the nearest. After EXPANSIONS
-    groups the search only goes on to an end, and says so.
+    The cost of a partial assembly never falls as it grows, so the first whole one is the nearest. Of several that fit
+    alike a `sound` one is taken, whose rates are determined, if there is one among the first. After EXPANSIONS groups
+    the search only goes on to an end, and says so.
     """
     stages = candidates.equations.stages
     number = count()
     heap = [_Node(0.0, 0, (), next(number), np.zeros(len(candidates.equations.unknowns)), ())]
     worst: Failure | None = None
     chosen: _Node | None = None
+    taken: _Node | None = None
+    tied = 0
     for expansions in count():
         if not heap or (chosen is not None and expansions > EXPANSIONS):
             break
@@ -68,11 +74,14 @@ def search(candidates: Candidates) -> Assembly | Failure:
         else:
             node = heap.pop(min(range(len(heap)), key=lambda index: (-len(heap[index].ranks), *heap[index][:4])))
         if chosen is not None and node.cost > chosen.cost:
-            return Assembly(chosen.z)
+            return Assembly((taken or chosen).z, (taken or chosen).ties if tied else ())
         if len(node.ranks) == len(stages):
-            if chosen is not None:
-                return Assembly(chosen.z, (_tie(stages, chosen.ties),))
-            chosen = node
+            tied += chosen is not None
+            chosen = chosen or node
+            if taken is None and (sound is None or sound(node.z)):
+                taken = node
+            if tied and (taken is not None or tied > MOST_TIED):
+                return Assembly((taken or chosen).z, (taken or chosen).ties)
             continue
         found, nearest = candidates.of(stages[len(node.ranks)], node.z)
         if not found and (worst is None or stages[len(node.ranks)].level > worst.stage.level):
@@ -93,24 +102,4 @@ def search(candidates: Candidates) -> Assembly | Failure:
     if chosen is None:
         assert worst is not None
         return worst
-    return Assembly(chosen.z, (_stopped(stages, chosen.ties),) if expansions >= EXPANSIONS else ())
-
-
-def _tie(stages: Sequence[Stage], ties: Sequence[int]) -> str:
-    return (
-        f"the sketch fits more than one assembly alike; taken is the one with its sliding points ahead of "
-        f"'through', else the upper one: sketch a point of {_open(stages, ties)} to choose"
-    )
-
-
-def _stopped(stages: Sequence[Stage], ties: Sequence[int]) -> str:
-    return (
-        f"the search for the assembly nearest to the sketch stopped after {EXPANSIONS} groups and took the nearest on "
-        f"its way; sketch a point of {_open(stages, ties)} to be sure of the one that is meant"
-    )
-
-
-def _open(stages: Sequence[Stage], ties: Sequence[int]) -> str:
-    """The links of the groups whose place the sketch leaves open."""
-    named = [", ".join(stages[index].links) for index in ties] or ["further links"]
-    return "; of ".join(named[:6]) + ("; and of the others" if len(named) > 6 else "")
+    return Assembly((taken or chosen).z, (taken or chosen).ties if tied else (), expansions >= EXPANSIONS)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -13,12 +14,15 @@ from planar.plane import Vector
 from planar.program import length, placed
 from planar.solving.newton import CLOSED, Closing, Found, newton, polished
 from planar.solving.setup import Setup
+from planar.solving.sketched import turn_between
 
 Array = np.ndarray
 
 SAME = 1e-6
 """Unknowns closer than this are one assembly: within it two would be a dead point to working precision."""
 MOST_STARTS = 160
+LARGE, BATCH = 10, 16
+"""Unknowns of a group from which on starts are tried in batches of so many."""
 BLUR = 0.3
 """Radians: how far about the angles of a sketch starts are spread, so that near twins are both found."""
 CLEAR = 0.03
@@ -86,12 +90,21 @@ class Candidates:
         dyad = length(stage.unknowns) == 2 and len(stage.pairs) == 3 and lower and len(found) == 2  # there is no third
         clear = shown and found and min(each.distance for each in found) <= sketched * CLEAR**2
         if not (dyad or clear):
-            more = newton(closing, self._with_lengths(stage, closing, _spread(length(stage.unknowns))))
-            ended = Found(*(np.concatenate(both) for both in zip(ended, more, strict=True)))
+            for starts in self._searched(stage, closing):
+                more = newton(closing, starts)
+                ended = Found(*(np.concatenate(both) for both in zip(ended, more, strict=True)))
+                if not sketched and np.any(more.closed):
+                    break
             found = self._candidates(stage, z, closing, ended.unknowns[ended.closed])
         nearest = z.copy()
         nearest[stage.unknowns] = ended.unknowns[int(np.argmin(ended.open))]
         return found, nearest
+
+    def _searched(self, stage: Stage, closing: Closing) -> Iterator[Array]:
+        """Starts all over the circles; of a large group in batches, since any assembly will do without a sketch."""
+        starts = self._with_lengths(stage, closing, _spread(length(stage.unknowns)))
+        many = len(starts) if length(stage.unknowns) < LARGE else BATCH
+        return (starts[first : first + many] for first in range(0, len(starts), many))
 
     def _candidates(self, stage: Stage, z: Array, closing: Closing, closed: Array) -> list[Candidate]:
         if self.counts:
@@ -209,7 +222,7 @@ class Candidates:
         angles = {}
         for link in stage.links:
             ends = [(self.local[link][point], located[name]) for point, name in self.points_of[link] if name in located]
-            angle = _turn_between(ends) if len(ends) > 1 else None
+            angle = turn_between(ends) if len(ends) > 1 else None
             if angle is not None:
                 angles[link] = angle
         return angles
@@ -232,11 +245,3 @@ def _spread(unknowns: int) -> Array:
     many = min(6 * unknowns**2, MOST_STARTS) or 1
     spread = np.arange(many)[:, None] * steps % 1.0
     return 2.0 * np.pi * np.where(spread > 0.5, spread - 1.0, spread)
-
-
-def _turn_between(ends: list[tuple[Vector, Vector]]) -> float | None:
-    """The angle that turns local points nearest to where they are shown (orthogonal Procrustes in the plane)."""
-    local = np.array([complex(*at) for at, _ in ends])
-    shown = np.array([complex(*at) for _, at in ends])
-    turn = np.vdot(local - local.mean(), shown - shown.mean())
-    return None if abs(turn) < 1e-12 else float(np.angle(turn))

@@ -12,14 +12,17 @@ from planar.pairs import Kind, Pair
 from planar.plane import Frame, frame_at
 from planar.program import scaled
 from planar.solving.setup import Setup
+from planar.solving.sketched import sketched
 
 Array = np.ndarray
 
 STEP = 1e-30
 CLOSED, ROUNDED = 1e-10, 1e-15
-LONGEST = 100
+NEARLY = 1e-6
+"""Damping above which a step need not be exact."""
+LONGEST = 60
 """Iterations: where constraints only just touch, the error halves each time."""
-TRIES = 8
+TRIES = 4
 """Starts from which a linkage is joined that its inputs do not determine."""
 AWAY = 0.02
 """How far (sizes, rad) a position is moved along what it allows, to see whether the motion goes on."""
@@ -112,8 +115,12 @@ class Constraints:
 
 
 def _damped(slope: Array, left: Array, damping: float) -> Array:
+    top = float(np.linalg.norm(slope)) or 1.0
+    if damping > NEARLY:
+        # far away the normal equations will do, at a fraction of the cost
+        square = slope.T @ slope + (damping * top) ** 2 * np.eye(slope.shape[1])
+        return -np.linalg.solve(square, slope.T @ left)
     u, s, vt = np.linalg.svd(slope, full_matrices=False)
-    top = s[0] if s.size else 1.0
     gain = np.where(s > 1e-13 * top, s / np.maximum(s * s + (damping * top) ** 2, 1e-300), 0.0)
     return -vt.T @ (gain * (u.T @ left))
 
@@ -143,24 +150,12 @@ def joined(constraints: Constraints) -> Array | None:
     names = tuple(given.pair for given in setup.mechanism.inputs)
     for held, at in ((names, setup.station.u), ((), None)):
         for seed in range(TRIES):
-            found = constraints.closed(_sketched(setup, seed), held, at)
+            found = constraints.closed(sketched(setup, seed), held, at)
             if found is not None:
                 return found
         if not names:
             break
     return None
-
-
-def _sketched(setup: Setup, seed: int) -> Array:
-    """Coordinates that are spread about the points of the sketch."""
-    rng = np.random.default_rng(seed)
-    shown = {name: np.array([x, y]) / setup.unit for name, x, y in setup.mechanism.sketch}
-    w = rng.uniform(-1.0, 1.0, len(setup.equations.coordinates))
-    for link, shape in setup.shapes.items():
-        at = [shown[name] for point in shape.points for name in (point, f"{link}.{point}") if name in shown]
-        if at and (link, "x") in setup.column:
-            w[[setup.column[link, "x"], setup.column[link, "y"]]] = np.mean(at, axis=0)
-    return w
 
 
 def motion_from(constraints: Constraints, w: Array) -> tuple[int, Array]:

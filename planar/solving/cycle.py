@@ -152,7 +152,7 @@ class _Runner:
             outcome=outcome,
             reason=reason,
             residual=float(solver.open_along(found.z, u).max(initial=0.0)),
-            remarks=self.found.remarks,
+            remarks=solver.remarks(self.found),
             frames=frames,
             own=own,
             shapes=solver.shapes,

@@ -13,6 +13,7 @@ Closing = Callable[[Array], tuple[Array, Array]]
 
 CLOSED = 1e-11
 """A group counts as closed below this (lengths of the mechanism's size); the gate asks for more afterwards."""
+STUCK = 1e-10
 LONGEST = 200
 """Iterations. A double root halves its error each time, so 27 take it from 1 to the square root of round-off."""
 
@@ -51,6 +52,8 @@ def newton(closing: Closing, starts: Array) -> Found:
         taken = busy[better]
         z[taken], left[taken], slope[taken] = tried[better], new_left[better], new_slope[better]
         small = np.max(np.abs(step), axis=1) < 1e-13
+        # far from closed and hardly coming closer: a start that ends where nothing closes
+        small |= better & (cost[busy] - new_cost < STUCK * cost[busy]) & (new_cost > 1e-8)
         settled = small | (better & (new_cost <= 1e-31)) | (damping[busy] > 1e12)
         cost[taken] = new_cost[better]
         damping[busy] = np.where(better, np.maximum(damping[busy] * 0.1, 1e-17), damping[busy] * growth[busy])

@@ -19,6 +19,7 @@ from planar.solving.candidates import Candidates
 from planar.solving.crossing import Passing, passing
 from planar.solving.follow import follow
 from planar.solving.freedom import SINGULAR, Crossing, always_weak, cancelled, mobility, slope_at, strengths
+from planar.solving.remarks import remarks
 from planar.solving.setup import Setup
 
 Array = np.ndarray
@@ -38,10 +39,10 @@ def solve(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = 
     here = Solver(mechanism)
     found = here.assembly()
     if not drives:
-        return here.state(found.z, found.remarks)
+        return here.state(found.z, here.remarks(found))
     there = Solver(with_inputs(mechanism, tuple(drives)))
     z = follow(there, there.station.p, found.z, here.station.u, there.station.u)
-    return there.state(z, found.remarks)
+    return there.state(z, here.remarks(found))
 
 
 class Solver(Setup):
@@ -51,10 +52,20 @@ class Solver(Setup):
         """The assembly nearest to the sketch. Raises NoAnswer."""
         if any(stage.free for stage in self.equations.stages):
             raise refusals.free(self)
-        found = search(Candidates(self))
+        found = search(Candidates(self), self._is_sound)
         if isinstance(found, Failure):
             raise self._unassembled(found)
-        return Assembly(found.z, (*self.mechanism.remarks, *found.remarks))
+        return found
+
+    def remarks(self, found: Assembly) -> tuple[str, ...]:
+        """What there is to say of an assembly."""
+        if not (found.ties or found.stopped):
+            return self.mechanism.remarks
+        return (*self.mechanism.remarks, *remarks(self, Candidates(self), found))
+
+    def _is_sound(self, z: Array) -> bool:
+        """Whether every group of an assembly is determined there."""
+        return bool(np.all(strengths(self, slope_at(self, z, self.station.u)) >= SINGULAR))
 
     def _unassembled(self, failure: Failure) -> NoAnswer:
         found = strengths(self, slope_at(self, failure.z, self.station.u))
