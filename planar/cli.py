@@ -136,13 +136,12 @@ def cycle(
         from planar.views.run import record
 
         click.echo(json.dumps(record(motion), ensure_ascii=False, allow_nan=False))
-    elif output is not None:
-        from planar.views.run import written
-
-        save(output, written(motion, output.suffix))
     else:
+        from planar.views.run import written
         from planar.views.table import run as table
 
+        if output is not None:
+            save(output, written(motion, output.suffix))
         _show(table(motion), None)
     if motion.outcome is not Outcome.SOLVED:
         click.echo(f"planar: {motion.outcome.value}: {motion.reason}", err=True)
