@@ -11,7 +11,6 @@ from planar.errors import NoAnswer
 from planar.pairs import Kind
 from planar.program import Rates, length
 from planar.solving import refusals
-from planar.solving.dependence import ways_on
 from planar.solving.follow import corrected
 from planar.solving.setup import Setup
 
@@ -62,6 +61,8 @@ def mobility(setup: Setup, z: Array, motion: Rates) -> int:
         raise refusals.dead_point(setup, links)
 
     def refused() -> NoAnswer:
+        from planar.solving.dependence import ways_on  # only where something is refused
+
         ways = ways_on(setup, motion.w)
         always = any(always_weak(setup, stage, z) for stage in weak) if ways is None else ways > inputs
         return refusals.ever_free(setup, links) if always else refusals.change_point(setup, links, found)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,11 +17,12 @@ from planar.program import Rates, length, placed, program
 from planar.solving import refusals
 from planar.solving.assemble import Assembly, Failure, search
 from planar.solving.candidates import Candidates
-from planar.solving.crossing import Passing, passing
 from planar.solving.follow import follow
 from planar.solving.freedom import SINGULAR, Crossing, always_weak, cancelled, mobility, slope_at, strengths
-from planar.solving.remarks import remarks
 from planar.solving.setup import Setup
+
+if TYPE_CHECKING:
+    from planar.solving.crossing import Passing
 
 Array = np.ndarray
 
@@ -61,6 +63,8 @@ class Solver(Setup):
         """What there is to say of an assembly."""
         if not (found.ties or found.stopped):
             return self.mechanism.remarks
+        from planar.solving.remarks import remarks  # only where there is something to say
+
         return (*self.mechanism.remarks, *remarks(self, Candidates(self), found))
 
     def _is_sound(self, z: Array) -> bool:
@@ -97,6 +101,8 @@ class Solver(Setup):
         try:
             found = mobility(self, z, still)
         except Crossing as crossing:
+            from planar.solving.crossing import passing  # few positions are of this kind
+
             through = passing(self, z)
             if through is None:
                 raise crossing.refused() from None

@@ -1,4 +1,7 @@
-"""The sentences in which a mechanism that has no answer is refused."""
+"""The sentences in which a mechanism that has no answer is refused.
+
+What finds causes and remedies is loaded only when something is refused.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +13,7 @@ from planar.errors import NoAnswer, Outcome
 from planar.pairs import Kind
 from planar.program import length
 from planar.solving.assemble import Failure
-from planar.solving.dependence import conflicting, stuck
 from planar.solving.gate import TOUCHING
-from planar.solving.remedy import remedy
 from planar.solving.setup import Setup
 from planar.words import amount, listed, many
 
@@ -55,6 +56,8 @@ def ever_free(setup: Setup, links: Sequence[str]) -> NoAnswer:
 
 def jammed(setup: Setup) -> NoAnswer | None:
     """Inputs at pairs that the others hold fast, while something else is free."""
+    from planar.solving.dependence import stuck
+
     found = stuck(setup)
     if found is None:
         return None
@@ -113,7 +116,9 @@ def no_contact(setup: Setup, pair: str, gap: float) -> NoAnswer:
 
 
 def not_assembled(setup: Setup, failure: Failure) -> NoAnswer:
-    """A group that cannot be joined: by how much, and at which pair."""
+    """A group that cannot be joined: by how much, at which pair, and what would mend it."""
+    from planar.solving.remedy import remedy
+
     stage = failure.stage
     gaps: dict[str, float] = {}
     still = setup.program.closing(stage)(failure.z, setup.station.u, setup.station.p)[0].full().ravel()
@@ -141,6 +146,8 @@ def too_many(setup: Setup) -> NoAnswer:
 
 def _leave_out(setup: Setup) -> str:
     """Which inputs conflict, and what to do about it."""
+    from planar.solving.dependence import conflicting
+
     sets = conflicting(setup)
     if not sets:
         return "; leave one out"
