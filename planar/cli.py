@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,16 +25,32 @@ NO_ANSWER, BAD_INPUT = 1, 2
 class Commands(click.Group):
     """Every command ends with the same sentences and exit statuses."""
 
-    def invoke(self, ctx: click.Context) -> Any:
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         for stream in (sys.stdout, sys.stderr):
             if hasattr(stream, "reconfigure"):
                 stream.reconfigure(errors="backslashreplace")  # what the screen's alphabet lacks
-        try:
+        with _ending() if args else nullcontext():  # without any words click shows the help
+            return super().parse_args(ctx, args)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        with _ending():
             return super().invoke(ctx)
-        except BadInput as problem:
-            _refuse(str(problem), "bad input", str(problem), BAD_INPUT)
-        except NoAnswer as problem:
-            _refuse(str(problem), problem.outcome.value, problem.reason, NO_ANSWER)
+
+
+@contextmanager
+def _ending() -> Iterator[None]:
+    try:
+        yield
+    except BadInput as problem:
+        _refuse(str(problem), "bad input", str(problem), BAD_INPUT)
+    except NoAnswer as problem:
+        _refuse(str(problem), problem.outcome.value, problem.reason, NO_ANSWER)
+    except click.UsageError as problem:
+        told = problem.format_message().rstrip(".").replace(". Did", "; did").replace(". (", " (")
+        if not told.endswith(("?", "?)")):
+            told += f"; see `{problem.ctx.command_path if problem.ctx else 'planar'} --help`"
+        wrong = str(BadInput("command line", told[0].lower() + told[1:]))
+        _refuse(wrong, "bad input", wrong, BAD_INPUT)
 
 
 def _refuse(sentence: str, outcome: str, reason: str, status: int) -> None:
@@ -177,7 +194,10 @@ def _position(mechanism: Mechanism, pair: str | None, text: str | None, option: 
         return None
     if pair is None:
         raise BadInput(option, "there are several inputs; name the one that runs with --input")
-    return read_drive(mechanism, pair, text).position
+    try:
+        return read_drive(mechanism, pair, text).position
+    except BadInput as problem:
+        raise BadInput(option, problem.sentence) from None
 
 
 def _busy(doing: str) -> AbstractContextManager[Any]:

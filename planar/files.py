@@ -57,7 +57,9 @@ def found(model: str | Path) -> Path:
         if path.is_file():
             return path
         if path.is_dir():
-            raise BadInput(str(model), "this is a folder; name a mechanism file in it")
+            raise BadInput(str(model) or "''", "this is a folder; name a mechanism file in it")
+        if path.exists():
+            raise BadInput(str(model), "this is a pipe or a device; save the mechanism to a file and name that")
     except OSError as problem:
         told = f"{str(model)[:60]}…" if len(str(model)) > 100 else str(model)
         raise BadInput(told, f"this cannot be the name of a file: {problem.strerror}") from None
@@ -89,11 +91,13 @@ def models() -> Iterator[tuple[Path, Mechanism]]:
 
 def _content(path: Path) -> bytes:
     try:
-        if path.stat().st_size > LARGEST:
-            raise BadInput(str(path), f"the file is larger than the {LARGEST // 2**20} MiB that a mechanism may take")
-        return path.read_bytes()
+        with path.open("rb") as file:
+            content = file.read(LARGEST + 1)
     except OSError as problem:
         raise BadInput(str(path), f"the file cannot be read: {problem.strerror}") from None
+    if len(content) > LARGEST:
+        raise BadInput(str(path), f"the file is larger than the {LARGEST // 2**20} MiB that a mechanism may take")
+    return content
 
 
 def _parsed(text: str | bytes, place: str) -> Any:

@@ -50,9 +50,9 @@ TABLE: dict[str, tuple[str, float, float]] = {
 LONGEST = 64
 """Characters of a quantity; the longest that `shortest` writes takes 33."""
 
-_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.DOTALL)
+_NUMBER = re.compile(r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*(.*?)\s*", re.DOTALL)
 # a word, with one small exponent at most, joined by a space, a dot, * or /: nothing that could be an expression
-_UNIT = re.compile(r"[A-Za-zµμΩ]+(\^[+-]?\d)?((\s*/\s*|\s*\*\s*|\s*·\s*|\s+)[A-Za-zµμΩ]+(\^[+-]?\d)?){0,7}")
+_UNIT = re.compile(r"[A-Za-zµμΩ]+(\^[+-]?[0-9])?((\s*/\s*|\s*\*\s*|\s*·\s*|\s+)[A-Za-zµμΩ]+(\^[+-]?[0-9])?){0,7}")
 _SPELLINGS = str.maketrans({"−": "-", "°": "deg", "²": "^2", "³": "^3", "µ": "u", "μ": "u", "⁻": "^-", "¹": "1"})
 
 
@@ -79,7 +79,7 @@ def unit(text: str) -> Unit:
     if len(text) > LONGEST:
         raise UnitError(f"a unit takes at most {LONGEST} characters, not {len(text)}")
     spelled = re.sub(r"\s+", " ", text.strip().translate(_SPELLINGS).replace("^-^", "^-").replace("**", "^"))
-    spelled = re.sub(r"(?<=[A-Za-z])\^-(?=\^?\d)", "^-", spelled)
+    spelled = re.sub(r"(?<=[A-Za-z])\^-(?=\^?[0-9])", "^-", spelled)
     if spelled in TABLE:
         return Unit(*TABLE[spelled])
     if not _UNIT.fullmatch(spelled):

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 import planar
-from planar.files import models
+from planar.files import LARGEST, models
 
 ROOT = Path(__file__).parent.parent
 FAR = 1e-12
@@ -85,6 +85,7 @@ def run(folder: Path, *words: str, **environment: str) -> Ended:
         capture_output=True,
         check=False,
         stdin=subprocess.DEVNULL,
+        timeout=120,  # no speed is tested: what would wait for ever ends
     )
     ended = Ended(process.returncode, process.stdout, process.stderr)
     assert "Traceback" not in ended.err, ended.err
@@ -277,12 +278,139 @@ def test_what_is_no_file_ends_with_2(model: str, words: list[str], tmp_path: Pat
         assert word in sentence
 
 
-@pytest.mark.parametrize("words", [["solv"], ["solve"]], ids=" ".join)
-def test_a_wrong_command_line_ends_with_2(words: list[str], tmp_path: Path) -> None:
+TEXT = json.dumps(FOUR_BAR)
+BIG = "9" * 400
+
+
+def told(old: str, new: str) -> str:
+    """The four-bar chain with a piece of its text replaced."""
+    assert old in TEXT
+    return TEXT.replace(old, new, 1)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("", ["m.json", "not JSON"]),
+        (TEXT[:-1], ["m.json", "not JSON", "line 1"]),
+        (TEXT + "}", ["m.json", "not JSON", "line 1"]),
+        (b'{"name": "\xff"}', ["m.json", "not UTF-8", "byte 10"]),
+        (TEXT.encode("utf-16"), ["m.json", "not UTF-8"]),
+        (told("66", "NaN"), ["m.json", "NaN", "not a number"]),
+        (told("66", "-Infinity"), ["m.json", "-Infinity", "not a number"]),
+        (told("66", "1e999"), ["$.links.BC.length", "too large"]),
+        (told("66", BIG), ["$.links.BC.length", "too large"]),
+        (told("100, 0", f"100, -{BIG}"), ["$.links.AD.points.D[1]", "too large"]),
+        (told("66", "9" * 5000), ["m.json", "digits"]),
+        (told('"frame": "AD"', '"frame": "AD", "frame": "AD"'), ["m.json", "'frame'", "twice"]),
+        (told('"sketch"', '"sketh"'), ["$.sketh", "unknown key", "did you mean 'sketch'?"]),
+        (told('"frame": "AD", ', ""), ["$: ", "'frame'", "missing"]),
+        (told('"frame": "AD"', '"frame": "Ad"'), ["$.frame", "no link 'Ad'", "did you mean 'AD'?"]),
+        (told('"turning": "C"', '"turning": "Z"'), ["$.pairs[2].turning", "no link", "'Z'"]),
+        (told('"C"}', '"C", "links": ["BC", "CD"]}'), ["$.pairs[2].links[1]", "no link 'CD'"]),
+        (told('"C"}', '"C", "links": ["BC", "AB"]}'), ["$.pairs[2].turning", "'AB'", "no point 'C'"]),
+        (
+            told('"along": ["B", "C"], "distance": 40', '"distances": {"B": 5, "C": 5}, "left_of": ["B", "C"]'),
+            ["$.links.BC.points.E", "does not close", "B-C-E"],
+        ),
+        (told("66", "0"), ["$.links.BC.length", "above zero", "0"]),
+        (told("66", '"-66 mm"'), ["$.links.BC.length", "above zero", "-66 mm"]),
+        (told("66", '"66 deg"'), ["$.links.BC.length", "a length is wanted"]),
+        (told("66", '"66"'), ["$.links.BC.length", "no unit"]),
+        (told('"10.5 rad/s"', "10.5"), ["$.inputs[0].velocity", "bare rate", "rad/s"]),
+        (
+            told('"inputs": [', '"inputs": [{"pair": "A", "position": 1}, '),
+            ["$.inputs[1].pair", "'A'", "an input already"],
+        ),
+        ("[" * 20_000, ["m.json", "nested too deeply"]),
+        ('{"a":' * 20_000 + "1" + "}" * 20_000, ["m.json", "nested too deeply"]),
+        (told("66", "[" * 300 + "]" * 300), ["$.links.BC.length", "a list"]),
+        (TEXT + " " * LARGEST, ["m.json", "larger than the 8 MiB"]),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_a_file_that_cannot_be_meant_ends_every_command_with_2_and_one_sentence(
+    content: str | bytes, words: list[str], tmp_path: Path
+) -> None:
+    (tmp_path / "m.json").write_bytes(content if isinstance(content, bytes) else content.encode())
+    refused_by(["solve", "inspect", "cycle"][len(words[0]) % 3], "m.json", words, tmp_path)
+
+
+def refused_by(command: str, model: str, words: list[str], folder: Path) -> None:
+    ended = run(folder, command, model, "--json")
+    sentence = ended.refused(2)
+    assert sentence.startswith(words[0])
+    for word in words:
+        assert word in sentence
+    assert json.loads(ended.out) == {"outcome": "bad input", "reason": sentence}
+
+
+@pytest.mark.parametrize("command", ["solve", "inspect", "cycle"])
+def test_a_byte_order_mark_is_no_mistake(command: str, tmp_path: Path) -> None:
+    (tmp_path / "m.json").write_bytes(TEXT.encode("utf-8-sig"))
+    assert "Four-bar chain" in run(tmp_path, command, "m.json").done()
+
+
+@pytest.mark.parametrize("command", ["solve", "inspect", "cycle"])
+def test_what_is_no_file_to_read_ends_with_2_and_is_not_waited_for(command: str, tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "circle").symlink_to(tmp_path / "circle")
+    for model in {"solve": ["pipe", "none"], "inspect": ["/dev/zero", "."], "cycle": ["circle", "m.json/x"]}[command]:
+        refused_by(command, model, [model], tmp_path)
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="a superuser may read any file")
+def test_a_file_that_may_not_be_read_ends_with_2(tmp_path: Path) -> None:
+    (tmp_path / written(tmp_path, FOUR_BAR)).chmod(0)
+    refused_by("solve", "m.json", ["m.json", "cannot be read"], tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["solv"], ["'solv'", "solve"]),
+        (["--nope", "solve", "m.json"], ["--nope"]),
+        (["solve"], ["MODEL", "`planar solve --help`"]),
+        (["solve", "m.json", "more"], ["more"]),
+        (["solve", "m.json", "--nope"], ["--nope"]),
+        (["solve", "m.json", "--relativ", "C,B"], ["--relativ"]),
+        (["solve", "m.json", "-o"], ["-o", "argument"]),
+        (["solve", "m.json", "--a\nb\x1b[31m"], [r"--a\nb\x1b[31m"]),
+        (["cycle", "m.json", "-o", "."], ["-o", "'.'"]),
+        (["cycle", "m.json", "--steps", "abc"], ["--steps", "'abc'", "integer"]),
+        (["cycle", "m.json", "--steps", "1e9"], ["--steps", "'1e9'", "integer"]),
+        (["cycle", "m.json", "--steps", "0"], ["steps", "1", "0"]),
+        (["cycle", "m.json", "--steps", "-5"], ["steps", "1", "-5"]),
+        (["cycle", "m.json", "--steps", "1000000000"], ["steps", "1000000", "1000000000"]),
+        (["cycle", "m.json", "--from", "5 parsecs"], ["'5 parsecs'", "angle is wanted"]),
+        (["cycle", "m.json", "--from", "nan"], ["not a number"]),
+        (["cycle", "m.json", "--to", "5 mm"], ["'5 mm'", "angle is wanted"]),
+        (["cycle", "m.json", "--to", ""], ["''"]),
+        (["cycle", "m.json", "--input", "Z"], ["'Z'", "inputs are at A"]),
+        (["models", "more"], ["more"]),
+    ],
+    ids=" ".join,
+)
+def test_a_wrong_command_line_ends_with_2_and_one_sentence(words: list[str], told: list[str], tmp_path: Path) -> None:
+    written(tmp_path, FOUR_BAR)
+    ended = run(tmp_path, words[0], "--json", *words[1:])
+    sentence = ended.refused(2)
+    for word in told:
+        assert word in sentence
+    assert json.loads(ended.out) == {"outcome": "bad input", "reason": sentence}
+
+
+@pytest.mark.parametrize("words", [["solv"], ["--nope"], ["solve"], ["cycle", "m", "--steps", "x"]], ids=" ".join)
+def test_a_wrong_command_line_prints_nothing_but_the_sentence(words: list[str], tmp_path: Path) -> None:
     ended = run(tmp_path, *words)
-    assert ended.status == 2
+    assert words[-1] in ended.refused(2)
     assert ended.out == ""
-    assert "Error" in ended.err
+
+
+def test_the_command_alone_tells_what_there_is(tmp_path: Path) -> None:
+    ended = run(tmp_path)
+    assert "Usage: planar" in ended.out + ended.err
+    assert "solve" in ended.out + ended.err
 
 
 def test_a_frame_alone_is_solved_or_refused_in_a_sentence(tmp_path: Path) -> None:
@@ -317,10 +445,17 @@ def test_tables_are_written_in_the_format_of_the_file(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("output", "words"), [("t.pdf", [".txt", ".svg", ".html", ".pdf"]), ("no/t.txt", ["t.txt", "cannot be written"])]
+    ("command", "output", "words"),
+    [
+        ("solve", "t.pdf", [".txt", ".svg", ".html", ".pdf"]),
+        ("solve", "no/t.txt", ["t.txt", "cannot be written"]),
+        ("cycle", "t.pdf", [".csv", ".json", ".npz", ".pdf"]),
+        ("cycle", "t", [".csv", ".json", ".npz"]),
+        ("cycle", "no/t.csv", ["t.csv", "cannot be written"]),
+    ],
 )
-def test_a_file_that_cannot_be_written_ends_with_2(output: str, words: list[str], tmp_path: Path) -> None:
-    sentence = run(tmp_path, "solve", written(tmp_path, FOUR_BAR), "-o", output).refused(2)
+def test_a_file_that_cannot_be_written_ends_with_2(command: str, output: str, words: list[str], tmp_path: Path) -> None:
+    sentence = run(tmp_path, command, written(tmp_path, FOUR_BAR), "-o", output).refused(2)
     for word in words:
         assert word in sentence
 
@@ -362,6 +497,26 @@ def test_no_text_of_a_file_commands_the_terminal(where: str, tmp_path: Path) -> 
     for sign in ("\x1b", "\x07", "\x9b"):
         assert sign not in ended.out + ended.err
     assert ended.status in (0, 2)
+
+
+CODE = "__import__('os')"
+
+
+@pytest.mark.parametrize("where", ["Four-bar chain", "AB", "E", "A"])
+def test_no_text_of_a_file_is_executed(where: str, tmp_path: Path) -> None:
+    text = f"{CODE} $(touch done) `touch done` [link=file]x[/link]"
+    name = written(tmp_path, changed(FOUR_BAR, **{where: text}))
+    out = run(tmp_path, "solve", name, FORCE_COLOR="1", COLUMNS="400").done()
+    assert text in out
+    assert "\x1b]8" not in out  # no link that a terminal would open
+    assert [file.name for file in tmp_path.iterdir()] == [name]
+
+
+@pytest.mark.parametrize("where", ['"mm"', "66"])
+def test_no_unit_of_a_file_is_executed(where: str, tmp_path: Path) -> None:
+    name = written(tmp_path, told(where, json.dumps(f"{CODE}.system('touch done')")))
+    assert "unit" in run(tmp_path, "solve", name).refused(2)
+    assert [file.name for file in tmp_path.iterdir()] == [name]
 
 
 def test_half_a_character_is_no_traceback(tmp_path: Path) -> None:

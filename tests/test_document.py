@@ -14,6 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import planar
+from planar.document import schema
 from planar.errors import BadInput
 from planar.files import models
 from planar.mechanism import (
@@ -112,7 +113,42 @@ TWO_DYADS = """
 }
 """
 
-EXAMPLES = {"four-bar": FOUR_BAR, "slider-crank": SLIDER_CRANK, "two dyads": TWO_DYADS}
+WHEELS = """
+{
+  "planar": 1,
+  "name": "A train of wheels, a rack and a slotted arm",
+  "units": {"length": "mm", "angle": "deg"},
+  "frame": "frame",
+  "links": {
+    "frame": {"points": {"O": [0, 0], "Q": [80, 0], "R": [80, 200], "T": [200, 0], "S": [-90, 0]}},
+    "sun": {"ends": ["O", "A"], "length": 40},
+    "planet": {"ends": ["Q", "B"], "length": 20},
+    "pulley": {"points": {"R": [0, 0], "E": [15, 5]}, "axis": ["R", "E"]},
+    "sprocket": {"ends": ["T", "F"], "length": 10},
+    "bar": {"points": {"G": [0, 0], "H": [100, 0]}},
+    "arm": {"ends": ["S", "K"], "length": 200}
+  },
+  "pairs": [
+    {"turning": "O"}, {"turning": "Q"}, {"turning": "R"}, {"turning": "T"}, {"turning": "S"},
+    {"gear": "mesh", "links": ["sun", "planet"], "carrier": "frame", "radii": [50, "3 cm"]},
+    {"belt": "loop", "links": ["planet", "pulley"], "radii": [20, 40], "crossed": true},
+    {"chain": "drive", "links": ["pulley", "sprocket"], "teeth": [15, 45],
+     "mesh": {"pulley": 10, "sprocket": "0.5 rad"}},
+    {"gear": "back", "links": ["sun", "bar"], "carrier": "arm", "ratio": -1.5},
+    {"sliding": "guide", "links": ["frame", "bar"], "line": {"through": [0, -50], "to": "T"},
+     "point": "G", "turn": 180},
+    {"rack": "roll", "links": ["bar", "sun"], "line": {"through": "G", "to": "H"}, "point": "O", "radius": -50,
+     "mesh": {"displacement": 5, "angle": "30 deg"}},
+    {"slot": "groove", "links": ["arm", "sun"], "line": {"through": "S", "angle": 0}, "point": "A"}
+  ],
+  "inputs": [{"pair": "mesh", "position": 700, "velocity": "100 rpm"},
+             {"pair": "roll", "position": "1 cm", "velocity": 2}],
+  "published": [{"symbol": "x", "quantity": "displacement", "of": "roll", "value": "1 cm", "tolerance": 0.01,
+                 "from": {"mesh": {"position": 0}}}]
+}
+"""
+
+EXAMPLES = {"four-bar": FOUR_BAR, "slider-crank": SLIDER_CRANK, "two dyads": TWO_DYADS, "wheels": WHEELS}
 
 STEADY = settings(deadline=None)
 """No example is timed: the first one may load a library."""
@@ -799,19 +835,23 @@ MISTAKES = [
 ]
 
 
+def mistaken(of: str, path: list[Any], new: Any) -> Any:
+    """The value of an example with a mistake in it."""
+    if not path:
+        return new
+    value = base(of)
+    if new is not GONE:
+        return put(value, path, new)
+    holder = value
+    for key in path[:-1]:
+        holder = holder[key]
+    del holder[path[-1]]
+    return value
+
+
 @pytest.mark.parametrize(("of", "path", "new", "place", "words"), MISTAKES)
 def test_a_mistake_is_refused_at_its_place(of: str, path: list[Any], new: Any, place: str, words: tuple[str]) -> None:
-    value = base(of)
-    if not path:
-        value = new
-    elif new is GONE:
-        holder = value
-        for key in path[:-1]:
-            holder = holder[key]
-        del holder[path[-1]]
-    else:
-        put(value, path, new)
-    problem = refused(value)
+    problem = refused(mistaken(of, path, new))
     assert problem.place == place
     for word in words:
         assert word in problem.sentence
@@ -949,8 +989,29 @@ def a_link(draw: Any, points: list[str]) -> Any:
 
 
 @st.composite
+def a_train(draw: Any, k: int) -> Any:
+    """Links and pairs: an arm, two wheels that it carries, and what ties their turning."""
+    arm, one, two = f"arm {k}", f"wheel {k}", f"wheel {k}'"
+    r, s = draw(st.integers(30, 99)), draw(st.integers(1, 29))
+    keyword, by = draw(st.sampled_from(["gear", "belt", "chain"])), draw(st.sampled_from(["radii", "teeth", "ratio"]))
+    tie: dict[str, Any] = {keyword: f"W{k}", "links": [one, two], "carrier": arm, by: [r, s]}
+    if by == "ratio":
+        tie["ratio"] = draw(st.sampled_from([-1, 1])) * draw(LENGTHS)
+    elif draw(st.booleans()):
+        tie |= {by: [-r, s]} if keyword == "gear" else {"crossed": True}
+    if draw(st.booleans()):
+        tie["mesh"] = {one: draw(SPELLED["angle"]), two: draw(SPELLED["angle"])}
+    apart = abs(sum(tie[by])) if keyword == "gear" and by != "ratio" else 200
+    links = {arm: {"points": {f"U{k}": [0, 0], f"V{k}": [apart, 0]}}}
+    links |= {wheel: {"points": {f"{pin}{k}": [0, 0]}} for wheel, pin in ((one, "U"), (two, "V"))}
+    return links, [{"turning": f"U{k}"}, {"turning": f"V{k}"}, tie]
+
+
+@st.composite
 def documents(draw: Any) -> Any:
-    """The JSON value of some mechanism: a tree of links, with pins of several links, slides, blocks, inputs, loads."""
+    """The JSON value of some mechanism: a tree of links, with pins of several links, slides, blocks, slots, racks,
+    trains of wheels, inputs, loads.
+    """
     names = draw(st.lists(NAMES, min_size=2, max_size=6, unique=True))
     carried: dict[str, list[str]] = {name: [] for name in names}
     pairs: list[dict[str, Any]] = []
@@ -981,14 +1042,24 @@ def documents(draw: Any) -> Any:
         first, second = draw(st.permutations(names))[:2]
         angle = draw(st.sampled_from([{}, {"angle": draw(SPELLED["angle"])}]))
         through = draw(st.sampled_from([*links[first]["points"], [draw(SPELLED["length"]), draw(SPELLED["length"])]]))
-        told = {"sliding": f"S{k}", "line": {"through": through} | angle, "turn": draw(SPELLED["angle"])}
-        if draw(st.booleans()):
-            told |= {"links": [first, second], "point": draw(st.sampled_from(list(links[second]["points"])))}
-        else:
+        how = draw(st.sampled_from(["sliding", "block", "slot", "rack"]))
+        told = {"sliding" if how == "block" else how: f"S{k}", "line": {"through": through} | angle}
+        if how == "block":
             links[second]["points"][f"B{k}"] = [draw(SPELLED["length"]), 0]
             told |= {"on": first, "block": f"B{k}"}
+        else:
+            told |= {"links": [first, second], "point": draw(st.sampled_from(list(links[second]["points"])))}
+        if how == "rack":
+            told |= {"radius": draw(LENGTHS), "mesh": {"displacement": draw(SPELLED["length"]), "angle": 5}}
+        elif how != "slot":
+            told["turn"] = draw(SPELLED["angle"])
         pairs.append(told)
         motions_of.append((f"S{k}", "length"))
+    for k in range(draw(st.integers(0, 2))):
+        more, tied = draw(a_train(k))
+        links |= more
+        pairs += tied
+        motions_of.append((f"W{k}", "angle"))
     driven = draw(st.lists(st.sampled_from(motions_of), unique=True, max_size=3)) if motions_of else []
     rates = {"angle": ("angular velocity", "angular acceleration"), "length": ("velocity", "acceleration")}
     value = {
@@ -1009,7 +1080,8 @@ def documents(draw: Any) -> Any:
         ],
         "sketch": {f"{names[0]}.{carried[names[0]][0]}": [draw(SPELLED["length"]), draw(SPELLED["length"])]},
         "published": [
-            {"symbol": "v", "quantity": "velocity", "of": f"{names[1]}.{carried[names[1]][0]}", "value": None},
+            {"symbol": "v", "quantity": "velocity", "of": f"{names[1]}.{carried[names[1]][0]}", "value": None}
+            | {"relative_to": f"{names[0]}.{carried[names[0]][0]}"},
             {"symbol": "w", "quantity": "angular velocity", "of": names[1], "value": draw(SPELLED["angular velocity"])}
             | {"inputs": {pair: {"position": draw(SPELLED[kind])} for pair, kind in driven}, "tolerance": 0.01},
         ],
@@ -1032,7 +1104,18 @@ def test_any_mechanism_written_and_read_again_is_the_same_to_the_last_bit(value:
 
 # mutilated files
 
-WORDS = sorted({word for text in EXAMPLES.values() for word in text.split('"')[1::2]} | {*pair_types(), "B:a,b", "C:"})
+
+def keys_of(part: Any) -> set[str]:
+    """Every key that a schema lets an object have."""
+    if isinstance(part, list):
+        return set().union(*map(keys_of, part))
+    if not isinstance(part, dict):
+        return set()
+    return set(part.get("properties", ())).union(*map(keys_of, part.values()))
+
+
+SAID = {word for text in EXAMPLES.values() for word in text.split('"')[1::2]}
+WORDS = sorted(SAID | keys_of(schema()) | {*pair_types(), "B:a,b", "C:"})
 SCRAPS = st.one_of(
     st.none(),
     st.booleans(),

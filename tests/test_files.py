@@ -129,10 +129,10 @@ def test_what_cannot_be_the_name_of_a_file_is_refused(model: str) -> None:
 def test_a_file_that_may_not_be_read_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = written(tmp_path, TEXT)
 
-    def barred(_: Path) -> bytes:
+    def barred(_: Path, *mode: str) -> None:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(Path, "read_bytes", barred)  # a superuser, as in a container, may read any file
+    monkeypatch.setattr(Path, "open", barred)  # a superuser, as in a container, may read any file
     problem = refused(path)
     assert problem.place == str(path)
     assert "cannot be read: Permission denied" in problem.sentence

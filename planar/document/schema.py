@@ -23,7 +23,8 @@ _TEXT: Schema = {"type": "string"}
 _TEXTS: Schema = {"type": "array", "items": _TEXT}
 _BOUNDED: Schema = {"type": "number", "exclusiveMinimum": -HUGE, "exclusiveMaximum": HUGE}
 _SIZE: Schema = {"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": HUGE}
-_NUMBER = r"(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*\S"
+_NUMBER = r"([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\s*(?![eE][+-]?[0-9])[A-Za-zµμΩ°]"
+"""A number and the beginning of its unit."""
 
 
 def _quantity(number: Schema, sign: str, such: str) -> Schema:
@@ -125,6 +126,7 @@ def schema() -> dict[str, Any]:
                 "pattern": rf"^[^{FORBIDDEN}]*[^\s{FORBIDDEN}][^{FORBIDDEN}]*$",
                 "description": f"contains none of {' '.join(FORBIDDEN)}",
             },
+            "number": _BOUNDED,
             "quantity": _quantity(_BOUNDED, "[+−-]?", "10.5 rad/s"),
             "length": _quantity(_BOUNDED, "[+−-]?", "50 mm"),
             "size": _quantity(_SIZE, "[+]?", "50 mm"),

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 from planar.algebra import Scalar
-from planar.pairs.base import Entry, Quantity, Sample, Schema, Told
+from planar.pairs.base import Entry, Quantity, Sample, Schema, Told, described, several
 from planar.pairs.wheels import Wheels
 
 
@@ -18,7 +18,13 @@ class Belt(Wheels):
     crossed: bool = False
 
     keyword: ClassVar[str] = "belt"
-    members: ClassVar[Mapping[str, Schema]] = {**Wheels.members, "crossed": {"type": "boolean"}}
+    members: ClassVar[Mapping[str, Schema]] = {
+        **Wheels.members,
+        "radii": several("size", 2, 2),
+        "teeth": {**several("number", 2, 2), "items": {"type": "integer", **described("number"), "minimum": 1}},
+        "crossed": {"type": "boolean"},
+    }
+    rule: ClassVar[Schema] = {**Wheels.rule, "not": {"required": ["ratio", "crossed"]}}
 
     def ratio(self) -> Scalar:
         if self.by == "ratio":

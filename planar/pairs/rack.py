@@ -30,7 +30,7 @@ class Rack(Guided):
         "links": several("name", 2, 2) | {"uniqueItems": True},
         "line": LINE,
         "point": described("name"),
-        "radius": described("length"),
+        "radius": {**described("length"), "not": {"const": 0}},
         "mesh": {
             "type": "object",
             "properties": {"displacement": described("length"), "angle": described("angle")},

@@ -15,6 +15,7 @@ from planar.shapes import Shape
 
 STEEPEST = 1e6
 SIZES = ("radii", "teeth", "ratio")
+NONZERO: Schema = {"not": {"const": 0}}
 NEAR = 1e-6
 """Centres are where the radii put them within this part of their distance: dimensions in files are rounded."""
 
@@ -34,9 +35,9 @@ class Wheels(Pair):
     members: ClassVar[Mapping[str, Schema]] = {
         "links": several("name", 2, 2) | {"uniqueItems": True},
         "carrier": described("name"),
-        "radii": several("length", 2, 2),
-        "teeth": {"type": "array", "items": {"type": "integer", "not": {"const": 0}}, "minItems": 2, "maxItems": 2},
-        "ratio": {"type": "number", "not": {"const": 0}},
+        "radii": {**several("length", 2, 2), "items": {**described("length"), **NONZERO}},
+        "teeth": {**several("number", 2, 2), "items": {**described("number"), **NONZERO, "type": "integer"}},
+        "ratio": {**described("number"), **NONZERO},
         "mesh": {
             "type": "object",
             "additionalProperties": described("angle"),
