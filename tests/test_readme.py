@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+import planar
+
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
@@ -47,6 +49,17 @@ def test_the_python_snippet_runs(folder):
     (snippet,) = blocks("python")
     done = run([sys.executable, "-c", snippet], folder)
     assert done.returncode == 0, done.stderr
+
+
+def test_entries_of_pairs_that_it_shows_are_such():
+    from jsonschema import Draft202012Validator
+
+    whole = planar.schema()
+    check = Draft202012Validator({"$ref": "#/$defs/pair", "$defs": whole["$defs"]})
+    shown = [json.loads(text) for text in re.findall(r"`(\{.*?\})` \|", README)]
+    assert len(shown) >= 4
+    for entry in shown:
+        check.validate(entry)
 
 
 def test_the_readme_names_every_room():

@@ -9,11 +9,12 @@ import numpy as np
 
 from planar.analysis.mobility import Mobility, gruebler, mobility
 from planar.analysis.names import names
-from planar.errors import NoAnswer, Outcome, PlanarError
+from planar.errors import BadInput, NoAnswer, Outcome, PlanarError
 from planar.graph import detached, numbered, pair_words
-from planar.mechanism import Mechanism, entries
+from planar.mechanism import Input, Mechanism, entries
 from planar.motion import Motion
 from planar.pairs import Kind
+from planar.program import shapes, size
 from planar.solving.cycle import cycle
 from planar.solving.position import solve
 from planar.words import listed, many
@@ -128,10 +129,19 @@ def _motions(mechanism: Mechanism) -> dict[str, str]:
     runs: list[Motion] = []
     for given in mechanism.inputs:
         try:
-            runs.append(cycle(mechanism, STEPS, pair=given.pair))
+            runs.append(_run(mechanism, given))
         except PlanarError:
             return {link.name: "fixed" if link.name == mechanism.frame else "unknown" for link in mechanism.links}
     return {link.name: _motion(mechanism, link.name, runs) for link in mechanism.links}
+
+
+def _run(mechanism: Mechanism, given: Input) -> Motion:
+    """One input through its range; a slide without limits a few sizes to either side."""
+    try:
+        return cycle(mechanism, STEPS, pair=given.pair)
+    except BadInput:
+        far = 2.0 * size(mechanism, shapes(mechanism))
+        return cycle(mechanism, STEPS, given.position - far, given.position + far, given.pair)
 
 
 def _motion(mechanism: Mechanism, link: str, runs: list[Motion]) -> str:

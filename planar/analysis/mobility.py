@@ -61,7 +61,7 @@ def measured(constraints: Constraints, w: Array) -> Mobility:
         finite, place = motion_from(constraints, w)
     left = null_space(constraints.slope(place).T)
     surplus = max(0, finite - count)
-    sets = ()
+    sets: tuple[tuple[str, ...], ...] = ()
     if surplus and left.shape[1] == surplus:
         sets = smallest_sets(left, constraints.pair_of_row, lambda name: farthest_first(mechanism, name))
     return Mobility(count, here, finite, surplus, sets, tuple(_why(count, here, finite, sets)))

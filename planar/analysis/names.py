@@ -291,7 +291,7 @@ def _wheels(chain: Scheme) -> tuple[str, ...]:
     of five links of which two neighbours of a third are geared in it is a geared five-bar (R. Norton). What else has
     loops besides its wheels is a geared linkage.
     """
-    if not all(pair.counts_turns for pair in chain.higher):
+    if not all(pair.counts_turns and not pair.at_a_distance for pair in chain.higher):
         return ()
     wheels = [pair for pair in chain.higher if pair.drive_kind is Kind.TURNS]
     carriers = {body for pair in wheels for body in pair.bodies if body not in pair.links}

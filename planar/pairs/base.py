@@ -38,7 +38,7 @@ class Pair(ABC):
 
     name: str
     links: tuple[str, str]
-    """The two links that touch."""
+    """The two links that it joins."""
 
     keyword: ClassVar[str]
     """The key that marks the type in a mechanism file."""
@@ -50,6 +50,8 @@ class Pair(ABC):
     """What JSON Schema says of the keys together."""
     lower: ClassVar[bool]
     """Whether the links touch along a surface; higher pairs touch at a point or along a line."""
+    at_a_distance: ClassVar[bool] = False
+    """Whether something runs between the two links, which do not touch themselves."""
     touching: ClassVar[str] = ""
     """What to know of a contact that is open, see `apart`."""
     counts_turns: ClassVar[bool] = False
@@ -67,7 +69,7 @@ class Pair(ABC):
 
     @property
     def bodies(self) -> tuple[str, ...]:
-        """The links whose frames its formulas need: the two that touch, and those that they are seen from."""
+        """The links whose frames its formulas need: the two that it joins, and those that they are seen from."""
         return self.links
 
     @abstractmethod

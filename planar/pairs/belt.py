@@ -18,6 +18,7 @@ class Belt(Wheels):
     crossed: bool = False
 
     keyword: ClassVar[str] = "belt"
+    at_a_distance: ClassVar[bool] = True
     members: ClassVar[Mapping[str, Schema]] = {
         **Wheels.members,
         "radii": several("size", 2, 2),

@@ -44,8 +44,6 @@ class Constraints:
             pair.name: scaled(pair.measure([setup.shapes[link] for link in pair.bodies]), pair.measures, setup.unit)
             for pair in (*self.pairs, *setup.named.values())
         }
-        is_angle = [coordinate.kind is not Kind.LENGTH for coordinate in self.coordinates]
-        self._angles = np.array(is_angle, dtype=bool)
 
     def gaps(self, w: Array) -> Array:
         """What every constraint leaves open (rows,), of w (coordinates, many) of each (rows, many)."""

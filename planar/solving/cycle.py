@@ -19,7 +19,7 @@ from planar.solving.position import Solver
 
 Array = np.ndarray
 
-FARTHEST = 1e3
+FARTHEST = 100.0
 """Lengths of the size: a slide that goes on so far has no limit."""
 MOST_STEPS = 10**6
 

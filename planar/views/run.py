@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -41,10 +41,10 @@ def columns(motion: Motion) -> Iterator[Column]:
             for what, values in link._asdict().items():
                 yield Column(name, what.replace("_", " "), what.replace("_", " "), values)
     for name, report in motion.pairs.items():
-        kinds = motion.reported(name)
-        for what, values in report.items():
-            if values is not None:
-                yield Column(f"pair {name}", what.replace("_", " "), kinds[what], values)
+        of = motion.reported(name)
+        for what, found in report.items():
+            if found is not None:
+                yield Column(f"pair {name}", what.replace("_", " "), of[what], found)
 
 
 def _kinds(motion: Motion, pair: str) -> tuple[str, str, str]:
@@ -55,7 +55,7 @@ def _kinds(motion: Motion, pair: str) -> tuple[str, str, str]:
 
 def written(motion: Motion, suffix: str) -> str | bytes:
     """The run in the format that a file's suffix names. Raises BadInput."""
-    formats = {".csv": _csv, ".json": _json, ".npz": _npz}
+    formats: dict[str, Callable[[Motion], str | bytes]] = {".csv": _csv, ".json": _json, ".npz": _npz}
     if suffix not in formats:
         raise BadInput(suffix or "the file", f"a run is written to {', '.join(formats)} files")
     return formats[suffix](motion)
@@ -104,7 +104,7 @@ def _json(motion: Motion) -> str:
 
 def _npz(motion: Motion) -> bytes:
     """SI arrays under names such as "points/C/velocity"."""
-    arrays = {}
+    arrays: dict[str, Array] = {}
     for group in ("inputs", "links", "points"):
         for name, each in getattr(motion, group).items():
             arrays |= {f"{group}/{name}/{what}": values for what, values in each._asdict().items()}

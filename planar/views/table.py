@@ -119,8 +119,8 @@ def run(motion: Motion) -> RenderableType:
     for name, point in motion.points.items():
         ends = [length.from_si(float(end)) for values in point.position.T for end in (values.min(), values.max())]
         greatest = [np.hypot(*rate.T) for rate in (point.velocity, point.acceleration)]
-        rates = ["-" if np.isnan(rate).all() else _number(float(np.nanmax(rate))) for rate in greatest]
-        table.add_row(name, *map(_number, ends), *rates)
+        most = ["-" if np.isnan(rate).all() else _number(float(np.nanmax(rate))) for rate in greatest]
+        table.add_row(name, *map(_number, ends), *most)
     notes = [paragraphs(("-", remark) for remark in motion.remarks)] if motion.remarks else []
     return Group(*lines, Text(), table, *notes)
 
