@@ -9,6 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 import planar
+from planar.analysis.efforts import efforts
 from planar.cli import main
 from planar.errors import BadInput, NoAnswer, Outcome
 
@@ -274,3 +275,39 @@ def test_a_gear_on_a_crank_that_a_linkage_turns_counts_its_turns(degrees, ratio)
     assert round(crank / (2 * np.pi)) == round((degrees - 100) / 360)
     if degrees == 820:
         assert crank == pytest.approx(4 * np.pi, abs=1e-12)
+
+
+CONTRACT = {
+    "planar": 1,
+    "name": "Andrew variable-stroke engine",
+    "units": {"length": "mm", "angle": "deg"},
+    "frame": "frame",
+    "links": {
+        "frame": {"points": {"O": [0, 0], "Q": [-158, 0]}},
+        "OA": {"ends": ["O", "A"], "length": 90},
+        "QB": {"ends": ["Q", "B"], "length": 45},
+        "AC": {"ends": ["A", "C"], "length": 185},
+        "BC": {"ends": ["B", "C"], "length": 185},
+        "CD": {"ends": ["C", "D"], "length": 240},
+    },
+    "pairs": [
+        *({"turning": name} for name in "OQABC"),
+        {"gear": "wheels", "links": ["OA", "QB"], "ratio": -2.122, "mesh": {"OA": 79.2, "QB": 208.1}},
+        {"sliding": "stroke", "on": "frame", "block": "D", "line": {"through": [0, 232], "angle": 0}},
+    ],
+    "inputs": [{"pair": "O", "position": 79.2, "velocity": "100 rpm"}],
+    "loads": [{"point": "D", "force": [-3000, 0]}],
+    "sketch": {"C": [-154, 159], "D": [74, 232]},
+}
+
+
+def test_the_geared_example_balances_power_as_a_difference_of_positions_says():
+    """Torque times speed of the crank is load times speed of the slider, that taken from two positions."""
+    mechanism = planar.from_dict(CONTRACT)
+    state = planar.solve(mechanism)
+    crank, step = mechanism.inputs[0].position, 1e-4
+    ahead, behind = (planar.solve(mechanism, {"O": crank + way * step}).point("D").position[0] for way in (1, -1))
+    # central difference: truncation of about step^2, so eight digits
+    assert efforts(state)["O"] == pytest.approx(3000 * (ahead - behind) / (2 * step), rel=1e-6)
+    assert state.link("QB").angle == pytest.approx(np.radians(208.1), rel=1e-12)
+    assert state.link("QB").angular_velocity == pytest.approx(-2.122 * 100 * np.pi / 30, rel=1e-12)

@@ -21,7 +21,7 @@ Array = np.ndarray
 
 FARTHEST = 100.0
 """Lengths of the size: a slide that goes on so far has no limit."""
-MOST_STEPS = 10**6
+MOST_STEPS = 10**5
 
 
 def cycle(
