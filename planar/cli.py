@@ -106,6 +106,7 @@ def solve(model: str, as_json: bool, at: tuple[str, ...], relative: tuple[str, .
     if as_json and output is not None:
         raise BadInput("-o", "tables go to a file or SI values are printed with --json; give one of the two")
     mechanism = load(model)
+    _spare(model, output)
     drives = _drives(mechanism, at)
     state = solved(mechanism, drives)
     comparisons = compare(state) if not drives else ()
@@ -144,6 +145,7 @@ def cycle(
     if as_json and output is not None:
         raise BadInput("-o", "a run goes to a file or is printed with --json; give one of the two")
     mechanism = load(model)
+    _spare(model, output)
     names = [given.pair for given in mechanism.inputs]
     pair = pair if pair is not None or len(names) != 1 else names[0]
     ends = [_position(mechanism, pair, text, option) for option, text in (("--from", start), ("--to", stop))]
@@ -184,6 +186,12 @@ def inspect(model: str, as_json: bool) -> None:
     from planar.views.inspected import inspection
 
     _show(inspection(found), None)
+
+
+def _spare(model: str, output: Path | None) -> None:
+    """Refuse to write over the mechanism's own file."""
+    if output is not None and output.exists() and Path(model).exists() and output.samefile(model):
+        raise BadInput("-o", "this is the mechanism's own file, which would be lost; name another")
 
 
 def _position(mechanism: Mechanism, pair: str | None, text: str | None, option: str) -> float | None:

@@ -119,7 +119,7 @@ def _is_mechanism(mechanism: Mechanism, found: Mobility | None, trouble: str) ->
     try:
         solve(mechanism)
     except NoAnswer as problem:
-        passing = problem.outcome in (Outcome.DEAD_POINT, Outcome.CHANGE_POINT)
+        passing = problem.outcome in (Outcome.DEAD_POINT, Outcome.CHANGE_POINT, Outcome.CANNOT_BE_ASSEMBLED)
         return passing, f"{told}; but here: {problem.reason}" if passing else str(problem)
     return True, told
 
@@ -133,6 +133,11 @@ def _motions(mechanism: Mechanism) -> dict[str, str]:
         except PlanarError:
             return {link.name: "fixed" if link.name == mechanism.frame else "unknown" for link in mechanism.links}
     return {link.name: _motion(mechanism, link.name, runs) for link in mechanism.links}
+
+
+def _same_place(run: Motion) -> bool:
+    """Whether everything that slides is at the end where it was at the start."""
+    return all(abs(float(np.ptp(jet.parts[0][[0, -1]]))) < 1e-6 for own in run.own.values() for jet in own)
 
 
 def _run(mechanism: Mechanism, given: Input) -> Motion:
@@ -157,7 +162,9 @@ def _motion(mechanism: Mechanism, link: str, runs: list[Motion]) -> str:
         return "translates" if strays else "stands still"
     if not _pinned(mechanism, link):
         return "general plane motion"
-    return "turns fully" if any(_turns(run, link) for run in runs) else "rocks"
+    if any(_turns(run, link) for run in runs):
+        return "turns fully"
+    return "rocks" if all(run.outcome is Outcome.SOLVED for run in runs) else "turns or rocks"
 
 
 def _parts(run: Motion, link: str, axis: str) -> np.ndarray:
@@ -184,4 +191,4 @@ def _turns(run: Motion, link: str) -> bool:
         not run.slides(name) and abs(float(np.ptp(given.position)) - 2.0 * np.pi) < STILL
         for name, given in run.inputs.items()
     )
-    return cyclic and run.outcome is Outcome.SOLVED and abs(float(angle[-1] - angle[0])) > 1e-6
+    return cyclic and _same_place(run) and run.outcome is Outcome.SOLVED and abs(float(angle[-1] - angle[0])) > 1e-6

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planar.errors import NoAnswer, Outcome
+from planar.errors import NoAnswer
 from planar.graph import farthest_first
 from planar.mechanism import Mechanism
 from planar.solving.constraints import Constraints, joined, motion_from, null_space, rank
@@ -71,9 +71,7 @@ def standing(setup: Solver, constraints: Constraints) -> Array:
     """A closed position w of a mechanism, the one of its inputs if they determine one. Raises NoAnswer."""
     try:
         z = setup.assembly().z
-    except NoAnswer as problem:
-        if problem.outcome is Outcome.CANNOT_BE_ASSEMBLED:
-            raise
+    except NoAnswer:
         found = joined(constraints)
         if found is None:
             raise

@@ -24,6 +24,7 @@ class Place(NamedTuple):
 
 CLOSE = 1.5
 """How many times shorter than the distances from singular positions at its two ends a step must be."""
+NOTHING = 1e-7
 NUDGE = 1e-6
 """The part of a step over which the change of a slope is taken."""
 
@@ -91,7 +92,9 @@ class Branch:
                 # columns of one size, so that a small link counts as much as a large one
                 sizes = np.maximum(np.linalg.norm(here, axis=1, keepdims=True), 1e-300)
                 change = np.linalg.norm((there - here) / sizes, axis=(1, 2)) / nudge[:, 0]
-                distances[:, index] = _least(here / sizes) / np.maximum(change, 1e-300)
+                least = _least(here / sizes)
+                # on the singular position itself rates are rounding, and say nothing of how it changes
+                distances[:, index] = np.where(least < NOTHING, 0.0, least / np.maximum(change, 1e-300))
         return np.nan_to_num(distances, nan=0.0, posinf=np.inf)
 
 

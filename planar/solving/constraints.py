@@ -26,6 +26,7 @@ TRIES = 4
 """Starts from which a linkage is joined that its inputs do not determine."""
 AWAY = 0.02
 """How far (sizes, rad) a position is moved along what it allows, to see whether the motion goes on."""
+LEAST_SEEDS, MOST_SEEDS = 3, 12
 NEAR = 1e-3
 """How far its neighbours are from a position whose motions are counted; what bends back within it is none."""
 SINGULAR = 1e-6
@@ -159,14 +160,17 @@ def joined(constraints: Constraints) -> Array | None:
 def motion_from(constraints: Constraints, w: Array) -> tuple[int, Array]:
     """The dimension of the motion that leads away from a position, and a position on it."""
     free = null_space(constraints.slope(w))
-    found, place = 0, w
-    for seed in range(4 if free.size else 0):
+    found, place, held = 0, w, -1
+    for seed in range(MOST_SEEDS if free.size else 0):
         rng = np.random.default_rng(seed)
         away = constraints.closed(w + moved(free, rng, AWAY))
         if away is not None:
-            ways = _ways(constraints, away, rng)
-            if ways > found:
-                found, place = ways, away
+            ways, holds = _ways(constraints, away, rng), rank(constraints.slope(away))
+            # of places that move alike the one where nothing is singular: some fall back beside w
+            if (ways, holds) > (found, held):
+                found, place, held = ways, away, holds
+        if seed >= LEAST_SEEDS and found + held == w.size:
+            break
     return found, place
 
 

@@ -13,13 +13,17 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.program import Rates
 from planar.solving.setup import Setup
 
 Array = np.ndarray
 
 SINGULAR = 1e-6
 """A singular value below this part of the greatest is zero: beside a crossing positions are known to about 1e-8."""
-AGREES = 1e-6
+AGREES, ALIKE = 1e-6, 1e-5
+"""Parts of the greatest: of a condition that is met to the position's own error, and of one that is squared in it."""
+FAR = 1e-3
+"""rad or sizes: a refinement that moves further was of another position; roots nearer than this are one."""
 REFINEMENTS = 4
 
 
@@ -41,95 +45,108 @@ class _Tangents(NamedTuple):
 
 def passing(setup: Setup, z: Array) -> Passing | None:
     """The one motion through a singular position near z, one freedom more than inputs; None if it is not one."""
-    for _ in range(REFINEMENTS):
-        tangents = _tangents(setup, z)
+    u1, u2 = setup.station.u1, setup.station.u2
+    speed, gain = float(np.linalg.norm(u1)), float(np.linalg.norm(u2))
+    if speed > 0.0:
+        # in units of time in which the inputs run at speed one, so that no tolerance depends on the speed
+        found = _Crossing(setup, u1 / speed, u2 / speed**2).passing(z)
+        return found and Passing(found.z, found.z1 * speed, found.z2 * speed**2)
+    way = u2 / gain if gain > 0.0 else np.eye(u1.size)[0]
+    found = _Crossing(setup, way, np.zeros_like(way)).passing(z)
+    return found and Passing(found.z, 0.0 * found.z1, found.z1 * gain)
+
+
+class _Crossing:
+    """The conditions of each order at positions of one mechanism, for given rates of its inputs."""
+
+    def __init__(self, setup: Setup, u1: Array, u2: Array):
+        self.program, self.u, self.p = setup.program, setup.station.u, setup.station.p
+        self.u1, self.u2 = u1, u2
+
+    def passing(self, z: Array) -> Passing | None:
+        for _ in range(REFINEMENTS):
+            z1 = self._velocity(z)
+            if z1 is None:
+                return None
+            refined = self._refined(z, z1)
+            if np.max(np.abs(refined - z)) > FAR:
+                return None
+            z = refined
+        z1, tangents = self._velocity(z), self._tangents(z)
+        z2 = None if z1 is None or tangents is None else self._acceleration(z, z1, tangents)
+        return None if z1 is None or z2 is None else Passing(z, z1, z2)
+
+    def _at(self, z: Array, z1: Array, z2: Array) -> tuple[Array, Array, Array]:
+        return np.concatenate([z, self.u]), np.concatenate([z1, self.u1]), np.concatenate([z2, self.u2])
+
+    def _rates(self, z: Array, z1: Array, z2: Array) -> Rates:
+        return self.program.kinematics(*self._at(z, z1, z2), self.p)
+
+    def _tangents(self, z: Array) -> _Tangents | None:
+        """What the first order leaves open; None where it cannot be met."""
+        none = np.zeros_like(z)
+        rest = self._rates(z, none, none)
+        u, s, vt = np.linalg.svd(rest.slope)
+        rank = int(np.sum(s > SINGULAR * s[0])) if s.size else 0
+        base = -vt[:rank].T @ ((u[:, :rank].T @ rest.F1) / s[:rank])
+        left = rest.slope @ base + rest.F1
+        if np.max(np.abs(left), initial=0.0) > AGREES * max(1.0, np.max(np.abs(rest.F1), initial=0.0)):
+            return None
+        return _Tangents(base, vt[rank:].T, u[:, rank:])
+
+    def _velocity(self, z: Array) -> Array | None:
+        """The z1 for which the second order can be solved; None if there is none, or more than one."""
+        tangents = self._tangents(z)
         if tangents is None or tangents.free.shape[1] != 1:
             return None
-        roots = _velocities(setup, z, tangents)
-        if len(roots) != 1:
+        scale = max(1.0, float(np.linalg.norm(tangents.base)))
+        way = tangents.free[:, 0] * scale
+
+        def open_at(c: float) -> Array:
+            return tangents.left.T @ self._rates(z, tangents.base + c * way, np.zeros_like(z)).F2
+
+        below, here, above = (open_at(c) for c in (-1.0, 0.0, 1.0))
+        roots = _common_roots(0.5 * (above + below) - here, 0.5 * (above - below), here, AGREES * scale**2)
+        return tangents.base + roots[0] * way if len(roots) == 1 else None
+
+    def _refined(self, z: Array, z1: Array) -> Array:
+        """The position to round-off: with the velocity's own equations beside the constraints it is no double root."""
+        left, slope = self.program.deflated(z, z1, self.u, self.u1, self.p)
+        return z + np.linalg.lstsq(slope, -left, rcond=SINGULAR)[0][: z.size]
+
+    def _acceleration(self, z: Array, z1: Array, tangents: _Tangents) -> Array | None:
+        """z2 from the third order, in which it is linear."""
+        known = self._rates(z, z1, np.zeros_like(z))
+        base = -np.linalg.pinv(known.slope, rcond=SINGULAR) @ known.F2
+        free = tangents.free[:, 0]
+
+        def open_at(e: float) -> Array:
+            return tangents.left.T @ self.program.third(*self._at(z, z1, base + e * free), self.p)
+
+        here, above = open_at(0.0), open_at(1.0)
+        slope = above - here
+        if np.linalg.norm(slope) < AGREES:
             return None
-        refined = _refined(setup, z, roots[0])
-        if np.max(np.abs(refined - z)) > 1e-3:
+        e = -float(slope @ here) / float(slope @ slope)
+        if np.max(np.abs(here + e * slope)) > ALIKE * (1.0 + np.max(np.abs(here))):
             return None
-        z = refined
-    tangents = _tangents(setup, z)
-    if tangents is None:
-        return None
-    z2 = _accelerations(setup, z, roots[0], tangents)
-    return None if z2 is None else Passing(z, roots[0], z2)
+        return base + e * free
 
 
-def _kinematics(setup: Setup, z: Array, z1: Array, z2: Array):  # noqa: ANN202 - Rates
-    s = setup.station
-    return setup.program.kinematics(
-        np.concatenate([z, s.u]), np.concatenate([z1, s.u1]), np.concatenate([z2, s.u2]), s.p
-    )
+def _common_roots(bend: Array, slope: Array, here: Array, least: float) -> list[float]:
+    """The real roots that quadratic equations bend c^2 + slope c + here = 0 have in common.
 
-
-def _tangents(setup: Setup, z: Array) -> _Tangents | None:
-    none = np.zeros_like(z)
-    rest = _kinematics(setup, z, none, none)
-    u, s, vt = np.linalg.svd(rest.slope)
-    rank = int(np.sum(s > SINGULAR * s[0])) if s.size else 0
-    base = -vt[:rank].T @ ((u[:, :rank].T @ rest.F1) / s[:rank])
-    left = rest.slope @ base + rest.F1
-    if np.max(np.abs(left), initial=0.0) > AGREES * max(1.0, np.max(np.abs(rest.F1), initial=0.0)):
-        return None
-    return _Tangents(base, vt[rank:].T, u[:, rank:])
-
-
-def _velocities(setup: Setup, z: Array, tangents: _Tangents) -> list[Array]:
-    """Every z1 for which the second order can be solved."""
-    base, free, left = tangents
-    scale = max(1.0, float(np.linalg.norm(base)))
-    way = free[:, 0] * scale
-
-    def open_at(c: float) -> Array:
-        return left.T @ _kinematics(setup, z, base + c * way, np.zeros_like(z)).F2
-
-    below, here, above = (open_at(c) for c in (-1.0, 0.0, 1.0))
-    bend, slope = 0.5 * (above + below) - here, 0.5 * (above - below)
+    None where all vanish, or where a root is double: there motions only touch, and this order does not part them.
+    """
     sizes = np.abs(bend) + np.abs(slope) + np.abs(here)
-    if not sizes.size or sizes.max() < AGREES * scale**2:
+    if not sizes.size or sizes.max() < least:
         return []
     first = int(np.argmax(sizes))
-    roots = np.roots(
-        [bend[first], slope[first], here[first]]
-        if abs(bend[first]) > 1e-9 * sizes[first]
-        else [slope[first], here[first]]
-    )
-    real = [float(root.real) for root in roots if abs(root.imag) < 1e-5 * (1.0 + abs(root))]
-    fitting = [c for c in real if np.all(np.abs((bend * c + slope) * c + here) < 1e-5 * sizes.max() * (1.0 + c * c))]
-    if len(fitting) == 2 and abs(fitting[0] - fitting[1]) < 1e-3 * (1.0 + abs(fitting[0])):
-        return []  # a double root: the motions only touch, and the second order does not tell them apart
-    return [base + c * way for c in fitting]
-
-
-def _refined(setup: Setup, z: Array, z1: Array) -> Array:
-    """The position to round-off: with the velocity's own equations beside the constraints it is no double root."""
-    s = setup.station
-    left, slope = setup.program.deflated(z, z1, s.u, s.u1, s.p)
-    step = np.linalg.lstsq(slope, -left, rcond=SINGULAR)[0]
-    return z + step[: z.size]
-
-
-def _accelerations(setup: Setup, z: Array, z1: Array, tangents: _Tangents) -> Array | None:
-    """z2 from the third order, in which it is linear."""
-    s = setup.station
-    known = _kinematics(setup, z, z1, np.zeros_like(z))
-    base = -np.linalg.pinv(known.slope, rcond=SINGULAR) @ known.F2
-    free, left = tangents.free[:, 0], tangents.left
-
-    def open_at(e: float) -> Array:
-        return left.T @ setup.program.third(
-            np.concatenate([z, s.u]), np.concatenate([z1, s.u1]), np.concatenate([base + e * free, s.u2]), s.p
-        )
-
-    here, above = open_at(0.0), open_at(1.0)
-    slope = above - here
-    if np.linalg.norm(slope) < AGREES:
-        return None
-    e = -float(slope @ here) / float(slope @ slope)
-    if np.max(np.abs(here + e * slope)) > 1e-5 * (1.0 + np.max(np.abs(here))):
-        return None
-    return base + e * free
+    straight = abs(bend[first]) < AGREES * 1e-3 * sizes[first]
+    roots = np.roots([slope[first], here[first]] if straight else [bend[first], slope[first], here[first]])
+    real = [float(root.real) for root in roots if abs(root.imag) < ALIKE * (1.0 + abs(root))]
+    left = [(c, np.max(np.abs((bend * c + slope) * c + here)) / (1.0 + c * c)) for c in real]
+    fitting = [c for c, open_by in left if open_by < ALIKE * sizes.max()]
+    if len(fitting) == 2 and abs(fitting[0] - fitting[1]) < FAR * (1.0 + abs(fitting[0])):
+        return []
+    return fitting

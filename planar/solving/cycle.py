@@ -16,11 +16,14 @@ from planar.solving.branch import cancelling
 from planar.solving.follow import Run, follow, reach, run
 from planar.solving.freedom import SINGULAR, strengths
 from planar.solving.position import Solver
+from planar.words import listed
 
 Array = np.ndarray
 
 FARTHEST = 100.0
 """Lengths of the size: a slide that goes on so far has no limit."""
+FAST = 50.0
+"""Beside a limit, at follow's least step from it, the rest moves some thousand times as fast as the input."""
 MOST_STEPS = 10**5
 
 
@@ -80,7 +83,8 @@ class _Runner:
         if stop is not None or (start is not None and not self.slides):
             last = first + 2.0 * pi if stop is None else stop / self.scale
             z = follow(self.solver, self.p, self.found.z, self.u, self._at(first))
-            return self._motion(*self._run(steps, z, first, last))
+            found, inputs = self._run(steps, z, first, last)
+            return self._motion(found, inputs) if found.stopped is None else self._stopped(found, inputs)
         if not self.slides:
             whole, inputs = self._run(steps, self.found.z, here, here + 2.0 * pi)
             if whole.stopped is None:
@@ -94,7 +98,31 @@ class _Runner:
             if part.stopped is not None:
                 return self._motion(part, self._inputs_at(np.concatenate([[here], back if part is down else on])))
         z = np.concatenate([[low_z], down.z[:0:-1], up.z[1:], [high_z]])
-        return self._motion(Run(z, down.general + up.general), self._inputs_at(grid), limits=True)
+        found = Run(z, down.general + up.general, self._crossing(z, grid))
+        return self._motion(found, self._inputs_at(grid), ends=(0, -1))
+
+    def _stopped(self, found: Run, inputs: Array) -> Motion:
+        """A run that did not come to its end, with a last row where it stopped."""
+        here = inputs[len(found.z) - 1]
+        z, part = reach(self.solver, self.p, found.z[-1], here, inputs[-1] - here)
+        if part == 0.0:
+            return self._motion(found, inputs)
+        inputs = np.vstack([inputs[: len(found.z)], here + part * (inputs[-1] - here)])
+        return self._motion(found._replace(z=np.vstack([found.z, z])), inputs, ends=(-1,))
+
+    def _crossing(self, z: Array, grid: Array) -> NoAnswer | None:
+        """What to say of a range that ends where branches cross; None where both its ends are limits.
+
+        At a limit the input turns back, so that the rest moves ever faster beside it; at a crossing it does not.
+        """
+        slopes, drives = self.solver.program.slopes(z[[0, -1]], self._inputs_at(grid[[0, -1]]), self.p)
+        fast = np.abs(cancelling(slopes, drives)[:, :, self.index]).max(axis=1, initial=0.0)
+        slow = [float(end) for end, rate in zip(grid[[0, -1]], fast, strict=True) if rate < FAST]
+        if not slow:
+            return None
+        told = listed([self.solver.where(self._at(end)) for end in slow])
+        sentence = f"at {told} branches of the motion cross; this one is followed up to there, and no further"
+        return NoAnswer(Outcome.BRANCH_LOST, sentence)
 
     def _through(self, positions: Array) -> Run:
         return run(self.solver, self.p, self.found.z, self._inputs_at(positions))
@@ -122,13 +150,13 @@ class _Runner:
         inputs = self._inputs_at(np.linspace(first, last, steps + 1))
         return run(self.solver, self.p, z, inputs), inputs
 
-    def _motion(self, found: Run, inputs: Array, limits: bool = False) -> Motion:
+    def _motion(self, found: Run, inputs: Array, ends: tuple[int, ...] = ()) -> Motion:
+        """The run with its rates; at its `ends` it goes on no further."""
         solver, many = self.solver, len(found.z)
         u = inputs[:many]
         w, w1, w2 = _rates(solver, found.z, u)
-        if limits:
-            # a limit is where the input turns back: no velocity of the rest goes with one of the input
-            w1[[0, -1]] = w2[[0, -1]] = np.nan
+        # where the input turns back, no velocity of the rest goes with one of the input
+        w1[list(ends)] = w2[list(ends)] = np.nan
         parts = np.stack([w, w1, w2]) * solver.scale
         jets = [Jet(*parts[:, :, column]) for column in range(parts.shape[2])]
         frames, own = placed(jets, solver.column, solver.shapes, solver.pairs)
@@ -144,7 +172,7 @@ class _Runner:
         outcome, reason = Outcome.SOLVED, ""
         if found.stopped is not None:
             outcome, reason = found.stopped.outcome, found.stopped.reason
-        elif limits:
+        elif ends:
             reason = f"the range of {self.pair!r} ends at {solver.where(u[0])} and {solver.where(u[-1])}"
         return Motion(
             mechanism=solver.mechanism,

@@ -74,7 +74,7 @@ def _broken_ways(motion: Rates) -> int:
     """The rank of what unit rates of the inputs leave open after the unknowns have done all they can."""
     if motion.slope.shape[0] == motion.slope.shape[1]:
         return 0
-    sizes = np.maximum(np.linalg.norm(motion.drive_slope, axis=0), 1e-300)
+    sizes = np.maximum(np.linalg.norm(motion.drive_slope, axis=0), NOTHING)
     rates = np.linalg.lstsq(motion.slope, motion.drive_slope, rcond=1e-12)[0]
     left = (motion.drive_slope - motion.slope @ rates) / sizes
     return int(np.sum(np.linalg.svd(left, compute_uv=False) > SINGULAR))

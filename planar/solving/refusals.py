@@ -38,7 +38,7 @@ def free(setup: Setup) -> NoAnswer:
     return NoAnswer(
         Outcome.TOO_FEW_INPUTS,
         f"with {many(inputs, 'input')} {_links(links)} can still move in {many(ways, 'way')}; "
-        f"give an input at {_pairs_of(setup, links, 6)}",
+        f"give an input at {_pairs_of(setup, links, 6)}{_surplus(setup)}",
     )
 
 
@@ -142,6 +142,14 @@ def too_many(setup: Setup) -> NoAnswer:
         Outcome.TOO_MANY_INPUTS,
         f"{_inputs(setup)} ask for more than the mechanism's freedom and do not agree {setup.at()}{_leave_out(setup)}",
     )
+
+
+def _surplus(setup: Setup) -> str:
+    """What to say of inputs that move one another while other links are free."""
+    from planar.solving.dependence import conflicting
+
+    sets = conflicting(setup) if len(setup.mechanism.inputs) > 1 else ()
+    return f", and leave one out of those at {_named(sets[0])}, which move one another" if sets else ""
 
 
 def _leave_out(setup: Setup) -> str:
