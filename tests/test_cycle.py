@@ -165,7 +165,7 @@ def test_a_trammels_slide_runs_from_limit_to_limit():
     x = motion.inputs["x"].position
     assert len(motion) == 201
     assert motion.outcome is Outcome.SOLVED
-    np.testing.assert_allclose(x[[0, -1]], [-bar, bar], atol=1e-6 * bar)
+    np.testing.assert_allclose(x[[0, -1]], [-bar, bar], rtol=1e-14)
     np.testing.assert_allclose(np.diff(x), (x[-1] - x[0]) / 200, rtol=1e-9)
     assert "-0.12 m" in motion.reason
     assert " 0.12 m" in motion.reason
@@ -174,11 +174,12 @@ def test_a_trammels_slide_runs_from_limit_to_limit():
     np.testing.assert_allclose(motion.pair("y")["displacement"][1:-1], y[1:-1], atol=1e-13)
     angle = -np.arctan2(y, x)
     same_angles(motion.link("bar").angle[1:-1], angle[1:-1], 1e-12)
-    first = -v / (bar * np.sin(angle))
-    second = -(first**2) / np.tan(angle) - a / (bar * np.sin(angle))
+    inner = angle[1:-1]  # at the limits no velocity goes with one of the slide
+    first = -v / (bar * np.sin(inner))
+    second = -(first**2) / np.tan(inner) - a / (bar * np.sin(inner))
     link = motion.link("bar")
-    np.testing.assert_allclose(link.angular_velocity[1:-1], first[1:-1], rtol=1e-11)
-    np.testing.assert_allclose(link.angular_acceleration[1:-1], second[1:-1], rtol=1e-10, atol=1e-10)
+    np.testing.assert_allclose(link.angular_velocity[1:-1], first, rtol=1e-11)
+    np.testing.assert_allclose(link.angular_acceleration[1:-1], second, rtol=1e-10, atol=1e-10)
     for values in (link.angular_velocity, link.angular_acceleration, *motion.point("Q")[1:]):
         assert np.isnan(values[[0, -1]]).all()
         assert np.isfinite(values[1:-1]).all()
@@ -193,7 +194,7 @@ def test_a_rockers_range_ends_where_coupler_and_follower_stretch(closed):
     motion = planar.cycle(mechanism, 120)
     theta = motion.inputs["A"].position
     limit = np.arccos((a * a + d * d - (b + c) ** 2) / (2 * a * d))
-    np.testing.assert_allclose(theta[[0, -1]], [-limit, limit], atol=1e-6)
+    np.testing.assert_allclose(theta[[0, -1]], [-limit, limit], atol=1e-13)
     np.testing.assert_allclose(np.diff(theta), (theta[-1] - theta[0]) / 120, rtol=1e-9)
     assert motion.outcome is Outcome.SOLVED
     assert f"A = {-limit:.6g} rad" in motion.reason
@@ -312,8 +313,8 @@ def test_of_several_inputs_one_runs_and_the_others_stand_still():
         ({"steps": 2.0}, "steps: "),
         ({"steps": True}, "steps: "),
         ({"steps": 10**7}, "steps: .*1000000"),
-        ({"start": np.nan}, "start: a finite number"),
-        ({"stop": np.inf}, "stop: a finite number"),
+        ({"start": np.nan}, "start: a number up to 10000"),
+        ({"stop": np.inf}, "stop: a number up to 10000"),
         ({"pair": "B"}, "there is no input at 'B'; inputs are at A"),
     ],
 )
@@ -368,7 +369,7 @@ def test_a_run_past_a_limit_stops_there_and_keeps_its_rows(steps, stop):
     # every sample before the limit, then the limit, where no velocity goes with one of the input
     theta = motion.inputs["A"].position
     np.testing.assert_allclose(theta[:-1], wanted[wanted < limit], atol=1e-14)
-    assert theta[-1] == pytest.approx(limit, abs=1e-6)
+    assert theta[-1] == pytest.approx(limit, abs=1e-13)
     assert np.isnan(motion.point("C").velocity[-1]).all()
     assert not np.isnan(motion.point("C").velocity[:-1]).any()
     # beside the limit an angle is as uncertain as the square root of rounding

@@ -82,10 +82,9 @@ def standing(setup: Solver, constraints: Constraints) -> Array:
 def _why(count: int, here: int, finite: int, sets: tuple[tuple[str, ...], ...]) -> list[str]:
     told = []
     if here > finite:
-        what = "nothing moves on from it" if finite == 0 else "branches of the motion cross here, or it turns back"
+        what = "nothing moves on from here" if finite == 0 else "branches of the motion cross here, or it turns back"
         told.append(
-            f"in this position the pairs also allow {many(here - finite, 'more way')} to first order, in which the "
-            f"links cannot go on: {what}"
+            f"in this position the pairs allow {many(here - finite, 'more way')}, but to first order only: {what}"
         )
     if finite > count:
         follows = "follows" if finite - count == 1 else "follow"

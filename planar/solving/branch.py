@@ -24,7 +24,8 @@ class Place(NamedTuple):
 
 CLOSE = 1.5
 """How many times shorter than the distances from singular positions at its two ends a step must be."""
-NOTHING = 1e-7
+NOTHING = 1e-6
+"""A least singular value that is zero: on the singular position itself it is what rounding left."""
 NUDGE = 1e-6
 """The part of a step over which the change of a slope is taken."""
 

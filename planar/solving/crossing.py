@@ -22,8 +22,12 @@ SINGULAR = 1e-6
 """A singular value below this part of the greatest is zero: beside a crossing positions are known to about 1e-8."""
 AGREES, ALIKE = 1e-6, 1e-5
 """Parts of the greatest: of a condition that is met to the position's own error, and of one that is squared in it."""
+TRULY = 1e-10
+"""At the position to round-off the least singular value, as a part of the greatest, is zero to rounding."""
+MOVED = 1e-6
+"""rad or sizes: a singular position is first known to about 1e-8; what moves further was none."""
 FAR = 1e-3
-"""rad or sizes: a refinement that moves further was of another position; roots nearer than this are one."""
+"""Roots nearer than this part are one."""
 REFINEMENTS = 4
 
 
@@ -69,9 +73,13 @@ class _Crossing:
             if z1 is None:
                 return None
             refined = self._refined(z, z1)
-            if np.max(np.abs(refined - z)) > FAR:
+            if np.max(np.abs(refined - z)) > MOVED:
                 return None
             z = refined
+        slope = self._rates(z, 0.0 * z, 0.0 * z).slope
+        values = np.linalg.svd(slope, compute_uv=False)
+        if values[min(slope.shape) - 1] > TRULY * values[0]:
+            return None  # it only comes near
         z1, tangents = self._velocity(z), self._tangents(z)
         z2 = None if z1 is None or tangents is None else self._acceleration(z, z1, tangents)
         return None if z1 is None or z2 is None else Passing(z, z1, z2)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from math import isfinite, pi
+from math import pi
+from numbers import Integral, Real
+from typing import NamedTuple
 
 import numpy as np
 
 from planar.algebra import Jet
 from planar.errors import BadInput, NoAnswer, Outcome
-from planar.mechanism import Drive, Mechanism, with_inputs
+from planar.mechanism import FARTHEST, Drive, Mechanism, with_inputs
 from planar.motion import InputMotion, Motion
 from planar.pairs import Kind
 from planar.program import placed
@@ -16,12 +18,16 @@ from planar.solving.branch import cancelling
 from planar.solving.follow import Run, follow, reach, run
 from planar.solving.freedom import SINGULAR, strengths
 from planar.solving.position import Solver
-from planar.words import listed
+from planar.words import amount, listed
 
 Array = np.ndarray
 
-FARTHEST = 100.0
+ENDLESS = 100.0
 """Lengths of the size: a slide that goes on so far has no limit."""
+LEAST = 1e-5
+"""rad or sizes: a range shorter than this is none; and how far beside the end of a run its limit may lie."""
+BESIDE, REFINEMENTS, NUDGE = 1e-2, 6, 1e-7
+"""Beside a limit unknowns move as the square root of the input does: so far at the most, in so many refinements."""
 FAST = 50.0
 """Beside a limit, at follow's least step from it, the rest moves some thousand times as fast as the input."""
 MOST_STEPS = 10**5
@@ -45,13 +51,24 @@ def cycle(
     point, the limits of a range) rates are NaN. Raises BadInput for an input or a range that is not there,
     NoAnswer where there is no position to start from.
     """
-    if isinstance(steps, bool) or not isinstance(steps, int) or not 1 <= steps <= MOST_STEPS:
+    if isinstance(steps, bool) or not isinstance(steps, Integral) or not 1 <= steps <= MOST_STEPS:
         raise BadInput("steps", f"a whole number of steps from 1 to {MOST_STEPS} is wanted, not {steps!r:.40}")
     for name, value in (("start", start), ("stop", stop)):
-        if value is not None and not isfinite(value):
-            raise BadInput(name, f"a finite number (rad or m) is wanted, not {value!r}")
+        if value is None:
+            continue
+        if isinstance(value, bool) or not isinstance(value, Real) or not abs(value) <= FARTHEST:
+            raise BadInput(name, f"a number up to {FARTHEST:g} (rad or m) is wanted, not {value!r:.40}")
     runner = _Runner(mechanism, pair)
-    return runner.between(steps, start, stop)
+    return runner.between(int(steps), start, stop)
+
+
+class _End(NamedTuple):
+    """An end of a range: the unknowns and the position there, whether the input goes on, or branches cross."""
+
+    z: Array
+    position: float
+    open: bool
+    crosses: bool
 
 
 class _Runner:
@@ -76,30 +93,46 @@ class _Runner:
         self.found = self.solver.assembly()
 
     def between(self, steps: int, start: float | None, stop: float | None) -> Motion:
+        """The run over a range, or over the one that the input has by itself."""
         here = float(self.u[self.index])
+        if start is None and stop is None:
+            return self._whole(steps, here)
         first = here if start is None else start / self.scale
-        if start is not None and stop is None and self.slides:
-            stop = self._end(self.found.z, here, 1.0)[1] * self.scale
-        if stop is not None or (start is not None and not self.slides):
+        z = follow(self.solver, self.p, self.found.z, self.u, self._at(first))
+        if stop is not None or not self.slides:
             last = first + 2.0 * pi if stop is None else stop / self.scale
-            z = follow(self.solver, self.p, self.found.z, self.u, self._at(first))
             found, inputs = self._run(steps, z, first, last)
             return self._motion(found, inputs) if found.stopped is None else self._stopped(found, inputs)
+        end = self._end(z, first, 1.0)
+        inputs = self._inputs_at(np.linspace(first, end.position, steps + 1))
+        found = run(self.solver, self.p, z, inputs[:-1])
+        if found.stopped is not None:
+            return self._stopped(found, inputs)
+        return self._motion(found._replace(z=np.vstack([found.z, end.z])), inputs, ends=(-1,))
+
+    def _whole(self, steps: int, here: float) -> Motion:
+        """One turn on where the input makes it, else all between its limits."""
         if not self.slides:
-            whole, inputs = self._run(steps, self.found.z, here, here + 2.0 * pi)
-            if whole.stopped is None:
-                return self._motion(whole, inputs)
-        (low_z, low), (high_z, high) = (self._end(self.found.z, here, sign) for sign in (-1.0, 1.0))
+            found, inputs = self._run(steps, self.found.z, here, here + 2.0 * pi)
+            if found.stopped is None:
+                return self._motion(found, inputs)
+        low, high = (self._end(self.found.z, here, sign) for sign in (-1.0, 1.0))
+        if high.position - low.position < LEAST:
+            self.solver.state(self.found.z)  # says why nothing goes on from a dead point or a change point
+            told = f"the input at {self.pair!r} cannot move from {self._told(here)} while the other inputs stand still"
+            raise NoAnswer(Outcome.TOO_MANY_INPUTS, told)
         # from within to the limits: from a limit two branches lead inwards
-        grid = np.linspace(low, high, steps + 1)
-        back, on = grid[(grid < here) & (grid > low)][::-1], grid[(grid >= here) & (grid < high)]
+        grid = np.linspace(low.position, high.position, steps + 1)
+        back, on = grid[(grid < here) & (grid > grid[0])][::-1], grid[(grid >= here) & (grid < grid[-1])]
         down, up = (self._through(np.concatenate([[here], part])) for part in (back, on))
-        for part in (down, up):
+        for part, way in ((down, back), (up, on)):
             if part.stopped is not None:
-                return self._motion(part, self._inputs_at(np.concatenate([[here], back if part is down else on])))
-        z = np.concatenate([[low_z], down.z[:0:-1], up.z[1:], [high_z]])
-        found = Run(z, down.general + up.general, self._crossing(z, grid))
-        return self._motion(found, self._inputs_at(grid), ends=(0, -1))
+                return self._stopped(part, self._inputs_at(np.concatenate([[here], way])))
+        z = np.concatenate([[low.z], down.z[:0:-1], up.z[1:], [high.z]])
+        slow = [end.position for end in (low, high) if end.crosses]
+        found = Run(z, down.general + up.general, self._crossing(slow) if slow else None)
+        ends = tuple(index for index, end in ((0, low), (-1, high)) if not end.open)
+        return self._motion(found, self._inputs_at(grid), ends)
 
     def _stopped(self, found: Run, inputs: Array) -> Motion:
         """A run that did not come to its end, with a last row where it stopped."""
@@ -107,22 +140,20 @@ class _Runner:
         z, part = reach(self.solver, self.p, found.z[-1], here, inputs[-1] - here)
         if part == 0.0:
             return self._motion(found, inputs)
-        inputs = np.vstack([inputs[: len(found.z)], here + part * (inputs[-1] - here)])
+        z, u, _ = self._settled(z, here + part * (inputs[-1] - here))
+        inputs = np.vstack([inputs[: len(found.z)], u])
         return self._motion(found._replace(z=np.vstack([found.z, z])), inputs, ends=(-1,))
 
-    def _crossing(self, z: Array, grid: Array) -> NoAnswer | None:
-        """What to say of a range that ends where branches cross; None where both its ends are limits.
-
-        At a limit the input turns back, so that the rest moves ever faster beside it; at a crossing it does not.
-        """
-        slopes, drives = self.solver.program.slopes(z[[0, -1]], self._inputs_at(grid[[0, -1]]), self.p)
-        fast = np.abs(cancelling(slopes, drives)[:, :, self.index]).max(axis=1, initial=0.0)
-        slow = [float(end) for end, rate in zip(grid[[0, -1]], fast, strict=True) if rate < FAST]
-        if not slow:
-            return None
-        told = listed([self.solver.where(self._at(end)) for end in slow])
+    def _crossing(self, slow: list[float]) -> NoAnswer:
+        """What to say of a range that ends where branches cross."""
+        told = listed([self._told(end) for end in slow])
         sentence = f"at {told} branches of the motion cross; this one is followed up to there, and no further"
         return NoAnswer(Outcome.BRANCH_LOST, sentence)
+
+    def _told(self, position: float) -> str:
+        """A position of the input that runs: A = 60 deg."""
+        kind = "length" if self.slides else "angle"
+        return f"{self.pair} = {amount(position * self.scale, kind, self.solver.mechanism.units)}"
 
     def _through(self, positions: Array) -> Run:
         return run(self.solver, self.p, self.found.z, self._inputs_at(positions))
@@ -137,14 +168,52 @@ class _Runner:
         u[self.index] = position
         return u
 
-    def _end(self, z: Array, here: float, sign: float) -> tuple[Array, float]:
-        """Unknowns and position of the input where its range ends."""
-        far = FARTHEST if self.slides else 2.0 * pi
-        found, part = reach(self.solver, self.p, z, self.u, self._at(here + sign * far) - self.u)
-        if part == 1.0 and self.slides:
-            told = "the slide goes on without a limit; name where the range starts and stops"
-            raise BadInput(self.pair, told)
-        return found, here + part * sign * far
+    def _end(self, z: Array, here: float, sign: float) -> _End:
+        """Where the range of the input ends, one way from a position with unknowns z."""
+        far = sign * (ENDLESS if self.slides else 2.0 * pi)
+        start, way = self._at(here), self._at(here + far) - self._at(here)
+        found, part = reach(self.solver, self.p, z, start, way)
+        if part == 1.0:
+            if self.slides:
+                told = "the slide goes on without a limit; name where the range starts and stops"
+                raise BadInput(self.pair, told)
+            return _End(found, here + far, True, False)
+        found, u, crosses = self._settled(found, start + part * way)
+        return _End(found, float(u[self.index]), False, crosses)
+
+    def _settled(self, z: Array, u: Array) -> tuple[Array, Array, bool]:
+        """The end of a run, a limit to round-off, and whether branches cross there instead.
+
+        At a limit the input turns back, so that the rest moves ever faster beside it; at a crossing it does not.
+        """
+        slopes, drives = self.solver.program.slopes(z[None], u[None], self.p)
+        if np.abs(cancelling(slopes, drives)[:, :, self.index]).max(initial=0.0) < FAST:
+            return z, u, True
+        return (*self._limit(z, u), False)
+
+    def _limit(self, z: Array, u: Array) -> tuple[Array, Array]:
+        """The limit next to a position, to round-off: where constraints have a slope with a null vector n, |n| = 1.
+
+        Newton's method for z, n and the input that runs; the position itself where that does not lead to one beside it.
+        """
+        program, many = self.solver.program, len(z)
+        found, place = z.copy(), u.copy()
+        slopes, _ = program.slopes(z[None], u[None], self.p)
+        null = np.linalg.svd(slopes[0])[2][-1] if slopes.size else np.zeros(0)
+        still = np.zeros_like(u)
+        for _ in range(REFINEMENTS):
+            left, slope = program.deflated(found, null, place, still, self.p)
+            nudged = place.copy()
+            nudged[self.index] += NUDGE
+            ahead, _ = program.deflated(found, null, nudged, still, self.p)
+            unit = np.concatenate([np.zeros(many), null, [0.0]])
+            system = np.vstack([np.hstack([slope, ((ahead - left) / NUDGE)[:, None]]), unit])
+            step = np.linalg.lstsq(system, -np.append(left, 0.5 * (null @ null - 1.0)), rcond=1e-12)[0]
+            found, null = found + step[:many], null + step[many:-1]
+            place[self.index] += step[-1]
+        near = abs(place[self.index] - u[self.index]) < LEAST and np.max(np.abs(found - z), initial=0.0) < BESIDE
+        closed = near and self.solver.open_along(found[None], place[None])[0] <= self.solver.tolerance
+        return (found, place) if closed else (z, u)
 
     def _run(self, steps: int, z: Array, first: float, last: float) -> tuple[Run, Array]:
         inputs = self._inputs_at(np.linspace(first, last, steps + 1))
@@ -173,7 +242,8 @@ class _Runner:
         if found.stopped is not None:
             outcome, reason = found.stopped.outcome, found.stopped.reason
         elif ends:
-            reason = f"the range of {self.pair!r} ends at {solver.where(u[0])} and {solver.where(u[-1])}"
+            told = listed([self._told(float(u[end, self.index])) for end in ends])
+            reason = f"the range of {self.pair!r} ends at {told}"
         return Motion(
             mechanism=solver.mechanism,
             inputs=self._inputs(u),

@@ -57,12 +57,14 @@ def stuck(setup: Setup) -> tuple[list[str], list[str]] | None:
     None where the mechanism cannot be joined, or every input moves.
     """
     names = tuple(given.pair for given in setup.mechanism.inputs)
-    w = _anywhere(setup) if names else None
-    if w is None:
+    places = _anywhere(setup) if names else ()
+    if not places:
         return None
     constraints = Constraints(setup)
-    free = null_space(constraints.slope(w))
-    moves = np.abs(constraints.drive_slope(names, w) @ free).max(axis=1, initial=0.0)
+    moves = np.zeros(len(names))
+    for w in places:
+        free = null_space(constraints.slope(w))
+        moves = np.maximum(moves, np.abs(constraints.drive_slope(names, w) @ free).max(axis=1, initial=0.0))
     fast = [name for name, move in zip(names, moves, strict=True) if move < 100.0 * NOTHING]
     if not fast or not free.size:
         return None
@@ -83,23 +85,23 @@ def ways_on(setup: Setup, w: Array) -> int | None:
 def conflicting(setup: Setup) -> tuple[tuple[str, ...], ...]:
     """The smallest sets of inputs that move one another, or cannot move; none where the mechanism cannot be joined."""
     names = tuple(given.pair for given in setup.mechanism.inputs)
-    w = _anywhere(setup)
-    if w is None:
+    places = _anywhere(setup)
+    if not places:
         return ()
-    constraints = Constraints(setup)
+    w, constraints = places[-1], Constraints(setup)
     rates = constraints.drive_slope(names, w) @ null_space(constraints.slope(w))
     together = null_space(rates.T) if rates.size else np.eye(len(names))
     return smallest_sets(together, names, lambda name: [other for other in names if other != name])
 
 
-def _anywhere(setup: Setup) -> Array | None:
-    """A closed position in general, inputs left aside but near to them if that can be."""
+def _anywhere(setup: Setup) -> tuple[Array, ...]:
+    """A closed position, at the inputs if that can be, and one beside it, which is like most; none if none is found."""
     if len(setup.equations.coordinates) > MOST:
-        return None
+        return ()
     constraints = Constraints(setup)
     w = joined(constraints)
     if w is None:
-        return None
+        return ()
     free = null_space(constraints.slope(w))
     beside = constraints.closed(w + moved(free, np.random.default_rng(0), AWAY)) if free.size else None
-    return w if beside is None else beside
+    return (w,) if beside is None else (w, beside)

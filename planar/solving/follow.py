@@ -58,7 +58,8 @@ def follow(solver: Followed, p: Array, z: Array, start: Array, stop: Array) -> A
         raise NoAnswer(
             Outcome.BRANCH_LOST,
             f"this assembly can be followed only to {solver.where(start + found.t * (stop - start))} on the way from "
-            f"{solver.where(start)} to {solver.where(stop)}: there its motion ends, or branches",
+            f"{solver.where(start)} to {solver.where(stop)}: there its motion ends, or branches; "
+            f"stop short of it, or drive another pair",
         )
     return found.z
 

@@ -104,18 +104,21 @@ class Solver(Setup):
             from planar.solving.crossing import passing  # few positions are of this kind
 
             through = passing(self, z)
-            if through is None:
+            state = through and self._passed(through, remarks)
+            if state is None:
                 raise crossing.refused() from None
-            return self._passed(through, remarks)
+            return state
         y1 = np.concatenate([cancelled(still.slope, still.F1), s.u1])
         moving = self.program.kinematics(y, y1, given, s.p)
         y2 = np.concatenate([cancelled(moving.slope, moving.F2), s.u2])
         return self._stated(self.program.kinematics(y, y1, y2, s.p), found, residual, remarks)
 
-    def _passed(self, through: Passing, remarks: tuple[str, ...]) -> State:
+    def _passed(self, through: Passing, remarks: tuple[str, ...]) -> State | None:
         """The state where more than the inputs could move to first order, but only one motion goes on."""
         s = self.station
         residual = float(self.open_along(through.z[None], s.u[None])[0])
+        if residual > self.tolerance:
+            return None
         y, y1, y2 = (np.concatenate(both) for both in ((through.z, s.u), (through.z1, s.u1), (through.z2, s.u2)))
         told = "to first order there is one more motion here; the rates are those of the only one that goes on"
         return self._stated(self.program.kinematics(y, y1, y2, s.p), s.u.size, residual, (*remarks, told))

@@ -11,7 +11,7 @@ from planar.solving.assemble import Assembly
 from planar.solving.candidates import Candidates
 from planar.solving.setup import Setup
 from planar.units import unit
-from planar.words import listed
+from planar.words import listed, many
 
 Array = np.ndarray
 
@@ -26,7 +26,7 @@ def remarks(setup: Setup, candidates: Candidates, found: Assembly) -> tuple[str,
     if open_ones:
         lead = "the sketch leaves open" if setup.mechanism.sketch else "there is no sketch to say"
         stand = [_stands(setup, candidates, stage, found.z) for stage in open_ones[:MOST]]
-        more = f", and so on for {len(open_ones) - MOST} more groups" if len(open_ones) > MOST else ""
+        more = f", and so on for {many(len(open_ones) - MOST, 'more group')}" if len(open_ones) > MOST else ""
         told.append(
             f"{lead} how some links go together; taken is {listed(stand)}{more}: the sliding points ahead of "
             f"'through', else the upper assembly; sketch these points elsewhere to choose another"

@@ -45,13 +45,15 @@ def remedy(setup: Setup, failure: Failure) -> str | None:
     # of changes that are as small, that of a link's length
     found.sort(key=lambda each: (round(each[0] / setup.unit, 6), not each[1].name.endswith(".length")))
     for _, dimension, value in found[:PROVED]:
-        shown = length.to_si(_rounded(length.from_si(value), up=value > dimension.value))
-        if _goes_together(changed(setup.mechanism, dimension, shown)):
-            units = setup.mechanism.units
-            return (
-                f"it would go together with {dimension.name} = {amount(shown, 'length', units)} "
-                f"instead of {amount(dimension.value, 'length', units)}"
-            )
+        near = length.from_si(value)
+        # first a little beyond, where it goes together with ease; what is held twice needs the very value
+        for shown in (_rounded(near, up=value > dimension.value), float(f"{near:.{DIGITS}g}")):
+            if _goes_together(changed(setup.mechanism, dimension, length.to_si(shown))):
+                units = setup.mechanism.units
+                return (
+                    f"it would go together with {dimension.name} = {shown:.6g} {units.length} "
+                    f"instead of {amount(dimension.value, 'length', units)}"
+                )
     return None
 
 

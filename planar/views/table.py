@@ -17,7 +17,7 @@ from planar.mechanism import QUANTITIES, motions
 from planar.motion import Motion, RelativeState, State
 from planar.pairs import Pair
 from planar.units import SI, Unit, unit
-from planar.words import amount, listed
+from planar.words import amount, listed, many
 
 HEADING = 13
 """Characters: longer headings stand in several lines, so that the tables of a textbook mechanism fit 80 columns."""
@@ -109,9 +109,10 @@ def run(motion: Motion) -> RenderableType:
     for name, given in motion.inputs.items():
         kind = "length" if motion.slides(name) else "angle"
         first, last = (amount(float(given.position[k]), kind, units) for k in (0, -1))
-        lines.append(Text(f"{name} from {first} to {last}" if first != last else f"{name} = {first}, held"))
+        held = ", held" if len(motion) > 1 else ""
+        lines.append(Text(f"{name} from {first} to {last}" if first != last else f"{name} = {first}{held}"))
     worst = f"worst residual {motion.residual:.1e} of the mechanism's size"
-    lines.append(Text(f"{len(motion)} positions; {worst}" + (f"; {motion.reason}" if motion.reason else "")))
+    lines.append(Text(f"{many(len(motion), 'position')}; {worst}" + (f"; {motion.reason}" if motion.reason else "")))
     heads = (f"x from, {units.length}", f"x to, {units.length}", f"y from, {units.length}", f"y to, {units.length}")
     rates = ("velocity up to, m/s", "acceleration up to, m/s²")
     table = plain_table("Points, among these positions", "point", *heads, *rates)
