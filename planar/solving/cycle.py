@@ -14,6 +14,7 @@ from planar.mechanism import FARTHEST, Drive, Mechanism, with_inputs
 from planar.motion import InputMotion, Motion
 from planar.pairs import Kind
 from planar.program import placed
+from planar.solving import refusals
 from planar.solving.branch import cancelling
 from planar.solving.follow import Run, follow, reach, run
 from planar.solving.freedom import SINGULAR, strengths
@@ -31,6 +32,7 @@ BESIDE, REFINEMENTS, NUDGE = 1e-2, 6, 1e-7
 FAST = 50.0
 """Beside a limit, at follow's least step from it, the rest moves some thousand times as fast as the input."""
 MOST_STEPS = 10**5
+"""A run of so many positions of forty links takes some hundred megabytes."""
 
 
 def cycle(
@@ -42,10 +44,10 @@ def cycle(
 ) -> Motion:
     """The motion of the assembly nearest to the sketch while one input runs from `start` to `stop` (rad or m).
 
-    `steps` divide the range, so there are steps + 1 positions. Left out, the range is one turn on from the file's
-    position where the input makes it, else from limit to limit; a slide's is always that. `pair` names the input that
-    runs, where there are several; the others stand still. Every row has the file's velocity and acceleration of
-    the input that runs, as the chapters do; it is no run in time.
+    `steps` divide the range, so there are steps + 1 positions unless it ends before. Left out, the range is one turn on
+    from the file's position where the input makes it, else from limit to limit; a slide's is always that. `pair` names
+    the input that runs, where there are several; the others stand still. Every row has the file's velocity and
+    acceleration of the input that runs, as the chapters do; it is no run in time.
 
     A motion that ends before `stop` says so in its `outcome` and `reason`. Where no velocity is determined (a dead
     point, the limits of a range) rates are NaN. Raises BadInput for an input or a range that is not there,
@@ -233,10 +235,7 @@ class _Runner:
         for (gaps, pair), what in zip(solver.gate.rate_gaps(frames, own), ("velocities", "accelerations"), strict=True):
             broken = np.broadcast_to(gaps, (many,))[determined].max(initial=0.0)
             if broken > 1e3 * solver.tolerance:
-                told = (
-                    f"on the way the {what} break pair {pair!r} by {broken:.2g} of the greatest; name a smaller range"
-                )
-                raise NoAnswer(Outcome.DEAD_POINT, told)
+                raise refusals.broken_rates(solver, what, pair, float(broken))
         solver.refuse_gap(frames, own)
         outcome, reason = Outcome.SOLVED, ""
         if found.stopped is not None:
