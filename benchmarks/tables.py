@@ -84,8 +84,8 @@ def notes() -> RenderableType:
         "Times are the best of several rounds run in turn, processes the median of their runs. The ways solve a turn "
         "of the crank in 360 steps, and their time is that of one position. Errors are against the closed form in "
         "longer arithmetic, as a part of the greatest value that a quantity takes in the turn. "
-        "Rates of planar's runs come sample by sample from the program and are ungated: planar has no rates of a "
-        "whole run yet.",
+        "planar.cycle assembles, runs and has its rates gated too; the other rates of runs come sample by sample from "
+        "the program and are ungated.",
         style="italic",
     )
 

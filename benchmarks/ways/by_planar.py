@@ -10,7 +10,7 @@ import planar
 from benchmarks.linkages import Linkage
 from benchmarks.ways.trial import CRANK, Array, Trial
 from planar.mechanism import Drive, with_inputs
-from planar.motion import State
+from planar.motion import Motion, State
 from planar.solving.follow import follow, run
 from planar.solving.position import Solver, solve
 
@@ -99,7 +99,12 @@ def trials(linkage: Linkage) -> tuple[Trial, ...]:
         ("planar, run through the gate", turn.gated),
         ("planar, the run's program alone", turn.bare),
     )
+
+    def cycled() -> Motion:
+        return planar.cycle(turn.mechanism, samples - 1, float(CRANK[0]), float(CRANK[-1]))
+
     return (
+        Trial("planar.cycle, from the sketch", True, samples, cycled, lambda motion: _answers(linkage, motion)),
         Trial("planar.solve, from the sketch", True, 1, lambda: [solve(turn.mechanism)], states),
         Trial("planar Solver.state, z known", True, samples, lambda: [s.state(z) for s, z in stations], states),
         *(Trial(way, False, samples, positions, turn.answers) for way, positions in ways),
@@ -107,8 +112,8 @@ def trials(linkage: Linkage) -> tuple[Trial, ...]:
     )
 
 
-def _answers(linkage: Linkage, state: State) -> Array:
-    """The linkage's answers (3, 2) in one state."""
+def _answers(linkage: Linkage, state: State | Motion) -> Array:
+    """The linkage's answers (3, 2) in one state, or (3, samples, 2) over a motion."""
     found = []
     for name, part in linkage.answers:
         if part == "angle":
@@ -116,4 +121,4 @@ def _answers(linkage: Linkage, state: State) -> Array:
             found.append((link.angle, link.angular_velocity, link.angular_acceleration))
         else:
             found.append(tuple(state.pair(name).values()))
-    return np.array(found).T
+    return np.moveaxis(np.array(found), 0, -1)
