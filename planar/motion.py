@@ -346,6 +346,10 @@ class Motion(Moving):
         """What a pair reports, and the kind of quantity that each is."""
         return self._motions[name].reports
 
+    def driven(self, name: str) -> tuple[str, str, str]:
+        """The kinds of quantity of an input's position, velocity and acceleration."""
+        return self._motions[name].driven()
+
     def slides(self, name: str) -> bool:
         """Whether the relative motion at a pair is a length."""
         return self._motions[name].drive_kind is Kind.LENGTH

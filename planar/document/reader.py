@@ -274,16 +274,10 @@ def _inputs(top: Cursor, known: Mapping[str, Pair]) -> tuple[Input, ...]:
         found[pair.name] = Input(
             pair.name,
             cursor.quantity("position", "length") if pair.drive_kind is Kind.LENGTH else cursor.turned("position"),
-            cursor.quantity("velocity", _kinds(pair)[1], 0.0),
-            cursor.quantity("acceleration", _kinds(pair)[2], 0.0),
+            cursor.quantity("velocity", pair.driven()[1], 0.0),
+            cursor.quantity("acceleration", pair.driven()[2], 0.0),
         )
     return tuple(found.values())
-
-
-def _kinds(pair: Pair) -> tuple[str, str, str]:
-    if pair.drive_kind is Kind.LENGTH:
-        return "length", "velocity", "acceleration"
-    return "angle", "angular velocity", "angular acceleration"
 
 
 def _motion(cursor: Cursor, known: Mapping[str, Pair]) -> Pair:
@@ -348,7 +342,7 @@ def read_drive(mechanism: Mechanism, pair: str, position: str) -> Drive:
         value: Any = float(position)
     except ValueError:
         value = position
-    return Drive(pair, Cursor(value, pair, Whole(mechanism.units)).as_quantity(_kinds(known[pair])[0]))
+    return Drive(pair, Cursor(value, pair, Whole(mechanism.units)).as_quantity(known[pair].driven()[0]))
 
 
 def _drives(cursor: Cursor, key: str, mechanism: Mechanism) -> tuple[Drive, ...]:
@@ -360,7 +354,7 @@ def _drives(cursor: Cursor, key: str, mechanism: Mechanism) -> tuple[Drive, ...]
         if name not in known:
             raise drive.refuse(None, f"there is no input at {name!r}{did_you_mean(name, known)}")
         drive.only(*DRIVE)
-        kinds = _kinds(known[name])
+        kinds = known[name].driven()
         found.append(
             Drive(
                 name,

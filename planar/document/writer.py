@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from planar.document.schema import FORMAT
+from planar.document.schema import DRIVE, FORMAT
 from planar.mechanism import QUANTITIES, Drive, Link, Mechanism, Published, entries, motions
-from planar.pairs import Kind, Quantity
+from planar.pairs import Quantity
 from planar.shapes import Along, At, Place
 from planar.units import SI, Unit, shortest, unit
 
@@ -98,12 +98,7 @@ def _drive_entry(mechanism: Mechanism, drive: Any, quantity: Quantity) -> dict[s
 
 
 def _drive(mechanism: Mechanism, drive: Any, quantity: Quantity) -> dict[str, Any]:
-    slides = motions(mechanism)[drive.pair].drive_kind is Kind.LENGTH
-    kinds = {
-        "position": "length" if slides else "angle",
-        "velocity": "velocity" if slides else "angular velocity",
-        "acceleration": "acceleration" if slides else "angular acceleration",
-    }
+    kinds = dict(zip(DRIVE, motions(mechanism)[drive.pair].driven(), strict=True))
     told = {key: getattr(drive, key) for key in kinds}
     return {key: quantity(value, kinds[key]) for key, value in told.items() if value is not None}
 

@@ -105,6 +105,13 @@ class Pair(ABC):
         """How many of the three relative motions of two links it prevents."""
         return len(cls.constrains) - len(cls.coordinates)
 
+    @classmethod
+    def driven(cls) -> tuple[str, str, str]:
+        """The kinds of quantity of an input's position, velocity and acceleration."""
+        if cls.drive_kind is Kind.LENGTH:
+            return "length", "velocity", "acceleration"
+        return "angle", "angular velocity", "angular acceleration"
+
     def misfit(self, beside: Sequence[Pair], shapes: Mapping[str, Shape], length: Told) -> str | None:
         """What is wrong with it beside all pairs of its mechanism, as a sentence."""
         return None

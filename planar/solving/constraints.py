@@ -6,11 +6,13 @@ W. Squire, G. Trapp, Using Complex Variables to Estimate Derivatives of Real Fun
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from planar.pairs import Kind, Pair
-from planar.plane import Frame, frame_at
-from planar.program import scaled
+from planar.plane import Frame
+from planar.program import placed, scaled
 from planar.solving.setup import Setup
 from planar.solving.sketched import sketched
 
@@ -48,9 +50,9 @@ class Constraints:
 
     def gaps(self, w: Array) -> Array:
         """What every constraint leaves open (rows,), of w (coordinates, many) of each (rows, many)."""
-        left = []
+        left, (frames, own) = [], self._placed(w)
         for pair in self.pairs:
-            for kind, value in zip(pair.constrains, pair.residual(*self._of(pair, w)), strict=True):
+            for kind, value in zip(pair.constrains, pair.residual(*self._of(pair, frames, own)), strict=True):
                 left.append(np.arctan2(np.sin(value), np.cos(value)) if self._wraps(kind, w) else value)
         return np.array(np.broadcast_arrays(*left)) if left else np.zeros((0, *w.shape[1:]))
 
@@ -64,31 +66,27 @@ class Constraints:
 
     def drives(self, names: tuple[str, ...], w: Array) -> Array:
         """The drives of these relative motions (names,)."""
-        return np.array([self._drive(name, w) for name in names])
+        return np.array(self._drives(names, w))
 
     def drive_slope(self, names: tuple[str, ...], w: Array) -> Array:
         """(names, coordinates)"""
         nudged = self._nudged(w)
-        rows = [np.broadcast_to(np.imag(self._drive(name, nudged)), (w.size,)) for name in names]
+        rows = [np.broadcast_to(np.imag(drive), (w.size,)) for drive in self._drives(names, nudged)]
         return np.array(rows).reshape(len(names), w.size) / STEP
 
-    def _drive(self, name: str, w: Array) -> Array:
-        pair = self.setup.named[name]
-        return pair.drive(*self._of(pair, w))
+    def _drives(self, names: tuple[str, ...], w: Array) -> list[Array]:
+        frames, own = self._placed(w)
+        return [pair.drive(*self._of(pair, frames, own)) for pair in (self.setup.named[name] for name in names)]
 
     def _nudged(self, w: Array) -> Array:
         return np.repeat(w[:, None].astype(complex), w.size, axis=1) + 1j * STEP * np.eye(w.size)
 
-    def _of(self, pair: Pair, w: Array) -> tuple[list[Frame], list[float], list[Array]]:
-        column = self.setup.column
-        frames = [
-            frame_at(*(w[column[link, part]] for part in ("x", "y", "angle")))
-            if (link, "x") in column
-            else Frame(0.0, 0.0, 1.0, 0.0, 0.0, True)
-            for link in pair.bodies
-        ]
-        own = [w[column[pair.name, part]] for part, _ in pair.coordinates if (pair.name, part) in column]
-        return frames, self._numbers[pair.name], own
+    def _placed(self, w: Array) -> tuple[dict[str, Frame], dict[str, tuple[Array, ...]]]:
+        return placed(w, self.setup.column, self.setup.shapes, self.setup.pairs)
+
+    def _of(self, pair: Pair, frames: dict[str, Frame], own: dict[str, tuple[Array, ...]]) -> tuple[Any, Any, Any]:
+        """What the pair's formulas take."""
+        return [frames[link] for link in pair.bodies], self._numbers[pair.name], own.get(pair.name, ())
 
     def closed(self, w: Array, drives: tuple[str, ...] = (), at: Array | None = None) -> Array | None:
         """The nearest closed position by Gauss and Newton's method, some drives held; None where there is none."""

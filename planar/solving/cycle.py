@@ -19,7 +19,7 @@ from planar.solving.branch import cancelling
 from planar.solving.follow import Run, follow, reach, run
 from planar.solving.freedom import SINGULAR, strengths
 from planar.solving.position import Solver
-from planar.words import amount, listed
+from planar.words import listed
 
 Array = np.ndarray
 
@@ -121,7 +121,8 @@ class _Runner:
         low, high = (self._end(self.found.z, here, sign) for sign in (-1.0, 1.0))
         if high.position - low.position < LEAST:
             self.solver.state(self.found.z)  # says why nothing goes on from a dead point or a change point
-            told = f"the input at {self.pair!r} cannot move from {self._told(here)} while the other inputs stand still"
+            at = self.solver.told(self.pair, here)
+            told = f"the input at {self.pair!r} cannot move from {at} while the other inputs stand still"
             raise NoAnswer(Outcome.TOO_MANY_INPUTS, told)
         # from within to the limits: from a limit two branches lead inwards
         grid = np.linspace(low.position, high.position, steps + 1)
@@ -148,14 +149,9 @@ class _Runner:
 
     def _crossing(self, slow: list[float]) -> NoAnswer:
         """What to say of a range that ends where branches cross."""
-        told = listed([self._told(end) for end in slow])
+        told = listed([self.solver.told(self.pair, end) for end in slow])
         sentence = f"at {told} branches of the motion cross; this one is followed up to there, and no further"
         return NoAnswer(Outcome.BRANCH_LOST, sentence)
-
-    def _told(self, position: float) -> str:
-        """A position of the input that runs: A = 60 deg."""
-        kind = "length" if self.slides else "angle"
-        return f"{self.pair} = {amount(position * self.scale, kind, self.solver.mechanism.units)}"
 
     def _through(self, positions: Array) -> Run:
         return run(self.solver, self.p, self.found.z, self._inputs_at(positions))
@@ -166,9 +162,7 @@ class _Runner:
         return inputs
 
     def _at(self, position: float) -> Array:
-        u = self.u.copy()
-        u[self.index] = position
-        return u
+        return self._inputs_at(np.array([position]))[0]
 
     def _end(self, z: Array, here: float, sign: float) -> _End:
         """Where the range of the input ends, one way from a position with unknowns z."""
@@ -241,7 +235,7 @@ class _Runner:
         if found.stopped is not None:
             outcome, reason = found.stopped.outcome, found.stopped.reason
         elif ends:
-            told = listed([self._told(float(u[end, self.index])) for end in ends])
+            told = listed([self.solver.told(self.pair, float(u[end, self.index])) for end in ends])
             reason = f"the range of {self.pair!r} ends at {told}"
         return Motion(
             mechanism=solver.mechanism,

@@ -73,11 +73,12 @@ class Setup:
 
     def where(self, u: Array) -> str:
         """A position of the inputs in words: A = 60 deg."""
-        told = []
-        for given, position in zip(self.mechanism.inputs, u, strict=True):
-            kind, by = ("length", self.unit) if self._slides(given) else ("angle", 1.0)
-            told.append(f"{given.pair} = {amount(position * by, kind, self.mechanism.units)}")
-        return listed(told)
+        return listed([self.told(given.pair, at) for given, at in zip(self.mechanism.inputs, u, strict=True)])
+
+    def told(self, pair: str, position: float) -> str:
+        """A position of one input in words."""
+        kind, by = ("length", self.unit) if self.named[pair].drive_kind is Kind.LENGTH else ("angle", 1.0)
+        return f"{pair} = {amount(position * by, kind, self.mechanism.units)}"
 
     def _slides(self, given: Input) -> bool:
         return self.named[given.pair].drive_kind is Kind.LENGTH

@@ -29,7 +29,7 @@ class Column(NamedTuple):
 def columns(motion: Motion) -> Iterator[Column]:
     """Inputs, points, links, then what the pairs report, in the order of the file."""
     for name, given in motion.inputs.items():
-        kinds = _kinds(motion, name)
+        kinds = motion.driven(name)
         for what, kind, values in zip(("position", "velocity", "acceleration"), kinds, given, strict=True):
             yield Column(f"input {name}", what, kind, values)
     for name, point in motion.points.items():
@@ -45,12 +45,6 @@ def columns(motion: Motion) -> Iterator[Column]:
         for what, found in report.items():
             if found is not None:
                 yield Column(f"pair {name}", what.replace("_", " "), of[what], found)
-
-
-def _kinds(motion: Motion, pair: str) -> tuple[str, str, str]:
-    if motion.slides(pair):
-        return "length", "velocity", "acceleration"
-    return "angle", "angular velocity", "angular acceleration"
 
 
 def written(motion: Motion, suffix: str) -> str | bytes:
