@@ -20,6 +20,7 @@ SI = {
     "acceleration": "m/s^2",
     "force": "N",
     "torque": "N m",
+    "time": "s",
 }
 """Every kind of quantity that a file holds, and its SI unit."""
 
@@ -44,6 +45,7 @@ TABLE: dict[str, tuple[str, float, float]] = {
     "N": ("force", 1.0, 1.0),
     "kN": ("force", 1e3, 1.0),
     "N m": ("torque", 1.0, 1.0),
+    "s": ("time", 1.0, 1.0),
 }
 """unit: (kind, numerator, denominator) of its size in SI."""
 

@@ -1,0 +1,144 @@
+"""Pictures as data: strokes and letters in millimetres on paper, before anything draws them.
+
+A picture can be looked at by a test, laid beside others on a sheet, or drawn by any means. Its own axes are x to the
+right and y upwards; where on the sheet it comes to lie is not its concern.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from enum import Enum
+from typing import NamedTuple
+
+import numpy as np
+
+Spot = tuple[float, float]
+"""A place on paper (mm)."""
+
+
+class Pen(Enum):
+    """What a stroke stands for; how wide, dark and dashed that is drawn is settled in one place."""
+
+    LINK = "link"
+    """The body of a moving link."""
+    PIN = "pin"
+    """The outline of a pin or a sliding block."""
+    GROUND = "ground"
+    """The outline of what does not move: a support, a fixed guide."""
+    HATCH = "hatch"
+    """The hatching of what does not move."""
+    PITCH = "pitch"
+    """Pitch circles and pitch lines, centre lines."""
+    BAND = "band"
+    """A belt or a chain."""
+    POSITION = "position"
+    """A link in one of many positions."""
+    PATH = "path"
+    """The path of a point."""
+    VELOCITY = "velocity"
+    ACCELERATION = "acceleration"
+    PART = "part"
+    """A part of an acceleration: centripetal, tangential, Coriolis."""
+    IMAGE = "image"
+    """A side of a link's image in a polygon."""
+    CONSTRUCTION = "construction"
+    """A line that only helps to find a point."""
+    INPUT = "input"
+    """The arrow that shows which way an input drives."""
+    LEADER = "leader"
+    """From a letter that stands away to what it names."""
+
+
+class Fill(Enum):
+    """What an area is filled with."""
+
+    NONE = "none"
+    PAPER = "paper"
+    """Hides what lies below."""
+    LINK = "link"
+    """The light tone of a link that is a plate."""
+
+
+class Line(NamedTuple):
+    """A line through spots, or an area if it is closed; `about` says what it belongs to, such as "link AB"."""
+
+    spots: tuple[Spot, ...]
+    pen: Pen
+    about: str = ""
+    closed: bool = False
+    fill: Fill = Fill.NONE
+
+
+class Arrow(NamedTuple):
+    """A straight arrow; its head's tip is at `head` exactly."""
+
+    tail: Spot
+    head: Spot
+    pen: Pen
+    about: str = ""
+
+
+class Circle(NamedTuple):
+    """A whole circle, or an arc anticlockwise from `start` to `stop` (degrees); an arc may end in an arrow head."""
+
+    centre: Spot
+    radius: float
+    pen: Pen
+    about: str = ""
+    fill: Fill = Fill.NONE
+    start: float = 0.0
+    stop: float = 360.0
+    pointed: int = 0
+    "1: an arrow head where the arc stops, -1: where it starts, 0: none"
+
+
+class Letter(NamedTuple):
+    """A text that names something at a spot; it is placed near it, clear of strokes and of other letters.
+
+    Texts are plain or mathtext ("$A_1$"). `away` keeps it that far from the spot (mm), such as a pin's radius.
+    """
+
+    text: str
+    at: Spot
+    about: str = ""
+    size: float = 9.0
+    "points"
+    away: float = 1.0
+    slanted: bool = False
+
+
+Mark = Line | Arrow | Circle | Letter
+
+
+class Picture(NamedTuple):
+    """Marks in the order in which they are drawn, with a title and lines of text that go below."""
+
+    marks: tuple[Mark, ...]
+    title: str = ""
+    notes: tuple[str, ...] = ()
+    "such as the scale: `1 cm = 0.1 m/s`"
+
+
+def spot(vector: Iterable[float]) -> Spot:
+    """A place on paper from any two numbers."""
+    x, y = vector
+    return float(x), float(y)
+
+
+def extent(marks: Iterable[Mark]) -> tuple[Spot, Spot]:
+    """The lower left and the upper right corner of everything but the texts (mm); letters count with their spot."""
+    corners: list[Spot] = []
+    for mark in marks:
+        if isinstance(mark, Line):
+            corners += mark.spots
+        elif isinstance(mark, Arrow):
+            corners += (mark.tail, mark.head)
+        elif isinstance(mark, Circle):
+            (x, y), r = mark.centre, mark.radius
+            corners += ((x - r, y - r), (x + r, y + r))
+        else:
+            corners.append(mark.at)
+    if not corners:
+        return (0.0, 0.0), (0.0, 0.0)
+    both = np.array(corners)
+    return spot(both.min(axis=0)), spot(both.max(axis=0))
