@@ -16,8 +16,6 @@ Array = np.ndarray
 class Part(Enum):
     """What part of a relative velocity or acceleration a vector is."""
 
-    WHOLE = "whole"
-    """Already drawn, or of no parts."""
     ROTATION = "rotation"
     """A relative velocity of two points of one link."""
     CENTRIPETAL = "centripetal"
@@ -43,8 +41,6 @@ class Vector(NamedTuple):
     value: Array
     "(2,)"
     known: bool
-    drawn: bool
-    "already drawn: it stands in the table to be added to"
     square: bool
     "its direction is square to `line`, else parallel"
     line: str
@@ -89,7 +85,7 @@ class Side(NamedTuple):
 class Meeting(NamedTuple):
     """One or two ways to a point. Of two, the lines of their last vectors meet in it.
 
-    `equation` is in point names: ((of, against), (of, against), ...): the first is the sum of the others.
+    A second side without vectors: the point is drawn already, and joined to the first side.
     """
 
     links: tuple[str, ...]
@@ -110,13 +106,20 @@ class Equation(NamedTuple):
     known: float
 
 
+class Unknown(NamedTuple):
+    """A rate that equations give (SI): of a link that turns, or along a line."""
+
+    name: str
+    value: float
+    turns: bool
+
+
 class Simultaneous(NamedTuple):
     """A group that no two lines locate: its equations and the unknowns that solve them."""
 
     links: tuple[str, ...]
     equations: tuple[Equation, ...]
-    unknowns: tuple[tuple[str, float, str], ...]
-    "name, value (SI), unit"
+    unknowns: tuple[Unknown, ...]
     letters: tuple[str, ...]
     "that are found by it"
 
@@ -133,6 +136,8 @@ class Turn(NamedTuple):
     line: str = ""
     "the length by which it is divided"
     length: float = 0.0
+    by: str = ""
+    "the input, or the pair, from which it is known otherwise"
 
 
 Stage = Meeting | Triangle | Simultaneous | Turn
@@ -153,13 +158,3 @@ class Polygon:
     "the point of the space diagram for each letter that is no head of a part"
     stages: tuple[Stage, ...]
     "in the order of drawing"
-
-
-def velocity_polygon(state: State) -> Polygon:
-    """The velocity polygon of a position."""
-    raise NotImplementedError
-
-
-def acceleration_polygon(state: State) -> Polygon:
-    """The acceleration polygon of a position."""
-    raise NotImplementedError

@@ -23,6 +23,7 @@ def figure(pictures: Sequence[Picture], title: str = "") -> Figure:
     sizes = [(high[0] - low[0] + 2 * MARGIN, high[1] - low[1] + 2 * MARGIN) for low, high in boxes]
     width, height = sum(w for w, _ in sizes), max(h for _, h in sizes) + 12.0
     made = Figure(figsize=(width * MM, height * MM))
+    made.suptitle(title)
     left = 0.0
     for picture, (low, high), (w, h) in zip(pictures, boxes, sizes, strict=True):
         axes = made.add_axes((left / width, 12.0 / height, w / width, h / height))
