@@ -1,50 +1,340 @@
-"""Pictures to matplotlib figures in which a millimetre on paper is a millimetre."""
+"""Pictures to matplotlib figures in which a millimetre on paper is a millimetre, and those to files."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+import re
+from collections.abc import Mapping, Sequence
+from io import BytesIO
+from math import hypot
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from planar.drawing.picture import Arrow, Circle, Line, Picture, extent
+from planar.drawing.ink import FILLS, INK, POINT, Ink, ready
+from planar.drawing.labels import Placed, placed
+from planar.drawing.lettering import font, measured, shown, wrapped
+from planar.drawing.outline import Head, check, head, pointed, sweep
+from planar.drawing.picture import Arrow, Circle, Letter, Line, Mark, Pen, Picture, Spot, extent
+from planar.errors import BadInput
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MM = 1.0 / 25.4
-MARGIN = 8.0
+INCH = 25.4
+PAGE = 277.0
+"""mm that a row of pictures may be wide: A4 on its side, less margins."""
+MARGIN, APART, EDGE = 3.0, 8.0, 5.0
+"""mm about the marks of a picture, between pictures, and about them all."""
+CAPTION = 70.0
+"""mm that the text below a narrow picture may be wide."""
+HEADING, TITLE, NOTE = 12.0, 10.0, 8.5
+"""Sizes of texts in points: above all pictures, below each, and its notes."""
+LEADING = 1.35
+"""From one line of text to the next, in sizes of the font."""
+LARGEST = 5000.0
+"""mm: the largest sheet that readers of PDF files show."""
+RESOLUTION = 200
+"""Dots to an inch in PNG files."""
+PIXELS = 1e8
+SETTINGS = {
+    "svg.fonttype": "none",
+    "svg.hashsalt": "planar",
+    "pdf.fonttype": 42,
+    "pdf.compression": 6,
+    "pdf.use14corefonts": False,
+    "text.usetex": False,
+    "text.hinting": "no_hinting",
+    "mathtext.fontset": "dejavusans",
+    "mathtext.default": "it",
+    "lines.scale_dashes": True,
+    "lines.antialiased": True,
+    "patch.antialiased": True,
+    "path.simplify": False,
+    "path.sketch": None,
+    "path.effects": [],
+    "lines.dash_capstyle": "butt",
+    "lines.marker": "None",
+    "figure.autolayout": False,
+    "figure.constrained_layout.use": False,
+    "savefig.bbox": None,
+    "savefig.facecolor": "auto",
+    "savefig.edgecolor": "auto",
+    "savefig.transparent": False,
+}
+"""What a reader's own settings of matplotlib must not change."""
+# no dates: the same picture is the same file
+METADATA: dict[str, dict[str, Any]] = {
+    "png": {"Software": None},
+    "svg": {"Date": None, "Creator": None},
+    "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
+}
+
+
+class _Cell(NamedTuple):
+    """A picture with its letters placed: its corners (mm, in its own axes), and lines of text as (text, size)."""
+
+    picture: Picture
+    letters: tuple[Placed, ...]
+    low: Spot
+    high: Spot
+    text: tuple[tuple[str, float], ...]
+
+    @property
+    def inside(self) -> tuple[float, float]:
+        """Width and height of its axes (mm)."""
+        return self.high[0] - self.low[0], self.high[1] - self.low[1]
+
+    @property
+    def width(self) -> float:
+        """mm, with the text below."""
+        return max(self.inside[0], *(measured(text, size, heavy=size == TITLE).width for text, size in self.text), 1.0)
+
+    @property
+    def below(self) -> float:
+        """mm that the text takes."""
+        return sum(LEADING * POINT * size for _, size in self.text) + (2.0 if self.text else 0.0)
 
 
 def figure(pictures: Sequence[Picture], title: str = "") -> Figure:
-    """Pictures side by side, each in axes whose data units are millimetres on paper."""
-    from matplotlib.figure import Figure
-    from matplotlib.patches import Arc, Polygon
+    """Pictures in rows, each in axes whose data units are millimetres on paper, named by the picture's title.
 
-    boxes = [extent(picture.marks) for picture in pictures]
-    sizes = [(high[0] - low[0] + 2 * MARGIN, high[1] - low[1] + 2 * MARGIN) for low, high in boxes]
-    width, height = sum(w for w, _ in sizes), max(h for _, h in sizes) + 12.0
-    made = Figure(figsize=(width * MM, height * MM))
-    made.suptitle(title)
-    left = 0.0
-    for picture, (low, high), (w, h) in zip(pictures, boxes, sizes, strict=True):
-        axes = made.add_axes((left / width, 12.0 / height, w / width, h / height))
-        axes.set_xlim(low[0] - MARGIN, high[0] + MARGIN)
-        axes.set_ylim(low[1] - MARGIN, high[1] + MARGIN)
-        axes.axis("off")
-        left += w
-        for mark in picture.marks:
-            if isinstance(mark, Line):
-                if mark.closed:
-                    axes.add_patch(Polygon(mark.spots, fill=mark.fill.value != "none", ec="k", fc="w", gid=mark.about))
-                else:
-                    axes.plot(*zip(*mark.spots, strict=True), "k-", lw=1, gid=mark.about)
-            elif isinstance(mark, Arrow):
-                axes.annotate("", mark.head, mark.tail, arrowprops={"arrowstyle": "->", "shrinkA": 0, "shrinkB": 0})
-            elif isinstance(mark, Circle):
-                d = 2 * mark.radius
-                axes.add_patch(Arc(mark.centre, d, d, theta1=mark.start, theta2=mark.stop, gid=mark.about))
-            else:
-                axes.annotate(mark.text, mark.at, (2, 2), textcoords="offset points", fontsize=mark.size)
-        axes.text(
-            0.5, -0.02, "\n".join((picture.title, *picture.notes)), transform=axes.transAxes, ha="center", va="top"
-        )
+    Below each stand its title and its notes; `title` goes above all. Every stroke's artist has the mark's `about` as
+    its gid, the head of an arrow that and " head" (its first corner is the tip). Raises BadInput for a picture that
+    is too large for any sheet or has a mark with no place, and where matplotlib is missing.
+    """
+    ready()
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    cells = [_cell(picture) for picture in pictures]
+    rows = _rows(cells)
+    widest = max((_across(row) for row in rows), default=20.0)
+    heading = wrapped(title, HEADING, max(widest, CAPTION), heavy=True)
+    widest = max([widest, *(measured(line, HEADING, heavy=True).width for line in heading)])
+    above = LEADING * POINT * HEADING * len(heading) + (3.0 if heading else 0.0)
+    heights = [max(cell.inside[1] for cell in row) + max(cell.below for cell in row) for row in rows]
+    width = widest + 2.0 * EDGE
+    height = above + sum(heights) + APART * max(len(rows) - 1, 0) + 2.0 * EDGE
+    if max(width, height) > LARGEST:
+        raise BadInput("scale", f"the drawing would be {max(width, height) / 1e3:.3g} m on paper: choose a smaller one")
+    with rc_context(SETTINGS):
+        made = Figure(figsize=(width / INCH, height / INCH), dpi=RESOLUTION, facecolor="white")
+        top = height - EDGE
+        for line in heading:
+            top -= LEADING * POINT * HEADING
+            _write(made, line, (width / 2.0, top), HEADING)
+        top = height - EDGE - above
+        for row, tall in zip(rows, heights, strict=True):
+            left = (width - _across(row)) / 2.0
+            floor = top - max(cell.inside[1] for cell in row)
+            for cell in row:
+                _put(made, cell, (left, floor))
+                left += cell.width + APART
+            top -= tall + APART
     return made
+
+
+def saved(figure: Figure, suffix: str) -> bytes:
+    """A figure as a file's content: png (200 dots to an inch), svg or pdf; the same bytes for the same picture.
+
+    Raises BadInput for another suffix, or a PNG too large for any screen.
+    """
+    return pages([figure], suffix)
+
+
+def pages(figures: Sequence[Figure], suffix: str) -> bytes:
+    """Figures as the pages of one PDF, or a single one as png or svg. Raises BadInput."""
+    ready()
+    from matplotlib import rc_context
+    from matplotlib.backends.backend_pdf import PdfPages
+
+    kind = suffix.lower().removeprefix(".")
+    if kind not in METADATA:
+        raise BadInput(suffix, "a drawing is saved as .png, .svg or .pdf")
+    if not figures:
+        raise BadInput(suffix, "there is nothing to draw")
+    if len(figures) > 1 and kind != "pdf":
+        raise BadInput(suffix, f"{len(figures)} sheets need pages, which only .pdf has")
+    out = BytesIO()
+    with rc_context(SETTINGS):
+        if kind == "pdf":
+            with PdfPages(out, metadata=METADATA[kind]) as book:
+                for each in figures:
+                    book.savefig(each)
+            return out.getvalue()
+        across, up = figures[0].get_size_inches() * RESOLUTION
+        if kind == "png" and (across * up > PIXELS or max(across, up) >= 2**16):
+            raise BadInput(suffix, f"{across:.0f} x {up:.0f} pixels are too many: choose .pdf, .svg or a smaller scale")
+        figures[0].savefig(out, format=kind, dpi=RESOLUTION, metadata=METADATA[kind])
+    return _any_font(out.getvalue()) if kind == "svg" else out.getvalue()
+
+
+def _any_font(page: bytes) -> bytes:
+    """An SVG page whose letters any font without serifs can show where matplotlib's own is not installed."""
+    return re.sub(rb"(font(?:-family)?: [^;\"]*'DejaVu Sans[^';\"]*')(?=[;\"])", rb"\1, sans-serif", page)
+
+
+def _cell(picture: Picture) -> _Cell:
+    for mark in picture.marks:
+        check(mark)
+    letters = placed([mark for mark in picture.marks if isinstance(mark, Letter)], picture.marks)
+    strokes = [mark for mark in picture.marks if not isinstance(mark, Letter)]
+    corners = [*extent(strokes)] if strokes else []
+    for each in letters:
+        corners += [(each.box.left, each.box.bottom), (each.box.right, each.box.top), *(each.leader or ())]
+    corners = corners or [(0.0, 0.0)]
+    low = min(x for x, _ in corners) - MARGIN, min(y for _, y in corners) - MARGIN
+    high = max(x for x, _ in corners) + MARGIN, max(y for _, y in corners) + MARGIN
+    room = max(high[0] - low[0], CAPTION)
+    text = [(line, TITLE) for line in wrapped(picture.title, TITLE, room, heavy=True)]
+    text += [(line, NOTE) for note in picture.notes for line in wrapped(note, NOTE, room)]
+    return _Cell(picture, letters, low, high, tuple(text))
+
+
+def _across(row: Sequence[_Cell]) -> float:
+    return sum(cell.width for cell in row) + APART * (len(row) - 1)
+
+
+def _rows(cells: Sequence[_Cell]) -> list[list[_Cell]]:
+    """Cells in reading order, as many to a row as the page is wide, one at least."""
+    rows: list[list[_Cell]] = []
+    for cell in cells:
+        if rows and _across([*rows[-1], cell]) <= PAGE:
+            rows[-1].append(cell)
+        else:
+            rows.append([cell])
+    return rows
+
+
+def _write(made: Figure, line: str, at: Spot, size: float) -> None:
+    """One line of text, centred, on its base line (mm from the sheet's lower left corner)."""
+    width, height = made.get_size_inches() * INCH
+    properties = font(size, heavy=size != NOTE)
+    where = at[0] / width, at[1] / height
+    made.text(*where, line, fontproperties=properties, ha="center", va="baseline", color="black", parse_math=False)
+
+
+def _put(made: Figure, cell: _Cell, corner: Spot) -> None:
+    """A picture with the lower left corner of its place there (mm on the sheet), and its text below."""
+    width, height = made.get_size_inches() * INCH
+    across, up = cell.inside
+    left = corner[0] + (cell.width - across) / 2.0
+    axes = made.add_axes((left / width, corner[1] / height, across / width, up / height))
+    axes.set_axis_off()
+    axes.set_label(cell.picture.title)
+    axes.set_gid(shown(cell.picture.title) or None)
+    axes.set(xlim=(cell.low[0], cell.high[0]), ylim=(cell.low[1], cell.high[1]), autoscale_on=False)
+    for order, mark in enumerate(cell.picture.marks):
+        _draw(axes, mark, order)
+    _letter(axes, cell.letters, len(cell.picture.marks))
+    down = corner[1]
+    for line, size in cell.text:
+        down -= LEADING * POINT * size
+        _write(made, line, (corner[0] + cell.width / 2.0, down), size)
+
+
+def _letter(axes: Axes, letters: Sequence[Placed], order: int) -> None:
+    """Letters in their boxes and the lines that lead to their spots, above all else."""
+    for letter, box, leader in letters:
+        if leader is not None:
+            _line(axes, leader, INK[Pen.LEADER], f"{letter.about} leader", order)
+        _, tall, below = measured(letter.text, letter.size, letter.slanted, letter.math)
+        written = axes.text(
+            # centred, as the same font is a little wider or narrower in other programs
+            (box.left + box.right) / 2.0,
+            box.bottom + below,
+            letter.text,
+            fontproperties=font(letter.size, letter.slanted),
+            ha="center",
+            va="baseline",
+            color="black",
+            parse_math=letter.math,
+            # so that the text's own extent is its box and not a full line (from matplotlib 3.11 on)
+            linespacing=max(tall / (letter.size * POINT), 1e-3),
+        )
+        _named(written, letter.about, order + 1)
+
+
+def _named(artist: Artist, about: str, order: float) -> None:
+    artist.set(gid=shown(about) or None, zorder=order, clip_on=False)
+
+
+def _stroke(ink: Ink, width: float | None = None) -> Mapping[str, Any]:
+    """How matplotlib draws with an ink, of another width (mm) if one is given."""
+    wide = ink.width if width is None else width
+    return {
+        "linewidth": wide / POINT,
+        # dashes are counted in widths of the line
+        "linestyle": (0, tuple(dash / wide for dash in ink.dashes)) if ink.dashes else "-",
+    }
+
+
+def _line(
+    axes: Axes, spots: Sequence[Spot], ink: Ink, about: str, order: float, width: float | None = None, cap: str = "butt"
+) -> None:
+    from matplotlib.lines import Line2D
+
+    x, y = [each[0] for each in spots], [each[1] for each in spots]
+    drawn = Line2D(x, y, color=ink.colour, solid_capstyle=cap, solid_joinstyle="round", **_stroke(ink, width))
+    axes.add_artist(drawn)
+    _named(drawn, about, order)
+
+
+def _head(axes: Axes, made: Head, ink: Ink, about: str, order: float) -> None:
+    from matplotlib.patches import Polygon
+
+    tip = Polygon(made.corners, closed=True, facecolor=ink.colour, edgecolor="none", linewidth=0.0)
+    axes.add_artist(tip)
+    _named(tip, f"{about} head", order)
+
+
+def _draw(axes: Axes, mark: Mark, order: int) -> None:
+    """The artists of a stroke; letters are drawn elsewhere."""
+    if isinstance(mark, Line):
+        _draw_line(axes, mark, order)
+    elif isinstance(mark, Arrow):
+        made = head(mark.tail, mark.head, hypot(mark.head[0] - mark.tail[0], mark.head[1] - mark.tail[1]))
+        if made is not None:
+            ink = INK[mark.pen]
+            _line(axes, (mark.tail, made.end), ink, mark.about, order, min(ink.width, made.line))
+            _head(axes, made, ink, mark.about, order + 0.5)
+    elif isinstance(mark, Circle):
+        _draw_circle(axes, mark, order)
+
+
+def _draw_line(axes: Axes, mark: Line, order: int) -> None:
+    from matplotlib.patches import Polygon
+
+    ink = INK[mark.pen]
+    if mark.closed and len(mark.spots) > 2:
+        fill = FILLS.get(mark.fill, "none")
+        area = Polygon(mark.spots, closed=True, facecolor=fill, edgecolor=ink.colour, joinstyle="round", **_stroke(ink))
+        axes.add_artist(area)
+        _named(area, mark.about, order)
+    elif len(mark.spots) > 1:
+        cap = "butt" if mark.pen in {Pen.HATCH, Pen.GROUND} else "round"
+        _line(axes, mark.spots, ink, mark.about, order, cap=cap)
+
+
+def _draw_circle(axes: Axes, mark: Circle, order: int) -> None:
+    from matplotlib.patches import Circle as Whole
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path
+
+    ink, turn = INK[mark.pen], sweep(mark)
+    fill = FILLS.get(mark.fill, "none")
+    looks = {"facecolor": fill, "edgecolor": ink.colour}
+    tip = pointed(mark)
+    if turn == 360.0 and tip is None:
+        drawn = Whole(mark.centre, abs(mark.radius), **looks, **_stroke(ink))
+    elif turn > 0.0:
+        start, stop = (mark.start, mark.start + turn) if tip is None else tip[1:]
+        arc = Path.arc(start, stop)
+        corners = arc.vertices * mark.radius + mark.centre
+        drawn = PathPatch(Path(corners, arc.codes), capstyle="butt", **looks, **_stroke(ink))
+    else:
+        return
+    axes.add_artist(drawn)
+    _named(drawn, mark.about, order)
+    if tip is not None:
+        _head(axes, tip[0], ink, mark.about, order + 0.5)

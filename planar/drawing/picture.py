@@ -95,7 +95,8 @@ class Circle(NamedTuple):
 class Letter(NamedTuple):
     """A text that names something at a spot; it is placed near it, clear of strokes and of other letters.
 
-    Texts are plain or mathtext ("$A_1$"). `away` keeps it that far from the spot (mm), such as a pin's radius.
+    A text is shown as it stands; with `math` it is mathtext ("$A_1$"), only ever for texts that the program itself
+    makes. `away` keeps it that far from the spot (mm), such as a pin's radius.
     """
 
     text: str
@@ -105,6 +106,7 @@ class Letter(NamedTuple):
     "points"
     away: float = 1.0
     slanted: bool = False
+    math: bool = False
 
 
 Mark = Line | Arrow | Circle | Letter
