@@ -9,6 +9,7 @@ from enum import Enum
 from typing import Any, ClassVar, NamedTuple, Protocol, Self
 
 from planar.algebra import Scalar
+from planar.pairs.marks import Mark
 from planar.plane import Frame, Vector
 from planar.shapes import Shape
 
@@ -95,6 +96,10 @@ class Pair(ABC):
     def rides(self) -> tuple[tuple[str, str], str] | None:
         """((link, point), link): a point of one link that moves along a line of another, if it does."""
         return None
+
+    def marks(self, shapes: Mapping[str, Shape], beside: Sequence[Pair]) -> tuple[Mark, ...]:
+        """How it is drawn, beside all pairs of its mechanism; nothing where its sizes cannot be known."""
+        return ()
 
     def ahead(self, drive: float) -> bool:
         """Whether this is the assembly that an author means who says nothing (a slide ahead of `through`)."""

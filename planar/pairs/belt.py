@@ -7,8 +7,13 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 from planar.algebra import Scalar
-from planar.pairs.base import Entry, Quantity, Sample, Schema, Told, described, several
+from planar.pairs.base import Entry, Pair, Quantity, Sample, Schema, Told, described, several
+from planar.pairs.marks import Band, Mark, Wheel
 from planar.pairs.wheels import Wheels
+from planar.shapes import Shape
+
+LARGER = 0.3
+"""Of the distance of the centres: how large the larger of two wheels is drawn whose radii are not known."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +44,17 @@ class Belt(Wheels):
             return None
         how = "crossed" if self.crossed else "open"
         return f"the centres are {length(apart)} apart; wheels of these radii need more than {length(least)} ({how})"
+
+    def marks(self, shapes: Mapping[str, Shape], beside: Sequence[Pair]) -> tuple[Mark, ...]:
+        wheels = [mark for mark in super().marks(shapes, beside) if isinstance(mark, Wheel)]
+        if len(wheels) != 2:
+            return tuple(wheels)
+        return (*wheels, Band(self.name, *wheels, self.ratio() < 0.0))
+
+    def _pitch_radii(self, apart: float) -> tuple[float, ...]:
+        ratio = abs(self.ratio())
+        larger = LARGER * apart
+        return (larger, larger / ratio) if ratio > 1.0 else (larger * ratio, larger)
 
     @classmethod
     def read(cls, entry: Entry) -> tuple[Self, ...]:

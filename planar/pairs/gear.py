@@ -25,6 +25,14 @@ class Gear(Wheels):
             return None
         return f"wheels of these radii mesh with centres {length(wanted)} apart, but theirs are {length(apart)} apart"
 
+    def _pitch_radii(self, apart: float) -> tuple[float, ...]:
+        """From ratio = -r / s and the distance |r + s|, where of an internal pair the larger wheel is negative."""
+        ratio = self.ratio()
+        if ratio == 1.0:  # equal wheels that turn alike do not meet
+            return 0.0, 0.0
+        s = (apart if ratio < 0.0 else -apart) / (1.0 - ratio)
+        return -ratio * s, s
+
     @classmethod
     def read(cls, entry: Entry) -> tuple[Gear, ...]:
         entry.only(cls.keyword, *cls.members)

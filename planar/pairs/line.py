@@ -109,5 +109,10 @@ class Guided(Pair):
     def rides(self) -> tuple[tuple[str, str], str] | None:
         return (self.links[1], self.point), self.links[0]
 
+    def _guide(self, shapes: Mapping[str, Shape]) -> tuple[Vector, Vector]:
+        """A point of the line and its unit direction, in the axes of the first link."""
+        x, y, *way = self.line.measure(shapes[self.links[0]])
+        return Vector(x, y), Vector(*way)
+
     def ahead(self, drive: float) -> bool:
         return drive >= 0.0

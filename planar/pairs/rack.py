@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 from planar.algebra import Scalar
-from planar.pairs.base import Entry, Kind, Quantity, Sample, Schema, described, plain, several
+from planar.pairs.base import Entry, Kind, Pair, Quantity, Sample, Schema, described, plain, several
 from planar.pairs.line import LINE, MEASURES, Guided, Line, along
+from planar.pairs.marks import Mark, PitchLine, Wheel
 from planar.plane import Frame, Vector, direction, frame_at
 from planar.shapes import Shape
 
@@ -60,6 +61,11 @@ class Rack(Guided):
 
     def apart(self, numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Scalar:
         return own[1] - numbers[6]
+
+    def marks(self, shapes: Mapping[str, Shape], beside: Sequence[Pair]) -> tuple[Mark, ...]:
+        rack, pinion = self.links
+        wheel = Wheel(self.name, pinion, shapes[pinion].at(self.point), abs(self.radius))
+        return wheel, PitchLine(self.name, rack, *self._guide(shapes), wheel)
 
     @classmethod
     def read(cls, entry: Entry) -> tuple[Rack, ...]:

@@ -8,8 +8,9 @@ from math import pi
 from typing import Any, ClassVar, Self
 
 from planar.algebra import Scalar
-from planar.pairs.base import Entry, Kind, Quantity, Rewritten, Sample, Schema, described, plain, several
+from planar.pairs.base import Entry, Kind, Pair, Quantity, Rewritten, Sample, Schema, described, plain, several
 from planar.pairs.line import LINE, MEASURES, Guided, Line, along
+from planar.pairs.marks import Block, Guide, Mark
 from planar.plane import Frame, Vector, direction, frame_at
 from planar.shapes import Shape
 
@@ -51,6 +52,15 @@ class Sliding(Guided):
         first, second = frames
         off = second.carry(Vector(*numbers[4:6])) - along(first, numbers, own[0])
         return (*off, second.angle - first.angle - numbers[6])
+
+    def marks(self, shapes: Mapping[str, Shape], beside: Sequence[Pair]) -> tuple[Mark, ...]:
+        guide, block = self.links
+        through, way = self._guide(shapes)
+        along_block = direction(-self.turn)  # the line's way, seen from the second link
+        return (
+            Guide(self.name, guide, through, way),
+            Block(self.name, block, shapes[block].at(self.point), along_block, guide),
+        )
 
     @classmethod
     def rewrite(cls, entry: Entry) -> Rewritten | None:

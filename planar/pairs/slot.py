@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 from planar.algebra import Scalar
-from planar.pairs.base import Entry, Kind, Quantity, Sample, Schema, described, plain, several
+from planar.pairs.base import Entry, Kind, Pair, Quantity, Sample, Schema, described, plain, several
 from planar.pairs.line import LINE, MEASURES, Guided, Line, along
+from planar.pairs.marks import Mark, Opening
 from planar.plane import Frame, Vector, direction, frame_at
 from planar.shapes import Shape
 
@@ -35,6 +36,10 @@ class Slot(Guided):
     def residual(self, frames: Sequence[Frame], numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Sequence[Scalar]:
         first, second = frames
         return second.carry(Vector(*numbers[4:6])) - along(first, numbers, own[0])
+
+    def marks(self, shapes: Mapping[str, Shape], beside: Sequence[Pair]) -> tuple[Mark, ...]:
+        slotted, pinned = self.links
+        return (Opening(self.name, slotted, *self._guide(shapes), pinned, shapes[pinned].at(self.point)),)
 
     @classmethod
     def read(cls, entry: Entry) -> tuple[Slot, ...]:

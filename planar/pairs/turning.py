@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Self
 
 from planar.algebra import Scalar
 from planar.pairs.base import Entry, Kind, Pair, Quantity, Sample, Schema, described, plain, several
+from planar.pairs.marks import Mark, Pin
 from planar.plane import Frame, Vector, frame_at
 from planar.shapes import Shape
 
@@ -59,6 +60,10 @@ class Turning(Pair):
 
     def coincident(self) -> tuple[tuple[str, str], ...]:
         return tuple(zip(self.links, self.points, strict=True))
+
+    def marks(self, shapes: Mapping[str, Shape], beside: Sequence[Pair]) -> tuple[Mark, ...]:
+        places = tuple(shapes[link].at(point) for link, point in self.coincident())
+        return (Pin(self.pin, self.links, places),)
 
     def entry_name(self) -> str:
         return self.pin

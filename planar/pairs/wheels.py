@@ -10,6 +10,7 @@ from typing import Any, ClassVar, Self
 
 from planar.algebra import Scalar
 from planar.pairs.base import Entry, Kind, Pair, Quantity, Sample, Schema, Told, described, plain, several
+from planar.pairs.marks import Mark, Wheel
 from planar.plane import Frame, Vector, frame_at
 from planar.shapes import Shape
 
@@ -81,19 +82,40 @@ class Wheels(Pair):
     def report(self, position: Scalar, rate: Scalar, second: Scalar) -> dict[str, Scalar | None]:
         return dict(zip(self.reports, (position, rate, second), strict=True))
 
-    def misfit(self, beside: Sequence[Pair], shapes: Mapping[str, Shape], length: Told) -> str | None:
-        if self.by != "radii":
-            return None
+    def marks(self, shapes: Mapping[str, Shape], beside: Sequence[Pair]) -> tuple[Mark, ...]:
+        """Both pitch circles, where both wheels are pinned to the carrier."""
+        pins = [self._centre(wheel, beside) for wheel in self.links]
+        if None in pins:
+            return ()
+        carrier = shapes[self.carrier]
+        apart = carrier.at(pins[1][self.carrier]) - carrier.at(pins[0][self.carrier])
+        radii = self.sizes if self.by == "radii" else self._pitch_radii(hypot(apart.x, apart.y))
+        return tuple(
+            Wheel(self.name, link, shapes[link].at(pin[link]), radius)
+            for link, pin, radius in zip(self.links, pins, radii, strict=True)
+            if radius != 0.0
+        )
+
+    @abstractmethod
+    def _pitch_radii(self, apart: float) -> tuple[float, ...]:
+        """Radii (m) in the ratio that go with centres so far apart; zeros where there are none."""
+
+    def _centre(self, wheel: str, beside: Sequence[Pair]) -> Mapping[str, str] | None:
+        """The points of links in the pin in which a wheel turns in the carrier."""
         pins: dict[str, dict[str, str]] = {}
         for pair in beside:  # a pin of n links is several pairs
             pins.setdefault(pair.entry_name(), {}).update(pair.coincident())
+        return next((pin for pin in pins.values() if wheel in pin and self.carrier in pin), None)
+
+    def misfit(self, beside: Sequence[Pair], shapes: Mapping[str, Shape], length: Told) -> str | None:
+        if self.by != "radii":
+            return None
         centres = []
         for wheel in self.links:
-            both = (pin for pin in pins.values() if wheel in pin and self.carrier in pin)
-            centre = next((pin[self.carrier] for pin in both), None)
-            if centre is None:
+            pin = self._centre(wheel, beside)
+            if pin is None:
                 return f"wheels with radii turn in their carrier, but link {wheel!r} is not pinned to {self.carrier!r}"
-            centres.append(shapes[self.carrier].at(centre))
+            centres.append(shapes[self.carrier].at(pin[self.carrier]))
         apart = centres[1] - centres[0]
         return self._misplaced(hypot(apart.x, apart.y), length)
 
