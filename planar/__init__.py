@@ -4,6 +4,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from planar.analysis.extremes import stroke
+    from planar.analysis.harmonics import harmonics
     from planar.analysis.inspection import Inspection, inspect
     from planar.analysis.mobility import Mobility, mobility
     from planar.document import schema
@@ -37,12 +39,14 @@ _ROOMS = {
     "cycle": "solving.cycle",
     "dumps": "files",
     "from_dict": "files",
+    "harmonics": "analysis.harmonics",
     "inspect": "analysis.inspection",
     "load": "files",
     "loads": "files",
     "mobility": "analysis.mobility",
     "schema": "document",
     "solve": "solving.position",
+    "stroke": "analysis.extremes",
     "to_dict": "files",
 }
 """Where each public name lives: it is loaded when it is first used."""
@@ -68,12 +72,14 @@ __all__ = [
     "cycle",
     "dumps",
     "from_dict",
+    "harmonics",
     "inspect",
     "load",
     "loads",
     "mobility",
     "schema",
     "solve",
+    "stroke",
     "to_dict",
 ]
 
