@@ -35,6 +35,7 @@ LIBRARIES = {
     "pint": {"units"},
     "rich": {"views", "cli"},
     "matplotlib": {"drawing"},
+    "PIL": {"drawing"},
     "imageio_ffmpeg": {"drawing"},
     "click": {"cli"},
 }

@@ -20,7 +20,7 @@ class Lettering:
     """
 
     def __init__(self, rates: Rates, named: Sequence[NamedPoint], frame: str, order: int):
-        self.rates, self.frame, self.order = rates, frame, order
+        self.rates, self.frame, self.suffix = rates, frame, "" if order == 1 else "_1"
         self.members: Mapping[str, tuple[tuple[str, str], ...]] = {each.name: each.members for each in named}
         taken = {name.lower() for name in self.members}
         self.guide = next((letter for letter in GUIDES if letter.lower() not in taken), "G*")
@@ -28,14 +28,17 @@ class Lettering:
         "letter: the point of the space diagram"
         self.places: dict[str, list[Place]] = {}
         self._letters: dict[tuple[str, str], str] = {}
-        self._guides: dict[str, str] = {}
+        self._heads: dict[tuple[tuple[str, str], tuple[str, str]], str] = {}
+        self._named: dict[str, str] = {}
+        for name in self.members:
+            self._named[name] = self._free(name)
 
     def letter(self, place: Place) -> str:
         """The letter of a place."""
         key = self._key(place)
         if key not in self._letters:
             point = self._point(place)
-            letter = self._free(point) + ("" if self.order == 1 else "_1")
+            letter = (self._free(point) if key[0] else self._named[point]) + self.suffix
             self._letters[key] = letter
             self.points[letter] = point
             own = [Place(link, self.rates.local(link, name), place.over) for link, name in self.members[place.over]]
@@ -52,11 +55,17 @@ class Lettering:
 
     def plain(self, place: Place) -> str:
         """The letter of a place in the velocity polygon."""
-        return self.letter(place).removesuffix("" if self.order == 1 else "_1")
+        return self.letter(place).removesuffix(self.suffix)
 
     def between(self, of: Place, against: Place) -> str:
         """The letter at the head of the first part of a relative acceleration: b_a."""
-        return f"{self.plain(of)}_{self.plain(against)}"
+        key = self._key(of), self._key(against)
+        if key not in self._heads:
+            letter = f"{self.plain(of)}_{self.plain(against)}"
+            while self._taken(letter):
+                letter += "*"
+            self._heads[key] = letter
+        return self._heads[key]
 
     def located(self, link: str, drawn: Mapping[str, object]) -> list[tuple[str, Place]]:
         """The drawn letters of points of a link, each with its place on it; of points in one place the first."""
@@ -83,18 +92,21 @@ class Lettering:
         link, over = self._key(place)
         if not link:
             return over
-        if link == self.frame:
-            return self.guide + PRIME * sum(key[0] == self.frame for key in self._letters)
-        return over + PRIME * (1 + sum(key[0] not in ("", self.frame) and key[1] == over for key in self._letters))
+        point = self.guide if link == self.frame else over + PRIME
+        while point in self.members or point in self.points.values():
+            point += PRIME
+        return point
 
     def _free(self, point: str) -> str:
         """A small letter that no other point has."""
-        letter, taken = point.lower(), {each.removesuffix("_1") for each in self.points}
-        if letter in taken:
-            letter = point
-        while letter in taken:
+        letter = point if self._taken(point.lower() + self.suffix) else point.lower()
+        while self._taken(letter + self.suffix):
             letter += "*"
         return letter
+
+    def _taken(self, letter: str) -> bool:
+        own = letter.endswith(self.suffix) and letter.removesuffix(self.suffix) in self._named.values()
+        return own or letter in self.points or letter in self._heads.values()
 
 
 def joined(first: str, second: str) -> str:

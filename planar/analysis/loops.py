@@ -68,7 +68,7 @@ def _ties(rates: Rates, known: Known, order: int, name: Callable[[Rate], str]) -
                 open_ones[stands] = open_ones.get(stands, 0.0) + slope
         terms = tuple((name(rate), slope) for rate, slope in open_ones.items() if abs(slope) > NOTHING)
         if terms:
-            found.append(Equation((tie.pair,), "turning", terms, right))
+            found.append(Equation((tie.pair,), "rates", terms, right))
     return found
 
 

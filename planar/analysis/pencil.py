@@ -75,7 +75,7 @@ class _Pencil:
         while left := [link for link in moving(self.state.mechanism) if link not in self.placed]:
             walk = self.walks.best(self._known())
             if walk is None:
-                self._together(self._group(left))
+                self._together(self._group(left), left)
             else:
                 self._walk(walk)
             self._settle()
@@ -129,18 +129,25 @@ class _Pencil:
             if isinstance(joint, Pin):
                 return True
             if joint.line is not None and self._knows(joint.line[1]):
-                rider = self.walks.end(joint, joint.rider)
-                leg = Leg(self.walks.end(joint, joint.guide), rider, joint.line[1], joint)
-                leg = leg if link == joint.rider else leg.turned_back()
-                self._meet((link,), ((leg.tail, (leg,)),), leg.head)
+                self._slid(joint, link)
                 return True
         return False
+
+    def _slid(self, slide: Slide, link: str) -> None:
+        """The point of a link at a slide from that of the other link, the rate along the slide being known."""
+        rider = self.walks.end(slide, slide.rider)
+        leg = Leg(self.walks.end(slide, slide.guide), rider, slide.rates[0], slide)
+        leg = leg if link == slide.rider else leg.turned_back()
+        self._meet((link,), ((leg.tail, (leg,)),), leg.head)
 
     def _walk(self, walk: Walk) -> None:
         """The point in which two lines meet, and all that is known by it."""
         first, second = walk.legs[: walk.meeting], tuple(leg.turned_back() for leg in walk.legs[walk.meeting :][::-1])
         sides = ((walk.start, first), (walk.stop, second))
-        self._meet(walk.links, sides if walk.unknown else sides[:1], first[-1].head if first else walk.start)
+        if len(first) == 1 and not second and walk.stop.link == self.frame:  # from the pole, as it is read
+            sides = ((walk.stop, (first[0].turned_back(),)), (walk.start, ()))
+        meeting = sides[0][1][-1].head if sides[0][1] else walk.start
+        self._meet(walk.links, sides if walk.unknown else sides[:1], meeting)
         self.known |= walk.unknown
         self.placed |= dict.fromkeys(walk.links)
         for leg in walk.legs:
@@ -150,15 +157,25 @@ class _Pencil:
     def _meet(self, links: tuple[str, ...], sides: Sequence[tuple[Place, tuple[Leg, ...]]], meeting: Place) -> None:
         drawn = []
         for start, legs in sides:
+            if not legs:
+                self._locate(start)
+        for start, legs in sides:
             tail, vectors = self._locate(start), []
             begin = tail
             for leg in legs:
                 found, tail = self._vectors(leg, tail)
                 vectors += found
-            drawn.append(Side(begin, tuple(vectors)))
+            drawn += [] if self._repeats(drawn, begin, vectors) else [Side(begin, tuple(vectors))]
         if any(side.vectors for side in drawn):
             letter = self.lettering.letter(meeting)
             self.stages.append(Meeting(links, self.lettering.points[letter], letter, tuple(drawn)))
+
+    @staticmethod
+    def _repeats(drawn: Sequence[Side], begin: str, vectors: Sequence[Vector]) -> bool:
+        """Whether vectors along a slide are those along another one on the same line, which are known."""
+        heads = [vector.head for vector in vectors if vector.part in (Part.SLIDING, Part.CORIOLIS)]
+        ways = [[vector.head for vector in side.vectors if vector.known] for side in drawn if side.start == begin]
+        return len(heads) == len(vectors) > 0 and heads in ways
 
     def _locate(self, place: Place) -> str:
         """The letter of a place on a known link, drawn now if it is not yet."""
@@ -170,24 +187,35 @@ class _Pencil:
             self.letters[letter] = np.zeros(2)
             self.pole.append(letter)
             return letter
-        spot = next(spot for spot in spots if spot.link in self.placed)
+        spot = next(spot for link in self.placed for spot in spots if spot.link == link)
         located = self.lettering.located(spot.link, self.letters)
         if not located:
-            joint = next(j for j in self.walks.joints(spot.link) if any(o in self.placed for o in j.members))
-            self._locate(self.walks.end(joint, spot.link))
+            self._reached(spot.link)
             return self._locate(place)
         value = self.rates.carried(spot.link, spot.local, self.order)
         base = located[0]
         reach = max(float(np.hypot(*self.rates.carried(place.link, place.local, self.order))), self._turn(spot.link))
         if self._turn(spot.link) <= NONE * max(reach, self.hardest if self.order == 2 else self.fastest):
             self.letters[letter] = value
-            self.stages.append(Triangle(spot.link, (base[1].over,) * 2, self.lettering.points[letter], 0.0, "same"))
+            moves_alike = self.lettering.points[base[0]]
+            point = self.lettering.points[letter]
+            self.stages.append(Triangle(spot.link, (moves_alike, moves_alike), point, 0.0, "same"))
         elif len(located) == 1:
             self._meet((spot.link,), ((base[1], (Leg(base[1], spot, Rate(spot.link)),)),), spot)
         else:
             self.letters[letter] = value
             self.stages.append(self._image(spot, located))
         return letter
+
+    def _reached(self, link: str) -> None:
+        """A first point of a known link: over a pin or a slide to a link that was known before it."""
+        before = list(self.placed)[: list(self.placed).index(link)]
+        joints = [joint for joint in self.walks.joints(link) if any(other in before for other in joint.members)]
+        joint = next(joint for joint in joints if isinstance(joint, Pin) or joint.line is not None)
+        if isinstance(joint, Pin):
+            self._locate(self.walks.end(joint, next(other for other in joint.members if other in before)))
+        else:
+            self._slid(joint, link)
 
     def _turn(self, link: str) -> float:
         """How a link's image is magnified: by its angular velocity, or by what its accelerations come from (SI)."""
@@ -341,21 +369,45 @@ class _Pencil:
                 return group
         return tuple(left)
 
-    def _together(self, group: tuple[str, ...]) -> None:
+    def _together(self, group: tuple[str, ...], left: Sequence[str]) -> None:
         """A group that no two lines locate: all its rates at once, then its pins."""
         found = loops(self.walks, group, self._known(), self.order)
+        while len(found.equations) < len(found.unknowns):  # links beside it hold it too, whose turning is known
+            joints = [joint for link in group for joint in self.walks.joints(link)]
+            beside = [link for link in left if link not in group and any(link in joint.members for joint in joints)]
+            if not beside:
+                break
+            group = (*group, *beside)
+            found = loops(self.walks, group, self._known(), self.order)
         names = {rate: name for name, rate in found.unknowns.items()}
         unknowns = tuple(Unknown(name, self.rates.value(rate, self.order), rate.turns) for rate, name in names.items())
+        for joint in (joint for link in group for joint in self.walks.joints(link)):
+            for link in joint.members:
+                if link in self.placed:
+                    self._locate(self.walks.end(joint, link))
         self.known |= {self._stands(Rate(link)) for link in group} | set(found.unknowns.values())
-        self.placed |= dict.fromkeys(group)
+        held = self._held(group)
+        self.placed |= dict.fromkeys(held or group)
         letters = []
-        for link in group:
+        for link in held or group:
             for joint in self.walks.joints(link):
                 place = self.walks.end(joint, link)
                 letter = self.lettering.letter(place)
-                if letter not in self.letters and any(
-                    spot.link != self.frame for spot in self.lettering.places[letter]
-                ):
+                if letter not in self.letters:
                     self.letters[letter] = self.rates.carried(place.link, place.local, self.order)
                     letters.append(letter)
         self.stages.append(Simultaneous(group, found.equations, unknowns, tuple(letters)))
+
+    def _held(self, group: tuple[str, ...]) -> list[str]:
+        """The links of a group that hang on known ones; others only turn as these do, and are still free to slide."""
+        held: dict[str, None] = {}
+        changed = True
+        while changed:
+            changed = False
+            for link in group:
+                for joint in self.walks.joints(link) if link not in held else ():
+                    firm = isinstance(joint, Pin) or all(map(self._knows, joint.rates))
+                    if firm and any(other in self.placed or other in held for other in joint.members):
+                        held[link] = None
+                        changed = True
+        return list(held)

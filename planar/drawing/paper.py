@@ -13,16 +13,8 @@ WIDTH, HEIGHT = 150.0, 110.0
 """mm on paper that one drawing takes at the most, unless its scale is given."""
 ROUND = (1.0, 2.0, 5.0, 10.0)
 """First digits of a scale that a ruler reads easily."""
-SYMBOLS = {
-    "length": "l",
-    "displacement": "s",
-    "velocity": "v",
-    "acceleration": "a",
-    "time": "t",
-    "angle": "α",
-    "angular velocity": "ω",
-    "angular acceleration": "ε",
-}
+SYMBOLS = {"length": "μₗ", "velocity": "μᵥ", "acceleration": "μₐ"}
+"""Of the calculating scales of a space diagram and its polygons."""
 
 
 @dataclass(frozen=True)
@@ -39,14 +31,14 @@ class Scale:
 
     def __str__(self) -> str:
         """As chapters write it: 1 cm = 100 mm."""
-        told = f"1 cm = {unit(self.unit).from_si(10.0 * self.per_mm):.6g} {self.unit}"
+        told = f"1 cm = {unit(self.unit).from_si(10.0 * self.per_mm):.6g} {raised(self.unit)}"
         return f"{told} (1:1)" if self.kind == "length" and self.per_mm == 1e-3 else told
 
     @property
     def mu(self) -> str:
-        """The calculating scale, in SI units to a millimetre: μ_l = 0.01 m/mm."""
-        si = SI[self.kind]
-        return f"μ_{SYMBOLS[self.kind]} = {self.per_mm:.4g} {f'({si})' if '/' in si else si}/mm"
+        """The calculating scale, in SI units to a millimetre: μₗ = 0.01 m/mm."""
+        si = raised(SI[self.kind])
+        return f"{SYMBOLS[self.kind]} = {self.per_mm:.4g} {f'({si})' if '/' in si else si}/mm"
 
 
 def fitting(kind: str, written: str, width: float, height: float, room: tuple[float, float] = (WIDTH, HEIGHT)) -> Scale:
@@ -62,26 +54,27 @@ def fitting(kind: str, written: str, width: float, height: float, room: tuple[fl
     return Scale(kind, size.to_si(first * power) / 10.0, written)
 
 
-def given(text: str, kind: str) -> Scale:
+def raised(written: str) -> str:
+    """A unit as it is printed: m/s²."""
+    return written.replace("^2", "²")
+
+
+def given(text: str) -> Scale:
     """A scale as a reader writes it: "1 cm = 0.1 m/s", of lengths also "1:5" or "2:1". Raises BadInput."""
     ratio = re.fullmatch(r"\s*([0-9.]+)\s*:\s*([0-9.]+)\s*", text)
     try:
-        if ratio is not None and kind == "length":
+        if ratio is not None:
             paper, real = (float(part) for part in ratio.groups())
-            per_mm, written = 1e-3 * real / paper, "mm"
+            kind, per_mm, written = "length", 1e-3 * real / paper, "mm"
         else:
             left, equals, right = text.partition("=")
             if not equals:
-                raise UnitError(f"{text!r} is not of the form 1 cm = {unit_of(kind)}")
-            per_mm = quantity(right.strip(), kind) / (1e3 * quantity(left.strip(), "length"))
+                raise UnitError(f'{text!r} is not of the form "1 cm = 100 mm", "1 cm = 0.1 m/s" or "1:5"')
             written = re.sub(r"^[\s0-9.eE+-]+", "", right).strip()
+            kind = unit(written).kind
+            per_mm = quantity(right.strip(), kind) / (1e3 * quantity(left.strip(), "length"))
     except (UnitError, ZeroDivisionError, ValueError) as problem:
         raise BadInput("scale", f"{problem}") from None
     if not 0.0 < per_mm < 1e12:
         raise BadInput("scale", f"{text!r} is no scale that could be drawn")
     return Scale(kind, per_mm, written)
-
-
-def unit_of(kind: str) -> str:
-    """An amount that a scale of this kind may have, as an example."""
-    return {"length": "100 mm", "velocity": "0.1 m/s", "acceleration": "2 m/s^2"}.get(kind, f"1 {SI[kind]}")

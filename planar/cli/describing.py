@@ -1,0 +1,70 @@
+"""The commands that say what there is: a mechanism, the models, the schema, the solver's speed."""
+
+from __future__ import annotations
+
+import json
+
+import click
+
+from planar.cli.shared import as_json, busy, main, show
+
+
+@main.command()
+@click.argument("model")
+@as_json
+def inspect(model: str, as_json: bool) -> None:
+    """What it is: links, pairs, chain, mobility, motions, names."""
+    from planar.analysis.inspection import inspect as inspected
+    from planar.files import load
+
+    mechanism = load(model)
+    with busy(mechanism.name):
+        found = inspected(mechanism)
+    if as_json:
+        from dataclasses import asdict
+
+        click.echo(json.dumps(asdict(found), ensure_ascii=False))
+        return
+    from planar.views.inspected import inspection
+
+    show(inspection(found), None)
+
+
+@main.command()
+def schema() -> None:
+    """The JSON schema of mechanism files, which editors can use."""
+    from planar.document import schema as published
+
+    click.echo(json.dumps(published(), ensure_ascii=False, indent=2))
+
+
+@main.command()
+@as_json
+def models(as_json: bool) -> None:
+    """The models that come along."""
+    from planar.files import models as known
+
+    rows = [(file.stem, [name for name in m.ids if name != file.stem], m.about or m.name) for file, m in known()]
+    if as_json:
+        click.echo(json.dumps([{"model": n, "ids": ids, "about": about} for n, ids, about in rows], ensure_ascii=False))
+        return
+    from planar.views.table import models as table
+
+    show(table((name, ", ".join(ids), about) for name, ids, about in rows), None)
+
+
+@main.command()
+@click.argument("model", required=False)
+@as_json
+def bench(model: str | None, as_json: bool) -> None:
+    """Solver speed on this machine: assembly, one warm position, a position of a 360-step run."""
+    from planar.analysis.speed import measure
+    from planar.files import load
+
+    speeds = [measure(load(name)) for name in ([model] if model else ["four-bar", "slider-crank", "double-butterfly"])]
+    if as_json:
+        click.echo(json.dumps([speed.record() for speed in speeds], ensure_ascii=False))
+        return
+    from planar.views.table import speeds as table
+
+    show(table(speeds), None)

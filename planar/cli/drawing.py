@@ -1,0 +1,97 @@
+"""The commands that draw."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from planar.cli.shared import advancing, at, busy, drives, main, output, ranged, run, spare
+from planar.errors import BadInput
+
+if TYPE_CHECKING:
+    from planar.mechanism import Mechanism
+    from planar.motion import Motion
+
+POSITION = ("scheme", "velocity", "acceleration")
+MOTION = ("positions", "loci", "diagrams")
+SMOOTH = 360
+"""Steps of a run that is drawn."""
+
+
+@main.command()
+@click.argument("model")
+@click.argument("what", type=click.Choice((*POSITION, *MOTION)))
+@output("Write the drawing to a .png, .svg or .pdf file.", required=True)
+@click.option("--scale", "scales", multiple=True, metavar="SCALE", help='"1 cm = 100 mm", "1:5", "1 cm = 2 m/s^2".')
+@at
+@click.option(
+    "--point", "points", multiple=True, metavar="NAME", help="A point to be lettered, or whose path is drawn."
+)
+@click.option("--of", "of", metavar="NAME", help="Diagrams of this slide, point or link.")
+@click.option("--steps", default=12, show_default=True, metavar="N", help="Positions, or chords of the diagrams.")
+@click.option("--chords", is_flag=True, help="Diagrams with graphical differentiation beside the curves.")
+@ranged
+def plot(
+    model: str,
+    what: str,
+    output: Path,
+    scales: tuple[str, ...],
+    at: tuple[str, ...],
+    points: tuple[str, ...],
+    of: str | None,
+    steps: int,
+    chords: bool,
+    pair: str | None,
+    start: str | None,
+    stop: str | None,
+) -> None:
+    """A drawing to scale: scheme, velocity or acceleration polygon; positions, loci or diagrams of a run."""
+    from planar import plot as drawn
+    from planar.files import load
+    from planar.solving.position import solve
+
+    mechanism = load(model)
+    spare(model, output)
+    with busy(f"{mechanism.name}: {what}"):
+        if what in POSITION:
+            if pair or start or stop:
+                raise BadInput("--input", f"a {what} is of one position; move an input there with --at")
+            figure = getattr(drawn, what)(solve(mechanism, drives(mechanism, at)), scales)
+        else:
+            if at:
+                raise BadInput("--at", f"{what} are of a run; say where it starts with --from")
+            moving = _run(mechanism, pair, start, stop)
+            if what == "diagrams":
+                figure = drawn.diagrams(moving, of, steps if chords else None)
+            elif what == "positions":
+                figure = drawn.positions(moving, steps, points or None, scales)
+            else:
+                figure = drawn.loci(moving, points or None, scales)
+        drawn.save(figure, output)
+
+
+@main.command()
+@click.argument("model")
+@output("Write the moving picture to a .gif or .mp4 file.", required=True)
+@click.option("--point", "points", multiple=True, metavar="NAME", help="A point whose path is drawn as it moves.")
+@ranged
+def animate(
+    model: str, output: Path, points: tuple[str, ...], pair: str | None, start: str | None, stop: str | None
+) -> None:
+    """The mechanism in motion, to and fro or round and round."""
+    from planar import plot as drawn
+    from planar.files import load
+
+    mechanism = load(model)
+    spare(model, output)
+    with advancing(mechanism.name) as progress:
+        drawn.animate(_run(mechanism, pair, start, stop), output, points or None, progress)
+
+
+def _run(mechanism: Mechanism, pair: str | None, start: str | None, stop: str | None) -> Mechanism | Motion:
+    """The run that the options ask for; without any the mechanism, whose drawings start where a slide's stroke does."""
+    if pair is None and start is None and stop is None and len(mechanism.inputs) == 1:
+        return mechanism
+    return run(mechanism, SMOOTH, pair, start, stop)

@@ -1,0 +1,144 @@
+"""What several commands have in common: their options, where inputs are moved to, how results are shown."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from planar import __version__
+from planar.cli.ending import Commands
+from planar.errors import BadInput
+
+if TYPE_CHECKING:
+    from planar.mechanism import Drive, Mechanism
+    from planar.motion import Motion
+
+
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, message="planar %(version)s")
+def main() -> None:
+    """How any planar linkage moves.
+
+    MODEL is a mechanism file (JSON), or the name of a model that comes along.
+    """
+
+
+as_json = click.option("--json", "as_json", is_flag=True, help="Print machine-readable SI values.")
+
+
+at = click.option(
+    "--at",
+    "at",
+    multiple=True,
+    metavar="PAIR=POSITION",
+    help="Move an input there first, along its branch: A=75deg, stroke=20mm, or a number in the file's units.",
+)
+
+
+def ranged(command: Any) -> Any:
+    """The options of a run: which input runs, from where to where."""
+    for option in (
+        click.option("--to", "stop", metavar="POSITION", help="Where it stops; left out, a turn on, or to its limits."),
+        click.option("--from", "start", metavar="POSITION", help="Where the range starts: 30deg, 20mm, a bare number."),
+        click.option("--input", "pair", metavar="PAIR", help="The input that runs, where there are several."),
+    ):
+        command = option(command)
+    return command
+
+
+def output(help: str, required: bool = False) -> Callable[[Any], Any]:  # noqa: A002
+    """The option that names a file to write."""
+    kind = click.Path(dir_okay=False, path_type=Path)
+    return click.option("-o", "output", type=kind, metavar="FILE", help=help, required=required)
+
+
+def spare(model: str, output: Path | None) -> None:
+    """Refuse to write over the mechanism's own file."""
+    if output is not None and output.exists() and Path(model).exists() and output.samefile(model):
+        raise BadInput("-o", "this is the mechanism's own file, which would be lost; name another")
+
+
+def busy(doing: str) -> AbstractContextManager[Any]:
+    """A sign on a terminal that work is under way."""
+    if not sys.stderr.isatty():
+        return nullcontext()
+    from rich.console import Console
+
+    return Console(stderr=True, markup=False).status(doing)
+
+
+@contextmanager
+def advancing(doing: str) -> Iterator[Callable[[int, int], None] | None]:
+    """A bar on a terminal that shows how much of a long work is done."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import Progress
+
+    with Progress(console=Console(stderr=True, markup=False)) as bar:
+        task = bar.add_task(doing.replace("[", r"\["), total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+def drives(mechanism: Mechanism, told: tuple[str, ...]) -> tuple[Drive, ...]:
+    """The inputs that `--at` moves."""
+    if not told:
+        return ()
+    from planar.document import read_drive
+
+    drives = []
+    for text in told:
+        pair, equals, position = text.partition("=")
+        if not equals:
+            raise BadInput("--at", f"{text!r} is not of the form PAIR=POSITION, such as A=75deg")
+        drives.append(read_drive(mechanism, pair.strip(), position.strip()))
+        if drives[-1].pair in (drive.pair for drive in drives[:-1]):
+            raise BadInput("--at", f"the input at {drives[-1].pair!r} is moved twice; say once where to")
+    return tuple(drives)
+
+
+def show(renderable: Any, output: Path | None) -> None:
+    """Print a table, or write it to a file in the format that its name says."""
+    from rich.console import Console
+
+    if output is None:
+        console = Console(markup=False, emoji=False, highlight=False)  # a name is text, whatever it looks like
+        if not console.is_terminal:
+            # a file or another program has no width: lines are not to be broken for it
+            console.width = 140
+        console.print(renderable)
+        return
+    from planar.files import save
+    from planar.views.saved import written
+
+    save(output, written(renderable, output.suffix))
+
+
+def run(mechanism: Mechanism, steps: int, pair: str | None, start: str | None, stop: str | None) -> Motion:
+    """The run of an input over the range that the options give."""
+    from planar.solving.cycle import cycle
+
+    names = [given.pair for given in mechanism.inputs]
+    pair = pair if pair is not None or len(names) != 1 else names[0]
+    ends = [_position(mechanism, pair, text, option) for option, text in (("--from", start), ("--to", stop))]
+    return cycle(mechanism, steps, ends[0], ends[1], pair)
+
+
+def _position(mechanism: Mechanism, pair: str | None, text: str | None, option: str) -> float | None:
+    """An end of a run's range."""
+    from planar.document import read_drive
+
+    if text is None:
+        return None
+    if pair is None:
+        raise BadInput(option, "there are several inputs; name the one that runs with --input")
+    try:
+        return read_drive(mechanism, pair, text).position
+    except BadInput as problem:
+        raise BadInput(option, problem.sentence) from None

@@ -1,0 +1,100 @@
+"""The commands that solve a position or a motion."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from planar.cli.ending import NO_ANSWER
+from planar.cli.shared import as_json, at, busy, drives, main, output, ranged, run, show, spare
+from planar.errors import BadInput, Outcome
+
+if TYPE_CHECKING:
+    from planar.motion import RelativeState, State
+
+
+@main.command()
+@click.argument("model")
+@as_json
+@at
+@click.option(
+    "--relative",
+    "relative",
+    multiple=True,
+    metavar="POINT,POINT[,LINK]",
+    help="Also how the first point moves against the second, in parts, in the axes of a link that carries the second.",
+)
+@output("Write the tables to a .txt, .svg or .html file.")
+def solve(model: str, as_json: bool, at: tuple[str, ...], relative: tuple[str, ...], output: Path | None) -> None:
+    """This position: mobility, all positions, velocities, accelerations, rubbing speeds."""
+    from planar.analysis.published import compare
+    from planar.files import load
+    from planar.solving.position import solve as solved
+
+    if as_json and output is not None:
+        raise BadInput("-o", "tables go to a file or SI values are printed with --json; give one of the two")
+    mechanism = load(model)
+    spare(model, output)
+    moved = drives(mechanism, at)
+    state = solved(mechanism, moved)
+    comparisons = () if moved else compare(state)
+    relatives = {text: _relative(state, text) for text in relative}
+    if as_json:
+        from planar.views.record import record
+
+        click.echo(json.dumps(record(state, comparisons, relatives), ensure_ascii=False, indent=1, allow_nan=False))
+        return
+    from planar.views.table import solution
+
+    show(solution(state, comparisons, relatives), output)
+
+
+@main.command()
+@click.argument("model")
+@as_json
+@click.option("--steps", default=360, show_default=True, metavar="N", help="Parts that the range is divided into.")
+@ranged
+@output("Write all positions, velocities and accelerations to a .csv, .json or .npz file.")
+def cycle(
+    model: str, as_json: bool, steps: int, pair: str | None, start: str | None, stop: str | None, output: Path | None
+) -> None:
+    """The whole motion: position to position through the range of an input."""
+    from planar.files import load, save
+
+    if as_json and output is not None:
+        raise BadInput("-o", "a run goes to a file or is printed with --json; give one of the two")
+    mechanism = load(model)
+    spare(model, output)
+    with busy(f"{mechanism.name}: {steps} steps"):
+        motion = run(mechanism, steps, pair, start, stop)
+    if as_json:
+        from planar.views.run import record
+
+        click.echo(json.dumps(record(motion), ensure_ascii=False, allow_nan=False))
+    else:
+        from planar.views.run import written
+        from planar.views.table import run as table
+
+        if output is not None:
+            save(output, written(motion, output.suffix))
+        show(table(motion), None)
+    if motion.outcome is not Outcome.SOLVED:
+        click.echo(f"planar: {motion.outcome.value}: {motion.reason}", err=True)
+        sys.exit(NO_ANSWER)
+
+
+def _relative(state: State, text: str) -> RelativeState:
+    """The relative motion that `--relative` asks for."""
+    from planar.motion import Unknown
+
+    names = [name.strip() for name in text.split(",")]
+    if len(names) not in (2, 3):
+        raise BadInput("--relative", f"{text!r} is not of the form POINT,POINT or POINT,POINT,LINK, such as C,B")
+    try:
+        return state.relative(*names)
+    except Unknown as problem:
+        raise BadInput("--relative", str(problem)) from None
