@@ -34,7 +34,7 @@ LIBRARIES = {
     "networkx": {"graph"},
     "pint": {"units"},
     "rich": {"views", "cli"},
-    "matplotlib": {"drawing"},
+    "matplotlib": {"drawing", "plot"},
     "PIL": {"drawing"},
     "imageio_ffmpeg": {"drawing"},
     "click": {"cli"},

@@ -451,7 +451,7 @@ def test_any_linkage_can_be_drawn_on_its_sheet(seed):
     for pair in state.mechanism.pairs:
         if pair.coincident():
             (pin,) = about(picture, f"pin {pair.entry_name()}")
-            per_mm = reading(picture.notes[0].removeprefix("Space diagram, "), "length").per_mm
+            per_mm = reading(picture.notes[0].removeprefix("Space diagram, ")).per_mm
             assert pin.centre == pytest.approx(tuple(state.point(pair.entry_name()).position / per_mm), abs=1e-9)
 
 
@@ -561,7 +561,7 @@ def test_a_rack_reaches_from_its_block_to_its_wheel():
             if isinstance(mark, PitchLine):
                 bar = next(each for each in about(picture, f"link {mark.link}", Line) if each.closed)
                 xs = [x for x, _ in bar.spots]
-                scale = reading(picture.notes[0].removeprefix("Space diagram, "), "length")
+                scale = reading(picture.notes[0].removeprefix("Space diagram, "))
                 for point in (*state.shapes[mark.link].points, None):
                     where = "C" if point is None else f"{mark.link}.{point}"
                     x = state.point(where).position[0] / scale.per_mm

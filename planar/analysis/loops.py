@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,8 @@ from planar.analysis.walks import Joint, Known, Walks
 Array = np.ndarray
 NOTHING = 1e-12
 """m or pure: a coefficient that is none."""
+DEPENDENT = 1e-9
+"""What is left of an equation's coefficients, made one in size, where it follows from others."""
 
 
 class Step(NamedTuple):
@@ -50,12 +53,31 @@ def loops(walks: Walks, group: Sequence[str], known: Known, order: int) -> Loops
             terms = tuple((name(rate), float(way[index])) for rate, way in sums.items() if abs(way[index]) > NOTHING)
             if terms:
                 equations.append(Equation(points, axis, terms, float(left[index])))
-    equations += _ties(walks.rates, known, order, name)
-    return Loops(tuple(equations), unknowns)
+    own = {stands for link in group if (stands := known.unknown(Rate(link)))} | set(unknowns.values())
+    equations += _ties(walks.rates, known, order, own, name)
+    return Loops(tuple(_independent(equations, tuple(unknowns))), unknowns)
 
 
-def _ties(rates: Rates, known: Known, order: int, name: Callable[[Rate], str]) -> list[Equation]:
-    """What ties the unknown rates besides: wheels on one another, inputs between moving links."""
+def _independent(equations: Sequence[Equation], unknowns: Sequence[str]) -> list[Equation]:
+    """The equations that do not follow from those before them: two slides on one line say the same twice."""
+    kept: list[Equation] = []
+    basis: list[Array] = []
+    for equation in equations:
+        terms = dict(equation.terms)
+        row = np.array([terms.get(name, 0.0) for name in unknowns])
+        row /= np.linalg.norm(row)
+        for other in (*basis, *basis):  # twice, so that rounding leaves nothing
+            row = row - (row @ other) * other
+        if np.linalg.norm(row) > DEPENDENT:
+            kept.append(equation)
+            basis.append(row / np.linalg.norm(row))
+    return kept
+
+
+def _ties(
+    rates: Rates, known: Known, order: int, own: AbstractSet[Rate], name: Callable[[Rate], str]
+) -> list[Equation]:
+    """What ties a group's own unknown rates besides: wheels on one another, inputs between moving links."""
     found = []
     for tie in rates.ties:
         open_ones: dict[Rate, float] = {}
@@ -66,9 +88,11 @@ def _ties(rates: Rates, known: Known, order: int, name: Callable[[Rate], str]) -
                 right -= slope * rates.value(rate, order)
             else:
                 open_ones[stands] = open_ones.get(stands, 0.0) + slope
+        if not own >= {rate for rate, slope in open_ones.items() if abs(slope) > NOTHING}:
+            continue
         terms = tuple((name(rate), slope) for rate, slope in open_ones.items() if abs(slope) > NOTHING)
         if terms:
-            found.append(Equation((tie.pair,), "rates", terms, right))
+            found.append(Equation((tie.pair,), "turns", terms, right))
     return found
 
 

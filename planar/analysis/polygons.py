@@ -100,7 +100,7 @@ class Equation(NamedTuple):
     loop: tuple[str, ...]
     "the points round which it goes"
     axis: str
-    "x or y"
+    "x or y; `turns` of what ties rates by a pair, which `loop` names"
     terms: tuple[tuple[str, float], ...]
     "unknown (ω_BC, v_D/D′) and its coefficient"
     known: float

@@ -148,6 +148,8 @@ class Walks:
                 if len(open_ones) == MOST_UNKNOWN and not self._cross(*(legs[k] for k, _ in open_ones)):
                     return None
                 meeting = open_ones[0][0] + 1 if open_ones else len(legs)
+                if meeting == len(legs) > 1:  # at the stop, which is known: one point before
+                    meeting -= 1
                 return Walk(links[1:-1], start, stop, tuple(legs), meeting, unknown)
         return None
 

@@ -31,7 +31,10 @@ class Scale:
 
     def __str__(self) -> str:
         """As chapters write it: 1 cm = 100 mm."""
-        told = f"1 cm = {unit(self.unit).from_si(10.0 * self.per_mm):.6g} {raised(self.unit)}"
+        value, written = unit(self.unit).from_si(10.0 * self.per_mm), self.unit
+        if written == "mm" and value >= 1000.0:
+            value, written = value / 1000.0, "m"
+        told = f"1 cm = {value:.6g} {raised(written)}"
         return f"{told} (1:1)" if self.kind == "length" and self.per_mm == 1e-3 else told
 
     @property

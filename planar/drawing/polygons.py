@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from itertools import combinations, groupby, pairwise, takewhile
 from math import atan2, hypot
@@ -46,16 +47,14 @@ def polygon_picture(polygon: Polygon, scale: Scale | None = None) -> Picture:
     values = np.array([(0.0, 0.0), *polygon.letters.values()])
     still = float(np.hypot(*values.T).max()) <= NOTHING * _most(polygon)
     if still:
-        polygon = _shrunk(polygon)
+        polygon = replace(polygon, letters={letter: np.zeros(2) for letter in polygon.letters})
         values = 0.0 * values
     if scale is None:
         width, height = np.ptp(values, axis=0)
         scale = fitting(polygon.kind, UNITS[polygon.kind], float(width), float(height))
-    notes = [f"{polygon.kind} polygon".capitalize(), str(scale), scale.mu]
+    notes = [f"{polygon.kind} polygon".capitalize(), *([STILL[polygon.kind]] if still else [str(scale), scale.mu])]
     if len(polygon.pole) > MANY:
         notes.append(f"at the pole: {', '.join(polygon.points[letter] for letter in polygon.pole)}")
-    if still:
-        notes.append(STILL[polygon.kind])
     return Picture(_Sheet(polygon, scale).marks(), polygon.state.mechanism.name, tuple(notes))
 
 
@@ -105,18 +104,6 @@ def _most(polygon: Polygon) -> float:
     fastest = max((hypot(*point.velocity) for point in points), default=0.0)
     hardest = max((abs(link.angular_acceleration) for link in links), default=0.0)
     return max(turning**2, hardest) * size + (fastest**2 / size if size else 0.0)
-
-
-def _shrunk(polygon: Polygon) -> Polygon:
-    """A polygon whose letters are all at the pole."""
-    return Polygon(
-        polygon.state,
-        polygon.kind,
-        polygon.pole,
-        {letter: np.zeros(2) for letter in polygon.letters},
-        polygon.points,
-        polygon.stages,
-    )
 
 
 class _Sheet:
@@ -216,10 +203,10 @@ class _Sheet:
         if stage.sense:
             yield from self._side(one, found, stage.link)
             yield from self._side(other, found, stage.link)
-        elif not 0.0 <= stage.ratio <= 1.0:
-            yield from self._side(one if stage.ratio < 0.0 else other, found, stage.link)
-        if not stage.sense:
+        elif 0.0 <= stage.ratio <= 1.0:
             yield from self._tick(found, (one, other))
+        else:
+            yield from self._side(one if stage.ratio < 0.0 else other, found, stage.link)
 
     def _whole(self, link: str, letters: Sequence[str]) -> Iterator[Mark]:
         """A link by all its letters: a line with ticks, or its outline."""
@@ -254,12 +241,11 @@ class _Sheet:
         for letter in dict.fromkeys((*self.polygon.pole, *self.polygon.letters)):
             away = POLE + 0.4 if self._distance(letter) <= POLE else 0.7
             place = self.spots[letter], f"letter {letter}"
-            if letter in self.polygon.pole[FEW:-1] and len(self.polygon.pole) > MANY:
-                if letter == self.polygon.pole[FEW]:
-                    yield Letter("…", *place, away=away)
-                continue
             text, math = letter_text(self.polygon, letter)
-            yield Letter(text, *place, away=away, slanted=not math, math=math)
+            if letter not in self.polygon.pole[FEW:-1] or len(self.polygon.pole) <= MANY:
+                yield Letter(text, *place, away=away, slanted=not math, math=math)
+            elif letter == self.polygon.pole[FEW]:
+                yield Letter("…", *place, away=away, slanted=not math)
 
     def _distance(self, one: str, other: str | None = None) -> float:
         """From one letter to another, or to the pole (mm)."""
@@ -294,12 +280,12 @@ class _Sheet:
         known = {*self.polygon.pole, *stage.letters}
         for before in takewhile(lambda each: each is not stage, self.polygon.stages):
             if isinstance(before, Meeting):
-                known.add(before.letter)
+                known |= {before.letter, *(vector.head for side in before.sides for vector in side.vectors)}
             elif isinstance(before, Triangle):
                 known.add(self.letter_of[before.point])
             elif isinstance(before, Simultaneous):
                 known |= set(before.letters)
-        return [each for each in self.polygon.letters if each in known]
+        return [each for each in self.polygon.points if each in known]
 
     @cached_property
     def _carriers(self) -> Mapping[str, frozenset[str]]:
