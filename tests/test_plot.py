@@ -1,0 +1,168 @@
+"""Every drawing of the textbook's examples and of ten other models, read back from the figures, and from the command."""
+
+import json
+import re
+import subprocess
+import sys
+from itertools import combinations
+
+import pypdfium2
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from PIL import Image
+
+import planar
+from planar import plot
+from tests.contact_sheet import DRAWINGS, MODELS, drawn
+
+CELLS = [(model, what) for model in MODELS for what in DRAWINGS]
+
+
+def texts(figure):
+    """Every text that can be seen, with its box in pixels."""
+    canvas = FigureCanvasAgg(figure)
+    figure.draw_without_rendering()
+    renderer = canvas.get_renderer()
+    found = [text for text in figure.findobj(lambda each: hasattr(each, "get_text")) if text.get_visible()]
+    return [(text.get_text(), text.get_window_extent(renderer)) for text in found if text.get_text().strip()]
+
+
+@pytest.mark.parametrize(("model", "what"), CELLS, ids=[f"{model}-{what}" for model, what in CELLS])
+def test_texts_lie_on_the_sheet_and_apart(model, what):
+    figure = drawn(model, what)
+    width, height = figure.get_size_inches() * figure.dpi
+    found = texts(figure)
+    assert found
+    for text, box in found:
+        assert box.x0 > -1.0, text
+        assert box.y0 > -1.0, text
+        assert box.x1 < width + 1.0, text
+        assert box.y1 < height + 1.0, text
+    for (one, a), (other, b) in combinations(found, 2):
+        across = min(a.x1, b.x1) - max(a.x0, b.x0)
+        along = min(a.y1, b.y1) - max(a.y0, b.y0)
+        assert min(across, along) < 1.0, f"{one!r} lies on {other!r}"
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_axes_of_diagrams_have_units(model):
+    figure = drawn(model, "diagrams")
+    labels = [axes.get_ylabel() for axes in figure.axes if axes.get_ylabel()]
+    assert len(labels) == 3
+    for label in labels:
+        assert re.search(r"\((mm|m|cm|deg|rad|m/s|m/s²|rad/s|rad/s²|m/rad|m/rad²|rad/rad|[^)]+)\)$", label)
+
+
+def run(*words, folder):
+    return subprocess.run(
+        [sys.executable, "-m", "planar", *words], capture_output=True, text=True, cwd=folder, check=False
+    )
+
+
+@pytest.mark.parametrize("what", DRAWINGS)
+def test_the_command_writes_what_it_is_asked_for(what, tmp_path):
+    done = run("plot", "002-E3.2", what, "-o", "drawing.png", folder=tmp_path)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    with Image.open(tmp_path / "drawing.png") as picture:
+        assert min(picture.size) > 300
+
+
+def test_a_ruler_on_the_printed_page_agrees(tmp_path):
+    # the pins of the frame are 100 mm apart; at 1:1 so are the centres of their circles on paper
+    done = run("plot", "four-bar", "scheme", "--scale", "1:1", "-o", "page.pdf", folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    page = pypdfium2.PdfDocument(tmp_path / "page.pdf")[0]
+    figure = plot.scheme(planar.solve(planar.load("four-bar")), "1:1")
+    points = 72.0
+    assert page.get_width() / points == pytest.approx(figure.get_size_inches()[0], abs=1e-3)
+    axes = figure.axes[0]
+    low, high = axes.get_xlim()
+    mm = axes.get_position().width * figure.get_size_inches()[0] * 25.4
+    assert mm == pytest.approx(high - low, rel=1e-9)
+    pins = {each.get_gid(): each for each in axes.findobj(lambda e: e.get_gid() in ("pin A", "pin D"))}
+    a, d = (pins[f"pin {name}"].get_path().vertices for name in "AD")
+    centres = [0.5 * (each.max(axis=0) + each.min(axis=0)) for each in (_shown(pins, "A", a), _shown(pins, "D", d))]
+    assert centres[1][0] - centres[0][0] == pytest.approx(100.0, abs=1e-6)
+
+
+def _shown(pins, name, vertices):
+    """Vertices in the axes' data, mm."""
+    artist = pins[f"pin {name}"]
+    if hasattr(artist, "get_patch_transform"):
+        return artist.get_patch_transform().transform(vertices)
+    return vertices
+
+
+def test_scales_are_taken_by_what_they_measure(tmp_path):
+    state = planar.solve(planar.load("002-E3.1"))
+    figure = plot.acceleration(state, ["1 cm = 50 mm", "1 cm = 2 m/s^2", "1 cm = 0.2 m/s"])
+    said = " ".join(text for text, _ in texts(figure))
+    for scale in ("1 cm = 50 mm", "1 cm = 0.2 m/s", "1 cm = 2 m/s²"):
+        assert scale in said
+    for wrong in ("1 cm = 3 kg", "3", "0:1", "1 cm = 0 m", "1 s = 2 m"):
+        with pytest.raises(planar.BadInput, match="scale"):
+            plot.scheme(state, wrong)
+    with pytest.raises(planar.BadInput, match="two scales of length"):
+        plot.scheme(state, ["1:2", "1:3"])
+    done = run("plot", "002-E3.1", "scheme", "--scale", "1 cm = 3 s", "-o", "a.png", folder=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr == "planar: scale: drawings have scales of length, velocity, acceleration, not of time\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("scheme", "-o", "a.bmp"), "a drawing is saved as .png, .svg or .pdf"),
+        (("scheme", "--input", "A", "-o", "a.png"), "a scheme is of one position"),
+        (("loci", "--at", "A=60deg", "-o", "a.png"), "say where it starts with --from"),
+        (("loci", "--point", "nothing", "-o", "a.png"), "there is no point 'nothing'"),
+        (("diagrams", "--of", "nothing", "-o", "a.png"), "there is no pair, point or link of this name"),
+        (("positions", "--steps", "0", "-o", "a.png"), "a whole number of positions"),
+        (("circles", "-o", "a.png"), "is not one of 'scheme'"),
+        (("scheme",), "missing option '-o'"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused_in_a_sentence(words, said, tmp_path):
+    done = run("plot", "002-E3.1", *words, folder=tmp_path)
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_dead_point_has_no_polygon_but_says_why(tmp_path):
+    model = {
+        "planar": 1,
+        "name": "stretched",
+        "frame": "f",
+        "links": {
+            "f": {"points": {"A": [0, 0], "D": [3, 0]}},
+            "AB": {"ends": ["A", "B"], "length": 1},
+            "BC": {"ends": ["B", "C"], "length": 1},
+            "DC": {"ends": ["D", "C"], "length": 1},
+        },
+        "pairs": [{"turning": name} for name in "ABCD"],
+        "inputs": [{"pair": "A", "position": "60 deg", "velocity": "1 rad/s"}],
+        "sketch": {"C": [2, 0.1]},
+    }
+    (tmp_path / "m.json").write_text(json.dumps(model | {"inputs": [{"pair": "A", "position": 0, "velocity": 1}]}))
+    done = run("plot", "m.json", "velocity", "-o", "a.png", folder=tmp_path)
+    assert done.returncode == 1
+    assert len(done.stderr.splitlines()) == 1
+    assert not (tmp_path / "a.png").exists()
+
+
+def test_a_moving_picture_comes_from_the_command(tmp_path):
+    done = run("animate", "four-bar", "--point", "E", "-o", "a.gif", folder=tmp_path)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    with Image.open(tmp_path / "a.gif") as picture:
+        assert picture.n_frames > 50
+
+
+def test_the_models_own_file_is_not_written_over(tmp_path):
+    (tmp_path / "m.json").write_text("{}")
+    text = planar.dumps(planar.load("four-bar"))
+    (tmp_path / "m.png").write_text(text)
+    done = run("plot", "m.png", "scheme", "-o", "m.png", folder=tmp_path)
+    assert done.returncode == 2
+    assert (tmp_path / "m.png").read_text() == text
