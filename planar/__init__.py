@@ -4,6 +4,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from planar import plot
     from planar.analysis.extremes import stroke
     from planar.analysis.harmonics import harmonics
     from planar.analysis.inspection import Inspection, inspect
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from planar.solving.cycle import cycle
     from planar.solving.position import solve
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"
 
 _ROOMS = {
     "Along": "mechanism",
@@ -44,6 +45,7 @@ _ROOMS = {
     "load": "files",
     "loads": "files",
     "mobility": "analysis.mobility",
+    "plot": "plot",
     "schema": "document",
     "solve": "solving.position",
     "stroke": "analysis.extremes",
@@ -77,6 +79,7 @@ __all__ = [
     "load",
     "loads",
     "mobility",
+    "plot",
     "schema",
     "solve",
     "stroke",
@@ -87,7 +90,8 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name not in _ROOMS:
         raise AttributeError(f"module 'planar' has no attribute {name!r}")
-    return getattr(import_module(f"planar.{_ROOMS[name]}"), name)
+    room = import_module(f"planar.{_ROOMS[name]}")
+    return room if _ROOMS[name] == name else getattr(room, name)
 
 
 def __dir__() -> list[str]:

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 from planar.drawing import animation
 from planar.drawing.diagrams import diagrams
-from planar.drawing.figure import figure, pages
-from planar.drawing.page import solution_pages
-from planar.drawing.panels import Scales, panels, scale_of
+from planar.drawing.figure import figure, saved
+from planar.drawing.page import sheets, solution_pages
+from planar.drawing.panels import Scales, panels
+from planar.drawing.paper import scales
 from planar.drawing.positions import loci as loci_picture
 from planar.drawing.positions import positions as positions_picture
 from planar.drawing.scheme import scheme as scheme_picture
@@ -26,7 +27,7 @@ __all__ = ["acceleration", "animate", "diagrams", "loci", "positions", "save", "
 
 def scheme(state: State, scale: Scales = None) -> Figure:
     """The kinematic scheme of a position: links numbered, points lettered. Raises BadInput for a scale that is none."""
-    return figure([scheme_picture(state, scale_of(scale, "length"))])
+    return figure([scheme_picture(state, scales(scale).get("length"))])
 
 
 def velocity(state: State, scale: Scales = None) -> Figure:
@@ -43,17 +44,17 @@ def positions(
     motion: Motion | Mechanism, count: int = 12, points: Sequence[str] | None = None, scale: Scales = None
 ) -> Figure:
     """The mechanism in `count` + 1 positions, its joints lettered A0, A1, ...; TDC and BDC where a slider has them."""
-    return figure([positions_picture(motion, count, points, scale_of(scale, "length"))])
+    return figure([positions_picture(motion, count, points, scales(scale).get("length"))])
 
 
 def loci(motion: Motion | Mechanism, points: Sequence[str] | None = None, scale: Scales = None) -> Figure:
     """The paths of points (left out: of those that no link on the frame carries)."""
-    return figure([loci_picture(motion, points, scale_of(scale, "length"))])
+    return figure([loci_picture(motion, points, scales(scale).get("length"))])
 
 
-def solution(state: State) -> list[Figure]:
+def solution(state: State, scale: Scales = None) -> list[Figure]:
     """The worked solution of a position on pages of A4."""
-    return solution_pages(state)
+    return solution_pages(state, scales=scales(scale))
 
 
 def animate(
@@ -71,6 +72,10 @@ def animate(
 
 
 def save(figures: Figure | Sequence[Figure], file: str | Path) -> None:
-    """Write a figure to a .png, .svg or .pdf file, several as pages of one .pdf. Raises BadInput."""
+    """Write a figure to a .png, .svg or .pdf file; several as pages of one .pdf, or one below the other.
+
+    Raises BadInput for another kind of file, and where it cannot be written.
+    """
     path = Path(file)
-    write(path, pages(figures if isinstance(figures, Sequence) else [figures], path.suffix))
+    several = isinstance(figures, Sequence)
+    write(path, sheets(figures, path.suffix) if several else saved(figures, path.suffix))

@@ -59,7 +59,7 @@ def main(file: Path) -> None:
             picture = Image.open(io.BytesIO(content))
             sheet.paste(picture, (x + (CELL[0] - picture.width) // 2, y + (CELL[1] - picture.height) // 2))
             pen.text((x + 4, y + CELL[1]), f"{cell[0]}: {cell[1]}", "black")
-    sheet.quantize(32).save(file, optimize=True)
+    sheet.quantize(64, Image.Quantize.FASTOCTREE).save(file, optimize=True)
 
 
 if __name__ == "__main__":

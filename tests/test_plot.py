@@ -1,4 +1,4 @@
-"""Every drawing of the textbook's examples and of ten other models, read back from the figures, and from the command."""
+"""Every drawing of the textbook's examples and of ten other models, read back, and made by the command."""
 
 import json
 import re

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from planar.cli.shared import advancing, at, busy, drives, main, output, ranged, run, spare
+from planar.cli.shared import advancing, at, busy, drives, main, output, ranged, run, scaled, spare
 from planar.errors import BadInput
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ SMOOTH = 360
 @click.argument("model")
 @click.argument("what", type=click.Choice((*POSITION, *MOTION)))
 @output("Write the drawing to a .png, .svg or .pdf file.", required=True)
-@click.option("--scale", "scales", multiple=True, metavar="SCALE", help='"1 cm = 100 mm", "1:5", "1 cm = 2 m/s^2".')
+@scaled
 @at
 @click.option(
     "--point", "points", multiple=True, metavar="NAME", help="A point to be lettered, or whose path is drawn."

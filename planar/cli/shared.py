@@ -40,6 +40,15 @@ at = click.option(
 )
 
 
+scaled = click.option(
+    "--scale",
+    "scales",
+    multiple=True,
+    metavar="SCALE",
+    help='Of what is drawn: "1 cm = 100 mm", "1:5", "1 cm = 0.1 m/s", "1 cm = 2 m/s^2"; left out, round ones that fit.',
+)
+
+
 def ranged(command: Any) -> Any:
     """The options of a run: which input runs, from where to where."""
     for option in (

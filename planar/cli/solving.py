@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING
 import click
 
 from planar.cli.ending import NO_ANSWER
-from planar.cli.shared import as_json, at, busy, drives, main, output, ranged, run, show, spare
+from planar.cli.shared import as_json, at, busy, drives, main, output, ranged, run, scaled, show, spare
 from planar.errors import BadInput, Outcome
 
 if TYPE_CHECKING:
+    from planar.analysis.published import Comparison
     from planar.motion import RelativeState, State
 
 
@@ -31,17 +32,7 @@ if TYPE_CHECKING:
 @output("Write the tables to a .txt, .svg or .html file.")
 def solve(model: str, as_json: bool, at: tuple[str, ...], relative: tuple[str, ...], output: Path | None) -> None:
     """This position: mobility, all positions, velocities, accelerations, rubbing speeds."""
-    from planar.analysis.published import compare
-    from planar.files import load
-    from planar.solving.position import solve as solved
-
-    if as_json and output is not None:
-        raise BadInput("-o", "tables go to a file or SI values are printed with --json; give one of the two")
-    mechanism = load(model)
-    spare(model, output)
-    moved = drives(mechanism, at)
-    state = solved(mechanism, moved)
-    comparisons = () if moved else compare(state)
+    state, comparisons = _solved(model, at, as_json, output)
     relatives = {text: _relative(state, text) for text in relative}
     if as_json:
         from planar.views.record import record
@@ -51,6 +42,52 @@ def solve(model: str, as_json: bool, at: tuple[str, ...], relative: tuple[str, .
     from planar.views.table import solution
 
     show(solution(state, comparisons, relatives), output)
+
+
+@main.command()
+@click.argument("model")
+@as_json
+@at
+@scaled
+@output("Write the text to a .txt, .svg or .html file, or pages with drawings to scale to a .pdf or .png file.")
+def explain(model: str, as_json: bool, at: tuple[str, ...], scales: tuple[str, ...], output: Path | None) -> None:
+    """The worked solution: vector equations and tables, both polygons step by step, results."""
+    from planar.drawing.paper import scales as read
+
+    state, comparisons = _solved(model, at, as_json, output)
+    given = read(scales)
+    if output is not None and output.suffix.lower() in (".pdf", ".png"):
+        from planar.drawing.page import sheets, solution_pages
+        from planar.files import save
+
+        with busy(state.mechanism.name):
+            save(output, sheets(solution_pages(state, comparisons, given), output.suffix))
+        return
+    from planar.analysis.solution import worked_solution
+    from planar.views.explained import explained, record
+
+    solution = worked_solution(state, comparisons)
+    if as_json:
+        click.echo(json.dumps(record(solution, given), ensure_ascii=False, indent=1, allow_nan=False))
+        return
+    show(explained(solution, given), output)
+
+
+def _solved(
+    model: str, at: tuple[str, ...], as_json: bool, output: Path | None
+) -> tuple[State, tuple[Comparison, ...]]:
+    """A model's position, moved to where `--at` says, with its published values unless it was moved."""
+    from planar.analysis.published import compare
+    from planar.files import load
+    from planar.solving.position import solve
+
+    if as_json and output is not None:
+        raise BadInput("-o", "tables go to a file or SI values are printed with --json; give one of the two")
+    mechanism = load(model)
+    spare(model, output)
+    moved = drives(mechanism, at)
+    state = solve(mechanism, moved)
+    return state, () if moved else compare(state)
 
 
 @main.command()

@@ -106,13 +106,13 @@ def figure(pictures: Sequence[Picture], title: str = "") -> Figure:
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    cells = [_cell(picture) for picture in pictures]
+    cells = [cell(picture) for picture in pictures]
     rows = _rows(cells)
     widest = max((_across(row) for row in rows), default=20.0)
     heading = wrapped(title, HEADING, max(widest, CAPTION), heavy=True)
     widest = max([widest, *(measured(line, HEADING, heavy=True).width for line in heading)])
     above = LEADING * POINT * HEADING * len(heading) + (3.0 if heading else 0.0)
-    heights = [max(cell.inside[1] for cell in row) + max(cell.below for cell in row) for row in rows]
+    heights = [max(each.inside[1] for each in row) + max(each.below for each in row) for row in rows]
     width = widest + 2.0 * EDGE
     height = above + sum(heights) + APART * max(len(rows) - 1, 0) + 2.0 * EDGE
     if max(width, height) > LARGEST:
@@ -126,10 +126,10 @@ def figure(pictures: Sequence[Picture], title: str = "") -> Figure:
         top = height - EDGE - above
         for row, tall in zip(rows, heights, strict=True):
             left = (width - _across(row)) / 2.0
-            floor = top - max(cell.inside[1] for cell in row)
-            for cell in row:
-                _put(made, cell, (left, floor))
-                left += cell.width + APART
+            floor = top - max(each.inside[1] for each in row)
+            for each in row:
+                put(made, each, (left, floor))
+                left += each.width + APART
             top -= tall + APART
     return made
 
@@ -174,7 +174,7 @@ def _any_font(page: bytes) -> bytes:
     return re.sub(rb"(font(?:-family)?: [^;\"]*'DejaVu Sans[^';\"]*')(?=[;\"])", rb"\1, sans-serif", page)
 
 
-def _cell(picture: Picture) -> _Cell:
+def cell(picture: Picture) -> _Cell:
     for mark in picture.marks:
         check(mark)
     letters = placed([mark for mark in picture.marks if isinstance(mark, Letter)], picture.marks)
@@ -214,7 +214,7 @@ def _write(made: Figure, line: str, at: Spot, size: float) -> None:
     made.text(*where, line, fontproperties=properties, ha="center", va="baseline", color="black", parse_math=False)
 
 
-def _put(made: Figure, cell: _Cell, corner: Spot) -> None:
+def put(made: Figure, cell: _Cell, corner: Spot) -> None:
     """A picture with the lower left corner of its place there (mm on the sheet), and its text below."""
     width, height = made.get_size_inches() * INCH
     across, up = cell.inside

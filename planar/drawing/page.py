@@ -1,5 +1,296 @@
-"""stand-in"""
+"""The worked solution as printed pages: space diagram and polygons to scale, equations, tables, sentences, results."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from io import BytesIO
+from logging import ERROR, getLogger
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from planar.analysis.phrases import SHOWN, Name, Phrase, number
+from planar.analysis.published import Comparison
+from planar.analysis.sections import Section
+from planar.analysis.solution import Solution, Worked, compared, worked_solution
+from planar.drawing.figure import SETTINGS, cell, pages, put
+from planar.drawing.flow import PAGE, ROOM, Column, Strip, lines, paged, table
+from planar.drawing.ink import ready
+from planar.drawing.paper import Scale, fitting
+from planar.drawing.picture import Letter, Picture, extent
+from planar.drawing.polygons import polygon_picture
+from planar.drawing.scheme import scheme, space_scale, standing
+from planar.drawing.typeset import Sheet, Style, lift
+from planar.errors import BadInput
+from planar.mechanism import QUANTITIES
+from planar.motion import State
+from planar.units import SI, unit
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from matplotlib.text import Text
+
+ROOMS = {"length": (80.0, 80.0), "velocity": (80.0, 90.0), "acceleration": (80.0, 90.0)}
+"""mm that a drawing takes at the most, unless its scale is given."""
+AROUND = 15.0
+"""mm that symbols may take about the points of a space diagram."""
+RESOLUTION = 150
+"""Dots to an inch of pages in one picture."""
+HIGHEST = 60_000
+"""Pixels: pages in one picture are not higher together."""
+TITLE, PART, TOPIC, SMALL = Style(15.0, heavy=True), Style(12.5, heavy=True), Style(11.0, heavy=True), Style(9.5)
+INDENT = 8.0
+"""mm by which numbered sentences are set in."""
 
 
-def solution_pages(state):
-    raise NotImplementedError
+def solution_pages(
+    state: State, comparisons: Sequence[Comparison] = (), scales: Mapping[str, Scale] | None = None
+) -> list[Figure]:
+    """The worked solution of a position on upright A4 pages, drawings to round scales unless they are given.
+
+    Raises BadInput where a given scale would make a drawing larger than a page, or matplotlib is missing.
+    """
+    ready()
+    from matplotlib import rc_context
+
+    solution = worked_solution(state, comparisons)
+    used = {**_fitting(solution), **(scales or {})}
+    with rc_context(SETTINGS):
+        return paged(_strips(solution, used))
+
+
+def sheets(figures: Sequence[Figure], suffix: str) -> bytes:
+    """Pages as a .pdf file, or below each other as one .png picture. Raises BadInput."""
+    if suffix.lower() != ".png":
+        with _level(figures), _quiet():
+            return pages(figures, suffix)
+    from matplotlib import rc_context
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.image import imsave
+
+    high = sum(figure.get_size_inches()[1] for figure in figures)
+    dots = min(RESOLUTION, int(HIGHEST / high))
+    found = []
+    with rc_context(SETTINGS):
+        for figure in figures:
+            canvas = FigureCanvasAgg(figure)
+            figure.set_dpi(dots)
+            canvas.draw()
+            found.append(np.asarray(canvas.buffer_rgba())[..., :3].copy())
+    out = BytesIO()
+    imsave(out, np.vstack(found), format="png", dpi=dots, metadata={"Software": None})
+    return out.getvalue()
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """The writer of fonts does not tell how old the book face is."""
+    log = getLogger("fontTools")
+    before = log.level
+    log.setLevel(ERROR)
+    try:
+        yield
+    finally:
+        log.setLevel(before)
+
+
+@contextmanager
+def _level(figures: Sequence[Figure]) -> Iterator[None]:
+    """Formulas on their base lines, as PDF files have them."""
+    moved: list[tuple[Text, float]] = []
+    for figure in figures:
+        high = 72.0 * figure.get_size_inches()[1]
+        for text in figure.texts:
+            if text.get_parse_math():
+                moved.append((text, text.get_position()[1]))
+                text.set_y(moved[-1][1] - lift(text.get_text(), text.get_fontsize()) / high)
+    try:
+        yield
+    finally:
+        for text, y in moved:
+            text.set_y(y)
+
+
+def _fitting(solution: Solution) -> dict[str, Scale]:
+    """Round scales at which the polygons fit their room."""
+    found = {}
+    for half in solution.halves:
+        values = np.array([(0.0, 0.0), *half.polygon.letters.values()])
+        width, height = (float(each) for each in np.ptp(values, axis=0))
+        most = ROOMS[half.kind]
+        found[half.kind] = fitting(half.kind, SI[half.kind], width, height, most)
+    return found | {"length": _space(solution.state)}
+
+
+def _space(state: State) -> Scale:
+    """A round scale at which the strokes of the space diagram fit their room, wheels and guides included."""
+    scale, length = space_scale(state.mechanism, standing(state.frames), state.shapes), state.mechanism.units.length
+    for _ in range(3):
+        low, high = extent([mark for mark in scheme(state, scale).marks if not isinstance(mark, Letter)])
+        size = [(b - a) * scale.per_mm for a, b in zip(low, high, strict=True)]
+        room = ROOMS["length"][0] + AROUND, ROOMS["length"][1] + AROUND
+        scale, before = fitting("length", length, *size, room), scale
+        if scale == before:
+            break
+    return scale
+
+
+def _strips(solution: Solution, used: Mapping[str, Scale]) -> Iterator[Strip]:
+    mechanism = solution.state.mechanism
+    yield from lines((mechanism.name,), TITLE)
+    if mechanism.source:
+        yield from lines((mechanism.source,), Style(9.5, slanted=True), before=0.5)
+    yield from lines(("Given",), TOPIC, before=3.0, keep=True)
+    for phrase in solution.given:
+        yield from lines(phrase, indent=4.0)
+    yield from lines(("To find",), TOPIC, before=2.0, keep=True)
+    for phrase in solution.asked:
+        yield from lines(phrase, indent=4.0)
+    pictures = [scheme(solution.state, used["length"])._replace(title="Space diagram")]
+    for half in solution.halves:
+        pictures.append(
+            polygon_picture(half.polygon, used[half.kind])._replace(title=f"{half.kind.capitalize()} polygon")
+        )
+    yield from _figures([_captioned(picture) for picture in pictures])
+    for count, half in enumerate(solution.halves, 1):
+        yield from lines((f"{count}. {half.kind.capitalize()} polygon",), PART, before=5.0, keep=True)
+        for section in half.sections:
+            yield from _section(section, half, used)
+    yield from lines(("3. Results",), PART, before=5.0, keep=True)
+    yield from _results(solution)
+    yield from _compared(solution)
+    notes = [*solution.state.remarks, *mechanism.notes]
+    if notes:
+        yield from lines(("Notes",), TOPIC, before=4.0, keep=True)
+    for note in notes:
+        yield from lines((note,), SMALL, label="–", indent=4.0)
+
+
+def _captioned(picture: Picture) -> Picture:
+    """A picture whose notes do not say its title again."""
+    notes = [note.removeprefix("Space diagram, ").replace("^2", "²") for note in picture.notes]
+    return picture._replace(notes=tuple(n for n in notes if n.lower() != picture.title.lower() and n[:1] != "μ"))
+
+
+def _figures(pictures: Sequence[Picture]) -> Iterator[Strip]:
+    """Pictures side by side where they fit, else below each other."""
+    made = [cell(picture) for picture in pictures]
+    for each in made:
+        if each.width > ROOM or each.inside[1] + each.below > PAGE:
+            size = f"{each.width:.0f} x {each.inside[1] + each.below:.0f} mm"
+            raise BadInput(
+                "--scale", f"the {each.picture.title.lower()} takes {size}, more than a page: choose a smaller"
+            )
+    rows: list[list] = []
+    for each in made:
+        if rows and sum(other.width for other in (*rows[-1], each)) + 6.0 * len(rows[-1]) <= ROOM:
+            rows[-1].append(each)
+        else:
+            rows.append([each])
+    for row in rows:
+        yield _drawn(row)
+
+
+def _drawn(row: Sequence) -> Strip:
+    inside = max(each.inside[1] for each in row)
+    tall = inside + max(each.below for each in row)
+    gap = (ROOM - sum(each.width for each in row)) / (len(row) + 1)
+
+    def draw(page: Sheet, x: float, y: float) -> None:
+        left = x + gap
+        for each in row:
+            put(page.figure, each, (left, y - inside))
+            left += each.width + gap
+
+    return Strip(tall, draw, before=4.0, floats=True)
+
+
+def _section(section: Section, half: Worked, used: Mapping[str, Scale]) -> Iterator[Strip]:
+    yield from lines((section.title,), TOPIC, before=3.0, keep=True)
+    for phrase in section.known:
+        yield from lines(phrase, keep=True)
+    for phrase in section.equation:
+        yield from lines(phrase, indent=INDENT, before=0.6, keep=True)
+    if section.rows:
+        heads = ("S.N.", "Vector", f"Magnitude ({SHOWN.get(SI[half.kind], SI[half.kind])})", "Direction", "Sense")
+        cells = [
+            ((f"{count}.",), (row.symbol, " or ", row.chord), row.magnitude, row.direction, row.sense)
+            for count, row in enumerate(section.rows, 1)
+        ]
+        yield from table([Column(head) for head in heads], cells)
+    for count, phrase in enumerate(section.steps, 1):
+        yield from lines(phrase, paper=used, label=f"{count})", indent=INDENT, before=2.0 if count == 1 else 0.0)
+    for phrase in section.simultaneous:
+        yield from lines(phrase, before=1.0)
+    for count, phrase in enumerate(section.images, len(section.steps) + 1):
+        yield from lines(phrase, paper=used, label=f"{count})", indent=INDENT)
+    for count, phrase in enumerate(section.results):
+        yield from lines(phrase, indent=INDENT, before=2.0 if not count else 0.0)
+
+
+def _results(solution: Solution) -> Iterator[Strip]:
+    if solution.links:
+        heads = [Column("Link"), Column("ω (rad/s)", True), Column(""), Column("α (rad/s²)", True), Column("")]
+        cells: list[Sequence[Phrase]] = [
+            (
+                (Name(link.link),),
+                (number(abs(link.velocity)),),
+                (link.velocity_sense,),
+                (number(abs(link.acceleration)),),
+                (link.acceleration_sense,),
+            )
+            for link in solution.links
+        ]
+        yield from table(heads, cells, title="Links")
+    heads = [Column("Point"), Column("v (m/s)", True), Column(""), Column("a (m/s²)", True), Column("")]
+    cells = [
+        (
+            (Name(point.point),),
+            (number(point.velocity),),
+            (point.velocity_sense,),
+            (number(point.acceleration),),
+            (point.acceleration_sense,),
+        )
+        for point in solution.points
+    ]
+    yield from table(heads, cells, title="Points", before=4.0)
+    if solution.slides:
+        length = solution.state.mechanism.units.length
+        names = ("Pair", f"s ({length})", "v (m/s)", "a (m/s²)")
+        cells = [
+            (
+                (slide.pair,),
+                (f"{unit(length).from_si(slide.displacement):.6g}".replace("-", "−"),),
+                (number(slide.velocity),),
+                (number(slide.acceleration),),
+            )
+            for slide in solution.slides
+        ]
+        heads = [Column(name, index > 0) for index, name in enumerate(names)]
+        yield from table(heads, cells, title="Slides, along their lines", before=4.0)
+    if solution.rubbing:
+        yield from lines(("Rubbing speeds at the pins",), Style(10.0, heavy=True), before=4.0, keep=True)
+    for phrase in solution.rubbing:
+        yield from lines(phrase, indent=4.0)
+
+
+def _compared(solution: Solution) -> Iterator[Strip]:
+    if not solution.comparisons:
+        return
+    cells: list[Sequence[Phrase]] = []
+    reasons: list[Phrase] = []
+    for each in solution.comparisons:
+        item = each.published
+        measure = SI[QUANTITIES[item.quantity]]
+        off = "" if each.apart is None else f"{round(100.0 * each.apart, 1) + 0.0:+.1f} %".replace("-", "−")
+        printed = "—" if item.value is None else f"{item.value:.6g}".replace("-", "−")
+        solved = (number(each.solved),)
+        cells.append(((compared(each),), solved, (printed,), (SHOWN.get(measure, measure),), (off,), (each.verdict,)))
+        why = item.slip or item.note
+        if why:
+            reasons.append((f"{compared(each)}: {why}",))
+    heads = [Column("Quantity"), Column("Solved", True), Column("Printed", True), Column("")]
+    yield from table([*heads, Column("Off", True), Column("")], cells, title="Published values", before=4.0)
+    for count, reason in enumerate(reasons):
+        yield from lines(reason, SMALL, label="–", indent=4.0, before=1.5 if not count else 0.0)

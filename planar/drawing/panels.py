@@ -12,19 +12,18 @@ from planar.drawing.picture import Picture, extent
 from planar.drawing.polygons import polygon_picture
 from planar.drawing.scheme import scheme as scheme_picture
 from planar.drawing.scheme import space_scale, standing
-from planar.errors import BadInput
 from planar.motion import State
 
 Scales = str | Sequence[str] | None
 """Scales as a reader writes them, each for what its unit measures: "1 cm = 100 mm", "1:5", "1 cm = 0.1 m/s"."""
-KINDS = ("length", "velocity", "acceleration")
 PANEL = (80.0, 80.0)
 """mm on paper for each of several drawings in a row of a sheet of A4."""
 
 
 def panels(state: State, scales: Scales, many: int) -> list[Picture]:
     """Space diagram, velocity polygon and acceleration polygon, the first of them, each small enough for a row."""
-    space = scale_of(scales, "length")
+    given = paper.scales(scales)
+    space = given.get("length")
     if space is None:
         whole = space_scale(state.mechanism, standing(state.frames), state.shapes)
         width, height = _size(scheme_picture(state, whole))
@@ -33,7 +32,7 @@ def panels(state: State, scales: Scales, many: int) -> list[Picture]:
     for polygon in (velocity_polygon(state), acceleration_polygon(state))[: many - 1]:
         spread = np.ptp([(0.0, 0.0), *polygon.letters.values()], axis=0)
         unit = paper.SI[polygon.kind]
-        fits = scale_of(scales, polygon.kind) or paper.fitting(polygon.kind, unit, *map(float, spread), PANEL)
+        fits = given.get(polygon.kind) or paper.fitting(polygon.kind, unit, *map(float, spread), PANEL)
         drawn = polygon_picture(polygon, fits)
         rest = tuple(note for note in drawn.notes[1:] if note not in _scales(fits))
         title = f"{polygon.kind} polygon".capitalize()
@@ -48,16 +47,3 @@ def _scales(scale: paper.Scale) -> tuple[str, str]:
 def _size(picture: Picture) -> tuple[float, float]:
     low, high = extent(picture.marks)
     return high[0] - low[0], high[1] - low[1]
-
-
-def scale_of(scales: Scales, kind: str) -> paper.Scale | None:
-    """The scale that is given for a kind of quantity. Raises BadInput for what is none, or stands twice."""
-    texts = [scales] if isinstance(scales, str) else list(scales or ())
-    found = [paper.given(text) for text in texts]
-    for each in found:
-        if each.kind not in KINDS:
-            raise BadInput("scale", f"drawings have scales of {', '.join(KINDS)}, not of {each.kind}")
-    of_kind = [each for each in found if each.kind == kind]
-    if len(of_kind) > 1:
-        raise BadInput("scale", f"two scales of {kind} are given; one is wanted")
-    return of_kind[0] if of_kind else None

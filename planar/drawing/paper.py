@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import floor, isfinite, log10
 
@@ -81,3 +82,16 @@ def given(text: str) -> Scale:
     if not 0.0 < per_mm < 1e12:
         raise BadInput("scale", f"{text!r} is no scale that could be drawn")
     return Scale(kind, per_mm, written)
+
+
+def scales(texts: str | Sequence[str] | None) -> dict[str, Scale]:
+    """Scales as a reader writes them, by the kind of quantity that each measures. Raises BadInput."""
+    found: dict[str, Scale] = {}
+    for text in [texts] if isinstance(texts, str) else texts or ():
+        scale = given(text)
+        if scale.kind not in SYMBOLS:
+            raise BadInput("scale", f"drawings have scales of {', '.join(SYMBOLS)}, not of {scale.kind}")
+        if scale.kind in found:
+            raise BadInput("scale", f"two scales of {scale.kind} are given; one is wanted")
+        found[scale.kind] = scale
+    return found
