@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from planar import plot
+    from planar.analysis.centres import Centre, Centres, centres
     from planar.analysis.extremes import stroke
     from planar.analysis.harmonics import harmonics
     from planar.analysis.inspection import Inspection, inspect
@@ -23,6 +24,8 @@ _ROOMS = {
     "Along": "mechanism",
     "At": "mechanism",
     "BadInput": "errors",
+    "Centre": "analysis.centres",
+    "Centres": "analysis.centres",
     "Distances": "mechanism",
     "Drive": "mechanism",
     "Input": "mechanism",
@@ -37,6 +40,7 @@ _ROOMS = {
     "PlanarError": "errors",
     "Point": "mechanism",
     "State": "motion",
+    "centres": "analysis.centres",
     "cycle": "solving.cycle",
     "dumps": "files",
     "from_dict": "files",
@@ -57,6 +61,8 @@ __all__ = [
     "Along",
     "At",
     "BadInput",
+    "Centre",
+    "Centres",
     "Distances",
     "Drive",
     "Input",
@@ -71,6 +77,7 @@ __all__ = [
     "PlanarError",
     "Point",
     "State",
+    "centres",
     "cycle",
     "dumps",
     "from_dict",

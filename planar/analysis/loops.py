@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.analysis.polygons import Equation
-from planar.analysis.ties import Pin, Rate, Rates
+from planar.analysis.ties import Pin, Rate, Rates, Tie
 from planar.analysis.walks import Joint, Known, Walks
 
 Array = np.ndarray
@@ -34,8 +34,11 @@ class Loops(NamedTuple):
     unknowns: Mapping[str, Rate]
 
 
-def loops(walks: Walks, group: Sequence[str], known: Known, order: int) -> Loops:
-    """Velocities (order 1) or accelerations (order 2) round the loops of a group, and what else ties its rates."""
+def loops(walks: Walks, group: Sequence[str], known: Known, order: int, inputs: bool = True) -> Loops:
+    """Velocities (order 1) or accelerations (order 2) round the loops of a group, and what else ties its rates.
+
+    Without `inputs` these are the equations of the mechanism alone, however it is driven.
+    """
     unknowns: dict[str, Rate] = {}
 
     def name(rate: Rate) -> str:
@@ -54,7 +57,8 @@ def loops(walks: Walks, group: Sequence[str], known: Known, order: int) -> Loops
             if terms:
                 equations.append(Equation(points, axis, terms, float(left[index])))
     own = {stands for link in group if (stands := known.unknown(Rate(link)))} | set(unknowns.values())
-    equations += _ties(walks.rates, known, order, own, name)
+    ties = [tie for tie in walks.rates.ties if inputs or not tie.given]
+    equations += _ties(ties, walks.rates, known, order, own, name)
     return Loops(tuple(_independent(equations, tuple(unknowns))), unknowns)
 
 
@@ -75,11 +79,11 @@ def _independent(equations: Sequence[Equation], unknowns: Sequence[str]) -> list
 
 
 def _ties(
-    rates: Rates, known: Known, order: int, own: AbstractSet[Rate], name: Callable[[Rate], str]
+    ties: Sequence[Tie], rates: Rates, known: Known, order: int, own: AbstractSet[Rate], name: Callable[[Rate], str]
 ) -> list[Equation]:
     """What ties a group's own unknown rates besides: wheels on one another, inputs between moving links."""
     found = []
-    for tie in rates.ties:
+    for tie in ties:
         open_ones: dict[Rate, float] = {}
         right = sum(slope * rates.value(rate, order) for rate, slope in tie.slopes.items()) if tie.given else 0.0
         for rate, slope in tie.slopes.items():

@@ -94,7 +94,7 @@ class Rates:
 
     def pinned(self, link: str, spot: Array) -> Vector:
         """The point of a link that lies at a place of the plane, in the link's own axes (m)."""
-        return _still(self.state.frames[link]).local(Vector(float(spot[0]), float(spot[1])))
+        return still(self.state.frames[link]).local(Vector(float(spot[0]), float(spot[1])))
 
     def carried(self, link: str, local: Vector, order: int = 0) -> Array:
         """Position (order 0), velocity (1) or acceleration (2) of a point of a link, (2,), SI."""
@@ -162,9 +162,19 @@ class _Slopes(NamedTuple):
     "own coordinates that stay as they are, because a contact that the others keep closed has no other"
 
 
-def _slopes(state: State, pair: Pair) -> _Slopes:
-    """The slopes of a pair's residual: rows that know no place are ties; of the others, the ways of own coordinates."""
-    frames = [_still(state.frames[link]) for link in pair.bodies]
+class Gradients(NamedTuple):
+    """How a pair's residual changes with each coordinate of its bodies, and with its own: columns (rows,)."""
+
+    bodies: Mapping[tuple[str, str], Array]
+    "(link, `x`, `y` or `angle`)"
+    own: tuple[Array, ...]
+    held: frozenset[int]
+    "own coordinates that stay as they are, because a contact that the others keep closed has no other"
+
+
+def gradients(state: State, pair: Pair) -> Gradients:
+    """The slopes of a pair's residual at a position, from the residual itself."""
+    frames = [still(state.frames[link]) for link in pair.bodies]
     own = [part(each, 0) for each in state.own.get(pair.name, ())]
     numbers = pair.measure([state.shapes[link] for link in pair.bodies])
 
@@ -172,33 +182,33 @@ def _slopes(state: State, pair: Pair) -> _Slopes:
         return np.array([part(row, 1) for row in pair.residual(frames_along, numbers, own_along)])
 
     still_frames, still_own = [_along(frame) for frame in frames], [Jet(value, 0.0) for value in own]
+    ways = [[Jet(value, float(k == index)) for k, value in enumerate(own)] for index in range(len(own))]
+    bodies = {}
+    for index, link in enumerate(pair.bodies):
+        for which in ("x", "y", "angle"):
+            moved = list(still_frames)
+            moved[index] = _along(frames[index], which)
+            bodies[link, which] = slope(moved, still_own)
+    held = frozenset(index for index, way in enumerate(ways) if part(pair.apart(numbers, way), 1))
+    return Gradients(bodies, tuple(slope(still_frames, way) for way in ways), held)
 
-    def of_body(index: int, which: str) -> Array:
-        moved = list(still_frames)
-        moved[index] = _along(frames[index], which)
-        return slope(moved, still_own)
 
-    placed = sum(np.abs(of_body(index, which)) for index in range(len(frames)) for which in "xy") > NOTHING
-    angular = {Rate(link): of_body(index, "angle") for index, link in enumerate(pair.bodies)}
-    along = [
-        slope(still_frames, [Jet(value, float(k == index)) for k, value in enumerate(own)]) for index in range(len(own))
-    ]
-    columns = angular | {Rate(pair.name, index): column for index, column in enumerate(along)}
+def _slopes(state: State, pair: Pair) -> _Slopes:
+    """Rows of a residual that know no place are ties; of the others, the ways of own coordinates."""
+    found = gradients(state, pair)
+    placed = sum(np.abs(column) for (_, which), column in found.bodies.items() if which != "angle") > NOTHING
+    columns = {Rate(link): column for (link, which), column in found.bodies.items() if which == "angle"}
+    columns |= {Rate(pair.name, index): column for index, column in enumerate(found.own)}
     ties = [
         {rate: float(column[row]) for rate, column in columns.items() if abs(column[row]) > NOTHING}
         for row in np.flatnonzero(~placed)
     ]
-    held = frozenset(
-        index
-        for index in range(len(own))
-        if part(pair.apart(numbers, [Jet(value, float(k == index)) for k, value in enumerate(own)]), 1)
-    )
     # the residual is the second's point minus the place along the first's line
-    return _Slopes(tuple(ties), tuple(-column[placed] for column in along), held)
+    return _Slopes(tuple(ties), tuple(-column[placed] for column in found.own), found.held)
 
 
 def _drive(state: State, pair: Pair) -> dict[Rate, float]:
-    frames = [_still(state.frames[link]) for link in pair.bodies]
+    frames = [still(state.frames[link]) for link in pair.bodies]
     own = [part(each, 0) for each in state.own.get(pair.name, ())]
     numbers = pair.measure([state.shapes[link] for link in pair.bodies])
     found = {}
@@ -211,7 +221,8 @@ def _drive(state: State, pair: Pair) -> dict[Rate, float]:
     return {rate: value for rate, value in found.items() if abs(value) > NOTHING}
 
 
-def _still(frame: Frame) -> Frame:
+def still(frame: Frame) -> Frame:
+    """A frame without its rates."""
     return Frame(*(part(value, 0) for value in frame[:5]), frame.fixed)
 
 
