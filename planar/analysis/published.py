@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from planar.analysis.efforts import efforts
 from planar.mechanism import Drive, Published
 from planar.motion import State
 from planar.solving.position import solve
-from planar.words import heading, turning
+from planar.words import heading, listed, turning
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,27 @@ class Comparison:
     sense: str
     apart: float | None
     verdict: str
+
+    @property
+    def about(self) -> str:
+        """What the value is of, in words."""
+        item = self.published
+        text = f"{item.component + ' of ' if item.component else ''}{item.quantity} of {item.of}"
+        text += f" relative to {item.relative_to}" if item.relative_to else ""
+        changed = [drive.pair for drive in item.inputs]
+        return f"{text} (other input at {listed(changed)})" if changed else text
+
+    def record(self) -> dict[str, Any]:
+        """It as a JSON value (SI)."""
+        return {
+            "symbol": self.published.symbol,
+            "quantity": self.published.quantity,
+            "of": self.published.of,
+            "solved": self.solved,
+            "published": self.published.value,
+            "verdict": self.verdict,
+            "slip": self.published.slip,
+        }
 
 
 def compare(state: State) -> tuple[Comparison, ...]:

@@ -102,15 +102,6 @@ def worked_solution(state: State, comparisons: Sequence[Comparison] = ()) -> Sol
     )
 
 
-def compared(each: Comparison) -> str:
-    """What a published value is of."""
-    item = each.published
-    text = f"{item.component + ' of ' if item.component else ''}{item.quantity} of {item.of}"
-    text += f" relative to {item.relative_to}" if item.relative_to else ""
-    changed = [drive.pair for drive in item.inputs]
-    return f"{text} (other input at {words_listed(changed)})" if changed else text
-
-
 def _asked(published: Sequence[Published]) -> Iterator[Phrase]:
     """What the book asks for, else all that there is."""
     found: dict[str, list[str]] = {}

@@ -13,7 +13,7 @@ import numpy as np
 from planar.analysis.phrases import SHOWN, Name, Phrase, number
 from planar.analysis.published import Comparison
 from planar.analysis.sections import Section
-from planar.analysis.solution import Solution, Worked, compared, worked_solution
+from planar.analysis.solution import Solution, Worked, worked_solution
 from planar.drawing.figure import SETTINGS, cell, pages, put
 from planar.drawing.flow import PAGE, ROOM, Column, Strip, lines, paged, table
 from planar.drawing.ink import ready
@@ -286,10 +286,10 @@ def _compared(solution: Solution) -> Iterator[Strip]:
         off = "" if each.apart is None else f"{round(100.0 * each.apart, 1) + 0.0:+.1f} %".replace("-", "−")
         printed = "—" if item.value is None else f"{item.value:.6g}".replace("-", "−")
         solved = (number(each.solved),)
-        cells.append(((compared(each),), solved, (printed,), (SHOWN.get(measure, measure),), (off,), (each.verdict,)))
+        cells.append(((each.about,), solved, (printed,), (SHOWN.get(measure, measure),), (off,), (each.verdict,)))
         why = item.slip or item.note
         if why:
-            reasons.append((f"{compared(each)}: {why}",))
+            reasons.append((f"{each.about}: {why}",))
     heads = [Column("Quantity"), Column("Solved", True), Column("Printed", True), Column("")]
     yield from table([*heads, Column("Off", True), Column("")], cells, title="Published values", before=4.0)
     for count, reason in enumerate(reasons):

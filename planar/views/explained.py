@@ -138,18 +138,7 @@ def record(solution: Solution, scales: Scales | None = None) -> dict[str, Any]:
     found["slides"] = {each.pair: _values(each) for each in solution.slides}
     found["rubbing"] = _lines(solution.rubbing)
     if solution.comparisons:
-        found["published"] = [
-            {
-                "symbol": each.published.symbol,
-                "quantity": each.published.quantity,
-                "of": each.published.of,
-                "solved": each.solved,
-                "published": each.published.value,
-                "verdict": each.verdict,
-                "slip": each.published.slip,
-            }
-            for each in solution.comparisons
-        ]
+        found["published"] = [each.record() for each in solution.comparisons]
     return found
 
 

@@ -33,17 +33,7 @@ def record(
         "pairs": state.pairs,
         "remarks": list(state.remarks),
     }
-    published = [
-        {
-            "symbol": each.published.symbol,
-            "quantity": each.published.quantity,
-            "of": each.published.of,
-            "solved": each.solved,
-            "published": each.published.value,
-            "verdict": each.verdict,
-        }
-        for each in comparisons
-    ]
+    published = [each.record() for each in comparisons]
     relative = {
         text: {name: part if isinstance(part, str) else part.tolist() for name, part in each._asdict().items()}
         for text, each in (relatives or {}).items()

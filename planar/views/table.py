@@ -54,7 +54,7 @@ def published(comparisons: Iterable[Comparison]) -> RenderableType:
         printed = "-" if item.value is None else f"{item.value:.6g}"
         table.add_row(
             item.symbol,
-            _quantity(each),
+            each.about,
             _number(each.solved),
             printed,
             _UNITS.get(SI[kind], SI[kind]),
@@ -256,14 +256,6 @@ def _shown(kind: str, state: State) -> tuple[str, Unit]:
 
 def _reported(value: float | None, kind: str, state: State) -> str:
     return "-" if value is None else _number(_shown(kind, state)[1].from_si(value))
-
-
-def _quantity(each: Comparison) -> str:
-    item = each.published
-    text = f"{item.component + ' of ' if item.component else ''}{item.quantity} of {item.of}"
-    text += f" against {item.relative_to}" if item.relative_to else ""
-    changed = [drive.pair for drive in item.inputs]
-    return f"{text} (other input at {listed(changed)})" if changed else text
 
 
 def _number(value: float) -> str:
