@@ -6,8 +6,12 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from planar.analysis.centres import centres as all_centres
 from planar.drawing import animation
+from planar.drawing.centres import REACH, centres_picture, chosen
+from planar.drawing.circle import circle_picture
 from planar.drawing.diagrams import diagrams
+from planar.drawing.directions import directions_picture
 from planar.drawing.figure import figure, saved
 from planar.drawing.page import sheets, solution_pages
 from planar.drawing.panels import Scales, panels
@@ -22,7 +26,19 @@ from planar.motion import Motion, State
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["acceleration", "animate", "diagrams", "loci", "positions", "save", "scheme", "solution", "velocity"]
+__all__ = [
+    "acceleration",
+    "animate",
+    "centres",
+    "diagrams",
+    "loci",
+    "positions",
+    "save",
+    "scheme",
+    "solution",
+    "two_directions",
+    "velocity",
+]
 
 
 def scheme(state: State, scale: Scales = None) -> Figure:
@@ -40,6 +56,25 @@ def acceleration(state: State, scale: Scales = None) -> Figure:
     return figure(panels(state, scale, 3), state.mechanism.name)
 
 
+def centres(
+    state: State, scale: Scales = None, links: str | Sequence[str] | None = None, reach: float = REACH
+) -> Figure:
+    """The scheme of a position with its instantaneous centres, and beside it the circle diagram.
+
+    `links` chooses: of one all its centres, of several those between any two of them; left out, all centres, or of
+    more than 28 those that pairs show and those against the frame. Centres within `reach` times the mechanism's greater
+    extent are drawn in their places, arrows lead to the others. Raises BadInput for a link that there is not, a scale
+    that is none, and a reach below 1.
+    """
+    found = all_centres(state)
+    shown = chosen(found, links)
+    pictures = [
+        centres_picture(found, shown, scales(scale).get("length"), reach),
+        circle_picture(found, shown),
+    ]
+    return figure(pictures, state.mechanism.name)
+
+
 def positions(
     motion: Motion | Mechanism, count: int = 12, points: Sequence[str] | None = None, scale: Scales = None
 ) -> Figure:
@@ -55,6 +90,16 @@ def loci(motion: Motion | Mechanism, points: Sequence[str] | None = None, scale:
 def solution(state: State, scale: Scales = None) -> list[Figure]:
     """The worked solution of a position on pages of A4."""
     return solution_pages(state, scales=scales(scale))
+
+
+def two_directions(state: State, link: str, points: Sequence[str] | None = None, scale: Scales = None) -> Figure:
+    """The construction of a link's centre C from the directions of two of its points' velocities (r, v, and ω = v / r).
+
+    `points` left out: the two joints of the link that lie farthest apart. Raises BadInput for a link or points that
+    there are not, a link at rest, and a scale that is none.
+    """
+    given = scales(scale)
+    return figure([directions_picture(state, link, points, given.get("length"), given.get("velocity"))])
 
 
 def animate(

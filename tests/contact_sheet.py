@@ -26,7 +26,7 @@ GALLERY = (
     "oscillating-cylinder",
 )
 MODELS = (*(file.stem for file in model_files() if file.parent.name == "textbook"), *GALLERY)
-DRAWINGS = ("scheme", "velocity", "acceleration", "positions", "loci", "diagrams")
+DRAWINGS = ("scheme", "velocity", "acceleration", "centres", "positions", "loci", "diagrams")
 CELL, LINE = (280, 190), 14
 """Pixels of a drawing on the sheet, and of the line below it."""
 
@@ -34,7 +34,7 @@ CELL, LINE = (280, 190), 14
 def drawn(model: str, what: str):
     """One drawing of a model as a figure."""
     mechanism = planar.load(model)
-    if what in ("scheme", "velocity", "acceleration"):
+    if what in ("scheme", "velocity", "acceleration", "centres"):
         return getattr(plot, what)(planar.solve(mechanism))
     return getattr(plot, what)(mechanism)
 

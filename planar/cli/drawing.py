@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from planar.mechanism import Mechanism
     from planar.motion import Motion
 
-POSITION = ("scheme", "velocity", "acceleration")
+POSITION = ("scheme", "velocity", "acceleration", "centres")
 MOTION = ("positions", "loci", "diagrams")
 SMOOTH = 360
 """Steps of a run that is drawn."""
@@ -30,6 +30,9 @@ SMOOTH = 360
     "--point", "points", multiple=True, metavar="NAME", help="A point to be lettered, or whose path is drawn."
 )
 @click.option("--of", "of", metavar="NAME", help="Diagrams of this slide, point or link.")
+@click.option(
+    "--link", "links", multiple=True, metavar="NAME", help="Centres of this link; of several, those between them."
+)
 @click.option("--steps", default=12, show_default=True, metavar="N", help="Positions, or chords of the diagrams.")
 @click.option("--chords", is_flag=True, help="Diagrams with graphical differentiation beside the curves.")
 @ranged
@@ -41,13 +44,14 @@ def plot(
     at: tuple[str, ...],
     points: tuple[str, ...],
     of: str | None,
+    links: tuple[str, ...],
     steps: int,
     chords: bool,
     pair: str | None,
     start: str | None,
     stop: str | None,
 ) -> None:
-    """A drawing to scale: scheme, velocity or acceleration polygon; positions, loci or diagrams of a run."""
+    """A drawing to scale: scheme, velocity or acceleration polygon, centres; positions, loci or diagrams of a run."""
     from planar import plot as drawn
     from planar.files import load
     from planar.solving.position import solve
@@ -58,7 +62,8 @@ def plot(
         if what in POSITION:
             if pair or start or stop:
                 raise BadInput("--input", f"a {what} is of one position; move an input there with --at")
-            figure = getattr(drawn, what)(solve(mechanism, drives(mechanism, at)), scales)
+            state = solve(mechanism, drives(mechanism, at))
+            figure = drawn.centres(state, scales, links) if what == "centres" else getattr(drawn, what)(state, scales)
         else:
             if at:
                 raise BadInput("--at", f"{what} are of a run; say where it starts with --from")

@@ -38,6 +38,12 @@ INK = {
     Pen.CONSTRUCTION: Ink(0.15, "#777777", (1.5, 0.9)),
     Pen.INPUT: Ink(0.45, "#a84a00"),
     Pen.LEADER: Ink(0.1, "#555555"),
+    Pen.CENTRE: Ink(0.6, "#6a1b9a"),
+    Pen.CENTRE_LINE: Ink(0.13, "#8e5bb0", (3.2, 1.0)),
+    Pen.CIRCLE: Ink(0.15, "#999999"),
+    Pen.CHORD: Ink(0.5, "#000000"),
+    Pen.CHORD_FOUND: Ink(0.25, "#6a1b9a", (2.2, 1.1)),
+    Pen.CHORD_SOLVED: Ink(0.35, "#a84a00", (3.5, 0.9, 0.4, 0.9)),
 }
 FILLS = {Fill.PAPER: "#ffffff", Fill.LINK: "#ece7dd"}
 """Colours of areas; those that are not here are empty."""

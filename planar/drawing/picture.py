@@ -47,6 +47,18 @@ class Pen(Enum):
     """The arrow that shows which way an input drives."""
     LEADER = "leader"
     """From a letter that stands away to what it names."""
+    CENTRE = "centre"
+    """The mark of an instantaneous centre, or the arrow towards one that is far away."""
+    CENTRE_LINE = "centre line"
+    """A line of centres, on which a centre was found."""
+    CIRCLE = "circle"
+    """The circle of a circle diagram."""
+    CHORD = "chord"
+    """In a circle diagram: a centre that a pair shows."""
+    CHORD_FOUND = "chord found"
+    """In a circle diagram: a centre found by Kennedy's theorem."""
+    CHORD_SOLVED = "chord solved"
+    """In a circle diagram: a centre found by equations."""
 
 
 class Fill(Enum):
