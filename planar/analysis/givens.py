@@ -37,14 +37,16 @@ def _pairs(group: Sequence[Pair], state: State) -> Phrase:
     slides = {slide.name: slide for slide in rates(state).slides}
     for pair in group:
         rides = pair.rides()
+        sizes = pair.sizes_told(lambda value: _amount(value, "length", state.mechanism.units))
+        more = f"; {sizes}" if sizes else ""
         if rides is not None:
             (rider, point), guide = rides
             line = _guide(state, slides[pair.name]) if guide == state.mechanism.frame else ""
-            said.append((f"{pair.name} ({point} of {rider} on {guide}{line})",))
+            said.append((f"{pair.name} ({point} of {rider} on {guide}{line}{more})",))
         elif pair.coincident():
             said.append((pair.entry_name(),))
         else:
-            said.append((f"{pair.name} ({' and '.join(pair.links)})",))
+            said.append((f"{pair.name} ({' and '.join(pair.links)}{more})",))
     return listed(said)
 
 
@@ -84,6 +86,9 @@ def _link(mechanism: Mechanism, link: Link) -> Iterator[Phrase]:
         if isinstance(place, Along):
             way = f"{_line(place.start, place.towards)}"
             back = " produced back" if float(place.distance) < 0.0 else ""
+            whole = link.length if link.ends and {place.start, place.towards} == set(link.ends) else None
+            if whole is not None and not float(place.angle) and float(place.distance) > float(whole) * (1.0 + 1e-9):
+                back = " produced"
             turned = _amount(float(place.angle), "angle", units) if float(place.angle) else ""
             where = f", at {turned} from {way}{back}" if turned else f" on {way}{back}"
             away = _amount(abs(float(place.distance)), "length", units)

@@ -37,7 +37,7 @@ class Readings:
             return (f"{source} {turn.by}: ", symbol, " = ", value, sense)
         chord: Phrase = (self.notation.chord(*turn.vector),)
         if still:
-            how = "turns at a uniform rate" if order == 2 and self._turns(turn.link) else "does not turn"
+            how = "neither gains nor loses speed here" if order == 2 and self._turns(turn.link) else "does not turn"
             return (symbol, " = ", Fraction(chord, (Name(turn.line),)), f" = 0: {turn.link} {how}")
         numbers = Fraction((number(turn.magnitude),), (number(turn.length),))
         return (symbol, " = ", Fraction(chord, (Name(turn.line),)), " = ", numbers, " = ", value, sense)
@@ -90,7 +90,8 @@ class Readings:
         velocity = self.notation.polygon.state.point(point).velocity
         sense = self.notation.polygon.state.point(point).sense
         if sense == "at rest":
-            return ("; it starts from rest",)
+            moving = any(given.velocity for given in self.notation.polygon.state.inputs.values())
+            return ("; at rest for an instant only: it turns back here" if moving else "; it starts from rest",)
         if float(velocity @ value) > 0.0:
             return ("; in the direction of ", Symbol("v", point), ": the slider speeds up")
         return ("; against ", Symbol("v", point), ": the slider slows down")

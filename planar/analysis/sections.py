@@ -13,6 +13,7 @@ from planar.analysis.phrases import Name, Phrase, Piece, Symbol, joined, listed,
 from planar.analysis.polygons import (
     Equation,
     Meeting,
+    Part,
     Polygon,
     Side,
     Simultaneous,
@@ -21,7 +22,7 @@ from planar.analysis.polygons import (
     Turn,
     Vector,
 )
-from planar.analysis.readings import Readings
+from planar.analysis.readings import MOTION, Readings
 from planar.analysis.steps import Steps, image
 from planar.words import listed as words_listed
 from planar.words import many
@@ -166,7 +167,10 @@ def _section(notation: Notation, batch: Batch, first: bool) -> Section:
     return Section(
         title=_title(batch),
         links=batch.main.links if batch.main is not None else tuple(dict.fromkeys(_links(batch))),
-        known=tuple(readings.turn(stage) for stage in batch.before if isinstance(stage, Turn)),
+        known=(
+            *_introduced(notation, batch),
+            *(readings.turn(stage) for stage in batch.before if isinstance(stage, Turn)),
+        ),
         equation=tuple(_equations(notation, apart, chains, main)),
         rows=tuple(dict.fromkeys(rows)),
         steps=tuple(written),
@@ -174,6 +178,23 @@ def _section(notation: Notation, batch: Batch, first: bool) -> Section:
         images=tuple(image(notation, stage) for stage in batch.after if isinstance(stage, Triangle)),
         results=tuple(_results(readings, batch)),
     )
+
+
+def _introduced(notation: Notation, batch: Batch) -> Iterator[Phrase]:
+    """What the points are that only lie on others: those of a line on which something slides."""
+    if notation.order == 2:  # they are known from the velocities
+        return
+    named, told = notation.polygon.state.point_names, set()
+    stages = [stage for stage in (*batch.before, batch.main) if isinstance(stage, Meeting)]
+    for vector in (vector for stage in stages for side in stage.sides for vector in side.vectors):
+        both = vector.of, vector.against
+        new = [point for point in both if point not in named and point not in told]
+        if vector.part is Part.SLIDING and len(new) == 1:
+            (point,), other = new, both[both[0] in new]
+            told.add(point)
+            fixed = vector.line.startswith(MOTION)
+            whose = "the fixed point" if fixed else f"the point of {vector.line.removeprefix('line on ')}"
+            yield (f"{primed(point)} is {whose} that {primed(other)} lies on",)
 
 
 def _links(batch: Batch) -> Iterator[str]:
@@ -228,7 +249,7 @@ def _rows(notation: Notation, term: Term) -> list[Row]:
     if not term.vectors:
         size = notation.length(term.tail, term.head)
         symbol, chord = notation.symbol(term.of, term.against), notation.chord(term.tail, term.head)
-        return [Row(symbol, chord, size, True, ("already drawn",), ("—",), ("—",))]
+        return [Row(symbol, chord, size, True, ("already drawn" if size else "0",), ("—",), ("—",))]
     return [notation.row(vector, len(term.vectors) == 1) for vector in term.vectors]
 
 

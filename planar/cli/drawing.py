@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+from click.core import ParameterSource
 
 from planar.cli.shared import advancing, at, busy, drives, main, output, ranged, run, scaled, spare
 from planar.errors import BadInput
@@ -56,6 +57,16 @@ def plot(
     from planar.files import load
     from planar.solving.position import solve
 
+    steps_told = click.get_current_context().get_parameter_source("steps") is ParameterSource.COMMANDLINE
+    for option, told, kinds in (
+        ("--point", points, ("positions", "loci")),
+        ("--of", of, ("diagrams",)),
+        ("--chords", chords, ("diagrams",)),
+        ("--steps", steps_told, ("positions", "diagrams") if chords else ("positions",)),
+        ("--scale", scales, (*POSITION, "positions", "loci")),
+    ):
+        if told and what not in kinds:
+            raise BadInput(option, f"this is for {' and '.join(kinds)}; {what} would not heed it")
     mechanism = load(model)
     spare(model, output)
     with busy(f"{mechanism.name}: {what}"):

@@ -76,7 +76,7 @@ def caption(sheet: Sheet, ordinates: list[Ordinate], points: float, room: float)
     lines = [(line, False) for line in wrapped(_start(sheet), points, room)]
     lines += [(line, True) for line in _filled(_scales(sheet, ordinates), points, room)]
     if endless(sheet):
-        told = "At an end of the range the input turns back and no rates exist; what grows without bound is cut off."
+        told = "At an end of the range, a dead or change point, no rates exist; what grows without bound is cut off."
         lines += [(line, False) for line in wrapped(told, points, room)]
     told = [line for index in (1, 2) for line in _peaks(sheet, ordinates[index], index)]
     if sheet.chords is not None:
@@ -160,7 +160,11 @@ def _peaks(sheet: Sheet, ordinate: Ordinate, index: int) -> list[str]:
             found = chords(sheet.run, curve.all[index - 1], sheet.chords)
             by_chords = _by_chords(ordinate, curve, found, written, sheet.chords)
             if by_chords is not None:
-                told = by_chords if exact is None or told is None else f"{told}; {by_chords}{_less(found, exact)}"
+                told = (
+                    f"Greatest {name} {by_chords}"
+                    if exact is None or told is None
+                    else f"{told}; {by_chords}{_less(found, exact)}"
+                )
         if told is not None:
             lines.append(f"{told}.")
     return lines

@@ -28,6 +28,8 @@ MANY, FEW = 8, 3
 UNITS = {"velocity": "m/s", "acceleration": "m/s^2"}
 PENS = {"velocity": Pen.VELOCITY, "acceleration": Pen.ACCELERATION}
 STILL = {"velocity": "everything is at rest", "acceleration": "nothing is accelerated"}
+TURNING = {"velocity": "no lettered point moves", "acceleration": "no lettered point is accelerated"}
+"""Of links that turn about their only points."""
 PRIME = "′"
 SIMPLE = re.compile(f"[A-Za-z][A-Za-z0-9]*{PRIME}*")
 """A letter as textbooks have it, with digits and primes, or a word; any other text is shown as it stands."""
@@ -52,7 +54,13 @@ def polygon_picture(polygon: Polygon, scale: Scale | None = None) -> Picture:
     if scale is None:
         width, height = np.ptp(values, axis=0)
         scale = fitting(polygon.kind, UNITS[polygon.kind], float(width), float(height))
-    notes = [f"{polygon.kind} polygon".capitalize(), *([STILL[polygon.kind]] if still else [str(scale), scale.mu])]
+    said = (
+        TURNING
+        if any(link.angular_velocity or link.angular_acceleration for link in polygon.state.links.values())
+        and _most(polygon)
+        else STILL
+    )[polygon.kind]
+    notes = [f"{polygon.kind} polygon".capitalize(), *([said] if still else [str(scale), scale.mu])]
     if len(polygon.pole) > MANY:
         notes.append(f"at the pole: {', '.join(polygon.points[letter] for letter in polygon.pole)}")
     return Picture(_Sheet(polygon, scale).marks(), polygon.state.mechanism.name, tuple(notes))

@@ -13,6 +13,7 @@ from planar.drawing.paper import WIDTH, Scale, fitting
 from planar.drawing.picture import Arrow, Letter, Line, Mark, Pen, Picture, spot
 from planar.drawing.scene import Scene, Travel, standing
 from planar.drawing.strokes import body_marks, moving
+from planar.errors import BadInput
 from planar.graph import numbered
 from planar.mechanism import Input, Mechanism, motions, named_points
 from planar.motion import State
@@ -29,6 +30,8 @@ SWEEP = 1.75
 """rad: how far the arrow of a turning input reaches round."""
 RADII = (6.0, 8.0, 10.5)
 """mm: how far from the pin it may be."""
+FINEST = 200.0
+"""How much larger than what fits the paper a drawing may be: no sheet takes more, and hatching it takes for ever."""
 ARROW = 10.0
 """mm: the length of the arrow of a sliding input."""
 ASIDE = 4.5
@@ -48,7 +51,10 @@ def scheme(
     `letters` names the points, `numbers` the links as textbooks do; `travel` tells how far slides go (m, by pair).
     """
     mechanism, frames = state.mechanism, standing(state.frames)
-    scale = scale or space_scale(mechanism, frames, state.shapes)
+    fits = space_scale(mechanism, frames, state.shapes)
+    if scale is not None and scale.per_mm * FINEST < fits.per_mm:
+        raise BadInput("scale", "the drawing would be metres large on paper: choose a smaller one")
+    scale = scale or fits
     scene = Scene(mechanism, bodies(mechanism, state.shapes), frames, state.shapes, scale, travel or {})
     strokes: list[Mark] = [*fixed(scene), *moving(scene), *_fixed_points(scene)]
     clear = Clearance.of(strokes)

@@ -101,6 +101,10 @@ class Pair(ABC):
         """How it is drawn, beside all pairs of its mechanism; nothing where its sizes cannot be known."""
         return ()
 
+    def sizes_told(self, length: Told) -> str:
+        """What else defines it, in words for a reader; empty where its links and points say all."""
+        return ""
+
     def ahead(self, drive: float) -> bool:
         """Whether this is the assembly that an author means who says nothing (a slide ahead of `through`)."""
         return True

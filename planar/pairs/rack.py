@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 from planar.algebra import Scalar
-from planar.pairs.base import Entry, Kind, Pair, Quantity, Sample, Schema, described, plain, several
+from planar.pairs.base import Entry, Kind, Pair, Quantity, Sample, Schema, Told, described, plain, several
 from planar.pairs.line import LINE, MEASURES, Guided, Line, along
 from planar.pairs.marks import Mark, PitchLine, Wheel
 from planar.plane import Frame, Vector, direction, frame_at
@@ -58,6 +58,9 @@ class Rack(Guided):
         off = pinion.carry(Vector(*numbers[4:6])) - along(rack, numbers, displacement, distance)
         # no slip: rolling on along the line with the centre on its left is turning clockwise
         return (*off, displacement - s0 + (pinion.angle - rack.angle - a0) * radius)
+
+    def sizes_told(self, length: Told) -> str:
+        return f"pitch radius {length(abs(self.radius))}"
 
     def apart(self, numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Scalar:
         return own[1] - numbers[6]

@@ -107,6 +107,12 @@ class Wheels(Pair):
             pins.setdefault(pair.entry_name(), {}).update(pair.coincident())
         return next((pin for pin in pins.values() if wheel in pin and self.carrier in pin), None)
 
+    def sizes_told(self, length: Told) -> str:
+        first, second = self.links
+        sizes = [f"{length(size) if self.by == 'radii' else f'{size:g}'}" for size in self.sizes]
+        told = f"{self.by} {' and '.join(sizes)}, " if len(sizes) == 2 else ""
+        return f"{told}{second} turns {self.ratio():.6g} times as fast as {first} against {self.carrier}"
+
     def misfit(self, beside: Sequence[Pair], shapes: Mapping[str, Shape], length: Told) -> str | None:
         if self.by != "radii":
             return None

@@ -140,7 +140,10 @@ def _formula(formula: Formula, units: Units, per: tuple[str, str]) -> Renderable
             _part(off.part),
             _angle(off.theta, units),
         )
-    note = "positive away from TDC; errors in parts of the greatest exact value, at crank angles from TDC"
+    note = (
+        "positive away from TDC; off here in parts of the exact value here, greatest errors in parts of the greatest"
+        " exact value, at crank angles from TDC"
+    )
     return Group(table, Text(note, style="italic"))
 
 
