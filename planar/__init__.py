@@ -6,7 +6,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from planar import plot
     from planar.analysis.centres import Centre, Centres, centres
+    from planar.analysis.centrodes import Centrodes, centrodes
+    from planar.analysis.curvature import Curvature, curvature
     from planar.analysis.extremes import stroke
+    from planar.analysis.forces import Forces, forces
     from planar.analysis.harmonics import harmonics
     from planar.analysis.inspection import Inspection, inspect
     from planar.analysis.mobility import Mobility, mobility
@@ -26,8 +29,11 @@ _ROOMS = {
     "BadInput": "errors",
     "Centre": "analysis.centres",
     "Centres": "analysis.centres",
+    "Centrodes": "analysis.centrodes",
+    "Curvature": "analysis.curvature",
     "Distances": "mechanism",
     "Drive": "mechanism",
+    "Forces": "analysis.forces",
     "Input": "mechanism",
     "Inspection": "analysis.inspection",
     "Link": "mechanism",
@@ -41,8 +47,11 @@ _ROOMS = {
     "Point": "mechanism",
     "State": "motion",
     "centres": "analysis.centres",
+    "centrodes": "analysis.centrodes",
+    "curvature": "analysis.curvature",
     "cycle": "solving.cycle",
     "dumps": "files",
+    "forces": "analysis.forces",
     "from_dict": "files",
     "harmonics": "analysis.harmonics",
     "inspect": "analysis.inspection",
@@ -63,8 +72,11 @@ __all__ = [
     "BadInput",
     "Centre",
     "Centres",
+    "Centrodes",
+    "Curvature",
     "Distances",
     "Drive",
+    "Forces",
     "Input",
     "Inspection",
     "Link",
@@ -78,8 +90,11 @@ __all__ = [
     "Point",
     "State",
     "centres",
+    "centrodes",
+    "curvature",
     "cycle",
     "dumps",
+    "forces",
     "from_dict",
     "harmonics",
     "inspect",

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from planar.analysis.centres import centres as all_centres
 from planar.drawing import animation
 from planar.drawing.centres import REACH, centres_picture, chosen
+from planar.drawing.centrodes import centrodes_picture
 from planar.drawing.circle import circle_picture
 from planar.drawing.diagrams import diagrams
 from planar.drawing.directions import directions_picture
@@ -30,6 +31,7 @@ __all__ = [
     "acceleration",
     "animate",
     "centres",
+    "centrodes",
     "diagrams",
     "loci",
     "positions",
@@ -85,6 +87,16 @@ def positions(
 def loci(motion: Motion | Mechanism, points: Sequence[str] | None = None, scale: Scales = None) -> Figure:
     """The paths of points (left out: of those that no link on the frame carries)."""
     return figure([loci_picture(motion, points, scales(scale).get("length"))])
+
+
+def centrodes(
+    motion: Motion | Mechanism, link: str | None = None, other: str | None = None, scale: Scales = None
+) -> Figure:
+    """The fixed and the moving centrode of a link against another (left out: the frame), touching in their pole.
+
+    Without a `link` those of the first coupler. Raises BadInput for a link that is not there, or a scale that is none.
+    """
+    return figure([centrodes_picture(motion, link, other, scales(scale).get("length"))])
 
 
 def solution(state: State, scale: Scales = None) -> list[Figure]:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import planar
-from planar.analysis.efforts import efforts
+from planar.analysis.forces import efforts
 from planar.analysis.published import compare
 from planar.analysis.speed import measure
 from planar.mechanism import Drive, Published

@@ -127,7 +127,7 @@ def test_micrometres_or_kilometres_give_the_same_numbers(seed, links, higher, fa
 @given(seeds, sizes, shares)
 def test_power_balances_for_any_load(seed, links, higher):
     """Inputs against loads: sum of T_i du_i + sum of F . v vanishes at the state's own rates, whatever they are."""
-    from planar.analysis.efforts import efforts
+    from planar.analysis.forces import efforts
 
     built = random_linkage(seed, links, 0.0, higher)
     rng = np.random.default_rng(seed)

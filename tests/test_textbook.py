@@ -106,7 +106,7 @@ def test_twelve_positions_of_the_slider_crank(degrees):
 
 
 def test_the_toggles_torque_balances_power():
-    from planar.analysis.efforts import efforts
+    from planar.analysis.forces import efforts
 
     state = planar.solve(planar.load("000-P2"))
     speed = state.inputs["O"].velocity

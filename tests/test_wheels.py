@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 import planar
-from planar.analysis.efforts import efforts
+from planar.analysis.forces import efforts
 from planar.cli import main
 from planar.errors import BadInput, NoAnswer, Outcome
 

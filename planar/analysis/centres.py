@@ -4,29 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
-from planar.analysis.kennedy import Found, Primary, Through, Two, constructed, unit
+from planar.analysis.branches import branches
+from planar.analysis.kennedy import WORST, Construction, Found, Through, Two, unit
 from planar.analysis.primary import primary
-from planar.analysis.ratios import motions_of
-from planar.analysis.ties import Rates, part, rates
+from planar.analysis.proof import AS_ONE, Proof, as_one, proved, ways
+from planar.analysis.ratios import Moved, motions_of
+from planar.analysis.standing import standing
+from planar.analysis.ties import Rates
+from planar.analysis.ties import rates as rates_of
 from planar.analysis.walks import Walks
 from planar.graph import numbered
-from planar.mechanism import named_points
+from planar.mechanism import Mechanism, named_points
 from planar.motion import State, Unknown
-from planar.solving.constraints import Constraints, null_space
-from planar.solving.setup import Setup
 
 Array = np.ndarray
+WORST_IN_CROSSING = 1e-9
+"""Where motions cross positions are exact to the root of rounding only: lines that close to one another are one."""
+CROSSING = 1e-6
+"""As INFINITE, where motions cross."""
 INFINITE = 1e-9
 """A centre whose w is this small beside x and y, in the mechanism's size, cannot be told from one at infinity."""
-AS_ONE = 1e-9
-"""Links that move this little against each other, beside the greatest motion, move as one."""
-EXACT = 1e-13
-"""How exact the equations round the loops are."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,7 @@ class Centre:
     name: str
     "I24, of the links' numbers"
     order: int
-    "the how manieth it was found as"
+    "the how manieth it was found as; what was not found comes last"
     how: str
     "`pair`, `Kennedy`, `ratio`, `equations`, `as one` or `open`"
     homogeneous: Array | None
@@ -70,19 +73,6 @@ class Line(NamedTuple):
     pair: str = ""
 
 
-class Proof(NamedTuple):
-    """The worst of three figures over all centres, on homogeneous points with lengths in the mechanism's size.
-
-    `routes`: between the centre and that of the null vector of the whole Jacobian. `collinear`: the determinant of the
-    centres of any three links. `velocities`: between the velocities that both links have in their centre, beside the
-    greatest. None where the Jacobian does not tell one motion.
-    """
-
-    routes: float | None
-    collinear: float
-    velocities: float | None
-
-
 @dataclass(frozen=True)
 class Centres:
     """All n(n-1)/2 centres of a position, by two link names in any order."""
@@ -93,11 +83,19 @@ class Centres:
     all: tuple[Centre, ...]
     "in the order in which they were found"
     proof: Proof
+    as_one: tuple[tuple[str, ...], ...]
+    "links that move as one in this position, in groups; at rest are those in one with the frame"
+    branches: tuple[Mapping[str, Array], ...] = ()
+    "at a change point, for each branch that crosses there, where the open centres by name lie on it: homogeneous (3,)"
+
+    @cached_property
+    def _by_links(self) -> dict[Two, Centre]:
+        return {frozenset(centre.links): centre for centre in self.all}
 
     def __getitem__(self, links: tuple[str, str]) -> Centre:
-        for centre in self.all:
-            if set(centre.links) == set(links):
-                return centre
+        two = frozenset(links)
+        if two in self._by_links:
+            return self._by_links[two]
         raise Unknown(f"there are no links {' and '.join(map(repr, links))}; links are {', '.join(self.numbers)}")
 
     def __iter__(self) -> Iterator[Centre]:
@@ -107,15 +105,24 @@ class Centres:
         return len(self.all)
 
 
-def centres(state: State) -> Centres:
+def centres(position: State | Mechanism) -> Centres:
     """Every instantaneous centre of a position, from positions alone: Kennedy's theorem on what the pairs show.
 
     Where no two lines are known, one centre is taken from the linear equations round the loops, and lines serve again;
-    a mechanism with several inputs has its centres for their given rates.
+    where the mechanism can move in several ways it is that of the inputs' given rates. Of a mechanism only the
+    position is assembled, so that it may stand where `solve` finds no velocities: on a dead point of its inputs or on
+    a change point. Raises NoAnswer where it cannot be assembled.
     """
-    found = _Search(state)
+    found = _Search(standing(position) if isinstance(position, Mechanism) else position)
     found.run()
     return found.told()
+
+
+def extent(state: State) -> tuple[Array, float]:
+    """The middle (2,) of all points, and the greater side of the rectangle that holds them (m)."""
+    points = np.array([point.position for point in state.points.values()]).reshape(-1, 2)
+    low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else (np.zeros(2), np.zeros(2))
+    return 0.5 * (low + high), float((high - low).max()) or 1.0
 
 
 class _Search:
@@ -125,59 +132,90 @@ class _Search:
         self.state = state
         self.numbers = numbered(state.mechanism)
         self.links = sorted(self.numbers, key=lambda link: int(self.numbers[link]))
-        points = np.array([point.position for point in state.points.values()])
-        self.middle = 0.5 * (points.max(axis=0) + points.min(axis=0))
-        self.size = float(np.ptp(points, axis=0).max()) or 1.0
-        self.rates: Rates = rates(state)
+        self.middle, self.size = extent(state)
+        rates: Rates = rates_of(state)
         named = {member: each.name for each in named_points(state.mechanism) for member in each.members}
-        self.walks = Walks(self.rates, named, self.size)
-        self.primary: Primary = primary(self.rates, self.middle, self.size)
-        self.found: dict[Two, Found] = {}
-        self.by_equations: set[Two] = set()
+        self.walks = Walks(rates, named, self.size)
+        self.ways = ways(state, self.middle, self.size)
+        worst = WORST if self.ways.count <= 1 else WORST_IN_CROSSING
+        self.construction = Construction(self.links, primary(rates, self.middle, self.size), worst)
+        self.by_equations: dict[Two, str] = {}
         self.as_one: set[Two] = set()
+        self.why_open = ""
+
+    @property
+    def found(self) -> dict[Two, Found]:
+        """By two links, in the order in which they were found."""
+        return self.construction.found
 
     def run(self) -> None:
         """All of them, as far as they are determined."""
-        every = [frozenset(two) for two in combinations(self.links, 2)]
-        self.found = constructed(self.links, self.primary, self.primary.centres)
-        if len(self.found) == len(every):
-            return
-        motions = motions_of(self.rates, self.walks, self.middle, self.size)
-        while motions is not None:
-            left = [two for two in every if two not in self.found and two not in self.as_one]
-            if not left:
+        self.construction.run()
+        moved: Moved | None = None
+        while left := self._left():
+            moved = moved or motions_of(self.walks.rates, self.walks, self.middle, self.size)
+            if moved.links is None:
+                self.why_open = moved.why
                 return
-            two = max(left, key=self._opens)
-            a, b = sorted(two)
-            relative = motions[b] - motions[a]
-            if np.linalg.norm(relative) <= AS_ONE:
+            opens = self._opens()
+            place = {link: index for index, link in enumerate(self.links)}
+            two = max(left, key=lambda two: opens[tuple(place[link] for link in two)])
+            a, b = two
+            relative = moved.links[b] - moved.links[a]
+            length = float(np.linalg.norm(relative))
+            if length <= AS_ONE:
                 self.as_one.add(two)
                 continue
-            self.by_equations.add(two)
-            self.found[two] = Found(unit(relative), EXACT)
-            self.found = constructed(self.links, self.primary, self.found)
+            nearly = self.construction.lines(two) > 1
+            self.by_equations[two] = "the lines known are one, or nearly" if nearly else "no two lines are known"
+            self.construction.add(two, Found(unit(relative), moved.error / length))
+            self.construction.run()
 
-    def _opens(self, two: Two) -> int:
-        """How many open centres would have two lines if this one were known."""
-        count = 0
-        for end in two:
-            (other,) = two - {end}
-            for link in self.links:
-                third = frozenset((end, link))
-                if link not in two and third not in self.found and frozenset((other, link)) in self.found:
-                    count += any(
-                        frozenset((end, via)) in self.found and frozenset((via, link)) in self.found
-                        for via in self.links
-                        if via not in (end, link, other)
-                    )
-        return count
+    def _left(self) -> list[Two]:
+        every = map(frozenset, combinations(self.links, 2))
+        return [two for two in every if two not in self.found and two not in self.as_one]
+
+    def _opens(self) -> Array:
+        """How many open centres would have two lines if that of two links were known, (links, links)."""
+        place = {link: index for index, link in enumerate(self.links)}
+        known = np.zeros((len(self.links), len(self.links)), dtype=int)
+        for two in self.found:
+            a, b = (place[link] for link in two)
+            known[a, b] = known[b, a] = 1
+        one_line = (known == 0) & (known @ known > 0)
+        np.fill_diagonal(one_line, False)
+        opened = one_line.astype(int) @ known
+        return opened + opened.T
 
     def told(self) -> Centres:
         """The centres in metres, with names and derivations, and their proof."""
         listed = [self._centre(two, order, one) for order, (two, one) in enumerate(self.found.items(), start=1)]
         rest = [frozenset(two) for two in combinations(self.links, 2) if frozenset(two) not in self.found]
-        listed += [self._without(two, len(listed) + k) for k, two in enumerate(rest, start=1)]
-        return Centres(self.state, self.numbers, tuple(listed), self._proof())
+        listed += [self._without(two, order) for order, two in enumerate(rest, start=len(listed) + 1)]
+        proof = proved({two: one.at for two, one in self.found.items()}, self.links, self.ways)
+        groups = as_one(self.links, self.ways)
+        return Centres(self.state, self.numbers, tuple(listed), proof, groups, self._branches(listed))
+
+    def _branches(self, listed: Sequence[Centre]) -> tuple[dict[str, Array], ...]:
+        """Where the open centres lie on each branch of a change point; links that move as one on it have none."""
+        left = [each for each in listed if each.how == "open"]
+        if not left or self.ways.count <= len(self.state.mechanism.inputs):
+            return ()
+        found = []
+        for motions in branches(self.state, self.middle, self.size):
+            relatives = {each.name: motions[each.links[1]] - motions[each.links[0]] for each in left}
+            moving = {name: each for name, each in relatives.items() if np.linalg.norm(each) > AS_ONE}
+            found.append(
+                {name: self._in_metres(each / np.linalg.norm(each), CROSSING) for name, each in moving.items()}
+            )
+        return tuple(found)
+
+    def _in_metres(self, at: Array, infinite: float = INFINITE) -> Array:
+        """A homogeneous point in sizes about the middle as one in metres, at infinity what cannot be told from it."""
+        x, y, w = at
+        if abs(w) <= infinite * np.hypot(x, y):
+            return unit(np.array([x, y, 0.0]))
+        return unit(np.array([self.size * x + w * self.middle[0], self.size * y + w * self.middle[1], w]))
 
     def _named(self, two: Two) -> tuple[tuple[str, str], str]:
         links = tuple(sorted(two, key=lambda link: int(self.numbers[link])))
@@ -189,11 +227,7 @@ class _Search:
 
     def _centre(self, two: Two, order: int, one: Found) -> Centre:
         links, name = self._named(two)
-        x, y, w = one.at
-        if abs(w) <= INFINITE * np.hypot(x, y):
-            at = unit(np.array([x, y, 0.0]))
-        else:
-            at = unit(np.array([self.size * x + w * self.middle[0], self.size * y + w * self.middle[1], w]))
+        at = self._in_metres(one.at)
         lines = tuple(self._line(through, links) for through in one.lines)
         if one.pair:
             how, told = (
@@ -201,7 +235,7 @@ class _Search:
                 f"{name} at infinity, square to the motion at {one.pair}" if at[2] == 0.0 else f"{name} at {one.pair}",
             )
         elif two in self.by_equations:
-            how, told = "equations", f"{name} by the equations round the loops: no two lines are known"
+            how, told = "equations", f"{name} by the equations round the loops: {self.by_equations[two]}"
         elif one.ratio:
             how, told = "ratio", f"{name} on {_said(lines[0])}, in the ratio of {one.ratio}"
         else:
@@ -218,66 +252,8 @@ class _Search:
         if two in self.as_one:
             told = f"{name}: {links[0]} and {links[1]} move as one here, so every point is their centre"
             return Centre(links, name, order, "as one", None, told)
-        told = f"{name} depends on the ratio of the inputs' rates, which are not given or all zero"
-        return Centre(links, name, order, "open", None, told)
-
-    def _proof(self) -> Proof:
-        found = {two: one.at for two, one in self.found.items()}
-        triples = [
-            tuple(found[frozenset(two)] for two in combinations(three, 2))
-            for three in combinations(self.links, 3)
-            if all(frozenset(two) in found for two in combinations(three, 2))
-        ]
-        collinear = float(np.abs(np.linalg.det(np.array(triples))).max()) if triples else 0.0
-        motions = _jacobian(self.state, self.middle, self.size)
-        if motions is None:
-            return Proof(None, collinear, None)
-        routes = velocities = 0.0
-        for two, at in found.items():
-            a, b = two
-            relative = motions[b] - motions[a]
-            length = float(np.linalg.norm(relative))
-            if length > AS_ONE:
-                routes = max(routes, float(np.linalg.norm(np.cross(at, relative / length))))
-            x, y, w = at
-            mx, my, turning = relative
-            apart = np.hypot(turning * y - my * w, turning * x - mx * w)
-            velocities = max(velocities, float(apart))
-        return Proof(routes, collinear, velocities)
+        return Centre(links, name, order, "open", None, f"{name} is not determined: {self.why_open}")
 
 
 def _said(line: Line) -> str:
     return " ".join(line.centres) if line.centres else f"the normal at {line.pair}"
-
-
-def _jacobian(state: State, middle: Array, size: float) -> dict[str, Array] | None:
-    """Every link's motion by the null vector of all constraints, nothing eliminated; as `motions_of` has it.
-
-    With several inputs the one in which their rates are as given. None where there is no such one.
-    """
-    setup = Setup(state.mechanism)
-    constraints = Constraints(setup)
-    w = np.array([_value(state, c.owner, c.part, c.of_link) for c in setup.equations.coordinates]) / setup.scale
-    free = null_space(constraints.slope(w)) if w.size else np.zeros((0, 0))
-    if free.shape[1] != 1:
-        names = tuple(given.pair for given in state.mechanism.inputs)
-        rows = constraints.drive_slope(names, w) @ free
-        if free.shape[1] == 0 or rows.shape[0] < free.shape[1] or not np.any(setup.station.u1):
-            return None
-        free = free @ np.linalg.lstsq(rows, setup.station.u1, rcond=None)[0][:, None]
-    moving = dict(zip(((c.owner, c.part) for c in setup.equations.coordinates), free[:, 0] * setup.scale, strict=True))
-    poles = {}
-    for link, frame in state.frames.items():
-        vx, vy, turning = (moving.get((link, which), 0.0) for which in ("x", "y", "angle"))
-        x, y = (np.array([part(frame.x, 0), part(frame.y, 0)]) - middle) / size
-        poles[link] = np.array([turning * x - vy / size, turning * y + vx / size, turning])
-    most = max(float(np.linalg.norm(pole)) for pole in poles.values())
-    return {link: pole / most for link, pole in poles.items()} if most else None
-
-
-def _value(state: State, owner: str, which: str, of_link: bool) -> float:
-    if of_link:
-        return part(getattr(state.frames[owner], which), 0)
-    pair = next(pair for pair in state.mechanism.pairs if pair.name == owner)
-    names = [name for name, _ in pair.coordinates]
-    return part(state.own[owner][names.index(which)], 0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from planar.analysis.kennedy import ROUNDING, Found, Primary, Two, unit
-from planar.analysis.ties import Rates, gradients, part
+from planar.analysis.ties import Rate, Rates, gradients, part
 from planar.mechanism import motions
 from planar.motion import State
 from planar.pairs import Pair
@@ -20,7 +20,8 @@ def primary(rates: Rates, middle: Array, size: float) -> Primary:
     """The centres that pairs show; lengths in the mechanism's `size` (m) about its `middle` (m), (2,)."""
     centres: dict[Two, Found] = {}
     normals: dict[Two, tuple[tuple[str, Array], ...]] = {}
-    for pair in motions(rates.state.mechanism).values():
+    named = motions(rates.state.mechanism)
+    for pair in named.values():
         if len(pair.bodies) != 2:
             continue
         poles = allowed(rates.state, pair, middle, size)
@@ -29,12 +30,13 @@ def primary(rates: Rates, middle: Array, size: float) -> Primary:
             centres[two] = Found(unit(poles[0]), ROUNDING, pair=pair.name)
         elif len(poles) == 2:
             normals[two] = (*normals.get(two, ()), (pair.name, unit(np.cross(*poles))))
-    ratios = tuple(
-        (tie.pair, {rate.owner: slope for rate, slope in tie.slopes.items()})
-        for tie in rates.ties
-        if not tie.given and len(tie.slopes) == 3 and all(rate.turns for rate in tie.slopes)
-    )
-    return Primary(centres, normals, ratios)
+    ratios = []
+    for tie in rates.ties:
+        bodies = named[tie.pair].bodies
+        if not tie.given and len(bodies) == 3 and all(rate.turns for rate in tie.slopes):
+            # wheels alike turn alike, whatever the link does that they are seen from
+            ratios.append((tie.pair, {link: tie.slopes.get(Rate(link), 0.0) for link in bodies}))
+    return Primary(centres, normals, tuple(ratios))
 
 
 def allowed(state: State, pair: Pair, middle: Array, size: float) -> Array:

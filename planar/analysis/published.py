@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from planar.analysis.efforts import efforts
+from planar.analysis.forces import efforts
 from planar.mechanism import Drive, Published
 from planar.motion import State
 from planar.solving.position import solve

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import click
 
-from planar.cli.shared import as_json, busy, main, show
+from planar.cli.shared import as_json, at, busy, drives, main, output, show, spare
+from planar.errors import BadInput
 
 
 @main.command()
@@ -28,3 +30,27 @@ def harmonics(model: str, pairs: tuple[str, ...], points: tuple[str, ...], runni
         click.echo(json.dumps(record(mechanism, found), ensure_ascii=False, allow_nan=False))
         return
     show(analytical(mechanism, found), None)
+
+
+@main.command()
+@click.argument("model")
+@as_json
+@at
+@output("Write the table to a .txt, .svg or .html file.")
+def centres(model: str, as_json: bool, at: tuple[str, ...], output: Path | None) -> None:
+    """All instantaneous centres, with the lines of centres that show each."""
+    from planar.analysis.centres import centres as all_centres
+    from planar.analysis.standing import standing
+    from planar.files import load
+    from planar.views.centres import record, table
+
+    if as_json and output is not None:
+        raise BadInput("-o", "the table goes to a file or SI values are printed with --json; give one of the two")
+    mechanism = load(model)
+    spare(model, output)
+    with busy(mechanism.name):
+        found = all_centres(standing(mechanism, drives(mechanism, at)))
+    if as_json:
+        click.echo(json.dumps(record(found), ensure_ascii=False, indent=1, allow_nan=False))
+        return
+    show(table(found), output)

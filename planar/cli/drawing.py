@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from planar.motion import Motion
 
 POSITION = ("scheme", "velocity", "acceleration", "centres")
-MOTION = ("positions", "loci", "diagrams")
+MOTION = ("positions", "loci", "centrodes", "diagrams")
 SMOOTH = 360
 """Steps of a run that is drawn."""
 
@@ -32,7 +32,11 @@ SMOOTH = 360
 )
 @click.option("--of", "of", metavar="NAME", help="Diagrams of this slide, point or link.")
 @click.option(
-    "--link", "links", multiple=True, metavar="NAME", help="Centres of this link; of several, those between them."
+    "--link",
+    "links",
+    multiple=True,
+    metavar="NAME",
+    help="Centres of this link, of several those between them; centrodes of the first in the axes of the second.",
 )
 @click.option("--steps", default=12, show_default=True, metavar="N", help="Positions, or chords of the diagrams.")
 @click.option("--chords", is_flag=True, help="Diagrams with graphical differentiation beside the curves.")
@@ -52,7 +56,7 @@ def plot(
     start: str | None,
     stop: str | None,
 ) -> None:
-    """A drawing to scale: scheme, velocity or acceleration polygon, centres; positions, loci or diagrams of a run."""
+    """A drawing to scale: scheme, polygons and centres of a position; loci, centrodes, diagrams and more of a run."""
     from planar import plot as drawn
     from planar.files import load
     from planar.solving.position import solve
@@ -61,9 +65,10 @@ def plot(
     for option, told, kinds in (
         ("--point", points, ("positions", "loci")),
         ("--of", of, ("diagrams",)),
+        ("--link", links, ("centres", "centrodes")),
         ("--chords", chords, ("diagrams",)),
         ("--steps", steps_told, ("positions", "diagrams") if chords else ("positions",)),
-        ("--scale", scales, (*POSITION, "positions", "loci")),
+        ("--scale", scales, (*POSITION, "positions", "loci", "centrodes")),
     ):
         if told and what not in kinds:
             raise BadInput(option, f"this is for {' and '.join(kinds)}; {what} would not heed it")
@@ -81,6 +86,12 @@ def plot(
             moving = _run(mechanism, pair, start, stop)
             if what == "diagrams":
                 figure = drawn.diagrams(moving, of, steps if chords else None)
+            elif what == "centrodes":
+                if len(links) > 2:
+                    raise BadInput(
+                        "--link", "centrodes are of two links; name one, or one and the link that it is seen from"
+                    )
+                figure = drawn.centrodes(moving, *links, scale=scales)
             elif what == "positions":
                 figure = drawn.positions(moving, steps, points or None, scales)
             else:

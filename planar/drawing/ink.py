@@ -31,6 +31,8 @@ INK = {
     Pen.BAND: Ink(0.3, "#222222", (5.0, 0.8)),
     Pen.POSITION: Ink(0.2, "#8f8f8f"),
     Pen.PATH: Ink(0.3, "#00796b"),
+    Pen.FIXED_CENTRODE: Ink(0.4, "#26a69a"),
+    Pen.MOVING_CENTRODE: Ink(0.4, "#0b46a8", (2.4, 1.1)),
     Pen.VELOCITY: Ink(0.4, "#0b46a8"),
     Pen.ACCELERATION: Ink(0.5, "#b00f1a"),
     Pen.PART: Ink(0.25, "#c02028"),

@@ -35,6 +35,8 @@ class Pen(Enum):
     """A link in one of many positions."""
     PATH = "path"
     """The path of a point."""
+    FIXED_CENTRODE = "fixed centrode"
+    MOVING_CENTRODE = "moving centrode"
     VELOCITY = "velocity"
     ACCELERATION = "acceleration"
     PART = "part"

@@ -1,0 +1,43 @@
+"""Where a mechanism stands, without rates: on dead points and change points too, where a velocity is none."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from planar.mechanism import Drive, Mechanism, with_inputs
+from planar.motion import State
+from planar.program import placed
+from planar.solving import refusals
+from planar.solving.constraints import Constraints, null_space
+from planar.solving.follow import follow
+from planar.solving.freedom import SINGULAR, slope_at, strengths
+from planar.solving.position import Solver
+
+
+def standing(mechanism: Mechanism, drives: Sequence[Drive] = ()) -> State:
+    """The position that `solve` finds, all rates zero; its mobility is that of this position.
+
+    Raises NoAnswer where the mechanism cannot be assembled, or inputs leave it free or cannot be moved there.
+    """
+    solver = Solver(mechanism)
+    found = solver.assembly()
+    z, remarks = found.z, solver.remarks(found)
+    if drives:
+        there = Solver(with_inputs(mechanism, tuple(drives)))
+        z = follow(there, there.station.p, z, solver.station.u, there.station.u)
+        solver = there
+    u, p = solver.station.u, solver.station.p
+    gaps = solver.gaps(z[None], u[None])[:, 0]
+    residual = float(gaps.max(initial=0.0))
+    if residual > solver.tolerance:
+        raise refusals.not_closed(solver, solver.gate.names[int(np.argmax(gaps))], residual)
+    w = solver.program.positions(z, u, p).full().ravel()
+    frames, own = placed((w * solver.scale).tolist(), solver.column, solver.shapes, solver.pairs)
+    solver.refuse_gap(frames, own)
+    mobility = null_space(Constraints(solver).slope(w)).shape[1] if w.size else 0
+    if np.any(strengths(solver, slope_at(solver, z, u)) < SINGULAR):
+        told = "the inputs are on a dead point or a change point, where places are exact to the root of rounding only"
+        remarks = (*remarks, told)
+    return State(solver.mechanism, mobility, residual, remarks, frames, own, solver.shapes)
