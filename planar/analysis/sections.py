@@ -303,8 +303,8 @@ def _simultaneous(notation: Notation, stage: Simultaneous) -> Iterator[Phrase]:
     give = "gives" if equations == 1 else "give"
     # of two unknowns or fewer it is not said that no pencil could: it may, in another order than is tried
     why = (
-        f"No two lines locate a point of {_links_of(stage.links)}: more than two unknown magnitudes hang together, and "
-        f"a pencil could only try."
+        f"No two lines locate a point of {_links_of(stage.links)}: more than two unknown magnitudes hang together, so "
+        f"there is no order in which a pencil could find them one after the other."
         if unknowns > 2
         else f"The rates of {_links_of(stage.links)} hang together."
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from numbers import Integral
 
 import numpy as np
@@ -14,7 +15,7 @@ from planar.drawing.picture import Circle, Fill, Letter, Line, Mark, Pen, Pictur
 from planar.drawing.runs import Run, closing, steady
 from planar.drawing.scheme import body_marks, ground_marks, scheme
 from planar.errors import BadInput
-from planar.mechanism import Mechanism, NamedPoint, motions, named_points
+from planar.mechanism import Drive, Mechanism, NamedPoint, motions, named_points, with_inputs
 from planar.motion import Motion
 from planar.pairs import Kind
 from planar.solving.position import solve
@@ -99,7 +100,9 @@ def loci(motion: Motion | Mechanism, points: Iterable[str] | None = None, scale:
     here, low, high = run.given.position, float(run.position.min()), float(run.position.max())
     within = run.whole or low <= here <= high
     state = solve(mechanism, {} if within else {run.given.pair: float(run.position[len(run.position) // 2])})
-    drawn = scheme(state, scale, numbers=False, travel=run.travel)
+    # as the file drives it: the run's own speed may be one that stands for none
+    as_given = with_inputs(mechanism, (Drive(run.given.pair, None, run.given.velocity, run.given.acceleration),))
+    drawn = scheme(replace(state, mechanism=as_given), scale, numbers=False, travel=run.travel)
     rows = _rows(run, 12)
     letters = [mark for mark in drawn.marks if isinstance(mark, Letter)]
     paths: list[Mark] = []
