@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from planar import plot
+    from planar.analysis.by_centres import velocity_by_centres
     from planar.analysis.centres import Centre, Centres, centres
     from planar.analysis.centrodes import Centrodes, centrodes
     from planar.analysis.curvature import Curvature, curvature
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from planar.analysis.harmonics import harmonics
     from planar.analysis.inspection import Inspection, inspect
     from planar.analysis.mobility import Mobility, mobility
+    from planar.analysis.two_directions import centre_of
     from planar.document import schema
     from planar.errors import BadInput, NoAnswer, Outcome, PlanarError
     from planar.files import dumps, from_dict, load, loads, to_dict
@@ -21,7 +23,7 @@ if TYPE_CHECKING:
     from planar.solving.cycle import cycle
     from planar.solving.position import solve
 
-__version__ = "0.3.0"
+__version__ = "0.4.0"
 
 _ROOMS = {
     "Along": "mechanism",
@@ -46,6 +48,7 @@ _ROOMS = {
     "PlanarError": "errors",
     "Point": "mechanism",
     "State": "motion",
+    "centre_of": "analysis.two_directions",
     "centres": "analysis.centres",
     "centrodes": "analysis.centrodes",
     "curvature": "analysis.curvature",
@@ -63,6 +66,7 @@ _ROOMS = {
     "solve": "solving.position",
     "stroke": "analysis.extremes",
     "to_dict": "files",
+    "velocity_by_centres": "analysis.by_centres",
 }
 """Where each public name lives: it is loaded when it is first used."""
 
@@ -89,6 +93,7 @@ __all__ = [
     "PlanarError",
     "Point",
     "State",
+    "centre_of",
     "centres",
     "centrodes",
     "curvature",
@@ -106,6 +111,7 @@ __all__ = [
     "solve",
     "stroke",
     "to_dict",
+    "velocity_by_centres",
 ]
 
 
