@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from planar import plot
+    from planar.analysis.advantage import Advantage, advantage
     from planar.analysis.by_centres import velocity_by_centres
     from planar.analysis.centres import Centre, Centres, centres
     from planar.analysis.centrodes import Centrodes, centrodes
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 __version__ = "0.4.0"
 
 _ROOMS = {
+    "Advantage": "analysis.advantage",
     "Along": "mechanism",
     "At": "mechanism",
     "BadInput": "errors",
@@ -48,6 +50,7 @@ _ROOMS = {
     "PlanarError": "errors",
     "Point": "mechanism",
     "State": "motion",
+    "advantage": "analysis.advantage",
     "centre_of": "analysis.two_directions",
     "centres": "analysis.centres",
     "centrodes": "analysis.centrodes",
@@ -71,6 +74,7 @@ _ROOMS = {
 """Where each public name lives: it is loaded when it is first used."""
 
 __all__ = [
+    "Advantage",
     "Along",
     "At",
     "BadInput",
@@ -93,6 +97,7 @@ __all__ = [
     "PlanarError",
     "Point",
     "State",
+    "advantage",
     "centre_of",
     "centres",
     "centrodes",

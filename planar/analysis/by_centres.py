@@ -171,6 +171,9 @@ class _Here:
             return {link: LinkByCentres(sign * motion, ())}
         # between moving links: m_second - m_first is known, and where both poles lie
         poles = [self.at(link, frame) for link in (first, second)]
+        for held, moves, sign in ((first, second, 1.0), (second, first, -1.0)):
+            if self._moves_with(held, frame):  # at rest here
+                return {held: LinkByCentres(np.zeros(3), ()), moves: LinkByCentres(sign * motion, ())}
         if any(pole is None for pole in poles):
             raise _undetermined(self.centres, [first, second], name)
         matrix = np.stack([-poles[0], poles[1]], axis=1)
