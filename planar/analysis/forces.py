@@ -19,7 +19,7 @@ from planar.words import listed
 
 Array = np.ndarray
 ROUNDING = 1e-14
-"""Of the power that loads could have: less is the round-off of their velocities."""
+"""Of the power that loads would have at the greatest speed: less is the round-off of their velocities."""
 
 
 class Loaded(NamedTuple):
@@ -34,24 +34,14 @@ class Loaded(NamedTuple):
     "rad/s, of a link"
     power: float
 
-    @property
-    def gross(self) -> float:
-        """The power (W) that it would have if it acted along the motion."""
-        found = 0.0
-        if self.load.force is not None and self.velocity is not None:
-            found += float(np.hypot(*self.load.force) * np.hypot(*self.velocity))
-        if self.load.torque is not None and self.angular_velocity is not None:
-            found += abs(self.load.torque * self.angular_velocity)
-        return found
-
 
 class Proof(NamedTuple):
     """How far three laws are from being kept, each beside what it balances; None where a law says nothing.
 
     `power`: what inputs and loads supply together at the state's own rates, beside what the loads would if each acted
-    along its motion; None where nothing that is loaded moves. `routes`: between the efforts and the multipliers of the
-    inputs in the equilibrium of all links, beside the loads at an arm of the mechanism's size; `equilibrium`: what
-    that leaves open. Both None without loads, or where links could move to first order with the inputs held.
+    along the greatest motion that there is; None where nothing moves. `routes`: between the efforts and the multipliers
+    of the inputs in the equilibrium of all links, beside the loads at an arm of the mechanism's size; `equilibrium`:
+    what that leaves open. Both None without loads, or where links could move to first order with the inputs held.
     """
 
     power: float | None
@@ -72,6 +62,11 @@ class Forces:
     loads: tuple[Loaded, ...]
     powers: Mapping[str, float]
     proof: Proof
+
+    @property
+    def greatest(self) -> float:
+        """What the loads would supply, W, if each acted along the greatest motion that there is."""
+        return greatest(self.state)
 
     @property
     def power_in(self) -> float:
@@ -97,8 +92,8 @@ def forces(state: State) -> Forces:
     """
     found = efforts(state)
     loads = tuple(loaded(state, load) for load in state.mechanism.loads)
-    powers = {name: effort * state.inputs[name].velocity for name, effort in found.items()}
-    whole = sum(each.gross for each in loads)
+    powers = {name: effort * state.inputs[name].velocity + 0.0 for name, effort in found.items()}
+    whole = greatest(state)
     left = abs(sum(powers.values()) + sum(each.power for each in loads))
     return Forces(state, found, loads, powers, Proof(left / whole if whole else None, *_other_route(state, found)))
 
@@ -114,9 +109,8 @@ def efforts(state: State) -> dict[str, float]:
     found = {given.pair: 0.0 for given in mechanism.inputs}
     for name in found if mechanism.loads else ():
         unit = alone(state, name)
-        loads = [loaded(unit, load) for load in mechanism.loads]
-        power = sum(each.power for each in loads)
-        found[name] = -power if abs(power) > ROUNDING * sum(each.gross for each in loads) else 0.0
+        power = sum(loaded(unit, load).power for load in mechanism.loads)
+        found[name] = -power if abs(power) > ROUNDING * greatest(unit) else 0.0
     return found
 
 
@@ -147,6 +141,15 @@ def loaded(state: State, load: Load) -> Loaded:
         turning = state.link(load.link).angular_velocity
         power += load.torque * turning
     return Loaded(load, position, velocity, turning, power)
+
+
+def greatest(state: State) -> float:
+    """The power (W) that the loads would have if each acted along the greatest motion of any point, or of any link."""
+    loads = state.mechanism.loads
+    speed = max((float(np.hypot(*point.velocity)) for point in state.points.values()), default=0.0)
+    turning = max(abs(link.angular_velocity) for link in state.links.values())
+    forces = sum(float(np.hypot(*load.force)) for load in loads if load.force is not None)
+    return forces * speed + turning * sum(abs(load.torque) for load in loads if load.torque is not None)
 
 
 def slides(mechanism: Mechanism, name: str) -> bool:
