@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.analysis.ties import part, still
+from planar.analysis.ties import still
 from planar.mechanism import Mechanism, motions, named_points
 from planar.motion import State
 from planar.pairs import Kind
@@ -47,7 +47,7 @@ def equilibrium(state: State) -> Equilibrium | None:
     scale += sum(abs(load.torque) for load in mechanism.loads if load.torque is not None)
     if not names or scale == 0.0:
         return None
-    constraints, w = Constraints(setup), _coordinates(state, setup)
+    constraints, w = Constraints(setup), setup.coordinates(state.frames, state.own)
     slopes = np.vstack([constraints.slope(w), constraints.drive_slope(names, w)])
     if rank(slopes) < w.size:
         return None
@@ -86,14 +86,3 @@ def carriers(mechanism: Mechanism) -> dict[str, tuple[str, str]]:
     named = named_points(mechanism)
     own = {f"{link}.{point}": (link, point) for each in named for link, point in each.members}
     return own | {each.name: each.members[0] for each in named}
-
-
-def _coordinates(state: State, setup: Setup) -> Array:
-    """Where a state stands, as w (coordinates,), lengths divided by the mechanism's size."""
-    found = {
-        (link, which): getattr(frame, which) for link, frame in state.frames.items() for which in ("x", "y", "angle")
-    }
-    for pair in state.mechanism.pairs:
-        own = zip(pair.coordinates, state.own.get(pair.name, ()), strict=True)
-        found |= {(pair.name, which): value for (which, _), value in own}
-    return np.array([part(found[c.owner, c.part], 0) for c in setup.equations.coordinates]) / setup.scale

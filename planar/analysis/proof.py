@@ -60,8 +60,7 @@ def stand(state: State) -> Stand:
     """A position in all coordinates, nothing eliminated."""
     setup = Setup(state.mechanism)
     constraints = Constraints(setup)
-    values = [_value(state, c.owner, c.part, c.of_link) for c in setup.equations.coordinates]
-    w = np.array(values) / setup.scale
+    w = setup.coordinates(state.frames, state.own)
     return Stand(setup, constraints, w, null_space(constraints.slope(w)) if w.size else np.zeros((0, 0)))
 
 
@@ -133,11 +132,3 @@ def as_one(links: Sequence[str], ways: Ways) -> tuple[tuple[str, ...], ...]:
         else:
             groups.append([link])
     return tuple(tuple(group) for group in groups if len(group) > 1)
-
-
-def _value(state: State, owner: str, which: str, of_link: bool) -> float:
-    if of_link:
-        return part(getattr(state.frames[owner], which), 0)
-    pair = next(pair for pair in state.mechanism.pairs if pair.name == owner)
-    names = [name for name, _ in pair.coordinates]
-    return part(state.own[owner][names.index(which)], 0)

@@ -125,15 +125,7 @@ class Solver(Setup):
 
     def at_rates_of(self, state: State) -> State:
         """The state in the same position as another's, with this mechanism's own rates."""
-        parts = {
-            (link, part): getattr(frame, part)
-            for link, frame in state.frames.items()
-            if not frame.fixed
-            for part in ("x", "y", "angle")
-        }
-        for name, own in state.own.items():
-            parts |= {(name, part): jet for (part, _), jet in zip(self.pairs[name].coordinates, own, strict=True)}
-        w = np.array([parts[c.owner, c.part].parts[0] for c in self.equations.coordinates]) / self.scale
+        w = self.coordinates(state.frames, state.own)
         return self.state(w[list(self.equations.unknowns)], state.remarks)
 
     def refuse_gap(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Jet]]) -> None:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from planar.algebra import Jet, Scalar
 from planar.errors import BadInput
 from planar.mechanism import Input, Mechanism, check, misfits, motions
 from planar.pairs import Kind
+from planar.plane import Frame
 from planar.program import Program, extent, fitted, placed, positions, program, rates, shapes, size
 from planar.solving.gate import Gate
 from planar.words import amount, listed
@@ -62,6 +65,16 @@ class Setup:
         with np.errstate(invalid="ignore"):  # what is not a number counts as open, and is refused as such
             frames, own = placed(w * self.scale[:, None], self.column, self.shapes, self.pairs)
             return self.gate.gaps(frames, own, u.T * scale[:, None]).reshape(-1, len(z))
+
+    def coordinates(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Scalar]]) -> Array:
+        """w (coordinates,) where the links' frames and the pairs' own coordinates are, jets or numbers (m, rad)."""
+        parts = {(link, name): getattr(frame, name) for link, frame in frames.items() for name in ("x", "y", "angle")}
+        for pair, values in own.items():
+            parts |= {
+                (pair, name): value for (name, _), value in zip(self.pairs[pair].coordinates, values, strict=True)
+            }
+        found = (parts[each.owner, each.part] for each in self.equations.coordinates)
+        return np.array([value.parts[0] if isinstance(value, Jet) else value for value in found]) / self.scale
 
     def open_along(self, z: Array, u: Array) -> Array:
         """What the worst constraint leaves open at every sample (samples,)."""
