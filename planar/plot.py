@@ -45,7 +45,7 @@ __all__ = [
 
 def scheme(state: State, scale: Scales = None) -> Figure:
     """The kinematic scheme of a position: links numbered, points lettered. Raises BadInput for a scale that is none."""
-    return figure([scheme_picture(state, scales(scale).get("length"))])
+    return figure([scheme_picture(state, scales(scale, ["length"]).get("length"))])
 
 
 def velocity(state: State, scale: Scales = None) -> Figure:
@@ -71,7 +71,7 @@ def centres(
     found = all_centres(state)
     shown = chosen(found, links)
     pictures = [
-        centres_picture(found, shown, scales(scale).get("length"), reach),
+        centres_picture(found, shown, scales(scale, ["length"]).get("length"), reach),
         circle_picture(found, shown),
     ]
     return figure(pictures, state.mechanism.name)
@@ -81,12 +81,12 @@ def positions(
     motion: Motion | Mechanism, count: int = 12, points: Sequence[str] | None = None, scale: Scales = None
 ) -> Figure:
     """The mechanism in `count` + 1 positions, its joints lettered A0, A1, ...; TDC and BDC where a slider has them."""
-    return figure([positions_picture(motion, count, points, scales(scale).get("length"))])
+    return figure([positions_picture(motion, count, points, scales(scale, ["length"]).get("length"))])
 
 
 def loci(motion: Motion | Mechanism, points: Sequence[str] | None = None, scale: Scales = None) -> Figure:
     """The paths of points (left out: of those that no link on the frame carries)."""
-    return figure([loci_picture(motion, points, scales(scale).get("length"))])
+    return figure([loci_picture(motion, points, scales(scale, ["length"]).get("length"))])
 
 
 def centrodes(
@@ -96,7 +96,7 @@ def centrodes(
 
     Without a `link` those of the first coupler. Raises BadInput for a link that is not there, or a scale that is none.
     """
-    return figure([centrodes_picture(motion, link, other, scales(scale).get("length"))])
+    return figure([centrodes_picture(motion, link, other, scales(scale, ["length"]).get("length"))])
 
 
 def solution(state: State, scale: Scales = None) -> list[Figure]:

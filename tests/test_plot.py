@@ -108,11 +108,14 @@ def test_scales_are_taken_by_what_they_measure(tmp_path):
     for wrong in ("1 cm = 3 kg", "3", "0:1", "1 cm = 0 m", "1 s = 2 m"):
         with pytest.raises(planar.BadInput, match="scale"):
             plot.scheme(state, wrong)
+    for make in (plot.scheme, plot.centres, plot.velocity):
+        with pytest.raises(planar.BadInput, match="not of acceleration"):
+            make(state, "1 cm = 2 m/s^2")
     with pytest.raises(planar.BadInput, match="two scales of length"):
         plot.scheme(state, ["1:2", "1:3"])
     done = run("plot", "002-E3.1", "scheme", "--scale", "1 cm = 3 s", "-o", "a.png", folder=tmp_path)
     assert done.returncode == 2
-    assert done.stderr == "planar: scale: drawings have scales of length, velocity, acceleration, not of time\n"
+    assert done.stderr == "planar: scale: this drawing has a scale of length, not of time\n"
 
 
 @pytest.mark.parametrize(

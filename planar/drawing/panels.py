@@ -22,7 +22,7 @@ PANEL = (80.0, 80.0)
 
 def panels(state: State, scales: Scales, many: int) -> list[Picture]:
     """Space diagram, velocity polygon and acceleration polygon, the first of them, each small enough for a row."""
-    given = paper.scales(scales)
+    given = paper.scales(scales, ("length", "velocity", "acceleration")[:many])
     space = given.get("length")
     if space is None:
         whole = space_scale(state.mechanism, standing(state.frames), state.shapes)

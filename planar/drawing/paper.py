@@ -84,13 +84,13 @@ def given(text: str) -> Scale:
     return Scale(kind, per_mm, written)
 
 
-def scales(texts: str | Sequence[str] | None) -> dict[str, Scale]:
-    """Scales as a reader writes them, by the kind of quantity that each measures. Raises BadInput."""
+def scales(texts: str | Sequence[str] | None, kinds: Sequence[str] = tuple(SYMBOLS)) -> dict[str, Scale]:
+    """Scales as a reader writes them, by the kind of quantity that each measures. Raises BadInput for other kinds."""
     found: dict[str, Scale] = {}
     for text in [texts] if isinstance(texts, str) else texts or ():
         scale = given(text)
-        if scale.kind not in SYMBOLS:
-            raise BadInput("scale", f"drawings have scales of {', '.join(SYMBOLS)}, not of {scale.kind}")
+        if scale.kind not in kinds:
+            raise BadInput("scale", f"this drawing has a scale of {' and of '.join(kinds)}, not of {scale.kind}")
         if scale.kind in found:
             raise BadInput("scale", f"two scales of {scale.kind} are given; one is wanted")
         found[scale.kind] = scale
