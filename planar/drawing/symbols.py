@@ -166,8 +166,3 @@ def arc(at: Vector, radius: float, middle: float, sweep: float, sense: int, abou
     """An arc about a place with an arrow head at the end to which it turns (rad)."""
     start = degrees(middle - sweep / 2.0) % 360.0
     return Circle(spot(at), radius, Pen.INPUT, about, Fill.NONE, start, start + degrees(sweep), sense)
-
-
-def on_arc(at: Vector, radius: float, middle: float) -> Vector:
-    """The middle of that arc."""
-    return at + Vector(cos(middle), sin(middle)) * radius
