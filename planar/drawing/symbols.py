@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import acos, atan2, ceil, cos, degrees, pi, sin, sqrt
+from math import acos, atan2, ceil, degrees, pi, sqrt
 
 from planar.drawing.picture import Circle, Fill, Line, Mark, Pen, spot
 from planar.plane import Vector, direction
