@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from planar.algebra import Jet
-from planar.errors import Outcome
+from planar.errors import BadInput, Outcome
 from planar.mechanism import Mechanism, NamedPoint, counting, motions, named_points
 from planar.pairs import Kind, Pair
 from planar.plane import Frame, Vector
@@ -81,6 +81,25 @@ class InputMotion(NamedTuple):
     position: Array
     velocity: Array
     acceleration: Array
+
+
+class Limit(NamedTuple):
+    """Where a motion cannot go on as it came, or an output turns back: solved for, to round-off of the input.
+
+    `kind` is "input dead point" (the input turns back), "stroke end" (the output `of` turns back) or "change point"
+    (branches of the motion cross). `of` is the pair whose relative motion turns back: the input's own at the first, the
+    output's at the second, the running input's at the third. `input` is the position of the input that runs (rad or m),
+    in a run in time the time (s). `value` is the output's position there (rad or m), `end` for a slide's two ends "TDC"
+    or "BDC" (farther from the driving crank's fixed pin, and nearer), `told` what there is to say of it, as where the
+    other branches lead.
+    """
+
+    kind: str
+    of: str
+    input: float
+    value: float
+    end: str | None = None
+    told: str = ""
 
 
 class RelativeState(NamedTuple):
@@ -289,12 +308,27 @@ class State(Moving):
         return float(fastest), float(max(hardest, fastest**2))
 
 
+class Jerked(NamedTuple):
+    """Frames of links and own coordinates of pairs over a motion, as jets that have third rates as well."""
+
+    frames: Mapping[str, Frame]
+    own: Mapping[str, tuple[Jet, ...]]
+
+
+class Course(Protocol):
+    """The curve of positions that a motion runs along."""
+
+    def limits(self, motion: Motion) -> tuple[Limit, ...]:
+        """See `Motion.limits`."""
+
+
 @dataclass(frozen=True)
 class Motion(Moving):
     """A run of positions of a mechanism, n of them, in the order in which its inputs run through them.
 
     `outcome` is solved where the run came to its end, else why it stopped, which `reason` says in a sentence;
-    `residual` is what the worst constraint leaves open at any position, in lengths of the mechanism's size.
+    `residual` is what the worst constraint leaves open at any position, in lengths of the mechanism's size. `time` (s)
+    is there where the inputs run by laws of time, `jerked` where third rates were asked for.
     """
 
     mechanism: Mechanism
@@ -307,6 +341,17 @@ class Motion(Moving):
     "of every link, as jets of arrays (n,)"
     own: Mapping[str, tuple[Jet, ...]]
     shapes: Mapping[str, Shape]
+    time: Array | None = None
+    jerked: Jerked | None = None
+    course: Course | None = None
+
+    @cached_property
+    def limits(self) -> tuple[Limit, ...]:
+        """Where an input or an output of the motion turns back, or branches cross, in the order of the rows.
+
+        Solved for when first asked for. Outputs are all slides, and all links pinned to the frame.
+        """
+        return self.course.limits(self) if self.course else ()
 
     def __len__(self) -> int:
         return len(next(iter(self.inputs.values())).position)
@@ -337,6 +382,22 @@ class Motion(Moving):
             angle = angle - (angle[0] - _wrapped(float(angle[0])))
         return LinkMotion(angle, velocity, acceleration)
 
+    def jerk(self, point: str) -> Array:
+        """A point's third rate (n, 2) (m/s^3). Raises Unknown, and BadInput where the motion was made without."""
+        link, own = self._named(point).members[0]
+        place = self._jerked().frames[link].carry(self.shapes[link].at(own))
+        return np.stack(self._rows((_third(place.x), _third(place.y))), axis=1)
+
+    def angular_jerk(self, link: str) -> Array:
+        """A link's third rate (n,) (rad/s^3). Raises Unknown, and BadInput where the motion was made without."""
+        self._frame(link)
+        return self._rows((_third(self._jerked().frames[link].angle),))[0]
+
+    def _jerked(self) -> Jerked:
+        if self.jerked is None:
+            raise BadInput("jerk", "third rates are there where the motion is made with jerk=True")
+        return self.jerked
+
     def pair(self, name: str) -> dict[str, Array | None]:
         """What a pair reports of its relative motion at every position, each (n,) (SI). Raises Unknown."""
         pair, parts = self._motion(name)
@@ -354,7 +415,7 @@ class Motion(Moving):
         """Whether the relative motion at a pair is a length."""
         return self._motions[name].drive_kind is Kind.LENGTH
 
-    def _rows(self, parts: Parts) -> tuple[Array, ...]:
+    def _rows(self, parts: tuple[Any, ...]) -> tuple[Array, ...]:
         return tuple(np.broadcast_to(part, (len(self),)).copy() for part in parts)
 
     def _point(self, named: NamedPoint) -> PointMotion:
@@ -378,6 +439,11 @@ Parts = tuple[Any, Any, Any]
 def _parts(value: Any) -> Parts:
     """Value, rate and second rate of a jet; a plain number is at rest."""
     return value.parts if isinstance(value, Jet) else (value, 0.0, 0.0)
+
+
+def _third(value: Any) -> Any:
+    """The third rate of a jet that has one; a plain number is at rest."""
+    return value.parts[3] if isinstance(value, Jet) else 0.0
 
 
 def _parts_of(vector: Vector) -> list[tuple[Any, Any]]:
