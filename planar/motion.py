@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -14,6 +14,17 @@ from planar.errors import BadInput, Outcome
 from planar.mechanism import Mechanism, NamedPoint, counting, motions, named_points
 from planar.pairs import Kind, Pair
 from planar.plane import Frame, Vector
+from planar.results import (
+    InputMotion,
+    InputState,
+    Jerked,
+    Limit,
+    LinkMotion,
+    LinkState,
+    PointMotion,
+    PointState,
+    RelativeState,
+)
 from planar.shapes import Shape
 from planar.words import heading, hurrying, turning
 
@@ -25,102 +36,6 @@ class Unknown(KeyError):
 
     def __str__(self) -> str:
         return str(self.args[0])
-
-
-class PointState(NamedTuple):
-    """A point's position (m), velocity (m/s) and acceleration (m/s^2), each (2,), in the frame's axes.
-
-    `sense` says in words which way it moves and whether it speeds up.
-    """
-
-    position: Array
-    velocity: Array
-    acceleration: Array
-    sense: str
-
-
-class LinkState(NamedTuple):
-    """A link's angle (rad), angular velocity (rad/s) and angular acceleration (rad/s^2), anticlockwise positive.
-
-    `sense` says in words which way it turns and whether it speeds up.
-    """
-
-    angle: float
-    angular_velocity: float
-    angular_acceleration: float
-    sense: str
-
-
-class InputState(NamedTuple):
-    """An input's position, velocity and acceleration: rad or m, and per second."""
-
-    position: float
-    velocity: float
-    acceleration: float
-
-
-class PointMotion(NamedTuple):
-    """A point's position (m), velocity (m/s) and acceleration (m/s^2) at every position of a motion, each (n, 2)."""
-
-    position: Array
-    velocity: Array
-    acceleration: Array
-
-
-class LinkMotion(NamedTuple):
-    """A link's angle (rad, counted on from turn to turn) with its first and second rate, each (n,)."""
-
-    angle: Array
-    angular_velocity: Array
-    angular_acceleration: Array
-
-
-class InputMotion(NamedTuple):
-    """An input's position, velocity and acceleration (rad or m, and per second), each (n,)."""
-
-    position: Array
-    velocity: Array
-    acceleration: Array
-
-
-class Limit(NamedTuple):
-    """Where a motion cannot go on as it came, or an output turns back: solved for, to round-off of the input.
-
-    `kind` is "input dead point" (the input turns back), "stroke end" (the output `of` turns back) or "change point"
-    (branches of the motion cross). `of` is the pair whose relative motion turns back: the input's own at the first, the
-    output's at the second, the running input's at the third. `input` is the position of the input that runs (rad or m),
-    in a run in time the time (s). `value` is the output's position there (rad or m), `end` for a slide's two ends "TDC"
-    or "BDC" (farther from the driving crank's fixed pin, and nearer), `told` what there is to say of it, as where the
-    other branches lead.
-    """
-
-    kind: str
-    of: str
-    input: float
-    value: float
-    end: str | None = None
-    told: str = ""
-
-
-class RelativeState(NamedTuple):
-    """How one point moves against another, as seen from the axes of a link that carries the other.
-
-    Vectors (2,), of a motion (n, 2); SI.
-
-    velocity = rotation + sliding, acceleration = centripetal + tangential + coriolis + sliding_acceleration,
-    where for two points of one link both sliding parts and the Coriolis part vanish.
-    """
-
-    axes: str
-    position: Array
-    velocity: Array
-    rotation: Array
-    sliding: Array
-    acceleration: Array
-    centripetal: Array
-    tangential: Array
-    coriolis: Array
-    sliding_acceleration: Array
 
 
 class Moving:
@@ -306,13 +221,6 @@ class State(Moving):
         parts = np.array([_parts(frame.angle) for frame in self.frames.values()])
         fastest, hardest = np.abs(parts[:, 1:]).max(axis=0, initial=0.0)
         return float(fastest), float(max(hardest, fastest**2))
-
-
-class Jerked(NamedTuple):
-    """Frames of links and own coordinates of pairs over a motion, as jets that have third rates as well."""
-
-    frames: Mapping[str, Frame]
-    own: Mapping[str, tuple[Jet, ...]]
 
 
 class Course(Protocol):

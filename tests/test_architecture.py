@@ -19,7 +19,7 @@ FLOORS = [
     {"pairs"},
     {"mechanism"},
     {"dimensions", "document", "elimination", "graph", "groups", "words"},
-    {"equations", "files"},
+    {"equations", "files", "results"},
     {"program", "motion"},
     {"solving"},
     {"analysis"},
@@ -29,7 +29,18 @@ FLOORS = [
     {"__main__"},
 ]
 LIBRARIES = {
-    "numpy": {"algebra", "equations", "program", "motion", "solving", "analysis", "views", "drawing", "words"},
+    "numpy": {
+        "algebra",
+        "equations",
+        "program",
+        "motion",
+        "results",
+        "solving",
+        "analysis",
+        "views",
+        "drawing",
+        "words",
+    },
     "casadi": {"elimination", "groups", "equations", "program"},
     "networkx": {"graph"},
     "pint": {"units"},

@@ -10,8 +10,9 @@ import numpy as np
 from planar.analysis.phrases import Phrase, Quantity, listed
 from planar.analysis.ties import Slide, rates
 from planar.mechanism import Along, At, Distances, Link, Mechanism, Units, entries, motions
-from planar.motion import InputState, State
+from planar.motion import State
 from planar.pairs import Kind, Pair
+from planar.results import InputState
 from planar.units import unit
 from planar.words import amount, turning
 

@@ -15,7 +15,8 @@ from planar.errors import BadInput, Outcome
 
 if TYPE_CHECKING:
     from planar.analysis.published import Comparison
-    from planar.motion import RelativeState, State
+    from planar.motion import State
+    from planar.results import RelativeState
 
 
 @main.command()

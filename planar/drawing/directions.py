@@ -15,7 +15,8 @@ from planar.drawing.rays import NOTHING, Ray
 from planar.drawing.scheme import scheme, space_scale, standing
 from planar.errors import BadInput
 from planar.mechanism import named_points
-from planar.motion import PointState, State
+from planar.motion import State
+from planar.results import PointState
 
 Array = np.ndarray
 REACH = 2.5

@@ -12,9 +12,10 @@ from planar.analysis.extremes import Stroke, stroke
 from planar.drawing.scene import standing
 from planar.errors import BadInput, Outcome, PlanarError
 from planar.mechanism import Drive, Input, Mechanism, with_inputs
-from planar.motion import Motion, PointMotion, Unknown
+from planar.motion import Motion, Unknown
 from planar.pairs import Pair
 from planar.plane import Frame
+from planar.results import PointMotion
 from planar.solving.cycle import cycle
 
 Array = np.ndarray

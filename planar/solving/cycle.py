@@ -11,9 +11,10 @@ import numpy as np
 from planar.algebra import Jet
 from planar.errors import BadInput, NoAnswer, Outcome
 from planar.mechanism import FARTHEST, Drive, Mechanism, with_inputs
-from planar.motion import InputMotion, Motion
+from planar.motion import Motion
 from planar.pairs import Kind
 from planar.program import placed
+from planar.results import InputMotion
 from planar.solving import refusals
 from planar.solving.branch import cancelling
 from planar.solving.follow import Run, follow, reach, run

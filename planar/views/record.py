@@ -7,7 +7,8 @@ from typing import Any
 
 from planar.analysis.published import Comparison
 from planar.errors import Outcome
-from planar.motion import RelativeState, State
+from planar.motion import State
+from planar.results import RelativeState
 
 
 def record(
