@@ -68,6 +68,7 @@ class Input(NamedTuple):
     position: float
     velocity: float = 0.0
     acceleration: float = 0.0
+    law: object = None
 
 
 class Load(NamedTuple):
@@ -165,8 +166,7 @@ def with_inputs(mechanism: Mechanism, drives: tuple[Drive, ...]) -> Mechanism:
         drive = changes.get(given.pair)
         if drive is None:
             return given
-        told = zip(given, drive, strict=True)
-        return Input(*(old if new is None else new for old, new in told))
+        return given._replace(**{name: value for name, value in drive._asdict().items() if value is not None})
 
     return replace(mechanism, inputs=tuple(changed(given) for given in mechanism.inputs))
 

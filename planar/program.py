@@ -83,9 +83,43 @@ class Program:
         third = ca.jtimes(second, y, y1) + ca.jtimes(second, y1, y2)
         return ca.Function("third", [y, y1, y2, e.p], [ca.densify(third)])
 
+    @cached_property
+    def _jerks(self) -> ca.Function:
+        e = self.equations
+        both = ca.vertcat(e.F, e.w)
+        y, y1, y2, _, second = _derivatives(e, both)
+        y3 = ca.SX.sym("y3", y.numel())
+        third = ca.jtimes(second, y, y1) + ca.jtimes(second, y1, y2) + ca.jtimes(second, y2, y3)
+        return ca.Function("jerks", [y, y1, y2, y3, e.p], [ca.densify(third)])
+
+    def jerks(self, y: Array, y1: Array, y2: Array, y3: Array, p: Array) -> tuple[Array, Array]:
+        """The third time derivatives of F (samples, rows) and of w (samples, coordinates); y (samples, y) alike."""
+        rows = self.equations.F.numel()
+        both = self._jerks(y.T, y1.T, y2.T, y3.T, p).full().T
+        return both[:, :rows], both[:, rows:]
+
     def third(self, y: Array, y1: Array, y2: Array, p: Array) -> Array:
         """The third time derivative of F (rows,), that of y left out."""
         return self._third(y, y1, y2, p).full().ravel()
+
+    @cached_property
+    def _bends(self) -> tuple[ca.Function, ca.Function]:
+        e = self.equations
+        y, way, rows = ca.vertcat(e.z, e.u), ca.SX.sym("way", e.z.numel() + e.u.numel()), ca.SX.sym("l", e.F.numel())
+        along = ca.jacobian(ca.jtimes(e.F, y, way), y)
+        weighed = ca.jacobian(ca.jtimes(e.F, y, rows, True), y)
+        return (
+            ca.Function("along", [y, way, e.p], [ca.densify(along)]),
+            ca.Function("weighed", [y, rows, e.p], [ca.densify(weighed)]),
+        )
+
+    def bend_along(self, y: Array, way: Array, p: Array) -> Array:
+        """The slope of (dF/dy) way (rows, y): the second derivatives of F with one direction filled in."""
+        return self._bends[0](y, way, p).full()
+
+    def bend_of(self, y: Array, rows: Array, p: Array) -> Array:
+        """The second derivatives (y, y) of the sum of the rows of F, each times its number."""
+        return self._bends[1](y, rows, p).full()
 
     @cached_property
     def _deflated(self) -> ca.Function:

@@ -47,9 +47,9 @@ def hurrying(power: float, scale: float = 0.0) -> str:
     return "speeding up" if power > 0.0 else "slowing down"
 
 
-def many(count: int, what: str) -> str:
+def many(count: int, what: str, plural: str = "") -> str:
     """So many of something: 1 way, 2 ways."""
-    return f"{count} {what}{'s' * (count != 1)}"
+    return f"{count} {what if count == 1 else plural or what + 's'}"
 
 
 def listed(names: Sequence[str]) -> str:

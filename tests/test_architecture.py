@@ -13,7 +13,7 @@ from planar.pairs import pair_types
 
 ROOT = Path(planar.__file__).parent
 FLOORS = [
-    {"errors", "algebra"},
+    {"errors", "algebra", "roots"},
     {"plane", "units"},
     {"shapes"},
     {"pairs"},

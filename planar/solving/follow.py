@@ -2,25 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from planar.errors import NoAnswer, Outcome
+from planar.errors import NoAnswer
 from planar.program import Program, length
+from planar.roots import root
 from planar.solving.branch import Branch
+from planar.solving.curve import Arc, Curve, Point
+from planar.solving.walk import Missed, Passed, Walk
 
 Array = np.ndarray
 
-STRIDE = 0.1
-"""Greatest first step of an input: rad, or lengths of the mechanism's size."""
-SHORTEST = 3e-7
-"""A step of the inputs (rad, or lengths of the size) below this says that the branch ends.
-
-So near to a crossing of branches rounding (1e-16 over the distance) moves a position by less than a hundredth of what
-the branches are apart; nearer, it could carry it from one to the other.
-"""
 CORRECTIONS = 8
+NEARLY = 0.1
+"""A correction longer than this part of an arc has gone astray."""
+RESTING = 1e-7
+"""A rate of the inputs along the curve below this is none: the position is a dead point to rounding."""
+SEAM = 1e-9
+"""rad or sizes: so near to the end of a way a change point is at that end."""
+STRAIGHT = 1e-12
+"""rad or sizes: inputs that are no further from a straight way are on it."""
 
 
 class Followed(Protocol):
@@ -35,95 +40,262 @@ class Followed(Protocol):
     def tolerance(self) -> float:
         """What the gate lets pass."""
 
-    def where(self, u: Array) -> str:
-        """A position of the inputs in words."""
+    def ends(self, z: Array, u: Array, tangent: Array, dead: bool) -> NoAnswer:
+        """Why a motion ends at unknowns z and inputs u: at a dead point, or where branches cannot be told apart."""
+
+
+class Local(NamedTuple):
+    """Rates where a slope is singular: first, second and third derivative of the unknowns (3, unknowns) by the distance
+    of the inputs along a way."""
+
+    rates: Array
+    way: Array
+
+
+class Met(NamedTuple):
+    """A change point on the way: the unknowns and inputs there, what the walk knows of it, and along which way."""
+
+    u: Array
+    passed: Passed
+    way: Array
 
 
 class Run(NamedTuple):
     """Unknowns at every sample that was reached (samples, unknowns), how many of them the general path had to solve,
-    and why the rest was not reached, if not."""
+    and why the rest was not reached, if not, with the last unknowns and inputs before that.
+
+    `local` are rates by sample where the slope is singular; `met` the change points passed, `missed` those near by.
+    """
 
     z: Array
     general: int
     stopped: NoAnswer | None = None
+    last: tuple[Array, Array] | None = None
+    local: Mapping[int, Local] = MappingProxyType({})
+    met: tuple[Met, ...] = ()
+    missed: tuple[Missed, ...] = ()
+
+
+class Piece(NamedTuple):
+    """A part of an arc on which the inputs go one way: from and to where on its axis, from and to where on the way of
+    the inputs, and the dead point at its end, if one is there."""
+
+    arc: Arc
+    first: float
+    last: float
+    start: float
+    stop: float
+    dead: Point | None
+
+    def holds(self, place: float) -> bool:
+        """Whether the inputs come to a place within this piece."""
+        return min(self.start, self.stop) <= place <= max(self.start, self.stop)
+
+    def at(self, curve: Curve, place: float) -> tuple[Array, Array | None]:
+        """The unknowns where the inputs are at a place, with their derivatives where the slope is singular."""
+        arc = self.arc
+        if self.dead is not None and place == self.stop:
+            return self.dead.y[:-1], None
+        x = root(lambda x: float(arc.rough(x)[-1]) - place, self.first, self.last)
+        rough = arc.rough(x)
+        rough[-1] = place
+        if arc.exact:
+            return curve.polished(rough)[:-1], derivatives(arc, x)
+        ahead = np.zeros_like(rough)
+        ahead[-1] = 1.0
+        y = curve.corrected(rough, ahead)
+        if y is None or np.linalg.norm(y - rough) > NEARLY * abs(self.last - self.first):
+            y = arc.y(curve, root(lambda x: float(arc.y(curve, x)[-1]) - place, self.first, self.last))
+        return y[:-1], None
+
+
+def pieces(walk: Walk) -> Iterator[Piece]:
+    """A walk's arcs, parted at dead points."""
+    curve = walk.curve
+    if rests(walk.here) and walk.here.bend[-1] < 0.0:
+        here = walk.here
+        yield Piece(Arc(here, here, here.y, here.tangent, 1.0, here.y[None], True), 0.0, 0.0, 0.0, 0.0, here)
+    for arc in walk.arcs():
+        (first, last), before = arc.ends, arc.before
+        while True:
+            dead = turning(curve, arc, before, first, last)
+            if dead is None:
+                break
+            at = float(arc.axis @ (dead.y - arc.origin))
+            yield Piece(arc, first, at, float(before.y[-1]), float(dead.y[-1]), dead)
+            first, before = at, dead
+        yield Piece(arc, first, last, float(before.y[-1]), float(arc.after.y[-1]), None)
+
+
+class Trip:
+    """Goes along a straight way of the inputs to its first dead point, and tells the unknowns at places in their order.
+
+    The way is one in which the fastest input goes one rad or size a unit.
+    """
+
+    def __init__(self, solver: Followed, p: Array, z: Array, start: Array, way: Array, branches: Sequence[int] = ()):
+        reach = float(np.max(np.abs(way), initial=0.0)) or 1.0
+        self.curve = Curve(solver, p, start, way / reach)
+        numbers = list(branches)
+        self.walk = Walk(self.curve, onwards(self.curve, np.append(z, 0.0), numbers), numbers)
+        self.here = self.walk.here
+        self.dead: Point | None = None
+        self._pieces = pieces(self.walk)
+        self._piece: Piece | None = None
+
+    def to(self, place: float) -> tuple[Array, Array | None] | None:
+        """The unknowns so far along the way, with derivatives where the slope is singular; None if it ends before."""
+        while self._piece is None or not place <= self._piece.stop:
+            if self.dead is not None:
+                return None
+            self._piece = next(self._pieces, None)
+            if self._piece is None:
+                return None
+            self.dead = self._piece.dead
+            self.here = self.dead or self._piece.arc.after
+        return self._piece.at(self.curve, place)
+
+
+def met(walk: Walk, last: float = np.inf) -> tuple[Met, ...]:
+    """The change points that a walk has passed up to a place of the inputs on their way."""
+    return tuple(
+        Met(walk.curve.inputs(each.crossing.y), each, walk.curve.way)
+        for each in walk.passed
+        if each.crossing.y[-1] <= last + SEAM
+    )
+
+
+def rests(point: Point) -> bool:
+    """Whether a point is a dead point to rounding."""
+    return abs(point.advance) < RESTING
+
+
+def onwards(curve: Curve, y: Array, branches: list[int]) -> Point:
+    """The point at y, to be left so that the inputs go on.
+
+    At a dead point two ways lead on: the first so that the most moved unknown grows; a number is taken off `branches`.
+    """
+    ahead = np.zeros_like(y)
+    ahead[-1] = 1.0
+    here = curve.at(y, ahead)
+    if rests(here):
+        most = int(np.argmax(np.abs(here.tangent)))
+        second = bool(branches) and branches.pop(0) > 1
+        return here if (here.tangent[most] > 0.0) is not second else here.turned()
+    return here
+
+
+def turning(curve: Curve, arc: Arc, before: Point, first: float, last: float) -> Point | None:
+    """The first dead point on an arc between two places on its axis, at which the inputs turn back, if there is one."""
+    g0 = before.advance
+    if rests(before):
+        g0 = RESTING * float(np.sign(before.bend[-1]))
+    sense = float(np.sign(g0))
+    g0, g1 = abs(g0), sense * arc.after.advance
+    if g1 > 0.0:
+        # between two points that go on the inputs may have gone back in the meantime
+        s0, s1, gone = sense * before.bend[-1], sense * arc.after.bend[-1], abs(last - first)
+        if s0 >= 0.0 or s1 <= 0.0:
+            return None
+        least, part = min((cubic(g0, s0 * gone, g1, s1 * gone, part), part) for part in np.linspace(0.05, 0.95, 19))
+        x = first + part * (last - first)
+        if least > 0.0 or sense * arc.at(curve, x).advance > 0.0:
+            return None
+        last = x
+    at = root(lambda x: sense * arc.at(curve, x).advance if x != first else g0, first, last)
+    return arc.at(curve, at)
+
+
+def cubic(g0: float, s0: float, g1: float, s1: float, part: float) -> float:
+    """The cubic with these values and slopes at 0 and 1, at a part of the way between."""
+    t = part
+    return (2 * t**3 - 3 * t**2 + 1) * g0 + (t**3 - 2 * t**2 + t) * s0 + (3 * t**2 - 2 * t**3) * g1 + (t**3 - t**2) * s1
+
+
+def derivatives(arc: Arc, x: float) -> Array:
+    """The first three derivatives of the unknowns by the place of the inputs (3, unknowns), on an exact arc."""
+    y1, y2, y3 = (arc.rough(x, order) for order in (1, 2, 3))
+    t1, t2, t3 = y1[-1], y2[-1], y3[-1]
+    # the chain rule, solved for the derivatives of the inverse
+    x1 = 1.0 / t1
+    x2 = -t2 * x1**3
+    x3 = (3.0 * t2**2 / t1 - t3) * x1**4
+    return np.array([y1 * x1, y2 * x1**2 + y1 * x2, y3 * x1**3 + 3.0 * y2 * x1 * x2 + y1 * x3])[:, :-1]
 
 
 def follow(solver: Followed, p: Array, z: Array, start: Array, stop: Array) -> Array:
     """The unknowns at inputs `stop`, followed from those at `start` along the straight line between them.
 
-    Raises NoAnswer where the branch ends on the way.
+    Smoothly through change points. Raises NoAnswer where a dead point is on the way, or the branch cannot be followed.
     """
-    found = _followed(solver, p, z, start, stop - start)
-    if found.t < 1.0:
-        raise NoAnswer(
-            Outcome.BRANCH_LOST,
-            f"this assembly can be followed only to {solver.where(start + found.t * (stop - start))} on the way from "
-            f"{solver.where(start)} to {solver.where(stop)}: there its motion ends, or branches; "
-            f"stop short of it, or drive another pair",
-        )
-    return found.z
+    way = stop - start
+    reach = float(np.max(np.abs(way), initial=0.0))
+    if reach == 0.0:
+        return z
+    trip = Trip(solver, p, z, start, way)
+    found = trip.to(reach)
+    if found is None:
+        raise _ended(solver, trip)
+    return found[0]
 
 
-class _Followed(NamedTuple):
-    """How far a branch was followed: the unknowns there, and the part of the way."""
-
-    z: Array
-    t: float
-
-
-def _followed(solver: Followed, p: Array, z: Array, start: Array, way: Array) -> _Followed:
-    """As far along the way as the branch goes.
-
-    A predictor of second order, Newton's corrector, and both parts of the gate at every step; steps shrink where
-    either objects.
-    """
-    stop = start + way
-    reach = float(np.max(np.abs(way), initial=0.0)) or 1.0
-    branch = Branch(solver.program, p)
-    t, step = 0.0, min(1.0, STRIDE / reach)
-    here = branch.at(z, start, way)
-    while t < 1.0:
-        step = min(step, 1.0 - t)
-        inputs = stop if t + step >= 1.0 else start + (t + step) * way
-        tried = corrected(solver.program, p, z + step * here.rates + 0.5 * step**2 * here.second, inputs)
-        if tried is not None and solver.open_along(tried[None], inputs[None])[0] <= solver.tolerance:
-            there = branch.at(tried, inputs, way)
-            if branch.same(here, there, step):
-                z, here, t, step = tried, there, t + step, 1.5 * step
-                continue
-        step *= 0.5
-        if step * reach < SHORTEST:
-            return _Followed(z, t)
-    return _Followed(z, 1.0)
-
-
-def run(solver: Followed, p: Array, z: Array, u: Array) -> Run:
+def run(solver: Followed, p: Array, z: Array, u: Array, branches: Sequence[int] = ()) -> Run:
     """The unknowns at every sample of a run of inputs u (samples, inputs), from those of the first.
 
     The whole run is one call of the compiled program; every sample then passes both parts of the gate, and from
-    one that does not the general path goes on to the next.
+    one that does not the general path goes on until the compiled program can take over again.
     """
     samples = len(u)
     found = np.empty((samples, z.size))
     found[0] = z
     done, general = 1, 0
+    local: dict[int, Local] = {}
+    met_on_way: list[Met] = []
+    missed: list[Missed] = []
     while done < samples:
         if solver.program.square:
             found[done:] = _accumulated(solver.program, p, found[done - 1], u[done:], samples - 1)
             done += _passing(solver, p, found[done - 1 :], u[done - 1 :])
-        if done < samples:
-            try:
-                found[done] = follow(solver, p, found[done - 1], u[done - 1], u[done])
-            except NoAnswer as stopped:
-                return Run(found[:done], general, stopped)
+        if done == samples:
+            break
+        trip, places = _trip(solver, p, found[done - 1], u[done - 1 :], branches[len(met_on_way) :])
+        before = len(met_on_way)
+        for place in places:
+            told = trip.to(place)
+            met_on_way[before:] = met(trip.walk, place)
+            if told is None:
+                missed += trip.walk.missed
+                last = trip.here.y[:-1], trip.curve.inputs(trip.here.y)
+                stopped = _ended(solver, trip)
+                return Run(found[:done], general, stopped, last, local, tuple(met_on_way), tuple(missed))
+            found[done] = told[0]
+            if told[1] is not None:
+                local[done] = Local(told[1], trip.curve.way)
             done, general = done + 1, general + 1
-    return Run(found, general)
+            if told[1] is None:
+                break
+        missed += trip.walk.missed
+    return Run(found, general, None, None, local, tuple(met_on_way), tuple(missed))
 
 
-def reach(solver: Followed, p: Array, z: Array, start: Array, way: Array) -> tuple[Array, float]:
-    """The unknowns at the end of the branch from `start` along `way`, and how many of `way` it is away; 1 at most."""
-    found = _followed(solver, p, z, start, way)
-    return found.z, found.t
+def _trip(solver: Followed, p: Array, z: Array, u: Array, branches: Sequence[int]) -> tuple[Trip, Iterator[float]]:
+    """A trip from the first of these inputs towards the next, and the places of those that lie on the same way."""
+    way = u[1] - u[0]
+    reach = float(np.max(np.abs(way), initial=0.0))
+    if reach == 0.0:
+        return Trip(solver, p, z, u[0], way), iter([0.0])
+    axis = way / reach
+    gone = (u[1:] - u[0]) @ axis / float(axis @ axis)
+    aside = np.max(np.abs(u[1:] - u[0] - gone[:, None] * axis), axis=1) > STRAIGHT
+    back = np.diff(gone, prepend=0.0) <= 0.0
+    off = aside | back
+    many = int(np.argmax(off)) if off.any() else len(gone)
+    return Trip(solver, p, z, u[0], way, branches), iter(gone[:many].tolist())
+
+
+def _ended(solver: Followed, trip: Trip) -> NoAnswer:
+    here = trip.here
+    return solver.ends(here.y[:-1], trip.curve.inputs(here.y), here.tangent, trip.dead is not None)
 
 
 def _accumulated(program: Program, p: Array, z: Array, u: Array, steps: int) -> Array:

@@ -163,7 +163,12 @@ def _moving_at_rest(setup: Setup, slope: Array) -> list[str]:
     null = vectors[int(np.sum(values > SINGULAR * max(1.0, values[0]))) :]
     if null.size == 0:
         return []
-    share = np.max(np.abs(null), axis=0)
+    return moved_by(setup, np.max(np.abs(null), axis=0))
+
+
+def moved_by(setup: Setup, rates: Array) -> list[str]:
+    """The links that rates of the unknowns (unknowns,) move."""
+    share = np.abs(rates)
     moved = [
         setup.equations.coordinates[column].owner
         for column, part in zip(setup.equations.unknowns, share, strict=True)

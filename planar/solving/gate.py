@@ -76,22 +76,22 @@ class Gate:
                     return pair.name, float(np.max(np.abs(gap.parts[0])))
         return None
 
-    def rate_gaps(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Jet]]) -> list[tuple[Array, str]]:
+    def rate_gaps(
+        self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Jet]], inputs: Sequence[Jet] | None = None
+    ) -> list[tuple[Array, str]]:
         """How far velocities, then accelerations, break the worst constraint, as a part of the greatest; its pair.
 
-        Of jets of arrays, an array.
+        Of jets of arrays, an array. `inputs` are the inputs with their rates, else the mechanism's own.
         """
-        closures = [(kind, left) for kind, left in self._closures(frames, own) if isinstance(left, Jet)]
+        u = [Jet(*given[1:4]) for given in self.mechanism.inputs] if inputs is None else inputs
+        closures = [(kind, left) for kind, left in self._closures(frames, own, u) if isinstance(left, Jet)]
         units = np.array([self.unit if kind is Kind.LENGTH else 1.0 for kind, _ in closures])
         found = []
         for order in (1, 2):
-            rates = [(given.velocity, given.acceleration)[order - 1] for given in self.mechanism.inputs]
-            wanted = np.zeros(len(closures))
-            wanted[len(closures) - len(rates) :] = rates
             if not closures:
                 found.append((np.zeros(1), ""))
                 continue
-            broken = np.array(np.broadcast_arrays(*(left.parts[order] for _, left in closures))).T - wanted
+            broken = np.array(np.broadcast_arrays(*(left.parts[order] for _, left in closures))).T
             gaps = np.nan_to_num((np.abs(broken) / units).T / self._greatest(frames, own, order), nan=np.inf)
             worst = int(np.argmax(gaps.reshape(len(closures), -1).max(axis=1)))
             found.append((gaps.max(axis=0), self.names[worst]))

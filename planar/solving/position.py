@@ -18,7 +18,16 @@ from planar.solving import refusals
 from planar.solving.assemble import Assembly, Failure, search
 from planar.solving.candidates import Candidates
 from planar.solving.follow import follow
-from planar.solving.freedom import SINGULAR, Crossing, always_weak, cancelled, mobility, slope_at, strengths
+from planar.solving.freedom import (
+    SINGULAR,
+    Crossing,
+    always_weak,
+    cancelled,
+    mobility,
+    moved_by,
+    slope_at,
+    strengths,
+)
 from planar.solving.setup import Setup
 
 if TYPE_CHECKING:
@@ -112,6 +121,10 @@ class Solver(Setup):
         moving = self.program.kinematics(y, y1, given, s.p)
         y2 = np.concatenate([cancelled(moving.slope, moving.F2), s.u2])
         return self._stated(self.program.kinematics(y, y1, y2, s.p), found, residual, remarks)
+
+    def ends(self, z: Array, u: Array, tangent: Array, dead: bool) -> NoAnswer:
+        """Why a motion ends at unknowns z and inputs u, towards which it went along a tangent."""
+        return refusals.ended(self, moved_by(self, tangent[:-1]), self.where(u), dead)
 
     def _passed(self, through: Passing, remarks: tuple[str, ...]) -> State | None:
         """The state where more than the inputs could move to first order, but only one motion goes on."""

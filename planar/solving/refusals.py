@@ -94,6 +94,21 @@ def dead_point(setup: Setup, links: Sequence[str]) -> NoAnswer:
     )
 
 
+def ended(setup: Setup, links: Sequence[str], where: str, dead: bool) -> NoAnswer:
+    """Where a motion of the inputs ends: a dead point, or branches that cannot be told apart."""
+    if dead:
+        return NoAnswer(
+            Outcome.DEAD_POINT,
+            f"{_inputs(setup)} cannot go beyond {where}, a dead point: {_links(links)} would lead back from there; stay "
+            f"short of it, go through the whole circuit, or drive {_pairs_of(setup, links, 4)}",
+        )
+    return NoAnswer(
+        Outcome.BRANCH_LOST,
+        f"this assembly can be followed only to {where}: there motions of {_links(links)} meet that cannot be told "
+        f"apart; stop short of it, or drive {_pairs_of(setup, links, 4)}",
+    )
+
+
 def not_closed(setup: Setup, pair: str, gap: float) -> NoAnswer:
     """A position that the gate does not let pass."""
     return NoAnswer(

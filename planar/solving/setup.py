@@ -9,7 +9,7 @@ import numpy as np
 
 from planar.algebra import Jet, Scalar
 from planar.errors import BadInput
-from planar.mechanism import Input, Mechanism, check, misfits, motions
+from planar.mechanism import Mechanism, check, misfits, motions
 from planar.pairs import Kind
 from planar.plane import Frame
 from planar.program import Program, extent, fitted, placed, positions, program, rates, shapes, size
@@ -61,7 +61,7 @@ class Setup:
     def gaps(self, z: Array, u: Array) -> Array:
         """What every constraint leaves open (constraints, samples); z (samples, unknowns), u (samples, inputs)."""
         w = self.program.positions(z.T, u.T, self.station.p).full()
-        scale = np.array([self.unit if self._slides(given) else 1.0 for given in self.mechanism.inputs])
+        scale = np.array([self.unit if self.slides(given.pair) else 1.0 for given in self.mechanism.inputs])
         with np.errstate(invalid="ignore"):  # what is not a number counts as open, and is refused as such
             frames, own = placed(w * self.scale[:, None], self.column, self.shapes, self.pairs)
             return self.gate.gaps(frames, own, u.T * scale[:, None]).reshape(-1, len(z))
@@ -90,8 +90,9 @@ class Setup:
 
     def told(self, pair: str, position: float) -> str:
         """A position of one input in words."""
-        kind, by = ("length", self.unit) if self.named[pair].drive_kind is Kind.LENGTH else ("angle", 1.0)
+        kind, by = ("length", self.unit) if self.slides(pair) else ("angle", 1.0)
         return f"{pair} = {amount(position * by, kind, self.mechanism.units)}"
 
-    def _slides(self, given: Input) -> bool:
-        return self.named[given.pair].drive_kind is Kind.LENGTH
+    def slides(self, pair: str) -> bool:
+        """Whether the relative motion at a pair is a length."""
+        return self.named[pair].drive_kind is Kind.LENGTH

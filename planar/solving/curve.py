@@ -1,0 +1,233 @@
+"""The curve of positions along a straight way of the inputs: points on it, their tangents, what lies between two."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from planar.program import Program
+
+Array = np.ndarray
+
+CORRECTIONS = 10
+NUDGE = 1e-6
+"""The part of a step over which the change of a slope is taken."""
+NOTHING = 1e-10
+"""A singular value that is this part of the greatest is zero to rounding."""
+SMALLEST = 1e-6
+"""A column of the slope is judged by its own size, down to this part of the size of the mechanism."""
+POLISHED = 1e-3
+"""Beside a change point a singular value vanishes: below this part of the greatest it is that one."""
+
+
+class Followed(Protocol):
+    """What following needs of a solver."""
+
+    program: Program
+
+    def open_along(self, z: Array, u: Array) -> Array:
+        """What the worst constraint leaves open at every sample; z (samples, unknowns), u (samples, inputs)."""
+
+    @property
+    def tolerance(self) -> float:
+        """What the gate lets pass."""
+
+
+class Point(NamedTuple):
+    """A point of the curve: y = (unknowns, how far the inputs are on their way), (n + 1,), its unit tangent, its second
+    derivative by arc length, and how far it is at least to where the slope could lose rank."""
+
+    y: Array
+    tangent: Array
+    bend: Array
+    clear: float
+
+    @property
+    def advance(self) -> float:
+        """The rate of the inputs along the curve: positive where they go on, zero at a dead point."""
+        return float(self.tangent[-1])
+
+    def turned(self) -> Point:
+        """The same point, to be left the other way."""
+        return self._replace(tangent=-self.tangent)
+
+
+class Curve:
+    """All positions F(z, start + t way) = 0 near by, as a curve in y = (z, t): dead points are on it as any others.
+
+    Lengths are in sizes of the mechanism, angles in rad. The slope J = dF/dy (rows, n + 1) has rank n but at change
+    points; its null vector is the tangent. E. Allgower, K. Georg, Introduction to Numerical Continuation Methods, 2003.
+    """
+
+    def __init__(self, solver: Followed, p: Array, start: Array, way: Array):
+        self.solver, self.program, self.p, self.start, self.way = solver, solver.program, p, start, way
+
+    def inputs(self, y: Array) -> Array:
+        """The inputs (inputs,) at a point, or at points (points, inputs)."""
+        return self.start + y[..., -1:] * self.way
+
+    def whole(self, y: Array) -> Array:
+        """Unknowns and inputs at a point, as the program takes them."""
+        return np.concatenate([y[:-1], self.inputs(y)])
+
+    def widened(self, way: Array) -> Array:
+        """A direction along the curve, as one of unknowns and inputs."""
+        return np.concatenate([way[:-1], way[-1] * self.way])
+
+    def narrowed(self, matrix: Array) -> Array:
+        """A matrix whose columns belong to unknowns and inputs, as one whose columns belong to y."""
+        many = len(matrix[0]) - len(self.way) if matrix.size else 0
+        return np.hstack([matrix[:, :many], matrix[:, many:] @ self.way[:, None]])
+
+    def slope(self, y: Array) -> Array:
+        """J (rows, n + 1)."""
+        dz, du = self.program.slopes(y[None, :-1], self.inputs(y)[None], self.p)
+        return np.hstack([dz[0], du[0] @ self.way[:, None]])
+
+    def left(self, y: Array) -> Array:
+        """F (rows,)."""
+        none = np.zeros(len(y) - 1 + len(self.way))
+        return self.program.kinematics(self.whole(y), none, none, self.p).F
+
+    def second(self, y: Array, way: Array) -> Array:
+        """The second derivative of F along a direction (rows,)."""
+        wide = self.widened(way)
+        return self.program.kinematics(self.whole(y), wide, 0.0 * wide, self.p).F2
+
+    def closes(self, y: Array) -> bool:
+        """Whether a point passes the first part of the gate."""
+        return bool(self.solver.open_along(y[None, :-1], self.inputs(y)[None])[0] <= self.solver.tolerance)
+
+    def at(self, y: Array, towards: Array) -> Point:
+        """The point at y, its tangent less than a right angle from a direction."""
+        slope = self.slope(y)
+        u, s, vt = np.linalg.svd(slope)
+        many = len(y) - 1
+        tangent = vt[many] if vt[many] @ towards >= 0.0 else -vt[many]
+        kept = s[:many] > NOTHING * max(s[0], 1.0) if many else np.zeros(0, dtype=bool)
+        along = (u.T[:many] @ self.second(y, tangent)) if many else np.zeros(0)
+        bend = -vt[:many].T @ np.where(kept, along / np.where(kept, s[:many], 1.0), 0.0)
+        return Point(y, tangent, bend, self._clear(y, tangent, slope))
+
+    def _clear(self, y: Array, tangent: Array, slope: Array) -> float:
+        """How far along the curve J keeps its rank: until it has changed by its least singular value (Weyl).
+
+        Columns of one size, so that a small link counts as much as a large one.
+        """
+        many = len(y) - 1
+        if many == 0:
+            return np.inf
+        sizes = np.maximum(np.linalg.norm(slope, axis=0), SMALLEST)
+        change = np.linalg.norm((self.slope(y + NUDGE * tangent) - slope) / sizes) / NUDGE
+        least = np.linalg.svd(slope / sizes, compute_uv=False)[many - 1]
+        return float(least / max(change, 1e-300))
+
+    def corrected(self, y: Array, normal: Array) -> Array | None:
+        """The point of the curve near y in the plane through y with this normal; None where Newton finds none."""
+        y, before = y.copy(), np.inf
+        for _ in range(CORRECTIONS):
+            whole = self.whole(y)
+            rates = self.program.kinematics(whole, 0.0 * whole, 0.0 * whole, self.p)
+            gap = float(np.max(np.abs(rates.F), initial=0.0))
+            if not gap < before:
+                break
+            before = gap
+            slope = np.hstack([rates.slope, rates.drive_slope @ self.way[:, None]])
+            y = y + np.linalg.lstsq(np.vstack([slope, normal]), np.append(-rates.F, 0.0), rcond=1e-14)[0]
+        return y if before <= 1e-10 else None
+
+    def polished(self, y: Array) -> Array:
+        """A position beside a change point, closed to round-off but not moved from one branch to the other."""
+        for _ in range(2):
+            y = y - truncated(self.slope(y), self.left(y), len(y) - 1)
+        return y
+
+
+def truncated(slope: Array, left: Array, rank: int) -> Array:
+    """The shortest step (n + 1,) that closes what is open, but for the direction in which the slope all but vanishes."""
+    u, s, vt = np.linalg.svd(slope, full_matrices=False)
+    kept = (s > POLISHED * s[0]) & (np.arange(len(s)) < rank) if s.size else np.zeros(0, dtype=bool)
+    return vt[kept].T @ ((u.T[kept] @ left) / s[kept])
+
+
+class Arc(NamedTuple):
+    """The curve from one point to the next: a polynomial in how far one is along an axis.
+
+    Between two points it is near the curve and `Curve.corrected` carries it there. Beside a change point it is the
+    curve to round-off, and nothing can correct it: there the slope is singular.
+    """
+
+    before: Point
+    after: Point
+    origin: Array
+    axis: Array
+    half: float
+    shape: Array
+    "coefficients (degree + 1, n + 1), of powers of the distance over `half`"
+    exact: bool
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """How far its two ends are along the axis."""
+        first, last = (float(self.axis @ (point.y - self.origin)) for point in (self.before, self.after))
+        return first, last
+
+    def rough(self, x: float, order: int = 0) -> Array:
+        """The polynomial, or a derivative of it (n + 1,), so far along the axis."""
+        powers, shape = np.arange(len(self.shape)), self.shape
+        for _ in range(order):
+            shape, powers = shape[1:] * powers[1 : len(shape), None] / self.half, powers[: len(shape) - 1]
+        return ((x / self.half) ** np.arange(len(shape))) @ shape
+
+    def y(self, curve: Curve, x: float) -> Array:
+        """The point of the curve so far along the axis (n + 1,)."""
+        rough = self.rough(x)
+        if self.exact:
+            return curve.polished(rough)
+        found = curve.corrected(rough, self.axis)
+        return rough if found is None else found
+
+    def at(self, curve: Curve, x: float) -> Point:
+        """The point of the curve so far along the axis, with its tangent."""
+        y = self.y(curve, x)
+        if not self.exact:
+            return curve.at(y, self.before.tangent)
+        first, second = self.rough(x, 1), self.rough(x, 2)
+        speed = float(np.linalg.norm(first))
+        tangent = first / speed
+        bend = (second - tangent * (tangent @ second)) / speed**2
+        sense = 1.0 if tangent @ self.before.tangent >= 0.0 else -1.0
+        return Point(y, sense * tangent, bend, 0.0)
+
+
+def between(before: Point, after: Point) -> Arc:
+    """The arc between two points: the polynomial of fifth degree with their tangents and second derivatives."""
+    chord = after.y - before.y
+    length = float(np.linalg.norm(chord))
+    axis = chord / length
+    shape = fitted((before, after), axis, (0.0, 1.0), length)
+    return Arc(before, after, before.y, axis, length, shape, False)
+
+
+def fitted(points: tuple[Point, ...], axis: Array, places: tuple[float, ...], half: float) -> Array:
+    """Coefficients of the polynomial through points at these places (times half) along an axis from the origin."""
+    rows = []
+    for point in points:
+        speed, change = float(axis @ point.tangent), float(axis @ point.bend)
+        first = point.tangent / speed
+        rows += [point.y, first * half, (point.bend - first * change) / speed**2 * half**2]
+    return np.linalg.solve(_hermite(places), np.array(rows))
+
+
+@cache
+def _hermite(places: tuple[float, ...]) -> Array:
+    """Values, first and second derivatives of the powers at the places (3 places, powers)."""
+    degree = 3 * len(places)
+    rows = []
+    for x in places:
+        for order in range(3):
+            factors = [np.prod([k - j for j in range(order)]) if k >= order else 0.0 for k in range(degree)]
+            rows.append([f * x ** max(k - order, 0) for k, f in enumerate(factors)])
+    return np.array(rows, dtype=float)

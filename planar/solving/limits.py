@@ -1,0 +1,195 @@
+"""Where along a curve of positions the input or an output turns back, or branches cross: solved for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from planar.algebra import Jet
+from planar.pairs import Kind, Pair
+from planar.program import placed
+from planar.results import Limit
+from planar.roots import root
+from planar.solving.circuit import circuit
+from planar.solving.curve import Curve, Point
+from planar.solving.follow import SEAM, Piece, cubic, met, pieces, rests
+from planar.solving.rows import crossed
+from planar.solving.setup import Setup
+from planar.solving.walk import Walk
+
+Array = np.ndarray
+
+STILL = 1e-9
+"""An output that moves less than this (rad or sizes) for one of the curve's length stands still but for rounding."""
+SAME = 1e-9
+
+
+class Outputs(NamedTuple):
+    """The relative motions whose ends of stroke are told, and how they move along a curve."""
+
+    setup: Setup
+    pairs: tuple[Pair, ...]
+
+    def along(self, curve: Curve, point: Point) -> Array:
+        """Position, first and second derivative by arc length of every output (outputs, 3), SI."""
+        setup = self.setup
+        if not self.pairs:
+            return np.zeros((0, 3))
+        rates, second = curve.widened(point.tangent), curve.widened(point.bend)
+        moving = setup.program.kinematics(curve.whole(point.y), rates, second, curve.p)
+        parts = np.stack([moving.w, moving.w1, moving.w2], axis=1) * setup.scale[:, None]
+        frames, own = placed([Jet(*each) for each in parts.tolist()], setup.column, setup.shapes, setup.pairs)
+        found = []
+        for pair in self.pairs:
+            numbers = pair.measure([setup.shapes[link] for link in pair.bodies])
+            drive = pair.drive([frames[link] for link in pair.bodies], numbers, own.get(pair.name, ()))
+            found.append(drive.parts if isinstance(drive, Jet) else (drive, 0.0, 0.0))
+        return np.array(found, dtype=float)
+
+    def distance(self, curve: Curve, point: Point, pair: Pair, pin: tuple[str, str]) -> float:
+        """How far the point that slides is from a pin of the frame (m)."""
+        setup = self.setup
+        w = setup.program.positions(point.y[:-1], curve.inputs(point.y), curve.p).full().ravel() * setup.scale
+        frames, _ = placed(w.tolist(), setup.column, setup.shapes, setup.pairs)
+        (link, name), _ = pair.rides()
+        gap = frames[link].carry(setup.shapes[link].at(name)) - frames[pin[0]].carry(setup.shapes[pin[0]].at(pin[1]))
+        return float(np.hypot(gap.x, gap.y))
+
+
+def outputs(setup: Setup) -> Outputs:
+    """All slides, and all pairs in which a link turns on the frame, but for inputs."""
+    inputs = {given.pair for given in setup.mechanism.inputs}
+    frame = setup.mechanism.frame
+    found = [
+        pair
+        for name, pair in setup.named.items()
+        if name not in inputs and (pair.drive_kind is Kind.LENGTH or frame in pair.links)
+    ]
+    return Outputs(setup, tuple(found))
+
+
+def until(parts: Iterable[Piece], last: float) -> Iterator[Piece]:
+    """The pieces of a curve up to a place of the inputs on their way."""
+    for piece in parts:
+        ends = piece.dead is not None and abs(piece.stop - last) < SEAM
+        if piece.stop < last - SEAM or ends:
+            yield piece
+            if ends:
+                return
+            continue
+        x = root(lambda x, arc=piece.arc: float(arc.rough(x)[-1]) - last, piece.first, piece.last)
+        yield piece._replace(last=x, stop=last, dead=None)
+        return
+
+
+class Found(NamedTuple):
+    """A limit, and the point of the curve where it is."""
+
+    limit: Limit
+    point: Point
+
+
+def limits(setup: Setup, pair: str, curve: Curve, found: Iterable[Found]) -> tuple[Limit, ...]:
+    """Limits in their order, each once, with the two ends of every slide on the frame told apart."""
+    once: list[Found] = []
+    for each in found:
+        same = (
+            other.limit[:2] == each.limit[:2] and abs(other.limit.input - each.limit.input) < SEAM
+            for other in once[-8:]
+        )
+        if not any(same):
+            once.append(each)
+    return tuple(_named(setup, outputs(setup), curve, pair, once))
+
+
+def along(setup: Setup, pair: str, start: float, way: float, walk: Walk, last: float | None = None) -> Iterator[Found]:
+    """What a walk meets on which the input at `pair` runs from `start` one way (1) or the other.
+
+    Up to a place of the input on that way, or all round a circuit.
+    """
+    curve, watched = walk.curve, outputs(setup)
+    unit = setup.unit if setup.slides(pair) else 1.0
+    passed = 0
+
+    def noted(kind: str, of: str, point: Point, value: float | None = None, told: str = "") -> Found:
+        place = (start + way * float(point.y[-1])) * unit
+        return Found(Limit(kind, of, place, place if value is None else value, None, told), point)
+
+    if rests(walk.here):
+        yield noted("input dead point", pair, walk.here)
+    before: Point | None = None
+    for piece in circuit(setup, walk).pieces if last is None else until(pieces(walk), last):
+        arc = piece.arc
+        if before is None or arc.exact:
+            before = arc.at(curve, piece.first)
+        after = piece.dead or (arc.after if piece.last == arc.ends[1] else arc.at(curve, piece.last))
+        for k, output in enumerate(watched.pairs):
+            scale = setup.unit if output.drive_kind is Kind.LENGTH else 1.0
+            for x in _turns(watched, curve, piece, (before, after), k, STILL * scale):
+                point = arc.at(curve, x)
+                yield noted("stroke end", output.name, point, float(watched.along(curve, point)[k, 0]))
+        for each in met(walk, np.inf if last is None else last)[passed:]:
+            yield noted("change point", pair, each.passed.crossing.ways[each.passed.came], None, crossed(setup, each))
+            passed += 1
+        if piece.dead is not None and piece.first != piece.last:
+            yield noted("input dead point", pair, piece.dead)
+        before = after
+
+
+def _turns(
+    watched: Outputs, curve: Curve, piece: Piece, ends: tuple[Point, Point], k: int, still: float
+) -> Iterator[float]:
+    """Where on a piece an output turns back: places on the arc's axis."""
+    arc = piece.arc
+    (_, g0, s0), (_, g1, s1) = (watched.along(curve, point)[k] for point in ends)
+    sense = 1.0 if piece.last > piece.first else -1.0
+
+    def rate(x: float) -> float:
+        return float(watched.along(curve, arc.at(curve, x))[k, 1])
+
+    if max(abs(g0), abs(g1)) < still:
+        return
+    if g0 * g1 < 0.0:
+        yield root(rate, piece.first, piece.last)
+    elif g0 * s0 < 0.0 < g1 * s1 and g0 * g1 > 0.0:
+        # both ends go one way, but the output may have gone back in between
+        gone, up = abs(piece.last - piece.first), float(np.sign(g0))
+        parts = np.linspace(0.05, 0.95, 19)
+        least, part = min((cubic(up * g0, up * s0 * gone, up * g1, up * s1 * gone, part), part) for part in parts)
+        middle = piece.first + sense * part * gone
+        if least < 0.0 and up * rate(middle) < -still:
+            yield root(rate, piece.first, middle)
+            yield root(rate, middle, piece.last)
+
+
+def _named(setup: Setup, watched: Outputs, curve: Curve, pair: str, found: list[Found]) -> Iterator[Limit]:
+    """The limits, with the two ends of every slide told apart by how far they are from the driving crank's pin."""
+    frame = setup.mechanism.frame
+    driving = setup.named[pair]
+    pins = [each for each in driving.coincident() if each[0] == frame] if driving.drive_kind is Kind.ANGLE else []
+    ends: dict[str, tuple[float, float, bool]] = {}
+    for output in watched.pairs:
+        if output.drive_kind is not Kind.LENGTH or frame not in output.links:
+            continue
+        of = [(limit.value, point) for limit, point in found if limit.kind == "stroke end" and limit.of == output.name]
+        if len(of) < 2:
+            continue
+        (low, at_low), (high, at_high) = min(of, key=lambda each: each[0]), max(of, key=lambda each: each[0])
+        if high - low <= SAME * setup.unit:
+            continue
+        far = True
+        if pins and output.rides() is not None:
+            distances = [watched.distance(curve, point, output, pins[0]) for point in (at_low, at_high)]
+            far = distances[1] >= distances[0] - SAME * setup.unit
+        ends[output.name] = (low, high, far)
+    for limit, _ in found:
+        if limit.kind != "stroke end" or limit.of not in ends:
+            yield limit
+            continue
+        low, high, far = ends[limit.of]
+        near = SAME * setup.unit
+        top = abs(limit.value - (high if far else low)) <= near
+        bottom = abs(limit.value - (low if far else high)) <= near
+        yield limit._replace(end="TDC" if top else "BDC" if bottom else None)

@@ -1,0 +1,265 @@
+"""One input through its range while the others stand still: a turn, limit to limit, there and back, a circuit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from math import ceil, pi
+from typing import NamedTuple
+
+import numpy as np
+
+from planar.errors import BadInput, NoAnswer, Outcome
+from planar.mechanism import Drive, Mechanism, with_inputs
+from planar.motion import Motion
+from planar.results import Limit
+from planar.solving import limits
+from planar.solving.circuit import circuit
+from planar.solving.curve import Curve
+from planar.solving.follow import Local, Run, Trip, follow, met, onwards, run
+from planar.solving.position import Solver
+from planar.solving.rates import Given
+from planar.solving.rows import Rows, joined, motion, reversed_, rows, shortened, spliced
+from planar.solving.walk import Walk
+from planar.words import listed
+
+Array = np.ndarray
+
+ENDLESS = 100.0
+"""Lengths of the size: a slide that goes on so far has no limit."""
+SEAM = 1e-9
+"""Parts of a step: what rounding leaves of one."""
+LEAST = 1e-5
+"""rad or sizes: a range shorter than this is none."""
+
+
+class _End(NamedTuple):
+    """An end of a range: the unknowns and the position there, and whether it is a dead point, or the input goes on."""
+
+    z: Array
+    position: float
+    dead: bool
+    open: bool
+
+
+class Ranged:
+    """One input of a mechanism that runs while the others stand still."""
+
+    def __init__(self, mechanism: Mechanism, pair: str | None, branches: Sequence[int], third: bool):
+        names = [given.pair for given in mechanism.inputs]
+        if pair is None and len(names) > 1:
+            raise BadInput("inputs", f"there are several inputs, {', '.join(names)}; name the one that runs")
+        if pair is not None and pair not in names:
+            raise BadInput(pair, f"there is no input at {pair!r}; inputs are at {', '.join(names)}")
+        self.index = names.index(pair) if pair is not None else 0
+        still = tuple(Drive(name, None, 0.0, 0.0) for k, name in enumerate(names) if k != self.index)
+        self.solver = Solver(with_inputs(mechanism, still))
+        self.pair = names[self.index]
+        self.slides = self.solver.slides(self.pair)
+        self.scale = self.solver.unit if self.slides else 1.0
+        self.u, self.p = self.solver.station.u, self.solver.station.p
+        self.branches, self.third = tuple(branches), third
+        self.found = self.solver.assembly()
+
+    def between(self, steps: int, start: float | None, stop: float | None, back: bool) -> Motion:
+        """The run over a range, or over the one that the input has by itself; and back again if wanted."""
+        here = float(self.u[self.index])
+        if start is None and stop is None:
+            return self._told(self._whole(steps, here), back)
+        first = here if start is None else start / self.scale
+        if stop is not None or not self.slides:
+            last = first + 2.0 * pi if stop is None else stop / self.scale
+            return self._told(self._run(steps, first, last), back)
+        end = self._end(follow(self.solver, self.p, self.found.z, self.u, self._at(first)), first, 1.0)
+        grid = np.linspace(first, end.position, steps + 1)
+        found = self._through(grid[:-1])
+        if found.stopped is not None:
+            return self._told(self._stopped(found, self._given(grid)), back)
+        whole = found._replace(z=np.vstack([found.z, end.z]))
+        return self._told(self._limited(rows(whole, self._given(grid), (steps,)), (end,)), back)
+
+    def round(self, steps: int, start: float | None) -> Motion:
+        """The whole circuit of the assembly, through its dead points, back to where it starts."""
+        here = float(self.u[self.index])
+        first = here if start is None else start / self.scale
+        walk = self.walk(follow(self.solver, self.p, self.found.z, self.u, self._at(first)), first)
+        if walk.here.clear < LEAST:
+            raise BadInput("start", "branches of the motion cross where the circuit would start; start it elsewhere")
+        whole = circuit(self.solver, walk)
+        turn = np.inf if self.slides else 2.0 * pi
+        spacing = min(max(abs(each.ends[1] - each.ends[0]) for each in whole.stretches), turn) / steps
+        z, places, senses, dead = [], [], [], []
+        local: dict[int, Local] = {}
+        for stretch in whole.stretches:
+            begin, last = stretch.ends
+            count = max(1, ceil(abs(last - begin) / spacing - SEAM))
+            for place in np.linspace(begin, last, count + 1)[1 if z else 0 :]:
+                known, singular = stretch.at(walk.curve, float(place))
+                if singular is not None:
+                    local[len(z)] = Local(singular, walk.curve.way)
+                z.append(known)
+                places.append(first + place)
+                senses.append(1.0 if last > begin else -1.0)
+            dead.append(len(z) - 1)
+        ends = (0, *dead) if whole.from_dead else tuple(dead[:-1])
+        given = self._given(np.array(places), np.array(senses))
+        found = Rows(np.array(z), given, ends, local, met(walk), tuple(walk.missed))
+        return self._told(found, back=False, circuit=True)
+
+    def _told(self, found: Rows, back: bool, circuit: bool = False) -> Motion:
+        if back:
+            found = joined(found, reversed_(found)._replace(met=(), missed=()))
+        return motion(self.solver, self.found, found, self.third, _Course(self, found, circuit))
+
+    def _run(self, steps: int, first: float, last: float) -> Rows:
+        grid = np.linspace(first, last, steps + 1)
+        found, given = self._through(grid), self._given(grid)
+        return rows(found, given) if found.stopped is None else self._stopped(found, given)
+
+    def _through(self, grid: Array) -> Run:
+        """The run through places of the input in their order, followed from the file's own position.
+
+        Raises NoAnswer where it does not come to the first of them.
+        """
+        here = float(self.u[self.index])
+        sense = 1.0 if grid[-1] >= grid[0] else -1.0
+        before = sense * grid < sense * here
+        if not before.any():
+            found = self._from_here(grid)
+            if len(found.z) < 2 and found.stopped is not None:
+                raise found.stopped
+            return shortened(found)
+        down = self._from_here(grid[before][::-1])
+        if down.stopped is not None:
+            raise down.stopped
+        return spliced(down, self._from_here(grid[~before]))
+
+    def _from_here(self, grid: Array) -> Run:
+        here = self.u[self.index]
+        return run(self.solver, self.p, self.found.z, self._at(np.append(here, grid)), self.branches)
+
+    def _whole(self, steps: int, here: float) -> Rows:
+        """One turn on where the input makes it, else all between its limits."""
+        if not self.slides:
+            found = self._run(steps, here, here + 2.0 * pi)
+            if found.outcome is Outcome.SOLVED:
+                return found
+        low, high = (self._end(self.found.z, here, sign) for sign in (-1.0, 1.0))
+        if high.position - low.position < LEAST:
+            self.solver.state(self.found.z)  # says why nothing goes on from a dead point or a change point
+            at = self.solver.told(self.pair, here)
+            told = f"the input at {self.pair!r} cannot move from {at} while the other inputs stand still"
+            raise NoAnswer(Outcome.TOO_MANY_INPUTS, told)
+        # from within to the limits: from a limit two branches lead inwards
+        grid = np.linspace(low.position, high.position, steps + 1)
+        inner = grid[1:-1]
+        down, up = self._from_here(inner[inner < here][::-1]), self._from_here(inner[inner >= here])
+        for part in (down, up):
+            if part.stopped is not None:
+                return self._stopped(shortened(part), self._given(inner[: len(part.z)]))
+        found = spliced(down, up)
+        local = {row + 1: each for row, each in found.local.items()}
+        whole = found._replace(z=np.vstack([low.z, found.z, high.z]), local=local)
+        dead = tuple(index for index, end in ((0, low), (steps, high)) if end.dead)
+        return self._limited(rows(whole, self._given(grid), dead), (low, high))
+
+    def _limited(self, found: Rows, ends: tuple[_End, ...]) -> Rows:
+        """Rows of a range that ends by itself, with what there is to say of it."""
+        lost = [end for end in ends if not end.dead and not end.open]
+        if lost:
+            told = listed([self.solver.told(self.pair, end.position) for end in lost])
+            sentence = f"at {told} branches of the motion meet that cannot be told apart; it is followed up to there"
+            return found.stopped(NoAnswer(Outcome.BRANCH_LOST, sentence))
+        told = listed([self.solver.told(self.pair, end.position) for end in ends if end.dead])
+        dead = tuple(row % len(found.z) for row in found.dead)
+        return found._replace(dead=dead, reason=f"the range of {self.pair!r} ends at {told}" if told else "")
+
+    def _stopped(self, found: Run, given: Given) -> Rows:
+        """A run that did not come to its end, with a last row where it stopped."""
+        reached = rows(found, given)
+        if found.last is None or found.stopped is None:
+            return reached.stopped(found.stopped)
+        z, u = found.last
+        ends_there = Given(u[None], *(each[-1:] for each in reached.given[1:]))
+        if np.max(np.abs(u - reached.given.u[-1]), initial=0.0) == 0.0:
+            dead = (len(reached.z) - 1,) if found.stopped.outcome is Outcome.DEAD_POINT else ()
+            return reached._replace(dead=dead).stopped(found.stopped)
+        reached = reached._replace(
+            z=np.vstack([reached.z, z]),
+            given=Given(*(np.vstack(both) for both in zip(reached.given, ends_there, strict=True))),
+            dead=(len(reached.z),),
+        )
+        return reached.stopped(found.stopped)
+
+    def _given(self, positions: Array, senses: Array | float = 1.0) -> Given:
+        """The inputs over a run, each row with the file's rates; backwards the velocity turns round."""
+        s, many = self.solver.station, len(positions)
+        u1, u2 = (np.repeat(rate[None], many, axis=0) for rate in (s.u1, s.u2))
+        return Given(self._at(positions), u1 * np.reshape(senses, (-1, 1)), u2, np.zeros_like(u1))
+
+    def _at(self, positions: Array | float) -> Array:
+        """The inputs where the one that runs is at a position, or at positions (positions, inputs)."""
+        inputs = np.tile(self.u, (*np.shape(positions), 1))
+        inputs[..., self.index] = positions
+        return inputs
+
+    def walk(self, z: Array, first: float, way: float = 1.0, towards: Array | None = None) -> Walk:
+        """A walk from a position of the input, in the direction in which it goes on, or towards other unknowns."""
+        axis = np.zeros_like(self.u)
+        axis[self.index] = way
+        curve = Curve(self.solver, self.p, self._at(first), axis)
+        numbers = list(self.branches)
+        y = np.append(z, 0.0)
+        start = onwards(curve, y, numbers) if towards is None else curve.at(y, towards)
+        return Walk(curve, start, numbers)
+
+    def _end(self, z: Array, here: float, sign: float) -> _End:
+        """Where the range of the input ends, one way from a position with unknowns z."""
+        far = ENDLESS if self.slides else 2.0 * pi
+        trip = Trip(self.solver, self.p, z, self._at(here), self._at(here + sign) - self._at(here), self.branches)
+        found = trip.to(far)
+        if found is not None:
+            if self.slides:
+                told = "the slide goes on without a limit; name where the range starts and stops"
+                raise BadInput(self.pair, told)
+            return _End(found[0], here + sign * far, False, True)
+        y = trip.here.y
+        return _End(y[:-1], here + sign * float(y[-1]), trip.dead is not None, False)
+
+
+class _Course:
+    """The curve along which an input runs: what it meets between the first row and the last."""
+
+    def __init__(self, ranged: Ranged, found: Rows, whole: bool):
+        self.ranged, self.found, self.whole = ranged, found, whole
+
+    def limits(self, motion: Motion) -> tuple[Limit, ...]:
+        """See `Motion.limits`."""
+        ranged, found = self.ranged, self.found
+        u = found.given.u[:, ranged.index]
+        if len(u) < 2:
+            return ()
+        if self.whole:
+            walk = self._walk(0, 1)
+            return limits.limits(ranged.solver, ranged.pair, walk.curve, self._along(walk, 0, None))
+        # from a row within, since on change points and dead points several ways lead on
+        inside = next((row for row in range(len(u)) if row not in found.local and row not in found.dead), 0)
+        last = (len(u) - 1) // 2 if self._turns_back(u) else len(u) - 1
+        down = self._along(self._walk(inside, 0), inside, 0) if inside else ()
+        walk = self._walk(inside, min(inside + 1, last))
+        up = self._along(walk, inside, last)
+        return limits.limits(ranged.solver, ranged.pair, walk.curve, [*list(down)[::-1], *up])
+
+    def _turns_back(self, u: Array) -> bool:
+        return len(u) > 2 and u[0] == u[-1] and u[1] == u[-2]
+
+    def _walk(self, row: int, towards: int) -> Walk:
+        """A walk from one row in the direction of another."""
+        u, z = self.found.given.u[:, self.ranged.index], self.found.z
+        way = np.append(z[towards] - z[row], abs(u[towards] - u[row]))
+        return self.ranged.walk(z[row], float(u[row]), 1.0 if u[towards] >= u[row] else -1.0, way)
+
+    def _along(self, walk: Walk, row: int, last: int | None) -> Iterator[limits.Found]:
+        u, ranged = self.found.given.u[:, self.ranged.index], self.ranged
+        way = float(walk.curve.way[ranged.index])
+        far = None if last is None else abs(float(u[last] - u[row]))
+        return limits.along(ranged.solver, ranged.pair, float(u[row]), way, walk, far)

@@ -1,0 +1,175 @@
+"""Positions of a run as a motion with its rates, once both parts of the gate have let them pass."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+
+from planar.algebra import Jet
+from planar.errors import NoAnswer, Outcome
+from planar.motion import Course, Motion
+from planar.program import placed
+from planar.results import InputMotion, Jerked
+from planar.solving import refusals
+from planar.solving.assemble import Assembly
+from planar.solving.follow import Local, Met, Run
+from planar.solving.position import Solver
+from planar.solving.rates import Given, rates
+from planar.solving.walk import Missed
+from planar.words import listed, many
+
+Array = np.ndarray
+
+NEARBY = 1e-2
+"""rad or sizes: a change point of a neighbouring linkage that is farther away is not worth a word."""
+
+
+class Rows(NamedTuple):
+    """Unknowns at the rows of a run (rows, unknowns), inputs with their rates, the rows that are dead points, rates
+    where the slope is singular, and what was met on the way."""
+
+    z: Array
+    given: Given
+    dead: tuple[int, ...] = ()
+    local: Mapping[int, Local] = MappingProxyType({})
+    met: tuple[Met, ...] = ()
+    missed: tuple[Missed, ...] = ()
+    outcome: Outcome = Outcome.SOLVED
+    reason: str = ""
+
+    def stopped(self, problem: NoAnswer | None) -> Rows:
+        """The same rows, of a run that stopped."""
+        return self if problem is None else self._replace(outcome=problem.outcome, reason=problem.reason)
+
+
+def rows(found: Run, given: Given, dead: tuple[int, ...] = ()) -> Rows:
+    """The rows of a run that was followed in one piece."""
+    part = Given(*(each[: len(found.z)] for each in given))
+    return Rows(found.z, part, dead, found.local, found.met, found.missed)
+
+
+def spliced(down: Run, up: Run) -> Run:
+    """Two runs from one position, which is no row, as one through it: the first backwards, then the second."""
+    back = len(down.z) - 1
+    local = {back - row: each for row, each in down.local.items()}
+    local |= {back + row - 1: each for row, each in up.local.items()}
+    return Run(
+        np.vstack([down.z[:0:-1], up.z[1:]]),
+        down.general + up.general,
+        up.stopped,
+        up.last,
+        local,
+        (*down.met[::-1], *up.met),
+        (*down.missed, *up.missed),
+    )
+
+
+def shortened(found: Run) -> Run:
+    """A run without its first position, which is no row."""
+    local = {row - 1: each for row, each in found.local.items() if row}
+    return found._replace(z=found.z[1:], local=local)
+
+
+def joined(first: Rows, second: Rows) -> Rows:
+    """Two runs one after the other, the second of which starts in the last row of the first."""
+    shift = len(first.z) - 1
+    given = Given(*(np.vstack([a, b[1:]]) for a, b in zip(first.given, second.given, strict=True)))
+    return first._replace(
+        z=np.vstack([first.z, second.z[1:]]),
+        given=given,
+        dead=tuple(sorted({*first.dead, *(row + shift for row in second.dead)})),
+        local={**first.local, **{row + shift: each for row, each in second.local.items() if row}},
+        met=(*first.met, *second.met),
+        missed=(*first.missed, *second.missed),
+        outcome=second.outcome,
+        reason=first.reason or second.reason,
+    )
+
+
+def reversed_(run: Rows) -> Rows:
+    """The same run backwards: velocities turn round, accelerations stay, as in a film run backwards."""
+    last = len(run.z) - 1
+    u, u1, u2, u3 = (each[::-1] for each in run.given)
+    return run._replace(
+        z=run.z[::-1],
+        given=Given(u, -u1, u2, -u3),
+        dead=tuple(sorted(last - row for row in run.dead)),
+        local={last - row: each for row, each in run.local.items()},
+    )
+
+
+def motion(
+    solver: Solver, assembly: Assembly, run: Rows, third: bool, course: Course, time: Array | None = None
+) -> Motion:
+    """The motion; raises NoAnswer where the gate does not let it pass."""
+    z, given = run.z, run.given
+    gaps = solver.gaps(z, given.u)
+    residual = float(gaps.max(initial=0.0))
+    if not residual <= solver.tolerance:
+        pair, _ = np.unravel_index(int(np.argmax(gaps)), gaps.shape)
+        raise refusals.not_closed(solver, solver.gate.names[pair], residual)
+    parts = rates(solver, z, given, run.local, third)
+    for part in parts[1:]:
+        # where the input turns back, no velocity of the rest goes with one of the input
+        part[list(run.dead)] = np.nan
+    scaled = [part * solver.scale for part in parts]
+    frames, own = _placed(solver, scaled[:3])
+    determined = ~np.isnan(parts[1]).any(axis=1) if parts[1].size else np.ones(len(z), dtype=bool)
+    inputs = [_input(solver, given, index) for index in range(len(solver.mechanism.inputs))]
+    gaps_of_rates = solver.gate.rate_gaps(frames, own, [Jet(*each) for each in inputs])
+    for (broken, pair), what in zip(gaps_of_rates, ("velocities", "accelerations"), strict=True):
+        worst = np.broadcast_to(broken, (len(z),))[determined].max(initial=0.0)
+        if worst > 1e3 * solver.tolerance:
+            raise refusals.broken_rates(solver, what, pair, float(worst))
+    solver.refuse_gap(frames, own)
+    return Motion(
+        mechanism=solver.mechanism,
+        inputs={each.pair: of for each, of in zip(solver.mechanism.inputs, inputs, strict=True)},
+        outcome=run.outcome,
+        reason=run.reason,
+        residual=residual,
+        remarks=(*solver.remarks(assembly), *_met(solver, run)),
+        frames=frames,
+        own=own,
+        shapes=solver.shapes,
+        time=time,
+        jerked=Jerked(*_placed(solver, scaled)) if third else None,
+        course=course,
+    )
+
+
+def _input(solver: Solver, given: Given, index: int) -> InputMotion:
+    size = solver.unit if solver.slides(solver.mechanism.inputs[index].pair) else 1.0
+    return InputMotion(*(part[:, index] * size for part in given[:3]))
+
+
+def _placed(solver: Solver, parts: list[Array]):  # noqa: ANN202
+    jets = [Jet(*(part[:, column] for part in parts)) for column in range(parts[0].shape[1])]
+    return placed(jets, solver.column, solver.shapes, solver.pairs)
+
+
+def _met(solver: Solver, run: Rows) -> list[str]:
+    """What to say of change points on the way, and near it."""
+    told: dict[str, None] = {}
+    for each in run.met:
+        told[crossed(solver, each)] = None
+    for missed in run.missed:
+        if missed.distance < NEARBY:
+            told[
+                f"the motion comes within {missed.distance:.1g} (rad, or lengths of the mechanism's size) of a change "
+                f"point of a linkage that differs from this one by {missed.open * solver.unit:.1g} m"
+            ] = None
+    return list(told)
+
+
+def crossed(solver: Solver, met: Met) -> str:
+    """What to say of a change point that a motion passes."""
+    ways = len(met.passed.crossing.ways)
+    at = listed([solver.told(g.pair, u) for g, u, w in zip(solver.mechanism.inputs, met.u, met.way, strict=True) if w])
+    if ways == 1:
+        return f"at {at} there is one more motion to first order, but only this one goes on"
+    on = "this one goes on smoothly" if met.passed.came == met.passed.went else "another one was taken, as asked for"
+    return f"at {at} {many(ways, 'branch', 'branches')} of the motion cross; {on}"

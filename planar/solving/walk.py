@@ -1,0 +1,160 @@
+"""Walking along the curve of positions, arc after arc, through dead points and smoothly through change points."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from planar.solving.change_point import Beside, Crossing, beside, crossing, lead, nearest
+from planar.solving.curve import Arc, Curve, Point, between
+
+Array = np.ndarray
+
+FIRST, LONGEST, SHORTEST = 0.05, 0.25, 1e-9
+"""Steps of arc length (rad, lengths of the size): the first, the longest, and one at which the curve ends."""
+BENT = 0.4
+"""rad by which the tangent may turn in a step."""
+CLOSE = 1.5
+"""How many times shorter than the distances from singular slopes at its two ends a step must be."""
+SUSPECTED, AGAIN = 0.15, 0.2
+"""Where to look for a change point: so near to a singular slope, and again where it is so many times nearer."""
+AHEAD = 10.0
+"""A change point farther ahead than so many times the distance within which there is none is another one."""
+ARCS = 50_000
+
+
+class Passed(NamedTuple):
+    """A change point that a walk went through: the ways, which of them it came by, and by which it went on."""
+
+    crossing: Crossing
+    came: int
+    went: int
+
+
+class Missed(NamedTuple):
+    """A change point of a neighbouring linkage that a walk came near: where, how near, and by how much this linkage's
+    constraints do not close there (lengths of the size)."""
+
+    y: Array
+    distance: float
+    open: float
+
+
+class Walk:
+    """One walk along a curve from a point: its arcs, one after the other, and what it met on the way.
+
+    `branches` are the numbers of the ways taken at change points, in the order in which they are met: 1 goes on
+    smoothly, 2 takes the way nearest to that, and so on; 1 where the list ends.
+    """
+
+    def __init__(self, curve: Curve, start: Point, branches: Sequence[int] = ()):
+        self.curve, self.here = curve, start
+        self.branches = list(branches)
+        self.passed: list[Passed] = []
+        self.missed: list[Missed] = []
+        self.step = FIRST
+        self._looked = np.inf
+
+    def arcs(self) -> Iterator[Arc]:
+        """The arcs of the curve; they end where it cannot be followed further."""
+        for _ in range(ARCS):
+            here = self.here
+            if here.clear < SUSPECTED and here.clear < AGAIN * self._looked:
+                through = list(self._through())
+                if through:
+                    yield from through
+                    self.step, self._looked = FIRST, np.inf
+                    continue
+            elif here.clear > SUSPECTED:
+                self._looked = np.inf
+            after = self._next()
+            if after is None:
+                return
+            self._note(after)
+            self.here = after
+            yield between(here, after)
+
+    def _next(self) -> Point | None:
+        """The next point: a predictor of second order, Newton's corrector, and the second part of the gate."""
+        here, curve = self.here, self.curve
+        bent = float(np.linalg.norm(here.bend))
+        step = min(self.step, LONGEST, 1.2 * here.clear, 0.8 * BENT / max(bent, 1e-300))
+        while step > SHORTEST:
+            y = curve.corrected(here.y + step * here.tangent + 0.5 * step**2 * here.bend, here.tangent)
+            if y is not None:
+                after = curve.at(y, here.tangent)
+                gone = float(np.linalg.norm(y - here.y))
+                onwards = after.tangent @ here.tangent > np.cos(BENT)
+                if onwards and CLOSE * gone < here.clear + after.clear and gone < 2.0 * step:
+                    self.step = 1.6 * step
+                    return after
+            step *= 0.5
+        return None
+
+    def _through(self) -> Iterator[Arc]:
+        """The arcs through a change point that lies just ahead, if one does."""
+        here, curve = self.here, self.curve
+        self._looked = here.clear
+        near = nearest(curve, here)
+        if near is None:
+            return
+        ahead = float(here.tangent @ (near.y - here.y))
+        away = float(np.linalg.norm(near.y - here.y))
+        if not ahead > 0.0 or away > AHEAD * here.clear:
+            return
+        if near.open > curve.solver.tolerance or not curve.closes(near.y):
+            self.missed = [each for each in self.missed if np.linalg.norm(each.y - near.y) > 1e-6]
+            self.missed.append(Missed(near.y, away, near.open))
+            return
+        found = crossing(curve, near.y)
+        came = None if found is None else lead(curve, here, found)
+        if found is None or came is None:
+            return
+        went = self._taken(found, came, here)
+        inwards, outwards = (
+            self._sided(found.ways[index], sense) for index, sense in ((came, here), (went[0], went[1]))
+        )
+        if inwards is None or outwards is None:
+            return
+        if float(inwards.middle.tangent @ (here.y - inwards.before.y)) < 0.0:
+            yield between(here, inwards.before)
+            here = inwards.before
+        self.passed.append(Passed(found, came, went[0]))
+        yield inwards.arc(here, inwards.middle)
+        yield outwards.arc(outwards.middle, outwards.after)
+        self.here = outwards.after
+
+    def _sided(self, way: Point, towards: Point) -> Beside | None:
+        """The curve beside a change point along a way, in the sense of a point on it."""
+        return beside(self.curve, way if way.tangent @ towards.tangent >= 0.0 else way.turned())
+
+    def _taken(self, found: Crossing, came: int, here: Point) -> tuple[int, Point]:
+        """The way to go on by, and a point in whose sense: smoothly, or as asked for."""
+        number = self.branches.pop(0) if self.branches else 1
+        options = outgoing(found, came, here)
+        index, tangent = options[min(number, len(options)) - 1]
+        return index, found.ways[index]._replace(tangent=tangent)
+
+    def _note(self, after: Point) -> None:
+        """How near the walk comes to change points of neighbouring linkages."""
+        for k, each in enumerate(self.missed):
+            self.missed[k] = each._replace(distance=min(each.distance, float(np.linalg.norm(after.y - each.y))))
+
+
+def outgoing(found: Crossing, came: int, here: Point) -> list[tuple[int, Array]]:
+    """The ways on from a change point with their directions: the smooth one first, then by the angle from it.
+
+    Of another way the direction in which the inputs go on as they came; both where they rest on it.
+    """
+    smooth = found.ways[came].tangent
+    smooth = smooth if smooth @ here.tangent >= 0.0 else -smooth
+    options = []
+    for index, way in enumerate(found.ways):
+        for tangent in (way.tangent, -way.tangent):
+            same = index == came
+            onwards = tangent @ smooth > 0.0 if same else tangent[-1] * smooth[-1] >= -1e-9
+            if onwards:
+                options.append((index, tangent))
+    return sorted(options, key=lambda each: -float(each[1] @ smooth))
