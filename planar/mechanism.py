@@ -68,7 +68,6 @@ class Input(NamedTuple):
     position: float
     velocity: float = 0.0
     acceleration: float = 0.0
-    law: object = None
 
 
 class Load(NamedTuple):
@@ -166,7 +165,8 @@ def with_inputs(mechanism: Mechanism, drives: tuple[Drive, ...]) -> Mechanism:
         drive = changes.get(given.pair)
         if drive is None:
             return given
-        return given._replace(**{name: value for name, value in drive._asdict().items() if value is not None})
+        told = zip(given, drive, strict=True)
+        return Input(*(old if new is None else new for old, new in told))
 
     return replace(mechanism, inputs=tuple(changed(given) for given in mechanism.inputs))
 
