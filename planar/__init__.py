@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from planar.motion import Motion, State
     from planar.solving.cycle import cycle
     from planar.solving.position import solve
+    from planar.views.dataset import dataset
 
 __version__ = "0.4.0"
 
@@ -56,6 +57,7 @@ _ROOMS = {
     "centrodes": "analysis.centrodes",
     "curvature": "analysis.curvature",
     "cycle": "solving.cycle",
+    "dataset": "views.dataset",
     "dumps": "files",
     "forces": "analysis.forces",
     "from_dict": "files",
@@ -103,6 +105,7 @@ __all__ = [
     "centrodes",
     "curvature",
     "cycle",
+    "dataset",
     "dumps",
     "forces",
     "from_dict",

@@ -10,6 +10,7 @@ from numbers import Real
 from typing import NamedTuple
 
 from planar.errors import BadInput
+from planar.laws import Law
 from planar.pairs.base import Pair
 from planar.shapes import Along, At, Distances, Link, Place, Point, Shape
 from planar.units import unit
@@ -62,12 +63,16 @@ FARTHEST = 1e4
 
 
 class Input(NamedTuple):
-    """A relative motion that is given: at a turning pair an angle, at a sliding pair a distance (rad or m, per s)."""
+    """A relative motion that is given: at a turning pair an angle, at a sliding pair a distance (rad or m, per s).
+
+    With a law it moves in time: from `position` on, and where the law goes on at a speed, from `velocity`.
+    """
 
     pair: str
     position: float
     velocity: float = 0.0
     acceleration: float = 0.0
+    law: Law | None = None
 
 
 class Load(NamedTuple):
@@ -149,7 +154,10 @@ class NamedPoint(NamedTuple):
 
 
 def with_inputs(mechanism: Mechanism, drives: tuple[Drive, ...]) -> Mechanism:
-    """The same mechanism with some of its inputs changed. Raises BadInput where it has no such input."""
+    """The same mechanism with some of its inputs changed; their laws start from there.
+
+    Raises BadInput where it has no such input.
+    """
     for drive in drives:
         for value in drive[1:]:
             if value is not None and (isinstance(value, bool) or not isinstance(value, Real) or not isfinite(value)):
@@ -165,8 +173,8 @@ def with_inputs(mechanism: Mechanism, drives: tuple[Drive, ...]) -> Mechanism:
         drive = changes.get(given.pair)
         if drive is None:
             return given
-        told = zip(given, drive, strict=True)
-        return Input(*(old if new is None else new for old, new in told))
+        found = given._replace(**{key: new for key, new in drive._asdict().items() if new is not None})
+        return found._replace(law=given.law and given.law.started(found.position, found.velocity))
 
     return replace(mechanism, inputs=tuple(changed(given) for given in mechanism.inputs))
 
@@ -191,6 +199,9 @@ def check(mechanism: Mechanism) -> None:
     for given in mechanism.inputs:
         if given.pair not in named:
             raise BadInput(given.pair, f"there is no pair {given.pair!r} to be driven; pairs are {', '.join(named)}")
+        wrong = given.law and given.law.problem()
+        if wrong:
+            raise BadInput(f"{given.pair}.law{wrong[0]}", wrong[1])
 
 
 def misfits(pairs: Sequence[Pair], shapes: Mapping[str, Shape], units: Units) -> Iterator[tuple[Pair, str]]:

@@ -18,6 +18,8 @@ SI = {
     "angular acceleration": "rad/s^2",
     "velocity": "m/s",
     "acceleration": "m/s^2",
+    "jerk": "m/s^3",
+    "angular jerk": "rad/s^3",
     "force": "N",
     "torque": "N m",
     "time": "s",
@@ -46,6 +48,7 @@ TABLE: dict[str, tuple[str, float, float]] = {
     "kN": ("force", 1e3, 1.0),
     "N m": ("torque", 1.0, 1.0),
     "s": ("time", 1.0, 1.0),
+    "ms": ("time", 1.0, 1e3),
 }
 """unit: (kind, numerator, denominator) of its size in SI."""
 

@@ -1,8 +1,6 @@
 """Runs of positions against closed forms, row by row, and where they end."""
 
 import copy
-import csv
-import io
 import json
 
 import numpy as np
@@ -13,7 +11,7 @@ from planar import files
 from planar.errors import BadInput, NoAnswer, Outcome
 from planar.solving.branch import Branch
 from planar.solving.position import Solver
-from tests.test_cli import run, written
+from tests.test_cli import run
 
 TURN = 2 * np.pi
 
@@ -515,98 +513,13 @@ def test_a_geared_five_bar_closes_only_after_two_turns():
     assert np.hypot(*(place[20] - place[0])) > 0.01
 
 
-# files
-
-
-def limits_file(folder):
-    value = json.loads(json.dumps(files.to_dict(four_bar(*TRIPLE, 0.6))))
-    value["units"] = {"length": "mm", "angle": "deg"}
-    for link, length in zip(("AB", "BC", "DC"), (900, 700, 850), strict=True):
-        value["links"][link]["length"] = length
-    value["links"]["AD"]["points"]["D"] = [1500, 0]
-    value["links"]["BC"]["points"]["E"]["distance"] = 280
-    value["inputs"] = [{"pair": "A", "position": 30, "velocity": "2 rad/s"}]
-    value["sketch"] = {"C": [1000, 800]}
-    return written(folder, value)
-
-
-def test_a_run_is_written_as_csv_in_the_units_of_its_file(tmp_path):
-    name = limits_file(tmp_path)
-    assert "positions" in run(tmp_path, "cycle", name, "--steps", "12", "-o", "m.csv").done()
-    motion = planar.cycle(planar.load(tmp_path / name), 12)
-    heads, *rows = csv.reader(io.StringIO((tmp_path / "m.csv").read_text(encoding="utf-8")))
-    assert len(rows) == 13
-    columns = dict(zip(heads, zip(*rows, strict=True), strict=True))
-    assert len(columns) == len(heads)
-    wanted = {
-        "input A position [deg]": np.degrees(motion.inputs["A"].position),
-        "input A velocity [rad/s]": motion.inputs["A"].velocity,
-        "input A acceleration [rad/s^2]": motion.inputs["A"].acceleration,
-        "C x [mm]": 1e3 * motion.point("C").position[:, 0],
-        "C y [mm]": 1e3 * motion.point("C").position[:, 1],
-        "E vx [m/s]": motion.point("E").velocity[:, 0],
-        "E ay [m/s^2]": motion.point("E").acceleration[:, 1],
-        "BC angle [deg]": np.degrees(motion.link("BC").angle),
-        "DC angular velocity [rad/s]": motion.link("DC").angular_velocity,
-        "DC angular acceleration [rad/s^2]": motion.link("DC").angular_acceleration,
-        "pair C relative angular velocity [rad/s]": motion.pair("C")["relative_angular_velocity"],
-    }
-    for head, values in wanted.items():
-        found = [float(cell) if cell else np.nan for cell in columns[head]]
-        np.testing.assert_allclose(found, values, rtol=1e-14, atol=1e-300)
-    # where no rate is determined the cell is blank, not a number that says so
-    assert columns["DC angular velocity [rad/s]"][0] == columns["E ay [m/s^2]"][-1] == ""
-    assert not any("nan" in cell.lower() for row in rows for cell in row)
-    assert not any(head.startswith("AD ") for head in heads)
-
-
-def test_a_run_is_written_as_json_and_npz_in_si(tmp_path):
-    def strict(word):
-        raise AssertionError(f"{word} is no JSON")
-
-    name = limits_file(tmp_path)
-    for output in ("run.json", "run.npz"):
-        assert "positions" in run(tmp_path, "cycle", name, "--steps", "12", "-o", output).done()
-    printed = json.loads(run(tmp_path, "cycle", name, "--steps", "12", "--json").done(), parse_constant=strict)
-    told = json.loads((tmp_path / "run.json").read_text(encoding="utf-8"), parse_constant=strict)
-    assert told == printed
-    motion = planar.cycle(planar.load(tmp_path / name), 12)
-    assert (told["outcome"], told["reason"], told["mechanism"]) == ("solved", motion.reason, "four-bar")
-    assert told["residual"] == motion.residual
-    with np.load(tmp_path / "run.npz", allow_pickle=False) as arrays:
-        for group in ("inputs", "links", "points"):
-            assert set(told[group]) == set(getattr(motion, group))
-            for key, each in getattr(motion, group).items():
-                for what, values in each._asdict().items():
-                    np.testing.assert_array_equal(np.array(told[group][key][what], dtype=float), values)
-                    np.testing.assert_array_equal(arrays[f"{group}/{key}/{what}"], values)
-        np.testing.assert_array_equal(
-            arrays["pairs/C/relative_angular_velocity"], motion.pair("C")["relative_angular_velocity"]
-        )
-        assert not any(name.endswith("rubbing_speed") for name in arrays)  # no pin has a radius
-    assert told["links"]["DC"]["angular_velocity"][0] is None
-    assert told["pairs"]["C"]["rubbing_speed"] is None
-    assert np.shape(told["points"]["C"]["velocity"]) == (13, 2)
-
-
-def test_a_slides_columns_have_units_of_length(tmp_path):
-    model = ("elliptical-trammel", "--steps", "4", "--from", "80mm", "--to", "0.1 m")
-    run(tmp_path, "cycle", *model, "-o", "m.csv").done()
-    heads, *rows = csv.reader(io.StringIO((tmp_path / "m.csv").read_text(encoding="utf-8")))
-    columns = dict(zip(heads, zip(*rows, strict=True), strict=True))
-    np.testing.assert_allclose([float(x) for x in columns["input across position [mm]"]], [80, 85, 90, 95, 100])
-    assert "input across velocity [m/s]" in columns
-    np.testing.assert_allclose(
-        [float(y) for y in columns["pair up displacement [mm]"]],
-        np.sqrt(120.0**2 - np.array([80, 85, 90, 95, 100]) ** 2),
-        rtol=1e-12,
-    )
+# the command line
 
 
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["-o", "m.xlsx"], [".xlsx", ".csv, .json, .npz"]),
+        (["-o", "m.xlsx"], [".xlsx", ".csv, .json, .npz, .parquet"]),
         (["-o", "m"], ["the file", ".csv"]),
         (["-o", "no/m.csv"], ["m.csv", "cannot be written"]),
         (["-o", "m.csv", "--json"], ["-o", "give one of the two"]),

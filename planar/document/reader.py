@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from planar.document.cursor import Cursor, Whole, called, did_you_mean
+from planar.document.laws import jumps, read_law
 from planar.document.schema import (
     ALONG,
     DISTANCES,
@@ -75,7 +76,8 @@ def read(value: Any) -> Mechanism:
         loads=(),
         remarks=_left_out(full, pairs),
     )
-    driven = replace(bare, inputs=_inputs(full, motions(bare)))
+    inputs = _inputs(full, motions(bare))
+    driven = replace(bare, inputs=inputs, remarks=(*bare.remarks, *jumps(inputs, motions(bare))))
     points = _point_names(driven)
     return replace(
         driven,
@@ -271,12 +273,14 @@ def _inputs(top: Cursor, known: Mapping[str, Pair]) -> tuple[Input, ...]:
         pair = _motion(cursor["pair"], known)
         if pair.name in found:
             raise cursor.refuse("pair", f"pair {pair.name!r} has an input already; a pair takes one")
-        found[pair.name] = Input(
+        given = Input(
             pair.name,
             cursor.quantity("position", "length") if pair.drive_kind is Kind.LENGTH else cursor.turned("position"),
             cursor.quantity("velocity", pair.driven()[1], 0.0),
             cursor.quantity("acceleration", pair.driven()[2], 0.0),
         )
+        law = read_law(cursor["law"], given, pair.driven()) if cursor.has("law") else None
+        found[pair.name] = given._replace(law=law)
     return tuple(found.values())
 
 

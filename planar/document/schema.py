@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from planar.laws import MOST, MOTIONS, Piece
 from planar.mechanism import QUANTITIES
 from planar.pairs import Pair, pair_types
 from planar.pairs.base import Schema, described, several
@@ -72,6 +73,7 @@ INPUT: Schema = {
     "position": described("quantity"),
     "velocity": described("quantity"),
     "acceleration": described("quantity"),
+    "law": {"anyOf": [described("piece"), several("piece", 1, MOST)]},
 }
 DRIVE: Schema = {key: INPUT[key] for key in ("position", "velocity", "acceleration")}
 FORCE: Schema = {"point": _TEXT, "force": _vector("quantity")}
@@ -148,6 +150,8 @@ def schema() -> dict[str, Any]:
                 ],
                 **{"not": {"required": ["ends", "axis"]}},
             ),
+            "time": _quantity(_SIZE, "[+]?", "0.5 s"),
+            "piece": {"oneOf": [_piece(kind) for kind in MOTIONS.values()]},
             "drives": {"type": "object", "additionalProperties": _object(DRIVE)},
             "pair": {"oneOf": [_pair(kind) for kind in pair_types().values()]},
         },
@@ -157,3 +161,13 @@ def schema() -> dict[str, Any]:
 def _pair(kind: type[Pair]) -> Schema:
     properties = {kind.keyword: described("name"), **kind.members}
     return _object(properties, kind.keyword, *kind.required) | dict(kind.rule)
+
+
+def _piece(kind: type[Piece]) -> Schema:
+    """The schema of one motion of an input's law."""
+    values = {"time": described("time"), "number": {"type": "number", "exclusiveMinimum": 0, "maximum": 1}}
+    properties: Schema = {"motion": {"const": kind.motion}}
+    for name, key in kind.keys.items():
+        value = values.get(key.what, described("quantity"))
+        properties[name] = several("quantity", 2, MOST) if key.many else value
+    return _object(properties, "motion", *(name for name, key in kind.keys.items() if key.needed))

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
+from planar.document.laws import write_law
 from planar.document.schema import DRIVE, FORMAT
-from planar.mechanism import QUANTITIES, Drive, Link, Mechanism, Published, entries, motions
+from planar.mechanism import QUANTITIES, Drive, Input, Link, Mechanism, Published, entries, motions
 from planar.pairs import Quantity
 from planar.shapes import Along, At, Place
 from planar.units import SI, Unit, shortest, unit
@@ -93,8 +94,9 @@ def _place(place: Place, quantity: Quantity) -> Any:
     }
 
 
-def _drive_entry(mechanism: Mechanism, drive: Any, quantity: Quantity) -> dict[str, Any]:
-    return {"pair": drive.pair} | _drive(mechanism, drive, quantity)
+def _drive_entry(mechanism: Mechanism, drive: Input, quantity: Quantity) -> dict[str, Any]:
+    law = None if drive.law is None else write_law(drive.law, motions(mechanism)[drive.pair].driven(), quantity)
+    return {"pair": drive.pair} | _drive(mechanism, drive, quantity) | _told(law=law)
 
 
 def _drive(mechanism: Mechanism, drive: Any, quantity: Quantity) -> dict[str, Any]:

@@ -1,109 +1,125 @@
-"""A run of positions as columns: named, with units, for files that other programs read."""
+"""A run of positions in the formats that other programs read."""
 
 from __future__ import annotations
 
-import csv
 import io
 import json
-from collections.abc import Callable, Iterator
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from planar.errors import BadInput
 from planar.motion import Motion
-from planar.units import SI, unit
+from planar.results import Limit
+from planar.units import SI
+from planar.views import parquet
+from planar.views.columns import about, columns, told
 
 Array = np.ndarray
 
-
-class Column(NamedTuple):
-    """What stands in a column: of what, which quantity, its kind, and its values (n,) in SI."""
-
-    of: str
-    what: str
-    kind: str
-    values: Array
+ROWS = 500
+"""Of a CSV file that are made at a time: enough to be quick, few enough for the memory of many columns."""
 
 
-def columns(motion: Motion) -> Iterator[Column]:
-    """Inputs, points, links, then what the pairs report, in the order of the file."""
-    for name, given in motion.inputs.items():
-        kinds = motion.driven(name)
-        for what, kind, values in zip(("position", "velocity", "acceleration"), kinds, given, strict=True):
-            yield Column(f"input {name}", what, kind, values)
-    for name, point in motion.points.items():
-        for letter, kind, vectors in zip(("", "v", "a"), ("length", "velocity", "acceleration"), point, strict=True):
-            for axis, values in zip("xy", vectors.T, strict=True):
-                yield Column(name, f"{letter}{axis}", kind, values)
-    for name, link in motion.links.items():
-        if name != motion.mechanism.frame:
-            for what, values in link._asdict().items():
-                yield Column(name, what.replace("_", " "), what.replace("_", " "), values)
-    for name, report in motion.pairs.items():
-        of = motion.reported(name)
-        for what, found in report.items():
-            if found is not None:
-                yield Column(f"pair {name}", what.replace("_", " "), of[what], found)
+def writable(suffix: str) -> None:
+    """Make sure, before a long run, that it can be written to a file of this suffix. Raises BadInput."""
+    if suffix.lower() not in _FORMATS:
+        raise BadInput(suffix or "the file", f"a run is written to {', '.join(_FORMATS)} files")
+    if suffix.lower() == ".parquet":
+        parquet.ready()
 
 
-def written(motion: Motion, suffix: str) -> str | bytes:
+def written(motion: Motion, suffix: str) -> bytes:
     """The run in the format that a file's suffix names. Raises BadInput."""
-    formats: dict[str, Callable[[Motion], str | bytes]] = {".csv": _csv, ".json": _json, ".npz": _npz}
-    if suffix not in formats:
-        raise BadInput(suffix or "the file", f"a run is written to {', '.join(formats)} files")
-    return formats[suffix](motion)
-
-
-def _csv(motion: Motion) -> str:
-    """A row a position; positions and angles in the units of the mechanism's file, rates in SI, as the heads say."""
-    units = motion.mechanism.units
-    heads, values = [], []
-    for column in columns(motion):
-        name = {"angle": units.angle, "length": units.length}.get(column.kind, SI[column.kind])
-        heads.append(f"{column.of} {column.what} [{name}]")
-        values.append([unit(name).from_si(float(value)) for value in column.values])
-    text = io.StringIO()
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow(heads)
-    table.writerows(["" if np.isnan(value) else repr(value) for value in row] for row in zip(*values, strict=True))
-    return text.getvalue()
+    writable(suffix)
+    return _FORMATS[suffix.lower()](motion)
 
 
 def record(motion: Motion) -> dict[str, Any]:
-    """The run as a JSON value in SI; null where no rate is determined."""
+    """The run as a JSON value in SI; null where no rate is determined.
+
+    "time" is there where the run has one, so are "jerk" of points and "angular_jerk" of links; "limits" is a list of
+    what `planar.results.Limit` holds.
+    """
+    return _record(motion, _list)
+
+
+def _record(motion: Motion, shown: Callable[[Array | None], Any]) -> dict[str, Any]:
+    groups: dict[str, dict[str, Any]] = {"inputs": {}, "links": {}, "points": {}, "pairs": {}}
+    for thing in told(motion):
+        groups[thing.group][thing.name] = {what: shown(values) for what, values in thing.values.items()}
     return {
-        "mechanism": motion.mechanism.name,
-        "outcome": motion.outcome.value,
-        "reason": motion.reason,
+        **about(motion),
         "residual": motion.residual,
-        "inputs": {name: _lists(given._asdict()) for name, given in motion.inputs.items()},
-        "links": {name: _lists(link._asdict()) for name, link in motion.links.items()},
-        "points": {name: _lists(point._asdict()) for name, point in motion.points.items()},
-        "pairs": {name: _lists(report) for name, report in motion.pairs.items()},
+        "units": "SI",
+        **({} if motion.time is None else {"time": shown(motion.time)}),
+        **groups,
+        "limits": [_limit(each) for each in motion.limits],
         "remarks": list(motion.remarks),
     }
 
 
-def _lists(arrays: dict[str, Array | None]) -> dict[str, Any]:
-    return {
-        name: None if values is None else np.where(np.isnan(values), None, values).tolist()
-        for name, values in arrays.items()
-    }
+def _limit(limit: Limit) -> dict[str, Any]:
+    """What is told of a limit; null for a number that is not there."""
+    numbers = {what: _list(np.asarray(getattr(limit, what), dtype=float)) for what in ("input", "value")}
+    return limit._asdict() | numbers
 
 
-def _json(motion: Motion) -> str:
-    return json.dumps(record(motion), ensure_ascii=False, allow_nan=False) + "\n"
+def _list(values: Array | None) -> Any:
+    """An array as lists; null where it has no finite number, for which JSON has no word."""
+    if values is None:
+        return None
+    there = np.isfinite(values)
+    return (values if there.all() else np.where(there, values, None)).tolist()
+
+
+def _json(motion: Motion) -> bytes:
+    whole = _record(motion, lambda values: values)
+    # arrays become lists one by one as they are written: lists of a long run take four times the memory of its arrays
+    return (json.dumps(whole, default=_list, ensure_ascii=False, allow_nan=False) + "\n").encode()
+
+
+def _csv(motion: Motion) -> bytes:
+    """A row a position; positions and angles in the units of the mechanism's file, rates in SI, as the heads say."""
+    all_columns = tuple(columns(motion))
+    text = io.BytesIO()
+    text.write((",".join(_cell(column.head) for column in all_columns) + "\n").encode())
+    for first in range(0, len(motion), ROWS):
+        block = np.column_stack([column.values[first : first + ROWS] for column in all_columns]).tolist()
+        rows = "".join(",".join(map(repr, row)) + "\n" for row in block)
+        text.write(rows.replace("nan", "").encode())  # what is not determined is a blank cell
+    return text.getvalue()
+
+
+def _cell(text: str) -> str:
+    """A text as a cell, in quotes where it holds what ends a cell (RFC 4180)."""
+    return '"' + text.replace('"', '""') + '"' if any(mark in text for mark in ',"\n\r') else text
 
 
 def _npz(motion: Motion) -> bytes:
-    """SI arrays under names such as "points/C/velocity"."""
-    arrays: dict[str, Array] = {}
-    for group in ("inputs", "links", "points"):
-        for name, each in getattr(motion, group).items():
-            arrays |= {f"{group}/{name}/{what}": values for what, values in each._asdict().items()}
-    for name, report in motion.pairs.items():
-        arrays |= {f"pairs/{name}/{what}": values for what, values in report.items() if values is not None}
+    """SI arrays under names such as "points/C/velocity", and texts; "units" are rows of an array's name and its unit.
+
+    `dict(arrays["units"])["points/C/velocity"]` is "m/s".
+    """
+    arrays: dict[str, Any] = {}
+    units: dict[str, str] = {}
+    if motion.time is not None:
+        arrays["time"], units["time"] = motion.time, SI["time"]
+    for thing in told(motion):
+        for what, values in thing.values.items():
+            if values is not None:
+                name = f"{thing.group}/{thing.name}/{what}"
+                arrays[name], units[name] = values, SI[thing.kinds[what]]
+    texts = {what: np.array(text) for what, text in about(motion).items()}
     content = io.BytesIO()
-    np.savez(content, **arrays)
+    np.savez(content, **arrays, **texts, units=np.array(list(units.items())))
     return content.getvalue()
+
+
+_FORMATS: dict[str, Callable[[Motion], bytes]] = {
+    ".csv": _csv,
+    ".json": _json,
+    ".npz": _npz,
+    ".parquet": parquet.written,
+}

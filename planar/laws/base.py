@@ -1,0 +1,76 @@
+"""What every piece of an input's law offers, and the keys that it is written with."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from math import isfinite
+from numbers import Real
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+Array = np.ndarray
+
+SHORTEST, LONGEST = 1e-9, 1e9
+"""s: what a piece takes at least and at most, so that no rate of it overflows."""
+MOST = 10_000
+"""Pieces of one law, and points of one table."""
+
+
+class Key(NamedTuple):
+    """A key of a piece in a file: the field that it fills, and what its value is.
+
+    `what` is "time", "number", or what of the input it is: "position", "velocity", "acceleration".
+    """
+
+    field: str
+    what: str
+    needed: bool = True
+    many: bool = False
+
+
+class Piece(ABC):
+    """One motion of an input, from the place that it has reached on.
+
+    Frozen dataclasses; `motion` is the name in files. All times are in s from where the piece starts, lengths in m,
+    angles in rad.
+    """
+
+    motion: ClassVar[str]
+    keys: ClassVar[Mapping[str, Key]]
+    duration: float
+
+    @abstractmethod
+    def at(self, t: Array, velocity: float) -> Array:
+        """(4, n): the way from where the piece starts, and its three rates, at times (n,) within the piece.
+
+        `velocity` is that at which the piece before ended.
+        """
+
+    @abstractmethod
+    def ends(self, velocity: float) -> tuple[float, float]:
+        """The whole way, and the velocity in the end."""
+
+    @abstractmethod
+    def starts(self, velocity: float) -> float:
+        """The velocity with which the piece starts."""
+
+    def problem(self) -> tuple[str, str] | None:
+        """The key whose value cannot be meant, and why."""
+        for key, (field, _, _, many) in self.keys.items():
+            value = getattr(self, field)
+            if value is None and getattr(type(self), field, 0.0) is None:
+                continue  # left out
+            for place, each in ((f"{key}[{i}]", each) for i, each in enumerate(value)) if many else ((key, value),):
+                if not _is_number(each):
+                    return place, f"a finite number is wanted here, not {each!r:.40}"
+        if "in" in self.keys and not self.duration > 0.0:
+            return "in", f"a time above zero is wanted here, not {float(self.duration):g} s"
+        if "in" in self.keys and not SHORTEST <= self.duration <= LONGEST:
+            return "in", f"a piece takes from {SHORTEST:g} s to {LONGEST:g} s, not {float(self.duration):g} s"
+        return None
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool) and isfinite(value)

@@ -1,0 +1,104 @@
+"""What a run of positions holds, by name and kind of quantity, and the same as columns of a table with heads."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from planar.motion import Motion
+from planar.units import SI, unit
+
+Array = np.ndarray
+
+POINTS = {"position": "length", "velocity": "velocity", "acceleration": "acceleration", "jerk": "jerk"}
+"""What is told of a point, and the kind of quantity that each is; a jerk where the run has one."""
+
+_LETTERS = {"position": "", "velocity": "v", "acceleration": "a", "jerk": "j"}
+
+
+class Told(NamedTuple):
+    """What a run tells of one thing, in SI.
+
+    `group` is "inputs", "points", "links" or "pairs"; `values` are arrays (n,), of points (n, 2), under the names of
+    the quantities, None where the thing has no such quantity; `kinds` are the kinds of these quantities (see units.SI).
+    """
+
+    group: str
+    name: str
+    kinds: Mapping[str, str]
+    values: Mapping[str, Array | None]
+
+
+class Column(NamedTuple):
+    """A column of a table: its name, its unit, its kind of quantity, and its values (n,) in that unit."""
+
+    name: str
+    unit: str
+    kind: str
+    values: Array
+
+    @property
+    def head(self) -> str:
+        """Name and unit, as "C x [mm]"."""
+        return f"{self.name} [{self.unit}]"
+
+
+def about(motion: Motion) -> dict[str, str]:
+    """The texts that stand at the head of a run in every format that has room for texts."""
+    return {"mechanism": motion.mechanism.name, "outcome": motion.outcome.value, "reason": motion.reason}
+
+
+def told(motion: Motion) -> Iterator[Told]:
+    """Inputs, points, links, then what the pairs report; the jerks of points and links where the run has them."""
+    for name, given in motion.inputs.items():
+        values = given._asdict()
+        yield Told("inputs", name, dict(zip(values, motion.driven(name), strict=True)), values)
+    jerked = motion.jerked is not None
+    for name in motion.point_names:
+        values = motion.point(name)._asdict() | ({"jerk": motion.jerk(name)} if jerked else {})
+        yield Told("points", name, POINTS, values)
+    for name in motion.frames:
+        values = motion.link(name)._asdict() | ({"angular_jerk": motion.angular_jerk(name)} if jerked else {})
+        yield Told("links", name, {what: what.replace("_", " ") for what in values}, values)
+    for name, report in motion.pairs.items():
+        yield Told("pairs", name, motion.reported(name), report)
+
+
+def columns(motion: Motion) -> Iterator[Column]:
+    """Time where there is one, then all that is told of the run but the frame's rest, under names that differ.
+
+    Positions and angles are in the units of the mechanism's file, everything else in SI.
+    """
+    own = {"angle": motion.mechanism.units.angle, "length": motion.mechanism.units.length}
+    taken: set[str] = set()
+    for name, kind, values in _named(motion):
+        different, again = name, 1
+        while different in taken:  # as a link "pair G" beside a pair "G"
+            again += 1
+            different = f"{name} ({again})"
+        taken.add(different)
+        if kind in own:
+            _, numerator, denominator = unit(own[kind])
+            yield Column(different, own[kind], kind, values * denominator / numerator)
+        else:
+            yield Column(different, SI[kind], kind, values)
+
+
+def _named(motion: Motion) -> Iterator[tuple[str, str, Array]]:
+    """Name, kind and values (n,) in SI of every column."""
+    if motion.time is not None:
+        yield "time", "time", motion.time
+    for thing in told(motion):
+        if thing.group == "links" and thing.name == motion.mechanism.frame:
+            continue
+        of = {"inputs": "input ", "pairs": "pair "}.get(thing.group, "") + thing.name
+        for what, values in thing.values.items():
+            if values is None:
+                continue
+            if thing.group == "points":
+                for axis, part in zip("xy", values.T, strict=True):
+                    yield f"{of} {_LETTERS[what]}{axis}", thing.kinds[what], part
+            else:
+                yield f"{of} {what.replace('_', ' ')}", thing.kinds[what], values
