@@ -15,7 +15,7 @@ from planar.solving.walk import Walk
 
 Array = np.ndarray
 
-PIECES = 4000
+PIECES = 1500
 """Linkages whose circuit is longer, as with wheels of many teeth, are followed over a range instead."""
 ENDLESS = 100.0
 """Lengths of the size: a slide that goes on so far has no limit."""

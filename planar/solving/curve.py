@@ -146,7 +146,7 @@ class Curve:
 
 
 def truncated(slope: Array, left: Array, rank: int) -> Array:
-    """The shortest step (n + 1,) that closes what is open, but for the direction in which the slope all but vanishes."""
+    """The shortest step (n + 1,) that closes what is open, without the way in which the slope all but vanishes."""
     u, s, vt = np.linalg.svd(slope, full_matrices=False)
     kept = (s > POLISHED * s[0]) & (np.arange(len(s)) < rank) if s.size else np.zeros(0, dtype=bool)
     return vt[kept].T @ ((u.T[kept] @ left) / s[kept])

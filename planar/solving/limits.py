@@ -12,9 +12,8 @@ from planar.pairs import Kind, Pair
 from planar.program import placed
 from planar.results import Limit
 from planar.roots import root
-from planar.solving.circuit import circuit
 from planar.solving.curve import Curve, Point
-from planar.solving.follow import SEAM, Piece, cubic, met, pieces, rests
+from planar.solving.follow import SEAM, Piece, cubic, met, rests
 from planar.solving.rows import crossed
 from planar.solving.setup import Setup
 from planar.solving.walk import Walk
@@ -104,10 +103,12 @@ def limits(setup: Setup, pair: str, curve: Curve, found: Iterable[Found]) -> tup
     return tuple(_named(setup, outputs(setup), curve, pair, once))
 
 
-def along(setup: Setup, pair: str, start: float, way: float, walk: Walk, last: float | None = None) -> Iterator[Found]:
+def along(
+    setup: Setup, pair: str, start: float, way: float, walk: Walk, parts: Iterable[Piece], last: float = np.inf
+) -> Iterator[Found]:
     """What a walk meets on which the input at `pair` runs from `start` one way (1) or the other.
 
-    Up to a place of the input on that way, or all round a circuit.
+    `parts` are its pieces, up to a place of the input on that way or all round a circuit.
     """
     curve, watched = walk.curve, outputs(setup)
     unit = setup.unit if setup.slides(pair) else 1.0
@@ -120,7 +121,7 @@ def along(setup: Setup, pair: str, start: float, way: float, walk: Walk, last: f
     if rests(walk.here):
         yield noted("input dead point", pair, walk.here)
     before: Point | None = None
-    for piece in circuit(setup, walk).pieces if last is None else until(pieces(walk), last):
+    for piece in parts:
         arc = piece.arc
         if before is None or arc.exact:
             before = arc.at(curve, piece.first)
@@ -130,7 +131,7 @@ def along(setup: Setup, pair: str, start: float, way: float, walk: Walk, last: f
             for x in _turns(watched, curve, piece, (before, after), k, STILL * scale):
                 point = arc.at(curve, x)
                 yield noted("stroke end", output.name, point, float(watched.along(curve, point)[k, 0]))
-        for each in met(walk, np.inf if last is None else last)[passed:]:
+        for each in met(walk, last)[passed:]:
             yield noted("change point", pair, each.passed.crossing.ways[each.passed.came], None, crossed(setup, each))
             passed += 1
         if piece.dead is not None and piece.first != piece.last:

@@ -13,9 +13,9 @@ from planar.mechanism import Drive, Mechanism, with_inputs
 from planar.motion import Motion
 from planar.results import Limit
 from planar.solving import limits
-from planar.solving.circuit import circuit
+from planar.solving.circuit import Circuit, circuit
 from planar.solving.curve import Curve
-from planar.solving.follow import Local, Run, Trip, follow, met, onwards, run
+from planar.solving.follow import Local, Run, Trip, follow, met, onwards, pieces, run
 from planar.solving.position import Solver
 from planar.solving.rates import Given
 from planar.solving.rows import Rows, joined, motion, reversed_, rows, shortened, spliced
@@ -103,12 +103,12 @@ class Ranged:
         ends = (0, *dead) if whole.from_dead else tuple(dead[:-1])
         given = self._given(np.array(places), np.array(senses))
         found = Rows(np.array(z), given, ends, local, met(walk), tuple(walk.missed))
-        return self._told(found, back=False, circuit=True)
+        return motion(self.solver, self.found, found, self.third, _Course(self, found, (whole, walk)))
 
-    def _told(self, found: Rows, back: bool, circuit: bool = False) -> Motion:
+    def _told(self, found: Rows, back: bool) -> Motion:
         if back:
             found = joined(found, reversed_(found)._replace(met=(), missed=()))
-        return motion(self.solver, self.found, found, self.third, _Course(self, found, circuit))
+        return motion(self.solver, self.found, found, self.third, _Course(self, found, None))
 
     def _run(self, steps: int, first: float, last: float) -> Rows:
         grid = np.linspace(first, last, steps + 1)
@@ -229,7 +229,7 @@ class Ranged:
 class _Course:
     """The curve along which an input runs: what it meets between the first row and the last."""
 
-    def __init__(self, ranged: Ranged, found: Rows, whole: bool):
+    def __init__(self, ranged: Ranged, found: Rows, whole: tuple[Circuit, Walk] | None):
         self.ranged, self.found, self.whole = ranged, found, whole
 
     def limits(self, motion: Motion) -> tuple[Limit, ...]:
@@ -238,9 +238,10 @@ class _Course:
         u = found.given.u[:, ranged.index]
         if len(u) < 2:
             return ()
-        if self.whole:
-            walk = self._walk(0, 1)
-            return limits.limits(ranged.solver, ranged.pair, walk.curve, self._along(walk, 0, None))
+        if self.whole is not None:
+            parts, walk = self.whole
+            told = limits.along(ranged.solver, ranged.pair, float(u[0]), 1.0, walk, parts.pieces)
+            return limits.limits(ranged.solver, ranged.pair, walk.curve, told)
         # from a row within, since on change points and dead points several ways lead on
         inside = next((row for row in range(len(u)) if row not in found.local and row not in found.dead), 0)
         last = (len(u) - 1) // 2 if self._turns_back(u) else len(u) - 1
@@ -258,8 +259,9 @@ class _Course:
         way = np.append(z[towards] - z[row], abs(u[towards] - u[row]))
         return self.ranged.walk(z[row], float(u[row]), 1.0 if u[towards] >= u[row] else -1.0, way)
 
-    def _along(self, walk: Walk, row: int, last: int | None) -> Iterator[limits.Found]:
+    def _along(self, walk: Walk, row: int, last: int) -> Iterator[limits.Found]:
         u, ranged = self.found.given.u[:, self.ranged.index], self.ranged
         way = float(walk.curve.way[ranged.index])
-        far = None if last is None else abs(float(u[last] - u[row]))
-        return limits.along(ranged.solver, ranged.pair, float(u[row]), way, walk, far)
+        far = abs(float(u[last] - u[row]))
+        parts = limits.until(pieces(walk), far)
+        return limits.along(ranged.solver, ranged.pair, float(u[row]), way, walk, parts, far)

@@ -41,7 +41,7 @@ def rates(setup: Setup, z: Array, given: Given, local: Mapping[int, Local], thir
 
     rest = program.kinematics(y, whole(none, given.u1), whole(none, given.u2), p)
     strong = np.array([strengths(setup, slope).min(initial=1.0) >= SINGULAR for slope in rest.slope], dtype=bool)
-    known = {index: _carried(setup, each, given, index) for index, each in local.items()}
+    known = {index: _carried(each, given, index) for index, each in local.items()}
     known = {index: each for index, each in known.items() if each is not None}
     weak = ~strong
     weak[list(known)] = False
@@ -70,7 +70,7 @@ def rates(setup: Setup, z: Array, given: Given, local: Mapping[int, Local], thir
     return parts
 
 
-def _carried(setup: Setup, local: Local, given: Given, index: int) -> Array | None:
+def _carried(local: Local, given: Given, index: int) -> Array | None:
     """Rates in time (3, unknowns) from those along a way; None where the inputs do not run along it."""
     way, size = local.way, float(local.way @ local.way)
     along = []

@@ -99,8 +99,8 @@ def ended(setup: Setup, links: Sequence[str], where: str, dead: bool) -> NoAnswe
     if dead:
         return NoAnswer(
             Outcome.DEAD_POINT,
-            f"{_inputs(setup)} cannot go beyond {where}, a dead point: {_links(links)} would lead back from there; stay "
-            f"short of it, go through the whole circuit, or drive {_pairs_of(setup, links, 4)}",
+            f"{_inputs(setup)} cannot go beyond {where}, a dead point: {_links(links)} would lead back from there; "
+            f"stay short of it, go through the whole circuit, or drive {_pairs_of(setup, links, 4)}",
         )
     return NoAnswer(
         Outcome.BRANCH_LOST,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -84,7 +85,7 @@ class _Course:
         for pair, velocity in zip(watched.pairs, rates_of, strict=True):
             least = STILL * max(float(np.nanmax(np.abs(velocity), initial=0.0)), STILL)
             sure = np.flatnonzero(np.abs(velocity) > least)
-            for before, after in zip(sure[:-1], sure[1:], strict=True):
+            for before, after in pairwise(sure.tolist()):
                 if velocity[before] * velocity[after] > 0.0 or after - before > 2:
                     continue  # a rest in between is no end of a stroke at one time
                 first, last = float(self.time[before]), float(self.time[after])
