@@ -2,24 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from planar.program import Program
 
 Array = np.ndarray
-
-
-class Place(NamedTuple):
-    """A position of a run: unknowns, their first and second rates along it, each group's distance (stages,) from the
-    nearest position in which it could be singular, in units of the run's parameter, and the way of the inputs."""
-
-    z: Array
-    rates: Array
-    second: Array
-    safe: Array
-    way: Array
 
 
 CLOSE = 1.5
@@ -42,22 +29,6 @@ class Branch:
 
     def __init__(self, program: Program, p: Array):
         self.program, self.p = program, p
-
-    def at(self, z: Array, u: Array, way: Array) -> Place:
-        """The position at unknowns z and inputs u, with rates against the parameter whose unit is `way` of u."""
-        y, still = np.concatenate([z, u]), np.zeros_like(z)
-        none = np.zeros_like(way)
-        rest = self.program.kinematics(y, np.concatenate([still, way]), np.concatenate([still, none]), self.p)
-        rates = cancelling(rest.slope, rest.F1[:, None])[:, 0]
-        moving = self.program.kinematics(y, np.concatenate([rates, way]), np.concatenate([still, none]), self.p)
-        second = cancelling(rest.slope, moving.F2[:, None])[:, 0]
-        return Place(z, rates, second, self._safe(z[None], u[None], rest.slope[None], rates[None], way[None])[0], way)
-
-    def same(self, before: Place, after: Place, step: float) -> bool:
-        """Whether two positions, a step of the parameter apart, can lie on one branch."""
-        smooth = np.all(allowed(after.z - before.z, before.rates * step, after.rates * step))
-        smooth &= np.all(self._onwards(before.rates[None], after.rates[None], before.way[None]))
-        return bool(smooth and np.all(CLOSE * step < before.safe + after.safe))
 
     def along(self, z: Array, u: Array) -> Array:
         """For each step of a run, z (samples, unknowns) and u (samples, inputs), whether it keeps to the branch."""

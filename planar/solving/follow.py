@@ -224,19 +224,24 @@ def derivatives(arc: Arc, x: float) -> Array:
 
 
 def follow(solver: Followed, p: Array, z: Array, start: Array, stop: Array) -> Array:
-    """The unknowns at inputs `stop`, followed from those at `start` along the straight line between them.
+    """The unknowns at inputs `stop`; see `followed`."""
+    return followed(solver, p, z, start, stop).z[-1]
+
+
+def followed(solver: Followed, p: Array, z: Array, start: Array, stop: Array) -> Run:
+    """The unknowns at inputs `start` and `stop`, followed along the straight line between them.
 
     Smoothly through change points. Raises NoAnswer where a dead point is on the way, or the branch cannot be followed.
     """
     way = stop - start
     reach = float(np.max(np.abs(way), initial=0.0))
     if reach == 0.0:
-        return z
+        return Run(np.stack([z, z]), 0)
     trip = Trip(solver, p, z, start, way)
     found = trip.to(reach)
     if found is None:
         raise _ended(solver, trip)
-    return found[0]
+    return Run(np.stack([z, found[0]]), 1, met=met(trip.walk, reach), missed=tuple(trip.walk.missed))
 
 
 def run(solver: Followed, p: Array, z: Array, u: Array, branches: Sequence[int] = ()) -> Run:

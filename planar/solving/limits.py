@@ -14,7 +14,7 @@ from planar.results import Limit
 from planar.roots import root
 from planar.solving.curve import Curve, Point
 from planar.solving.follow import SEAM, Piece, cubic, met, rests
-from planar.solving.rows import crossed
+from planar.solving.passing import crossed
 from planar.solving.setup import Setup
 from planar.solving.walk import Walk
 

@@ -17,7 +17,7 @@ from planar.program import Rates, length, placed, program
 from planar.solving import refusals
 from planar.solving.assemble import Assembly, Failure, search
 from planar.solving.candidates import Candidates
-from planar.solving.follow import follow
+from planar.solving.follow import followed
 from planar.solving.freedom import (
     SINGULAR,
     Crossing,
@@ -52,8 +52,13 @@ def solve(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = 
     if not drives:
         return here.state(found.z, here.remarks(found))
     there = Solver(with_inputs(mechanism, tuple(drives)))
-    z = follow(there, there.station.p, found.z, here.station.u, there.station.u)
-    return there.state(z, here.remarks(found))
+    way = followed(there, there.station.p, found.z, here.station.u, there.station.u)
+    told = here.remarks(found)
+    if way.met or way.missed:
+        from planar.solving.passing import on_the_way
+
+        told = (*told, *on_the_way(there, way.met, way.missed))
+    return there.state(way.z[-1], told)
 
 
 class Solver(Setup):

@@ -16,15 +16,12 @@ from planar.results import InputMotion, Jerked
 from planar.solving import refusals
 from planar.solving.assemble import Assembly
 from planar.solving.follow import Local, Met, Run
+from planar.solving.passing import on_the_way
 from planar.solving.position import Solver
 from planar.solving.rates import Given, rates
 from planar.solving.walk import Missed
-from planar.words import listed, many
 
 Array = np.ndarray
-
-NEARBY = 1e-2
-"""rad or sizes: a change point of a neighbouring linkage that is farther away is not worth a word."""
 
 
 class Rows(NamedTuple):
@@ -131,7 +128,7 @@ def motion(
         outcome=run.outcome,
         reason=run.reason,
         residual=residual,
-        remarks=(*solver.remarks(assembly), *_met(solver, run)),
+        remarks=(*solver.remarks(assembly), *on_the_way(solver, run.met, run.missed)),
         frames=frames,
         own=own,
         shapes=solver.shapes,
@@ -149,27 +146,3 @@ def _input(solver: Solver, given: Given, index: int) -> InputMotion:
 def _placed(solver: Solver, parts: list[Array]):  # noqa: ANN202
     jets = [Jet(*(part[:, column] for part in parts)) for column in range(parts[0].shape[1])]
     return placed(jets, solver.column, solver.shapes, solver.pairs)
-
-
-def _met(solver: Solver, run: Rows) -> list[str]:
-    """What to say of change points on the way, and near it."""
-    told: dict[str, None] = {}
-    for each in run.met:
-        told[crossed(solver, each)] = None
-    for missed in run.missed:
-        if missed.distance < NEARBY:
-            told[
-                f"the motion comes within {missed.distance:.1g} (rad, or lengths of the mechanism's size) of a change "
-                f"point of a linkage that differs from this one by {missed.open * solver.unit:.1g} m"
-            ] = None
-    return list(told)
-
-
-def crossed(solver: Solver, met: Met) -> str:
-    """What to say of a change point that a motion passes."""
-    ways = len(met.passed.crossing.ways)
-    at = listed([solver.told(g.pair, u) for g, u, w in zip(solver.mechanism.inputs, met.u, met.way, strict=True) if w])
-    if ways == 1:
-        return f"at {at} there is one more motion to first order, but only this one goes on"
-    on = "this one goes on smoothly" if met.passed.came == met.passed.went else "another one was taken, as asked for"
-    return f"at {at} {many(ways, 'branch', 'branches')} of the motion cross; {on}"

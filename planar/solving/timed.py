@@ -16,9 +16,10 @@ from planar.results import Limit
 from planar.roots import root
 from planar.solving.follow import follow, run
 from planar.solving.limits import STILL, Outputs, outputs
+from planar.solving.passing import crossed
 from planar.solving.position import Solver
 from planar.solving.rates import Given, rates
-from planar.solving.rows import Rows, crossed, motion, rows
+from planar.solving.rows import Rows, motion, rows
 
 Array = np.ndarray
 

@@ -1,0 +1,37 @@
+"""What is to be said of change points that a motion passes, or comes near."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from planar.solving.follow import Met
+from planar.solving.setup import Setup
+from planar.solving.walk import Missed
+from planar.words import listed, many
+
+NEARBY = 1e-2
+"""rad or sizes: a change point of a neighbouring linkage that is farther away is not worth a word."""
+
+
+def on_the_way(setup: Setup, met: Sequence[Met], missed: Sequence[Missed]) -> tuple[str, ...]:
+    """What to say of change points on the way, and near it."""
+    told: dict[str, None] = {}
+    for each in met:
+        told[crossed(setup, each)] = None
+    for each in missed:
+        if each.distance < NEARBY:
+            told[
+                f"the motion comes within {each.distance:.1g} (rad, or lengths of the mechanism's size) of a change "
+                f"point of a linkage that differs from this one by {each.open * setup.unit:.1g} m"
+            ] = None
+    return tuple(told)
+
+
+def crossed(setup: Setup, met: Met) -> str:
+    """What to say of a change point that a motion passes."""
+    ways = len(met.passed.crossing.ways)
+    at = listed([setup.told(g.pair, u) for g, u, w in zip(setup.mechanism.inputs, met.u, met.way, strict=True) if w])
+    if ways == 1:
+        return f"at {at} there is one more motion to first order, but only this one goes on"
+    on = "this one goes on smoothly" if met.passed.came == met.passed.went else "another one was taken, as asked for"
+    return f"at {at} {many(ways, 'branch', 'branches')} of the motion cross; {on}"
