@@ -8,10 +8,11 @@ from pathlib import Path
 
 from PIL import Image, ImageDraw
 
-import planar
 from planar import plot
 from planar.drawing.figure import saved
 from planar.files import model_files
+from tests.known import MODELS as MODELS_OF
+from tests.known import state_of
 
 GALLERY = (
     "jansen-leg",
@@ -33,10 +34,9 @@ CELL, LINE = (280, 190), 14
 
 def drawn(model: str, what: str):
     """One drawing of a model as a figure."""
-    mechanism = planar.load(model)
     if what in ("scheme", "velocity", "acceleration", "centres"):
-        return getattr(plot, what)(planar.solve(mechanism))
-    return getattr(plot, what)(mechanism)
+        return getattr(plot, what)(state_of(model))
+    return getattr(plot, what)(MODELS_OF[model])
 
 
 def small(cell: tuple[str, str]) -> bytes:

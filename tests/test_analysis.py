@@ -1,8 +1,6 @@
 """Published values, efforts, speed and words."""
 
 import json
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +12,7 @@ from planar.analysis.published import compare
 from planar.analysis.speed import measure
 from planar.mechanism import Drive, Published
 from planar.words import heading, hurrying, listed, turning
+from tests.command import run
 
 
 def compared(item: Published, model: str = "002-E3.1"):
@@ -89,12 +88,11 @@ def test_speed_is_measured_over_a_run_that_the_linkage_makes(model):
     assert json.loads(json.dumps(speed.record()))["links"] == len(planar.load(model).links)
 
 
-def test_bench_prints_a_table_and_a_record():
-    command = [sys.executable, "-m", "planar", "bench", "000-P1"]
-    table = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+def test_bench_prints_a_table_and_a_record(tmp_path):
+    table = run(tmp_path, "bench", "000-P1").done()
     assert "assembly" in table
     assert "Four-bar" in table
-    (record,) = json.loads(subprocess.run([*command, "--json"], capture_output=True, text=True, check=True).stdout)
+    (record,) = json.loads(run(tmp_path, "bench", "000-P1", "--json").done())
     assert set(record) == {"name", "links", "unknowns", "equations", "assembly", "position", "run", "span"}
 
 
@@ -169,19 +167,18 @@ def test_a_pin_at_constant_speed_is_steady_at_any_size(degrees):
     assert state.link("a").sense == "anticlockwise, steady"
 
 
-def test_bare_bench_measures_models_that_come_along():
-    command = [sys.executable, "-m", "planar", "bench", "--json"]
-    records = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+def test_bare_bench_measures_models_that_come_along(tmp_path):
+    records = json.loads(run(tmp_path, "bench", "--json").done())
     assert len(records) == 3
     assert all(record["run"] > 0 for record in records)
 
 
-def test_relative_motion_in_the_table_and_the_record():
-    command = [sys.executable, "-m", "planar", "solve", "004-QR", "--relative", "A,C"]
-    table = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+def test_relative_motion_in_the_table_and_the_record(tmp_path):
+    words = ("solve", "004-QR", "--relative", "A,C")
+    table = run(tmp_path, *words).done()
     assert "A against C, in the axes of CD" in table
     assert "Coriolis" in table
-    record = json.loads(subprocess.run([*command, "--json"], capture_output=True, text=True, check=True).stdout)
+    record = json.loads(run(tmp_path, *words, "--json").done())
     parts = record["relative"]["A,C"]
     whole = [
         sum(each)
@@ -194,9 +191,5 @@ def test_relative_motion_in_the_table_and_the_record():
 
 
 @pytest.mark.parametrize(("asked", "words"), [("A", "POINT,POINT"), ("A,Z", "no point 'Z'"), ("R,A", "name the link")])
-def test_a_relative_motion_that_cannot_be_had_is_refused(asked, words):
-    command = [sys.executable, "-m", "planar", "solve", "004-QR", "--relative", asked]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 2
-    assert words in done.stderr
-    assert done.stderr.count("\n") == 1
+def test_a_relative_motion_that_cannot_be_had_is_refused(asked, words, tmp_path):
+    assert words in run(tmp_path, "solve", "004-QR", "--relative", asked).refused(2)

@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 import json
-import os
 import re
-import subprocess
-import sys
 import time
 from collections import Counter
 from dataclasses import replace
-from functools import cache
 from itertools import combinations
 from math import acos, atan2, cos, hypot, pi, sin, sqrt
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -30,18 +25,15 @@ from planar.mechanism import Drive, Mechanism, with_inputs
 from planar.motion import State, Unknown
 from planar.solving.position import solve
 from planar.views.centres import remarks
+from tests.command import run
+from tests.known import MODELS, state_of
+from tests.known import found_centres as found
 from tests.linkages import random_linkage
 
-MODELS = {file.stem: mechanism for file, mechanism in files.models()}
 EXACT = 1e-10
 many = settings(
     max_examples=50, deadline=None, suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow]
 )
-
-
-@cache
-def found(stem: str) -> Centres:
-    return centres(solve(MODELS[stem]))
 
 
 def moved(mechanism: Mechanism, rng: np.random.Generator) -> State | None:
@@ -881,7 +873,7 @@ def test_velocities_that_no_rigid_link_has_are_refused(given_values, said):
 
 
 def test_many_links_take_no_long_time():
-    state = solve(MODELS["chain-42"])
+    state = state_of("chain-42")
     began = time.process_time()
     result = centres(state)
     assert time.process_time() - began < 4.0  # a third of a second on the machine that this was written on
@@ -913,48 +905,32 @@ def test_links_may_have_any_names():
         assert same(other.homogeneous, each.homogeneous)
 
 
-# the whole program, in a process of its own
-
-
-def run(*words: str, folder: Path) -> subprocess.CompletedProcess:
-    inherited = {key: value for key, value in os.environ.items() if key not in ("COLUMNS", "FORCE_COLOR", "NO_COLOR")}
-    told = {"PYTHONPATH": str(Path(__file__).parent.parent), "PYTHONIOENCODING": "utf-8", "PYTHONWARNINGS": "error"}
-    return subprocess.run(
-        [sys.executable, "-m", "planar", *words],
-        cwd=folder,
-        env=inherited | told,
-        capture_output=True,
-        text=True,
-        encoding="utf-8",
-        check=False,
-        stdin=subprocess.DEVNULL,
-        timeout=120,
-    )
+# the whole program
 
 
 def test_the_command_prints_all_centres_in_the_order_of_finding(tmp_path):
-    ended = run("centres", "002-E3.1", folder=tmp_path)
-    assert (ended.returncode, ended.stderr) == (0, "")
-    rows = re.findall(r"^ +(\d+) +(I\d\d) +(\S+ - \S+) +(\w+) +(\S+) +(\S+) +(I.*?) *$", ended.stdout, re.MULTILINE)
+    ended = run(tmp_path, "centres", "002-E3.1")
+    assert (ended.status, ended.err) == (0, "")
+    rows = re.findall(r"^ +(\d+) +(I\d\d) +(\S+ - \S+) +(\w+) +(\S+) +(\S+) +(I.*?) *$", ended.out, re.MULTILINE)
     assert [row[:2] for row in rows] == [(str(e.order), e.name) for e in found("002-E3.1")]
     for row, each in zip(rows, found("002-E3.1"), strict=True):
         assert [float(row[4]), float(row[5])] == pytest.approx(list(1000.0 * each.position), rel=1e-5, abs=1e-9)
         assert (row[2], row[3], row[6]) == (" - ".join(each.links), each.how, each.derivation)
-    assert "6 centres of 4 links: 4 by the pairs and 2 by Kennedy's theorem" in ended.stdout
-    assert "none needed the simultaneous equations" in ended.stdout
-    assert len(re.findall(r"but for \d\.\de-1\d", ended.stdout)) == 3
+    assert "6 centres of 4 links: 4 by the pairs and 2 by Kennedy's theorem" in ended.out
+    assert "none needed the simultaneous equations" in ended.out
+    assert len(re.findall(r"but for \d\.\de-1\d", ended.out)) == 3
 
 
 def test_the_command_says_what_lies_at_infinity_and_where(tmp_path):
-    ended = run("centres", "elliptical-trammel", "--at", "across=60mm", folder=tmp_path)
-    assert ended.returncode == 0
-    assert re.search(r"I14 .*at infinity +at 90 deg +I14 at infinity, square to the motion at across", ended.stdout)
-    assert re.search(r"I24 +bar - frame +Kennedy +60 +103\.923", ended.stdout)  # 120^2 = 60^2 + 103.923^2
+    ended = run(tmp_path, "centres", "elliptical-trammel", "--at", "across=60mm")
+    assert ended.status == 0
+    assert re.search(r"I14 .*at infinity +at 90 deg +I14 at infinity, square to the motion at across", ended.out)
+    assert re.search(r"I24 +bar - frame +Kennedy +60 +103\.923", ended.out)  # 120^2 = 60^2 + 103.923^2
 
 
 def test_the_command_prints_si_values_for_programs(tmp_path):
-    ended = run("centres", "single-flier", "--json", folder=tmp_path)
-    value = json.loads(ended.stdout)
+    ended = run(tmp_path, "centres", "single-flier", "--json")
+    value = json.loads(ended.out)
     assert value["links"]["frame"] == "8"
     assert len(value["centres"]) == 28
     for told, each in zip(value["centres"], found("single-flier"), strict=True):
@@ -965,41 +941,41 @@ def test_the_command_prints_si_values_for_programs(tmp_path):
     assert sum(each["how"] == "equations" for each in value["centres"]) == 1
     assert set(value["proof"]) == {"routes", "collinear", "velocities"}
     assert max(value["proof"].values()) < EXACT
-    trammel = json.loads(run("centres", "elliptical-trammel", "--json", folder=tmp_path).stdout)["centres"][0]
+    trammel = json.loads(run(tmp_path, "centres", "elliptical-trammel", "--json").out)["centres"][0]
     assert (trammel["position"], trammel["homogeneous"][2]) == (None, 0.0)
 
 
 def test_the_command_answers_on_dead_points_and_change_points(tmp_path):
     (tmp_path / "dead.json").write_text(planar.dumps(on_a_dead_point()))
-    ended = run("centres", "dead.json", folder=tmp_path)
-    assert (ended.returncode, ended.stderr) == (0, "")
-    assert "AB rests in this position" in ended.stdout
+    ended = run(tmp_path, "centres", "dead.json")
+    assert (ended.status, ended.err) == (0, "")
+    assert "AB rests in this position" in ended.out
     flat = four_bar(1.0, 2.0, 1.0, (2.0, 0.0), 0.0, {"B": [1.0, 0.0], "C": [3.0, 0.0]})
     (tmp_path / "flat.json").write_text(planar.dumps(flat))
-    ended = run("centres", "flat.json", folder=tmp_path)
-    assert ended.returncode == 0
-    assert "I13 and I24 are not determined" in ended.stdout
+    ended = run(tmp_path, "centres", "flat.json")
+    assert ended.status == 0
+    assert "I13 and I24 are not determined" in ended.out
 
 
 def test_the_command_prints_hostile_names_as_they_are(tmp_path):
     (tmp_path / "x.json").write_text(json.dumps(hostile()))
-    ended = run("centres", "x.json", folder=tmp_path)
-    assert (ended.returncode, ended.stderr) == (0, "")
-    assert "[bold]x × y - I24 = I12" in ended.stdout
+    ended = run(tmp_path, "centres", "x.json")
+    assert (ended.status, ended.err) == (0, "")
+    assert "[bold]x × y - I24 = I12" in ended.out
 
 
 def test_the_command_refuses_what_it_cannot_do_in_a_sentence(tmp_path):
-    ended = run("centres", "no-such-model", folder=tmp_path)
-    assert ended.returncode == 2
-    ended = run("centres", "four-bar", "--at", "X=1", folder=tmp_path)
-    assert ended.returncode == 2
-    ended = run("centres", "four-bar", "--json", "-o", "x.txt", folder=tmp_path)
-    assert ended.returncode == 2
+    ended = run(tmp_path, "centres", "no-such-model")
+    assert ended.status == 2
+    ended = run(tmp_path, "centres", "four-bar", "--at", "X=1")
+    assert ended.status == 2
+    ended = run(tmp_path, "centres", "four-bar", "--json", "-o", "x.txt")
+    assert ended.status == 2
     open_chain = files.to_dict(MODELS["geared-five-bar"])
     open_chain["inputs"] = []
     (tmp_path / "open.json").write_text(json.dumps(open_chain))
-    ended = run("centres", "open.json", folder=tmp_path)
-    assert (ended.returncode, ended.stdout) == (1, "")
-    assert ended.stderr.startswith("planar: too few inputs:")
-    assert run("centres", "four-bar", "-o", "x.txt", folder=tmp_path).returncode == 0
+    ended = run(tmp_path, "centres", "open.json")
+    assert (ended.status, ended.out) == (1, "")
+    assert ended.err.startswith("planar: too few inputs:")
+    assert run(tmp_path, "centres", "four-bar", "-o", "x.txt").status == 0
     assert "I24 = I12 I14 × I23 I34" in (tmp_path / "x.txt").read_text(encoding="utf-8")

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-import subprocess
-import sys
 from functools import cache
 from itertools import combinations, pairwise
 
@@ -19,16 +17,14 @@ from planar.drawing.centres import MANY, ROOM, centres_picture, chosen
 from planar.drawing.circle import circle_picture, radius
 from planar.drawing.directions import directions_picture
 from planar.drawing.picture import Arrow, Circle, Letter, Line, Pen, extent
+from tests.command import run
+from tests.known import MODELS as ALL
+from tests.known import found_centres as found
 from tests.test_plot import texts
 
-MODELS = {file.stem: mechanism for file, mechanism in files.models() if file.stem != "chain-42"}
+MODELS = {stem: mechanism for stem, mechanism in ALL.items() if stem != "chain-42"}
 every_model = pytest.mark.parametrize("stem", MODELS)
 INSIDE = 1e-6
-
-
-@cache
-def found(stem):
-    return centres(planar.solve(MODELS[stem]))
 
 
 @cache
@@ -352,21 +348,12 @@ def _middle(text):
     return (box.x0 + box.x1) / 2.0, (box.y0 + box.y1) / 2.0
 
 
-def run(*words, folder):
-    done = subprocess.run(
-        [sys.executable, "-m", "planar", "plot", *words], capture_output=True, text=True, cwd=folder, check=False
-    )
-    return done.returncode, done.stdout, done.stderr
-
-
 def test_the_command_draws_centres_and_refuses_links_that_there_are_not(tmp_path):
-    assert run("002-E3.4", "centres", "--link", "CD", "--link", "frame", "-o", "a.png", folder=tmp_path) == (0, "", "")
+    assert run(tmp_path, "plot", "002-E3.4", "centres", "--link", "CD", "--link", "frame", "-o", "a.png").done() == ""
     with Image.open(tmp_path / "a.png") as picture:
         assert min(picture.size) > 600
-    code, _, error = run("002-E3.4", "centres", "--link", "XY", "-o", "b.png", folder=tmp_path)
-    assert code == 2
-    assert "XY: there is no link of this name" in error
-    assert len(error.splitlines()) == 1
+    sentence = run(tmp_path, "plot", "002-E3.4", "centres", "--link", "XY", "-o", "b.png").refused(2)
+    assert "XY: there is no link of this name" in sentence
     assert not (tmp_path / "b.png").exists()
 
 

@@ -1,7 +1,5 @@
 """Centrodes: they touch in the pole and roll on each other; closed forms; infinity, limits, links at rest; drawings."""
 
-import subprocess
-import sys
 from dataclasses import replace
 from math import hypot, pi
 
@@ -9,7 +7,6 @@ import numpy as np
 import pytest
 
 import planar
-from planar import files
 from planar.analysis.centrodes import Centrode, _arcs, centrodes, usual
 from planar.analysis.relative import quarter
 from planar.drawing.centrodes import MOST, ROOM, centrodes_picture
@@ -19,8 +16,9 @@ from planar.drawing.picture import Circle, Letter, Line, Pen, extent
 from planar.errors import BadInput
 from planar.mechanism import Drive, with_inputs
 from planar.motion import Unknown
+from tests import command
+from tests.known import MODELS
 
-MODELS = {file.stem: mechanism for file, mechanism in files.models()}
 RANGES = {
     "davis-steering": (-0.05, 0.05),
     "rack-differential": (0.0, 0.2),
@@ -409,19 +407,11 @@ def test_what_runs_over_itself_is_drawn_once_and_what_crosses_itself_all():
     assert sum(np.hypot(*np.diff(line, axis=0).T).sum() for line in once([eight])) == pytest.approx(whole, abs=1.0)
 
 
-def command(*words):
-    return subprocess.run(
-        [sys.executable, "-m", "planar", *words], capture_output=True, text=True, timeout=120, check=False
-    )
-
-
 def test_the_command_draws_them_and_refuses_what_are_no_two_links(tmp_path):
     file = tmp_path / "centrodes.svg"
-    done = command("plot", "antiparallelogram", "centrodes", "--link", "follower", "--link", "crank", "-o", str(file))
-    assert (done.returncode, done.stderr) == (0, "")
+    words = ("plot", "antiparallelogram", "centrodes")
+    assert command.run(tmp_path, *words, "--link", "follower", "--link", "crank", "-o", file.name).done() == ""
     assert "centrodes of follower against crank" in file.read_text()
     for links, why in ((("a", "b", "c"), "two links"), (("coupler", "nothing"), "no link 'nothing'")):
-        words = [word for link in links for word in ("--link", link)]
-        refused = command("plot", "antiparallelogram", "centrodes", *words, "-o", str(file))
-        assert refused.returncode == 2
-        assert why in refused.stderr
+        named = [word for link in links for word in ("--link", link)]
+        assert why in command.run(tmp_path, *words, *named, "-o", file.name).refused(2)

@@ -1,12 +1,10 @@
-"""The command line, as real processes: what they print, where, and how they end."""
+"""The command line: what every command prints, where, and how it ends."""
 
 from __future__ import annotations
 
 import json
 import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +12,8 @@ import pytest
 
 import planar
 from planar.files import LARGEST, models
+from tests.command import process, run
 
-ROOT = Path(__file__).parent.parent
 FAR = 1e-12
 """A result printed in full and read again is the same number; one solved again is so to round-off."""
 
@@ -55,43 +53,6 @@ SLIDER_CRANK: dict[str, Any] = {
 }
 
 
-class Ended:
-    """A finished process: status, and the text of its two streams."""
-
-    def __init__(self, status: int, out: bytes, err: bytes):
-        self.status, self.out, self.err = status, out.decode("utf-8"), err.decode("utf-8")
-
-    def refused(self, status: int) -> str:
-        """The sentence of a failure: one printable line on stderr."""
-        assert self.status == status, self.err
-        assert self.err.startswith("planar: ")
-        assert self.err.endswith("\n")
-        assert self.err[:-1].isprintable()
-        return self.err[len("planar: ") : -1]
-
-    def done(self) -> str:
-        assert (self.status, self.err) == (0, "")
-        return self.out
-
-
-def run(folder: Path, *words: str, **environment: str) -> Ended:
-    """The command `planar` in a folder, its output piped."""
-    inherited = {key: value for key, value in os.environ.items() if key not in ("COLUMNS", "FORCE_COLOR", "NO_COLOR")}
-    told = {"PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "utf-8", "PYTHONWARNINGS": "error"} | environment
-    process = subprocess.run(
-        [sys.executable, "-m", "planar", *words],
-        cwd=folder,
-        env=inherited | told,
-        capture_output=True,
-        check=False,
-        stdin=subprocess.DEVNULL,
-        timeout=120,  # no speed is tested: what would wait for ever ends
-    )
-    ended = Ended(process.returncode, process.stdout, process.stderr)
-    assert "Traceback" not in ended.err, ended.err
-    return ended
-
-
 def changed(value: dict[str, Any], **names: str) -> dict[str, Any]:
     """A mechanism with some of its texts replaced wherever they stand."""
     text = json.dumps(value)
@@ -109,6 +70,41 @@ def row(table: str, first: str) -> list[str]:
     """The cells of the row that begins with a word."""
     line = next(line for line in table.splitlines() if line.split()[:1] == [first])
     return re.split(r"\s{2,}", line.strip())
+
+
+# in a process of its own
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        [],
+        ["--version"],
+        ["solve", "m.json"],
+        ["solve", "m.json", "--at", "A=170deg", "--json"],
+        ["cycle", "m.json", "--steps", "4", "-o", "t.csv"],
+        ["models"],
+        ["solve", "no.json"],
+        ["solve", "short.json", "--json"],
+        ["cycle", "m.json", "--steps", "0", "--json"],
+        ["plot", "m.json", "--nope"],
+    ],
+    ids=" ".join,
+)
+def test_a_process_prints_writes_and_ends_as_the_command_does_within_this_one(words: list[str], tmp_path: Path) -> None:
+    """What the other tests run without a process of its own is what users run."""
+    short = json.loads(json.dumps(FOUR_BAR))
+    short["links"]["AB"]["length"] = 500
+    ways: list[tuple[int, str, str, dict[str, bytes]]] = []
+    for way in (process, run):
+        folder = tmp_path / way.__name__
+        folder.mkdir()
+        written(folder, FOUR_BAR)
+        written(folder, short, "short.json")
+        ended = way(folder, *words)
+        files = {file.name: file.read_bytes() for file in folder.iterdir()}
+        ways.append((ended.status, ended.out, ended.err, files))
+    assert ways[0] == ways[1]
 
 
 # solve
@@ -537,5 +533,5 @@ def test_names_and_files_in_any_language_are_printed(tmp_path: Path) -> None:
 
 def test_a_screen_without_the_characters_is_no_traceback(tmp_path: Path) -> None:
     value = changed(FOUR_BAR, AB="曲柄") | {"name": "连杆"}
-    ended = run(tmp_path, "solve", written(tmp_path, value, "连杆.json"), PYTHONIOENCODING="ascii")
+    ended = process(tmp_path, "solve", written(tmp_path, value, "连杆.json"), PYTHONIOENCODING="ascii")
     assert "60.0000" in ended.done()

@@ -7,14 +7,12 @@ import numpy as np
 import pytest
 
 import planar
-from planar import files
 from planar.analysis.curvature import curvature
 from planar.analysis.relative import quarter, relative
 from planar.errors import BadInput
 from planar.mechanism import Drive, with_inputs
 from planar.motion import Unknown
-
-MODELS = {file.stem: mechanism for file, mechanism in files.models()}
+from tests.known import MODELS, state_of
 
 
 def driven(mechanism, velocity, acceleration, **positions):
@@ -34,7 +32,7 @@ def velocity_and_acceleration(found, at):
 
 @pytest.mark.parametrize("model", MODELS)
 def test_euler_savary_agrees_with_velocity_and_acceleration_for_random_points_of_every_link(model):
-    state = planar.solve(MODELS[model])
+    state = state_of(model)
     rng = np.random.default_rng(1)
     turning = 0
     for link in state.frames:
@@ -52,7 +50,7 @@ def test_euler_savary_agrees_with_velocity_and_acceleration_for_random_points_of
 
 @pytest.mark.parametrize("model", ["four-bar", "slider-crank", "whitworth", "cardan-gears", "jansen-leg", "002-E3.6a"])
 def test_what_belongs_to_pole_inflection_circle_and_acceleration_pole_holds_there(model):
-    state = planar.solve(MODELS[model])
+    state = state_of(model)
     for link in state.frames:
         found = curvature(state, link) if link != state.mechanism.frame else None
         if found is None or found.inflection is None:
@@ -151,7 +149,7 @@ def test_an_input_at_rest_gets_a_unit_rate_and_the_acceleration_pole_is_then_tha
 
 
 def test_points_of_a_trammel_are_curved_as_their_ellipses():
-    state = planar.solve(MODELS["elliptical-trammel"])
+    state = state_of("elliptical-trammel")
     found = curvature(state, "bar")
     x, y = state.point("E").position
     # half axes 180 mm across, 300 mm up: radius (b^2 cos^2 + a^2 sin^2)^(3/2) / (a b) at x = a cos, y = b sin
@@ -170,7 +168,7 @@ def test_points_of_a_trammel_are_curved_as_their_ellipses():
     ("model", "link", "radius"), [("elliptical-trammel", "bar", 0.06), ("cardan-gears", "wheel", 0.05)]
 )
 def test_of_cardan_motion_the_inflection_circle_is_the_moving_centrode(model, link, radius):
-    state = planar.solve(MODELS[model])
+    state = state_of(model)
     found = curvature(state, link)
     # R = 2 r: 1 / d = 1 / r - 1 / R, so that d = 2 r
     assert found.inflection.diameter == pytest.approx(2.0 * radius)
@@ -206,7 +204,7 @@ def test_a_point_in_the_pole_has_a_cusp():
 
 
 def test_a_crank_curves_its_points_about_its_pin_and_its_pin_not_at_all():
-    found = curvature(planar.solve(MODELS["four-bar"]), "AB")
+    found = curvature(state_of("four-bar"), "AB")
     path = found.path("B")
     assert (path.radius, path.direct) == pytest.approx((0.05, 0.05))
     assert path.centre == pytest.approx([0.0, 0.0], abs=1e-12)
@@ -219,7 +217,7 @@ def test_a_crank_curves_its_points_about_its_pin_and_its_pin_not_at_all():
 
 
 def test_coupler_pins_are_curved_about_the_frames_pins():
-    state = planar.solve(MODELS["four-bar"])
+    state = state_of("four-bar")
     found = curvature(state, "BC")
     assert found.path("B").centre == pytest.approx(state.point("A").position, abs=1e-10)
     assert found.path("C").centre == pytest.approx(state.point("D").position, abs=1e-10)
@@ -241,18 +239,18 @@ def test_straight_lines_are_drawn_by_points_near_the_inflection_circle(model, li
 
 
 def test_without_turning_the_pole_is_at_infinity_and_curvature_is_that_of_velocity_and_acceleration():
-    found = curvature(planar.solve(MODELS["three-parallel-cranks"]), "rod")
+    found = curvature(state_of("three-parallel-cranks"), "rod")
     assert found.pole is None
     assert found.inflection is None
     assert "at infinity" in found.reason
-    state = planar.solve(MODELS["three-parallel-cranks"])
+    state = state_of("three-parallel-cranks")
     crank = next(name for name in state.frames if name not in ("rod", state.mechanism.frame))
     radius = max(hypot(*at) for at in state.shapes[crank].points.values())
     for point in ((0.0, 0.0), (0.3, -0.1)):
         path = found.path(point)
         assert path.radius == path.direct == pytest.approx(radius)
     # a piston: straight, and no centre
-    piston = curvature(planar.solve(MODELS["slider-crank"]), "piston").path("B")
+    piston = curvature(state_of("slider-crank"), "piston").path("B")
     assert piston.radius == inf
     assert piston.centre is None
 
@@ -271,7 +269,7 @@ def test_a_coupler_that_just_does_not_turn_still_curves_its_paths():
 
 
 def test_seen_from_another_link_the_motion_is_the_relative_one():
-    state = planar.solve(MODELS["cardan-gears"])
+    state = state_of("cardan-gears")
     found = curvature(state, "wheel", "arm")
     # against the arm the wheel turns about its pin
     assert found.pole == pytest.approx([0.05, 0.0], abs=1e-12)
@@ -289,7 +287,7 @@ def test_seen_from_another_link_the_motion_is_the_relative_one():
 
 
 def test_links_that_move_as_one_are_said_to():
-    state = planar.solve(MODELS["planetary-gear-set"])
+    state = state_of("planetary-gear-set")
     frozen = replace(state, frames=state.frames | {"sun": state.frames["arm"]})
     found = curvature(frozen, "sun", "arm")
     assert "move as one" in found.reason
@@ -297,7 +295,7 @@ def test_links_that_move_as_one_are_said_to():
 
 
 def test_names_that_are_not_there_and_inputs_that_are_all_at_rest_are_refused():
-    state = planar.solve(MODELS["four-bar"])
+    state = state_of("four-bar")
     with pytest.raises(Unknown, match="no link 'XY'"):
         curvature(state, "XY")
     with pytest.raises(Unknown, match="both are 'BC'"):

@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -21,18 +19,18 @@ from planar.analysis.sections import Section
 from planar.analysis.solution import Solution, worked_solution
 from planar.drawing.paper import given
 from planar.errors import PlanarError
-from planar.files import models
 from planar.views.explained import explained, record
+from tests.command import run
+from tests.known import MODELS, state_of
 from tests.linkages import random_linkage
 
 ROOT = Path(__file__).parent.parent
-MODELS = [file.stem for file, _ in models()]
 DRAWN = 0.03
 """What a drawing may be off, where the model's file states no other tolerance."""
 
 
 def solved(model: str) -> Solution:
-    return worked_solution(planar.solve(planar.load(model)))
+    return worked_solution(state_of(model))
 
 
 def shown(solution: Solution, width: int = 100, scales: Any = None) -> str:
@@ -346,27 +344,13 @@ def _consistent(magnitude: Any, value: float, known: bool) -> None:
     assert made == pytest.approx(value, rel=0.02, abs=1e-12)
 
 
-# a terminal, a process, hostile names
-
-
-def run(folder: Path, *words: str) -> subprocess.CompletedProcess[bytes]:
-    environment = {key: value for key, value in os.environ.items() if key not in ("COLUMNS", "FORCE_COLOR")}
-    told = {"PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "utf-8", "PYTHONWARNINGS": "error"}
-    return subprocess.run(
-        [sys.executable, "-m", "planar", "explain", *words],
-        cwd=folder,
-        env=environment | told,
-        capture_output=True,
-        check=False,
-        stdin=subprocess.DEVNULL,
-        timeout=120,
-    )
+# the command, hostile names
 
 
 def test_the_command_prints_the_whole_solution(tmp_path: Path) -> None:
-    ended = run(tmp_path, "002-E3.1", "--scale", "1 cm = 0.1 m/s", "--scale", "1 cm = 2 m/s^2")
-    assert (ended.returncode, ended.stderr) == (0, b"")
-    out = ended.stdout.decode("utf-8")
+    ended = run(tmp_path, "explain", "002-E3.1", "--scale", "1 cm = 0.1 m/s", "--scale", "1 cm = 2 m/s^2")
+    assert (ended.status, ended.err) == (0, "")
+    out = ended.out
     for words in (
         "To find",
         "Velocity polygon, 1 cm = 0.1 m/s",
@@ -379,9 +363,9 @@ def test_the_command_prints_the_whole_solution(tmp_path: Path) -> None:
 
 
 def test_the_command_moves_an_input_and_prints_data(tmp_path: Path) -> None:
-    ended = run(tmp_path, "four-bar", "--at", "A=75deg", "--json")
-    assert (ended.returncode, ended.stderr) == (0, b"")
-    told = json.loads(ended.stdout)
+    ended = run(tmp_path, "explain", "four-bar", "--at", "A=75deg", "--json")
+    assert (ended.status, ended.err) == (0, "")
+    told = json.loads(ended.out)
     state = planar.solve(planar.load("four-bar"), [planar.Drive("A", np.radians(75.0))])
     assert told["links"]["BC"]["velocity"] == pytest.approx(state.link("BC").angular_velocity)
     assert "published" not in told
@@ -400,10 +384,9 @@ def test_the_command_moves_an_input_and_prints_data(tmp_path: Path) -> None:
     ],
 )
 def test_what_cannot_be_meant_is_refused_in_a_sentence(tmp_path: Path, words: tuple[str, ...], sentence: str) -> None:
-    ended = run(tmp_path, *words)
-    assert ended.returncode == 2
-    assert sentence in ended.stderr.decode("utf-8")
-    assert b"Traceback" not in ended.stderr
+    ended = run(tmp_path, "explain", *words)
+    assert ended.status == 2
+    assert sentence in ended.err
 
 
 HOSTILE = ("$x", "a_b^", "\\frac{", "<b>[red]", "点", "🙂", "name of a point that goes on and on", "%d{}")

@@ -23,7 +23,8 @@ from planar.drawing.page import sheets, solution_pages
 from planar.drawing.paper import given, scales
 from planar.drawing.typeset import TEXT, set_lines, words
 from planar.errors import BadInput
-from tests.test_explain import HOSTILE, hostile, run
+from tests.command import run
+from tests.test_explain import HOSTILE, hostile
 
 A4 = (210.0, 297.0)
 POINT = 25.4 / 72.0
@@ -53,10 +54,11 @@ def characters(page: pypdfium2.PdfPage) -> np.ndarray:
 
 def covered(boxes: np.ndarray) -> np.ndarray:
     """For every two boxes, how much of the smaller one the other covers; none where both are in one formula."""
-    low = np.maximum(boxes[:, None, :2], boxes[None, :, :2])
-    high = np.minimum(boxes[:, None, 2:], boxes[None, :, 2:])
-    both = np.clip(high - low, 0.0, None).prod(axis=2)
-    area = (boxes[:, 2:] - boxes[:, :2]).prod(axis=1)
+    left, low, right, high = boxes.T
+    across = np.minimum.outer(right, right) - np.maximum.outer(left, left)
+    up = np.minimum.outer(high, high) - np.maximum.outer(low, low)
+    both = across.clip(0.0) * up.clip(0.0)
+    area = (right - left) * (high - low)
     part = both / np.minimum(area[:, None], area[None, :])
     index = np.arange(len(boxes))
     part[np.abs(index[:, None] - index[None, :]) <= 4] = 0.0
@@ -169,8 +171,8 @@ def test_hostile_names_are_set_as_they_are() -> None:
 
 
 def test_the_command_writes_pages(tmp_path: Path) -> None:
-    ended = run(tmp_path, "single-link", "-o", "solution.pdf")
-    assert (ended.returncode, ended.stdout, ended.stderr) == (0, b"", b"")
+    ended = run(tmp_path, "explain", "single-link", "-o", "solution.pdf")
+    assert (ended.status, ended.out, ended.err) == (0, "", "")
     assert len(pypdfium2.PdfDocument((tmp_path / "solution.pdf").read_bytes())) >= 1
 
 

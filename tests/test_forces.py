@@ -13,17 +13,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import planar
-from planar import files
 from planar.analysis.advantage import advantage, advantages
 from planar.analysis.forces import alone, slides
 from planar.errors import BadInput, NoAnswer, Outcome
 from planar.mechanism import Drive, Input, Load, Mechanism
 from planar.motion import State, Unknown
 from planar.solving.position import solve
+from tests.command import run
+from tests.known import MODELS, state_of
 from tests.linkages import random_linkage
-from tests.test_cli import run
 
-MODELS = {file.stem: mechanism for file, mechanism in files.models()}
 ONE_INPUT = [stem for stem, mechanism in MODELS.items() if len(mechanism.inputs) == 1]
 EXACT = 1e-10
 near = settings(max_examples=15, deadline=None)
@@ -292,7 +291,7 @@ def test_efforts_add_up_and_need_no_speed():
 
 
 def test_without_loads_every_effort_is_zero():
-    found = planar.forces(solve(MODELS["four-bar"]))
+    found = planar.forces(state_of("four-bar"))
     assert set(found.inputs.values()) == {0.0}
     assert found.loads == ()
     assert found.proof == (None, None, None)
@@ -308,7 +307,7 @@ def test_a_force_on_the_frame_costs_nothing():
 
 @pytest.mark.parametrize("stem", ONE_INPUT)
 def test_the_advantage_of_everything_is_the_same_by_power_and_by_centres(stem):
-    state = solve(MODELS[stem])
+    state = state_of(stem)
     told = 0
     for over in advantages(state, (*state.points, *state.links, *state.pairs)).values():
         (found,) = over.values()
@@ -415,7 +414,7 @@ def test_loads_made_in_python_are_checked(load, sentence):
 
 
 def test_unknown_outputs_and_inputs_are_named():
-    state = solve(MODELS["four-bar"])
+    state = state_of("four-bar")
     with pytest.raises(Unknown, match="there is no point, link or pair 'nothing'"):
         advantage(state, "nothing")
     with pytest.raises(Unknown, match="there is no input at 'nothing'"):

@@ -17,7 +17,7 @@ from planar.analysis.piston import Exact, Piston, TwoTerms, piston
 from planar.errors import BadInput, NoAnswer
 from planar.mechanism import Drive, motions, with_inputs
 from planar.views.analytical import record
-from tests.test_cli import run
+from tests.command import run
 
 NEAR = 1e-12
 """Part of a value: rounding of a position solved."""

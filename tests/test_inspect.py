@@ -12,9 +12,10 @@ import planar
 from planar import files
 from planar.mechanism import entries
 from planar.views.inspected import inspection, orders
-from tests.test_cli import run, written
+from tests.command import run
+from tests.known import MODELS
+from tests.test_cli import written
 
-MODELS = {file.stem: mechanism for file, mechanism in files.models()}
 SLOW = {"chain-42", "rolling-wheel"}
 """Seconds each; the others take a tenth."""
 

@@ -18,8 +18,8 @@ from planar.drawing.picture import Arrow, Circle, Letter, Line, Pen, Picture, ex
 from planar.drawing.polygons import letter_text, polygon_picture
 from planar.mechanism import Drive
 from planar.solving.position import solve
+from tests.known import MODELS, state_of
 
-MODELS = {file.stem: mechanism for file, mechanism in files.models()}
 KINDS = {"velocity": velocity_polygon, "acceleration": acceleration_polygon}
 every_model = pytest.mark.parametrize("stem", MODELS)
 both_kinds = pytest.mark.parametrize("kind", KINDS)
@@ -27,7 +27,7 @@ both_kinds = pytest.mark.parametrize("kind", KINDS)
 
 @cache
 def drawn(stem: str, kind: str) -> Polygon:
-    return KINDS[kind](solve(MODELS[stem]))
+    return KINDS[kind](state_of(stem))
 
 
 @cache

@@ -14,22 +14,17 @@ from hypothesis import strategies as st
 from planar import files
 from planar.analysis.pencil import acceleration_polygon, velocity_polygon
 from planar.analysis.polygons import Meeting, Part, Polygon, Simultaneous, Triangle, Turn, Vector
-from planar.motion import State
 from planar.plane import direction
 from planar.solving.position import solve
 from planar.words import heading
+from tests.known import MODELS
+from tests.known import state_of as solved
 from tests.linkages import random_linkage
 from tests.test_random import assembled
 
-MODELS = {file.stem: mechanism for file, mechanism in files.models()}
 KINDS = {"velocity": velocity_polygon, "acceleration": acceleration_polygon}
 TIGHT = 1e-9
 """Of the largest vector: what rounding may leave of a law in a model."""
-
-
-@cache
-def solved(stem: str) -> State:
-    return solve(MODELS[stem])
 
 
 @cache

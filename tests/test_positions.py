@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 import planar
-from planar import files
 from planar.drawing.paper import Scale
 from planar.drawing.picture import Circle, Letter, Line, Pen, extent
 from planar.drawing.positions import loci, positions
 from planar.drawing.runs import smooth
 from planar.errors import BadInput
 from planar.mechanism import Drive, with_inputs
+from tests.known import MODELS
 
 PER_MM = 1e-3
 FULL = Scale("length", PER_MM, "mm")
@@ -248,7 +248,7 @@ def test_a_mechanism_without_a_speed_is_drawn_alike(twelve):
     assert marked(positions(still, scale=FULL), "B") == pytest.approx(marked(twelve, "B"))
 
 
-SOME = sorted(path.stem for path, mechanism in files.models() if mechanism.inputs)[::9]
+SOME = sorted(stem for stem, mechanism in MODELS.items() if mechanism.inputs)[::9]
 
 
 @pytest.mark.parametrize("model", SOME)

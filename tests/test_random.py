@@ -22,8 +22,10 @@ many = settings(
 def assembled(built: Built, least: float) -> tuple[Mechanism, State]:
     """The linkage solved; assumed to have determinate rates, with some distance from dead points."""
     mechanism = files.from_dict(built.value)
+    solver = Solver(mechanism)
     try:
-        state = solve(mechanism)
+        found = solver.assembly()
+        state = solver.state(found.z, solver.remarks(found))  # as `solve` does
     except NoAnswer as problem:
         # loops drawn at random may hold each other twice, or leave freedom: then that is what must be said, and only
         # then
@@ -31,8 +33,7 @@ def assembled(built: Built, least: float) -> tuple[Mechanism, State]:
         assert not determinate(mechanism, built)
         assume(False)
         raise
-    solver = Solver(mechanism)
-    assume(conditioning(solver, solver.assembly().z) > least)
+    assume(conditioning(solver, found.z) > least)
     return mechanism, state
 
 
@@ -113,7 +114,8 @@ def test_micrometres_or_kilometres_give_the_same_numbers(seed, links, higher, fa
         for given in value["inputs"]
     ]
     other = solve(files.from_dict(value))
-    condition = 1.0 / conditioning(Solver(mechanism), Solver(mechanism).assembly().z)
+    solver = Solver(mechanism)
+    condition = 1.0 / conditioning(solver, solver.assembly().z)
     for name, point in state.points.items():
         twin = other.point(name)
         for part in ("position", "velocity", "acceleration"):

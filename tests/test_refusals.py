@@ -10,7 +10,8 @@ import pytest
 import planar
 from planar import files
 from planar.errors import NoAnswer, Outcome
-from tests.test_cli import run, written
+from tests.command import run
+from tests.test_cli import written
 
 DEG = np.pi / 180
 

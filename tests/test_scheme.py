@@ -24,18 +24,14 @@ from planar.pairs import Kind, pair_types
 from planar.pairs.marks import Band, Block, Guide, Opening, Pin, PitchLine, Wheel
 from planar.plane import Vector, frame_at
 from planar.shapes import shape
+from tests.known import MODELS
+from tests.known import state_of as solved
 from tests.linkages import random_linkage
 
 SAMPLES = [sample for kind in pair_types().values() for sample in kind.samples()]
 every_sample = pytest.mark.parametrize("sample", SAMPLES, ids=lambda sample: f"{sample.pair.keyword} {sample.entry}")
-NAMES = [path.stem for path, _ in files.models()]
-every_model = pytest.mark.parametrize("name", NAMES)
+every_model = pytest.mark.parametrize("name", MODELS)
 UNIT = Scale("length", 1e-3, "mm")
-
-
-@cache
-def solved(name):
-    return planar.solve(planar.load(name))
 
 
 @cache
