@@ -107,6 +107,8 @@ def test_velocities_and_accelerations_are_the_derivatives_at_order_two(seed, lin
 def test_micrometres_or_kilometres_give_the_same_numbers(seed, links, higher, factor):
     built = random_linkage(seed, links, 0.0, higher)
     mechanism, state = assembled(built, 0.01)
+    # what the sketch leaves open is taken as it is found first, which rounding can change
+    assume(not any("leaves open" in remark for remark in state.remarks))
     value = built.value | {"units": {"length": {1e-6: "um", 1e-3: "mm", 1e3: "km"}[factor]}}
     slides = {pair.name for pair in mechanism.pairs if pair.coordinates}
     value["inputs"] = [

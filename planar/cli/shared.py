@@ -129,14 +129,14 @@ def show(renderable: Any, output: Path | None) -> None:
     save(output, written(renderable, output.suffix))
 
 
-def run(mechanism: Mechanism, steps: int, pair: str | None, start: str | None, stop: str | None) -> Motion:
-    """The run of an input over the range that the options give."""
+def run(mechanism: Mechanism, steps: int, pair: str | None, start: str | None, stop: str | None, **more: Any) -> Motion:
+    """The run of an input over the range that the options give; `more` goes to `planar.cycle` as it is."""
     from planar.solving.cycle import cycle
 
     names = [given.pair for given in mechanism.inputs]
-    pair = pair if pair is not None or len(names) != 1 else names[0]
-    ends = [_position(mechanism, pair, text, option) for option, text in (("--from", start), ("--to", stop))]
-    return cycle(mechanism, steps, ends[0], ends[1], pair)
+    of = pair if pair is not None or len(names) != 1 else names[0]
+    ends = [_position(mechanism, of, text, option) for option, text in (("--from", start), ("--to", stop))]
+    return cycle(mechanism, steps, ends[0], ends[1], pair, **more)
 
 
 def _position(mechanism: Mechanism, pair: str | None, text: str | None, option: str) -> float | None:

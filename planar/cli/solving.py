@@ -96,30 +96,73 @@ def _solved(
 @as_json
 @click.option("--steps", default=360, show_default=True, metavar="N", help="Parts that the range is divided into.")
 @ranged
-@output("Write all positions, velocities and accelerations to a .csv, .json or .npz file.")
+@click.option("--there-and-back", is_flag=True, help="Come back through the range by the same positions.")
+@click.option("--circuit", is_flag=True, help="Go through dead points, all round the circuit of this assembly.")
+@click.option(
+    "--branch",
+    "branches",
+    multiple=True,
+    type=click.IntRange(1),
+    metavar="N",
+    help="The way taken where branches of the motion cross: 1 smoothly, 2 the next; once for each change point.",
+)
+@click.option(
+    "--duration", metavar="TIME", help="Run in time so long, every input by its law or at constant acceleration."
+)
+@click.option("--jerk", is_flag=True, help="Third rates as well.")
+@output("Write positions, velocities and accelerations to a .csv, .json, .npz or .parquet file.")
 def cycle(
-    model: str, as_json: bool, steps: int, pair: str | None, start: str | None, stop: str | None, output: Path | None
+    model: str,
+    as_json: bool,
+    steps: int,
+    pair: str | None,
+    start: str | None,
+    stop: str | None,
+    there_and_back: bool,
+    circuit: bool,
+    branches: tuple[int, ...],
+    duration: str | None,
+    jerk: bool,
+    output: Path | None,
 ) -> None:
-    """The whole motion: position to position through the range of an input."""
+    """The whole motion: position to position through the range of an input, or in time by the inputs' laws."""
+    from planar.document import read_time
     from planar.files import load, save
 
     if as_json and output is not None:
         raise BadInput("-o", "a run goes to a file or is printed with --json; give one of the two")
     mechanism = load(model)
     spare(model, output)
+    if output is not None:
+        from planar.views.run import writable
+
+        writable(output.suffix)
     with busy(f"{mechanism.name}: {steps} steps"):
-        motion = run(mechanism, steps, pair, start, stop)
+        motion = run(
+            mechanism,
+            steps,
+            pair,
+            start,
+            stop,
+            there_and_back=there_and_back,
+            circuit=circuit,
+            branches=branches,
+            duration=None if duration is None else read_time(duration, "--duration"),
+            jerk=jerk,
+        )
+        if not as_json:
+            motion.limits  # noqa: B018 - solved for while the sign is up
     if as_json:
         from planar.views.run import record
 
         click.echo(json.dumps(record(motion), ensure_ascii=False, allow_nan=False))
     else:
+        from planar.views.ran import ran
         from planar.views.run import written
-        from planar.views.table import run as table
 
         if output is not None:
             save(output, written(motion, output.suffix))
-        show(table(motion), None)
+        show(ran(motion), None)
     if motion.outcome is not Outcome.SOLVED:
         click.echo(f"planar: {motion.outcome.value}: {motion.reason}", err=True)
         sys.exit(NO_ANSWER)

@@ -349,6 +349,15 @@ def read_drive(mechanism: Mechanism, pair: str, position: str) -> Drive:
     return Drive(pair, Cursor(value, pair, Whole(mechanism.units)).as_quantity(known[pair].driven()[0]))
 
 
+def read_time(text: str, place: str) -> float:
+    """A time (s) written as text: a number of seconds, or a quantity. Raises BadInput."""
+    try:
+        value: Any = float(text)
+    except ValueError:
+        value = text
+    return Cursor(value, place).as_quantity("time")
+
+
 def _drives(cursor: Cursor, key: str, mechanism: Mechanism) -> tuple[Drive, ...]:
     if not cursor.has(key):
         return ()

@@ -14,10 +14,10 @@ from rich.text import Text
 from planar.analysis.published import Comparison
 from planar.analysis.speed import Speed
 from planar.mechanism import QUANTITIES, motions
-from planar.motion import Motion, RelativeState, State
+from planar.motion import RelativeState, State
 from planar.pairs import Pair
 from planar.units import SI, Unit, unit
-from planar.words import amount, listed, many
+from planar.words import amount, listed
 
 HEADING = 13
 """Characters: longer headings stand in several lines, so that the tables of a textbook mechanism fit 80 columns."""
@@ -55,7 +55,7 @@ def published(comparisons: Iterable[Comparison]) -> RenderableType:
         table.add_row(
             item.symbol,
             each.about,
-            _number(each.solved),
+            number(each.solved),
             printed,
             _UNITS.get(SI[kind], SI[kind]),
             off,
@@ -102,30 +102,6 @@ def speeds(measured: Iterable[Speed]) -> RenderableType:
     return Group(table, Text(note, style="italic"))
 
 
-def run(motion: Motion) -> RenderableType:
-    """A run: its range, and for every point where it went and how fast it was at the most, among the positions."""
-    units = motion.mechanism.units
-    lines = [Text(motion.mechanism.name, style="bold")]
-    for name, given in motion.inputs.items():
-        kind = "length" if motion.slides(name) else "angle"
-        first, last = (amount(float(given.position[k]), kind, units) for k in (0, -1))
-        held = ", held" if len(motion) > 1 else ""
-        lines.append(Text(f"{name} from {first} to {last}" if first != last else f"{name} = {first}{held}"))
-    worst = f"worst residual {motion.residual:.1e} of the mechanism's size"
-    lines.append(Text(f"{many(len(motion), 'position')}; {worst}" + (f"; {motion.reason}" if motion.reason else "")))
-    heads = (f"x from, {units.length}", f"x to, {units.length}", f"y from, {units.length}", f"y to, {units.length}")
-    rates = ("velocity up to, m/s", "acceleration up to, m/s²")
-    table = plain_table("Points, among these positions", "point", *heads, *rates)
-    length = unit(units.length)
-    for name, point in motion.points.items():
-        ends = [length.from_si(float(end)) for values in point.position.T for end in (values.min(), values.max())]
-        greatest = [np.hypot(*rate.T) for rate in (point.velocity, point.acceleration)]
-        most = ["-" if np.isnan(rate).all() else _number(float(np.nanmax(rate))) for rate in greatest]
-        table.add_row(name, *map(_number, ends), *most)
-    notes = [paragraphs(("-", remark) for remark in motion.remarks)] if motion.remarks else []
-    return Group(*lines, Text(), table, *notes)
-
-
 def _time(seconds: float) -> str:
     for size, name in ((1.0, "s"), (1e-3, "ms"), (1e-6, "us")):
         if seconds >= size:
@@ -158,9 +134,9 @@ def _links(state: State) -> RenderableType:
         if name != state.mechanism.frame:
             table.add_row(
                 name,
-                _number(angle.from_si(link.angle)),
-                _number(link.angular_velocity),
-                _number(link.angular_acceleration),
+                number(angle.from_si(link.angle)),
+                number(link.angular_velocity),
+                number(link.angular_acceleration),
                 link.sense,
             )
     return table
@@ -185,19 +161,19 @@ def _points(state: State) -> RenderableType:
     scale = max((float(np.hypot(*point.position)) for point in points.values()), default=1.0) or 1.0
 
     def placed(value: float) -> str:
-        return _number(length.from_si(value if abs(value) > 1e-13 * scale else 0.0))
+        return number(length.from_si(value if abs(value) > 1e-13 * scale else 0.0))
 
     def at(vector: np.ndarray) -> str:
-        return _number(angle.from_si(float(np.arctan2(vector[1], vector[0])))) if np.hypot(*vector) else ""
+        return number(angle.from_si(float(np.arctan2(vector[1], vector[0])))) if np.hypot(*vector) else ""
 
     for name, point in points.items():
         table.add_row(
             name,
             placed(point.position[0]),
             placed(point.position[1]),
-            _number(float(np.hypot(*point.velocity))),
+            number(float(np.hypot(*point.velocity))),
             at(point.velocity),
-            _number(float(np.hypot(*point.acceleration))),
+            number(float(np.hypot(*point.acceleration))),
             at(point.acceleration),
             point.sense,
         )
@@ -242,8 +218,8 @@ def _relative(text: str, relative: RelativeState, state: State) -> RenderableTyp
     angle = unit(degree)
     for name, (measure, part) in parts.items():
         size = float(np.hypot(*part))
-        at = _number(angle.from_si(float(np.arctan2(part[1], part[0])))) if size > 1e-14 else ""
-        table.add_row(name, _number(size), measure, at, *(_number(float(each)) for each in part))
+        at = number(angle.from_si(float(np.arctan2(part[1], part[0])))) if size > 1e-14 else ""
+        table.add_row(name, number(size), measure, at, *(number(float(each)) for each in part))
     return table
 
 
@@ -255,10 +231,10 @@ def _shown(kind: str, state: State) -> tuple[str, Unit]:
 
 
 def _reported(value: float | None, kind: str, state: State) -> str:
-    return "-" if value is None else _number(_shown(kind, state)[1].from_si(value))
+    return "-" if value is None else number(_shown(kind, state)[1].from_si(value))
 
 
-def _number(value: float) -> str:
+def number(value: float) -> str:
     return "0" if abs(value) < 1e-14 else f"{value:#.{DIGITS}g}".rstrip(".")
 
 

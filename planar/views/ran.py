@@ -1,0 +1,85 @@
+"""A motion as tables: its range, its limits, and where every point went and how fast."""
+
+from __future__ import annotations
+
+import numpy as np
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from planar.motion import Motion
+from planar.units import unit
+from planar.views.table import number, paragraphs, plain_table
+from planar.words import amount, listed, many
+
+MOST_ENDS = 6
+"""Ends of stretches of a circuit that are named one by one."""
+
+
+def ran(motion: Motion) -> RenderableType:
+    """A run: its range, its limits, and for every point where it went and how fast it was, at most, among the rows."""
+    lines = [Text(motion.mechanism.name, style="bold")]
+    lines += [Text(_range(motion, name)) for name in motion.inputs]
+    if motion.time is not None:
+        lines.append(Text(f"in time, from 0 s to {motion.time[-1]:.6g} s"))
+    worst = f"worst residual {motion.residual:.1e} of the mechanism's size"
+    lines.append(Text(f"{many(len(motion), 'position')}; {worst}" + (f"; {motion.reason}" if motion.reason else "")))
+    tables = [Text(), _limits(motion)] if motion.limits else []
+    notes = [paragraphs(("-", remark) for remark in motion.remarks)] if motion.remarks else []
+    return Group(*lines, *tables, Text(), _points(motion), *notes)
+
+
+def _range(motion: Motion, name: str) -> str:
+    """Where an input went: A from 0 deg to 90 deg and to 0 deg."""
+    units, kind = motion.mechanism.units, "length" if motion.slides(name) else "angle"
+    position = motion.inputs[name].position
+    way = np.sign(np.diff(position))
+    turns = [k + 1 for k in range(len(way) - 1) if way[k] * way[k + 1] < 0.0]
+    ends = [amount(float(position[k]), kind, units) for k in (0, *turns, len(position) - 1)]
+    if len(set(ends)) == 1 and not turns:
+        return f"{name} = {ends[0]}" + (", held" if len(motion) > 1 else "")
+    told = ends[1:] if len(ends) <= MOST_ENDS else [*ends[1:MOST_ENDS], f"and so on to {ends[-1]}"]
+    return f"{name} from {ends[0]} to {', to '.join(told)}"
+
+
+def _limits(motion: Motion) -> Table:
+    """Dead points, change points and ends of strokes, solved for."""
+    units = motion.mechanism.units
+    running = _running(motion)
+    at = "time, s" if running is None else f"at {running}, {units.length if motion.slides(running) else units.angle}"
+    table = plain_table("Limits, solved for", "limit", "of", at, "where")
+    for limit in motion.limits:
+        of = [name for name in (limit.of,) if name]
+        kind = "length" if limit.of and motion.slides(limit.of) else "angle"
+        where = amount(limit.value, kind, units) if limit.kind == "stroke end" else ""
+        at_input = limit.input if running is None else _in_units(motion, running, limit.input)
+        name = f"{limit.kind}, {limit.end}" if limit.end else limit.kind
+        table.add_row(name, listed(of) if of else "", number(at_input), where)
+    return table
+
+
+def _in_units(motion: Motion, pair: str, value: float) -> float:
+    units = motion.mechanism.units
+    return unit(units.length if motion.slides(pair) else units.angle).from_si(value)
+
+
+def _running(motion: Motion) -> str | None:
+    """The input that runs, unless they run in time."""
+    if motion.time is not None:
+        return None
+    return max(motion.inputs, key=lambda name: float(np.ptp(motion.inputs[name].position)))
+
+
+def _points(motion: Motion) -> Table:
+    units = motion.mechanism.units
+    heads = (f"x from, {units.length}", f"x to, {units.length}", f"y from, {units.length}", f"y to, {units.length}")
+    table = plain_table(
+        "Points, among these positions", "point", *heads, "velocity up to, m/s", "acceleration up to, m/s²"
+    )
+    length = unit(units.length)
+    for name, point in motion.points.items():
+        ends = [length.from_si(float(end)) for values in point.position.T for end in (values.min(), values.max())]
+        greatest = [np.hypot(*rate.T) for rate in (point.velocity, point.acceleration)]
+        most = ["-" if np.isnan(rate).all() else number(float(np.nanmax(rate))) for rate in greatest]
+        table.add_row(name, *map(number, ends), *most)
+    return table
