@@ -6,15 +6,22 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from planar import plot
     from planar.analysis.advantage import Advantage, advantage
+    from planar.analysis.advantage_over import AdvantageOver, advantage_over
+    from planar.analysis.answers import Answers, answers
+    from planar.analysis.area import Area, area
     from planar.analysis.by_centres import velocity_by_centres
     from planar.analysis.centres import Centre, Centres, centres
     from planar.analysis.centrodes import Centrodes, centrodes
     from planar.analysis.curvature import Curvature, curvature
-    from planar.analysis.extremes import stroke
+    from planar.analysis.dwells import Dwell, dwells
+    from planar.analysis.extremes import Extremes, Stroke, Swing, extremes, greatest, stroke, swing
     from planar.analysis.forces import Forces, forces
     from planar.analysis.harmonics import harmonics
     from planar.analysis.inspection import Inspection, inspect
     from planar.analysis.mobility import Mobility, mobility
+    from planar.analysis.output import Extreme
+    from planar.analysis.time_ratio import TimeRatio, time_ratio
+    from planar.analysis.transmission import Transmission, transmission
     from planar.analysis.two_directions import centre_of
     from planar.document import schema
     from planar.errors import BadInput, NoAnswer, Outcome, PlanarError
@@ -29,7 +36,10 @@ __version__ = "0.4.0"
 
 _ROOMS = {
     "Advantage": "analysis.advantage",
+    "AdvantageOver": "analysis.advantage_over",
     "Along": "mechanism",
+    "Answers": "analysis.answers",
+    "Area": "analysis.area",
     "At": "mechanism",
     "BadInput": "errors",
     "Centre": "analysis.centres",
@@ -38,20 +48,30 @@ _ROOMS = {
     "Curvature": "analysis.curvature",
     "Distances": "mechanism",
     "Drive": "mechanism",
+    "Dwell": "analysis.dwells",
+    "Extreme": "analysis.output",
+    "Extremes": "analysis.extremes",
     "Forces": "analysis.forces",
     "Input": "mechanism",
     "Inspection": "analysis.inspection",
     "Link": "mechanism",
     "Load": "mechanism",
     "Mechanism": "mechanism",
-    "Motion": "motion",
     "Mobility": "analysis.mobility",
+    "Motion": "motion",
     "NoAnswer": "errors",
     "Outcome": "errors",
     "PlanarError": "errors",
     "Point": "mechanism",
     "State": "motion",
+    "Stroke": "analysis.extremes",
+    "Swing": "analysis.extremes",
+    "TimeRatio": "analysis.time_ratio",
+    "Transmission": "analysis.transmission",
     "advantage": "analysis.advantage",
+    "advantage_over": "analysis.advantage_over",
+    "answers": "analysis.answers",
+    "area": "analysis.area",
     "centre_of": "analysis.two_directions",
     "centres": "analysis.centres",
     "centrodes": "analysis.centrodes",
@@ -59,8 +79,11 @@ _ROOMS = {
     "cycle": "solving.cycle",
     "dataset": "views.dataset",
     "dumps": "files",
+    "dwells": "analysis.dwells",
+    "extremes": "analysis.extremes",
     "forces": "analysis.forces",
     "from_dict": "files",
+    "greatest": "analysis.extremes",
     "harmonics": "analysis.harmonics",
     "inspect": "analysis.inspection",
     "load": "files",
@@ -70,14 +93,20 @@ _ROOMS = {
     "schema": "document",
     "solve": "solving.position",
     "stroke": "analysis.extremes",
+    "swing": "analysis.extremes",
+    "time_ratio": "analysis.time_ratio",
     "to_dict": "files",
+    "transmission": "analysis.transmission",
     "velocity_by_centres": "analysis.by_centres",
 }
 """Where each public name lives: it is loaded when it is first used."""
 
 __all__ = [
     "Advantage",
+    "AdvantageOver",
     "Along",
+    "Answers",
+    "Area",
     "At",
     "BadInput",
     "Centre",
@@ -86,6 +115,9 @@ __all__ = [
     "Curvature",
     "Distances",
     "Drive",
+    "Dwell",
+    "Extreme",
+    "Extremes",
     "Forces",
     "Input",
     "Inspection",
@@ -99,7 +131,14 @@ __all__ = [
     "PlanarError",
     "Point",
     "State",
+    "Stroke",
+    "Swing",
+    "TimeRatio",
+    "Transmission",
     "advantage",
+    "advantage_over",
+    "answers",
+    "area",
     "centre_of",
     "centres",
     "centrodes",
@@ -107,8 +146,11 @@ __all__ = [
     "cycle",
     "dataset",
     "dumps",
+    "dwells",
+    "extremes",
     "forces",
     "from_dict",
+    "greatest",
     "harmonics",
     "inspect",
     "load",
@@ -118,7 +160,10 @@ __all__ = [
     "schema",
     "solve",
     "stroke",
+    "swing",
+    "time_ratio",
     "to_dict",
+    "transmission",
     "velocity_by_centres",
 ]
 

@@ -1,41 +1,30 @@
-"""Where in a run a slide turns back, and where something moves fastest: solved for, not read off its samples."""
+"""Where in a run a slide, a rocker or a point turns back, and where it is fastest: solved for, not read off samples."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from math import inf, nan, sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numpy.polynomial import Chebyshev
 
+from planar.analysis.output import Axis, Extreme, Output
 from planar.analysis.steady import SAME, Steady
+from planar.analysis.zeros import ROUND_OFF, changes, peaks, summit
 from planar.errors import BadInput, NoAnswer
 from planar.mechanism import motions
 from planar.motion import Motion, Moving, State
 from planar.pairs import Kind
+from planar.roots import root
 
 Array = np.ndarray
 Measure = Callable[[State], float | Array]
 
-NODES, HALVINGS = 12, 4
-"""Exact positions through which a quantity is laid to be differentiated; how often their stretch is halved for it."""
-ROUND_OFF = 1e-12
-"""The last terms of a series, as a part of the greatest, when it has come to its end."""
 RIVAL = 0.5
 """Local maxima of the samples less than this part of the greatest are not looked into."""
 CLOSER, GROWTH = 5.0, 0.6
 """So many times nearer to a limit, the square of what grows there as the root of the distance, or faster, grows by more
 than this power of it."""
-EVALUATIONS = 80
-"""Bisection alone needs 52 for a root to round-off."""
-
-
-class Extreme(NamedTuple):
-    """An extreme value (SI), and the position of the running input (rad or m) where it is."""
-
-    input: float
-    value: float
 
 
 class Stroke(NamedTuple):
@@ -48,6 +37,29 @@ class Stroke(NamedTuple):
     top: Extreme
     bottom: Extreme
     length: float
+
+
+class Swing(NamedTuple):
+    """The swing of a rocker: its extreme angles (rad), and the angle between them (rad)."""
+
+    of: str
+    least: Extreme
+    greatest: Extreme
+    angle: float
+
+
+class Extremes(NamedTuple):
+    """The extreme positions of a point along an axis: coordinates (m), and the distance between them (m).
+
+    `turning` says of each whether the point turns back there; else it is at an end of the input's range.
+    """
+
+    point: str
+    axis: Axis
+    least: Extreme
+    greatest: Extreme
+    length: float
+    turning: tuple[bool, bool]
 
 
 def stroke(motion: Motion, pair: str) -> Stroke | None:
@@ -64,34 +76,54 @@ def stroke(motion: Motion, pair: str) -> Stroke | None:
 
 def ends(steady: Steady, pair: str) -> Stroke | None:
     """See `stroke`; of a motion made ready for it."""
-    displacement = _motion_at(steady.samples, pair)[0]
-    least, greatest, near = displacement.min(), displacement.max(), SAME * steady.solver.unit
-    if greatest - least <= near:
+    found = Output(steady, pair).ends()
+    if found is None:
         return None
-    positions, velocities = steady.tabled(lambda moving: np.asarray(_motion_at(moving, pair)[1]))
-    found = []
-    for low, high in _changes(positions, velocities):
-        try:
-            zero = root(lambda at: float(_motion_at(steady.at(at), pair)[1]), low, high)
-            place, value = steady.within(zero), float(_motion_at(steady.at(zero), pair)[0])
-        except NoAnswer:
-            continue  # what cannot be followed does not turn back
-        if place is not None:
-            found.append(Extreme(place, value))
-    if len(found) < 2:
-        return None
-    low, high = (_first(found, pick(each.value for each in found), near) for pick in (min, max))
-    if low.value > least + near or high.value < greatest - near:
-        return None
+    low, high = found
     top, bottom = (high, low) if _farther(steady, pair, high, low) else (low, high)
     return Stroke(pair, top, bottom, high.value - low.value)
+
+
+def swing(motion: Motion, name: str) -> Swing | None:
+    """The extreme angles of a rocker, solved for to round-off: of a turning pair, else of a link, of this name.
+
+    Angles are those of the motion, so that the swing may be more than a turn. None where it turns right round, where it
+    does not turn, where it is most at an end of the input's range and does not turn back there, and of a slide. Raises
+    Unknown for another name.
+    """
+    if name in motions(motion.mechanism) and motion.slides(name):
+        return None
+    found = Output(Steady(motion), name).ends()
+    return found and Swing(name, *found, found[1].value - found[0].value)
+
+
+def extremes(motion: Motion, point: str, axis: Axis = "x") -> Extremes:
+    """The extreme positions of a point along an axis, "x" or "y" or a direction (rad), solved for to round-off.
+
+    Over a range that is not closed they may be at its ends. Of places that are alike the first in the range is told.
+    Raises Unknown for another name, BadInput for another axis.
+    """
+    return spread(Output(Steady(motion), point, axis))
+
+
+def spread(output: Output) -> Extremes:
+    """See `extremes`; of an output that is made already."""
+    turns = output.turns
+    candidates = [(each, True) for each in turns] + [(each, False) for each in output.borders]
+    least, greatest = (
+        min((each for each in candidates if abs(each[0].value - end) <= output.near), key=lambda each: not each[1])
+        for end in output.range
+    )
+    length = greatest[0].value - least[0].value
+    return Extremes(output.name, output.axis, least[0], greatest[0], length, (least[1], greatest[1]))
 
 
 def greatest(motion: Motion, of: str | Measure, what: str = "velocity") -> Extreme:
     """Where in a run a slide, a point or anything else is fastest, and how fast, solved for.
 
-    `of` is a pair, whose relative motion is meant, or a point, and `what` its "velocity" or "acceleration"; the value
-    is the magnitude. Or `of` is a function of a State, a number or a vector, whose greatest magnitude is asked for.
+    `of` is a slide, else a point, else another pair, whose relative motion is meant, else a link, which turns; `what`
+    is its "velocity" or "acceleration"; the value is the magnitude. Or `of` is a function of a State, a number or a
+    vector, whose greatest magnitude is asked for.
 
     The input runs steadily at the file's velocity, without acceleration, as the chapters take it; where the file's
     velocity is zero, values are per unit of the input (m/rad, m/rad^2). The place of the greatest velocity, where
@@ -105,14 +137,14 @@ def greatest(motion: Motion, of: str | Measure, what: str = "velocity") -> Extre
     return fastest(Steady(motion), of, what)
 
 
-def fastest(steady: Steady, of: str | Measure, what: str = "velocity") -> Extreme:
-    """See `greatest`; of a motion made ready for it."""
+def fastest(steady: Steady, of: str | Output | Measure, what: str = "velocity") -> Extreme:
+    """See `greatest`; of a motion made ready for it, or of an output of it."""
     if what not in ("velocity", "acceleration"):
         raise BadInput("what", f"the greatest 'velocity' or 'acceleration' is found, not {what!r:.40}")
 
     def measured(moving: Moving) -> Array:
         """The square of the quantity, and of a velocity what its square grows by (..., 2)."""
-        if not isinstance(of, str):
+        if not isinstance(of, str | Output):
             if isinstance(moving, Motion):
                 return np.stack([_or_nothing(measured, steady, at) if ok else np.zeros(2) for at, ok in rows])
             return np.array([float(np.sum(np.square(of(moving)))), 0.0])
@@ -129,21 +161,23 @@ def fastest(steady: Steady, of: str | Measure, what: str = "velocity") -> Extrem
     if not len(positions):
         return Extreme(steady.first, nan)
     squares = table[:, 0]
-    still = steady.solver.unit * max(abs(steady.rate), steady.rate**2) if isinstance(of, str) else 0.0
+    still = steady.solver.unit * max(abs(steady.rate), steady.rate**2) if isinstance(of, str | Output) else 0.0
     if np.ptp(squares) <= max(ROUND_OFF * squares.max(), (ROUND_OFF * still) ** 2):
         return Extreme(steady.first, sqrt(float(squares.max())))
     for limit, _ in steady.limited():
         if _grows(positions, squares, limit):
             return Extreme(limit, inf)
-    worth = RIVAL**2 * float(squares.max())
+    rival = float(squares.max())
+    worth = RIVAL**2 * rival
     ends = () if steady.closed else (steady.first, steady.last)
     found = [Extreme(end, float(squares[np.argmin(np.abs(positions - end))])) for end in ends]
-    exact = isinstance(of, str) and what == "velocity"
-    for low, high in _changes(positions, table[:, 1], falling=True) if exact else _peaks(positions, squares):
-        if squares[(positions >= low) & (positions <= high)].max() < worth:
-            continue
+    exact = isinstance(of, str | Output) and what == "velocity"
+    for low, high in changes(positions, table[:, 1], falling=True) if exact else peaks(positions, squares):
+        around = squares[(positions >= low) & (positions <= high)]
+        if around.max() < (worth if exact else max(worth, rival - np.ptp(around))):
+            continue  # a top is less above its samples than these are apart
         try:
-            at = root(lambda at: float(measured(steady.at(at))[1]), low, high) if exact else _summit(square, low, high)
+            at = root(lambda at: float(measured(steady.at(at))[1]), low, high) if exact else summit(square, low, high)
             place, value = steady.within(at), square(at)
         except NoAnswer:
             continue  # the motion branches there
@@ -164,12 +198,16 @@ def _or_nothing(measured: Callable[[State], Array], steady: Steady, position: fl
         return np.zeros(2)
 
 
-def rates(moving: Moving, name: str) -> tuple[Array, Array, Array]:
-    """Position, velocity and acceleration (..., axes) of a slide, else of a point, else of the motion at a pair."""
+def rates(moving: Moving, name: str | Output) -> tuple[Array, Array, Array]:
+    """Position, velocity and acceleration (..., axes) of a slide, else of a point, another pair or a link."""
+    if isinstance(name, Output):
+        position, velocity, acceleration = (each[..., None] for each in np.broadcast_arrays(*name.of(moving)))
+        return position, velocity, acceleration
     named = motions(moving.mechanism)
     slides = name in named and named[name].drive_kind is Kind.LENGTH
-    if slides or (name in named and name not in moving.point_names):
-        position, velocity, acceleration = (np.asarray(part)[..., None] for part in _motion_at(moving, name))
+    if slides or (name not in moving._point_names and (name in named or name in moving.frames)):
+        parts = _motion_at(moving, name) if name in named else moving.link(name)[:3]
+        position, velocity, acceleration = (np.asarray(part)[..., None] for part in parts)
         return position, velocity, acceleration
     return moving.point(name)[:3]
 
@@ -203,68 +241,3 @@ def _grows(positions: Array, squares: Array, limit: float) -> bool:
     near, nearer = np.argsort(np.abs(positions - limit))[1::-1]
     times = abs((positions[near] - limit) / (positions[nearer] - limit))
     return times > CLOSER and squares[nearer] > times**GROWTH * squares[near]
-
-
-def _changes(positions: Array, values: Array, falling: bool = False) -> Iterator[tuple[float, float]]:
-    """Where a quantity passes zero, or only where it falls through it: the positions on either side."""
-    kept = values != 0.0
-    positions, values = positions[kept], values[kept]
-    for k in np.flatnonzero(np.sign(values[:-1]) != np.sign(values[1:])):
-        if not falling or values[k] > 0.0:
-            yield float(positions[k]), float(positions[k + 1])
-
-
-def _peaks(positions: Array, values: Array) -> Iterator[tuple[float, float]]:
-    """Where a quantity has a local maximum: the positions on either side."""
-    inner = values[1:-1]
-    for k in np.flatnonzero((inner >= values[:-2]) & (inner >= values[2:]) & (values[:-2] + values[2:] < 2.0 * inner)):
-        yield float(positions[k]), float(positions[k + 2])
-
-
-def _summit(function: Callable[[float], float], low: float, high: float) -> float:
-    """Where a function is greatest between two positions: a zero of the derivative of a polynomial through it."""
-    lowest, highest = low, high
-    at = 0.5 * (low + high)
-    for _ in range(HALVINGS):
-        series = Chebyshev.interpolate(
-            lambda some: np.array([function(float(each)) for each in some]), NODES - 1, domain=[low, high]
-        )
-        roots = [float(each.real) for each in series.deriv().roots() if abs(each.imag) < SAME]
-        flat = [each for each in roots if low <= each <= high]
-        at = max([*flat, low, high], key=series)
-        terms = np.abs(series.coef)
-        if terms[-2:].max() <= ROUND_OFF * terms.max():
-            break
-        quarter = 0.25 * (high - low)
-        low, high = max(at - quarter, lowest), min(at + quarter, highest)
-    return at
-
-
-def root(function: Callable[[float], float], low: float, high: float) -> float:
-    """A zero of a function between two positions at which its signs differ, to round-off.
-
-    T. Chandrupatla, A new hybrid quadratic/bisection algorithm, Advances in Engineering Software 28, 1997.
-    """
-    a, b = high, low
-    fa, fb = function(a), function(b)
-    if fa * fb >= 0.0:  # a sample at round-off of the zero
-        return a if abs(fa) < abs(fb) else b
-    part = 0.5
-    for _ in range(EVALUATIONS):
-        x = a + part * (b - a)
-        fx = function(x)
-        if fx * fa > 0.0:
-            c, fc = a, fa
-        else:
-            c, fc, b, fb = b, fb, a, fa
-        a, fa = x, fx
-        best = a if abs(fa) < abs(fb) else b
-        least = 2.0 * float(np.finfo(float).eps) * max(abs(best), 1.0) / abs(b - a)
-        if fx == 0.0 or least > 0.5:
-            break
-        xi, phi = (a - b) / (c - b), (fa - fb) / (fc - fb)
-        part = 0.5
-        if phi**2 < xi and (1.0 - phi) ** 2 < 1.0 - xi:
-            part = fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
-        part = min(1.0 - least, max(least, part))
-    return best

@@ -39,6 +39,8 @@ class Steady:
         self.rate = given.velocity or 1.0
         self.mechanism = with_inputs(motion.mechanism, (Drive(self.pair, None, self.rate, 0.0),))
         self.solver = Solver(self.mechanism)
+        self._which = [each.pair for each in self.mechanism.inputs].index(self.pair)
+        self._scale = self.solver.unit if self.solver.named[self.pair].drive_kind is Kind.LENGTH else 1.0
         self.positions: Array = motion.inputs[self.pair].position
         self.first, self.last = float(self.positions.min()), float(self.positions.max())
         self.z = self._unknowns(motion)
@@ -64,7 +66,8 @@ class Steady:
         if position not in self._states:
             index = int(np.argmin(np.where(self.known, np.abs(self.positions - position), np.inf)))
             there = self._solver(position)
-            start = self._solver(float(self.positions[index])).station.u
+            start = there.station.u.copy()
+            start[self._which] = self.positions[index] / self._scale
             z = follow(there, there.station.p, self.z[index], start, there.station.u)
             self._states[position] = there.state(z)
         return self._states[position]

@@ -14,8 +14,9 @@ from planar.cli.shared import as_json, at, busy, drives, main, output, ranged, r
 from planar.errors import BadInput, Outcome
 
 if TYPE_CHECKING:
+    from planar.analysis.answers import Answers
     from planar.analysis.published import Comparison
-    from planar.motion import State
+    from planar.motion import Motion, State
     from planar.results import RelativeState
 
 
@@ -110,6 +111,13 @@ def _solved(
     "--duration", metavar="TIME", help="Run in time so long, every input by its law or at constant acceleration."
 )
 @click.option("--jerk", is_flag=True, help="Third rates as well.")
+@click.option(
+    "--of",
+    "asked",
+    multiple=True,
+    metavar="NAME",
+    help="Also what is asked of a pair, link or point: stroke or swing, greatest speed, time ratio, dwells, area, ...",
+)
 @output("Write positions, velocities and accelerations to a .csv, .json, .npz or .parquet file.")
 def cycle(
     model: str,
@@ -123,6 +131,7 @@ def cycle(
     branches: tuple[int, ...],
     duration: str | None,
     jerk: bool,
+    asked: tuple[str, ...],
     output: Path | None,
 ) -> None:
     """The whole motion: position to position through the range of an input, or in time by the inputs' laws."""
@@ -152,10 +161,16 @@ def cycle(
         )
         if not as_json:
             motion.limits  # noqa: B018 - solved for while the sign is up
+        told = {name: _answers(motion, name) for name in asked}
     if as_json:
         from planar.views.run import record
 
-        click.echo(json.dumps(record(motion), ensure_ascii=False, allow_nan=False))
+        value = record(motion)
+        if told:
+            from planar.views.answers import record as answered
+
+            value["answers"] = answered(told)
+        click.echo(json.dumps(value, ensure_ascii=False, allow_nan=False))
     else:
         from planar.views.ran import ran
         from planar.views.run import written
@@ -163,9 +178,24 @@ def cycle(
         if output is not None:
             save(output, written(motion, output.suffix))
         show(ran(motion), None)
+        if told:
+            from planar.views.answers import tables
+
+            show(tables(motion, told), None)
     if motion.outcome is not Outcome.SOLVED:
         click.echo(f"planar: {motion.outcome.value}: {motion.reason}", err=True)
         sys.exit(NO_ANSWER)
+
+
+def _answers(motion: Motion, name: str) -> tuple[Answers, ...]:
+    """What `--of` asks for."""
+    from planar.analysis.answers import answers
+    from planar.motion import Unknown
+
+    try:
+        return answers(motion, name)
+    except Unknown as problem:
+        raise BadInput("--of", str(problem)) from None
 
 
 def _relative(state: State, text: str) -> RelativeState:

@@ -21,6 +21,12 @@ SETTLED = 1e-13
 SINGULAR = 1e-6
 """A singular value below this part of the greatest is zero at a change point, which is found to about 1e-8 at first."""
 TRULY = 1e-10
+CLOSED = 1e-10
+"""A quadratic form below this part of the greatest vanishes."""
+STARTS = 12
+"""Directions for each null vector from which ways are looked for."""
+NEARLY = 1e-2
+"""A point is on a way if it is no further from it than this part of its distance from the change point."""
 ALIKE = 1e-6
 """Ways that are nearer to one another are one."""
 HALF, LEAST_HALF = 0.02, 1e-4
@@ -39,10 +45,15 @@ class Near(NamedTuple):
 
 
 class Crossing(NamedTuple):
-    """A change point with the ways through it: points at one place, whose tangents are the ways."""
+    """A change point with the ways through it, points at one place whose tangents are the ways: first the one that
+    leads from where the walk came.
+
+    `whole` says whether these are all; where ways touch one another, or are many without an end, they are not told.
+    """
 
     y: Array
     ways: tuple[Point, ...]
+    whole: bool
 
 
 def nearest(curve: Curve, here: Point) -> Near | None:
@@ -95,86 +106,76 @@ def _refined(curve: Curve, y: Array, count: int) -> Near | None:
     return Near(y, vt[rank:].T, float(np.max(np.abs(curve.left(y)), initial=0.0)))
 
 
-def crossing(curve: Curve, y: Array) -> Crossing | None:
-    """A change point with all ways through it; None where third order does not tell them, as where branches touch."""
-    u, s, vt = np.linalg.svd(curve.slope(y))
-    rank = int(np.sum(s > TRULY * max(s[0], 1.0)))
-    null, idle = vt[rank:].T, u[:, rank:]
-    whole = curve.whole(y)
-    quadratics = []
-    for rows in idle.T:
-        bends = curve.program.bend_of(whole, rows, curve.p)
-        quadratics.append(null.T @ curve.narrowed(curve.narrowed(bends).T) @ null)
-    ways = []
-    for c in _roots(np.array(quadratics)):
-        found = _way(curve, y, null, idle, np.array(quadratics), c, (u, s, vt, rank))
-        if found is None:
+class _Ways:
+    """The conditions of second and third order for ways through one change point."""
+
+    def __init__(self, curve: Curve, y: Array):
+        self.curve, self.y = curve, y
+        self.u, self.s, self.vt = np.linalg.svd(curve.slope(y))
+        self.rank = int(np.sum(self.s > TRULY * max(self.s[0], 1.0)))
+        self.null, self.idle = self.vt[self.rank :].T, self.u[:, self.rank :]
+        whole, forms = curve.whole(y), []
+        for rows in self.idle.T:
+            bends = curve.program.bend_of(whole, rows, curve.p)
+            forms.append(self.null.T @ curve.narrowed(curve.narrowed(bends).T) @ self.null)
+        self.forms = np.array(forms).reshape(-1, *2 * [self.null.shape[1]])
+
+    def root(self, c: Array) -> Array | None:
+        """The direction next to c, |c| = 1, in which all quadratic forms vanish."""
+        scale = float(np.max(np.abs(self.forms), initial=0.0))
+        if scale < SINGULAR:
             return None
-        ways.append(found)
-    return Crossing(y, tuple(ways))
-
-
-def _roots(quadratics: Array) -> list[Array]:
-    """The directions c, |c| = 1, one of each pair c and -c, in which all quadratic forms (forms, k, k) vanish."""
-    size = quadratics.shape[-1]
-    scale = np.max(np.abs(quadratics), initial=0.0)
-    if scale < SINGULAR:
-        return []
-    forms = quadratics / scale
-    rng = np.random.default_rng(0)
-    found: list[Array] = []
-    for start in rng.normal(size=(16 * size * size, size)):
-        c = start / np.linalg.norm(start)
-        for _ in range(40):
+        forms = self.forms / scale
+        c = c / np.linalg.norm(c)
+        for _ in range(REFINEMENTS):
             left = np.append(np.einsum("fij,i,j->f", forms, c, c), 0.5 * (c @ c - 1.0))
-            slope = np.vstack([2.0 * forms @ c, c])
-            step = np.linalg.lstsq(slope, -left, rcond=1e-10)[0]
+            step = np.linalg.lstsq(np.vstack([2.0 * forms @ c, c]), -left, rcond=1e-10)[0]
             c = c + step
-            if np.max(np.abs(step)) < 1e-15:
+            if np.max(np.abs(step)) < SETTLED:
                 break
-        if np.max(np.abs(np.einsum("fij,i,j->f", forms, c, c))) > 1e-10 or abs(c @ c - 1.0) > 1e-6:
-            continue
-        if all(min(np.linalg.norm(c - each), np.linalg.norm(c + each)) > ALIKE for each in found):
-            found.append(c)
-    return found
+        met = np.max(np.abs(np.einsum("fij,i,j->f", forms, c, c))) < CLOSED and abs(c @ c - 1.0) < ALIKE
+        return c if met else None
+
+    def way(self, c: Array) -> Point | None:
+        """The way with tangent null c and its second derivative; None where the third order leaves it open."""
+        curve, rank = self.curve, self.rank
+        v = self.null @ c
+        base = -self.vt[:rank].T @ ((self.u[:, :rank].T @ curve.second(self.y, v)) / self.s[:rank])
+        # of the null space only what is normal to the tangent
+        across = np.linalg.svd(c[None])[2][1:].T
+        slope = 3.0 * (self.forms @ c) @ across
+        if np.linalg.svd(slope, compute_uv=False)[-1] < SINGULAR:
+            return None
+        third = curve.program.third(curve.whole(self.y), curve.widened(v), curve.widened(base), curve.p)
+        e = np.linalg.lstsq(slope, -(self.idle.T @ third), rcond=None)[0]
+        return Point(self.y, v, base + self.null @ (across @ e), 0.0)
 
 
-def _way(
-    curve: Curve,
-    y: Array,
-    null: Array,
-    idle: Array,
-    quadratics: Array,
-    c: Array,
-    parts: tuple[Array, Array, Array, int],
-) -> Point | None:
-    """The way with tangent null c and its second derivative; None where the third order leaves it open."""
-    u, s, vt, rank = parts
-    v = null @ c
-    base = -vt[:rank].T @ ((u[:, :rank].T @ curve.second(y, v)) / s[:rank])
-    # of the null space only what is normal to the tangent
-    across = np.linalg.svd(c[None])[2][1:].T
-    slope = 3.0 * (quadratics @ c) @ across
-    wide = curve.widened(v)
-    third = curve.program.third(curve.whole(y), wide, curve.widened(base), curve.p)
-    if np.linalg.svd(slope, compute_uv=False)[-1] < SINGULAR:
+def crossing(curve: Curve, here: Point, y: Array) -> Crossing | None:
+    """A change point with the ways through it, if one of them leads from a point beside it."""
+    ways = _Ways(curve, y)
+    first = ways.root(ways.null.T @ (y - here.y))
+    came = None if first is None else ways.way(first)
+    if first is None or came is None or not _leads(curve, here, came):
         return None
-    e = np.linalg.lstsq(slope, -(idle.T @ third), rcond=None)[0]
-    return Point(y, v, base + null @ (across @ e), 0.0)
+    size = len(first)
+    found = [first]
+    for start in np.random.default_rng(0).normal(size=(STARTS * size, size)):
+        c = ways.root(start)
+        if c is not None and all(min(np.linalg.norm(c - a), np.linalg.norm(c + a)) > ALIKE for a in found):
+            found.append(c)
+    others = [ways.way(c) for c in found[1:]]
+    told = tuple(way for way in others if way is not None)
+    return Crossing(y, (came, *told), len(told) == len(others))
 
 
-def lead(curve: Curve, here: Point, crossed: Crossing) -> int | None:
-    """Which of the ways through a change point leads from a point beside it; its index."""
-    best, way = 0.1, None
-    for index, point in enumerate(crossed.ways):
-        gone = float(point.tangent @ (crossed.y - here.y))
-        if gone * float(point.tangent @ here.tangent) <= 0.0:
-            continue
-        guess = curve.corrected(point.y - gone * point.tangent + 0.5 * gone**2 * point.bend, point.tangent)
-        apart = np.inf if guess is None else float(np.linalg.norm(guess - here.y)) / abs(gone)
-        if apart < best:
-            best, way = apart, index
-    return way
+def _leads(curve: Curve, here: Point, way: Point) -> bool:
+    """Whether a way through a change point leads to a point beside it."""
+    gone = float(way.tangent @ (way.y - here.y))
+    if gone * float(way.tangent @ here.tangent) <= 0.0:
+        return False
+    guess = curve.corrected(way.y - gone * way.tangent + 0.5 * gone**2 * way.bend, way.tangent)
+    return guess is not None and float(np.linalg.norm(guess - here.y)) < NEARLY * abs(gone)
 
 
 class Beside(NamedTuple):

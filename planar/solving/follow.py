@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
 from types import MappingProxyType
 from typing import NamedTuple, Protocol
 
@@ -143,9 +144,13 @@ class Trip:
         self._pieces = pieces(self.walk)
         self._piece: Piece | None = None
 
+    def holds(self, place: float) -> bool:
+        """Whether a place lies on what has been followed already."""
+        return self._piece is not None and place <= self._piece.stop
+
     def to(self, place: float) -> tuple[Array, Array | None] | None:
         """The unknowns so far along the way, with derivatives where the slope is singular; None if it ends before."""
-        while self._piece is None or not place <= self._piece.stop:
+        while self._piece is None or not self.holds(place):
             if self.dead is not None:
                 return None
             self._piece = next(self._pieces, None)
@@ -265,7 +270,7 @@ def run(solver: Followed, p: Array, z: Array, u: Array, branches: Sequence[int] 
             break
         trip, places = _trip(solver, p, found[done - 1], u[done - 1 :], branches[len(met_on_way) :])
         before = len(met_on_way)
-        for place in places:
+        for place, following in pairwise([*places, np.inf]):
             told = trip.to(place)
             met_on_way[before:] = met(trip.walk, place)
             if told is None:
@@ -277,25 +282,25 @@ def run(solver: Followed, p: Array, z: Array, u: Array, branches: Sequence[int] 
             if told[1] is not None:
                 local[done] = Local(told[1], trip.curve.way)
             done, general = done + 1, general + 1
-            if told[1] is None:
+            if told[1] is None and not trip.holds(following):
                 break
         missed += trip.walk.missed
     return Run(found, general, None, None, local, tuple(met_on_way), tuple(missed))
 
 
-def _trip(solver: Followed, p: Array, z: Array, u: Array, branches: Sequence[int]) -> tuple[Trip, Iterator[float]]:
+def _trip(solver: Followed, p: Array, z: Array, u: Array, branches: Sequence[int]) -> tuple[Trip, list[float]]:
     """A trip from the first of these inputs towards the next, and the places of those that lie on the same way."""
     way = u[1] - u[0]
     reach = float(np.max(np.abs(way), initial=0.0))
     if reach == 0.0:
-        return Trip(solver, p, z, u[0], way), iter([0.0])
+        return Trip(solver, p, z, u[0], way), [0.0]
     axis = way / reach
     gone = (u[1:] - u[0]) @ axis / float(axis @ axis)
     aside = np.max(np.abs(u[1:] - u[0] - gone[:, None] * axis), axis=1) > STRAIGHT
     back = np.diff(gone, prepend=0.0) <= 0.0
     off = aside | back
     many = int(np.argmax(off)) if off.any() else len(gone)
-    return Trip(solver, p, z, u[0], way, branches), iter(gone[:many].tolist())
+    return Trip(solver, p, z, u[0], way, branches), gone[:many].tolist()
 
 
 def _ended(solver: Followed, trip: Trip) -> NoAnswer:

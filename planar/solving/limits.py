@@ -132,7 +132,7 @@ def along(
                 point = arc.at(curve, x)
                 yield noted("stroke end", output.name, point, float(watched.along(curve, point)[k, 0]))
         for each in met(walk, last)[passed:]:
-            yield noted("change point", pair, each.passed.crossing.ways[each.passed.came], None, crossed(setup, each))
+            yield noted("change point", pair, each.passed.crossing.ways[0], None, crossed(setup, each))
             passed += 1
         if piece.dead is not None and piece.first != piece.last:
             yield noted("input dead point", pair, piece.dead)

@@ -29,9 +29,9 @@ def on_the_way(setup: Setup, met: Sequence[Met], missed: Sequence[Missed]) -> tu
 
 def crossed(setup: Setup, met: Met) -> str:
     """What to say of a change point that a motion passes."""
-    ways = len(met.passed.crossing.ways)
+    ways, more = len(met.passed.crossing.ways), "" if met.passed.crossing.whole else "at least "
     at = listed([setup.told(g.pair, u) for g, u, w in zip(setup.mechanism.inputs, met.u, met.way, strict=True) if w])
-    if ways == 1:
+    if ways == 1 and not more:
         return f"at {at} there is one more motion to first order, but only this one goes on"
-    on = "this one goes on smoothly" if met.passed.came == met.passed.went else "another one was taken, as asked for"
-    return f"at {at} {many(ways, 'branch', 'branches')} of the motion cross; {on}"
+    on = "this one goes on smoothly" if met.passed.went == 0 else "another one was taken, as asked for"
+    return f"at {at} {more}{many(max(ways, 2), 'branch', 'branches')} of the motion cross; {on}"

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.solving.change_point import Beside, Crossing, beside, crossing, lead, nearest
+from planar.solving.change_point import Beside, Crossing, beside, crossing, nearest
 from planar.solving.curve import Arc, Curve, Point, between
 
 Array = np.ndarray
@@ -26,10 +26,9 @@ ARCS = 50_000
 
 
 class Passed(NamedTuple):
-    """A change point that a walk went through: the ways, which of them it came by, and by which it went on."""
+    """A change point that a walk went through: the ways, by the first of which it came, and by which it went on."""
 
     crossing: Crossing
-    came: int
     went: int
 
 
@@ -55,17 +54,17 @@ class Walk:
         self.passed: list[Passed] = []
         self.missed: list[Missed] = []
         self.step = FIRST
-        self._looked = np.inf
+        self._looked, self._approaching = np.inf, False
 
     def arcs(self) -> Iterator[Arc]:
         """The arcs of the curve; they end where it cannot be followed further."""
         for _ in range(ARCS):
             here = self.here
-            if here.clear < SUSPECTED and here.clear < AGAIN * self._looked:
+            if self._approaching and here.clear < min(SUSPECTED, AGAIN * self._looked, self.step):
                 through = list(self._through())
                 if through:
                     yield from through
-                    self.step, self._looked = FIRST, np.inf
+                    self.step, self._looked, self._approaching = FIRST, np.inf, False
                     continue
             elif here.clear > SUSPECTED:
                 self._looked = np.inf
@@ -73,6 +72,7 @@ class Walk:
             if after is None:
                 return
             self._note(after)
+            self._approaching = after.clear < here.clear
             self.here = after
             yield between(here, after)
 
@@ -102,26 +102,23 @@ class Walk:
             return
         ahead = float(here.tangent @ (near.y - here.y))
         away = float(np.linalg.norm(near.y - here.y))
-        if not ahead > 0.0 or away > AHEAD * here.clear:
+        if not ahead > 0.0 or away > max(AHEAD * here.clear, SUSPECTED):
             return
         if near.open > curve.solver.tolerance or not curve.closes(near.y):
             self.missed = [each for each in self.missed if np.linalg.norm(each.y - near.y) > 1e-6]
             self.missed.append(Missed(near.y, away, near.open))
             return
-        found = crossing(curve, near.y)
-        came = None if found is None else lead(curve, here, found)
-        if found is None or came is None:
+        found = crossing(curve, here, near.y)
+        if found is None:
             return
-        went = self._taken(found, came, here)
-        inwards, outwards = (
-            self._sided(found.ways[index], sense) for index, sense in ((came, here), (went[0], went[1]))
-        )
+        went, onwards = self._taken(found, here)
+        inwards, outwards = self._sided(found.ways[0], here), self._sided(found.ways[went], onwards)
         if inwards is None or outwards is None:
             return
         if float(inwards.middle.tangent @ (here.y - inwards.before.y)) < 0.0:
             yield between(here, inwards.before)
             here = inwards.before
-        self.passed.append(Passed(found, came, went[0]))
+        self.passed.append(Passed(found, went))
         yield inwards.arc(here, inwards.middle)
         yield outwards.arc(outwards.middle, outwards.after)
         self.here = outwards.after
@@ -130,10 +127,10 @@ class Walk:
         """The curve beside a change point along a way, in the sense of a point on it."""
         return beside(self.curve, way if way.tangent @ towards.tangent >= 0.0 else way.turned())
 
-    def _taken(self, found: Crossing, came: int, here: Point) -> tuple[int, Point]:
+    def _taken(self, found: Crossing, here: Point) -> tuple[int, Point]:
         """The way to go on by, and a point in whose sense: smoothly, or as asked for."""
         number = self.branches.pop(0) if self.branches else 1
-        options = outgoing(found, came, here)
+        options = outgoing(found, here)
         index, tangent = options[min(number, len(options)) - 1]
         return index, found.ways[index]._replace(tangent=tangent)
 
@@ -143,17 +140,17 @@ class Walk:
             self.missed[k] = each._replace(distance=min(each.distance, float(np.linalg.norm(after.y - each.y))))
 
 
-def outgoing(found: Crossing, came: int, here: Point) -> list[tuple[int, Array]]:
+def outgoing(found: Crossing, here: Point) -> list[tuple[int, Array]]:
     """The ways on from a change point with their directions: the smooth one first, then by the angle from it.
 
     Of another way the direction in which the inputs go on as they came; both where they rest on it.
     """
-    smooth = found.ways[came].tangent
+    smooth = found.ways[0].tangent
     smooth = smooth if smooth @ here.tangent >= 0.0 else -smooth
     options = []
     for index, way in enumerate(found.ways):
         for tangent in (way.tangent, -way.tangent):
-            same = index == came
+            same = index == 0
             onwards = tangent @ smooth > 0.0 if same else tangent[-1] * smooth[-1] >= -1e-9
             if onwards:
                 options.append((index, tangent))
