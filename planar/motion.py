@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -13,7 +13,7 @@ from planar.algebra import Jet
 from planar.errors import BadInput, Outcome
 from planar.mechanism import Mechanism, NamedPoint, counting, motions, named_points
 from planar.pairs import Kind, Pair
-from planar.plane import Frame, Vector
+from planar.plane import Frame, Vector, frame_at
 from planar.results import (
     InputMotion,
     InputState,
@@ -226,6 +226,9 @@ class State(Moving):
 class Course(Protocol):
     """The curve of positions that a motion runs along."""
 
+    singular: frozenset[int]
+    """Rows on a change point, or so near one that their rates are those of the branch that was followed."""
+
     def limits(self, motion: Motion) -> tuple[Limit, ...]:
         """See `Motion.limits`."""
 
@@ -260,6 +263,28 @@ class Motion(Moving):
         Solved for when first asked for. Outputs are all slides, and all links pinned to the frame.
         """
         return self.course.limits(self) if self.course else ()
+
+    def until(self, row: int) -> Motion:
+        """The rows up to one, and that."""
+        many = slice(row + 1)
+
+        def cut(jet: Any) -> Any:
+            return (
+                Jet(*(np.broadcast_to(part, (len(self),))[many] for part in jet.parts)) if isinstance(jet, Jet) else jet
+            )
+
+        frames = {
+            name: frame if frame.fixed else frame_at(cut(frame.x), cut(frame.y), cut(frame.angle))
+            for name, frame in self.frames.items()
+        }
+        return replace(
+            self,
+            inputs={name: InputMotion(*(part[many] for part in given)) for name, given in self.inputs.items()},
+            frames=frames,
+            own={name: tuple(map(cut, each)) for name, each in self.own.items()},
+            time=None if self.time is None else self.time[many],
+            jerked=None,
+        )
 
     def __len__(self) -> int:
         return len(next(iter(self.inputs.values())).position)

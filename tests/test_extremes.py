@@ -10,12 +10,13 @@ from hypothesis import strategies as st
 
 import planar
 from planar.algebra import Jet
-from planar.analysis.extremes import Extreme, greatest, root, stroke
+from planar.analysis.extremes import Extreme, greatest, stroke
 from planar.analysis.steady import Steady
 from planar.errors import BadInput, NoAnswer
 from planar.mechanism import Drive, motions, with_inputs
 from planar.motion import Unknown
 from planar.pairs import Kind
+from planar.roots import root
 
 NEAR = 1e-12
 """rad, and part of a value: rounding of a position solved."""

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 from planar.analysis.output import Axis, Extreme, Output
 from planar.analysis.steady import Steady
-from planar.analysis.zeros import root
 from planar.errors import BadInput, NoAnswer
 from planar.motion import Motion
+from planar.roots import root
 
 WITHIN = 0.01
 """Of the stroke: an output that stays so near to a value dwells, if nothing else is told."""

@@ -10,13 +10,13 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from planar.algebra import Jet
-from planar.analysis.extremes import root
 from planar.analysis.scheme import NEAR, Joint, Scheme, apart, scheme
 from planar.errors import BadInput
 from planar.mechanism import Mechanism, motions
 from planar.motion import Array, State
 from planar.pairs import Kind
 from planar.plane import Vector
+from planar.roots import root
 from planar.solving.position import solve
 
 ANGLES = 3600

@@ -9,7 +9,7 @@ from math import pi
 import numpy as np
 
 from planar.algebra import Jet
-from planar.errors import NoAnswer
+from planar.errors import BadInput, NoAnswer
 from planar.mechanism import Drive, with_inputs
 from planar.motion import Motion, Moving, State
 from planar.pairs import Kind
@@ -29,10 +29,12 @@ class Steady:
     """A motion between its samples: states at any position of its running input, which runs steadily.
 
     Its `rate` is the file's velocity, without acceleration; where the file's velocity is zero it is 1 rad/s or 1 m/s,
-    so that rates are per unit of the input.
+    so that rates are per unit of the input. Of a motion there and back it is the way there; raises BadInput for a run
+    in time and for a circuit, whose input is more than once at a position.
     """
 
     def __init__(self, motion: Motion):
+        motion = _one_way(motion)
         ranges = {name: float(np.ptp(given.position)) for name, given in motion.inputs.items()}
         self.pair = max(ranges, key=ranges.__getitem__)
         given = next(each for each in motion.mechanism.inputs if each.pair == self.pair)
@@ -125,7 +127,11 @@ class Steady:
         jets = [each for f in self.samples.frames.values() if not f.fixed for each in (f.x, f.y, f.angle)]
         jets += [jet for own in self.samples.own.values() for jet in own]
         parts = [np.broadcast_to(part, len(self.positions)) for jet in jets for part in jet.parts]
-        return np.isfinite(parts).all(axis=0) if parts else np.ones(len(self.positions), dtype=bool)
+        found = np.isfinite(parts).all(axis=0) if parts else np.ones(len(self.positions), dtype=bool)
+        if self.samples.course is not None:
+            # several branches lead on from there
+            found[[row for row in self.samples.course.singular if row < len(found)]] = False
+        return found
 
     def _unknowns(self, motion: Motion) -> Array:
         """The unknowns at every sample (samples, unknowns), from the frames."""
@@ -206,3 +212,16 @@ class Steady:
                     return False
         slides = [jet.parts[0] for own in self.samples.own.values() for jet in own]
         return all(abs(each[-1] - each[0]) <= SAME * unit for each in slides)
+
+
+def _one_way(motion: Motion) -> Motion:
+    """The motion, or its way there if it comes back."""
+    if motion.time is not None:
+        raise BadInput("motion", "this is asked of the range of one input; the motion is a run in time")
+    ways = [np.diff(given.position) for given in motion.inputs.values()]
+    if not any((way > 0.0).any() and (way < 0.0).any() for way in ways):
+        return motion
+    middle = (len(motion) - 1) // 2
+    if all(np.array_equal(given.position, given.position[::-1]) for given in motion.inputs.values()):
+        return motion.until(middle)
+    raise BadInput("motion", "this is asked of one range of the input; a circuit goes through its dead points")

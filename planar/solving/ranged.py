@@ -231,6 +231,7 @@ class _Course:
 
     def __init__(self, ranged: Ranged, found: Rows, whole: tuple[Circuit, Walk] | None):
         self.ranged, self.found, self.whole = ranged, found, whole
+        self.singular = frozenset(found.local)
 
     def limits(self, motion: Motion) -> tuple[Limit, ...]:
         """See `Motion.limits`."""

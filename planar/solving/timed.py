@@ -67,6 +67,7 @@ class _Course:
 
     def __init__(self, timed: Timed, found: Rows, time: Array):
         self.timed, self.found, self.time = timed, found, time
+        self.singular = frozenset(found.local)
 
     def limits(self, motion: Motion) -> tuple[Limit, ...]:
         """See `Motion.limits`."""
