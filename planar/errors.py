@@ -16,6 +16,14 @@ class Outcome(StrEnum):
     BRANCH_LOST = "branch lost"
 
 
+class Ending(StrEnum):
+    """How a motion ends that cannot be followed further."""
+
+    DEAD_POINT = "dead point"
+    ENDLESS = "endless"
+    LOST = "lost"
+
+
 def _shown(text: str, longest: int) -> str:
     """The text as one line that a screen can show, whatever a file put into it."""
     if len(text) > longest:

@@ -221,7 +221,6 @@ REFUSED = [
         NoAnswer,
         "makes no full turn.*the range of 'A' ends at A = -103.792 deg and A = 103.792 deg",
     ),
-    ("antiparallelogram", "B", "x", NoAnswer, "makes no full turn.*branches of the motion cross"),
     ("002-E3.6a", "stroke", None, BadInput, "after a turn of 'O' it is not where it was"),
     ("planetary-gear-set", "T", "x", BadInput, "it is not where it was"),
     ("landing-gear", "D", "x", BadInput, "the input at 'jack' slides"),

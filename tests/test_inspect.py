@@ -138,7 +138,7 @@ KNOWN = [
     ("three-parallel-cranks", "crank C", "turns fully"),
     ("three-parallel-cranks", "rod", "translates"),
     ("scissor-lift", "platform", "translates"),
-    ("scissor-lift", "a1", "turns or rocks"),
+    ("scissor-lift", "a1", "rocks"),
     ("scotch-yoke", "yoke", "translates"),
     ("whitworth", "slotted link", "turns fully"),
     ("crank-and-slotted-lever", "lever", "rocks"),

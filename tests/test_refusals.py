@@ -146,15 +146,40 @@ def test_the_command_ends_with_1_and_says_outcome_and_reason(outcome, tmp_path):
     assert json.loads(ended.out) == {"outcome": outcome, "reason": problem.reason}
 
 
-def test_a_branch_that_is_lost_on_the_way_by_the_command(tmp_path):
+def test_a_dead_point_on_the_way_by_the_command(tmp_path):
     name = written(tmp_path, four_bar())
     ended = run(tmp_path, "solve", name, "--json", "--at", "A=140")
     told = json.loads(ended.out)
-    assert ended.refused(1) == f"branch lost: {told['reason']}"
-    assert told["outcome"] == "branch lost"
-    for word in (f"A = {LIMIT:.6g} deg", "from A = 60 deg to A = 140 deg"):
+    assert ended.refused(1) == f"dead point: {told['reason']}"
+    assert told["outcome"] == "dead point"
+    for word in (f"beyond A = {LIMIT:.6g} deg", "links 'BC' and 'DC'", "drive 'B' or 'C' or 'D'"):
         assert word in told["reason"]
     assert refused(four_bar(), {"A": 140 * DEG}).reason == told["reason"]
+
+
+def test_a_slide_that_goes_out_without_an_end_is_lost_there():
+    """A pin on the line x = 1 m in the slot of a lever about the origin stands at y = tan(angle)."""
+    value = {
+        "planar": 1,
+        "frame": "frame",
+        "units": {"angle": "deg"},
+        "links": {
+            "frame": {"points": {"O": [0, 0]}},
+            "lever": {"points": {"O": [0, 0]}},
+            "rod": {"points": {"P": [0, 0]}},
+        },
+        "pairs": [
+            {"turning": "O"},
+            {"sliding": "rail", "links": ["frame", "rod"], "line": {"through": [1, 0], "angle": 90}, "point": "P"},
+            {"sliding": "slot", "on": "lever", "block": "P", "line": {"through": "O"}},
+        ],
+        "inputs": [{"pair": "O", "position": 20, "velocity": "1 rad/s"}],
+    }
+    problem = refused(value, {"O": 100.0 * DEG})
+    assert problem.outcome is Outcome.BRANCH_LOST
+    # followed as far as 100 lengths of the mechanism
+    for word in ("beyond O = 89", "without an end", "drive 'rail'"):
+        assert word in problem.reason
 
 
 def test_every_outcome_is_provoked_here():

@@ -6,19 +6,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.errors import NoAnswer, Outcome
+from planar.errors import Ending, NoAnswer, Outcome
 from planar.pairs import Kind
 from planar.solving.curve import Curve, Point
 from planar.solving.follow import Piece, pieces, rests
+from planar.solving.position import Solver
 from planar.solving.setup import Setup
-from planar.solving.walk import Walk
+from planar.solving.walk import ENDLESS, Walk
 
 Array = np.ndarray
 
 PIECES = 1500
 """Linkages whose circuit is longer, as with wheels of many teeth, are followed over a range instead."""
-ENDLESS = 100.0
-"""Lengths of the size: a slide that goes on so far has no limit."""
 BACK = 1e-7
 """rad or sizes: a curve that comes so near to its start, in its direction, is closed."""
 SAME = 1e-9
@@ -56,7 +55,7 @@ class Circuit(NamedTuple):
         return tuple(Stretch(tuple(each)) for each in found if each and each[0].start != each[-1].stop)
 
 
-def circuit(setup: Setup, walk: Walk) -> Circuit:
+def circuit(setup: Solver, walk: Walk) -> Circuit:
     """The circuit from where a walk stands. Raises NoAnswer where it is not found to close."""
     start, curve = walk.here, walk.curve
     counts = _turning(setup)
@@ -71,12 +70,12 @@ def circuit(setup: Setup, walk: Walk) -> Circuit:
             if closing is not None:
                 return Circuit((*found, closing), rests(start))
         found.append(piece)
-        far = np.max(np.abs(piece.arc.after.y - start.y)[~counts], initial=0.0) > ENDLESS
-        if far or len(found) > PIECES:
-            told = "the motion goes on without an end" if far else "the motion does not come back within so many turns"
+        if (not counts[-1] and abs(piece.stop) > ENDLESS) or len(found) > PIECES:
+            told = "the motion does not come back to where it started within the turns that are followed"
             raise NoAnswer(Outcome.BRANCH_LOST, f"{told}; name where the range starts and stops instead of the circuit")
     here = walk.here.y
-    raise setup.ends(here[:-1], curve.inputs(here), walk.here.tangent, False)
+    ending = Ending.ENDLESS if walk.endless else Ending.LOST
+    raise setup.ends(curve.inputs(here), walk.here.tangent, ending)
 
 
 def _turning(setup: Setup) -> Array:

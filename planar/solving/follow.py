@@ -9,7 +9,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from planar.errors import NoAnswer
+from planar.errors import Ending, NoAnswer
 from planar.program import Program, length
 from planar.roots import root
 from planar.solving.branch import Branch
@@ -41,8 +41,8 @@ class Followed(Protocol):
     def tolerance(self) -> float:
         """What the gate lets pass."""
 
-    def ends(self, z: Array, u: Array, tangent: Array, dead: bool) -> NoAnswer:
-        """Why a motion ends at unknowns z and inputs u: at a dead point, or where branches cannot be told apart."""
+    def ends(self, u: Array, tangent: Array, ending: Ending) -> NoAnswer:
+        """What to say of a motion that ends at inputs u, towards which it went along a tangent."""
 
 
 class Local(NamedTuple):
@@ -245,7 +245,7 @@ def followed(solver: Followed, p: Array, z: Array, start: Array, stop: Array) ->
     trip = Trip(solver, p, z, start, way)
     found = trip.to(reach)
     if found is None:
-        raise _ended(solver, trip)
+        raise ended(solver, trip)
     return Run(np.stack([z, found[0]]), 1, met=met(trip.walk, reach), missed=tuple(trip.walk.missed))
 
 
@@ -276,7 +276,7 @@ def run(solver: Followed, p: Array, z: Array, u: Array, branches: Sequence[int] 
             if told is None:
                 missed += trip.walk.missed
                 last = trip.here.y[:-1], trip.curve.inputs(trip.here.y)
-                stopped = _ended(solver, trip)
+                stopped = ended(solver, trip)
                 return Run(found[:done], general, stopped, last, local, tuple(met_on_way), tuple(missed))
             found[done] = told[0]
             if told[1] is not None:
@@ -303,9 +303,11 @@ def _trip(solver: Followed, p: Array, z: Array, u: Array, branches: Sequence[int
     return Trip(solver, p, z, u[0], way, branches), gone[:many].tolist()
 
 
-def _ended(solver: Followed, trip: Trip) -> NoAnswer:
+def ended(solver: Followed, trip: Trip) -> NoAnswer:
+    """Why a trip goes no further."""
     here = trip.here
-    return solver.ends(here.y[:-1], trip.curve.inputs(here.y), here.tangent, trip.dead is not None)
+    ending = Ending.ENDLESS if trip.walk.endless else Ending.LOST if trip.dead is None else Ending.DEAD_POINT
+    return solver.ends(trip.curve.inputs(here.y), here.tangent, ending)
 
 
 def _accumulated(program: Program, p: Array, z: Array, u: Array, steps: int) -> Array:

@@ -70,10 +70,10 @@ def outputs(setup: Setup) -> Outputs:
 
 
 def until(parts: Iterable[Piece], last: float) -> Iterator[Piece]:
-    """The pieces of a curve up to a place of the inputs on their way."""
+    """The pieces of a curve up to a place of the inputs on their way, or to the dead point before it."""
     for piece in parts:
-        ends = piece.dead is not None and abs(piece.stop - last) < SEAM
-        if piece.stop < last - SEAM or ends:
+        ends = piece.dead is not None and piece.first != piece.last
+        if ends or piece.stop < last - SEAM:
             yield piece
             if ends:
                 return
@@ -121,14 +121,19 @@ def along(
     if rests(walk.here):
         yield noted("input dead point", pair, walk.here)
     before: Point | None = None
+    gains = np.zeros((0, 3))
+    if rests(walk.here):
+        yield noted("input dead point", pair, walk.here)
     for piece in parts:
         arc = piece.arc
         if before is None or arc.exact:
             before = arc.at(curve, piece.first)
+            gains = watched.along(curve, before)
         after = piece.dead or (arc.after if piece.last == arc.ends[1] else arc.at(curve, piece.last))
+        ahead = watched.along(curve, after)
         for k, output in enumerate(watched.pairs):
-            scale = setup.unit if output.drive_kind is Kind.LENGTH else 1.0
-            for x in _turns(watched, curve, piece, (before, after), k, STILL * scale):
+            still = STILL * (setup.unit if output.drive_kind is Kind.LENGTH else 1.0)
+            for x in _turns(watched, curve, piece, (gains[k], ahead[k]), k, still):
                 point = arc.at(curve, x)
                 yield noted("stroke end", output.name, point, float(watched.along(curve, point)[k, 0]))
         for each in met(walk, last)[passed:]:
@@ -136,15 +141,15 @@ def along(
             passed += 1
         if piece.dead is not None and piece.first != piece.last:
             yield noted("input dead point", pair, piece.dead)
-        before = after
+        before, gains = after, ahead
 
 
 def _turns(
-    watched: Outputs, curve: Curve, piece: Piece, ends: tuple[Point, Point], k: int, still: float
+    watched: Outputs, curve: Curve, piece: Piece, ends: tuple[Array, Array], k: int, still: float
 ) -> Iterator[float]:
     """Where on a piece an output turns back: places on the arc's axis."""
     arc = piece.arc
-    (_, g0, s0), (_, g1, s1) = (watched.along(curve, point)[k] for point in ends)
+    (_, g0, s0), (_, g1, s1) = ends
     sense = 1.0 if piece.last > piece.first else -1.0
 
     def rate(x: float) -> float:

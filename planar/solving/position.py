@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from planar.algebra import Jet
-from planar.errors import NoAnswer
+from planar.errors import Ending, NoAnswer
 from planar.mechanism import Drive, Mechanism, with_inputs
 from planar.motion import State
 from planar.plane import Frame
@@ -127,9 +127,9 @@ class Solver(Setup):
         y2 = np.concatenate([cancelled(moving.slope, moving.F2), s.u2])
         return self._stated(self.program.kinematics(y, y1, y2, s.p), found, residual, remarks)
 
-    def ends(self, z: Array, u: Array, tangent: Array, dead: bool) -> NoAnswer:
-        """Why a motion ends at unknowns z and inputs u, towards which it went along a tangent."""
-        return refusals.ended(self, moved_by(self, tangent[:-1]), self.where(u), dead)
+    def ends(self, u: Array, tangent: Array, ending: Ending) -> NoAnswer:
+        """What to say of a motion that ends at inputs u, towards which it went along a tangent."""
+        return refusals.ended(self, moved_by(self, tangent[:-1]), self.where(u), ending)
 
     def _passed(self, through: Passing, remarks: tuple[str, ...]) -> State | None:
         """The state where more than the inputs could move to first order, but only one motion goes on."""

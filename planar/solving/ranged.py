@@ -15,17 +15,15 @@ from planar.results import Limit
 from planar.solving import limits
 from planar.solving.circuit import Circuit, circuit
 from planar.solving.curve import Curve
-from planar.solving.follow import Local, Run, Trip, follow, met, onwards, pieces, run
+from planar.solving.follow import Local, Run, Trip, ended, follow, met, onwards, pieces, run
 from planar.solving.position import Solver
 from planar.solving.rates import Given
 from planar.solving.rows import Rows, joined, motion, reversed_, rows, shortened, spliced
-from planar.solving.walk import Walk
+from planar.solving.walk import ENDLESS, Walk
 from planar.words import listed
 
 Array = np.ndarray
 
-ENDLESS = 100.0
-"""Lengths of the size: a slide that goes on so far has no limit."""
 SEAM = 1e-9
 """Parts of a step: what rounding leaves of one."""
 LEAST = 1e-5
@@ -39,6 +37,7 @@ class _End(NamedTuple):
     position: float
     dead: bool
     open: bool
+    problem: NoAnswer | None = None
 
 
 class Ranged:
@@ -164,11 +163,11 @@ class Ranged:
 
     def _limited(self, found: Rows, ends: tuple[_End, ...]) -> Rows:
         """Rows of a range that ends by itself, with what there is to say of it."""
-        lost = [end for end in ends if not end.dead and not end.open]
-        if lost:
-            told = listed([self.solver.told(self.pair, end.position) for end in lost])
-            sentence = f"at {told} branches of the motion meet that cannot be told apart; it is followed up to there"
-            return found.stopped(NoAnswer(Outcome.BRANCH_LOST, sentence))
+        for end in ends:
+            if end.problem is not None:
+                found = found.stopped(end.problem)
+        if found.outcome is not Outcome.SOLVED:
+            return found
         told = listed([self.solver.told(self.pair, end.position) for end in ends if end.dead])
         dead = tuple(row % len(found.z) for row in found.dead)
         return found._replace(dead=dead, reason=f"the range of {self.pair!r} ends at {told}" if told else "")
@@ -223,7 +222,8 @@ class Ranged:
                 raise BadInput(self.pair, told)
             return _End(found[0], here + sign * far, False, True)
         y = trip.here.y
-        return _End(y[:-1], here + sign * float(y[-1]), trip.dead is not None, False)
+        problem = None if trip.dead is not None else ended(self.solver, trip)
+        return _End(y[:-1], here + sign * float(y[-1]), trip.dead is not None, False, problem)
 
 
 class _Course:

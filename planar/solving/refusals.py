@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from planar.errors import NoAnswer, Outcome
+from planar.errors import Ending, NoAnswer, Outcome
 from planar.pairs import Kind
 from planar.program import length
 from planar.solving.assemble import Failure
@@ -94,13 +94,19 @@ def dead_point(setup: Setup, links: Sequence[str]) -> NoAnswer:
     )
 
 
-def ended(setup: Setup, links: Sequence[str], where: str, dead: bool) -> NoAnswer:
-    """Where a motion of the inputs ends: a dead point, or branches that cannot be told apart."""
-    if dead:
+def ended(setup: Setup, links: Sequence[str], where: str, ending: Ending) -> NoAnswer:
+    """Where a motion of the inputs ends: a dead point, the infinite, or branches that cannot be told apart."""
+    if ending is Ending.DEAD_POINT:
         return NoAnswer(
             Outcome.DEAD_POINT,
             f"{_inputs(setup)} cannot go beyond {where}, a dead point: {_links(links)} would lead back from there; "
             f"stay short of it, go through the whole circuit, or drive {_pairs_of(setup, links, 4)}",
+        )
+    if ending is Ending.ENDLESS:
+        return NoAnswer(
+            Outcome.BRANCH_LOST,
+            f"{_inputs(setup)} cannot go beyond {where}: towards there {_links(links)} slide out without an end, as "
+            f"where lines become parallel; stop short of it, or drive {_pairs_of(setup, links, 4)}",
         )
     return NoAnswer(
         Outcome.BRANCH_LOST,

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.pairs import Kind
 from planar.solving.change_point import Beside, Crossing, beside, crossing, nearest
 from planar.solving.curve import Arc, Curve, Point, between
 
@@ -23,6 +24,8 @@ SUSPECTED, AGAIN = 0.15, 0.2
 AHEAD = 10.0
 """A change point farther ahead than so many times the distance within which there is none is another one."""
 ARCS = 50_000
+ENDLESS = 100.0
+"""Lengths of the size: what slides so far from where it started goes out without an end."""
 
 
 class Passed(NamedTuple):
@@ -55,11 +58,18 @@ class Walk:
         self.missed: list[Missed] = []
         self.step = FIRST
         self._looked, self._approaching = np.inf, False
+        self.endless = False
+        coordinates, unknowns = curve.program.equations.coordinates, curve.program.equations.unknowns
+        self._slides = np.array([coordinates[column].kind is Kind.LENGTH for column in unknowns], dtype=bool)
 
     def arcs(self) -> Iterator[Arc]:
         """The arcs of the curve; they end where it cannot be followed further."""
+        start = self.here.y[:-1][self._slides]
         for _ in range(ARCS):
             here = self.here
+            self.endless = float(np.max(np.abs(here.y[:-1][self._slides] - start), initial=0.0)) > ENDLESS
+            if self.endless:
+                return
             if self._approaching and here.clear < min(SUSPECTED, AGAIN * self._looked, self.step):
                 through = list(self._through())
                 if through:
