@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from planar.solving.position import solve
     from planar.views.dataset import dataset
 
-__version__ = "0.4.0"
+__version__ = "0.5.0"
 
 _ROOMS = {
     "Advantage": "analysis.advantage",

@@ -70,8 +70,9 @@ def circuit(setup: Solver, walk: Walk) -> Circuit:
             if closing is not None:
                 return Circuit((*found, closing), rests(start))
         found.append(piece)
-        if (not counts[-1] and abs(piece.stop) > ENDLESS) or len(found) > PIECES:
-            told = "the motion does not come back to where it started within the turns that are followed"
+        out = not counts[-1] and abs(piece.stop) > ENDLESS
+        if out or len(found) > PIECES:
+            told = "the input slides on without an end" if out else "the motion does not come back within so many turns"
             raise NoAnswer(Outcome.BRANCH_LOST, f"{told}; name where the range starts and stops instead of the circuit")
     here = walk.here.y
     ending = Ending.ENDLESS if walk.endless else Ending.LOST
