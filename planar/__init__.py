@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from planar.analysis.time_ratio import TimeRatio, time_ratio
     from planar.analysis.transmission import Transmission, transmission
     from planar.analysis.two_directions import centre_of
-    from planar.document import schema
+    from planar.document.schema import schema
     from planar.errors import BadInput, NoAnswer, Outcome, PlanarError
     from planar.files import dumps, from_dict, load, loads, to_dict
     from planar.mechanism import Along, At, Distances, Drive, Input, Link, Load, Mechanism, Point
@@ -90,7 +90,7 @@ _ROOMS = {
     "loads": "files",
     "mobility": "analysis.mobility",
     "plot": "plot",
-    "schema": "document",
+    "schema": "document.schema",
     "solve": "solving.position",
     "stroke": "analysis.extremes",
     "swing": "analysis.extremes",

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from planar.document import read, write
+from planar.document import read
 from planar.errors import BadInput
 from planar.mechanism import Mechanism
 
@@ -28,12 +28,14 @@ def from_dict(value: Any) -> Mechanism:
 
 def to_dict(mechanism: Mechanism) -> dict[str, Any]:
     """The JSON value of a mechanism; `from_dict` gives the same mechanism back, to the last bit."""
+    from planar.document.writer import write
+
     return write(mechanism)
 
 
 def dumps(mechanism: Mechanism) -> str:
     """The JSON text of a mechanism."""
-    return json.dumps(write(mechanism), indent=2, ensure_ascii=False) + "\n"
+    return json.dumps(to_dict(mechanism), indent=2, ensure_ascii=False) + "\n"
 
 
 def load(model: str | Path) -> Mechanism:

@@ -7,13 +7,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import isfinite
 from numbers import Real
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from planar.errors import BadInput
-from planar.laws import Law
 from planar.pairs.base import Pair
 from planar.shapes import Along, At, Distances, Link, Place, Point, Shape
 from planar.units import unit
+
+if TYPE_CHECKING:
+    from planar.laws import Law
 
 __all__ = [
     "QUANTITIES",

@@ -14,7 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import planar
-from planar.document import schema
+from planar.document.schema import schema
 from planar.errors import BadInput
 from planar.files import models
 from planar.mechanism import (

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 
 import planar
-from planar.document import schema
+from planar.document.schema import schema
 from planar.errors import BadInput
 from planar.laws import (
     MOTIONS,

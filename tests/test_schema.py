@@ -12,7 +12,7 @@ from jsonschema import Draft202012Validator
 from jsonschema.exceptions import best_match
 
 import planar
-from planar.document import schema
+from planar.document.schema import schema
 from planar.errors import BadInput
 from planar.files import model_files
 from planar.pairs import pair_types

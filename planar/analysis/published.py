@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from planar.analysis.forces import efforts
 from planar.mechanism import Drive, Published
 from planar.motion import State
 from planar.solving.position import solve
@@ -103,6 +102,8 @@ def _value(item: Published, state: State, start: State) -> float | np.ndarray:
     if item.quantity in of_pair:
         return float(state.pair(item.of)[of_pair[item.quantity]] or 0.0)
     if item.quantity == "input torque":
+        from planar.analysis.forces import efforts  # few examples have loads
+
         return efforts(state)[item.of]
     if item.relative_to is not None:
         relative = state.relative(item.of, item.relative_to)

@@ -33,7 +33,7 @@ def inspect(model: str, as_json: bool) -> None:
 @main.command()
 def schema() -> None:
     """The JSON schema of mechanism files, which editors can use."""
-    from planar.document import schema as published
+    from planar.document.schema import schema as published
 
     click.echo(json.dumps(published(), ensure_ascii=False, indent=2))
 

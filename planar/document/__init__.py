@@ -1,7 +1,6 @@
-"""Mechanism files: JSON value to Mechanism and back."""
+"""Mechanism files: JSON value to Mechanism; `writer` is the way back, `schema` describes them."""
 
-from planar.document.reader import read, read_drive, read_time
-from planar.document.schema import schema
-from planar.document.writer import write
+from planar.document.reader import read
+from planar.document.texts import read_drive, read_time
 
-__all__ = ["read", "read_drive", "read_time", "schema", "write"]
+__all__ = ["read", "read_drive", "read_time"]

@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any
 
 from planar.document.cursor import Cursor, Whole, called, did_you_mean
-from planar.document.laws import jumps, read_law
 from planar.document.schema import (
     ALONG,
     DISTANCES,
@@ -77,7 +76,11 @@ def read(value: Any) -> Mechanism:
         remarks=_left_out(full, pairs),
     )
     inputs = _inputs(full, motions(bare))
-    driven = replace(bare, inputs=inputs, remarks=(*bare.remarks, *jumps(inputs, motions(bare))))
+    driven = replace(bare, inputs=inputs)
+    if any(given.law is not None for given in inputs):
+        from planar.document.laws import jumps
+
+        driven = replace(driven, remarks=(*bare.remarks, *jumps(inputs, motions(bare))))
     points = _point_names(driven)
     return replace(
         driven,
@@ -279,8 +282,11 @@ def _inputs(top: Cursor, known: Mapping[str, Pair]) -> tuple[Input, ...]:
             cursor.quantity("velocity", pair.driven()[1], 0.0),
             cursor.quantity("acceleration", pair.driven()[2], 0.0),
         )
-        law = read_law(cursor["law"], given, pair.driven()) if cursor.has("law") else None
-        found[pair.name] = given._replace(law=law)
+        if cursor.has("law"):
+            from planar.document.laws import read_law  # few mechanisms run by laws
+
+            given = given._replace(law=read_law(cursor["law"], given, pair.driven()))
+        found[pair.name] = given
     return tuple(found.values())
 
 
@@ -334,28 +340,6 @@ def _sketch(top: Cursor, points: Mapping[str, str]) -> tuple[tuple[str, float, f
             raise place.refuse(None, f"the point {point!r} is sketched already, under another of its names")
         found[point] = (point, *place.as_vector("length"))
     return tuple(found.values())
-
-
-def read_drive(mechanism: Mechanism, pair: str, position: str) -> Drive:
-    """An input moved to a position written as text: a number in the file's units, or a quantity. Raises BadInput."""
-    known = {given.pair: motions(mechanism)[given.pair] for given in mechanism.inputs}
-    if pair not in known:
-        told = f"there is no input at {pair!r}; inputs are at {', '.join(known) or 'no pair'}"
-        raise Cursor(pair, pair).refuse(None, told)
-    try:
-        value: Any = float(position)
-    except ValueError:
-        value = position
-    return Drive(pair, Cursor(value, pair, Whole(mechanism.units)).as_quantity(known[pair].driven()[0]))
-
-
-def read_time(text: str, place: str) -> float:
-    """A time (s) written as text: a number of seconds, or a quantity. Raises BadInput."""
-    try:
-        value: Any = float(text)
-    except ValueError:
-        value = text
-    return Cursor(value, place).as_quantity("time")
 
 
 def _drives(cursor: Cursor, key: str, mechanism: Mechanism) -> tuple[Drive, ...]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from rich.console import Group, RenderableType
 from rich.table import Table
@@ -34,7 +36,8 @@ def _range(motion: Motion, name: str) -> str:
     units, kind = motion.mechanism.units, "length" if motion.slides(name) else "angle"
     position = motion.inputs[name].position
     way = np.sign(np.diff(position))
-    turns = [k + 1 for k in range(len(way) - 1) if way[k] * way[k + 1] < 0.0]
+    moved = np.flatnonzero(way)
+    turns = [int(after) for before, after in pairwise(moved) if way[before] != way[after]]
     ends = [amount(float(position[k]), kind, units) for k in (0, *turns, len(position) - 1)]
     if len(set(ends)) == 1 and not turns:
         return f"{name} = {ends[0]}" + (", held" if len(motion) > 1 else "")
