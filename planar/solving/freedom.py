@@ -81,42 +81,50 @@ def _broken_ways(motion: Rates) -> int:
 
 
 def strengths(setup: Setup, slope: Array) -> Array:
-    """The least singular value of every group's slope (stages,), each column by what its links could reach at best.
+    """The least singular value of every group's slope (..., stages), each column by what its links could reach at best.
 
     Zero at a dead point or a change point; lengths are divided by the reach of the group's links, so that neither
-    their size nor that of the whole matters.
+    their size nor that of the whole matters. `slope` is (..., rows, unknowns).
     """
     scaled = _scaled(setup, slope)
-    return np.array([_least(scaled[stage.rows, stage.unknowns]) for stage in setup.equations.stages])
+    stages = setup.equations.stages
+    found = [_least(scaled[..., stage.rows, stage.unknowns]) for stage in stages]
+    return np.stack(found, axis=-1) if stages else np.zeros((*slope.shape[:-2], 0))
 
 
-def _least(own: Array) -> float:
-    if not own.shape[1]:
-        return 1.0
+def _least(own: Array) -> Array:
+    if not own.shape[-1]:
+        return np.ones(own.shape[:-2])
+    if own.shape[-2] < own.shape[-1]:
+        return np.zeros(own.shape[:-2])
     values = np.linalg.svd(own, compute_uv=False)
-    return float(values[-1] / max(1.0, values[0])) if len(values) == own.shape[1] else 0.0
+    return values[..., -1] / np.maximum(1.0, values[..., 0])
 
 
 def _scaled(setup: Setup, slope: Array) -> Array:
-    """A slope (rows, unknowns and inputs) with every group's lengths in units of its reach, and columns of one size.
+    """A slope (..., rows, unknowns and inputs), every group's lengths in units of its reach, columns of one size.
 
     The size of an unknown's column is that in its own group, whatever large or small things later groups hang on it.
     A column that could reach further than it does now keeps what it lacks: it is that which vanishes.
     """
     scaled = slope.copy()
-    sizes = np.maximum(np.linalg.norm(slope, axis=0), 1.0)
+    sizes = np.maximum(np.linalg.norm(slope, axis=-2), 1.0)
     for stage in setup.equations.stages:
         reach = _reach(setup, stage)
         kinds = [row.kind for row in setup.equations.rows[stage.rows]]
-        scaled[stage.rows] /= np.array([[reach if kind is Kind.LENGTH else 1.0] for kind in kinds]).reshape(-1, 1)
-        for index in range(stage.unknowns.start, stage.unknowns.stop):
-            coordinate = setup.equations.coordinates[setup.equations.unknowns[index]]
-            own = float(np.linalg.norm(scaled[stage.rows, index]))
-            if coordinate.kind is Kind.LENGTH:
-                sizes[index] = max(own, 1.0 / reach)
-            else:
-                sizes[index] = max(own, setup.reach.get(coordinate.owner, reach) / reach or 1.0)
-    return scaled / sizes
+        scaled[..., stage.rows, :] /= np.array([reach if kind is Kind.LENGTH else 1.0 for kind in kinds])[:, None]
+        least = [_least_size(setup, column, reach) for column in setup.equations.unknowns[stage.unknowns]]
+        own = np.linalg.norm(scaled[..., stage.rows, stage.unknowns], axis=-2)
+        sizes[..., stage.unknowns] = np.maximum(own, least)
+    return scaled / sizes[..., None, :]
+
+
+def _least_size(setup: Setup, column: int, reach: float) -> float:
+    """What the column of a coordinate could be at best in a group of this reach."""
+    coordinate = setup.equations.coordinates[column]
+    if coordinate.kind is Kind.LENGTH:
+        return 1.0 / reach
+    return setup.reach.get(coordinate.owner, reach) / reach or 1.0
 
 
 def _reach(setup: Setup, stage: Stage) -> float:

@@ -40,7 +40,7 @@ def rates(setup: Setup, z: Array, given: Given, local: Mapping[int, Local], thir
         return np.hstack([rate, of_inputs])
 
     rest = program.kinematics(y, whole(none, given.u1), whole(none, given.u2), p)
-    strong = np.array([strengths(setup, slope).min(initial=1.0) >= SINGULAR for slope in rest.slope], dtype=bool)
+    strong = strengths(setup, rest.slope).min(axis=-1, initial=1.0) >= SINGULAR
     known = {index: _carried(each, given, index) for index, each in local.items()}
     known = {index: each for index, each in known.items() if each is not None}
     weak = ~strong
