@@ -52,14 +52,27 @@ def test_the_flipped_assembly_is_closed_too(solver):
 
 
 def test_a_step_to_the_flipped_assembly_is_refused_though_its_residual_is_zero(solver):
-    z, way = solver.assembly().z, np.ones(1)
-    branch = Branch(solver.program, solver.station.p)
-    here = branch.at(z, solver.station.u, way)
-    ahead = solver.station.u + 0.01
-    on = follow(solver, solver.station.p, z, solver.station.u, ahead)
-    assert branch.same(here, branch.at(on, ahead, way), 0.01)
+    z, u = solver.assembly().z, solver.station.u
+    ahead = u + 0.01
+    on = follow(solver, solver.station.p, z, u, ahead)
     off = mirrored(Solver(files.from_dict(CRANK | {"inputs": [{"pair": "A", "position": 0.81}]})), on)
-    assert not branch.same(here, branch.at(off, ahead, way), 0.01)
+    inputs = np.array([u, ahead])
+    branch = Branch(solver.program, solver.station.p)
+    for after, keeps in ((on, True), (off, False)):
+        assert np.all(solver.open_along(np.array([z, after]), inputs) < solver.tolerance)
+        assert branch.along(np.array([z, after]), inputs).tolist() == [keeps]
+
+
+def test_followed_samples_are_on_the_branch_and_the_flipped_ones_are_another_branch(solver):
+    """The second assembly is followed as well as the first, and passes: it is the way between them that does not."""
+    inputs = circle(solver)
+    first = run(solver, solver.station.p, solver.assembly().z, inputs).z
+    second = run(solver, solver.station.p, mirrored(solver, first[0]), inputs).z
+    branch = Branch(solver.program, solver.station.p)
+    for samples in (first, second):
+        assert branch.along(samples, inputs).all()
+    crossed = np.where(np.arange(len(inputs))[:, None] % 2, first, second)
+    assert not branch.along(crossed, inputs).any()
 
 
 def test_a_run_whose_program_flips_half_way_is_put_right_and_counted(solver, monkeypatch):

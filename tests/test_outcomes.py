@@ -253,7 +253,7 @@ def test_wedges_close_in_angle_whatever_whole_turns_their_author_wrote():
 
 def test_a_branch_that_ends_on_the_way_says_where():
     problem = refused(changed(), [Drive("A", np.radians(140.0))])
-    assert problem.outcome is Outcome.BRANCH_LOST
+    assert problem.outcome is Outcome.DEAD_POINT
     assert f"A = {LIMIT:.6g} deg" in problem.reason
 
 
@@ -272,8 +272,8 @@ def test_a_frame_alone_with_a_rigid_truss_needs_no_input():
 
 
 @pytest.mark.parametrize("start", np.linspace(21.3, 158.7, 40))
-def test_a_flat_parallelogram_is_never_passed_without_a_word(start):
-    """Beyond it the linkage may be a parallelogram or cross its bars: which, only its user can say."""
+def test_a_flat_parallelogram_is_passed_smoothly_and_never_without_a_word(start):
+    """Beyond it the linkage may be a parallelogram or cross its bars: it stays what it is, and that is said."""
     turn = np.radians(start)
     sketch = {"C": [100 + 50 * np.cos(turn), 50 * np.sin(turn)]}
     mechanism = changed(
@@ -281,8 +281,15 @@ def test_a_flat_parallelogram_is_never_passed_without_a_word(start):
     )
     short_of_it = solve(mechanism, {"A": np.radians(175.0)})
     assert short_of_it.link("BC").angle == pytest.approx(0.0, abs=1e-10)
-    for beyond in (185.0 + start / 3, -5.0 - start / 3):
-        assert refused(mechanism, {"A": np.radians(beyond)}).outcome is Outcome.BRANCH_LOST
+    assert not any("branches" in each for each in short_of_it.remarks)
+    for beyond, flat in ((185.0 + start / 3, 180), (-5.0 - start / 3, 0)):
+        state = solve(mechanism, {"A": np.radians(beyond)})
+        assert state.link("BC").angle == pytest.approx(0.0, abs=1e-12)
+        assert state.link("BC").angular_velocity == pytest.approx(0.0, abs=1e-12)
+        assert state.link("DC").angular_velocity == pytest.approx(1.0, abs=1e-12)
+        said = [each for each in state.remarks if "2 branches of the motion cross" in each]
+        assert len(said) == 1
+        assert float(re.search(r"A = (\S+) deg", said[0]).group(1)) == pytest.approx(flat, abs=1e-5)
 
 
 @pytest.mark.parametrize("start", np.linspace(20.7, 70.1, 15))
@@ -295,8 +302,11 @@ def test_a_slider_crank_of_equal_lengths_does_not_change_over_by_itself(start):
     pairs = [{"turning": "O"}, {"turning": "A"}, {"sliding": "s", "on": "f", "block": "B", "line": {"through": "O"}}]
     inputs = [{"pair": "O", "position": start, "velocity": "1 rad/s"}]
     mechanism = changed(frame="f", links=links, pairs=pairs, inputs=inputs, sketch={})
-    assert solve(mechanism, {"O": np.radians(80)}).point("B").position[0] == pytest.approx(0.1 * np.cos(np.radians(80)))
-    assert refused(mechanism, {"O": np.radians(90 + start)}).outcome is Outcome.BRANCH_LOST
+    for turn in (80.0, 90.0 + start):
+        state = solve(mechanism, {"O": np.radians(turn)})
+        assert state.point("B").position[0] == pytest.approx(0.1 * np.cos(np.radians(turn)), abs=1e-14)
+        assert state.point("B").velocity[0] == pytest.approx(-0.1 * np.sin(np.radians(turn)), abs=1e-12)
+        assert any("O = 90 deg 2 branches" in each for each in state.remarks) is bool(turn > 90)
 
 
 @pytest.mark.parametrize("position", [0, 30, 90, 179.9, 179.999, 180])

@@ -49,11 +49,13 @@ class Crossing(NamedTuple):
     leads from where the walk came.
 
     `whole` says whether these are all; where ways touch one another, or are many without an end, they are not told.
+    `lost` is how much rank the slope lacks.
     """
 
     y: Array
     ways: tuple[Point, ...]
     whole: bool
+    lost: int
 
 
 def nearest(curve: Curve, here: Point) -> Near | None:
@@ -166,7 +168,7 @@ def crossing(curve: Curve, here: Point, y: Array) -> Crossing | None:
             found.append(c)
     others = [ways.way(c) for c in found[1:]]
     told = tuple(way for way in others if way is not None)
-    return Crossing(y, (came, *told), len(told) == len(others))
+    return Crossing(y, (came, *told), len(told) == len(others), size - 1)
 
 
 def _leads(curve: Curve, here: Point, way: Point) -> bool:
@@ -186,13 +188,14 @@ class Beside(NamedTuple):
     after: Point
     half: float
     shape: Array
+    lost: int
 
     def arc(self, before: Point, after: Point) -> Arc:
         """A part of it."""
-        return Arc(before, after, self.middle.y, self.middle.tangent, self.half, self.shape, True)
+        return Arc(before, after, self.middle.y, self.middle.tangent, self.half, self.shape, self.lost)
 
 
-def beside(curve: Curve, way: Point) -> Beside | None:
+def beside(curve: Curve, way: Point, lost: int) -> Beside | None:
     """The polynomial of eighth degree through a change point and a point on each side, along one way through it.
 
     Its error falls with the ninth power of its length; so far that rounding is all that is left.
@@ -205,7 +208,7 @@ def beside(curve: Curve, way: Point) -> Beside | None:
             ends.append(None if y is None else curve.at(y, way.tangent))
         if all(end is not None and end.tangent @ way.tangent > 0.9 for end in ends):
             shape = fitted((ends[0], way, ends[1]), way.tangent, (-1.0, 0.0, 1.0), half)
-            found = Beside(ends[0], way, ends[1], half, shape)
+            found = Beside(ends[0], way, ends[1], half, shape, lost)
             if _agrees(curve, found):
                 return found
         half *= 0.5

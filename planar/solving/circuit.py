@@ -9,7 +9,7 @@ import numpy as np
 from planar.errors import Ending, NoAnswer, Outcome
 from planar.pairs import Kind
 from planar.solving.curve import Curve, Point
-from planar.solving.follow import Piece, pieces, rests
+from planar.solving.follow import Local, Piece, pieces, rests
 from planar.solving.position import Solver
 from planar.solving.setup import Setup
 from planar.solving.walk import ENDLESS, Walk
@@ -33,8 +33,8 @@ class Stretch(NamedTuple):
         """Where the input starts and stops on its way."""
         return self.pieces[0].start, self.pieces[-1].stop
 
-    def at(self, curve: Curve, place: float) -> tuple[Array, Array | None]:
-        """The unknowns where the input is at a place, with their derivatives where the slope is singular."""
+    def at(self, curve: Curve, place: float) -> tuple[Array, Local | None]:
+        """The unknowns where the input is at a place, with their rates where the slope is singular."""
         return next((each for each in self.pieces if each.holds(place)), self.pieces[-1]).at(curve, place)
 
 

@@ -18,8 +18,6 @@ NOTHING = 1e-10
 """A singular value that is this part of the greatest is zero to rounding."""
 SMALLEST = 1e-6
 """A column of the slope is judged by its own size, down to this part of the size of the mechanism."""
-POLISHED = 1e-3
-"""Beside a change point a singular value vanishes: below this part of the greatest it is that one."""
 
 
 class Followed(Protocol):
@@ -138,25 +136,28 @@ class Curve:
             y = y + np.linalg.lstsq(np.vstack([slope, normal]), np.append(-rates.F, 0.0), rcond=1e-14)[0]
         return y if before <= 1e-10 else None
 
-    def polished(self, y: Array) -> Array:
-        """A position beside a change point, closed to round-off but not moved from one branch to the other."""
+    def polished(self, y: Array, lost: int) -> Array:
+        """A position beside a change point, closed to round-off but not moved from one branch to the other.
+
+        `lost` is by how much the slope's rank falls at the change point.
+        """
         for _ in range(2):
-            y = y - truncated(self.slope(y), self.left(y), len(y) - 1)
+            y = y - truncated(self.slope(y), self.left(y), len(y) - 1 - lost)
         return y
 
 
 def truncated(slope: Array, left: Array, rank: int) -> Array:
-    """The shortest step (n + 1,) that closes what is open, without the way in which the slope all but vanishes."""
+    """The shortest step that closes what is open, by so many of the directions in which the slope is steepest."""
     u, s, vt = np.linalg.svd(slope, full_matrices=False)
-    kept = (s > POLISHED * s[0]) & (np.arange(len(s)) < rank) if s.size else np.zeros(0, dtype=bool)
-    return vt[kept].T @ ((u.T[kept] @ left) / s[kept])
+    return vt[:rank].T @ ((u.T[:rank] @ left) / s[:rank])
 
 
 class Arc(NamedTuple):
     """The curve from one point to the next: a polynomial in how far one is along an axis.
 
     Between two points it is near the curve and `Curve.corrected` carries it there. Beside a change point it is the
-    curve to round-off, and nothing can correct it: there the slope is singular.
+    curve to round-off, and nothing can correct it: there the slope is singular. `lost` is how much rank it lacks at
+    that change point, and 0 where there is none.
     """
 
     before: Point
@@ -166,7 +167,12 @@ class Arc(NamedTuple):
     half: float
     shape: Array
     "coefficients (degree + 1, n + 1), of powers of the distance over `half`"
-    exact: bool
+    lost: int
+
+    @property
+    def exact(self) -> bool:
+        """Whether the polynomial is the curve to round-off."""
+        return self.lost > 0
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -185,7 +191,7 @@ class Arc(NamedTuple):
         """The point of the curve so far along the axis (n + 1,)."""
         rough = self.rough(x)
         if self.exact:
-            return curve.polished(rough)
+            return curve.polished(rough, self.lost)
         found = curve.corrected(rough, self.axis)
         return rough if found is None else found
 
@@ -208,7 +214,7 @@ def between(before: Point, after: Point) -> Arc:
     length = float(np.linalg.norm(chord))
     axis = chord / length
     shape = fitted((before, after), axis, (0.0, 1.0), length)
-    return Arc(before, after, before.y, axis, length, shape, False)
+    return Arc(before, after, before.y, axis, length, shape, 0)
 
 
 def fitted(points: tuple[Point, ...], axis: Array, places: tuple[float, ...], half: float) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from numbers import Integral, Real
 
 from planar.errors import BadInput
@@ -63,8 +63,10 @@ def cycle(
             raise BadInput(name, f"a number up to {most:g} ({of}) is wanted, not {value!r:.40}")
     if duration is not None and not duration > 0.0:
         raise BadInput("duration", f"a time from zero on is wanted, not {duration!r:.40}")
-    if any(isinstance(each, bool) or not isinstance(each, Integral) or each < 1 for each in branches):
-        raise BadInput("branches", f"numbers of branches from 1 on are wanted, not {list(branches)!r:.60}")
+    numbers = branches if isinstance(branches, Iterable) else [branches]
+    numbered = not any(isinstance(each, bool) or not isinstance(each, Integral) or each < 1 for each in numbers)
+    if not numbered or not isinstance(branches, Iterable):
+        raise BadInput("branches", f"a list of numbers of branches from 1 on is wanted, not {branches!r:.60}")
     if not mechanism.inputs:
         raise BadInput("inputs", "the mechanism has no input that could run")
     ranged = (start is not None, stop is not None, pair is not None, there_and_back, circuit)

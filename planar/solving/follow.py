@@ -12,7 +12,7 @@ import numpy as np
 from planar.errors import Ending, NoAnswer
 from planar.program import Program, length
 from planar.roots import root
-from planar.solving.branch import Branch
+from planar.solving.branch import Branch, cancelling
 from planar.solving.curve import Arc, Curve, Point
 from planar.solving.walk import Missed, Passed, Walk
 
@@ -47,10 +47,11 @@ class Followed(Protocol):
 
 class Local(NamedTuple):
     """Rates where a slope is singular: first, second and third derivative of the unknowns (3, unknowns) by the distance
-    of the inputs along a way."""
+    of the inputs along a way; and how much rank the slope lacks at the change point."""
 
     rates: Array
     way: Array
+    lost: int
 
 
 class Met(NamedTuple):
@@ -92,8 +93,8 @@ class Piece(NamedTuple):
         """Whether the inputs come to a place within this piece."""
         return min(self.start, self.stop) <= place <= max(self.start, self.stop)
 
-    def at(self, curve: Curve, place: float) -> tuple[Array, Array | None]:
-        """The unknowns where the inputs are at a place, with their derivatives where the slope is singular."""
+    def at(self, curve: Curve, place: float) -> tuple[Array, Local | None]:
+        """The unknowns where the inputs are at a place, with their rates where the slope is singular."""
         arc = self.arc
         if self.dead is not None and place == self.stop:
             return self.dead.y[:-1], None
@@ -101,7 +102,7 @@ class Piece(NamedTuple):
         rough = arc.rough(x)
         rough[-1] = place
         if arc.exact:
-            return curve.polished(rough)[:-1], derivatives(arc, x)
+            return curve.polished(rough, arc.lost)[:-1], Local(derivatives(arc, x), curve.way, arc.lost)
         ahead = np.zeros_like(rough)
         ahead[-1] = 1.0
         y = curve.corrected(rough, ahead)
@@ -115,7 +116,7 @@ def pieces(walk: Walk) -> Iterator[Piece]:
     curve = walk.curve
     if rests(walk.here) and walk.here.bend[-1] < 0.0:
         here = walk.here
-        yield Piece(Arc(here, here, here.y, here.tangent, 1.0, here.y[None], True), 0.0, 0.0, 0.0, 0.0, here)
+        yield Piece(Arc(here, here, here.y, here.tangent, 1.0, here.y[None], 1), 0.0, 0.0, 0.0, 0.0, here)
     for arc in walk.arcs():
         (first, last), before = arc.ends, arc.before
         while True:
@@ -148,8 +149,8 @@ class Trip:
         """Whether a place lies on what has been followed already."""
         return self._piece is not None and place <= self._piece.stop
 
-    def to(self, place: float) -> tuple[Array, Array | None] | None:
-        """The unknowns so far along the way, with derivatives where the slope is singular; None if it ends before."""
+    def to(self, place: float) -> tuple[Array, Local | None] | None:
+        """The unknowns so far along the way, with rates where the slope is singular; None if it ends before."""
         while self._piece is None or not self.holds(place):
             if self.dead is not None:
                 return None
@@ -186,7 +187,7 @@ def onwards(curve: Curve, y: Array, branches: list[int]) -> Point:
     if rests(here):
         most = int(np.argmax(np.abs(here.tangent)))
         second = bool(branches) and branches.pop(0) > 1
-        return here if (here.tangent[most] > 0.0) is not second else here.turned()
+        return here if bool(here.tangent[most] > 0.0) is not second else here.turned()
     return here
 
 
@@ -265,7 +266,9 @@ def run(solver: Followed, p: Array, z: Array, u: Array, branches: Sequence[int] 
     while done < samples:
         if solver.program.square:
             found[done:] = _accumulated(solver.program, p, found[done - 1], u[done:], samples - 1)
-            done += _passing(solver, p, found[done - 1 :], u[done - 1 :])
+            passed = _passing(solver, p, found[done - 1 :], u[done - 1 :])
+            found[done : done + passed] = _settled(solver.program, p, found[done : done + passed], u[done:][:passed])
+            done += passed
         if done == samples:
             break
         trip, places = _trip(solver, p, found[done - 1], u[done - 1 :], branches[len(met_on_way) :])
@@ -280,7 +283,7 @@ def run(solver: Followed, p: Array, z: Array, u: Array, branches: Sequence[int] 
                 return Run(found[:done], general, stopped, last, local, tuple(met_on_way), tuple(missed))
             found[done] = told[0]
             if told[1] is not None:
-                local[done] = Local(told[1], trip.curve.way)
+                local[done] = told[1]
             done, general = done + 1, general + 1
             if told[1] is None and not trip.holds(following):
                 break
@@ -326,6 +329,16 @@ def _passing(solver: Followed, p: Array, z: Array, u: Array) -> int:
         return 0
     keeps = Branch(solver.program, p).along(z[:whole], u[:whole])
     return len(keeps) if keeps.all() else int(np.argmin(keeps))
+
+
+def _settled(program: Program, p: Array, z: Array, u: Array) -> Array:
+    """Regular samples after one more of Newton's corrections: beside a change point the gate leaves room for an error
+    in their unknowns, which grows with every rate."""
+    if not z.size:
+        return z
+    none = np.zeros((len(z), z.shape[1] + u.shape[1]))
+    there = program.kinematics(np.hstack([z, u]), none, none, p)
+    return z + cancelling(there.slope, there.F[..., None])[..., 0]
 
 
 def corrected(program: Program, p: Array, z: Array, u: Array, last: int | None = None) -> Array | None:

@@ -22,7 +22,18 @@ Array = np.ndarray
 
 STILL = 1e-9
 """An output that moves less than this (rad or sizes) for one of the curve's length stands still but for rounding."""
+ROUNDING = 1e-13
+"""A rate of an output below this part is zero."""
 SAME = 1e-9
+APART = 1e-6
+"""rad or sizes: at a dead point unknowns are known to the root of rounding."""
+
+
+class _End(NamedTuple):
+    """An end of a piece of the curve, and how the outputs move there (outputs, 3)."""
+
+    point: Point
+    gains: Array
 
 
 class Outputs(NamedTuple):
@@ -46,6 +57,10 @@ class Outputs(NamedTuple):
             drive = pair.drive([frames[link] for link in pair.bodies], numbers, own.get(pair.name, ()))
             found.append(drive.parts if isinstance(drive, Jet) else (drive, 0.0, 0.0))
         return np.array(found, dtype=float)
+
+    def end(self, curve: Curve, point: Point) -> _End:
+        """An end of a piece, with how the outputs move there."""
+        return _End(point, self.along(curve, point))
 
     def distance(self, curve: Curve, point: Point, pair: Pair, pin: tuple[str, str]) -> float:
         """How far the point that slides is from a pin of the frame (m)."""
@@ -94,13 +109,17 @@ def limits(setup: Setup, pair: str, curve: Curve, found: Iterable[Found]) -> tup
     """Limits in their order, each once, with the two ends of every slide on the frame told apart."""
     once: list[Found] = []
     for each in found:
-        same = (
-            other.limit[:2] == each.limit[:2] and abs(other.limit.input - each.limit.input) < SEAM
-            for other in once[-8:]
-        )
-        if not any(same):
+        if not any(_same(other, each) for other in once[-8:]):
             once.append(each)
     return tuple(_named(setup, outputs(setup), curve, pair, once))
+
+
+def _same(one: Found, other: Found) -> bool:
+    """Whether two limits are one: of one pair, at one place of the input, in one assembly."""
+    if one.limit[:2] != other.limit[:2] or abs(one.limit.input - other.limit.input) >= SEAM:
+        return False
+    # of two assemblies some link stands elsewhere, whole turns aside
+    return float(np.max(np.abs(np.sin(0.5 * (one.point.y[:-1] - other.point.y[:-1]))), initial=0.0)) < APART
 
 
 def along(
@@ -120,20 +139,19 @@ def along(
 
     if rests(walk.here):
         yield noted("input dead point", pair, walk.here)
-    before: Point | None = None
-    gains = np.zeros((0, 3))
+    before: _End | None = None
     if rests(walk.here):
         yield noted("input dead point", pair, walk.here)
     for piece in parts:
         arc = piece.arc
         if before is None or arc.exact:
-            before = arc.at(curve, piece.first)
-            gains = watched.along(curve, before)
-        after = piece.dead or (arc.after if piece.last == arc.ends[1] else arc.at(curve, piece.last))
-        ahead = watched.along(curve, after)
+            before = watched.end(curve, arc.at(curve, piece.first))
+        after = watched.end(
+            curve, piece.dead or (arc.after if piece.last == arc.ends[1] else arc.at(curve, piece.last))
+        )
         for k, output in enumerate(watched.pairs):
             still = STILL * (setup.unit if output.drive_kind is Kind.LENGTH else 1.0)
-            for x in _turns(watched, curve, piece, (gains[k], ahead[k]), k, still):
+            for x in _turns(watched, curve, piece, (before, after), k, still):
                 point = arc.at(curve, x)
                 yield noted("stroke end", output.name, point, float(watched.along(curve, point)[k, 0]))
         for each in met(walk, last)[passed:]:
@@ -141,15 +159,15 @@ def along(
             passed += 1
         if piece.dead is not None and piece.first != piece.last:
             yield noted("input dead point", pair, piece.dead)
-        before, gains = after, ahead
+        before = after
 
 
 def _turns(
-    watched: Outputs, curve: Curve, piece: Piece, ends: tuple[Array, Array], k: int, still: float
+    watched: Outputs, curve: Curve, piece: Piece, ends: tuple[_End, _End], k: int, still: float
 ) -> Iterator[float]:
     """Where on a piece an output turns back: places on the arc's axis."""
     arc = piece.arc
-    (_, g0, s0), (_, g1, s1) = ends
+    (_, g0, s0), (_, g1, s1) = (end.gains[k] for end in ends)
     sense = 1.0 if piece.last > piece.first else -1.0
 
     def rate(x: float) -> float:
@@ -157,6 +175,15 @@ def _turns(
 
     if max(abs(g0), abs(g1)) < still:
         return
+    # where a piece starts or ends in the very turn, the sign of its rate there is rounding
+    none = ROUNDING * still / STILL
+    for end, x, g, s in ((ends[0], piece.first, g0, s0), (ends[1], piece.last, g1, s1)):
+        if abs(g) < none and abs(s) > still and not rests(end.point):
+            yield x
+            return
+    # what only turns back since the input does, at a dead point, has no end of its stroke there
+    g0 = none * s0 if abs(g0) < none and rests(ends[0].point) else g0
+    g1 = -none * s1 if abs(g1) < none and rests(ends[1].point) else g1
     if g0 * g1 < 0.0:
         yield root(rate, piece.first, piece.last)
     elif g0 * s0 < 0.0 < g1 * s1 and g0 * g1 > 0.0:

@@ -19,7 +19,7 @@ from planar.solving.follow import Local, Run, Trip, ended, follow, met, onwards,
 from planar.solving.position import Solver
 from planar.solving.rates import Given
 from planar.solving.rows import Rows, joined, motion, reversed_, rows, shortened, spliced
-from planar.solving.walk import ENDLESS, Walk
+from planar.solving.walk import ENDLESS, Missed, Walk
 from planar.words import listed
 
 Array = np.ndarray
@@ -38,6 +38,7 @@ class _End(NamedTuple):
     dead: bool
     open: bool
     problem: NoAnswer | None = None
+    missed: tuple[Missed, ...] = ()
 
 
 class Ranged:
@@ -94,7 +95,7 @@ class Ranged:
             for place in np.linspace(begin, last, count + 1)[1 if z else 0 :]:
                 known, singular = stretch.at(walk.curve, float(place))
                 if singular is not None:
-                    local[len(z)] = Local(singular, walk.curve.way)
+                    local[len(z)] = singular
                 z.append(known)
                 places.append(first + place)
                 senses.append(1.0 if last > begin else -1.0)
@@ -125,6 +126,8 @@ class Ranged:
         if not before.any():
             found = self._from_here(grid)
             if len(found.z) < 2 and found.stopped is not None:
+                if found.stopped.outcome is Outcome.BRANCH_LOST:
+                    self.solver.state(self.found.z)  # says if it is a change point that nothing leads on from
                 raise found.stopped
             return shortened(found)
         down = self._from_here(grid[before][::-1])
@@ -170,7 +173,10 @@ class Ranged:
             return found
         told = listed([self.solver.told(self.pair, end.position) for end in ends if end.dead])
         dead = tuple(row % len(found.z) for row in found.dead)
-        return found._replace(dead=dead, reason=f"the range of {self.pair!r} ends at {told}" if told else "")
+        missed = (*found.missed, *(each for end in ends for each in end.missed))
+        return found._replace(
+            dead=dead, missed=missed, reason=f"the range of {self.pair!r} ends at {told}" if told else ""
+        )
 
     def _stopped(self, found: Run, given: Given) -> Rows:
         """A run that did not come to its end, with a last row where it stopped."""
@@ -223,7 +229,8 @@ class Ranged:
             return _End(found[0], here + sign * far, False, True)
         y = trip.here.y
         problem = None if trip.dead is not None else ended(self.solver, trip)
-        return _End(y[:-1], here + sign * float(y[-1]), trip.dead is not None, False, problem)
+        missed = tuple(trip.walk.missed)
+        return _End(y[:-1], here + sign * float(y[-1]), trip.dead is not None, False, problem, missed)
 
 
 class _Course:

@@ -53,7 +53,7 @@ def rates(setup: Setup, z: Array, given: Given, local: Mapping[int, Local], thir
             found[strong] = cancelling(rest.slope[strong], left[strong][..., None])[..., 0]
         for index, each in known.items():
             slope, guess = rest.slope[index], each[order - 1]
-            found[index] = guess - truncated(slope, left[index] + slope @ guess, z.shape[1])
+            found[index] = guess - truncated(slope, left[index] + slope @ guess, z.shape[1] - local[index].lost)
         return found
 
     z1 = solved(rest.F1, 1)

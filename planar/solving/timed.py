@@ -8,13 +8,13 @@ from itertools import pairwise
 import numpy as np
 
 from planar.algebra import Jet
-from planar.errors import BadInput
+from planar.errors import BadInput, Outcome
 from planar.mechanism import Input, Mechanism
 from planar.motion import Motion
 from planar.program import placed
 from planar.results import Limit
 from planar.roots import root
-from planar.solving.follow import follow, run
+from planar.solving.follow import SEAM, Met, Run, follow, run
 from planar.solving.limits import STILL, Outputs, outputs
 from planar.solving.passing import crossed
 from planar.solving.position import Solver
@@ -44,8 +44,30 @@ class Timed:
         given = self.given(time)
         found = run(self.solver, self.solver.station.p, self.found.z, given.u, self.branches)
         told = rows(found, given).stopped(found.stopped)
+        last = self._dead(found, given, time)
         time = time[: len(found.z)]
+        if last is not None and found.last is not None:
+            ends = self.given(np.array([last]))._replace(u=found.last[1][None])
+            whole = Given(*(np.vstack(both) for both in zip(told.given, ends, strict=True)))
+            told = told._replace(z=np.vstack([told.z, found.last[0]]), given=whole, dead=(len(told.z),))
+            time = np.append(time, last)
         return motion(self.solver, self.found, told, self.third, _Course(self, told, time), time)
+
+    def _dead(self, found: Run, given: Given, time: Array) -> float | None:
+        """When a run comes to its dead point (s). Of several inputs that move there at once no time is told: between
+        samples they are followed along a straight way, which is not theirs."""
+        if found.last is None or found.stopped is None or found.stopped.outcome is not Outcome.DEAD_POINT:
+            return None
+        row = len(found.z) - 1
+        moving = np.flatnonzero(given.u[row + 1] != given.u[row])
+        if len(moving) != 1 or np.all(found.last[1] == given.u[row]):
+            return None
+        place = float(found.last[1][moving[0]])
+
+        def left(t: float) -> float:
+            return float(self.given(np.array([t])).u[0, moving[0]]) - place
+
+        return root(left, float(time[row]), float(time[row + 1]))
 
     def given(self, time: Array) -> Given:
         """The inputs at times (s)."""
@@ -73,16 +95,39 @@ class _Course:
         """See `Motion.limits`."""
         solver, found = self.timed.solver, self.found
         watched = outputs(solver)
-        told = list(self._turns(motion, watched))
-        for each in found.met:
-            gone = (found.given.u - each.u) @ each.way
-            row = int(np.argmin(np.abs(gone)))
-            told.append(
-                Limit("change point", "", float(self.time[row]), float(self.time[row]), None, crossed(solver, each))
-            )
+        met = list(self._crossings())
+        switched = [at for at, each in met if each.passed.went]
+        told = list(self._turns(motion, watched, switched))
+        for at, each in met:
+            pair = next(g.pair for g, w in zip(solver.mechanism.inputs, each.way, strict=True) if w)
+            told.append(Limit("change point", pair, at, at, None, crossed(solver, each)))
+        for row in found.dead:
+            moved = int(np.argmax(np.abs(found.given.u[row] - found.given.u[row - 1])))
+            pair = solver.mechanism.inputs[moved].pair
+            place = float(found.given.u[row, moved] * self.timed.scale[moved])
+            told.append(Limit("input dead point", pair, float(self.time[row]), place))
         return tuple(sorted(told, key=lambda each: each.input))
 
-    def _turns(self, motion: Motion, watched: Outputs) -> Iterator[Limit]:
+    def _crossings(self) -> Iterator[tuple[float, Met]]:
+        """The change points passed, each with its time (s)."""
+        row = 0
+        for each in self.found.met:
+            gone = (self.found.given.u - each.u) @ each.way
+            for k in range(row, len(gone)):
+                if abs(gone[k]) < SEAM:
+                    yield float(self.time[k]), each
+                elif k + 1 < len(gone) and gone[k] * gone[k + 1] < 0.0 and abs(gone[k + 1]) >= SEAM:
+
+                    def left(t: float, each: Met = each) -> float:
+                        return float((self.timed.given(np.array([t])).u[0] - each.u) @ each.way)
+
+                    yield root(left, float(self.time[k]), float(self.time[k + 1])), each
+                else:
+                    continue
+                row = k + 1
+                break
+
+    def _turns(self, motion: Motion, watched: Outputs, switched: list[float]) -> Iterator[Limit]:
         rates_of = [np.asarray(list(motion.pair(pair.name).values())[1], dtype=float) for pair in watched.pairs]
         for pair, velocity in zip(watched.pairs, rates_of, strict=True):
             least = STILL * max(float(np.nanmax(np.abs(velocity), initial=0.0)), STILL)
@@ -91,8 +136,11 @@ class _Course:
                 if velocity[before] * velocity[after] > 0.0 or after - before > 2:
                     continue  # a rest in between is no end of a stroke at one time
                 first, last = float(self.time[before]), float(self.time[after])
-                at = root(lambda t, row=int(before), pair=pair: self._at(row, t, pair.name)[1], first, last)
-                value = self._at(int(before), at, pair.name)[0]
+                if any(first <= at <= last for at in switched):
+                    continue  # it is the branch that turns, not the output
+                base = after if before in self.found.local else before
+                at = root(lambda t, row=base, pair=pair: self._at(row, t, pair.name)[1], first, last)
+                value = self._at(base, at, pair.name)[0]
                 yield Limit("stroke end", pair.name, at, value)
 
     def _at(self, row: int, time: float, pair: str) -> tuple[float, float]:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.pairs import Kind
+from planar.roots import root
 from planar.solving.change_point import Beside, Crossing, beside, crossing, nearest
 from planar.solving.curve import Arc, Curve, Point, between
 
@@ -25,7 +26,7 @@ AHEAD = 10.0
 """A change point farther ahead than so many times the distance within which there is none is another one."""
 ARCS = 50_000
 ENDLESS = 100.0
-"""Lengths of the size: what slides so far from where it started goes out without an end."""
+"""Lengths of the size: what slides out so far goes out without an end."""
 
 
 class Passed(NamedTuple):
@@ -64,12 +65,9 @@ class Walk:
 
     def arcs(self) -> Iterator[Arc]:
         """The arcs of the curve; they end where it cannot be followed further."""
-        start = self.here.y[:-1][self._slides]
+        farthest = max(ENDLESS, 2.0 * self._out(self.here.y))
         for _ in range(ARCS):
             here = self.here
-            self.endless = float(np.max(np.abs(here.y[:-1][self._slides] - start), initial=0.0)) > ENDLESS
-            if self.endless:
-                return
             if self._approaching and here.clear < min(SUSPECTED, AGAIN * self._looked, self.step):
                 through = list(self._through())
                 if through:
@@ -83,8 +81,19 @@ class Walk:
                 return
             self._note(after)
             self._approaching = after.clear < here.clear
+            arc = between(here, after)
+            if self._out(after.y) > farthest:
+                first, last = arc.ends
+                x = root(lambda x, arc=arc: self._out(arc.y(self.curve, x)) - farthest, first, last)
+                self.here, self.endless = arc.at(self.curve, x), True
+                yield between(here, self.here)
+                return
             self.here = after
-            yield between(here, after)
+            yield arc
+
+    def _out(self, y: Array) -> float:
+        """How far the farthest slide is out (sizes)."""
+        return float(np.max(np.abs(y[:-1][self._slides]), initial=0.0))
 
     def _next(self) -> Point | None:
         """The next point: a predictor of second order, Newton's corrector, and the second part of the gate."""
@@ -122,7 +131,7 @@ class Walk:
         if found is None:
             return
         went, onwards = self._taken(found, here)
-        inwards, outwards = self._sided(found.ways[0], here), self._sided(found.ways[went], onwards)
+        inwards, outwards = self._sided(found, 0, here), self._sided(found, went, onwards)
         if inwards is None or outwards is None:
             return
         if float(inwards.middle.tangent @ (here.y - inwards.before.y)) < 0.0:
@@ -133,9 +142,10 @@ class Walk:
         yield outwards.arc(outwards.middle, outwards.after)
         self.here = outwards.after
 
-    def _sided(self, way: Point, towards: Point) -> Beside | None:
-        """The curve beside a change point along a way, in the sense of a point on it."""
-        return beside(self.curve, way if way.tangent @ towards.tangent >= 0.0 else way.turned())
+    def _sided(self, found: Crossing, index: int, towards: Point) -> Beside | None:
+        """The curve beside a change point along one of its ways, in the sense of a point on it."""
+        way = found.ways[index]
+        return beside(self.curve, way if way.tangent @ towards.tangent >= 0.0 else way.turned(), found.lost)
 
     def _taken(self, found: Crossing, here: Point) -> tuple[int, Point]:
         """The way to go on by, and a point in whose sense: smoothly, or as asked for."""
