@@ -16,6 +16,8 @@ from planar.words import amount, listed, many
 
 MOST_ENDS = 6
 """Ends of stretches of a circuit that are named one by one."""
+WHOLE = 1e-9
+"""Turns: what rounding leaves of one."""
 
 
 def ran(motion: Motion) -> RenderableType:
@@ -41,6 +43,10 @@ def _range(motion: Motion, name: str) -> str:
     ends = [amount(float(position[k]), kind, units) for k in (0, *turns, len(position) - 1)]
     if len(set(ends)) == 1 and not turns:
         return f"{name} = {ends[0]}" + (", held" if len(motion) > 1 else "")
+    gone = abs(float(position[-1] - position[0])) / (2.0 * np.pi)
+    if not turns and kind == "angle" and round(gone) >= 1 and abs(gone - round(gone)) < WHOLE:
+        told = "a full turn" if round(gone) == 1 else many(round(gone), "full turn")
+        return f"{name} from {ends[0]} to {ends[1]}, {told}"
     told = ends[1:] if len(ends) <= MOST_ENDS else [*ends[1:MOST_ENDS], f"and so on to {ends[-1]}"]
     return f"{name} from {ends[0]} to {', to '.join(told)}"
 
