@@ -197,6 +197,8 @@ def turning(curve: Curve, arc: Arc, before: Point, first: float, last: float) ->
     if rests(before):
         g0 = RESTING * float(np.sign(before.bend[-1]))
     sense = float(np.sign(g0))
+    if arc.after.clear == 0.0 and rests(arc.after) and sense * arc.after.bend[-1] < 0.0:
+        return arc.after  # a change point at which the inputs turn back as well
     g0, g1 = abs(g0), sense * arc.after.advance
     if g1 > 0.0:
         # between two points that go on the inputs may have gone back in the meantime
