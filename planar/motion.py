@@ -229,6 +229,9 @@ class Course(Protocol):
     singular: frozenset[int]
     """Rows on a change point, or so near one that their rates are those of the branch that was followed."""
 
+    forks: tuple[float, ...]
+    """Positions of the running input (rad or m) at which another way was taken than the smooth one."""
+
     def limits(self, motion: Motion) -> tuple[Limit, ...]:
         """See `Motion.limits`."""
 
@@ -260,7 +263,8 @@ class Motion(Moving):
     def limits(self) -> tuple[Limit, ...]:
         """Where an input or an output of the motion turns back, or branches cross, in the order of the rows.
 
-        Solved for when first asked for. Outputs are all slides, and all links pinned to the frame.
+        Solved for when first asked for. Outputs are all slides, and all links pinned to the frame. Of a motion there and
+        back they are those of the way there.
         """
         return self.course.limits(self) if self.course else ()
 

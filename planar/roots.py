@@ -31,8 +31,10 @@ def root(function: Callable[[float], float], low: float, high: float) -> float:
         least = 2.0 * ulp(max(abs(best), 1.0)) / abs(b - a)
         if fx == 0.0 or least > 0.5:
             break
-        xi, phi = (a - b) / (c - b), (fa - fb) / (fc - fb)
         part = 0.5
+        if fc in (fa, fb):
+            continue
+        xi, phi = (a - b) / (c - b), (fa - fb) / (fc - fb)
         if phi**2 < xi and (1.0 - phi) ** 2 < 1.0 - xi:
             part = fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
         part = min(1.0 - least, max(least, part))

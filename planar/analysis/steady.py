@@ -14,7 +14,7 @@ from planar.mechanism import Drive, with_inputs
 from planar.motion import Motion, Moving, State
 from planar.pairs import Kind
 from planar.plane import Frame, frame_at
-from planar.solving.follow import follow
+from planar.solving.follow import followed
 from planar.solving.position import Solver
 
 Array = np.ndarray
@@ -48,6 +48,10 @@ class Steady:
         self.z = self._unknowns(motion)
         self.samples = self._sampled(motion, given.velocity, given.acceleration)
         self.known = self._determined()
+        course = motion.course
+        self._singular = np.zeros(len(self.positions), dtype=bool)
+        self._singular[[row for row in course.singular if row < len(motion)] if course is not None else []] = True
+        self._forks = () if course is None else course.forks
         self.closed = self._closes()
         self._states: dict[float, State] = {}
 
@@ -66,13 +70,24 @@ class Steady:
     def at(self, position: float) -> State:
         """The state at a position of the running input, on this motion's branch. Raises NoAnswer."""
         if position not in self._states:
-            index = int(np.argmin(np.where(self.known, np.abs(self.positions - position), np.inf)))
+            index = int(np.argmin(np.where(self._sound(position), np.abs(self.positions - position), np.inf)))
             there = self._solver(position)
             start = there.station.u.copy()
             start[self._which] = self.positions[index] / self._scale
-            z = follow(there, there.station.p, self.z[index], start, there.station.u)
-            self._states[position] = there.state(z)
+            way = followed(there, there.station.p, self.z[index], start, there.station.u)
+            z, local = way.z[-1], way.local.get(1)
+            self._states[position] = there.state(z) if local is None else there.on_branch(z, local)
         return self._states[position]
+
+    def _sound(self, position: float) -> Array:
+        """Which samples lead to a position on this motion's branch (samples,).
+
+        Not those on change points, from which several ways lead on, nor those beyond one where another way was taken.
+        """
+        sound = self.known & ~self._singular
+        for fork in self._forks:
+            sound &= (self.positions - fork) * (position - fork) >= 0.0
+        return sound
 
     def tabled(self, measure: Callable[[Moving], Array]) -> tuple[Array, Array]:
         """Positions in order, and what is measured there (positions, ...), of states that have rates.
@@ -127,11 +142,7 @@ class Steady:
         jets = [each for f in self.samples.frames.values() if not f.fixed for each in (f.x, f.y, f.angle)]
         jets += [jet for own in self.samples.own.values() for jet in own]
         parts = [np.broadcast_to(part, len(self.positions)) for jet in jets for part in jet.parts]
-        found = np.isfinite(parts).all(axis=0) if parts else np.ones(len(self.positions), dtype=bool)
-        if self.samples.course is not None:
-            # several branches lead on from there
-            found[[row for row in self.samples.course.singular if row < len(found)]] = False
-        return found
+        return np.isfinite(parts).all(axis=0) if parts else np.ones(len(self.positions), dtype=bool)
 
     def _unknowns(self, motion: Motion) -> Array:
         """The unknowns at every sample (samples, unknowns), from the frames."""

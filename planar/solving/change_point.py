@@ -8,6 +8,7 @@ analysis of kinematic singularities of lower pair linkages and serial manipulato
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,8 @@ Array = np.ndarray
 
 REFINEMENTS = 12
 SETTLED = 1e-13
+FAINT = 0.1
+"""A singular value below this part of the greatest may be one that vanishes near by."""
 SINGULAR = 1e-6
 """A singular value below this part of the greatest is zero at a change point, which is found to about 1e-8 at first."""
 TRULY = 1e-10
@@ -58,26 +61,30 @@ class Crossing(NamedTuple):
     lost: int
 
 
-def nearest(curve: Curve, here: Point) -> Near | None:
-    """The point next to this one at which the slope has more than one null vector; None where Newton finds none.
+def nearest(curve: Curve, here: Point) -> Iterator[Near]:
+    """The points next to this one at which the slope has more than one null vector, those that Newton finds.
 
     Gauss and Newton's method for F = 0, J A = 0 with A0^T A = 1: regular wherever branches cross at an angle, and for
-    any number of redundant constraints.
+    any number of redundant constraints. Where several loops come near one at once, each is looked for.
     """
-    many = len(here.y)
-    count = 2
-    y = here.y + min(here.clear, 0.1) * here.tangent
-    for _ in range(2):
-        found = _refined(curve, y, count)
-        if found is None or found.null.shape[1] == count:
-            return found
-        y, count = found.y, min(found.null.shape[1], many)
-    return None
+    size = len(here.y)
+    _, values, rows = np.linalg.svd(curve.slope(here.y))
+    for second in range(2, size + 1):
+        if second > 2 and values[size - second] > FAINT * max(values[0], 1.0):
+            return
+        start = rows[[size - second, size - 1]].T
+        y = here.y + min(here.clear, 0.1) * here.tangent
+        found = _refined(curve, y, start)
+        if found is not None and found.null.shape[1] > 2:
+            found = _refined(curve, found.y, found.null)
+        if found is not None:
+            yield found
 
 
-def _refined(curve: Curve, y: Array, count: int) -> Near | None:
-    size = len(y)
-    start = null = np.linalg.svd(curve.slope(y))[2][size - count :].T
+def _refined(curve: Curve, y: Array, start: Array) -> Near | None:
+    """The point next to y at which the slope has null vectors next to these (n + 1, k)."""
+    size, count = start.shape
+    null = start
     for _ in range(REFINEMENTS):
         slope = curve.slope(y)
         rows = len(slope)

@@ -42,13 +42,14 @@ def cycle(
     stretch between dead points (a turn, if that is longer), and each stretch is divided about as finely.
 
     Where branches of the motion cross, it goes on smoothly; `branches` are the numbers of the ways taken at the first,
-    second ... change point instead: 1 smoothly, 2 the next by the angle from that. At a start on a dead point they tell
-    the two ways apart.
+    second ... change point instead, counted from the file's position each way: 1 smoothly, 2 the next by the angle from
+    that. At a start on a dead point they tell the two ways apart.
 
     Where an input has a law, or a `duration` (s) is given, the run is one in time: every input follows its law, else
     the file's constant acceleration, for the longest law or the duration; `steps` divide the time.
 
-    With `jerk` the motion has third rates too. `motion.limits` are the dead points, change points and ends of strokes.
+    With `jerk` the motion has third rates too (beside a change point, where they come from a polynomial through the
+    branch, to about 1e-5 of the greatest). `motion.limits` are the dead points, change points and ends of strokes.
     A motion that ends before `stop` says so in its `outcome` and `reason`; its last row is the dead point itself, where
     no velocity is determined: rates are NaN there. Raises BadInput for an input or a range that is not there, NoAnswer
     where there is no position to start from.

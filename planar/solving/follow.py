@@ -102,11 +102,11 @@ class Piece(NamedTuple):
         rough = arc.rough(x)
         rough[-1] = place
         if arc.exact:
-            return curve.polished(rough, arc.lost)[:-1], Local(derivatives(arc, x), curve.way, arc.lost)
+            return curve.closed(rough, arc.lost)[:-1], Local(derivatives(arc, x), curve.way, arc.lost)
         ahead = np.zeros_like(rough)
         ahead[-1] = 1.0
         y = curve.corrected(rough, ahead)
-        if y is None or np.linalg.norm(y - rough) > NEARLY * abs(self.last - self.first):
+        if y is None or np.linalg.norm(y - rough) > NEARLY * abs(self.last - self.first) or not curve.closes(y):
             y = arc.y(curve, root(lambda x: float(arc.y(curve, x)[-1]) - place, self.first, self.last))
         return y[:-1], None
 
@@ -119,11 +119,16 @@ def pieces(walk: Walk) -> Iterator[Piece]:
         yield Piece(Arc(here, here, here.y, here.tangent, 1.0, here.y[None], 1), 0.0, 0.0, 0.0, 0.0, here)
     for arc in walk.arcs():
         (first, last), before = arc.ends, arc.before
+        if rests(before) and rests(arc.after) and abs(arc.after.y[-1] - before.y[-1]) < SEAM:
+            yield Piece(arc, first, first, float(before.y[-1]), float(before.y[-1]), before)
+            return  # all else moves on while the inputs rest
         while True:
             dead = turning(curve, arc, before, first, last)
             if dead is None:
                 break
             at = float(arc.axis @ (dead.y - arc.origin))
+            if before is not arc.before and abs(at - first) <= STRAIGHT:
+                break  # the dead point from which this part starts
             yield Piece(arc, first, at, float(before.y[-1]), float(dead.y[-1]), dead)
             first, before = at, dead
         yield Piece(arc, first, last, float(before.y[-1]), float(arc.after.y[-1]), None)
@@ -197,9 +202,11 @@ def turning(curve: Curve, arc: Arc, before: Point, first: float, last: float) ->
     if rests(before):
         g0 = RESTING * float(np.sign(before.bend[-1]))
     sense = float(np.sign(g0))
-    if arc.after.clear == 0.0 and rests(arc.after) and sense * arc.after.bend[-1] < 0.0:
-        return arc.after  # a change point at which the inputs turn back as well
     g0, g1 = abs(g0), sense * arc.after.advance
+    if rests(arc.after) and not rests(before) and sense * arc.after.bend[-1] < 0.0:
+        # at its very end, whichever sign rounding gives what is left of the rate
+        left = arc.after.advance / abs(float(arc.after.bend[-1]))
+        return arc.after if arc.exact else arc.at(curve, last + sense * left * float(np.sign(last - first)))
     if g1 > 0.0:
         # between two points that go on the inputs may have gone back in the meantime
         s0, s1, gone = sense * before.bend[-1], sense * arc.after.bend[-1], abs(last - first)
@@ -249,7 +256,8 @@ def followed(solver: Followed, p: Array, z: Array, start: Array, stop: Array) ->
     found = trip.to(reach)
     if found is None:
         raise ended(solver, trip)
-    return Run(np.stack([z, found[0]]), 1, met=met(trip.walk, reach), missed=tuple(trip.walk.missed))
+    local = {} if found[1] is None else {1: found[1]}
+    return Run(np.stack([z, found[0]]), 1, None, None, local, met(trip.walk, reach), tuple(trip.walk.missed))
 
 
 def run(solver: Followed, p: Array, z: Array, u: Array, branches: Sequence[int] = ()) -> Run:
@@ -273,7 +281,11 @@ def run(solver: Followed, p: Array, z: Array, u: Array, branches: Sequence[int] 
             done += passed
         if done == samples:
             break
-        trip, places = _trip(solver, p, found[done - 1], u[done - 1 :], branches[len(met_on_way) :])
+        base = done - 1
+        while base and base in local and (u[done] - u[done - 1]) @ local[base].way < 0.0:
+            base -= 1  # what turns back on a change point comes back by the branch on which it came
+        ahead = np.vstack([u[base], u[done:]])
+        trip, places = _trip(solver, p, found[base], ahead, branches[len(met_on_way) :])
         before = len(met_on_way)
         for place, following in pairwise([*places, np.inf]):
             told = trip.to(place)
@@ -302,7 +314,7 @@ def _trip(solver: Followed, p: Array, z: Array, u: Array, branches: Sequence[int
     axis = way / reach
     gone = (u[1:] - u[0]) @ axis / float(axis @ axis)
     aside = np.max(np.abs(u[1:] - u[0] - gone[:, None] * axis), axis=1) > STRAIGHT
-    back = np.diff(gone, prepend=0.0) <= 0.0
+    back = np.diff(gone, prepend=0.0) < 0.0
     off = aside | back
     many = int(np.argmax(off)) if off.any() else len(gone)
     return Trip(solver, p, z, u[0], way, branches), gone[:many].tolist()

@@ -17,7 +17,7 @@ from planar.program import Rates, length, placed, program
 from planar.solving import refusals
 from planar.solving.assemble import Assembly, Failure, search
 from planar.solving.candidates import Candidates
-from planar.solving.follow import followed
+from planar.solving.follow import Local, followed
 from planar.solving.freedom import (
     SINGULAR,
     Crossing,
@@ -140,6 +140,22 @@ class Solver(Setup):
         y, y1, y2 = (np.concatenate(both) for both in ((through.z, s.u), (through.z1, s.u1), (through.z2, s.u2)))
         told = "to first order there is one more motion here; the rates are those of the only one that goes on"
         return self._stated(self.program.kinematics(y, y1, y2, s.p), s.u.size, residual, (*remarks, told))
+
+    def on_branch(self, z: Array, local: Local) -> State:
+        """The state on a change point or beside it, with the rates of the branch that was followed there.
+
+        Raises NoAnswer where the inputs do not run along the way on which it was followed.
+        """
+        from planar.solving.rates import Given, rates
+
+        s = self.station
+        residual = float(self.open_along(z[None], s.u[None])[0])
+        given = Given(s.u[None], s.u1[None], s.u2[None], 0.0 * s.u[None])
+        w, w1, w2 = (part[0] for part in rates(self, z[None], given, {0: local}, False))
+        if residual > self.tolerance or not np.isfinite(w1).all():
+            return self.state(z)  # says why not
+        none = np.zeros(0)
+        return self._stated(Rates(none, none, none, w, w1, w2, none, none), s.u.size, residual, ())
 
     def at_rates_of(self, state: State) -> State:
         """The state in the same position as another's, with this mechanism's own rates."""

@@ -239,6 +239,7 @@ class _Course:
     def __init__(self, ranged: Ranged, found: Rows, whole: tuple[Circuit, Walk] | None):
         self.ranged, self.found, self.whole = ranged, found, whole
         self.singular = frozenset(found.local)
+        self.forks = tuple(float(each.u[ranged.index]) * ranged.scale for each in found.met if each.passed.went)
 
     def limits(self, motion: Motion) -> tuple[Limit, ...]:
         """See `Motion.limits`."""
@@ -250,26 +251,23 @@ class _Course:
             parts, walk = self.whole
             told = limits.along(ranged.solver, ranged.pair, float(u[0]), 1.0, walk, parts.pieces)
             return limits.limits(ranged.solver, ranged.pair, walk.curve, told)
-        # from a row within, since on change points and dead points several ways lead on
-        inside = next((row for row in range(len(u)) if row not in found.local and row not in found.dead), 0)
-        last = (len(u) - 1) // 2 if self._turns_back(u) else len(u) - 1
-        down = self._along(self._walk(inside, 0), inside, 0) if inside else ()
-        walk = self._walk(inside, min(inside + 1, last))
-        up = self._along(walk, inside, last)
-        return limits.limits(ranged.solver, ranged.pair, walk.curve, [*list(down)[::-1], *up])
+        # from where the rows were followed from, so that the same ways are taken at change points
+        back = self._turns_back(u)
+        first, last = float(u[0]), float(u[(len(u) - 1) // 2 if back else -1])
+        here, sense = float(ranged.u[ranged.index]), 1.0 if last >= first else -1.0
+        down = list(self._along(here, first, -sense)) if sense * first < sense * here else []
+        walk = ranged.walk(ranged.found.z, here, sense)
+        up = list(self._along(here, last, sense, walk)) if sense * last > sense * here else []
+        low, high = sorted((first * ranged.scale, last * ranged.scale))
+        room = SEAM * ranged.scale
+        told = [each for each in (*down[::-1], *up) if low - room <= each.limit.input <= high + room]
+        return limits.limits(ranged.solver, ranged.pair, walk.curve, told)
 
     def _turns_back(self, u: Array) -> bool:
         return len(u) > 2 and u[0] == u[-1] and u[1] == u[-2]
 
-    def _walk(self, row: int, towards: int) -> Walk:
-        """A walk from one row in the direction of another."""
-        u, z = self.found.given.u[:, self.ranged.index], self.found.z
-        way = np.append(z[towards] - z[row], abs(u[towards] - u[row]))
-        return self.ranged.walk(z[row], float(u[row]), 1.0 if u[towards] >= u[row] else -1.0, way)
-
-    def _along(self, walk: Walk, row: int, last: int) -> Iterator[limits.Found]:
-        u, ranged = self.found.given.u[:, self.ranged.index], self.ranged
-        way = float(walk.curve.way[ranged.index])
-        far = abs(float(u[last] - u[row]))
-        parts = limits.until(pieces(walk), far)
-        return limits.along(ranged.solver, ranged.pair, float(u[row]), way, walk, parts, far)
+    def _along(self, here: float, last: float, way: float, walk: Walk | None = None) -> Iterator[limits.Found]:
+        """What is met from the file's own position to another."""
+        ranged, far = self.ranged, abs(last - here)
+        walk = walk or ranged.walk(ranged.found.z, here, way)
+        return limits.along(ranged.solver, ranged.pair, here, way, walk, limits.until(pieces(walk), far), far)

@@ -108,18 +108,19 @@ def ended(setup: Setup, links: Sequence[str], where: str, ending: Ending) -> NoA
             f"{_inputs(setup)} cannot go beyond {where}: towards there {_links(links)} slide out without an end, as "
             f"where lines become parallel; stop short of it, or drive {_pairs_of(setup, links, 4)}",
         )
+    meet = f"motions of {_links(links)} meet" if links else "motions meet"
     return NoAnswer(
         Outcome.BRANCH_LOST,
-        f"this assembly can be followed only to {where}: there motions of {_links(links)} meet that cannot be told "
-        f"apart; stop short of it, or drive {_pairs_of(setup, links, 4)}",
+        f"this assembly can be followed only to {where}: there {meet} that cannot be told apart; stop short of it, or "
+        f"drive {_pairs_of(setup, links, 4)}",
     )
 
 
-def not_closed(setup: Setup, pair: str, gap: float) -> NoAnswer:
-    """A position that the gate does not let pass."""
+def not_closed(setup: Setup, pair: str, gap: float, at: str = "") -> NoAnswer:
+    """A position that the gate does not let pass; the file's own, or another in words."""
     return NoAnswer(
         Outcome.CANNOT_BE_ASSEMBLED,
-        f"{setup.at()} the nearest position leaves pair {pair!r} open by {gap:.2g} of the mechanism's size where "
+        f"{at or setup.at()} the nearest position leaves pair {pair!r} open by {gap:.2g} of the mechanism's size where "
         f"rounding explains {setup.tolerance:.2g}; change a length or the input a little",
     )
 
@@ -196,11 +197,11 @@ def disagreeing(setup: Setup, mobility: int, what: str) -> NoAnswer:
     )
 
 
-def broken_rates(setup: Setup, what: str, pair: str, gap: float) -> NoAnswer:
-    """Rates that the gate does not let pass."""
+def broken_rates(setup: Setup, what: str, pair: str, gap: float, at: str = "") -> NoAnswer:
+    """Rates that the gate does not let pass, at the file's own position or at another in words."""
     return NoAnswer(
         Outcome.DEAD_POINT,
-        f"{setup.at()} the {what} break pair {pair!r} by {gap:.2g} of the greatest; move the input",
+        f"{at or setup.at()} the {what} break pair {pair!r} by {gap:.2g} of the greatest; move the input",
     )
 
 

@@ -106,8 +106,8 @@ def motion(
     gaps = solver.gaps(z, given.u)
     residual = float(gaps.max(initial=0.0))
     if not residual <= solver.tolerance:
-        pair, _ = np.unravel_index(int(np.argmax(gaps)), gaps.shape)
-        raise refusals.not_closed(solver, solver.gate.names[pair], residual)
+        pair, row = np.unravel_index(int(np.argmax(gaps)), gaps.shape)
+        raise refusals.not_closed(solver, solver.gate.names[pair], residual, f"at {solver.where(given.u[row])}")
     parts = rates(solver, z, given, run.local, third)
     for part in parts[1:]:
         # where the input turns back, no velocity of the rest goes with one of the input
@@ -118,9 +118,11 @@ def motion(
     inputs = [_input(solver, given, index) for index in range(len(solver.mechanism.inputs))]
     gaps_of_rates = solver.gate.rate_gaps(frames, own, [Jet(*each) for each in inputs])
     for (broken, pair), what in zip(gaps_of_rates, ("velocities", "accelerations"), strict=True):
-        worst = np.broadcast_to(broken, (len(z),))[determined].max(initial=0.0)
-        if worst > 1e3 * solver.tolerance:
-            raise refusals.broken_rates(solver, what, pair, float(worst))
+        of_rows = np.where(determined, np.broadcast_to(broken, (len(z),)), 0.0)
+        row = int(np.argmax(of_rows))
+        if of_rows[row] > 1e3 * solver.tolerance:
+            at = f"at {solver.where(given.u[row])}"
+            raise refusals.broken_rates(solver, what, pair, float(of_rows[row]), at)
     solver.refuse_gap(frames, own)
     return Motion(
         mechanism=solver.mechanism,

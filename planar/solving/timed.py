@@ -14,7 +14,7 @@ from planar.motion import Motion
 from planar.program import placed
 from planar.results import Limit
 from planar.roots import root
-from planar.solving.follow import SEAM, Met, Run, follow, run
+from planar.solving.follow import SEAM, Met, Run, followed, run
 from planar.solving.limits import STILL, Outputs, outputs
 from planar.solving.passing import crossed
 from planar.solving.position import Solver
@@ -90,6 +90,7 @@ class _Course:
     def __init__(self, timed: Timed, found: Rows, time: Array):
         self.timed, self.found, self.time = timed, found, time
         self.singular = frozenset(found.local)
+        self.forks: tuple[float, ...] = ()
 
     def limits(self, motion: Motion) -> tuple[Limit, ...]:
         """See `Motion.limits`."""
@@ -147,8 +148,11 @@ class _Course:
         """Position and velocity of an output at a time after a row."""
         solver = self.timed.solver
         given = self.timed.given(np.array([time]))
-        z = follow(solver, solver.station.p, self.found.z[row], self.found.given.u[row], given.u[0])
-        parts = [part[0] * solver.scale for part in rates(solver, z[None], given, {}, False)]
+        while row and row in self.singular:
+            row -= 1  # from a change point several ways lead on
+        way = followed(solver, solver.station.p, self.found.z[row], self.found.given.u[row], given.u[0])
+        local = {0: way.local[1]} if 1 in way.local else {}
+        parts = [part[0] * solver.scale for part in rates(solver, way.z[-1:], given, local, False)]
         jets = [Jet(*(float(part[column]) for part in parts)) for column in range(len(parts[0]))]
         frames, own = placed(jets, solver.column, solver.shapes, solver.pairs)
         named = solver.named[pair]

@@ -114,20 +114,9 @@ class Walk:
 
     def _through(self) -> Iterator[Arc]:
         """The arcs through a change point that lies just ahead, if one does."""
-        here, curve = self.here, self.curve
+        here = self.here
         self._looked = here.clear
-        near = nearest(curve, here)
-        if near is None:
-            return
-        ahead = float(here.tangent @ (near.y - here.y))
-        away = float(np.linalg.norm(near.y - here.y))
-        if not ahead > 0.0 or away > max(AHEAD * here.clear, SUSPECTED):
-            return
-        if near.open > curve.solver.tolerance or not curve.closes(near.y):
-            self.missed = [each for each in self.missed if np.linalg.norm(each.y - near.y) > 1e-6]
-            self.missed.append(Missed(near.y, away, near.open))
-            return
-        found = crossing(curve, here, near.y)
+        found = self._crossing(here)
         if found is None:
             return
         went, onwards = self._taken(found, here)
@@ -141,6 +130,22 @@ class Walk:
         yield inwards.arc(here, inwards.middle)
         yield outwards.arc(outwards.middle, outwards.after)
         self.here = outwards.after
+
+    def _crossing(self, here: Point) -> Crossing | None:
+        """The change point that lies just ahead; those of neighbouring linkages are noted."""
+        curve = self.curve
+        for near in nearest(curve, here):
+            away = float(np.linalg.norm(near.y - here.y))
+            if not float(here.tangent @ (near.y - here.y)) > 0.0 or away > max(AHEAD * here.clear, SUSPECTED):
+                continue
+            if near.open > curve.solver.tolerance or not curve.closes(near.y):
+                self.missed = [each for each in self.missed if np.linalg.norm(each.y - near.y) > 1e-6]
+                self.missed.append(Missed(near.y, away, near.open))
+                continue
+            found = crossing(curve, here, near.y)
+            if found is not None:
+                return found
+        return None
 
     def _sided(self, found: Crossing, index: int, towards: Point) -> Beside | None:
         """The curve beside a change point along one of its ways, in the sense of a point on it."""
