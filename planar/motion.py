@@ -263,8 +263,8 @@ class Motion(Moving):
     def limits(self) -> tuple[Limit, ...]:
         """Where an input or an output of the motion turns back, or branches cross, in the order of the rows.
 
-        Solved for when first asked for. Outputs are all slides, and all links pinned to the frame. Of a motion there and
-        back they are those of the way there.
+        Solved for when first asked for. Outputs are all slides, and all links pinned to the frame. Of a motion there
+        and back they are those of the way there.
         """
         return self.course.limits(self) if self.course else ()
 

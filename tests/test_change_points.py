@@ -231,3 +231,53 @@ def test_a_change_point_of_a_part_of_a_linkage_is_passed_with_the_whole():
     _, phi1, _, phi2 = rates(1.0, 2.5, 2.2, turned, beta, phi, 2.0, 1.0)
     same_angles(motion.link("GH").angle, phi + np.pi / 2, 1e-11)
     same_rates(motion, "GH", phi1, phi2)
+
+
+def test_what_is_greatest_on_a_change_point_is_found_there():
+    """An antiparallelogram a, b: its follower turns (b + a) / (b - a) times as fast as the crank where B is nearest."""
+    motion = planar.cycle(planar.load("antiparallelogram"), 90)
+    ends = planar.extremes(motion, "B", "x")
+    np.testing.assert_allclose([ends.least.value, ends.greatest.value], [0.04, 0.16], atol=1e-9)
+    omega = abs(motion.link("crank").angular_velocity[0])
+    fastest = planar.greatest(motion, "follower")
+    assert fastest.value == pytest.approx(4.0 * omega, rel=1e-9)
+    assert np.degrees(fastest.input) == pytest.approx(360.0, abs=1e-4)
+
+
+def test_limits_are_those_of_the_branches_that_the_rows_take():
+    """The piston of equal crank and rod rests on the crank's pin where that branch is taken: no end of a stroke."""
+    motion = planar.cycle(slider_crank(1.0, 1.0, 0.0, 1.0), 40, start=1.2, stop=4.0, branches=[2])
+    resting = motion.inputs["O"].position > TURN / 4 + 1e-9
+    assert np.ptp(motion.pair("s")["displacement"][resting]) < 1e-12
+    assert [limit.kind for limit in motion.limits] == ["change point"]
+    assert motion.limits[0].input == pytest.approx(TURN / 4, abs=1e-12)
+    beyond = planar.cycle(slider_crank(1.0, 1.0, 0.0, 1.0), 40, start=2.0, stop=4.0, branches=[2])
+    assert beyond.limits == ()
+
+
+def test_a_range_beside_a_change_point_passes_the_gate_on_any_grid():
+    for wide in (0.05, 0.005, 1e-4, 1e-6):
+        motion = planar.cycle(four_bar(*PARALLELOGRAM, 1.0), 37, start=np.pi - wide, stop=np.pi + 0.93 * wide)
+        assert motion.outcome is Outcome.SOLVED
+        np.testing.assert_allclose(motion.link("BC").angle, 0.0, atol=1e-12)
+
+
+def test_where_the_inputs_turn_back_on_a_change_point_the_range_ends():
+    """Hart's inversor lies flat at both ends of its range, and its circuit comes back through them."""
+    motion = planar.cycle(planar.load("hart-inversor"), 40)
+    ends = [limit.input for limit in motion.limits if limit.kind == "input dead point"]
+    np.testing.assert_allclose(ends, motion.inputs["B"].position[[0, -1]], atol=1e-12)
+    assert ends[0] == pytest.approx(-ends[1], abs=1e-12)
+    round_it = planar.cycle(planar.load("hart-inversor"), 40, circuit=True)
+    for point in round_it.points.values():
+        np.testing.assert_allclose(point.position[-1], point.position[0], atol=1e-9)
+
+
+def test_a_range_up_to_a_dead_point_that_was_told_is_solved():
+    mechanism = four_bar(0.9, 0.7, 0.85, 1.5, 0.5)
+    end = planar.cycle(mechanism, 4).limits[-1]
+    assert end.kind == "input dead point"
+    for short in (0.0, 1e-14, 1e-13, 1e-9):
+        motion = planar.cycle(mechanism, 6, start=0.5, stop=end.input - short)
+        assert motion.residual < 1e-12
+        assert motion.inputs["A"].position[-1] == pytest.approx(end.input, abs=2e-9)

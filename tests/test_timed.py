@@ -340,3 +340,21 @@ def test_third_rates_of_a_slider_crank_are_those_of_its_closed_form():
     # third derivative of r exp(i theta): r (i a''' - 3 w a - i w^3) exp(i theta) with no third rate of the input
     third = r * (-3 * 3.0 * -1.0 - 1j * 27.0) * crank
     np.testing.assert_allclose(motion.jerk("A") @ [1, 1j], third, atol=1e-12)
+
+
+@pytest.mark.parametrize("steps", [3, 7, 50, 51])
+def test_a_change_point_that_is_passed_to_and_fro_has_both_its_times(steps):
+    """By symmetry of a cycloidal rise of 240 deg from 60 deg the flat position at 180 deg is passed half-way."""
+    law = [rise(4 * np.pi / 3, 1.0), {"motion": "dwell", "in": 0.5}, rise(-4 * np.pi / 3, 1.0, "3-4-5")]
+    motion = planar.cycle(lawful(four_bar(*PARALLELOGRAM, np.pi / 3), law), steps)
+    times = [limit.input for limit in motion.limits if limit.kind == "change point"]
+    np.testing.assert_allclose(times, [0.5, 2.0], atol=1e-9)
+    np.testing.assert_allclose(np.sin(motion.link("BC").angle), 0.0, atol=1e-12)
+
+
+def test_a_rest_and_a_return_on_a_change_point_keep_to_the_branch():
+    law = [rise(2 * np.pi / 3, 1.0), {"motion": "dwell", "in": 0.5}, rise(-2 * np.pi / 3, 1.0)]
+    motion = planar.cycle(lawful(four_bar(*PARALLELOGRAM, np.pi / 3), law), 50)
+    assert motion.outcome is Outcome.SOLVED
+    np.testing.assert_allclose(np.sin(motion.link("BC").angle), 0.0, atol=1e-12)
+    assert motion.link("DC").angle[-1] == pytest.approx(np.pi / 3, abs=1e-12)
