@@ -1,0 +1,1 @@
+"""Casadi's programs printed for other machines."""

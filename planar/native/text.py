@@ -1,0 +1,157 @@
+"""A listing's values as LLVM IR, on vectors of lanes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from planar.native.listing import Listing, NotPrinted, needed
+
+BINARY = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
+CALLS = {"sqrt": "sqrt", "abs": "fabs"}
+LIBRARY = ("cos", "sin", "atan")
+
+
+class Text:
+    """Instructions one after the other, with fresh names."""
+
+    def __init__(self, lanes: int):
+        self.lanes, self.lines, self._count = lanes, [], 0
+        self.vector = f"<{lanes} x double>"
+
+    def line(self, text: str) -> None:
+        """Add a line as it is."""
+        self.lines.append(text)
+
+    def new(self, text: str) -> str:
+        """Add an instruction that gives a value; the value's name."""
+        self._count += 1
+        name = f"%v{self._count}"
+        self.lines.append(f"{name} = {text}")
+        return name
+
+    def label(self, name: str) -> None:
+        self.lines.append(f"{name}:")
+
+    def constant(self, value: float) -> str:
+        return f"splat (double {_hex(value)})"
+
+    def binary(self, what: str, a: str, b: str) -> str:
+        return self.new(f"{BINARY[what]} contract {self.vector} {a}, {b}")
+
+    def call(self, what: str, *of: str) -> str:
+        args = ", ".join(f"{self.vector} {each}" for each in of)
+        return self.new(f"call contract {self.vector} @llvm.{what}.v{self.lanes}f64({args})")
+
+    def each(self, what: str, of: str) -> str:
+        """A function of the mathematics library, called lane by lane."""
+        found = "poison"
+        for lane in range(self.lanes):
+            one = self.new(f"extractelement {self.vector} {of}, i64 {lane}")
+            one = self.new(f"call double @{what}(double {one})")
+            found = self.new(f"insertelement {self.vector} {found}, double {one}, i64 {lane}")
+        return found
+
+    def load(self, pointer: str) -> str:
+        return self.new(f"load {self.vector}, ptr {pointer}, align 8")
+
+    def store(self, value: str, pointer: str) -> None:
+        self.line(f"store {self.vector} {value}, ptr {pointer}, align 8")
+
+    def loop(self, counter: str, last: str, again: str, after: str) -> None:
+        """Count on, and go round again up to the last."""
+        self.line(f"%{counter}next = add i64 %{counter}, 1")
+        self.line(f"%{counter}more = icmp slt i64 %{counter}next, %{last}")
+        self.line(f"br i1 %{counter}more, label %{again}, label %{after}")
+
+    def folded(self, what: str, of: Sequence[str]) -> str:
+        """A call of two values over many; nothing of none."""
+        found = of[0] if of else self.constant(0.0)
+        for each in of[1:]:
+            found = self.call(what, found, each)
+        return found
+
+    def summed(self, of: Sequence[str]) -> str:
+        """The sum of values."""
+        found = of[0]
+        for each in of[1:]:
+            found = self.binary("add", found, each)
+        return found
+
+    def compared(self, how: str, a: str, b: str) -> str:
+        """A flag in every lane."""
+        return self.new(f"fcmp {how} {self.vector} {a}, {b}")
+
+    def both(self, a: str, b: str) -> str:
+        """Two flags at once."""
+        return self.new(f"and <{self.lanes} x i1> {a}, {b}")
+
+    def either(self, a: str, b: str) -> str:
+        """One flag or the other."""
+        return self.new(f"or <{self.lanes} x i1> {a}, {b}")
+
+    def where(self, flag: str, value: str) -> str:
+        """A value where a flag is up, else nothing."""
+        return self.new(f"select <{self.lanes} x i1> {flag}, {self.vector} {value}, {self.vector} zeroinitializer")
+
+    def slot(self) -> str:
+        """Room for a value."""
+        return self.new(f"alloca {self.vector}, align 64")
+
+    def spread_flag(self, counter: str, last: int) -> str:
+        """Whether a counter is at most so great, in every lane."""
+        flag = self.new(f"icmp sle i64 {counter}, {last}")
+        one = self.new(f"insertelement <{self.lanes} x i1> poison, i1 {flag}, i64 0")
+        return self.new(
+            f"shufflevector <{self.lanes} x i1> {one}, <{self.lanes} x i1> poison, <{self.lanes} x i32> zeroinitializer"
+        )
+
+    def module(self) -> str:
+        """All that was written, with what it calls."""
+        v, of = self.vector, f"v{self.lanes}f64"
+        calls = [f"declare {v} @llvm.{name}.{of}({v})" for name in ("sqrt", "fabs")]
+        calls += [f"declare {v} @llvm.{name}.{of}({v}, {v})" for name in ("minnum", "maxnum")]
+        calls += [f"declare double @{name}(double) memory(none)" for name in LIBRARY]
+        return "\n".join([*self.lines, *calls])
+
+    def at(self, base: str, index: str) -> str:
+        """A pointer to the double at an index."""
+        return self.new(f"getelementptr double, ptr {base}, i64 {index}")
+
+    def spread(self, scalar: str) -> str:
+        """A number in every lane."""
+        one = self.new(f"insertelement {self.vector} poison, double {scalar}, i64 0")
+        return self.new(
+            f"shufflevector {self.vector} {one}, {self.vector} poison, <{self.lanes} x i32> zeroinitializer"
+        )
+
+    def values(self, listing: Listing, wanted: Sequence[int], inputs: Mapping[int, str]) -> list[str]:
+        """The names of wanted values, given those of the inputs."""
+        names: dict[int, str] = {}
+        for each in needed(listing, wanted):
+            value = listing.values[each]
+            of = [names[k] for k in value.of]
+            if value.what == "input":
+                if each not in inputs:
+                    raise NotPrinted(f"an angle stands outside cos and sin: {value.data}")
+                names[each] = inputs[each]
+            elif value.what == "const":
+                names[each] = self.constant(value.data)
+            elif value.what == "neg":
+                names[each] = self.new(f"fneg {self.vector} {of[0]}")
+            elif value.what in BINARY:
+                names[each] = self.binary(value.what, *of)
+            elif value.what in ("minnum", "maxnum"):
+                names[each] = self.call(value.what, *of)
+            elif value.what in LIBRARY:
+                names[each] = self.each(value.what, *of)
+            elif value.what in CALLS:
+                names[each] = self.call(CALLS[value.what], *of)
+            else:
+                raise NotPrinted(f"there is no {value.what} on vectors")
+        return [names[each] for each in wanted]
+
+
+def _hex(value: float) -> str:
+    import struct
+
+    return "0x" + struct.pack(">d", float(value)).hex().upper()

@@ -1,0 +1,116 @@
+"""What LLVM is told equals what casadi computes: runs of many designs against runs of one."""
+
+import numpy as np
+import pytest
+
+import planar
+from planar.errors import BadInput, Outcome
+from planar.mechanism import named_points
+from planar.native.backend import run
+from planar.native.listing import Listing, NotPrinted, Turned, without_turning
+from tests.known import MODELS
+
+PART = slice(30, 331)
+"""Rows of a cycle of 360 steps that are away from its limits."""
+
+
+def arguments(motion, points):
+    """A run of a motion's rows as what the backend takes, for one design."""
+    course = motion.course
+    solver, found = course.ranged.solver, course.found
+    named = {each.name: each.members[0] for each in named_points(motion.mechanism)}
+    members = [named[point] for point in points]
+    u = found.given.u[PART]
+    places = [solver.shapes[link].at(name) for link, name in members]
+    return {
+        "program": solver.program,
+        "p": solver.station.p[:, None],
+        "q": np.array([[part / solver.unit] for place in places for part in (place.x, place.y)]),
+        "z": found.z[PART][0][:, None],
+        "start": u[0][:, None],
+        "gone": u - u[0],
+        "u1": solver.station.u1[:, None],
+        "u2": solver.station.u2[:, None],
+        "turning": [not solver.slides(given.pair) for given in motion.mechanism.inputs],
+        "links": [link for link, _ in members],
+        "rates": True,
+        "tolerance": solver.tolerance,
+    }
+
+
+def repeated(given, designs):
+    """The same design so many times."""
+    return given | {key: np.repeat(given[key], designs, axis=1) for key in ("p", "q", "z", "start", "u1", "u2")}
+
+
+@pytest.mark.parametrize("stem", [stem for stem, mechanism in MODELS.items() if mechanism.inputs])
+def test_a_run_of_a_model_is_the_one_that_casadi_gives(stem):
+    mechanism = MODELS[stem]
+    try:
+        motion = planar.cycle(mechanism, pair=mechanism.inputs[0].pair)
+    except BadInput:  # a slide without limits
+        at = mechanism.inputs[0].position
+        motion = planar.cycle(mechanism, start=at, stop=at + 0.1, pair=mechanism.inputs[0].pair)
+    assert motion.outcome is Outcome.SOLVED
+    points = motion.point_names[-3:]
+    given = repeated(arguments(motion, points), 3)
+    if not given["program"].square:
+        with pytest.raises(NotPrinted, match="more than once"):
+            run(**given)
+        return
+    out, good = run(**given)
+    assert out.shape == (len(given["gone"]), 6 * len(points), 3)
+    np.testing.assert_array_equal(out, np.repeat(out[:, :, :1], 3, axis=2))
+    # what is near a change point, or moves too far in a step, is left to the general path
+    first = int(good[0])
+    near = [row - PART.start for row in motion.course.singular if row >= PART.start]
+    assert first == len(out) or min(near, default=0) <= first
+    unit = motion.course.ranged.solver.unit
+    for order, what in enumerate(("position", "velocity", "acceleration")):
+        for k, point in enumerate(points):
+            wanted = getattr(motion.point(point), what)[PART][:first]
+            told = unit * out[:first, 2 * (len(points) * order + k) : 2 * (len(points) * order + k) + 2, 0]
+            scale = max(float(np.abs(wanted).max(initial=0.0)), unit)
+            np.testing.assert_allclose(told, wanted, rtol=0, atol=(1e-12, 1e-10, 1e-8)[order] * scale)
+
+
+def test_cos_and_sin_of_sums_are_put_together_from_the_angles_own():
+    listing = Listing()
+    a, b, c = (listing.add("input", data=("z", k)) for k in range(3))
+    turned = [Turned(*(listing.add("input", data=(part, k)) for part in ("zc", "zs"))) for k in range(2)]
+    inside = listing.add("sub", listing.add("add", a, listing.add("mul", listing.const(2.0), b)), c)
+    wanted = [listing.add("cos", inside), listing.add("sin", inside)]
+    made, numbers = without_turning(listing, wanted, {a: turned[0], b: turned[1]})
+    values = {
+        ("zc", 0): np.cos(0.3),
+        ("zs", 0): np.sin(0.3),
+        ("zc", 1): np.cos(1.1),
+        ("zs", 1): np.sin(1.1),
+        ("z", 2): 0.7,
+    }
+    with_angles = {
+        "cos": np.cos,
+        "sin": np.sin,
+        "neg": np.negative,
+        "add": np.add,
+        "sub": np.subtract,
+        "mul": np.multiply,
+    }
+    found = []
+    for value in made.values:
+        if value.what == "input":
+            found.append(values.get(value.data, np.nan))  # the angles' own values stand nowhere
+        elif value.what == "const":
+            found.append(value.data)
+        else:
+            found.append(with_angles[value.what](*(found[k] for k in value.of)))
+    angle = 0.3 + 2 * 1.1 - 0.7
+    np.testing.assert_allclose([found[k] for k in numbers], [np.cos(angle), np.sin(angle)], atol=1e-15)
+
+
+def test_what_is_not_a_number_is_not_good():
+    motion = planar.cycle(MODELS["crank-rocker"])
+    given = repeated(arguments(motion, motion.point_names[-1:]), 2)
+    given["p"][0, 1] = np.nan
+    _, good = run(**given)
+    assert good.tolist() == [len(given["gone"]), 0]
