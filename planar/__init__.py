@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from planar.motion import Motion, State
     from planar.solving.cycle import cycle
     from planar.solving.position import solve
+    from planar.sweeping.result import Sweep
+    from planar.sweeping.sweep import sweep
     from planar.views.dataset import dataset
 
 __version__ = "0.5.0"
@@ -65,6 +67,7 @@ _ROOMS = {
     "Point": "mechanism",
     "State": "motion",
     "Stroke": "analysis.extremes",
+    "Sweep": "sweeping.result",
     "Swing": "analysis.extremes",
     "TimeRatio": "analysis.time_ratio",
     "Transmission": "analysis.transmission",
@@ -93,6 +96,7 @@ _ROOMS = {
     "schema": "document.schema",
     "solve": "solving.position",
     "stroke": "analysis.extremes",
+    "sweep": "sweeping.sweep",
     "swing": "analysis.extremes",
     "time_ratio": "analysis.time_ratio",
     "to_dict": "files",
@@ -132,6 +136,7 @@ __all__ = [
     "Point",
     "State",
     "Stroke",
+    "Sweep",
     "Swing",
     "TimeRatio",
     "Transmission",
@@ -160,6 +165,7 @@ __all__ = [
     "schema",
     "solve",
     "stroke",
+    "sweep",
     "swing",
     "time_ratio",
     "to_dict",

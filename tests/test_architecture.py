@@ -24,7 +24,7 @@ FLOORS = [
     {"program", "motion"},
     {"native"},
     {"solving"},
-    {"analysis"},
+    {"analysis", "sweeping"},
     {"views", "drawing"},
     {"plot"},
     {"cli", "__init__"},
@@ -41,6 +41,7 @@ LIBRARIES = {
         "native",
         "solving",
         "analysis",
+        "sweeping",
         "views",
         "drawing",
         "words",
@@ -55,7 +56,8 @@ LIBRARIES = {
     "PIL": {"drawing"},
     "imageio_ffmpeg": {"drawing"},
     "click": {"cli"},
-    "pyarrow": {"views"},
+    "pyarrow": {"views", "sweeping"},
+    "zarr": {"sweeping"},
     "xarray": {"views"},
 }
 FILES = sorted(ROOT.rglob("*.py"))

@@ -1,0 +1,83 @@
+"""What a backend does for a sweep: all designs of a block through the same steps, each position judged."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+from importlib.util import find_spec
+from typing import NamedTuple
+
+import numpy as np
+
+from planar.errors import BadInput
+from planar.mechanism import Mechanism
+from planar.program import Program
+
+Array = np.ndarray
+
+BACKENDS = {"native": "planar.sweeping.native", "casadi": "planar.sweeping.by_program"}
+"""The modules of the backends, the faster first; each has a function `march`."""
+
+
+class NotMarched(Exception):
+    """A backend cannot do this structure; the text says why."""
+
+
+class March(NamedTuple):
+    """A block of designs that is to run. Lengths are in units of one size for all, angles in rad.
+
+    p (numbers, designs): the numbers of all pairs; q (2 a point, designs): coordinates of the wanted points in the axes
+    of their `links`, none of which is the frame; z0 (unknowns, designs): the assembly at the start; u (steps + 1,
+    inputs): how far the inputs are from where each design starts, u0 (inputs, designs); u1, u2 (inputs, designs): their
+    rates, the same at every step. `rates`: whether first and second rates are wanted. `tolerance`: what a constraint
+    may leave open. `mechanism` has the pairs and inputs; its numbers are not those of the designs.
+    """
+
+    program: Program
+    mechanism: Mechanism
+    p: Array
+    q: Array
+    z0: Array
+    u: Array
+    u0: Array
+    u1: Array
+    u2: Array
+    links: tuple[str, ...]
+    rates: bool
+    tolerance: float
+
+    def of(self, designs: Array, z0: Array | None = None) -> March:
+        """The march of some of the designs, from other unknowns if they are given."""
+        parts = {name: getattr(self, name)[:, designs] for name in ("p", "q", "z0", "u0", "u1", "u2")}
+        return self._replace(**parts | ({} if z0 is None else {"z0": z0}))
+
+
+class Marched(NamedTuple):
+    """Where the points are, out (steps + 1, rows, designs): x and y of each, then their first, then second rates, in
+    units of the size; and how many of the first steps passed both parts of the gate, good (designs,)."""
+
+    out: Array
+    good: Array
+
+
+Marching = Callable[[March], Marched]
+
+
+def marching(backend: str) -> list[tuple[str, Marching]]:
+    """The backends to try, in this order, each with its name; one that raises NotMarched leaves it to the next.
+
+    Raises BadInput.
+    """
+    if backend not in ("auto", *BACKENDS):
+        raise BadInput("backend", f"there is no backend {backend!r:.40}; choose from auto, {', '.join(BACKENDS)}")
+    wanted = [*BACKENDS] if backend == "auto" else [*dict.fromkeys((backend, "casadi"))]
+    there = [name for name in wanted if find_spec(BACKENDS[name]) is not None]
+    found = []
+    for name in there:
+        try:
+            found.append((name, import_module(BACKENDS[name]).march))
+        except ImportError:
+            continue
+    if backend not in ("auto", *(name for name, _ in found)):
+        raise BadInput("backend", f"the backend {backend!r} is not installed: pip install 'planar[{backend}]'")
+    return found
