@@ -1,46 +1,74 @@
-"""`python -m benchmarks` measures everything in one run and prints it."""
+"""`python -m benchmarks` measures everything in one run and prints it; `--readme` writes README's table and plots."""
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Callable
+from typing import Any
 
 from rich.console import Console, RenderableType
 from rich.progress import Progress
 from rich.text import Text
 
-from benchmarks import tables
+from benchmarks import readme, tables
 from benchmarks.comparison import compare
-from benchmarks.growth import LINKS, grow
+from benchmarks.contests import Contest, contests
+from benchmarks.curves import against_designs, against_links
+from benchmarks.growth import FAR, LINKS, grow, grow_far
 from benchmarks.imports import costs
 from benchmarks.linkages import LINKAGES, Linkage
-from benchmarks.processes import cold_starts
+from benchmarks.memory import hold
+from benchmarks.processes import ROOT, cold_starts
 from benchmarks.versions import versions
+
+DESIGNS, ROW = "time a position against the number of designs", "time a position against the number of links"
 
 
 def main() -> None:
-    """Measure, then print."""
+    """Measure, then print, then write."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description="Measures everything in one run.")
+    parser.add_argument("--readme", action="store_true", help="write README's table and plots")
+    wanted = parser.parse_args()
     console = Console()
     if not console.is_terminal:
         console = Console(width=160)
-    measurements: dict[str, Callable[[], RenderableType]] = {
+    hold()
+    held = contests()
+    measurements: dict[str, Callable[[], Any]] = {
+        **{contest.name: contest.measure for contest in held},
+        DESIGNS: against_designs,
+        ROW: against_links,
         **{linkage.name: _compared(linkage) for linkage in LINKAGES},
-        "number of links": lambda: tables.growth(grow(links) for links in LINKS),
+        "links": lambda: tables.growth(grow(links) for links in LINKS),
+        "many links": lambda: tables.far(grow_far(*each) for each in FAR),
         "cold start": lambda: tables.processes(cold_starts()),
         "what costs what": lambda: tables.costs(costs()),
     }
-    shown: list[RenderableType] = [Text(versions(), style="bold"), tables.notes()]
+    found: dict[str, Any] = {}
     with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
         task = progress.add_task("", total=len(measurements))
         for name, measure in measurements.items():
             progress.update(task, description=name)
-            shown.append(measure())
+            found[name] = measure()
             progress.advance(task)
-    for each in shown:
-        console.print(each)
+    console.print(Text(versions(), style="bold"))
+    console.print(tables.notes())
+    for name, each in found.items():
+        console.print(_shown(name, each, held))
+    if wanted.readme:
+        results = [result for contest in held for result in found[contest.name]]
+        readme.write(ROOT, versions(), results, found[DESIGNS], found[ROW])
+
+
+def _shown(name: str, found: Any, held: tuple[Contest, ...]) -> RenderableType:
+    if name in (DESIGNS, ROW):
+        return tables.curves(name, found)
+    return tables.contest(found) if any(contest.name == name for contest in held) else found
 
 
 def _compared(linkage: Linkage) -> Callable[[], RenderableType]:
     return lambda: tables.comparison(linkage.name, compare(linkage))
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -15,7 +15,7 @@ NEXT = (FourBar(a=0.5, b=1.02, c=0.5, g=1.0), FourBar(a=0.5, b=0.98, c=0.5, g=1.
 
 def document(links: int) -> dict[str, Any]:
     """The mechanism file (m, rad) of a frame, a crank and (links - 2) / 2 dyads of a coupler and a rocker."""
-    dyads = _dyads(links)
+    dyads = cells(links)
     frame: dict[str, list[float]] = {"A": [0.0, 0.0]}
     bars: dict[str, Any] = {"crank": {"ends": ["A", "B1"], "length": FIRST.a}}
     sketch = {}
@@ -46,16 +46,17 @@ def document(links: int) -> dict[str, Any]:
 
 def last_rocker(links: int) -> str:
     """The name of the link that moves last."""
-    return f"rocker{len(_dyads(links))}"
+    return f"rocker{len(cells(links))}"
 
 
 def motion(m: Any, links: int, theta: Scalar) -> tuple[Scalar, Scalar, Scalar]:
     """The last rocker's angle, velocity and acceleration (rad, per s, per s^2), four-bar after four-bar."""
     swing = theta, OMEGA, ALPHA
-    for cell in _dyads(links):
+    for cell in cells(links):
         swing = tuple(rates[1] for rates in cell.motion(m, *swing))
     return swing
 
 
-def _dyads(links: int) -> tuple[FourBar, ...]:
+def cells(links: int) -> tuple[FourBar, ...]:
+    """The four-bars of a row, the first one first."""
     return (FIRST, *(NEXT[index % 2] for index in range((links - 4) // 2)))

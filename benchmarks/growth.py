@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
+from time import perf_counter
 
 import numpy as np
 
@@ -10,7 +12,7 @@ import planar
 from benchmarks import chain
 from benchmarks.comparison import error
 from benchmarks.timing import best
-from benchmarks.ways.trial import CRANK
+from benchmarks.ways.trial import CRANK, STEPS
 from planar.equations import build
 from planar.program import Program, structure
 from planar.solving.follow import run
@@ -37,6 +39,45 @@ class Growth:
     position_error: float
     run: float
     run_error: float
+
+
+@dataclass(frozen=True)
+class Far:
+    """Seconds of the steps for many links, each done once; None for what was not waited for."""
+
+    links: int
+    parsing: float
+    equations: float
+    program: float | None
+    assembly: float | None
+    position: float | None
+
+
+FAR = ((100, True), (400, True), (1000, False))
+"""Numbers of links, and whether the steps after the equations are waited for too."""
+
+
+def grow_far(links: int, whole: bool) -> Far:
+    """Time a long row of four-bars, once."""
+    taken = [perf_counter()]
+
+    def done() -> None:
+        taken.append(perf_counter())
+
+    mechanism = planar.from_dict(chain.document(links))
+    done()
+    equations = build(structure(mechanism))
+    done()
+    if whole:
+        Program(equations).runs(STEPS)
+        done()
+        solver = Solver(mechanism)
+        z = solver.assembly().z
+        done()
+        solver.state(z)
+        done()
+    spent = [after - before for before, after in pairwise(taken)] + 3 * [None]
+    return Far(links, *spent[:5])
 
 
 def grow(links: int) -> Growth:

@@ -9,8 +9,11 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+import planar
 from benchmarks.comparison import Row
-from benchmarks.growth import Growth
+from benchmarks.contests import Result
+from benchmarks.curves import Curve
+from benchmarks.growth import Far, Growth
 from benchmarks.imports import Cost
 from benchmarks.processes import Process
 
@@ -28,7 +31,61 @@ def _compared(title: str, rows: Iterable[Row]) -> Table:
     table = _table(title, "way", "time", "ratio", "greatest error")
     table.columns[0].min_width = 34
     for row in rows:
-        table.add_row(row.way, _time(row.seconds), _ratio(row.ratio), _error(row.error))
+        table.add_row(row.way, time(row.seconds), ratio(row.ratio), _error(row.error))
+    return table
+
+
+NOT_THERE = "" if hasattr(planar, "sweep") else "planar.sweep is not there in this version. "
+
+
+def contest(results: Iterable[Result]) -> RenderableType:
+    """One contest, in the order of times: positions alone, then with rates; ratios to the limit."""
+    results = sorted(results, key=lambda result: (result.rates, result.seconds))
+    table = _table(
+        results[0].contest, "system", "a position", "ratio", "greatest error", "designs", "refused", "wrongly"
+    )
+    table.columns[0].min_width = 34
+    for index, each in enumerate(results):
+        if index and each.rates != results[index - 1].rates:
+            table.add_section()
+        shown = each.system + (", with rates" if each.rates else "")
+        table.add_row(
+            shown,
+            time(each.seconds),
+            ratio(each.ratio),
+            _error(each.error),
+            str(each.designs),
+            str(each.refused),
+            str(each.wrong),
+        )
+    return table
+
+
+def curves(title: str, measured: Iterable[Curve]) -> RenderableType:
+    """Time a position against what grows."""
+    measured = tuple(measured)
+    grows = sorted({number for curve in measured for number in curve.grows})
+    table = _table(title, "system", *(f"{number:,}" for number in grows), "greatest error (m)")
+    for curve in measured:
+        known = dict(zip(curve.grows, curve.seconds, strict=True))
+        table.add_row(curve.system, *(time(known[n]) if n in known else "" for n in grows), _error(curve.error))
+    return table
+
+
+def far(measured: Iterable[Far]) -> RenderableType:
+    """The steps of solving for many links, each done once."""
+    table = _table(
+        "long rows of four-bars, once each",
+        "links",
+        "file",
+        "equations",
+        "program of a run",
+        "assembly",
+        "a position with rates",
+    )
+    for each in measured:
+        steps = (each.parsing, each.equations, each.program, each.assembly, each.position)
+        table.add_row(str(each.links), *("not waited for" if step is None else time(step) for step in steps))
     return table
 
 
@@ -65,7 +122,7 @@ def processes(measured: Iterable[Process]) -> RenderableType:
     """Whole processes, from start to end."""
     table = _table("cold start, whole processes", "command", "time", "ratio")
     for each in measured:
-        table.add_row(each.command, _time(each.seconds), _ratio(each.ratio))
+        table.add_row(each.command, time(each.seconds), ratio(each.ratio))
     return table
 
 
@@ -73,7 +130,7 @@ def costs(measured: Iterable[Cost]) -> RenderableType:
     """What a cold `planar solve` spends its time on."""
     table = _table("what costs what in a cold `planar solve`", "part", "time", "share")
     for each in measured:
-        table.add_row(each.part, _time(each.seconds), f"{100.0 * each.share:.0f} %")
+        table.add_row(each.part, time(each.seconds), f"{100.0 * each.share:.0f} %")
     return table
 
 
@@ -84,13 +141,17 @@ def notes() -> RenderableType:
         "Times are the best of several rounds run in turn, processes the median of their runs. The ways solve a turn "
         "of the crank in 360 steps, and their time is that of one position. Errors are against the closed form in "
         "longer arithmetic, as a part of the greatest value that a quantity takes in the turn. "
+        "In the contests ratios are to C by hand. Everybody gives new arrays, in memory that the process has already. "
+        "Refused are designs with a position that is not given, wrongly those that are refused at another step than "
+        f"the closed form, or not. {NOT_THERE}"
         "planar.cycle assembles, runs and has its rates gated too; the other rates of runs come sample by sample from "
         "the program and are ungated.",
         style="italic",
     )
 
 
-def _time(seconds: float) -> str:
+def time(seconds: float) -> str:
+    """In the unit that fits."""
     for size, name in ((1.0, "s"), (1e-3, "ms"), (1e-6, "us")):
         if seconds >= size:
             return f"{seconds / size:.3g} {name}"
@@ -98,11 +159,12 @@ def _time(seconds: float) -> str:
 
 
 def _step(seconds: float, first: float) -> str:
-    return f"{_time(seconds)} ({_ratio(seconds / first)})"
+    return f"{time(seconds)} ({ratio(seconds / first)})"
 
 
-def _ratio(ratio: float) -> str:
-    return f"x {ratio:.2g}" if ratio < 100.0 else f"x {ratio:.0f}"
+def ratio(times: float) -> str:
+    """As a factor."""
+    return f"x {times:.2g}" if times < 100.0 else f"x {times:.0f}"
 
 
 def _error(error: float) -> str:

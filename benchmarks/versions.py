@@ -4,17 +4,23 @@ from __future__ import annotations
 
 import platform
 from importlib.metadata import version
+from importlib.util import find_spec
 from os import cpu_count
 from pathlib import Path
 
 import planar
+from benchmarks import peers
+from benchmarks.limit import compiler_version
+
+LIBRARIES = ("numpy", "casadi", "llvmlite", "scipy", "networkx")
 
 
 def versions() -> str:
-    """One line: planar, Python, the libraries that do the work, the processor."""
-    libraries = ", ".join(f"{name} {version(name)}" for name in ("numpy", "casadi", "scipy", "networkx"))
+    """One line: planar, Python, the libraries that do the work, the peers, the C compiler, the processor."""
+    libraries = ", ".join(f"{name} {version(name)}" for name in LIBRARIES if find_spec(name))
     machine = f"{_processor()}, {cpu_count()} cores"
-    return f"planar {planar.__version__}, Python {platform.python_version()}, {libraries}; {machine}"
+    python = f"planar {planar.__version__}, Python {platform.python_version()}, {libraries}"
+    return f"{python}; {peers.versions()}; {compiler_version()}; {machine}"
 
 
 def _processor() -> str:

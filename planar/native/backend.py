@@ -7,9 +7,10 @@ from functools import lru_cache
 
 import numpy as np
 
+from planar.mechanism import Mechanism
 from planar.native.compiled import compiled
 from planar.native.march import ORDER, Layout, march
-from planar.program import Program
+from planar.program import Program, structure
 
 Array = np.ndarray
 
@@ -23,9 +24,9 @@ KINDS = ("int", "int", *("array",) * 7, "float", "array", "array")
 
 
 @lru_cache(maxsize=64)
-def layout(program: Program, turning: tuple[bool, ...], links: tuple[str, ...], rates: bool) -> Layout:
-    """The function for points on these links. Raises NotPrinted."""
-    return march(program.equations, turning, links, rates, LANES)
+def layout(program: Program, of: Mechanism, links: tuple[str, ...], rates: bool) -> Layout:
+    """The function for points on links of a structure. Raises NotPrinted."""
+    return march(program.equations, of, links, rates, LANES)
 
 
 def run(
@@ -37,7 +38,7 @@ def run(
     gone: Array,
     u1: Array,
     u2: Array,
-    turning: Sequence[bool],
+    mechanism: Mechanism,
     links: Sequence[str],
     rates: bool,
     tolerance: float,
@@ -45,13 +46,13 @@ def run(
     """The places of points on links over a run of designs, and how many of its first steps every design did well.
 
     p (numbers, designs): numbers of the pairs; q (2 points, designs): the points' coordinates in their links;
-    z (unknowns, designs): where the run starts, closed; start (inputs, designs), u1, u2 alike: inputs there and their rates; gone
-    (steps, inputs): how far the inputs are from there at every step, the first of which is none. Lengths in sizes.
+    z (unknowns, designs): where the run starts, closed; start (inputs, designs), u1, u2 alike: inputs there and their
+    rates; gone (steps, inputs): how far the inputs are from there at every step, the first of which is none. Lengths in sizes.
 
     Returns (steps, rows, designs): x and y of every point, then with `rates` all first rates, then all second ones; and
     (designs,). Raises NotPrinted where the structure is not for this backend.
     """
-    plan = layout(program, tuple(turning), tuple(links), rates)
+    plan = layout(program, structure(mechanism), tuple(links), rates)
     function = compiled(plan.text, "march", *KINDS)
     designs, steps = z.shape[1], len(gone)
     blocks = -(-designs // plan.lanes)

@@ -6,11 +6,11 @@ import ctypes
 from functools import lru_cache
 from typing import Any
 
+import llvmlite.binding as llvm
+
 
 def _machine() -> Any:
     """What to compile for; one for every module, since what is compiled owns it."""
-    import llvmlite.binding as llvm
-
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     return llvm.Target.from_default_triple().create_target_machine(
@@ -21,8 +21,6 @@ def _machine() -> Any:
 @lru_cache(maxsize=64)
 def compiled(text: str, name: str, *kinds: str) -> Any:
     """The function of that name in a text, which takes arguments of these kinds ("int", "float", "array")."""
-    import llvmlite.binding as llvm
-
     machine = _machine()
     module = llvm.parse_assembly(text)
     tuning = llvm.create_pipeline_tuning_options(speed_level=2)

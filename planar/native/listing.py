@@ -95,9 +95,8 @@ class Listing:
             return self.const(0.0)
         if what == "sub" and known[0] == 0.0:
             return self.add("neg", of[1])
-        if what == "neg" and self.values[of[0]].what == "neg":
-            return self.values[of[0]].of[0]
-        return None
+        inside = self.values[of[0]] if what == "neg" else None
+        return inside.of[0] if inside is not None and inside.what == "neg" else None
 
     def inlined(self, function: ca.Function, inputs: list[list[int]]) -> list[list[int]]:
         """A function of values: the numbers of its results, dense, column by column. Raises NotPrinted."""
@@ -213,16 +212,13 @@ class _Turning:
             return None
         if not any(part.factors for part in of):
             return _Sum({}, self.made.add(value.what, *(self.number[k] for k in value.of), data=value.data))
-        if value.what == "neg":
-            return self._times(of[0], -1)
         if value.what in ("add", "sub"):
             return self._plus(of[0], of[1] if value.what == "add" else self._times(of[1], -1))
-        if value.what == "mul":
-            for k, other in ((0, 1), (1, 0)):
-                times = self.listing.number(value.of[k])
-                if times in WHOLE:
-                    return self._times(of[other], int(times))
-        return None
+        if value.what == "neg":
+            return self._times(of[0], -1)
+        known = [(self.listing.number(k), other) for k, other in zip(value.of, of[::-1], strict=True)]
+        whole = [(other, int(times)) for times, other in known if value.what == "mul" and times in WHOLE]
+        return self._times(*whole[0]) if whole else None
 
     def _times(self, part: _Sum, times: int) -> _Sum:
         rest = None if part.rest is None else self.made.add("mul", self.made.const(times), part.rest)

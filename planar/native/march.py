@@ -12,11 +12,12 @@ from typing import NamedTuple
 import casadi as ca
 
 from planar.equations import Equations, Stage
+from planar.mechanism import Mechanism, motions
 from planar.native.listing import Listing, NotPrinted, Turned, needed, without_turning
 from planar.native.text import Text
 from planar.pairs import Kind
 from planar.plane import GROUND, Frame, Vector, frame_at
-from planar.program import length
+from planar.program import length, placed
 
 ORDER = 5
 """Steps before from which the next is predicted."""
@@ -39,12 +40,15 @@ class Layout(NamedTuple):
     lanes: int
 
 
-def march(equations: Equations, turning: Sequence[bool], links: Sequence[str], rates: bool, lanes: int) -> Layout:
-    """The function for points on these links; `turning` says which inputs are angles. Raises NotPrinted."""
+def march(equations: Equations, mechanism: Mechanism, links: Sequence[str], rates: bool, lanes: int) -> Layout:
+    """The function for points on these links, none of which is the frame. Raises NotPrinted.
+
+    Of the mechanism only the structure matters: links, pairs, and which motions are driven.
+    """
     carried: frozenset[int] = frozenset()
     while True:
         try:
-            return _March(equations, turning, links, rates, lanes, carried).written()
+            return _March(equations, mechanism, links, rates, lanes, carried).written()
         except Outside as angle:
             carried |= {angle.index}
 
@@ -70,7 +74,7 @@ class _March:
     def __init__(
         self,
         e: Equations,
-        turning: Sequence[bool],
+        mechanism: Mechanism,
         links: Sequence[str],
         rates: bool,
         lanes: int,
@@ -78,7 +82,9 @@ class _March:
     ):
         if any(length(s.rows) != length(s.unknowns) or s.free for s in e.stages):
             raise NotPrinted("constraints hold each other more than once")
-        self.e, self.turning, self.links, self.rates = e, tuple(turning), tuple(links), rates
+        named = motions(mechanism)
+        self.turning = tuple(named[given.pair].drive_kind is Kind.ANGLE for given in mechanism.inputs)
+        self.e, self.mechanism, self.links, self.rates = e, mechanism, tuple(links), rates
         self.text = Text(lanes)
         self.angle = [e.coordinates[column].kind is Kind.ANGLE for column in e.unknowns]
         inputs = e.u.numel()
@@ -117,7 +123,7 @@ class _March:
             place = frames[link].carry(Vector(s.q[2 * k], s.q[2 * k + 1]))
             found += [place.x, place.y]
         places = ca.vertcat(*found)
-        outputs = [e.F, places]
+        outputs = [_open(e, self.mechanism), places]
         if self.rates:
             first = ca.jtimes(places, y, y1)
             v1, v2 = ca.SX.sym("v1", y.numel()), ca.SX.sym("v2", y.numel())
@@ -155,7 +161,7 @@ class _March:
         """The whole function: blocks of designs, in each the steps, in each of these Newton's."""
         t = self.text
         told = self._told()
-        rows = told.numel_out(0) - self.e.F.numel()
+        rows = 2 * len(self.links) * (3 if self.rates else 1)
         names = ("p", "q", "state", "drive", "rate", "table", "counts")
         arrays = ", ".join(f"ptr noalias readonly %{name}" for name in names)
         t.line(
@@ -253,7 +259,7 @@ class _March:
 
     def _tell(self, told: ca.Function, have: dict[tuple[str, int], str], rows: int) -> None:
         """The step ends: its results are written and judged, and what it moved is remembered."""
-        t, left = self.text, self.e.F.numel()
+        t, left = self.text, told.numel_out(0) - rows
         t.label("told")
         found = self._values(told, have | self._now())
         for k, each in enumerate(found[left:]):
@@ -291,8 +297,9 @@ class _March:
     def _judged(self, left: list[str]) -> None:
         """Count the step as good while everything closes, is regular, and was moved as predicted."""
         t = self.text
+        # sums, since what is not a number stays so in them
         worst, far = (
-            t.folded("maxnum", [t.call("fabs", each) for each in of])
+            t.summed([t.constant(0.0), *(t.call("fabs", each) for each in of)])
             for of in (left, [t.load(each) for each in self.moved])
         )
         # what is not a number is not below anything
@@ -354,6 +361,30 @@ def _rates(e: Equations, u1: ca.SX, u2: ca.SX) -> tuple[ca.SX, ca.SX]:
             else:
                 z2[stage.unknowns] = step
     return z1, z2
+
+
+def _open(e: Equations, mechanism: Mechanism) -> ca.SX:
+    """What every constraint leaves open, by the pairs' own formulas: nothing of the elimination is believed.
+
+    Of an angle that closes modulo a turn |sin| + 1 - cos, which needs no arc.
+    """
+    column = {(c.owner, c.part): k for k, c in enumerate(e.coordinates)}
+    shapes = {link.name: None for link in mechanism.links}
+    frames, own = placed(ca.vertsplit(e.w), column, shapes, {pair.name: pair for pair in mechanism.pairs})
+    found, first = [], 0
+    numbers: dict[str, list[ca.SX]] = {}
+    for pair in mechanism.pairs:
+        numbers[pair.name] = [e.p[first + k] for k in range(len(pair.measures))]
+        first += len(pair.measures)
+        left = pair.residual([frames[link] for link in pair.bodies], numbers[pair.name], own[pair.name])
+        found += list(zip(pair.constrains, left, strict=True))
+    named = motions(mechanism)
+    for k, given in enumerate(mechanism.inputs):
+        pair = named[given.pair]
+        drive = pair.drive([frames[link] for link in pair.bodies], numbers.get(pair.name, []), own.get(pair.name, ()))
+        found.append((pair.drive_kind, drive - e.u[k]))
+    closed = [ca.fabs(ca.sin(left)) + 1.0 - ca.cos(left) if kind is Kind.ANGLE else left for kind, left in found]
+    return ca.vertcat(*closed)
 
 
 def _frames(e: Equations, links: Sequence[str]) -> dict[str, Frame]:

@@ -63,13 +63,6 @@ class Text:
         self.line(f"%{counter}more = icmp slt i64 %{counter}next, %{last}")
         self.line(f"br i1 %{counter}more, label %{again}, label %{after}")
 
-    def folded(self, what: str, of: Sequence[str]) -> str:
-        """A call of two values over many; nothing of none."""
-        found = of[0] if of else self.constant(0.0)
-        for each in of[1:]:
-            found = self.call(what, found, each)
-        return found
-
     def summed(self, of: Sequence[str]) -> str:
         """The sum of values."""
         found = of[0]

@@ -1,0 +1,142 @@
+"""planar on a swept linkage: `planar.sweep` by each of its backends, and `planar.cycle` design by design."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+import planar
+from benchmarks.entry import Array, Entry
+from benchmarks.swept import Swept
+from planar.dimensions import changed, dimensions
+from planar.mechanism import Mechanism
+from planar.motion import Motion
+from planar.solving.follow import run
+from planar.solving.position import Solver
+
+BACKENDS = {"native": 10**9, "casadi": 1000}
+"""The backends of `planar.sweep`, and to how many designs each is put."""
+CYCLED = 3
+"""So many designs are enough to time `planar.cycle` design by design."""
+
+
+def system(backend: str) -> str:
+    """The name of a row."""
+    return f"planar.sweep, {backend}"
+
+
+def sweeps(swept: Swept, d: Array, steps: int) -> list[Entry]:
+    """Designs d (dimensions, designs) over a turn, positions alone and with rates; refused ones are NaN."""
+    mechanism = planar.from_dict(swept.document())
+    found = [
+        _swept(mechanism, swept, d[:, : BACKENDS[backend]], steps, backend, rates)
+        for backend in backends(mechanism, swept)
+        for rates in (False, True)
+    ]
+    return [*found, _cycled(mechanism, swept, d[:, :CYCLED], steps)]
+
+
+def backends(mechanism: Mechanism, swept: Swept) -> list[str]:
+    """The backends that are there: none before `planar.sweep` is, `native` only beside its compiler."""
+    there = []
+    for backend in BACKENDS if hasattr(planar, "sweep") else ():
+        try:
+            planar.sweep(
+                mechanism, _named(swept, swept.base()[:, None]), steps=4, points=[swept.point], backend=backend
+            )
+        except (ImportError, planar.BadInput):
+            continue
+        there.append(backend)
+    return there
+
+
+def turns(swept: Swept, steps: int) -> list[Entry]:
+    """The file's own design over a turn: a run through the gate, and `planar.cycle`, which has rates and limits too."""
+    mechanism = planar.from_dict(swept.document())
+    solver = Solver(mechanism)
+    z, p = solver.assembly().z, solver.station.p
+    start = mechanism.inputs[0].position
+    u = (start + 2.0 * np.pi * np.linspace(0.0, 1.0, steps + 1))[:, None]
+    link = next(each.name for each in mechanism.links if swept.point in each.names and each.name != mechanism.frame)
+    columns = [solver.column[link, part] for part in ("x", "y", "angle")]
+    at = solver.shapes[link].at(swept.point)
+
+    def read(found: Array) -> Array:
+        x, y, angle = solver.program.positions(found.T, u.T, p).full()[columns]
+        c, s = np.cos(angle), np.sin(angle)
+        return np.stack([x * solver.unit + c * at.x - s * at.y, y * solver.unit + s * at.x + c * at.y])[..., None]
+
+    one, all_steps = np.arange(1), np.arange(steps + 1)
+    return [
+        Entry("planar, a run through the gate", False, one, all_steps, lambda: run(solver, p, z, u).z, read),
+        Entry(
+            "planar.cycle, from the sketch",
+            True,
+            one,
+            all_steps,
+            lambda: [planar.cycle(mechanism, steps)],
+            lambda found: _read(found, swept.point, steps),
+        ),
+    ]
+
+
+def _swept(mechanism: Mechanism, swept: Swept, d: Array, steps: int, backend: str, rates: bool) -> Entry:
+    named, points = _named(swept, d), [swept.point]
+
+    def read(found: Any) -> Array:
+        orders = (found.position, found.velocity, found.acceleration)[: 3 if rates else 1]
+        told = np.concatenate([np.moveaxis(np.array(order[swept.point]), (0, 1, 2), (2, 1, 0)) for order in orders])
+        told[:, np.asarray(found.status).T != 0] = np.nan
+        return told
+
+    return Entry(
+        system(backend),
+        rates,
+        np.arange(d.shape[1]),
+        np.arange(steps + 1),
+        lambda: planar.sweep(mechanism, named, steps=steps, points=points, rates=rates, backend=backend),
+        read,
+    )
+
+
+def _cycled(mechanism: Mechanism, swept: Swept, d: Array, steps: int) -> Entry:
+    remade = []
+    for values in d.T:
+        each = mechanism
+        for dimension, value in zip(swept.dimensions, values, strict=True):
+            held = next(one for one in _all(each) if one.name == dimension.name)
+            each = changed(each, held, float(value))
+        remade.append(each)
+    return Entry(
+        "planar.cycle, design by design",
+        True,
+        np.arange(d.shape[1]),
+        np.arange(steps + 1),
+        lambda: [planar.cycle(each, steps, *_turn(each)) for each in remade],
+        lambda found: _read(found, swept.point, steps),
+    )
+
+
+def _turn(mechanism: Mechanism) -> tuple[float, float]:
+    start = mechanism.inputs[0].position
+    return start, start + 2.0 * np.pi
+
+
+def _all(mechanism: Mechanism) -> list:
+    return list(dimensions(mechanism, frozenset(link.name for link in mechanism.links)))
+
+
+def _named(swept: Swept, d: Array) -> dict[str, Array]:
+    return {dimension.name: values for dimension, values in zip(swept.dimensions, d, strict=True)}
+
+
+def _read(found: list[Motion], point: str, steps: int) -> Array:
+    told = np.full((6, steps + 1, len(found)), np.nan)
+    for design, motion in enumerate(found):
+        moved = motion.point(point)
+        # a motion that ends before has its dead point after the last step that is on the grid
+        known = steps + 1 if motion.outcome.value == "solved" else len(moved.position) - 1
+        for order, values in enumerate((moved.position, moved.velocity, moved.acceleration)):
+            told[2 * order : 2 * order + 2, :known, design] = values[:known].T
+    return told

@@ -1,0 +1,70 @@
+"""README's table and plots, written between their markers from one run's measurements."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from benchmarks import plots
+from benchmarks.contests import Result
+from benchmarks.curves import Curve
+from benchmarks.tables import time
+
+START, END = "<!-- benchmarks -->", "<!-- /benchmarks -->"
+PICTURES = {"designs": ".pictures/time-designs.png", "links": ".pictures/time-links.png"}
+
+
+def write(
+    root: Path, versions: str, results: Iterable[Result], designs: Sequence[Curve], links: Sequence[Curve]
+) -> None:
+    """README.md and its two plots. Raises ValueError where README has no markers."""
+    readme = root / "README.md"
+    text = readme.read_text(encoding="utf-8")
+    if text.count(START) != 1 or text.count(END) != 1 or text.index(END) < text.index(START):
+        raise ValueError(f"README.md has no {START} before an {END}")
+    for what, title, along, curves in (
+        ("designs", "Four-bars, 200 steps round, positions", "designs in one call", designs),
+        ("links", "One row of four-bars, 360 steps round, positions", "links", links),
+    ):
+        path = root / PICTURES[what]
+        path.parent.mkdir(exist_ok=True)
+        plots.save(path, title, along, curves)
+    before, after = text.split(START)[0], text.split(END)[1]
+    readme.write_text(f"{before}{START}\n{section(versions, results)}\n{END}{after}", encoding="utf-8")
+
+
+def section(versions: str, results: Iterable[Result]) -> str:
+    """What stands between the markers, as Markdown."""
+    lines = [
+        f"{versions}.",
+        "",
+        "| | system | a position | with velocities and accelerations | times C | greatest error | refused (wrongly) |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    by_contest: dict[str, dict[str, dict[bool, Result]]] = {}
+    for each in results:
+        by_contest.setdefault(each.contest, {}).setdefault(each.system, {})[each.rates] = each
+    for contest, systems in by_contest.items():
+        for index, (system, found) in enumerate(sorted(systems.items(), key=lambda item: _key(item[1]))):
+            lines.append(f"| {contest if not index else ''} | {system} | {_row(found)} |")
+    lines += [
+        "",
+        f"![Time a position against the number of designs]({PICTURES['designs']})",
+        "",
+        f"![Time a position against the number of links]({PICTURES['links']})",
+    ]
+    return "\n".join(lines)
+
+
+def _key(found: dict[bool, Result]) -> float:
+    return min(each.seconds for each in found.values())
+
+
+def _row(found: dict[bool, Result]) -> str:
+    both = [found.get(rates) for rates in (False, True)]
+    there = [each for each in both if each is not None]
+    times = " | ".join("" if each is None else time(each.seconds) for each in both)
+    ratios = " / ".join("-" if each is None else f"{each.ratio:.3g}" for each in both)
+    error = max(each.error for each in there)
+    most = max(there, key=lambda each: each.designs)
+    return f"{times} | {ratios} | {error:.0e} | {most.refused} of {most.designs} ({max(e.wrong for e in there)})"

@@ -1,0 +1,138 @@
+"""What the benchmark measures against: C by hand, closed forms, and other solvers where they are installed."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import planar
+from benchmarks import by_planar, peers, readme
+from benchmarks.contests import Contest, Result
+from benchmarks.curves import Curve
+from benchmarks.limit import LANES, compiled
+from benchmarks.swept import SWEPT, SweptFourBar, angles
+from benchmarks.swept.row import Row
+
+NAMES = [swept.name for swept in SWEPT]
+WITHIN = {"python_solvespace": 1e-7}
+"""A solver's own tolerance (m), where it is not told another."""
+
+
+@pytest.fixture(scope="module")
+def limit():
+    found = compiled()
+    if found is None:
+        pytest.skip("no C compiler")
+    return found
+
+
+def far(found, exact):
+    """The greatest error of each order as a part of its greatest value."""
+    off = np.abs(np.asarray(found, dtype=float) - exact).reshape(-1, 2, *exact.shape[1:]).max(axis=(1, 2, 3))
+    return off / np.abs(exact).reshape(-1, 2, *exact.shape[1:]).max(axis=(1, 2, 3))
+
+
+@pytest.mark.parametrize("swept", SWEPT, ids=NAMES)
+def test_c_by_hand_is_the_closed_form(limit, swept):
+    d, theta = swept.designs(2 * LANES), angles(200)
+    for entry in Contest("", swept, d, 200)._limits(theta):
+        exact = swept.motion(d, theta)[: 6 if entry.rates else 2]
+        assert far(entry.read(entry.solve()), exact).max() < 1e-12
+
+
+def test_c_by_hand_over_the_steps_of_one_design(limit):
+    for swept in (SWEPT[0], SWEPT[-1]):
+        for entry in Contest("", swept, None, 360)._alone(angles(360)):
+            exact = swept.motion(swept.base()[:, None], angles(360))[: 6 if entry.rates else 2]
+            assert far(entry.read(entry.solve()), exact).max() < 1e-12
+    row = Row(10)
+    exact = row.motion(np.empty((0, 1)), angles(360))
+    assert far(limit.row(row.cells, angles(360))()[:, :, None], exact).max() < 1e-12
+
+
+@pytest.mark.parametrize("swept", SWEPT, ids=NAMES)
+def test_closed_forms_are_what_planar_finds(swept):
+    moved = planar.cycle(planar.from_dict(swept.document()), 60).point(swept.point)
+    found = np.concatenate([moved.position.T, moved.velocity.T, moved.acceleration.T])[..., None]
+    assert far(found, swept.motion(swept.base()[:, None], angles(60))).max() < 1e-12
+
+
+def test_designs_that_cannot_turn_are_refused_from_the_same_step_on():
+    swept = SweptFourBar()
+    d = swept.mixed(200)
+    a, b, c, g = d
+    turns = (g + a < b + c) & (np.abs(g - a) > np.abs(b - c))
+    stuck = np.flatnonzero(~turns)[:2]
+    assert np.array_equal(turns, ~np.isnan(swept.motion(d, angles(2000))[0]).any(axis=0))
+    contest = Contest("", swept, np.ascontiguousarray(d[:, [*stuck, *np.flatnonzero(turns)[:1]]]), 50)
+    entry = by_planar.sweeps(swept, contest.d, 50)[-1]
+    result = contest._result(entry, 1.0, 1.0)
+    assert (result.designs, result.refused, result.wrong) == (3, 2, 0)
+    assert result.error < 1e-12
+
+
+def test_a_sweep_is_read_as_its_contract_has_it(monkeypatch):
+    swept, asked = SweptFourBar(), {}
+    d, exact = swept.designs(7), swept.motion(swept.designs(7), angles(20))
+
+    def sweep(mechanism, named, *, steps, points, rates, backend):
+        asked.update(named)
+        orders = [{points[0]: np.moveaxis(exact[k : k + 2], (0, 2), (2, 0))} for k in (0, 2, 4)]
+        status = np.zeros((7, steps + 1), dtype=int)
+        status[3, 5:] = 2
+        return SimpleNamespace(position=orders[0], velocity=orders[1], acceleration=orders[2], status=status)
+
+    monkeypatch.setattr(planar, "sweep", sweep, raising=False)
+    monkeypatch.setattr(by_planar, "backends", lambda mechanism, swept: ["native"])
+    for entry in by_planar.sweeps(swept, d, 20)[:2]:
+        found = entry.read(entry.solve())
+        assert np.isnan(found[:, 5:, 3]).all()
+        whole = np.delete(found, 3, axis=2), np.delete(exact[: len(found)], 3, axis=2)
+        assert np.array_equal(*whole)
+    assert np.array_equal(asked["BC.length"], d[1])
+
+
+@pytest.mark.skipif(not hasattr(planar, "sweep"), reason="planar.sweep is not there")
+@pytest.mark.parametrize("swept", SWEPT, ids=NAMES)
+def test_sweeps_find_the_closed_form(swept):
+    d = swept.designs(5)
+    for entry in by_planar.sweeps(swept, d, 40):
+        exact = swept.motion(d, angles(40))[: 6 if entry.rates else 2, :, entry.designs]
+        assert far(entry.read(entry.solve()), exact).max() < 1e-9
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("name", peers.installed())
+def test_peers_find_what_planar_finds(name):
+    module = import_module(f"benchmarks.peers.{peers.PACKAGES[name]}")
+    for swept in SWEPT:
+        base, theta = swept.base()[:, None], angles(90)
+        if name == "pylinkage":
+            entries = module.entries(swept, base, theta, many=False)
+        else:
+            entries = module.entries(swept, theta) if swept.only_turning else []
+        for entry in entries:
+            exact = swept.motion(base, theta)[: 6 if entry.rates else 2, entry.steps]
+            assert far(entry.read(entry.solve()), exact).max() < WITHIN.get(name, 1e-9), (name, swept.name)
+
+
+def test_readme_gets_its_table_and_plots_between_its_markers(tmp_path):
+    results = [
+        Result("four-bar", "C by hand", False, 1e-9, 1.0, 1e-16, 10, 1, 0),
+        Result("four-bar", "planar.sweep, native", False, 5e-9, 5.0, 2e-16, 10, 1, 0),
+        Result("four-bar", "planar.sweep, native", True, 1.1e-8, 2.5, 3e-15, 10, 1, 0),
+    ]
+    curves = [Curve("C by hand", (1, 10), (1e-8, 1e-9), 1e-16), Curve("planar", (1, 10), (1e-6, 1e-7), 1e-16)]
+    path = tmp_path / "README.md"
+    path.write_text("nothing", encoding="utf-8")
+    with pytest.raises(ValueError, match="README"):
+        readme.write(tmp_path, "planar", results, curves, curves)
+    path.write_text(f"before\n{readme.START}\nold\n{readme.END}\nafter\n", encoding="utf-8")
+    readme.write(tmp_path, "planar", results, curves, curves)
+    text = path.read_text(encoding="utf-8")
+    assert text.startswith("before\n") and text.endswith("\nafter\n") and "old" not in text
+    assert "|  | planar.sweep, native | 5 ns | 11 ns | 5 / 2.5 | 3e-15 | 1 of 10 (0) |" in text
+    assert all((tmp_path / picture).stat().st_size > 5000 for picture in readme.PICTURES.values())
