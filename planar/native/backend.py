@@ -18,6 +18,8 @@ LANES = 16
 """Designs at once: two vectors of the widest machines, so that one waits while the other works."""
 CORRECTIONS, FIRST = 1, 6
 """Steps of Newton's method where the run has come far enough to be predicted, and before."""
+COARSE = (0.04, 0.12)
+"""rad or sizes: where the inputs go farther in a step, what is predicted takes one more of Newton's, and another."""
 AHEAD = ((), (1,), (2, -1), (3, -3, 1), (4, -6, 4, -1), (5, -10, 10, -5, 1))
 """Weights of the last steps in the next one: the polynomial through them, continued."""
 KINDS = ("int", "int", *("array",) * 7, "float", "array", "array")
@@ -46,8 +48,7 @@ def run(
     """The places of points on links over a run of designs, and how many of its first steps every design did well.
 
     p (numbers, designs): numbers of the pairs; q (2 points, designs): the points' coordinates in their links;
-    z (unknowns, designs): where the run starts, closed; start (inputs, designs), u1, u2 alike: inputs there and their
-    rates; gone (steps, inputs): how far the inputs are from there at every step, the first of which is none. Lengths in sizes.
+    z (unknowns, designs): where the run starts, closed; start, u1, u2 (inputs, designs): inputs there and their rates; gone (steps, inputs): how far the inputs are from there at every step, the first of which is none. Lengths in sizes.
 
     Returns (steps, rows, designs): x and y of every point, then with `rates` all first rates, then all second ones; and
     (designs,). Raises NotPrinted where the structure is not for this backend.
@@ -87,6 +88,8 @@ def _table(gone: Array) -> tuple[Array, Array]:
     for step in range(steps):
         known = min(max(step - 1, 0), ORDER)
         table[step, :known] = AHEAD[known]
+    longest = float(np.max(np.abs(np.diff(gone, axis=0)), initial=0.0))
+    counts[:] = CORRECTIONS + sum(longest > each for each in COARSE)
     counts[: ORDER + 2] = FIRST
     for k in range(inputs):
         table[:, ORDER + 3 * k : ORDER + 3 * k + 3] = np.stack(

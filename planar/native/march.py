@@ -310,9 +310,9 @@ class _March:
         t.store(t.binary("add", t.load(self.good), t.load(self.fine)), self.good)
 
 
-WEAK = 1e-4
+WEAK = 1e-3
 """A stage whose slope is less regular than this is left to the general path."""
-ASTRAY = 1e-3
+ASTRAY = 3e-3
 """rad or sizes by which Newton may correct what was predicted."""
 
 
