@@ -154,6 +154,8 @@ def test_turning_and_shifting_the_whole_turns_and_shifts_every_result(seed, link
     """The frame's points moved rigidly (with an input that counts from the frame's axis turned along)."""
     built = random_linkage(seed, links, 0.0, higher)
     mechanism, state = assembled(built, 0.01)
+    # what the sketch leaves open is taken as it is found first, which rounding can change
+    assume(not any("leaves open" in remark for remark in state.remarks))
     turn, shift = 1.1, np.array([3.0, -2.0])
     rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
 

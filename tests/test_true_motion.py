@@ -242,7 +242,8 @@ def test_a_circuit_comes_back_to_its_start_or_says_why_not(seed, links):
         motion = planar.cycle(mechanism, 12, pair=pair, circuit=True)
     except NoAnswer as problem:
         assert problem.outcome is Outcome.BRANCH_LOST
-        assert "name where the range starts" in problem.reason or "cannot be told" in problem.reason
+        told = ("name where the range starts", "cannot be told", "slide out without an end")
+        assert any(each in problem.reason for each in told)
         return
     assert motion.outcome is Outcome.SOLVED
     assert passes_gate(mechanism, motion)
