@@ -48,7 +48,8 @@ def run(
     """The places of points on links over a run of designs, and how many of its first steps every design did well.
 
     p (numbers, designs): numbers of the pairs; q (2 points, designs): the points' coordinates in their links;
-    z (unknowns, designs): where the run starts, closed; start, u1, u2 (inputs, designs): inputs there and their rates; gone (steps, inputs): how far the inputs are from there at every step, the first of which is none. Lengths in sizes.
+    z (unknowns, designs): where the run starts, closed; start, u1, u2 (inputs, designs): inputs there and their
+    rates; gone (steps, inputs): how far the inputs are from there at every step, the first none. Lengths in sizes.
 
     Returns (steps, rows, designs): x and y of every point, then with `rates` all first rates, then all second ones; and
     (designs,). Raises NotPrinted where the structure is not for this backend.
