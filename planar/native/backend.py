@@ -18,11 +18,13 @@ LANES = 16
 """Designs at once: two vectors of the widest machines, so that one waits while the other works."""
 CORRECTIONS, FIRST = 1, 6
 """Steps of Newton's method where the run has come far enough to be predicted, and before."""
+ASTRAY, MOST = 3e-3, 0.05
+"""rad or sizes by which Newton's method may correct what was predicted for steps of the first of these, and at most."""
 COARSE = (0.04, 0.12)
 """rad or sizes: where the inputs go farther in a step, what is predicted takes one more of Newton's, and another."""
 AHEAD = ((), (1,), (2, -1), (3, -3, 1), (4, -6, 4, -1), (5, -10, 10, -5, 1))
 """Weights of the last steps in the next one: the polynomial through them, continued."""
-KINDS = ("int", "int", *("array",) * 7, "float", "array", "array")
+KINDS = ("int", "int", *("array",) * 7, "float", "float", "array", "array")
 
 
 @lru_cache(maxsize=64)
@@ -69,6 +71,8 @@ def run(
     parts = {"c": np.cos, "s": np.sin, "z": lambda angle: angle}
     out, good = np.empty((steps, plan.out, padded)), np.empty(padded)
     table, counts = _table(gone)
+    longest = float(np.max(np.abs(np.diff(gone, axis=0)), initial=0.0))
+    astray = min(ASTRAY * max(1.0, longest / COARSE[0]) ** 2, MOST)
     arrays = (
         full(p),
         full(q),
@@ -78,7 +82,9 @@ def run(
         table,
         counts,
     )
-    function(blocks, steps, *(each.ctypes.data for each in arrays), tolerance, out.ctypes.data, good.ctypes.data)
+    function(
+        blocks, steps, *(each.ctypes.data for each in arrays), tolerance, astray, out.ctypes.data, good.ctypes.data
+    )
     return out[:, :, :designs], good[:designs].astype(int)
 
 

@@ -165,7 +165,7 @@ class _March:
         names = ("p", "q", "state", "drive", "rate", "table", "counts")
         arrays = ", ".join(f"ptr noalias readonly %{name}" for name in names)
         t.line(
-            f"define void @march(i64 %blocks, i64 %steps, {arrays}, double %tolerance, "
+            f"define void @march(i64 %blocks, i64 %steps, {arrays}, double %tolerance, double %astray, "
             "ptr noalias %out, ptr noalias %good) {"
         )
         t.label("entry")
@@ -305,15 +305,13 @@ class _March:
         # what is not a number is not below anything
         closes = t.compared("ole", worst, t.spread("%tolerance"))
         regular = t.compared("oge", t.load(self.strong), t.constant(WEAK**2))
-        near = t.either(t.compared("ole", far, t.constant(ASTRAY)), t.spread_flag("%k", ORDER))
+        near = t.either(t.compared("ole", far, t.spread("%astray")), t.spread_flag("%k", ORDER))
         t.store(t.where(t.both(t.both(closes, regular), near), t.load(self.fine)), self.fine)
         t.store(t.binary("add", t.load(self.good), t.load(self.fine)), self.good)
 
 
-WEAK = 1e-3
+WEAK = 1e-2
 """A stage whose slope is less regular than this is left to the general path."""
-ASTRAY = 3e-3
-"""rad or sizes by which Newton may correct what was predicted."""
 
 
 def _turned(t: Text, c: str, s: str, cos: str, sin: str) -> tuple[str, str]:

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from planar.native.backend import run
 from planar.native.listing import NotPrinted
+from planar.sweeping import by_program
 from planar.sweeping.marching import March, Marched, NotMarched
 
 
 def march(task: March) -> Marched:
-    """See `Marched`. Raises NotMarched where the structure is not for vectors."""
+    """See `Marched`. Designs that the machine code leaves off run once more by casadi, which corrects as often as need.
+
+    Raises NotMarched where the structure is not for vectors.
+    """
     try:
         out, good = run(
             task.program,
@@ -26,4 +32,8 @@ def march(task: March) -> Marched:
         )
     except NotPrinted as why:
         raise NotMarched(str(why)) from None
+    left = np.flatnonzero(good < len(task.u))
+    if left.size:
+        again = by_program.march(task.of(left))
+        out[:, :, left], good[left] = again.out, again.good
     return Marched(out, good)
