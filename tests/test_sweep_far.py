@@ -1,6 +1,7 @@
 """Sweeps whose blocks are solved elsewhere: threads, processes, a Dask cluster; workers that are killed."""
 
 import os
+import re
 import signal
 from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
@@ -31,9 +32,10 @@ def agree(found, wanted):
         np.testing.assert_allclose(getattr(found, order)["C"][:], getattr(wanted, order)["C"], rtol=0, atol=1e-11)
     np.testing.assert_array_equal(found.status[:], wanted.status)
     np.testing.assert_array_equal(found.input, wanted.input)
-    assert found.said == wanted.said
     # how many positions are left to the general path hangs on which designs run side by side
     assert (found.general > 0) is (wanted.general > 0)
+    mine, here = ([re.sub(r"\d+ positions", "positions", each) for each in of.said] for of in (found, wanted))
+    assert mine == here
 
 
 def two_processes():
