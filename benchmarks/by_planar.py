@@ -15,7 +15,7 @@ from planar.motion import Motion
 from planar.solving.follow import run
 from planar.solving.position import Solver
 
-BACKENDS = {"native": 10**9, "casadi": 1000}
+BACKENDS = {"native": 10**9, "casadi": 200}
 """The backends of `planar.sweep`, and to how many designs each is put."""
 CYCLED = 3
 """So many designs are enough to time `planar.cycle` design by design."""

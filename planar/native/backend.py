@@ -46,12 +46,15 @@ def run(
     links: Sequence[str],
     rates: bool,
     tolerance: float,
+    more: int = 0,
 ) -> tuple[Array, Array]:
     """The places of points on links over a run of designs, and how many of its first steps every design did well.
 
     p (numbers, designs): numbers of the pairs; q (2 points, designs): the points' coordinates in their links;
     z (unknowns, designs): where the run starts, closed; start, u1, u2 (inputs, designs): inputs there and their
     rates; gone (steps, inputs): how far the inputs are from there at every step, the first none. Lengths in sizes.
+
+    `more` are further corrections at every step, for designs that are less well predicted.
 
     Returns (steps, rows, designs): x and y of every point, then with `rates` all first rates, then all second ones; and
     (designs,). Raises NotPrinted where the structure is not for this backend.
@@ -71,6 +74,7 @@ def run(
     parts = {"c": np.cos, "s": np.sin, "z": lambda angle: angle}
     out, good = np.empty((steps, plan.out, padded)), np.empty(padded)
     table, counts = _table(gone)
+    counts += more
     longest = float(np.max(np.abs(np.diff(gone, axis=0)), initial=0.0))
     astray = min(ASTRAY * max(1.0, longest / COARSE[0]) ** 2, MOST)
     arrays = (
