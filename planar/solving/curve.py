@@ -20,8 +20,8 @@ SMALLEST = 1e-6
 """A column of the slope is judged by its own size, down to this part of the size of the mechanism."""
 
 
-class Followed(Protocol):
-    """What following needs of a solver."""
+class Traced(Protocol):
+    """What a curve needs of a solver."""
 
     program: Program
 
@@ -59,7 +59,7 @@ class Curve:
     points; its null vector is the tangent. E. Allgower, K. Georg, Introduction to Numerical Continuation Methods, 2003.
     """
 
-    def __init__(self, solver: Followed, p: Array, start: Array, way: Array):
+    def __init__(self, solver: Traced, p: Array, start: Array, way: Array):
         self.solver, self.program, self.p, self.start, self.way = solver, solver.program, p, start, way
 
     def inputs(self, y: Array) -> Array:

@@ -13,7 +13,7 @@ from planar.errors import Ending, NoAnswer
 from planar.program import Program, length
 from planar.roots import root
 from planar.solving.branch import Branch, cancelling
-from planar.solving.curve import Arc, Curve, Point
+from planar.solving.curve import Arc, Curve, Point, Traced
 from planar.solving.walk import Missed, Passed, Walk
 
 Array = np.ndarray
@@ -29,17 +29,8 @@ STRAIGHT = 1e-12
 """rad or sizes: inputs that are no further from a straight way are on it."""
 
 
-class Followed(Protocol):
-    """What following needs of a solver."""
-
-    program: Program
-
-    def open_along(self, z: Array, u: Array) -> Array:
-        """What the worst constraint leaves open at every sample; z (samples, unknowns), u (samples, inputs)."""
-
-    @property
-    def tolerance(self) -> float:
-        """What the gate lets pass."""
+class Followed(Traced, Protocol):
+    """What following needs of a solver beyond that."""
 
     def ends(self, u: Array, tangent: Array, ending: Ending) -> NoAnswer:
         """What to say of a motion that ends at inputs u, towards which it went along a tangent."""
