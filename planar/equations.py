@@ -122,15 +122,15 @@ def _staged(mechanism: Mechanism, whole: Equations) -> Equations:
     for coordinate, level in zip(whole.coordinates, known_from, strict=True):
         if coordinate.of_link:
             level_of_link[coordinate.owner] = max(level, level_of_link.get(coordinate.owner, -1))
+    placed_at: dict[int, dict[str, None]] = {}
+    for c, known in zip(whole.coordinates, known_from, strict=True):
+        if c.of_link:
+            placed_at.setdefault(known, {})[c.owner] = None
+    joined_at: dict[int, list[str]] = {}
+    for pair in mechanism.pairs:
+        joined_at.setdefault(max(level_of_link.get(link, -1) for link in pair.bodies), []).append(pair.name)
     for level, group in enumerate(groups):
-        placed = {
-            c.owner: None
-            for c, known in zip(whole.coordinates, known_from, strict=True)
-            if c.of_link and known == level
-        }
-        joined = [
-            pair.name for pair in mechanism.pairs if max(level_of_link.get(link, -1) for link in pair.bodies) == level
-        ]
+        placed, joined = placed_at.get(level, {}), joined_at.get(level, [])
         stages.append(
             Stage(
                 slice(first_unknown, first_unknown + len(group.columns)),
@@ -163,11 +163,14 @@ def _moved(whole: Equations) -> list[set[int]]:
     touched = _touched(whole.F, whole.z)
     if not any(touched):
         return touched
-    slope = ca.Function("slope", [whole.z, whole.u, whole.p], [ca.densify(ca.jacobian(whole.F, whole.z))])
+    slope = ca.Function("slope", [whole.z, whole.u, whole.p], [ca.jacobian(whole.F, whole.z)])
     rng = np.random.default_rng(0)
     sizes = [symbol.numel() for symbol in (whole.z, whole.u, whole.p)]
-    seen = sum(np.abs(slope(*(rng.uniform(0.5, 2.0, size) for size in sizes)).full()) for _ in range(2))
-    return [{column for column in held if seen[row, column] > 1e-12} for row, held in enumerate(touched)]
+    found = [slope(*(rng.uniform(0.5, 2.0, size) for size in sizes)) for _ in range(2)]
+    seen = sum(np.abs(np.array(each.nonzeros())) for each in found)
+    rows, columns = found[0].sparsity().get_triplet()
+    alive = {(row, column) for row, column, value in zip(rows, columns, seen, strict=True) if value > 1e-12}
+    return [{column for column in held if (row, column) in alive} for row, held in enumerate(touched)]
 
 
 def _touched(expressions: ca.SX, z: ca.SX) -> list[set[int]]:
