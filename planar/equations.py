@@ -4,7 +4,7 @@ Symbol table, used in every room above this one (lengths divided by the mechanis
 
 ====  ==========================================================================  ============
 z     unknown coordinates that remain after elimination                           (unknowns,)
-u     positions of the inputs, in the order of the mechanism's inputs             (inputs,)
+u     x, y, angle of every given link, then positions of the inputs, in order     (inputs,)
 p     numbers that the pairs take from the shapes of their links                  (numbers,)
 w     x, y, angle of every moving link, then every pair's own coordinates         (coordinates,)
 F     what the remaining constraints leave open, group after group                (rows,)
@@ -13,7 +13,7 @@ F     what the remaining constraints leave open, group after group              
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -24,7 +24,7 @@ from planar.elimination import Solved, Symbols, eliminate, expressed, lines_of, 
 from planar.groups import decompose
 from planar.mechanism import Mechanism, motions
 from planar.pairs import Kind, Pair
-from planar.plane import GROUND, Frame
+from planar.plane import GROUND, Frame, frame_at
 
 
 class Coordinate(NamedTuple):
@@ -69,6 +69,8 @@ class Equations:
     p: ca.SX
     w: ca.SX
     F: ca.SX
+    drives: tuple[Kind, ...]
+    """What every entry of u is."""
 
 
 class _Unknown(NamedTuple):
@@ -80,12 +82,20 @@ class _Unknown(NamedTuple):
     own: dict[str, list[ca.SX]]
 
 
-def build(mechanism: Mechanism) -> Equations:
-    """The equations of a mechanism; only its structure matters, its numbers are `p` and `u`."""
-    unknown = _coordinates(mechanism)
+def build(mechanism: Mechanism, given: Sequence[str] = ()) -> Equations:
+    """The equations of a mechanism; only its structure matters, its numbers are `p` and `u`.
+
+    The links that are `given` are no unknowns: where they are is told by u, ahead of the inputs' positions.
+    """
+    named = motions(mechanism)
+    drives = (
+        *(Kind.LENGTH, Kind.LENGTH, Kind.ANGLE) * len(given),
+        *(named[g.pair].drive_kind for g in mechanism.inputs),
+    )
+    u = ca.SX.sym("u", len(drives))
+    unknown = _coordinates(mechanism, {link: u[3 * k : 3 * k + 3] for k, link in enumerate(given)})
     p, numbers = _numbers(mechanism)
-    u = ca.SX.sym("u", len(mechanism.inputs))
-    closures, rows = _closures(mechanism, unknown, numbers, u)
+    closures, rows = _closures(mechanism, unknown, numbers, u[3 * len(given) :])
     lines = lines_of(closures, unknown.symbols)
 
     solved: Solved = []
@@ -100,7 +110,8 @@ def build(mechanism: Mechanism) -> Equations:
     wanted = [stack(open_ones), stack(unknown.symbols.values)]
     F, w = expressed(dict(zip(columns, ca.vertsplit(z), strict=True)), solved, unknown.symbols, wanted)
     kept = tuple(rows[row] for row in left)
-    return _staged(mechanism, Equations(tuple(unknown.coordinates), tuple(columns), kept, (), (), z, u, p, w, F))
+    whole = Equations(tuple(unknown.coordinates), tuple(columns), kept, (), (), z, u, p, w, F, drives)
+    return _staged(mechanism, whole)
 
 
 def _wrapped(left: ca.SX, kind: Kind) -> ca.SX:
@@ -181,7 +192,7 @@ def _touched(expressions: ca.SX, z: ca.SX) -> list[set[int]]:
     return held
 
 
-def _coordinates(mechanism: Mechanism) -> _Unknown:
+def _coordinates(mechanism: Mechanism, given: Mapping[str, ca.SX]) -> _Unknown:
     coordinates: list[Coordinate] = []
     values: list[ca.SX] = []
     turned: dict[int, tuple[ca.SX, ca.SX]] = {}
@@ -195,6 +206,9 @@ def _coordinates(mechanism: Mechanism) -> _Unknown:
     for link in mechanism.links:
         if link.name == mechanism.frame:
             frames[link.name] = GROUND
+            continue
+        if link.name in given:
+            frames[link.name] = frame_at(*ca.vertsplit(given[link.name]))
             continue
         x, y = (add(link.name, part, Kind.LENGTH, True) for part in ("x", "y"))
         angle = add(link.name, "angle", Kind.ANGLE, True)
