@@ -227,12 +227,12 @@ def test_what_a_backend_does_not_let_pass_is_solved_all_the_same_and_counted(mon
     mechanism, designs = four_bar(*ROCKER, 0.8), {"BC.length": np.linspace(0.85, 0.95, 6)}
     wanted = planar.sweep(mechanism, designs, 30, "E", rates=rates)
 
-    def march(task):
-        out, good = by_program.march(task)
+    def march(task, out):
+        good = by_program.march(task, out)
         out[7:, :, 1] = np.nan
         out[:, :, 2] = np.nan
         good[1], good[2] = 7, 0
-        return marching.Marched(out, good)
+        return good
 
     backend(monkeypatch, march)
     found = planar.sweep(mechanism, designs, 30, "E", rates=rates)
@@ -245,7 +245,7 @@ def test_what_a_backend_does_not_let_pass_is_solved_all_the_same_and_counted(mon
 
 
 def test_a_structure_that_a_backend_cannot_do_is_done_by_the_next(monkeypatch):
-    def march(task):
+    def march(task, out):
         raise marching.NotMarched("not this one")
 
     backend(monkeypatch, march)

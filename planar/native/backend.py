@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from planar.mechanism import Mechanism
 from planar.native.compiled import compiled
-from planar.native.march import ORDER, Layout, march
+from planar.native.kernel import Structure
+from planar.native.listing import NotPrinted
+from planar.native.march import KINDS, NAME, ORDER, Layout, march
 from planar.program import Program, structure
 
 Array = np.ndarray
@@ -22,74 +25,179 @@ ASTRAY, MOST = 3e-3, 0.05
 """rad or sizes by which Newton's method may correct what was predicted for steps of the first of these, and at most."""
 COARSE = (0.04, 0.12)
 """rad or sizes: where the inputs go farther in a step, what is predicted takes one more of Newton's, and another."""
+COARSEST = 0.5
+"""rad or sizes: farther apart positions do not show whether a group comes to a dead point between them."""
 AHEAD = ((), (1,), (2, -1), (3, -3, 1), (4, -6, 4, -1), (5, -10, 10, -5, 1))
 """Weights of the last steps in the next one: the polynomial through them, continued."""
-KINDS = ("int", "int", *("array",) * 7, "float", "float", "array", "array")
 
 
-@lru_cache(maxsize=64)
-def layout(program: Program, of: Mechanism, links: tuple[str, ...], rates: bool) -> Layout:
-    """The function for points on links of a structure. Raises NotPrinted."""
-    return march(program.equations, of, links, rates, LANES)
+@lru_cache(maxsize=256)
+def printed(program: Program, of: Mechanism) -> Structure:
+    """A structure ready to be printed. Raises NotPrinted."""
+    return Structure(program.equations, of)
+
+
+@lru_cache(maxsize=256)
+def layout(
+    program: Program, of: Mechanism, links: tuple[str, ...], rates: bool, levels: tuple[int, ...] | None = None
+) -> Layout:
+    """The function for points on links of a structure, see `march`. Raises NotPrinted."""
+    return march(printed(program, of), links, rates, LANES, levels)
+
+
+class Designs(NamedTuple):
+    """What differs from design to design, lengths in sizes, each (rows, designs): p, the numbers of the pairs; q, the
+    points' coordinates in their links; z, the unknowns where the run starts, closed; start, u1, u2, the inputs there
+    and their rates."""
+
+    p: Array
+    q: Array
+    z: Array
+    start: Array
+    u1: Array
+    u2: Array
 
 
 def run(
     program: Program,
-    p: Array,
-    q: Array,
-    z: Array,
-    start: Array,
-    gone: Array,
-    u1: Array,
-    u2: Array,
     mechanism: Mechanism,
+    designs: Designs,
+    gone: Array,
     links: Sequence[str],
     rates: bool,
     tolerance: float,
     more: int = 0,
+    scale: float = 1.0,
+    out: Array | None = None,
 ) -> tuple[Array, Array]:
     """The places of points on links over a run of designs, and how many of its first steps every design did well.
 
-    p (numbers, designs): numbers of the pairs; q (2 points, designs): the points' coordinates in their links;
-    z (unknowns, designs): where the run starts, closed; start, u1, u2 (inputs, designs): inputs there and their
-    rates; gone (steps, inputs): how far the inputs are from there at every step, the first none. Lengths in sizes.
+    gone (steps, inputs): how far the inputs are from where they start at every step, the first none. `more` are further
+    corrections at every step, for designs that are less well predicted. What is told is times `scale`.
 
-    `more` are further corrections at every step, for designs that are less well predicted.
-
-    Returns (steps, rows, designs): x and y of every point, then with `rates` all first rates, then all second ones; and
-    (designs,). Raises NotPrinted where the structure is not for this backend.
+    Returns (steps, rows, designs), in `out` if that is given: x and y of every point, then with `rates` all first and
+    all second rates; and (designs,). Raises NotPrinted where the structure is not for this backend.
     """
+    longest = float(np.max(np.abs(np.diff(gone, axis=0)), initial=0.0))
+    if longest > COARSEST or len(gone) == 2:
+        raise NotPrinted("steps so long do not show what lies between them")
     plan = layout(program, structure(mechanism), tuple(links), rates)
-    function = compiled(plan.text, "march", *KINDS)
-    designs, steps = z.shape[1], len(gone)
-    blocks = -(-designs // plan.lanes)
-    padded = blocks * plan.lanes
-
-    def full(rows: Sequence[Array]) -> Array:
-        found = np.zeros((max(len(rows), 1), padded))
-        for row, values in zip(found, rows, strict=False):
-            row[:designs], row[designs:] = values, values[-1]
-        return found
-
-    parts = {"c": np.cos, "s": np.sin, "z": lambda angle: angle}
-    out, good = np.empty((steps, plan.out, padded)), np.empty(padded)
     table, counts = _table(gone)
     counts += more
-    longest = float(np.max(np.abs(np.diff(gone, axis=0)), initial=0.0))
     astray = min(ASTRAY * max(1.0, longest / COARSE[0]) ** 2, MOST)
-    arrays = (
-        full(p),
-        full(q),
-        full([parts[part](z[k]) for part, k in plan.state]),
-        full([parts[part](start[k]) for part, k in plan.drives]),
-        full([*u1, *u2] if rates else []),
-        table,
-        counts,
+    return _called(plan, designs, rates, table, counts, (tolerance, astray, scale), out)
+
+
+class Ends(NamedTuple):
+    """Where designs are that were closed from near by: which are, and how regular the least regular is of the groups
+    that Newton's method closed (the volume that the columns of its slope span), both (designs,); the unknowns
+    (unknowns, designs); the points that were asked for, and the same in the other assembly of their group, infinite
+    where that is
+    not known (points, 2, designs)."""
+
+    closed: Array
+    regular: Array
+    z: Array
+    points: Array
+    others: Array
+
+
+def ended(
+    program: Program,
+    mechanism: Mechanism,
+    designs: Designs,
+    links: Sequence[str],
+    levels: Sequence[int],
+    tolerance: float,
+    corrections: int,
+) -> Ends:
+    """Designs closed from unknowns near by, at the inputs where they start; points on `links` that these groups place.
+
+    Raises NotPrinted.
+    """
+    plan = layout(program, structure(mechanism), tuple(links), False, tuple(levels))
+    gone = np.zeros((1, len(designs.start)))
+    table, counts = _table(gone)
+    counts[:] = corrections
+    out, good = _called(plan, designs, False, table, counts, (tolerance, np.inf, 1.0), None)
+    rows, places = out[0], 2 * len(links)
+    state = dict(zip(plan.state, rows[2 * places :], strict=False))
+    z = np.empty_like(designs.z)
+    for k in range(len(z)):
+        z[k] = state["z", k] if ("z", k) in state else np.arctan2(state["zs", k], state["zc", k])
+    both = rows[: 2 * places].reshape(2, len(links), 2, rows.shape[1])
+    return Ends(good > 0, np.sqrt(np.maximum(rows[-1], 0.0)), z, *both)
+
+
+def _called(
+    plan: Layout,
+    designs: Designs,
+    rates: bool,
+    table: Array,
+    counts: Array,
+    numbers: tuple[float, float, float],
+    out: Array | None,
+) -> tuple[Array, Array]:
+    function = compiled(plan.text, NAME, *KINDS)
+    many, steps, lanes = designs.p.shape[1], len(table), plan.lanes
+    rows = (
+        designs.p,
+        designs.q,
+        _stated(plan.state, designs.z),
+        _stated(plan.drives, designs.start),
+        np.concatenate([designs.u1, designs.u2]) if rates else np.zeros((0, many)),
     )
+    if out is None:
+        out = np.empty((steps, plan.out, many))
+    good = np.empty(-(-many // lanes) * lanes)
+    whole = many // lanes * lanes
+    if whole:
+        _call(function, plan, rows, whole, (table, counts), numbers, out, good)
+    if whole < many:
+        # those that do not fill the lanes, with copies of the last beside them
+        which = np.minimum(np.arange(whole, whole + lanes), many - 1)
+        last = np.empty((steps, plan.out, lanes))
+        _call(function, plan, [row[:, which] for row in rows], lanes, (table, counts), numbers, last, good[whole:])
+        out[:, :, whole:] = last[:, :, : many - whole]
+    return out, good[:many].astype(int)
+
+
+def _call(
+    function: Any,
+    plan: Layout,
+    rows: Sequence[Array],
+    many: int,
+    tables: tuple[Array, Array],
+    numbers: tuple[float, float, float],
+    out: Array,
+    good: Array,
+) -> None:
+    arrays = [np.ascontiguousarray(row) for row in (*rows, *tables)]
+    width = rows[0].shape[1]
+    strides = (out.strides[1] // out.itemsize, out.strides[0] // out.itemsize)
     function(
-        blocks, steps, *(each.ctypes.data for each in arrays), tolerance, astray, out.ctypes.data, good.ctypes.data
+        many // plan.lanes,
+        len(tables[0]),
+        width,
+        *strides,
+        *(each.ctypes.data for each in arrays),
+        *numbers,
+        out.ctypes.data,
+        good.ctypes.data,
     )
-    return out[:, :, :designs], good[:designs].astype(int)
+
+
+def _stated(leaves: Sequence[tuple[str, int]], values: Array) -> Array:
+    """Cosines, sines and values of rows, as leaves say."""
+    found = np.empty((len(leaves), values.shape[1]))
+    for row, (part, k) in zip(found, leaves, strict=True):
+        if part.endswith("c"):
+            np.cos(values[k], out=row)
+        elif part.endswith("s"):
+            np.sin(values[k], out=row)
+        else:
+            row[:] = values[k]
+    return found
 
 
 def _table(gone: Array) -> tuple[Array, Array]:

@@ -93,8 +93,8 @@ class Listing:
             return of[1]
         if (what == "mul" and 0.0 in known) or (what == "div" and known[0] == 0.0):
             return self.const(0.0)
-        if what == "sub" and known[0] == 0.0:
-            return self.add("neg", of[1])
+        if what == "sub" and (of[0] == of[1] or known[0] == 0.0):
+            return self.const(0.0) if of[0] == of[1] else self.add("neg", of[1])
         inside = self.values[of[0]] if what == "neg" else None
         return inside.of[0] if inside is not None and inside.what == "neg" else None
 

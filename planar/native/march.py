@@ -1,184 +1,135 @@
-"""The run of many designs, lane by lane, as one function of LLVM IR: predicted, corrected by Newton, judged, told.
+"""The run of many designs, lane by lane, as one function of LLVM IR: predicted, solved, judged, told.
 
-The angles' cos and sin are the state; Newton's step d turns them by the rational rotation of Cayley, by 2 atan(d / 2),
-so that no sine stands in the loop. The next step is predicted by the polynomial through the steps before.
+What Newton's method solves is predicted by the polynomial through the steps before.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import inf
 from typing import NamedTuple
 
 import casadi as ca
 
-from planar.equations import Equations, Stage
-from planar.mechanism import Mechanism, motions
-from planar.native.listing import Listing, NotPrinted, Turned, needed, without_turning
-from planar.native.text import Text
-from planar.pairs import Kind
-from planar.plane import GROUND, Frame, Vector, frame_at
-from planar.program import length, placed
+from planar.native.kernel import WEAK, Have, Kernel, Leaf, Outside, Part, Structure
+from planar.plane import Vector
 
 ORDER = 5
 """Steps before from which the next is predicted."""
+NAME = "march"
+KINDS = (*("int",) * 5, *("array",) * 7, *("float",) * 3, "array", "array")
+"""Of the function's arguments: blocks, steps, width of the arrays that are read, how far a row and a step of `out` are
+from the next; p, q, state, drives, rates, table, counts; tolerance, astray, scale; out, good."""
 
 
 class Layout(NamedTuple):
     """What the function takes and gives, row by row, each with an entry for every design.
 
-    state: ("c" or "s" of an angle, "z" of a length; index), drives: the same of the inputs; p and q: numbers of pairs,
-    and coordinates of the points that are told; rates: of the inputs, first and second. out: rows that a step gives.
+    state: cos and sin of an angle, or a length, and what else is carried of it; drives: the same of the inputs; out:
+    rows that a step gives; table: numbers that a step takes.
     """
 
-    state: tuple[tuple[str, int], ...]
-    drives: tuple[tuple[str, int], ...]
-    p: int
-    q: int
-    rates: int
+    state: tuple[Leaf, ...]
+    drives: tuple[Leaf, ...]
     out: int
+    table: int
     text: str
     lanes: int
 
 
-def march(equations: Equations, mechanism: Mechanism, links: Sequence[str], rates: bool, lanes: int) -> Layout:
+def march(
+    structure: Structure, links: Sequence[str], rates: bool, lanes: int, levels: tuple[int, ...] | None = None
+) -> Layout:
     """The function for points on these links, none of which is the frame. Raises NotPrinted.
 
-    Of the mechanism only the structure matters: links, pairs, and which motions are driven.
+    A step gives x and y of every point, then with `rates` all first and all second rates. With `levels`, of the group
+    that places each point, it gives more: x and y of every point in the other assembly of its group (infinite where
+    that is
+    not in closed form), the state, and how regular the least regular of the groups is that Newton's method solves.
     """
-    carried: frozenset[int] = frozenset()
+    carried: frozenset[Leaf] = frozenset()
     while True:
         try:
-            return _March(equations, mechanism, links, rates, lanes, carried).written()
+            return _March(structure, tuple(links), rates, lanes, levels, carried).written()
         except Outside as angle:
-            carried |= {angle.index}
+            carried |= {angle.leaf}
 
 
-class Outside(Exception):
-    """An angle stands outside cos and sin, so that its value has to be carried beside them."""
-
-    def __init__(self, index: int):
-        super().__init__()
-        self.index = index
-
-
-class _Symbols(NamedTuple):
-    z: ca.SX
-    u: ca.SX
-    p: ca.SX
-    q: ca.SX
-    u1: ca.SX
-    u2: ca.SX
-
-
-class _March:
+class _March(Kernel):
     def __init__(
         self,
-        e: Equations,
-        mechanism: Mechanism,
-        links: Sequence[str],
+        of: Structure,
+        links: tuple[str, ...],
         rates: bool,
         lanes: int,
-        carried: frozenset[int],
+        levels: tuple[int, ...] | None,
+        carried: frozenset[Leaf],
     ):
-        if any(length(s.rows) != length(s.unknowns) or s.free for s in e.stages):
-            raise NotPrinted("constraints hold each other more than once")
-        named = motions(mechanism)
-        self.turning = tuple(named[given.pair].drive_kind is Kind.ANGLE for given in mechanism.inputs)
-        self.e, self.mechanism, self.links, self.rates = e, mechanism, tuple(links), rates
-        self.text = Text(lanes)
-        self.angle = [e.coordinates[column].kind is Kind.ANGLE for column in e.unknowns]
-        inputs = e.u.numel()
-        self.s = _Symbols(
-            e.z, e.u, e.p, ca.SX.sym("q", 2 * len(links)), ca.SX.sym("u1", inputs), ca.SX.sym("u2", inputs)
-        )
-        self.state = tuple(
-            (part, k)
-            for k, is_angle in enumerate(self.angle)
-            for part in (("c", "s", "z") if k in carried else ("c", "s") if is_angle else ("z",))
-        )
+        super().__init__(of, lanes, len(links), frozenset({"p", "q", "u1", "u2"}), carried)
+        self.links, self.rates, self.levels = links, rates, levels
+        self.others: dict[int, list[str]] = {}
+        self.state = tuple(leaf for k, turns in enumerate(of.angle) for leaf in self._leaves("z", k, turns))
         self.drives = tuple(
-            (part, k) for k, is_angle in enumerate(self.turning) for part in (("c", "s", "z") if is_angle else ("z",))
+            leaf for k, turns in enumerate(of.turning) for leaf in (("uc", k), ("us", k), ("u", k))[0 if turns else 2 :]
         )
+        self.inputs = len(of.turning)
+        self.newtons = [k for part in of.parts if part.form is None for k in part.unknowns]
 
-    # what is computed, as casadi expressions
+    def _leaves(self, name: str, k: int, turns: bool) -> list[Leaf]:
+        if not turns:
+            return [(name, k)]
+        return [(name + "c", k), (name + "s", k), *([(name, k)] if self.carries((name, k)) else [])]
 
-    def _function(self, outputs: list[ca.SX]) -> ca.Function:
-        return ca.Function("part", list(self.s), [ca.densify(ca.vertcat(*outputs))], {"cse": True})
+    def _places(self, points: Sequence[int]) -> ca.SX:
+        q = self.symbols["q"]
+        places = [self.of.frame(self.links[k]).carry(Vector(q[2 * k], q[2 * k + 1])) for k in points]
+        return ca.vertcat(ca.SX(0, 1), *(part for place in places for part in place))
 
-    def _step(self, stage: Stage) -> ca.Function:
-        """Newton's step of a stage, and the square of how regular its slope is."""
-        e = self.e
-        slope = ca.densify(ca.jacobian(e.F[stage.rows], e.z[stage.unknowns]))
-        step, strength = _solved(slope, e.F[stage.rows])
-        return self._function([step, strength])
-
-    def _told(self) -> ca.Function:
-        """What is left open by the constraints, then the points' positions, and rates."""
-        e, s = self.e, self.s
-        z1, z2 = _rates(e, s.u1, s.u2) if self.rates else (e.z, e.z)
-        y, y1, y2 = ca.vertcat(e.z, e.u), ca.vertcat(z1, s.u1), ca.vertcat(z2, s.u2)
-        frames = _frames(e, self.links)
-        found: list[ca.SX] = []
-        for k, link in enumerate(self.links):
-            place = frames[link].carry(Vector(s.q[2 * k], s.q[2 * k + 1]))
-            found += [place.x, place.y]
-        places = ca.vertcat(*found)
-        outputs = [_open(e, self.mechanism), places]
-        if self.rates:
-            first = ca.jtimes(places, y, y1)
-            v1, v2 = ca.SX.sym("v1", y.numel()), ca.SX.sym("v2", y.numel())
-            moving = ca.jtimes(places, y, v1)
-            second = ca.jtimes(moving, y, v1) + ca.jtimes(places, y, v2)
-            second = ca.substitute(second, ca.vertcat(v1, v2), ca.vertcat(y1, y2))
-            outputs += [first, second]
-        return self._function(outputs)
-
-    # how it is written
-
-    def _values(self, function: ca.Function, have: dict[tuple[str, int], str]) -> list[str]:
-        """The values of a function where the leaves stand under these names."""
-        listing = Listing()
-        angles: dict[int, Turned] = {}
-        kinds = zip(("z", "u", "p", "q", "u1", "u2"), self.s, strict=True)
-        arguments = []
-        for name, symbol in kinds:
-            numbers = [listing.add("input", data=(name, k)) for k in range(symbol.numel())]
-            arguments.append(numbers)
-            turned = self.angle if name == "z" else self.turning if name == "u" else ()
-            for k, is_angle in enumerate(turned):
-                if is_angle:
-                    parts = [listing.add("input", data=(name + part, k)) for part in "cs"]
-                    angles[numbers[k]] = Turned(*parts)
-        outputs = [each for output in listing.inlined(function, arguments) for each in output]
-        made, wanted = without_turning(listing, outputs, angles)
-        names = {k: have[v.data] for k, v in enumerate(made.values) if v.what == "input" and v.data in have}
-        for k in needed(made, wanted):
-            if made.values[k].what == "input" and k not in names:
-                raise Outside(made.values[k].data[1])
-        return self.text.values(made, wanted, names)
+    def _told(self) -> list[ca.SX]:
+        """The points' positions, and rates."""
+        e, s = self.of.equations, self.symbols
+        places = self._places(range(len(self.links)))
+        if not self.rates:
+            return [places]
+        z1, z2 = self.of.rates(s["u1"], s["u2"])
+        y, y1, y2 = ca.vertcat(e.z, e.u), ca.vertcat(z1, s["u1"]), ca.vertcat(z2, s["u2"])
+        first = ca.jtimes(places, y, y1)
+        v1, v2 = ca.SX.sym("v1", y.numel()), ca.SX.sym("v2", y.numel())
+        moving = ca.jtimes(places, y, v1)
+        second = ca.jtimes(moving, y, v1) + ca.jtimes(places, y, v2)
+        return [places, first, ca.substitute(second, ca.vertcat(v1, v2), ca.vertcat(y1, y2))]
 
     def written(self) -> Layout:
-        """The whole function: blocks of designs, in each the steps, in each of these Newton's."""
+        """The whole function: blocks of designs, in each the steps."""
         t = self.text
-        told = self._told()
         rows = 2 * len(self.links) * (3 if self.rates else 1)
-        names = ("p", "q", "state", "drive", "rate", "table", "counts")
-        arrays = ", ".join(f"ptr noalias readonly %{name}" for name in names)
+        rows += 0 if self.levels is None else 2 * len(self.links) + len(self.state) + 1
+        arrays = ", ".join(
+            f"ptr noalias readonly %{name}" for name in ("p", "q", "state", "drive", "rate", "table", "counts")
+        )
         t.line(
-            f"define void @march(i64 %blocks, i64 %steps, {arrays}, double %tolerance, double %astray, "
-            "ptr noalias %out, ptr noalias %good) {"
+            f"define void @{NAME}(i64 %blocks, i64 %steps, i64 %width, i64 %row, i64 %time, {arrays}, "
+            "double %tolerance, double %astray, double %scale, ptr noalias %out, ptr noalias %good) {"
         )
         t.label("entry")
-        self.designs = t.new(f"mul i64 %blocks, {t.lanes}")
-        self.slots = {each: t.slot() for each in self.state}
-        self.steps = [[t.slot() for _ in range(ORDER)] for _ in self.angle]
-        self.gone, self.moved = ([t.slot() for _ in self.angle] for _ in range(2))
+        self.slots = {leaf: t.slot() for leaf in self.state}
+        self.steps = {k: [t.slot() for _ in range(ORDER)] for k in self.newtons}
+        self.gone, self.moved = ({k: t.slot() for k in self.newtons} for _ in range(2))
+        self.bends = [[t.slot() for _ in range(2)] for _ in self.of.forms]
         self.strong, self.fine, self.good = (t.slot() for _ in range(3))
+        scale = t.spread("%scale")
         t.line("br label %block")
         have, at_start = self._block()
-        self._predicted(have, at_start)
-        self._corrected(have)
-        self._tell(told, have, rows)
+        self._step(have, at_start)
+        flags = []
+        for part in self.of.parts:
+            if part.form is None:
+                self._newton(part, have)
+            else:
+                flags += self._closed(part, have)
+        t.line("br label %told")
+        t.label("told")
+        self._tell(have, flags, scale)
         t.loop("k", "steps", "step", "blockend")
         t.label("blockend")
         t.store(t.load(self.good), t.at("%good", self.lane))
@@ -186,211 +137,175 @@ class _March:
         t.label("done")
         t.line("ret void")
         t.line("}")
-        sizes = (self.e.p.numel(), 2 * len(self.links), 2 * self.e.u.numel() if self.rates else 0, rows)
-        return Layout(self.state, self.drives, *sizes, t.module(), t.lanes)
+        return Layout(self.state, self.drives, rows, ORDER + 3 * self.inputs, t.module(), t.lanes)
 
-    def _row(self, base: str, k: int | str) -> str:
-        """Where the entries of a row for this block of designs stand."""
+    def _row(self, base: str, k: int) -> str:
+        """Where the entries of a row that is read stand for this block of designs."""
         t = self.text
-        return t.at(base, t.new(f"add i64 {t.new(f'mul i64 {self.designs}, {k}')}, {self.lane}"))
+        return t.at(base, t.new(f"add i64 {t.new(f'mul i64 %width, {k}')}, {self.lane}"))
 
-    def _block(self) -> tuple[dict[tuple[str, int], str], dict[tuple[str, int], str]]:
+    def _block(self) -> tuple[Have, Have]:
         """A block of designs begins: its numbers, and the inputs at the start."""
-        t, e = self.text, self.e
-        inputs = e.u.numel()
+        t, count = self.text, self.inputs
         t.label("block")
         t.line("%b = phi i64 [0, %entry], [%bnext, %blockend]")
         self.lane = t.new(f"mul i64 %b, {t.lanes}")
-        have = {("p", k): t.load(self._row("%p", k)) for k in range(e.p.numel())}
+        have: Have = {("p", k): t.load(self._row("%p", k)) for k in range(self.symbols["p"].numel())}
         have |= {("q", k): t.load(self._row("%q", k)) for k in range(2 * len(self.links))}
         if self.rates:
-            have |= {(f"u{1 + k // inputs}", k % inputs): t.load(self._row("%rate", k)) for k in range(2 * inputs)}
-        at_start = {each: t.load(self._row("%drive", k)) for k, each in enumerate(self.drives)}
-        for k, each in enumerate(self.state):
-            t.store(t.load(self._row("%state", k)), self.slots[each])
-        for each in [slot for of in self.steps for slot in of]:
-            t.store("zeroinitializer", each)
+            have |= {(f"u{1 + k // count}", k % count): t.load(self._row("%rate", k)) for k in range(2 * count)}
+        t.mark()
+        at_start = {leaf: t.load(self._row("%drive", k)) for k, leaf in enumerate(self.drives)}
+        state = {leaf: t.load(self._row("%state", k)) for k, leaf in enumerate(self.state)}
+        if self.of.forms:
+            sides = self.values([self.of.sides], have | at_start | state)
+            for k, side in enumerate(sides):
+                have["sign", k] = t.call("copysign", t.constant(1.0), side)
+        for leaf, value in state.items():
+            t.store(value, self.slots[leaf])
+        for slot in [slot for of in (*self.steps.values(), *self.bends) for slot in of]:
+            t.store("zeroinitializer", slot)
         t.store(t.constant(1.0), self.fine)
         t.store("zeroinitializer", self.good)
         t.line("br label %step")
         return have, at_start
 
-    def _predicted(self, have: dict[tuple[str, int], str], at_start: dict[tuple[str, int], str]) -> None:
-        """A step begins: where the inputs are, and where the unknowns would be if they went on as before."""
-        t, inputs = self.text, self.e.u.numel()
+    def _step(self, have: Have, at_start: Have) -> None:
+        """A step begins: where the inputs are."""
+        t = self.text
         t.label("step")
         t.line("%k = phi i64 [0, %block], [%knext, %told]")
-        begin = t.new(f"mul i64 %k, {ORDER + 3 * inputs}")
+        begin = t.new(f"mul i64 %k, {ORDER + 3 * self.inputs}")
 
         def tabled(k: int) -> str:
-            pointer = t.at("%table", t.new(f"add i64 {begin}, {k}"))
-            return t.spread(t.new(f"load double, ptr {pointer}"))
+            return t.spread(t.new(f"load double, ptr {t.at('%table', t.new(f'add i64 {begin}, {k}'))}"))
 
-        weights = [tabled(k) for k in range(ORDER)]
-        for k in range(inputs):
+        self.weights = [tabled(k) for k in range(ORDER)] if self.newtons else []
+        for k, turns in enumerate(self.of.turning):
             by, cos, sin = (tabled(ORDER + 3 * k + j) for j in range(3))
-            have["u", k] = t.binary("add", at_start["z", k], by)
-            if self.turning[k]:
-                have["uc", k], have["us", k] = _turned(t, at_start["c", k], at_start["s", k], cos, sin)
-        for k, before in enumerate(self.steps):
-            ahead = t.summed([t.binary("mul", w, t.load(d)) for w, d in zip(weights, before, strict=True)])
+            have["u", k] = t.binary("add", at_start["u", k], by)
+            if turns:
+                have["uc", k], have["us", k] = self.turned(at_start["uc", k], at_start["us", k], cos, sin)
+        t.store(t.constant(1.0), self.strong)
+
+    def _closed(self, part: Part, have: Have) -> list[str]:
+        """A group in closed form; flags that say where its two assemblies keep apart.
+
+        Between steps too: the bend does not reach one, by as much as it bends over the last three steps.
+        """
+        t = self.text
+        if self.levels is not None:
+            self._other(part, have)
+        bend = self.found(part, have)
+        for k in part.unknowns:
+            if self.carries(("z", k)):
+                self._carried(k, have)
+        before, earlier = (t.load(slot) for slot in self.bends[self.signs[part.stage.level]])
+        change = t.binary("sub", t.binary("add", bend, earlier), t.binary("add", before, before))
+        room = t.binary("sub", t.constant(1.0), bend)
+        for slot, value in zip(self.bends[self.signs[part.stage.level]], (bend, before), strict=True):
+            t.store(value, slot)
+        change = t.binary("mul", t.call("fabs", change), t.constant(0.5))
+        kept = t.where(t.spread_flag("%k", "sgt", 1), change)
+        return [t.compared("oge", t.binary("sub", room, kept), t.constant(WEAK**2))]
+
+    def _other(self, part: Part, have: Have) -> None:
+        """Where the group places its points in its other assembly."""
+        assert self.levels is not None
+        level, there = part.stage.level, dict(have)
+        there["sign", self.signs[level]] = self.text.new(f"fneg {self.text.vector} {have['sign', self.signs[level]]}")
+        self.found(part, there)
+        points = [k for k, each in enumerate(self.levels) if each == level]
+        places = self.values([self._places(points)], there)
+        self.others |= {k: places[2 * n : 2 * n + 2] for n, k in enumerate(points)}
+
+    def _carried(self, k: int, have: Have) -> None:
+        """Move an angle's own value on to where its new cos and sin are."""
+        t = self.text
+        c, s = (t.load(self.slots[leaf, k]) for leaf in ("zc", "zs"))
+        cos, sin = self.turned(have["zc", k], have["zs", k], c, t.new(f"fneg {t.vector} {s}"))
+        half = t.each("atan", t.binary("div", sin, t.binary("add", t.constant(1.0), cos)))
+        have["z", k] = t.binary("add", t.load(self.slots["z", k]), t.binary("add", half, half))
+        for leaf in ("zc", "zs", "z"):
+            t.store(have[leaf, k], self.slots[leaf, k])
+
+    def _newton(self, part: Part, have: Have) -> None:
+        """Newton's method for a group from where it would be if it went on as before, so often as the step says."""
+        t, level = self.text, part.stage.level
+        for k in part.unknowns:
+            terms = [t.binary("mul", w, t.load(d)) for w, d in zip(self.weights, self.steps[k], strict=True)]
+            ahead = t.summed(terms)
             self._move(k, ahead)
             t.store(ahead, self.gone[k])
             t.store("zeroinitializer", self.moved[k])
-
-    def _corrected(self, have: dict[tuple[str, int], str]) -> None:
-        """Newton's method, stage after stage, so often as the step's count says."""
-        t = self.text
-        t.line(f"%count = load i64, ptr {t.new('getelementptr i64, ptr %counts, i64 %k')}")
-        t.line("br label %newton")
-        t.label("newton")
-        t.line("%n = phi i64 [0, %step], [%nnext, %newton]")
-        t.store(t.constant(1.0), self.strong)
-        for stage in self.e.stages:
-            if length(stage.unknowns) == 0:
-                continue
-            *delta, strength = self._values(self._step(stage), have | self._now())
-            t.store(t.call("minnum", t.load(self.strong), strength), self.strong)
-            for k, each in zip(range(stage.unknowns.start, stage.unknowns.stop), delta, strict=True):
-                back = t.new(f"fneg {t.vector} {each}")
-                self._move(k, back)
-                t.store(t.binary("add", t.load(self.moved[k]), back), self.moved[k])
-        t.loop("n", "count", "newton", "told")
-
-    def _tell(self, told: ca.Function, have: dict[tuple[str, int], str], rows: int) -> None:
-        """The step ends: its results are written and judged, and what it moved is remembered."""
-        t, left = self.text, told.numel_out(0) - rows
-        t.label("told")
-        found = self._values(told, have | self._now())
-        for k, each in enumerate(found[left:]):
-            place = t.new(f"add i64 {t.new(f'mul i64 %k, {rows}')}, {k}")
-            t.store(each, self._row("%out", place))
-        self._judged(found[:left])
-        for k, before in enumerate(self.steps):
+        count = t.new(f"load i64, ptr {t.new('getelementptr i64, ptr %counts, i64 %k')}")
+        strong = t.load(self.strong)
+        t.line(f"br label %from{level}")
+        t.label(f"from{level}")
+        t.line(f"br label %newton{level}")
+        t.label(f"newton{level}")
+        t.line(f"%n{level} = phi i64 [0, %from{level}], [%n{level}next, %newton{level}]")
+        *delta, strength = self.values(self.of.step(part.stage), have | self._now(part))
+        for k, each in zip(part.unknowns, delta, strict=True):
+            back = t.new(f"fneg {t.vector} {each}")
+            self._move(k, back)
+            t.store(t.binary("add", t.load(self.moved[k]), back), self.moved[k])
+        t.store(t.call("minnum", strong, strength), self.strong)
+        t.loop(f"n{level}", count.lstrip("%"), f"newton{level}", f"solved{level}")
+        t.label(f"solved{level}")
+        have.update(self._now(part))
+        for k in part.unknowns:
+            before = self.steps[k]
             whole = t.binary("add", t.load(self.gone[k]), t.load(self.moved[k]))
             for later, earlier in zip(reversed(before[1:]), reversed(before[:-1]), strict=True):
                 t.store(t.load(earlier), later)
             t.store(whole, before[0])
 
-    def _now(self) -> dict[tuple[str, int], str]:
-        names = {"c": "zc", "s": "zs", "z": "z"}
-        return {(names[part], k): self.text.load(slot) for (part, k), slot in self.slots.items()}
+    def _now(self, part: Part) -> Have:
+        own = set(part.unknowns)
+        return {leaf: self.text.load(slot) for leaf, slot in self.slots.items() if leaf[1] in own}
 
     def _move(self, k: int, by: str) -> None:
         """Move an unknown on: a length by so much, an angle by the rational rotation."""
         t, slots = self.text, self.slots
-        if not self.angle[k]:
+        if not self.of.angle[k]:
             t.store(t.binary("add", t.load(slots["z", k]), by), slots["z", k])
             return
-        half = t.binary("mul", by, t.constant(0.5))
-        square = t.binary("mul", half, half)
-        scale = t.binary("div", t.constant(1.0), t.binary("add", t.constant(1.0), square))
-        cos = t.binary("mul", t.binary("sub", t.constant(1.0), square), scale)
-        c, s = _turned(t, t.load(slots["c", k]), t.load(slots["s", k]), cos, t.binary("mul", by, scale))
-        t.store(c, slots["c", k])
-        t.store(s, slots["s", k])
-        if ("z", k) in slots:
+        cos, sin, half = self.rotation(by)
+        c, s = self.turned(t.load(slots["zc", k]), t.load(slots["zs", k]), cos, sin)
+        t.store(c, slots["zc", k])
+        t.store(s, slots["zs", k])
+        if self.carries(("z", k)):
             # the rotation turns by 2 atan(by / 2)
             turned = t.each("atan", half)
             t.store(t.binary("add", t.load(slots["z", k]), t.binary("add", turned, turned)), slots["z", k])
 
-    def _judged(self, left: list[str]) -> None:
-        """Count the step as good while everything closes, is regular, and was moved as predicted."""
-        t = self.text
-        # sums, since what is not a number stays so in them
-        worst, far = (
-            t.summed([t.constant(0.0), *(t.call("fabs", each) for each in of)])
-            for of in (left, [t.load(each) for each in self.moved])
-        )
-        # what is not a number is not below anything
-        closes = t.compared("ole", worst, t.spread("%tolerance"))
-        regular = t.compared("oge", t.load(self.strong), t.constant(WEAK**2))
-        near = t.either(t.compared("ole", far, t.spread("%astray")), t.spread_flag("%k", ORDER))
-        t.store(t.where(t.both(t.both(closes, regular), near), t.load(self.fine)), self.fine)
+    def _tell(self, have: Have, flags: list[str], scale: str) -> None:
+        """The step ends: its results are written, and judged."""
+        t, told = self.text, self._told()
+        left, *values = self._parted([self.of.open(), *told], have)
+        many = [t.binary("mul", scale, each) for of in values for each in of]
+        if self.levels is not None:
+            nowhere = [t.constant(inf)] * 2
+            many += [part for k in range(len(self.links)) for part in self.others.get(k, nowhere)]
+            many += [*(have[leaf] for leaf in self.state), t.load(self.strong)]
+        for k, each in enumerate(many):
+            place = t.new(f"add i64 {t.new('mul i64 %k, %time')}, {t.new(f'mul i64 %row, {k}')}")
+            t.store(each, t.at("%out", t.new(f"add i64 {place}, {self.lane}")))
+        # sums, since what is not a number stays so in them, and is not below anything
+        worst = t.summed([t.constant(0.0), *(t.call("fabs", each) for each in left)])
+        flags = [*flags, t.compared("ole", worst, t.spread("%tolerance"))]
+        if self.newtons:
+            flags.append(t.compared("oge", t.load(self.strong), t.constant(WEAK**2)))
+            far = t.summed([t.call("fabs", t.load(self.moved[k])) for k in self.newtons])
+            near = t.compared("ole", far, t.spread("%astray"))
+            flags.append(t.either(near, t.spread_flag("%k", "sle", ORDER)))
+        for flag in flags[1:]:
+            flags[0] = t.both(flags[0], flag)
+        t.store(t.where(flags[0], t.load(self.fine)), self.fine)
         t.store(t.binary("add", t.load(self.good), t.load(self.fine)), self.good)
 
-
-WEAK = 1e-2
-"""A stage whose slope is less regular than this is left to the general path."""
-
-
-def _turned(t: Text, c: str, s: str, cos: str, sin: str) -> tuple[str, str]:
-    return (
-        t.binary("sub", t.binary("mul", c, cos), t.binary("mul", s, sin)),
-        t.binary("add", t.binary("mul", s, cos), t.binary("mul", c, sin)),
-    )
-
-
-def _solved(slope: ca.SX, left: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """slope^-1 left, and the square of how far its columns are from depending on each other, 1 at best."""
-    many = left.numel()
-    if many == 1:
-        return left / slope, slope * slope
-    if many == 2:
-        a, b, c, d = slope[0, 0], slope[0, 1], slope[1, 0], slope[1, 1]
-        det = a * d - b * c
-        scale = 1.0 / det
-        step = ca.vertcat((d * left[0] - b * left[1]) * scale, (a * left[1] - c * left[0]) * scale)
-        return step, det * det / ((a * a + c * c) * (b * b + d * d))
-    q, r = ca.qr(slope)
-    strength = ca.SX(1.0)
-    for k in range(many):
-        strength = ca.fmin(strength, r[k, k] ** 2 / ca.sumsqr(slope[:, k]))
-    return ca.solve(r, ca.mtimes(q.T, left)), strength
-
-
-def _rates(e: Equations, u1: ca.SX, u2: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """First and second rates of the unknowns, stage after stage."""
-    y = ca.vertcat(e.z, e.u)
-    v1, v2 = ca.SX.sym("v1", y.numel()), ca.SX.sym("v2", y.numel())
-    first = ca.jtimes(e.F, y, v1)
-    second = ca.jtimes(first, y, v1) + ca.jtimes(e.F, y, v2)
-    z1 = ca.SX.zeros(e.z.numel())
-    z2 = ca.SX.zeros(e.z.numel())
-    for order, expression in ((1, first), (2, second)):
-        for stage in e.stages:
-            if length(stage.unknowns) == 0:
-                continue
-            known = ca.substitute(expression[stage.rows], ca.vertcat(v1, v2), ca.vertcat(z1, u1, z2, u2))
-            slope = ca.densify(ca.jacobian(e.F[stage.rows], e.z[stage.unknowns]))
-            step = -_solved(slope, known)[0]
-            if order == 1:
-                z1[stage.unknowns] = step
-            else:
-                z2[stage.unknowns] = step
-    return z1, z2
-
-
-def _open(e: Equations, mechanism: Mechanism) -> ca.SX:
-    """What every constraint leaves open, by the pairs' own formulas: nothing of the elimination is believed.
-
-    Of an angle that closes modulo a turn |sin| + 1 - cos, which needs no arc.
-    """
-    column = {(c.owner, c.part): k for k, c in enumerate(e.coordinates)}
-    shapes = {link.name: None for link in mechanism.links}
-    frames, own = placed(ca.vertsplit(e.w), column, shapes, {pair.name: pair for pair in mechanism.pairs})
-    found, first = [], 0
-    numbers: dict[str, list[ca.SX]] = {}
-    for pair in mechanism.pairs:
-        numbers[pair.name] = [e.p[first + k] for k in range(len(pair.measures))]
-        first += len(pair.measures)
-        left = pair.residual([frames[link] for link in pair.bodies], numbers[pair.name], own[pair.name])
-        found += list(zip(pair.constrains, left, strict=True))
-    named = motions(mechanism)
-    for k, given in enumerate(mechanism.inputs):
-        pair = named[given.pair]
-        drive = pair.drive([frames[link] for link in pair.bodies], numbers.get(pair.name, []), own.get(pair.name, ()))
-        found.append((pair.drive_kind, drive - e.u[k]))
-    closed = [ca.fabs(ca.sin(left)) + 1.0 - ca.cos(left) if kind is Kind.ANGLE else left for kind, left in found]
-    return ca.vertcat(*closed)
-
-
-def _frames(e: Equations, links: Sequence[str]) -> dict[str, Frame]:
-    column = {(c.owner, c.part): k for k, c in enumerate(e.coordinates)}
-
-    def frame(link: str) -> Frame:
-        if (link, "x") not in column:
-            return GROUND
-        return frame_at(*(e.w[column[link, part]] for part in ("x", "y", "angle")))
-
-    return {link: frame(link) for link in dict.fromkeys(links)}
+    def _parted(self, outputs: list[ca.SX], have: Have) -> list[list[str]]:
+        """The values of several expressions, each of its own."""
+        values = iter(self.values(outputs, have))
+        return [[next(values) for _ in range(each.numel())] for each in outputs]

@@ -2,25 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 
-from planar.native.listing import Listing, NotPrinted, needed
+from planar.native.listing import Listing, NotPrinted
 
 BINARY = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
 CALLS = {"sqrt": "sqrt", "abs": "fabs"}
-LIBRARY = ("cos", "sin", "atan")
+LIBRARY = {"cos": 1, "sin": 1, "atan": 1, "atan2": 2}
+"""What is called lane by lane, and how many arguments it has."""
 
 
 class Text:
     """Instructions one after the other, with fresh names."""
 
     def __init__(self, lanes: int):
-        self.lanes, self.lines, self._count = lanes, [], 0
+        self.lanes, self._count = lanes, 0
+        self.lines: list[str | list[str]] = []
+        self._ahead: list[str | list[str]] = []
         self.vector = f"<{lanes} x double>"
 
     def line(self, text: str) -> None:
         """Add a line as it is."""
         self.lines.append(text)
+
+    def mark(self) -> None:
+        """Here, later, stands what is written `ahead`."""
+        self._ahead = []
+        self.lines.append(self._ahead)
+
+    @contextmanager
+    def ahead(self) -> Iterator[None]:
+        """What is written meanwhile stands where the last mark is."""
+        here, self.lines = self.lines, self._ahead
+        yield
+        self.lines = here
 
     def new(self, text: str) -> str:
         """Add an instruction that gives a value; the value's name."""
@@ -42,12 +58,12 @@ class Text:
         args = ", ".join(f"{self.vector} {each}" for each in of)
         return self.new(f"call contract {self.vector} @llvm.{what}.v{self.lanes}f64({args})")
 
-    def each(self, what: str, of: str) -> str:
+    def each(self, what: str, *of: str) -> str:
         """A function of the mathematics library, called lane by lane."""
         found = "poison"
         for lane in range(self.lanes):
-            one = self.new(f"extractelement {self.vector} {of}, i64 {lane}")
-            one = self.new(f"call double @{what}(double {one})")
+            ones = [self.new(f"extractelement {self.vector} {value}, i64 {lane}") for value in of]
+            one = self.new(f"call double @{what}({', '.join(f'double {each}' for each in ones)})")
             found = self.new(f"insertelement {self.vector} {found}, double {one}, i64 {lane}")
         return found
 
@@ -90,9 +106,9 @@ class Text:
         """Room for a value."""
         return self.new(f"alloca {self.vector}, align 64")
 
-    def spread_flag(self, counter: str, last: int) -> str:
-        """Whether a counter is at most so great, in every lane."""
-        flag = self.new(f"icmp sle i64 {counter}, {last}")
+    def spread_flag(self, counter: str, how: str, than: int) -> str:
+        """Whether a counter is greater ("sgt") than a number, or at most ("sle") that, in every lane."""
+        flag = self.new(f"icmp {how} i64 {counter}, {than}")
         one = self.new(f"insertelement <{self.lanes} x i1> poison, i1 {flag}, i64 0")
         return self.new(
             f"shufflevector <{self.lanes} x i1> {one}, <{self.lanes} x i1> poison, <{self.lanes} x i32> zeroinitializer"
@@ -102,9 +118,12 @@ class Text:
         """All that was written, with what it calls."""
         v, of = self.vector, f"v{self.lanes}f64"
         calls = [f"declare {v} @llvm.{name}.{of}({v})" for name in ("sqrt", "fabs")]
-        calls += [f"declare {v} @llvm.{name}.{of}({v}, {v})" for name in ("minnum", "maxnum")]
-        calls += [f"declare double @{name}(double) memory(none)" for name in LIBRARY]
-        return "\n".join([*self.lines, *calls])
+        calls += [f"declare {v} @llvm.{name}.{of}({v}, {v})" for name in ("minnum", "maxnum", "copysign")]
+        calls += [
+            f"declare double @{name}({', '.join(['double'] * many)}) memory(none)" for name, many in LIBRARY.items()
+        ]
+        lines = [each for line in self.lines for each in ([line] if isinstance(line, str) else line)]
+        return "\n".join([*lines, *calls])
 
     def at(self, base: str, index: str) -> str:
         """A pointer to the double at an index."""
@@ -117,15 +136,12 @@ class Text:
             f"shufflevector {self.vector} {one}, {self.vector} poison, <{self.lanes} x i32> zeroinitializer"
         )
 
-    def values(self, listing: Listing, wanted: Sequence[int], inputs: Mapping[int, str]) -> list[str]:
-        """The names of wanted values, given those of the inputs."""
-        names: dict[int, str] = {}
-        for each in needed(listing, wanted):
+    def put(self, listing: Listing, order: Sequence[int], names: dict[int, str], inputs: Mapping[int, str]) -> None:
+        """Write values in an order; `names` grows by theirs, those of inputs are known."""
+        for each in order:
             value = listing.values[each]
             of = [names[k] for k in value.of]
             if value.what == "input":
-                if each not in inputs:
-                    raise NotPrinted(f"an angle stands outside cos and sin: {value.data}")
                 names[each] = inputs[each]
             elif value.what == "const":
                 names[each] = self.constant(value.data)
@@ -141,7 +157,6 @@ class Text:
                 names[each] = self.call(CALLS[value.what], *of)
             else:
                 raise NotPrinted(f"there is no {value.what} on vectors")
-        return [names[each] for each in wanted]
 
 
 def _hex(value: float) -> str:

@@ -15,16 +15,16 @@ from planar.shapes import Shape
 from planar.solving.assemble import ALIKE
 from planar.solving.candidates import CLEAR, SAME, Candidates
 from planar.solving.newton import CLOSED, newton
-from planar.sweeping.base import Base
+from planar.sweeping.base import Base, of_designs
 from planar.sweeping.columns import Over
 from planar.sweeping.judging import volume
+from planar.sweeping.marching import Closing
+from planar.sweeping.nearby import REGULAR, nearby
 
 Array = np.ndarray
 
 FIRST, MORE = 8, 40
 """Newton's steps from the assemblies of the base, and from starts all over the circles."""
-REGULAR = 0.2
-"""The volume that the columns of a slope span, each of length one, from which on no other assembly is near."""
 LONGEST = 0.8
 """rad or sizes: no step of Newton's method is longer."""
 NEARLY_CLOSED = 1e-5
@@ -67,10 +67,18 @@ class _Partial(NamedTuple):
         return _Partial(self.z[:, designs], self.there[designs], self.distance[designs], lying)
 
 
-def assembled(base: Base, shapes: Mapping[str, Shape], p: Array, u: Array) -> Assembled:
+def assembled(base: Base, shapes: Mapping[str, Shape], p: Array, u: Array, close: Closing | None) -> Assembled:
     """The assemblies at inputs u (inputs, designs), of designs with numbers p (numbers, designs) and these shapes."""
     with np.errstate(all="ignore"):  # starts that lead nowhere end as what is no number
-        return _Assembling(base, shapes, p, u).found()
+        near = close and nearby(base, shapes, p, u, close)
+        if not near:
+            return _Assembling(base, shapes, p, u).found()
+        every, rest = Assembled(near.z, near.clear, np.full(len(near.clear), -1)), np.flatnonzero(~near.clear)
+        if rest.size:
+            own = {name: of_designs(shape, rest) for name, shape in shapes.items()}
+            found = _Assembling(base, own, p[:, rest], u[:, rest]).found()
+            every.z[:, rest], every.sure[rest], every.ends[rest] = found
+        return every
 
 
 class _Assembling:

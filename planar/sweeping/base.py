@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import lru_cache
 
 import numpy as np
@@ -169,8 +169,16 @@ def spread(rows, many: int) -> Array:  # noqa: ANN001 - numbers and arrays mixed
 
 def at_design(whole: Shape, index: int) -> Shape:
     """The shape of one design, out of that of all."""
+    return _shaped(whole, lambda part: float(part[index]))
 
+
+def of_designs(whole: Shape, which: Array) -> Shape:
+    """The shapes of some designs, out of those of all."""
+    return _shaped(whole, lambda part: part[which])
+
+
+def _shaped(whole: Shape, of: Callable[[Array], Scalar]) -> Shape:
     def own(value):  # noqa: ANN001, ANN202
-        return type(value)(*(float(part[index]) if isinstance(part, np.ndarray) else part for part in value))
+        return type(value)(*(of(part) if isinstance(part, np.ndarray) else part for part in value))
 
     return Shape({name: own(at) for name, at in whole.points.items()}, own(whole.origin), own(whole.axis))

@@ -14,7 +14,7 @@ from planar.sweeping.assembling import assembled
 from planar.sweeping.base import Base, base, spread
 from planar.sweeping.by_program import rows
 from planar.sweeping.designs import lifted, one
-from planar.sweeping.marching import March, Marching, NotMarched, marching
+from planar.sweeping.marching import March, Marching, NotMarched, closing, marching, room
 from planar.sweeping.one_by_one import OUTCOMES, Solved, solve_one
 from planar.sweeping.stops import stopped
 
@@ -22,6 +22,8 @@ Array = np.ndarray
 
 GENTLE = 0.03
 """rad or sizes a step on the way to where the run starts."""
+MOSTLY = 0.9
+"""Where more than this part of the designs can be run, all are."""
 TURN = 2.0 * np.pi
 
 
@@ -53,14 +55,15 @@ class Done(NamedTuple):
     said: tuple[tuple[int, int, str], ...]
 
 
-def solve_block(block: Block) -> Done:
-    """Solve a block. Raises BadInput only for what holds for all designs."""
-    return _Solving(block).done()
+def solve_block(block: Block, out: Array | None = None) -> Done:
+    """Solve a block, in `out` (steps + 1, rows, designs) if that is given. Raises BadInput only for what holds for all
+    designs."""
+    return _Solving(block, out).done()
 
 
 class _Solving:
-    def __init__(self, block: Block):
-        self.block = block
+    def __init__(self, block: Block, out: Array | None):
+        self.block, self.out = block, out
         self.base: Base = base(block.mechanism, block.pair)
         self.many = len(next(iter(block.designs.values())))
         self.scale = float(self.base.scale[self.base.index])
@@ -82,15 +85,11 @@ class _Solving:
     def done(self) -> Done:
         """See `solve_block`."""
         block = self.block
-        wide = 2 * len(block.points) * (3 if block.rates else 1)
         status = np.zeros((self.many, block.steps + 1), dtype=np.int8)
         grid = np.linspace(0.0, 1.0, block.steps + 1)
         same = np.ptp(self.length) == 0.0
         found = self._marched() if same and not self.own_range and self.base.marched else None
-        if found is None:
-            out, good = np.empty((block.steps + 1, wide, self.many)), np.zeros(self.many, dtype=int)
-        else:
-            out, good = found
+        out, good = (self._room(), np.zeros(self.many, dtype=int)) if found is None else found
         ended = (self.solved >= 0) & (good <= block.steps)
         rest = np.flatnonzero((good <= block.steps) & ~ended)
         alike = same and np.ptp(self.first) == 0.0
@@ -140,7 +139,7 @@ class _Solving:
         told = {name: base_.member(name) for name in block.points}
         moving = {name: each for name, each in told.items() if each[0] != base_.mechanism.frame}
         q = [part for link, point in moving.values() for part in shapes[link].at(point)]
-        start = assembled(base_, shapes, p, self.u)
+        start = assembled(base_, shapes, p, self.u, closing(block.backend))
         self.ends = start.ends
         fit = start.sure & ~base_.unfit(block.designs, shapes) & np.all(np.isfinite(p), axis=0)
         offsets = np.zeros((block.steps + 1, len(self.u)))
@@ -160,6 +159,7 @@ class _Solving:
             tuple(link for link, _ in moving.values()),
             block.rates,
             base_.tolerance(p),
+            base_.unit,
         )
         march, fit = self._at_start(march, fit)
         for _, run in marching(block.backend):
@@ -171,16 +171,25 @@ class _Solving:
             return self._whole(out, told, shapes), good
         return None
 
+    def _room(self) -> Array:
+        """Where the results stand."""
+        block = self.block
+        if self.out is None:
+            self.out = room(block.steps + 1, 2 * len(block.points) * (3 if block.rates else 1), self.many)
+        return self.out
+
     def _run(self, run: Marching, march: March, fit: Array) -> tuple[Array, Array]:
         """out and good of all designs, of which only the fit ones are run."""
-        if fit.all():
-            out, good = run(march)
-            return out, good.astype(int)
-        some = np.flatnonzero(fit)
-        wide = 2 * len(march.links) * (3 if march.rates else 1)
-        out, good = np.empty((len(march.u), wide, self.many)), np.zeros(self.many, dtype=int)
+        out = self._room()
+        if march.rows != out.shape[1]:
+            out = room(len(out), march.rows, self.many)
+        if fit.mean() > MOSTLY:
+            return out, np.where(fit, run(march, out), 0)
+        some, good = np.flatnonzero(fit), np.zeros(self.many, dtype=int)
         if some.size:
-            out[:, :, some], good[some] = run(march.of(some))
+            own = room(len(out), march.rows, some.size)
+            good[some] = run(march.of(some), own)
+            out[:, :, some] = own
         return out, good
 
     def _stopped(self, march: March, out: Array, good: Array) -> None:
@@ -206,14 +215,13 @@ class _Solving:
         return march._replace(z0=last.z.T), fit & last.good
 
     def _whole(self, out: Array, told: Mapping[str, tuple[str, str]], shapes) -> Array:  # noqa: ANN001
-        """The rows of all points in m and s, those on the frame filled in."""
-        if self.base.unit != 1.0:
-            out *= self.base.unit
+        """The rows of all points, those on the frame filled in."""
         frame = self.base.mechanism.frame
         if all(link != frame for link, _ in told.values()):
             return out
         orders = 3 if self.block.rates else 1
-        whole = np.zeros((len(out), 2 * len(told) * orders, self.many))
+        whole = self._room()
+        whole[:] = 0.0
         moving = [k for k, (link, _) in enumerate(told.values()) if link != frame]
         for k, (link, point) in enumerate(told.values()):
             if link == frame:

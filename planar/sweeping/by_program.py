@@ -13,7 +13,7 @@ from planar.program import Rates, shapes, size
 from planar.solving.gate import Gate
 from planar.sweeping.columns import Columns
 from planar.sweeping.judging import Branches, Closed, Here
-from planar.sweeping.marching import March, Marched, NotMarched
+from planar.sweeping.marching import March, NotMarched
 
 Array = np.ndarray
 
@@ -36,17 +36,16 @@ class Row(NamedTuple):
     here: Here
 
 
-def march(task: March) -> Marched:
-    """See `Marched`. Raises NotMarched where groups hold more constraints than unknowns."""
+def march(task: March, out: Array) -> Array:
+    """See `Marching`. Raises NotMarched where groups hold more constraints than unknowns."""
     steps, designs = len(task.u), task.p.shape[1]
-    out = np.empty((steps, 2 * len(task.links) * (3 if task.rates else 1), designs))
     good, some, first, part = np.zeros(designs, dtype=int), np.arange(designs), 0, task
     with np.errstate(all="ignore"):  # designs that have failed run on as what is no number
         while some.size and first < steps:
             first, row = _marched(part, first, some, out, good)
             # those that have failed are left behind; the others go on from the step where they are
             some, part = some[row.good], task.of(some[row.good], row.z[row.good].T)
-    return Marched(out, good)
+    return good
 
 
 def _marched(part: March, first: int, some: Array, out: Array, good: Array) -> tuple[int, Row]:
@@ -145,7 +144,7 @@ class Told:
             place = frames[link].carry(Vector(*self.task.q[2 * k : 2 * k + 2]))
             for axis, value in enumerate(place):
                 for order, part in enumerate(value.parts if isinstance(value, Jet) else (value,)):
-                    out[order * many + 2 * k + axis] = part
+                    np.multiply(part, self.task.unit, out=out[order * many + 2 * k + axis])
 
 
 def _solved(slope: Array, left: Array) -> Array:

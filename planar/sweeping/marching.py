@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib import import_module
 from importlib.util import find_spec
 from typing import NamedTuple
@@ -30,7 +30,7 @@ class March(NamedTuple):
     of their `links`, none of which is the frame; z0 (unknowns, designs): the assembly at the start; u (steps + 1,
     inputs): how far the inputs are from where each design starts, u0 (inputs, designs); u1, u2 (inputs, designs): their
     rates, the same at every step. `rates`: whether first and second rates are wanted. `tolerance`: what a constraint
-    may leave open. `mechanism` has the pairs and inputs; its numbers are not those of the designs.
+    may leave open. `mechanism` has the pairs and inputs; its numbers are not those of the designs. `unit`: the size, m.
     """
 
     program: Program
@@ -45,6 +45,12 @@ class March(NamedTuple):
     links: tuple[str, ...]
     rates: bool
     tolerance: float
+    unit: float
+
+    @property
+    def rows(self) -> int:
+        """What is told at a step: x and y of each point, then their first, then second rates."""
+        return 2 * len(self.links) * (3 if self.rates else 1)
 
     def of(self, designs: Array, z0: Array | None = None) -> March:
         """The march of some of the designs, from other unknowns if they are given."""
@@ -52,15 +58,46 @@ class March(NamedTuple):
         return self._replace(**parts | ({} if z0 is None else {"z0": z0}))
 
 
-class Marched(NamedTuple):
-    """Where the points are, out (steps + 1, rows, designs): x and y of each, then their first, then second rates, in
-    units of the size; and how many of the first steps passed both parts of the gate, good (designs,)."""
-
-    out: Array
-    good: Array
+Marching = Callable[[March, Array], Array]
+"""Takes a march and room for what it tells, out (steps + 1, rows, designs), which it fills with x and y of each point,
+then their first, then second rates (m, s); gives how many of the first steps passed both parts of the gate (designs,).
+"""
 
 
-Marching = Callable[[March], Marched]
+class Closed(NamedTuple):
+    """Where designs are that a backend closed from near by: which are, and how regular the least regular is of the
+    groups that Newton's method closed (the volume that the columns of its slope span), both (designs,); the unknowns
+    (unknowns, designs); the points of the march, and the same in the other assembly of their group, infinite where
+    that is not
+    known (points, 2, designs), in sizes."""
+
+    closed: Array
+    regular: Array
+    z: Array
+    points: Array
+    others: Array
+
+
+Closing = Callable[[March, Sequence[int], int], Closed]
+"""Takes a march, of which it looks at the start only, the groups that place its points, and how many of Newton's steps
+it may take. Raises NotMarched."""
+
+
+def closing(backend: str) -> Closing | None:
+    """What closes many designs at once, if the backend that is tried first does."""
+    return getattr(import_module(BACKENDS[marching(backend)[0][0]]), "closed", None)
+
+
+def room(steps: int, rows: int, designs: int) -> Array:
+    """An array (steps, rows, designs), not filled, whose rows begin where vectors of the machine do."""
+    width = -(-designs // ALIGNED) * ALIGNED
+    made = np.empty(steps * rows * width + ALIGNED)
+    first = -(made.ctypes.data // made.itemsize) % ALIGNED
+    return made[first : first + steps * rows * width].reshape(steps, rows, width)[:, :, :designs]
+
+
+ALIGNED = 8
+"""Numbers of the widest vectors of a machine: rows that begin elsewhere are written twice as slowly."""
 
 
 def marching(backend: str) -> list[tuple[str, Marching]]:

@@ -2,36 +2,54 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from planar.native.backend import run
+from planar.native.backend import Designs, ended, run
 from planar.native.listing import NotPrinted
 from planar.sweeping import by_program
-from planar.sweeping.marching import March, Marched, NotMarched
+from planar.sweeping.marching import Closed, March, NotMarched
+
+Array = np.ndarray
 
 MORE = 2
 """Further corrections at every step for designs that the usual ones leave open."""
 
 
-def march(task: March) -> Marched:
-    """See `Marched`. What the usual corrections leave open runs once more with further ones, and then by casadi.
+def march(task: March, out: Array) -> Array:
+    """See `Marching`. What the usual corrections leave open runs once more with further ones, and then by casadi.
 
     Raises NotMarched where the structure is not for vectors.
     """
-    out, good = _run(task, 0)
-    for again in (lambda part: _run(part, MORE), by_program.march):
+    good = _run(task, out, 0)
+    for again in (lambda part, room: _run(part, room, MORE), by_program.march):
         left = np.flatnonzero(good < len(task.u))
         if left.size:
-            out[:, :, left], good[left] = again(task.of(left))
-    return Marched(out, good)
+            own = np.empty((*out.shape[:2], left.size))
+            good[left] = again(task.of(left), own)
+            out[:, :, left] = own
+    return good
 
 
-def _run(task: March, more: int) -> Marched:
-    inputs = (task.u0, task.u, task.u1, task.u2)
+def closed(task: March, levels: Sequence[int], corrections: int) -> Closed:
+    """See `Closing`."""
     try:
-        found = run(
-            task.program, task.p, task.q, task.z0, *inputs, task.mechanism, task.links, task.rates, task.tolerance, more
-        )
+        found = ended(task.program, task.mechanism, _designs(task), task.links, levels, task.tolerance, corrections)
     except NotPrinted as why:
         raise NotMarched(str(why)) from None
-    return Marched(*found)
+    return Closed(*found)
+
+
+def _run(task: March, out: Array, more: int) -> Array:
+    tolerance, unit = task.tolerance, task.unit
+    try:
+        return run(
+            task.program, task.mechanism, _designs(task), task.u, task.links, task.rates, tolerance, more, unit, out
+        )[1]
+    except NotPrinted as why:
+        raise NotMarched(str(why)) from None
+
+
+def _designs(task: March) -> Designs:
+    return Designs(task.p, task.q, task.z0, task.u0, task.u1, task.u2)

@@ -249,7 +249,7 @@ class _Stopping:
     def _told(self) -> Stopped:
         solved = np.where(self.settled, np.searchsorted(self.places, np.minimum(self.stop, 2 * self.places[-1])), 0)
         arcs = [np.concatenate(parts) for parts in zip(*self.arcs, strict=True)] if self.arcs else None
-        wide = 2 * len(self.march.links) * (3 if self.march.rates else 1)
+        wide = self.march.rows
         if arcs is None:
             none = np.zeros(0, dtype=int)
             return Stopped(self.settled, solved, none, none, np.zeros((wide, 0)))
@@ -271,7 +271,7 @@ class _Stopping:
     def _at(self, arcs: _Arcs, step: Array) -> tuple[Array, Array]:
         """The points (rows, steps) where arcs come to steps, and which of them pass the gate."""
         march = self.march
-        wide = 2 * len(march.links) * (3 if march.rates else 1)
+        wide = march.rows
         if not len(step):
             return np.zeros((wide, 0)), np.zeros(0, dtype=bool)
         place = self.places[step]

@@ -18,6 +18,7 @@ from planar.errors import BadInput, Outcome
 from planar.files import to_dict
 from planar.mechanism import Mechanism
 from planar.sweeping.block import Done
+from planar.sweeping.marching import room
 from planar.sweeping.result import Sweep
 
 Array = np.ndarray
@@ -65,6 +66,10 @@ class Sink(ABC):
         self.finished: set[int] = set()
         self.told: dict[int, tuple[int, int, Any]] = {}
         "of every block: positions and designs of the general path, and what is said"
+
+    def room(self, part: slice) -> Array | None:
+        """Where a block may put its results, if that is known ahead: out (steps + 1, rows, designs)."""
+        return None
 
     @abstractmethod
     def take(self, number: int, part: slice, done: Done) -> None:
@@ -141,22 +146,22 @@ class _Memory(Sink):
         if np.prod(self.shape, dtype=float) * 8.0 > MOST:
             told = f"results of {np.prod(self.shape, dtype=float) * 8e-9:.0f} GB are too much for memory"
             raise BadInput("store", f"{told}; name a store, as 'sweep.zarr'")
-        self.out: Array | None = None
+        self.out = room(*self.shape)
         self.status = np.zeros((plan.many, plan.steps + 1), dtype=np.int8)
         self.inputs: Array | None = None
 
+    def room(self, part: slice) -> Array:
+        return self.out[:, :, part]
+
     def take(self, number: int, part: slice, done: Done) -> None:
-        if part.stop - part.start == self.plan.many:
-            self.out, self.status, self.inputs = done.out, done.status, done.input
-        else:
-            if self.out is None:
-                self.out = np.empty(self.shape)
-            self.out[:, :, part], self.status[part] = done.out, done.status
-            self.inputs = _joined(self.inputs, done.input, part, self.plan)
+        own = self.room(part)
+        if not np.shares_memory(own, done.out, max_work=1):
+            own[:] = done.out
+        self.status[part] = done.status
+        self.inputs = _joined(self.inputs, done.input, part, self.plan)
         self.told[number] = done.general, done.sent, done.said
 
     def result(self) -> Sweep:
-        assert self.out is not None
         assert self.inputs is not None
         return self.sweep(_views(self.out, self.plan), self.status, self.inputs)
 

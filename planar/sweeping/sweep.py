@@ -91,7 +91,7 @@ def sweep(
     if progress is not None and ready:
         progress(ready, many)
     todo = {k: part for k, part in parts.items() if k not in into.finished}
-    for k, done in _solved({k: task(part) for k, part in todo.items()}, executor):
+    for k, done in _solved({k: task(part) for k, part in todo.items()}, executor, lambda k: into.room(parts[k])):
         into.take(k, parts[k], done)
         ready += parts[k].stop - parts[k].start
         if progress is not None:
@@ -127,11 +127,13 @@ def _workers(executor: Executor) -> int:
     return max(1, getattr(executor, "_max_workers", None) or os.cpu_count() or 1)
 
 
-def _solved(tasks: Mapping[int, Block], executor: Executor | None) -> Iterator[tuple[int, Done]]:
-    """The blocks as they are solved, here or by an executor; each by its number."""
+def _solved(
+    tasks: Mapping[int, Block], executor: Executor | None, room: Callable[[int], Any]
+) -> Iterator[tuple[int, Done]]:
+    """The blocks as they are solved, here, each in its room, or by an executor; each by its number."""
     if executor is None:
         for k, task in tasks.items():
-            yield k, solve_block(task)
+            yield k, solve_block(task, room(k))
         return
     waiting, tries = list(tasks)[::-1], dict.fromkeys(tasks, 0)
     running: dict[Future, int] = {}
