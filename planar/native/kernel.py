@@ -78,7 +78,7 @@ class Structure:
             return GROUND
         return frame_at(*(self.equations.w[self.column[link, part]] for part in ("x", "y", "angle")))
 
-    def open(self) -> ca.SX:
+    def gaps(self) -> ca.SX:
         """What every constraint leaves open, by the pairs' own formulas: nothing of the elimination is believed.
 
         Of an angle that closes modulo a turn |sin| + 1 - cos, which needs no arc.
@@ -228,6 +228,11 @@ class Kernel:
         turned_out, wanted = without_turning(listing, wanted, angles)
         numbers = self.collecting.again(turned_out, wanted)
         return self._written(numbers, have)
+
+    def parted(self, outputs: Sequence[ca.SX], have: Mapping[Leaf, str]) -> list[list[str]]:
+        """The same, of each expression by itself."""
+        values = iter(self.values(outputs, have))
+        return [[next(values) for _ in range(each.numel())] for each in outputs]
 
     def _written(self, wanted: Sequence[int], have: Mapping[Leaf, str]) -> list[str]:
         made, still = self.collecting.made, self.collecting.still

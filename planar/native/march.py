@@ -283,7 +283,7 @@ class _March(Kernel):
     def _tell(self, have: Have, flags: list[str], scale: str) -> None:
         """The step ends: its results are written, and judged."""
         t, told = self.text, self._told()
-        left, *values = self._parted([self.of.open(), *told], have)
+        left, *values = self.parted([self.of.gaps(), *told], have)
         many = [t.binary("mul", scale, each) for of in values for each in of]
         if self.levels is not None:
             nowhere = [t.constant(inf)] * 2
@@ -304,8 +304,3 @@ class _March(Kernel):
             flags[0] = t.both(flags[0], flag)
         t.store(t.where(flags[0], t.load(self.fine)), self.fine)
         t.store(t.binary("add", t.load(self.good), t.load(self.fine)), self.good)
-
-    def _parted(self, outputs: list[ca.SX], have: Have) -> list[list[str]]:
-        """The values of several expressions, each of its own."""
-        values = iter(self.values(outputs, have))
-        return [[next(values) for _ in range(each.numel())] for each in outputs]
