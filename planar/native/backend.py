@@ -27,8 +27,9 @@ COARSE = (0.04, 0.12)
 """rad or sizes: where the inputs go farther in a step, what is predicted takes one more of Newton's, and another."""
 COARSEST = 0.5
 """rad or sizes: farther apart positions do not show whether a group comes to a dead point between them."""
-AHEAD = ((), (1,), (2, -1), (3, -3, 1), (4, -6, 4, -1), (5, -10, 10, -5, 1))
-"""Weights of the last steps in the next one: the polynomial through them, continued."""
+AHEAD = ((1,), (1,), (2, -1), (3, -3, 1), (4, -6, 4, -1), (5, -10, 10, -5, 1), (6, -15, 20, -15, 6, -1))
+"""Weights of the last steps in the next: the polynomial through them, continued; ahead of the first there is its
+start."""
 
 
 @lru_cache(maxsize=256)
@@ -191,12 +192,10 @@ def _stated(leaves: Sequence[tuple[str, int]], values: Array) -> Array:
     """Cosines, sines and values of rows, as leaves say."""
     found = np.empty((len(leaves), values.shape[1]))
     for row, (part, k) in zip(found, leaves, strict=True):
-        if part.endswith("c"):
-            np.cos(values[k], out=row)
-        elif part.endswith("s"):
-            np.sin(values[k], out=row)
-        else:
-            row[:] = values[k]
+        of = values[k]
+        # designs mostly start at one input
+        alike = of.size and of[0] == of[-1] and np.all(of == of[0])
+        row[:] = {"c": np.cos, "s": np.sin}.get(part[1:], np.positive)(of[:1] if alike else of)
     return found
 
 
@@ -204,12 +203,12 @@ def _table(gone: Array) -> tuple[Array, Array]:
     """What every step needs to know: the weights of the steps before, and how far each input has gone."""
     steps, inputs = gone.shape
     table, counts = np.zeros((steps, ORDER + 3 * inputs)), np.full(steps, CORRECTIONS, dtype=np.int64)
-    for step in range(steps):
-        known = min(max(step - 1, 0), ORDER)
-        table[step, :known] = AHEAD[known]
+    for step in range(min(steps, ORDER)):
+        table[step, : len(AHEAD[step])] = AHEAD[step]
+    table[ORDER:, :ORDER] = AHEAD[ORDER]
     longest = float(np.max(np.abs(np.diff(gone, axis=0)), initial=0.0))
     counts[:] = CORRECTIONS + sum(longest > each for each in COARSE)
-    counts[: ORDER + 2] = FIRST
+    counts[: ORDER + 1] = FIRST
     for k in range(inputs):
         table[:, ORDER + 3 * k : ORDER + 3 * k + 3] = np.stack(
             [gone[:, k], np.cos(gone[:, k]), np.sin(gone[:, k])], axis=1

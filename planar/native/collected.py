@@ -35,7 +35,7 @@ class Collecting:
         uses = Counter(each for k in order for each in listing.values[k].of)
         for k in order:
             found = self._sum(listing.values[k])
-            if uses[k] > 1 and len(found.factors) > LONGEST:
+            if uses[k] > 1 and (len(found.factors) > LONGEST or self._fresh(found) > 1):
                 found = self._atom(self._made(found))
             self.sums[k] = found
         return [self._value(k) for k in wanted]
@@ -50,9 +50,22 @@ class Collecting:
         if value.what == "mul" and not all(part.factors for part in of):
             by, part = (of[0], of[1]) if not of[0].factors else (of[1], of[0])
             return self._times(part, self._rest(by))
-        if value.what == "div" and not of[1].factors:
-            return self._times(of[0], self._still("div", self._constant(1.0), self._rest(of[1])))
+        if value.what == "div":
+            return self._divided(value, *of)
         return self._atom(self.made.add(value.what, *(self._value(k) for k in value.of), data=value.data))
+
+    def _divided(self, value: Value, above: _Sum, below: _Sum) -> _Sum:
+        """One division for all that is divided by the same."""
+        if not below.factors:
+            return self._times(above, self._still("div", self._constant(1.0), self._rest(below)))
+        inverse = self.made.add("div", self._constant(1.0), self._value(value.of[1]))
+        if not above.factors:
+            return self._times(self._atom(inverse), self._rest(above))
+        return self._atom(self.made.add("mul", self._value(value.of[0]), inverse))
+
+    def _fresh(self, part: _Sum) -> int:
+        """How many of a sum's terms are products or the like, which stand in few other sums."""
+        return sum(self.made.values[atom].what != "input" for atom in part.factors)
 
     def _atom(self, number: int) -> _Sum:
         return _Sum({number: self._constant(1.0)}, None) if number not in self.still else _Sum({}, number)
@@ -85,6 +98,8 @@ class Collecting:
     def _times(self, part: _Sum, by: int) -> _Sum:
         if self.made.number(by) == 0.0:
             return _Sum({}, None)
+        if self._fresh(part) > 1:
+            part = self._atom(self._made(part))
         factors = {atom: self._still("mul", factor, by) for atom, factor in part.factors.items()}
         return _Sum(factors, None if part.rest is None else self._still("mul", part.rest, by))
 

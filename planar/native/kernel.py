@@ -1,8 +1,9 @@
 """What every function of LLVM IR that solves positions is made of: a mechanism's equations, printed group by group.
 
 The angles' cos and sin are carried, never the angles. A group in closed form is written as that; any other is solved by
-Newton's method, whose step d turns an angle by the rational rotation of Cayley, by 2 atan(d / 2), so that no sine
-stands in the loop.
+Newton's method, whose step turns an angle by the first terms of its cos and sin; what is not quite of length one then
+is
+brought to it. So no sine stands in the loop, and few divisions.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ from planar.plane import GROUND, Frame, frame_at
 from planar.program import length, placed
 
 WEAK = 1e-2
-"""A group whose slope is less regular than this is left to the general path."""
+"""A group whose slope is less regular than this (of more than two unknowns, than its power of 1.5: it is a volume) is
+left to the general path."""
 
 Leaf = tuple[str, int]
 """A number that the expressions take: which kind of it, and its index.
@@ -118,7 +120,8 @@ class Structure:
         return z1, z2
 
     def step(self, stage: Stage) -> list[ca.SX]:
-        """Newton's step of a group, and the square of how regular its slope is, 1 at best."""
+        """Newton's step of a group, the square of the volume that its slope's columns span, and that of their
+        lengths."""
         return list(solved(self._slope(stage), self.equations.F[stage.rows]))
 
     def _slope(self, stage: Stage) -> ca.SX:
@@ -126,20 +129,20 @@ class Structure:
         return ca.densify(ca.jacobian(e.F[stage.rows], e.z[stage.unknowns]))
 
 
-def solved(slope: ca.SX, left: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """slope^-1 left, and the square of the volume that its columns span, each of length one.
+def solved(slope: ca.SX, left: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """slope^-1 left, the square of the volume that its columns span, and the product of the squares of their lengths.
 
     Up to four unknowns by determinants, which leave nothing where the slope has nothing; of more by QR.
     """
     many = left.numel()
     if many == 1:
-        return left / slope, slope * slope
+        return left / slope, slope * slope, ca.SX(1.0)
     if many > MOST_BY_DETERMINANTS:
         q, r = ca.qr(slope)
         strength = ca.SX(1.0)
         for k in range(many):
             strength = ca.fmin(strength, r[k, k] ** 2 / ca.sumsqr(slope[:, k]))
-        return ca.solve(r, ca.mtimes(q.T, left)), strength
+        return ca.solve(r, ca.mtimes(q.T, left)), strength, ca.SX(1.0)
     both = ca.horzcat(slope, left)
     minors = _minors(both)
     whole = minors[tuple(range(many))]
@@ -154,7 +157,7 @@ def solved(slope: ca.SX, left: ca.SX) -> tuple[ca.SX, ca.SX]:
     lengths = ca.SX(1.0)
     for k in range(many):
         lengths = lengths * ca.sumsqr(slope[:, k])
-    return ca.vertcat(*step), whole * whole / lengths
+    return ca.vertcat(*step), whole * whole, lengths
 
 
 MOST_BY_DETERMINANTS = 4
@@ -271,11 +274,30 @@ class Kernel:
             t.binary("add", t.binary("mul", sin, c), t.binary("mul", cos, s)),
         )
 
-    def rotation(self, by: str) -> tuple[str, str, str]:
-        """The rational rotation by about so much: its cos and sin, and half of `by`."""
+    def turned_by(self, c: str, s: str, by: str) -> tuple[str, str]:
+        """The cos and sin of an angle turned by a little."""
         t = self.text
-        half = t.binary("mul", by, t.constant(0.5))
-        square = t.binary("mul", half, half)
-        scale = t.binary("div", t.constant(1.0), t.binary("add", t.constant(1.0), square))
-        cos = t.binary("mul", t.binary("sub", t.constant(1.0), square), scale)
-        return cos, t.binary("mul", by, scale), half
+        square = t.binary("mul", by, by)
+        cos = t.binary("sub", t.constant(1.0), t.binary("mul", square, t.constant(0.5)))
+        sin = t.binary("mul", by, t.binary("sub", t.constant(1.0), t.binary("mul", square, t.constant(1.0 / 6.0))))
+        return self.unit(*self.turned(c, s, cos, sin))
+
+    def unit(self, c: str, s: str) -> tuple[str, str]:
+        """What is nearly of length one, nearer to it: the inverse root by its first terms."""
+        t = self.text
+        square = t.binary("add", t.binary("mul", c, c), t.binary("mul", s, s))
+        scale = t.binary("sub", t.constant(1.5), t.binary("mul", square, t.constant(0.5)))
+        return t.binary("mul", c, scale), t.binary("mul", s, scale)
+
+    def off_circle(self, have: Have) -> list[str]:
+        """How far the square of every unknown angle's cos and sin is from one."""
+        t = self.text
+        return [
+            t.binary(
+                "sub",
+                t.summed([t.binary("mul", have[part, k], have[part, k]) for part in ("zc", "zs")]),
+                t.constant(1.0),
+            )
+            for k, turns in enumerate(self.of.angle)
+            if turns
+        ]

@@ -14,8 +14,8 @@ import casadi as ca
 from planar.native.kernel import WEAK, Have, Kernel, Leaf, Outside, Part, Structure
 from planar.plane import Vector
 
-ORDER = 5
-"""Steps before from which the next is predicted."""
+ORDER, RING = 6, 8
+"""Steps before from which the next is predicted, and for how many there is room: a power of two."""
 NAME = "march"
 KINDS = (*("int",) * 5, *("array",) * 7, *("float",) * 3, "array", "array")
 """Of the function's arguments: blocks, steps, width of the arrays that are read, how far a row and a step of `out` are
@@ -113,8 +113,9 @@ class _March(Kernel):
         )
         t.label("entry")
         self.slots = {leaf: t.slot() for leaf in self.state}
-        self.steps = {k: [t.slot() for _ in range(ORDER)] for k in self.newtons}
-        self.gone, self.moved = ({k: t.slot() for k in self.newtons} for _ in range(2))
+        self.rings = {leaf: t.slot(RING) for leaf in self.state if leaf[1] in self.newtons}
+        self.moved = t.slot()
+        self.moves = {part.stage.level: t.slot() for part in self.of.parts if part.form is None}
         self.bends = [[t.slot() for _ in range(2)] for _ in self.of.forms]
         self.strong, self.fine, self.good = (t.slot() for _ in range(3))
         scale = t.spread("%scale")
@@ -163,8 +164,12 @@ class _March(Kernel):
                 have["sign", k] = t.call("copysign", t.constant(1.0), side)
         for leaf, value in state.items():
             t.store(value, self.slots[leaf])
-        for slot in [slot for of in (*self.steps.values(), *self.bends) for slot in of]:
+        for slot in [slot for of in self.bends for slot in of]:
             t.store("zeroinitializer", slot)
+        for leaf, ring in self.rings.items():
+            for k in range(RING - 1):
+                t.store("zeroinitializer", t.place(ring, str(k)))
+            t.store(state[leaf], t.place(ring, str(RING - 1)))
         t.store(t.constant(1.0), self.fine)
         t.store("zeroinitializer", self.good)
         t.line("br label %step")
@@ -187,6 +192,8 @@ class _March(Kernel):
             if turns:
                 have["uc", k], have["us", k] = self.turned(at_start["uc", k], at_start["us", k], cos, sin)
         t.store(t.constant(1.0), self.strong)
+        t.store("zeroinitializer", self.moved)
+        self.last = [t.new(f"and i64 {t.new(f'sub i64 %k, {j + 1}')}, {RING - 1}") for j in range(ORDER)]
 
     def _closed(self, part: Part, have: Have) -> list[str]:
         """A group in closed form; flags that say where its two assemblies keep apart.
@@ -232,53 +239,61 @@ class _March(Kernel):
     def _newton(self, part: Part, have: Have) -> None:
         """Newton's method for a group from where it would be if it went on as before, so often as the step says."""
         t, level = self.text, part.stage.level
+        own = {leaf: slot for leaf, slot in self.slots.items() if leaf[1] in part.unknowns}
+        ahead = {
+            leaf: t.summed(
+                [
+                    t.binary("mul", w, t.load(t.place(self.rings[leaf], at)))
+                    for w, at in zip(self.weights, self.last, strict=True)
+                ]
+            )
+            for leaf in own
+        }
         for k in part.unknowns:
-            terms = [t.binary("mul", w, t.load(d)) for w, d in zip(self.weights, self.steps[k], strict=True)]
-            ahead = t.summed(terms)
-            self._move(k, ahead)
-            t.store(ahead, self.gone[k])
-            t.store("zeroinitializer", self.moved[k])
+            if self.of.angle[k]:
+                ahead["zc", k], ahead["zs", k] = self.unit(ahead["zc", k], ahead["zs", k])
+        for leaf, slot in own.items():
+            t.store(ahead[leaf], slot)
         count = t.new(f"load i64, ptr {t.new('getelementptr i64, ptr %counts, i64 %k')}")
-        strong = t.load(self.strong)
+        strong, before = t.load(self.strong), t.load(self.moved)
+        moved = self.moves[level]
+        t.store("zeroinitializer", moved)
         t.line(f"br label %from{level}")
         t.label(f"from{level}")
         t.line(f"br label %newton{level}")
         t.label(f"newton{level}")
         t.line(f"%n{level} = phi i64 [0, %from{level}], [%n{level}next, %newton{level}]")
-        *delta, strength = self.values(self.of.step(part.stage), have | self._now(part))
+        now = {leaf: t.load(slot) for leaf, slot in own.items()}
+        *delta, spanned, lengths = self.values(self.of.step(part.stage), have | now)
+        far = []
         for k, each in zip(part.unknowns, delta, strict=True):
+            far.append(t.call("fabs", each))
             back = t.new(f"fneg {t.vector} {each}")
-            self._move(k, back)
-            t.store(t.binary("add", t.load(self.moved[k]), back), self.moved[k])
-        t.store(t.call("minnum", strong, strength), self.strong)
+            if ("z", k) in now:
+                now["z", k] = t.binary("add", now["z", k], back)
+            if self.carries(("z", k)):
+                now["zc", k], now["zs", k] = t.each("cos", now["z", k]), t.each("sin", now["z", k])
+            elif self.of.angle[k]:
+                now["zc", k], now["zs", k] = self.turned_by(now["zc", k], now["zs", k], back)
+        for leaf, slot in own.items():
+            t.store(now[leaf], slot)
+        t.store(t.summed([t.load(moved), *far]), moved)
         t.loop(f"n{level}", count.lstrip("%"), f"newton{level}", f"solved{level}")
         t.label(f"solved{level}")
-        have.update(self._now(part))
-        for k in part.unknowns:
-            before = self.steps[k]
-            whole = t.binary("add", t.load(self.gone[k]), t.load(self.moved[k]))
-            for later, earlier in zip(reversed(before[1:]), reversed(before[:-1]), strict=True):
-                t.store(t.load(earlier), later)
-            t.store(whole, before[0])
+        have.update({leaf: t.load(slot) for leaf, slot in own.items()})
+        t.store(t.call("minnum", strong, self._regular(spanned, lengths, len(part.unknowns))), self.strong)
+        t.store(t.binary("add", before, t.load(moved)), self.moved)
+        here = t.new(f"and i64 %k, {RING - 1}")
+        for leaf in own:
+            t.store(have[leaf], t.place(self.rings[leaf], here))
 
-    def _now(self, part: Part) -> Have:
-        own = set(part.unknowns)
-        return {leaf: self.text.load(slot) for leaf, slot in self.slots.items() if leaf[1] in own}
-
-    def _move(self, k: int, by: str) -> None:
-        """Move an unknown on: a length by so much, an angle by the rational rotation."""
-        t, slots = self.text, self.slots
-        if not self.of.angle[k]:
-            t.store(t.binary("add", t.load(slots["z", k]), by), slots["z", k])
-            return
-        cos, sin, half = self.rotation(by)
-        c, s = self.turned(t.load(slots["zc", k]), t.load(slots["zs", k]), cos, sin)
-        t.store(c, slots["zc", k])
-        t.store(s, slots["zs", k])
-        if self.carries(("z", k)):
-            # the rotation turns by 2 atan(by / 2)
-            turned = t.each("atan", half)
-            t.store(t.binary("add", t.load(slots["z", k]), t.binary("add", turned, turned)), slots["z", k])
+    def _regular(self, spanned: str, lengths: str, count: int) -> str:
+        """How regular a slope is, where that is told; else only whether it is enough: not below nothing."""
+        t = self.text
+        if self.levels is not None:
+            return t.binary("div", spanned, lengths)
+        least = WEAK**2 if count <= 2 else WEAK**3
+        return t.binary("sub", spanned, t.binary("mul", lengths, t.constant(least)))
 
     def _tell(self, have: Have, flags: list[str], scale: str) -> None:
         """The step ends: its results are written, and judged."""
@@ -293,12 +308,12 @@ class _March(Kernel):
             place = t.new(f"add i64 {t.new('mul i64 %k, %time')}, {t.new(f'mul i64 %row, {k}')}")
             t.store(each, t.at("%out", t.new(f"add i64 {place}, {self.lane}")))
         # sums, since what is not a number stays so in them, and is not below anything
-        worst = t.summed([t.constant(0.0), *(t.call("fabs", each) for each in left)])
+        worst = t.summed([t.constant(0.0), *(t.call("fabs", each) for each in (*left, *self.off_circle(have)))])
         flags = [*flags, t.compared("ole", worst, t.spread("%tolerance"))]
         if self.newtons:
-            flags.append(t.compared("oge", t.load(self.strong), t.constant(WEAK**2)))
-            far = t.summed([t.call("fabs", t.load(self.moved[k])) for k in self.newtons])
-            near = t.compared("ole", far, t.spread("%astray"))
+            least = WEAK**3 if self.levels is not None else 0.0
+            flags.append(t.compared("oge", t.load(self.strong), t.constant(least)))
+            near = t.compared("ole", t.load(self.moved), t.spread("%astray"))
             flags.append(t.either(near, t.spread_flag("%k", "sle", ORDER)))
         for flag in flags[1:]:
             flags[0] = t.both(flags[0], flag)

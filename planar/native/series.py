@@ -120,7 +120,7 @@ class _Series(Kernel):
         t.label("told")
         told = self._told()
         left, *values = self.parted([of.gaps(), *told], have)
-        worst = t.summed([t.constant(0.0), *(t.call("fabs", each) for each in left)])
+        worst = t.summed([t.constant(0.0), *(t.call("fabs", each) for each in (*left, *self.off_circle(have)))])
         unknowns = [have[leaf] for k, turns in enumerate(of.angle) for leaf in _leaves("z", k, turns)]
         many = [
             worst,
@@ -150,17 +150,16 @@ class _Series(Kernel):
         t.label(f"newton{level}")
         t.line(f"%n{level} = phi i64 [0, %from{level}], [%n{level}next, %newton{level}]")
         now = {leaf: t.load(slot) for leaf, slot in own.items()}
-        *delta, strength = self.values(self.of.step(part.stage), have | now)
+        *delta, spanned, lengths = self.values(self.of.step(part.stage), have | now)
         for k, each in zip(part.unknowns, delta, strict=True):
             back = t.new(f"fneg {t.vector} {each}")
             t.store(t.binary("add", t.load(self.moved), t.call("fabs", each)), self.moved)
             if self.of.angle[k]:
-                cos, sin, _ = self.rotation(back)
-                for leaf, value in zip(("zc", "zs"), self.turned(now["zc", k], now["zs", k], cos, sin), strict=True):
+                for leaf, value in zip(("zc", "zs"), self.turned_by(now["zc", k], now["zs", k], back), strict=True):
                     t.store(value, own[leaf, k])
             else:
                 t.store(t.binary("add", now["z", k], back), own["z", k])
-        t.store(t.call("minnum", strong, strength), self.strong)
+        t.store(t.call("minnum", strong, t.binary("div", spanned, lengths)), self.strong)
         t.loop(f"n{level}", "count", f"newton{level}", f"solved{level}")
         t.label(f"solved{level}")
         have.update({leaf: t.load(slot) for leaf, slot in own.items()})

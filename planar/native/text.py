@@ -102,9 +102,13 @@ class Text:
         """A value where a flag is up, else nothing."""
         return self.new(f"select <{self.lanes} x i1> {flag}, {self.vector} {value}, {self.vector} zeroinitializer")
 
-    def slot(self) -> str:
-        """Room for a value."""
-        return self.new(f"alloca {self.vector}, align 64")
+    def slot(self, many: int = 1) -> str:
+        """Room for values."""
+        return self.new(f"alloca {self.vector}, i64 {many}, align 64")
+
+    def place(self, slot: str, index: str) -> str:
+        """One of the places of a slot that has room for several."""
+        return self.new(f"getelementptr {self.vector}, ptr {slot}, i64 {index}")
 
     def spread_flag(self, counter: str, how: str, than: int) -> str:
         """Whether a counter is greater ("sgt") than a number, or at most ("sle") that, in every lane."""

@@ -67,10 +67,12 @@ class _Partial(NamedTuple):
         return _Partial(self.z[:, designs], self.there[designs], self.distance[designs], lying)
 
 
-def assembled(base: Base, shapes: Mapping[str, Shape], p: Array, u: Array, close: Closing | None) -> Assembled:
+def assembled(
+    base: Base, shapes: Mapping[str, Shape], p: Array, u: Array, tolerance: float, close: Closing | None
+) -> Assembled:
     """The assemblies at inputs u (inputs, designs), of designs with numbers p (numbers, designs) and these shapes."""
     with np.errstate(all="ignore"):  # starts that lead nowhere end as what is no number
-        near = close and nearby(base, shapes, p, u, close)
+        near = close and nearby(base, shapes, p, u, tolerance, close)
         if not near:
             return _Assembling(base, shapes, p, u).found()
         every, rest = Assembled(near.z, near.clear, np.full(len(near.clear), -1)), np.flatnonzero(~near.clear)

@@ -139,7 +139,8 @@ class _Solving:
         told = {name: base_.member(name) for name in block.points}
         moving = {name: each for name, each in told.items() if each[0] != base_.mechanism.frame}
         q = [part for link, point in moving.values() for part in shapes[link].at(point)]
-        start = assembled(base_, shapes, p, self.u, closing(block.backend))
+        tolerance = base_.tolerance(p)
+        start = assembled(base_, shapes, p, self.u, tolerance, closing(block.backend))
         self.ends = start.ends
         fit = start.sure & ~base_.unfit(block.designs, shapes) & np.all(np.isfinite(p), axis=0)
         offsets = np.zeros((block.steps + 1, len(self.u)))
@@ -158,7 +159,7 @@ class _Solving:
             self.u2,
             tuple(link for link, _ in moving.values()),
             block.rates,
-            base_.tolerance(p),
+            tolerance,
             base_.unit,
         )
         march, fit = self._at_start(march, fit)

@@ -32,7 +32,9 @@ class Nearby(NamedTuple):
     clear: Array
 
 
-def nearby(base: Base, shapes: Mapping[str, Shape], p: Array, u: Array, close: Closing) -> Nearby | None:
+def nearby(
+    base: Base, shapes: Mapping[str, Shape], p: Array, u: Array, tolerance: float, close: Closing
+) -> Nearby | None:
     """The assemblies at inputs u (inputs, designs); None where the sketch does not show every group, or `close` cannot.
 
     Costs never fall: where the nearest assembly is taken of every group, and each group's next one alone would cost
@@ -46,7 +48,7 @@ def nearby(base: Base, shapes: Mapping[str, Shape], p: Array, u: Array, close: C
     if candidates.counts or any(length(stage.unknowns) > MOST or not at[stage.level] for stage in stages):
         return None
     try:
-        return _Near(base, shapes, p, u, close, candidates, stages).found()
+        return _Near(base, shapes, p, u, tolerance, close, candidates, stages).found()
     except NotMarched:
         return None
 
@@ -58,6 +60,7 @@ class _Near:
         shapes: Mapping[str, Shape],
         p: Array,
         u: Array,
+        tolerance: float,
         close: Closing,
         candidates: Candidates,
         stages: list[Stage],
@@ -72,7 +75,7 @@ class _Near:
         self.sketch = np.array([candidates.sketch[name] for name in self.names]).reshape(-1, 2, 1)
         members = [candidates.first[name][1:] for name in self.names]
         q = spread([part for link, point in members for part in shapes[link].at(point)], self.many) / base.unit
-        links, tolerance = tuple(link for link, _ in members), base.tolerance(p)
+        links = tuple(link for link, _ in members)
         start = np.concatenate([np.zeros(0), *(roots[0] for roots, _ in self.roots.values() if len(roots))])
         self.march = March(
             base.program,
