@@ -102,7 +102,10 @@ def _angles(e: Equations, stage: Stage, unknowns: list[ca.SX]) -> Closed | None:
     d = -g
     sign = ca.SX.sym("sign")
     spanned, gap = a.square * b.square, 0.5 * (a.square + b.square - d.square)
-    across = sign * ca.sqrt(spanned - gap * gap)
+    # spanned less the gap's square, as Heron has it: so nothing cancels where the angles are small
+    one_length, other_length = ca.sqrt(a.square), ca.sqrt(b.square)
+    least, greatest = one_length - other_length, one_length + other_length
+    across = sign * 0.5 * ca.sqrt((d.square - least * least) * (greatest * greatest - d.square))
     scale = 1.0 / d.square
     along = 0.5 + 0.5 * (a.square - b.square) * scale
     reached = d.by(along) + _Vector(-d.y, d.x).by(across * scale)
@@ -129,12 +132,12 @@ def _angle_and_length(e: Equations, stage: Stage, unknowns: list[ca.SX]) -> Clos
     sign = ca.SX.sym("sign")
     if rest[1] and not rest[0] and not rest[2]:
         # the length goes along a direction that is known
-        way, base, spanned = fixed, g, a.square * fixed.square
+        way, base, reach = fixed, g, a
     elif rest[0] and not rest[1]:
-        way, base, spanned = d, a, g.square * d.square
+        way, base, reach = d, a, g
     else:
         return None
-    gap = base.across(way)
+    gap, spanned = base.across(way), reach.square * way.square
     length = (sign * ca.sqrt(spanned - gap * gap) - base.along(way)) / way.square
     side = way.square * slide + base.along(way)
     if way is fixed:
