@@ -84,9 +84,18 @@ def run(
         raise NotPrinted("steps so long do not show what lies between them")
     plan = layout(program, structure(mechanism), tuple(links), rates)
     table, counts = _table(gone)
-    counts += more
-    astray = min(ASTRAY * max(1.0, longest / COARSE[0]) ** 2, MOST)
-    return _called(plan, designs, rates, table, counts, (tolerance, astray, scale), out)
+    return _called(plan, designs, rates, table, counts + more, (tolerance, _astray(longest), scale), out)
+
+
+def reached(
+    program: Program, mechanism: Mechanism, designs: Designs, gone: Array, tolerance: float, more: int, at: Array
+) -> Array:
+    """The unknowns (unknowns, designs) of a run that came to these steps, at (designs,), of each design to one."""
+    plan = layout(program, structure(mechanism), (), False, ())
+    table, counts = _table(gone)
+    astray = _astray(float(np.max(np.abs(np.diff(gone, axis=0)), initial=0.0)))
+    found, _ = _called(plan, designs, False, table, counts + more, (tolerance, astray, 1.0), None)
+    return _unknowns(plan, found[at, :, np.arange(len(at))].T, len(designs.z))
 
 
 class Ends(NamedTuple):
@@ -122,12 +131,22 @@ def ended(
     counts[:] = corrections
     out, good = _called(plan, designs, False, table, counts, (tolerance, np.inf, 1.0), None)
     rows, places = out[0], 2 * len(links)
-    state = dict(zip(plan.state, rows[2 * places :], strict=False))
-    z = np.empty_like(designs.z)
-    for k in range(len(z)):
-        z[k] = state["z", k] if ("z", k) in state else np.arctan2(state["zs", k], state["zc", k])
+    z = _unknowns(plan, rows[2 * places :], len(designs.z))
     both = rows[: 2 * places].reshape(2, len(links), 2, rows.shape[1])
     return Ends(good > 0, np.sqrt(np.maximum(rows[-1], 0.0)), z, *both)
+
+
+def _unknowns(plan: Layout, rows: Array, many: int) -> Array:
+    """The unknowns (unknowns, designs) of a state (rows, designs)."""
+    state = dict(zip(plan.state, rows, strict=False))
+    z = np.empty((many, rows.shape[1]))
+    for k in range(many):
+        z[k] = state["z", k] if ("z", k) in state else np.arctan2(state["zs", k], state["zc", k])
+    return z
+
+
+def _astray(longest: float) -> float:
+    return min(ASTRAY * max(1.0, longest / COARSE[0]) ** 2, MOST)
 
 
 def _called(

@@ -14,7 +14,7 @@ from planar.sweeping.assembling import assembled
 from planar.sweeping.base import Base, base, spread
 from planar.sweeping.by_program import rows
 from planar.sweeping.designs import lifted, one
-from planar.sweeping.marching import March, Marching, NotMarched, closing, marching, room
+from planar.sweeping.marching import March, Marching, NotMarched, Reaching, closing, marching, reaching, room
 from planar.sweeping.one_by_one import OUTCOMES, Solved, solve_one
 from planar.sweeping.stops import stopped
 
@@ -163,12 +163,12 @@ class _Solving:
             base_.unit,
         )
         march, fit = self._at_start(march, fit)
-        for _, run in marching(block.backend):
+        for name, run in marching(block.backend):
             try:
                 out, good = self._run(run, march, fit)
             except NotMarched:
                 continue
-            self._stopped(march, out, good)
+            self._stopped(march, out, good, reaching(name))
             return self._whole(out, told, shapes), good
         return None
 
@@ -193,12 +193,12 @@ class _Solving:
             out[:, :, some] = own
         return out, good
 
-    def _stopped(self, march: March, out: Array, good: Array) -> None:
+    def _stopped(self, march: March, out: Array, good: Array, reach: Reaching | None) -> None:
         """Follow those that a backend did not bring to the end, all at once, as far as they come."""
         some = np.flatnonzero((good > 0) & (good < len(march.u)))
         if not some.size:
             return
-        found = stopped(march.of(some), self.base.index, good[some])
+        found = stopped(march.of(some), self.base.index, good[some], reach)
         out[found.step, :, some[found.design]] = found.out.T
         settled = some[found.settled]
         self.followed = int(found.design.size)

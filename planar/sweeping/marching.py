@@ -83,9 +83,19 @@ Closing = Callable[[March, Sequence[int], int], Closed]
 it may take. Raises NotMarched."""
 
 
+Reaching = Callable[[March, Array], Array]
+"""Takes a march and how many of its first steps were good, one at least; gives the unknowns at the last of these
+(unknowns, designs)."""
+
+
 def closing(backend: str) -> Closing | None:
     """What closes many designs at once, if the backend that is tried first does."""
     return getattr(import_module(BACKENDS[marching(backend)[0][0]]), "closed", None)
+
+
+def reaching(name: str) -> Reaching | None:
+    """What of a backend tells where designs came to, if it does."""
+    return getattr(import_module(BACKENDS[name]), "reached", None)
 
 
 def room(steps: int, rows: int, designs: int) -> Array:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from planar.native import backend
 from planar.native.backend import Designs, ended, run
 from planar.native.listing import NotPrinted
 from planar.sweeping import by_program
@@ -18,18 +19,28 @@ MORE = 2
 
 
 def march(task: March, out: Array) -> Array:
-    """See `Marching`. What the usual corrections leave open runs once more with further ones, and then by casadi.
+    """See `Marching`. What the usual corrections leave open runs once more with further ones; what does not begin so,
+    by casadi.
 
     Raises NotMarched where the structure is not for vectors.
     """
     good = _run(task, out, 0)
+    least = len(task.u)
     for again in (lambda part, room: _run(part, room, MORE), by_program.march):
-        left = np.flatnonzero(good < len(task.u))
+        left = np.flatnonzero(good < least)
         if left.size:
             own = np.empty((*out.shape[:2], left.size))
             good[left] = again(task.of(left), own)
             out[:, :, left] = own
+        least = 1
     return good
+
+
+def reached(task: March, good: Array) -> Array:
+    """See `Reaching`."""
+    return backend.reached(
+        task.program, task.mechanism, _designs(task), task.u, task.tolerance, MORE, np.maximum(good - 1, 0)
+    )
 
 
 def closed(task: March, levels: Sequence[int], corrections: int) -> Closed:

@@ -9,7 +9,7 @@ import numpy as np
 from planar.sweeping.by_program import Row, Told, rows, told_closed
 from planar.sweeping.columns import Columns
 from planar.sweeping.judging import Branches
-from planar.sweeping.marching import March
+from planar.sweeping.marching import March, Reaching
 
 Array = np.ndarray
 
@@ -127,14 +127,15 @@ def _bordered(slope: Array, normal: Array, left: Array, last: float) -> Array:
     return found
 
 
-def stopped(march: March, index: int, good: Array) -> Stopped:
-    """Go on from the last of the `good` steps of each design, which are one at least.
+def stopped(march: March, index: int, good: Array, reach: Reaching | None) -> Stopped:
+    """Go on from the last of the `good` steps of each design, which are one at least; `reach` tells where that was.
 
     Each step is under the conditions of `solving.walk`; a design that does not keep them is not settled. `index` is the
     input that runs.
     """
     with np.errstate(all="ignore"):  # what leads astray ends as what is no number
-        return _Stopping(march, index, good).stopped()
+        stopping = _Stopping(march, index, good)
+        return stopping.stopped(reach(march, good).T if reach else stopping.reached())
 
 
 class _Stopping:
@@ -151,14 +152,14 @@ class _Stopping:
         self.stop = np.full(self.many, np.inf)
         "the place of the dead point"
 
-    def stopped(self) -> Stopped:
-        z = self._reached()
+    def stopped(self, z: Array) -> Stopped:
+        """See `stopped`; z (designs, unknowns) at the last good steps."""
         self._walk(z)
         if self.dead:
             self._dead_points()
         return self._told()
 
-    def _reached(self) -> Array:
+    def reached(self) -> Array:
         """The unknowns at the last good step of each design (designs, unknowns)."""
         found = np.full((self.many, self.march.z0.shape[0]), np.nan)
         # those that come about as far are led together
