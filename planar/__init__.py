@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from planar.motion import Motion, State
     from planar.solving.cycle import cycle
     from planar.solving.position import solve
+    from planar.sweeping.prepared import prepared
     from planar.sweeping.result import Sweep
     from planar.sweeping.sweep import sweep
     from planar.views.dataset import dataset
@@ -93,6 +94,7 @@ _ROOMS = {
     "loads": "files",
     "mobility": "analysis.mobility",
     "plot": "plot",
+    "prepared": "sweeping.prepared",
     "schema": "document.schema",
     "solve": "solving.position",
     "stroke": "analysis.extremes",
@@ -162,6 +164,7 @@ __all__ = [
     "loads",
     "mobility",
     "plot",
+    "prepared",
     "schema",
     "solve",
     "stroke",

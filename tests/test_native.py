@@ -1,6 +1,5 @@
 """What LLVM is told equals what casadi computes: runs of many designs against runs of one."""
 
-import casadi as ca
 import numpy as np
 import pytest
 
@@ -8,15 +7,9 @@ import planar
 from planar.errors import BadInput, Outcome
 from planar.mechanism import named_points
 from planar.native.backend import Designs, run
-from planar.native.kernel import Structure
 from planar.native.listing import Listing, NotPrinted, Turned, without_turning
-from planar.native.series import LANES, series, solved
-from planar.program import structure
-from planar.solving.rates import rates as _rates
 from tests.known import MODELS
 
-SHORT = ("landing-gear", "elliptical-trammel", "scissor-lift")
-"""Models that a run of a tenth (rad or m) leads to a limit, or over a change point."""
 PART = slice(30, 331)
 """Rows of a cycle of 360 steps that are away from its limits."""
 
@@ -123,44 +116,3 @@ def test_what_is_not_a_number_is_not_good():
     given["designs"].p[0, 1] = np.nan
     _, good = run(**given)
     assert good.tolist() == [len(given["gone"]), 0]
-
-
-@pytest.mark.parametrize("stem", [stem for stem, mechanism in MODELS.items() if mechanism.inputs])
-def test_positions_that_are_found_each_by_itself_are_those_of_a_run(stem):
-    mechanism = MODELS[stem]
-    at, pair = mechanism.inputs[0].position, mechanism.inputs[0].pair
-    motion = planar.cycle(mechanism, steps=2 * LANES - 1, start=at, stop=at + 0.1, pair=pair)
-    course = motion.course
-    solver, found = course.ranged.solver, course.found
-    if len(motion) != 2 * LANES or course.singular:
-        assert stem in SHORT
-        return
-    try:
-        of = Structure(solver.program.equations, structure(solver.mechanism))
-        plan = series(of, True)
-    except NotPrinted:
-        assert not solver.program.square or motion._counting
-        return
-    e, p, given = solver.program.equations, solver.station.p, found.given
-    side = ca.Function("side", [e.z, e.u, e.p], [of.sides])(found.z[0], given.u[0], p).full().ravel()
-
-    def values(leaves):
-        rows = [(found.z if name.startswith("z") else given.u)[:, k] for name, k in leaves]
-        turned = {"c": np.cos, "s": np.sin}
-        return np.array(
-            [turned.get(name[1:], np.positive)(row) for (name, _), row in zip(leaves, rows, strict=True)]
-        ).reshape(1, len(leaves), len(motion))
-
-    rates = np.concatenate([given.u1.T, given.u2.T])[None]
-    told = solved(of, p[None], np.sign(side)[None], values(plan.state), values(plan.drives), rates, 2)
-    assert np.max(told.left) <= solver.tolerance
-    assert np.max(told.moved, initial=0.0) < 1e-9
-    w, w1, w2 = (part[0].T for part in (told.w, told.w1, told.w2))
-    angles = [c.of_link and c.part == "angle" for c in e.coordinates]
-    whole = solver.program.positions(found.z.T, given.u.T, p).full()
-    turned = [
-        row for k, turns in enumerate(angles) for row in ([np.cos(whole[k]), np.sin(whole[k])] if turns else [whole[k]])
-    ]
-    np.testing.assert_allclose(w.T, turned, atol=1e-11)
-    for part, kept in zip((w1, w2), _rates(solver, found.z, given, {}, False)[1:], strict=True):
-        np.testing.assert_allclose(part, kept, atol=1e-9 * np.maximum(1.0, np.abs(kept).max()))

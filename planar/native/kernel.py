@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import casadi as ca
+import numpy as np
 
 from planar.closed import Closed, closed
 from planar.equations import Equations, Stage
@@ -68,8 +69,13 @@ class Structure:
         self.angle = tuple(e.coordinates[column].kind is Kind.ANGLE for column in e.unknowns)
         self.turning = tuple(kind is Kind.ANGLE for kind in e.drives)
         self.forms = tuple(part.form for part in self.parts if part.form is not None)
-        self.sides = ca.vertcat(*(form.side for form in self.forms))
+        self.sides = ca.vertcat(ca.SX(0, 1), *(form.side for form in self.forms))
         self.column = {(c.owner, c.part): k for k, c in enumerate(e.coordinates)}
+
+    def signs(self, z: np.ndarray, u: np.ndarray, p: np.ndarray) -> np.ndarray:
+        """Which assembly every group in closed form is in (groups,), +1 or -1."""
+        e = self.equations
+        return np.sign(ca.Function("sides", [e.z, e.u, e.p], [ca.densify(self.sides)])(z, u, p).full().ravel())
 
     def frame(self, link: str) -> Frame:
         """Where a link is, as expressions."""

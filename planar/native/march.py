@@ -9,10 +9,8 @@ from collections.abc import Sequence
 from math import inf
 from typing import NamedTuple
 
-import casadi as ca
-
-from planar.native.kernel import WEAK, Have, Kernel, Leaf, Outside, Part, Structure
-from planar.plane import Vector
+from planar.native.kernel import WEAK, Have, Leaf, Outside, Part, Structure
+from planar.native.points import Points
 
 ORDER, RING = 6, 8
 """Steps before from which the next is predicted, and for how many there is room: a power of two."""
@@ -55,7 +53,7 @@ def march(
             carried |= {angle.leaf}
 
 
-class _March(Kernel):
+class _March(Points):
     def __init__(
         self,
         of: Structure,
@@ -65,8 +63,8 @@ class _March(Kernel):
         levels: tuple[int, ...] | None,
         carried: frozenset[Leaf],
     ):
-        super().__init__(of, lanes, len(links), frozenset({"p", "q", "u1", "u2"}), carried)
-        self.links, self.rates, self.levels = links, rates, levels
+        super().__init__(of, links, rates, lanes, frozenset({"p", "q", "u1", "u2"}), carried)
+        self.levels = levels
         self.others: dict[int, list[str]] = {}
         self.state = tuple(leaf for k, turns in enumerate(of.angle) for leaf in self._leaves("z", k, turns))
         self.drives = tuple(
@@ -79,25 +77,6 @@ class _March(Kernel):
         if not turns:
             return [(name, k)]
         return [(name + "c", k), (name + "s", k), *([(name, k)] if self.carries((name, k)) else [])]
-
-    def _places(self, points: Sequence[int]) -> ca.SX:
-        q = self.symbols["q"]
-        places = [self.of.frame(self.links[k]).carry(Vector(q[2 * k], q[2 * k + 1])) for k in points]
-        return ca.vertcat(ca.SX(0, 1), *(part for place in places for part in place))
-
-    def _told(self) -> list[ca.SX]:
-        """The points' positions, and rates."""
-        e, s = self.of.equations, self.symbols
-        places = self._places(range(len(self.links)))
-        if not self.rates:
-            return [places]
-        z1, z2 = self.of.rates(s["u1"], s["u2"])
-        y, y1, y2 = ca.vertcat(e.z, e.u), ca.vertcat(z1, s["u1"]), ca.vertcat(z2, s["u2"])
-        first = ca.jtimes(places, y, y1)
-        v1, v2 = ca.SX.sym("v1", y.numel()), ca.SX.sym("v2", y.numel())
-        moving = ca.jtimes(places, y, v1)
-        second = ca.jtimes(moving, y, v1) + ca.jtimes(places, y, v2)
-        return [places, first, ca.substitute(second, ca.vertcat(v1, v2), ca.vertcat(y1, y2))]
 
     def written(self) -> Layout:
         """The whole function: blocks of designs, in each the steps."""
@@ -223,7 +202,7 @@ class _March(Kernel):
         there["sign", self.signs[level]] = self.text.new(f"fneg {self.text.vector} {have['sign', self.signs[level]]}")
         self.found(part, there)
         points = [k for k, each in enumerate(self.levels) if each == level]
-        places = self.values([self._places(points)], there)
+        places = self.values([self.places(points)], there)
         self.others |= {k: places[2 * n : 2 * n + 2] for n, k in enumerate(points)}
 
     def _carried(self, k: int, have: Have) -> None:
@@ -297,7 +276,7 @@ class _March(Kernel):
 
     def _tell(self, have: Have, flags: list[str], scale: str) -> None:
         """The step ends: its results are written, and judged."""
-        t, told = self.text, self._told()
+        t, told = self.text, self.told()
         left, *values = self.parted([self.of.gaps(), *told], have)
         many = [t.binary("mul", scale, each) for of in values for each in of]
         if self.levels is not None:

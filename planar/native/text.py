@@ -118,6 +118,19 @@ class Text:
             f"shufflevector <{self.lanes} x i1> {one}, <{self.lanes} x i1> poison, <{self.lanes} x i32> zeroinitializer"
         )
 
+    def beyond(self, first: str, last: str) -> str:
+        """A flag in every lane: whether its number, counted from `first`, is that in the first lane of `last` or
+        more."""
+        lanes = self.lanes
+
+        def spread(vector: str) -> str:
+            mask = f"<{lanes} x i32> zeroinitializer"
+            return self.new(f"shufflevector <{lanes} x i64> {vector}, <{lanes} x i64> poison, {mask}")
+
+        begin = spread(self.new(f"insertelement <{lanes} x i64> poison, i64 {first}, i64 0"))
+        own = self.new(f"add <{lanes} x i64> {begin}, <{', '.join(f'i64 {k}' for k in range(lanes))}>")
+        return self.new(f"icmp sge <{lanes} x i64> {own}, {spread(last)}")
+
     def module(self) -> str:
         """All that was written, with what it calls."""
         v, of = self.vector, f"v{self.lanes}f64"

@@ -70,9 +70,9 @@ def sweep(
     Raises BadInput for a name that is not there, a range or a store that cannot be.
     """
     values = checked(mechanism, designs)
-    _check(mechanism, steps, start, stop, pair, block)
-    # a range is run at the inputs' own rates, whatever their laws
-    mechanism = replace(mechanism, inputs=tuple(given._replace(law=None) for given in mechanism.inputs))
+    if block is not None and (isinstance(block, bool) or not isinstance(block, Integral) or block < 1):
+        raise BadInput("block", f"a whole number of designs is wanted, not {block!r:.40}")
+    mechanism = range_checked(mechanism, steps, start, stop, pair)
     common = base(mechanism, pair)
     names = common.wanted(points)
     marching(backend)
@@ -99,19 +99,19 @@ def sweep(
     return into.result()
 
 
-def _check(mechanism: Mechanism, steps: object, start: object, stop: object, pair: str | None, block: object) -> None:
+def range_checked(mechanism: Mechanism, steps: object, start: object, stop: object, pair: str | None) -> Mechanism:
+    """The mechanism with inputs that run over a range at their own rates, whatever their laws. Raises BadInput."""
     if isinstance(steps, bool) or not isinstance(steps, Integral) or not 1 <= steps <= MOST_STEPS:
         raise BadInput("steps", f"a whole number of steps from 1 to {MOST_STEPS} is wanted, not {steps!r:.40}")
     for name, value in (("start", start), ("stop", stop)):
         wrong = isinstance(value, bool) or not isinstance(value, Real) or not abs(value) <= FARTHEST
         if value is not None and wrong:
             raise BadInput(name, f"a number up to {FARTHEST:g} (rad or m) is wanted, not {value!r:.40}")
-    if block is not None and (isinstance(block, bool) or not isinstance(block, Integral) or block < 1):
-        raise BadInput("block", f"a whole number of designs is wanted, not {block!r:.40}")
     lawful = [given.pair for given in mechanism.inputs if given.law is not None]
     if lawful and start is None and stop is None and pair is None:
         told = f"the input at {lawful[0]!r} has a law of time, which a sweep does not run; give it a start and a stop"
         raise BadInput("designs", told)
+    return replace(mechanism, inputs=tuple(given._replace(law=None) for given in mechanism.inputs))
 
 
 def _size(many: int, steps: int, points: int, rates: bool, executor: Executor | None) -> int:
