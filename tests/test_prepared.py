@@ -14,7 +14,9 @@ RUNNING = [stem for stem, mechanism in MODELS.items() if len(mechanism.inputs) =
 
 def agree(found, swept, points):
     np.testing.assert_array_equal(found.status, np.asarray(swept.status)[0])
-    for told, wanted, near in zip(found[:3], (swept.position, swept.velocity, swept.acceleration), (1e-12, 1e-9, 2e-7), strict=True):
+    for told, wanted, near in zip(
+        found[:3], (swept.position, swept.velocity, swept.acceleration), (1e-12, 1e-9, 2e-7), strict=True
+    ):
         for point in points:
             scale = max(1.0, np.nanmax(np.abs(wanted[point][0]), initial=0.0))
             np.testing.assert_allclose(told[point], wanted[point][0], atol=near * scale)

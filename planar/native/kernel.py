@@ -9,6 +9,7 @@ brought to it. So no sine stands in the loop, and few divisions.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import NamedTuple
 
 import casadi as ca
@@ -74,8 +75,12 @@ class Structure:
 
     def signs(self, z: np.ndarray, u: np.ndarray, p: np.ndarray) -> np.ndarray:
         """Which assembly every group in closed form is in (groups,), +1 or -1."""
+        return np.sign(self._sides(z, u, p).full().ravel())
+
+    @cached_property
+    def _sides(self) -> ca.Function:
         e = self.equations
-        return np.sign(ca.Function("sides", [e.z, e.u, e.p], [ca.densify(self.sides)])(z, u, p).full().ravel())
+        return ca.Function("sides", [e.z, e.u, e.p], [ca.densify(self.sides)])
 
     def frame(self, link: str) -> Frame:
         """Where a link is, as expressions."""

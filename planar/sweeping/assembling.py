@@ -13,7 +13,7 @@ from planar.plane import Vector
 from planar.program import length, placed
 from planar.shapes import Shape
 from planar.solving.assemble import ALIKE
-from planar.solving.candidates import CLEAR, SAME, Candidates
+from planar.solving.candidates import CLEAR, SAME
 from planar.solving.newton import CLOSED, newton
 from planar.sweeping.base import Base, of_designs
 from planar.sweeping.columns import Over
@@ -88,7 +88,7 @@ class _Assembling:
         self.base, self.p, self.u = base, p, u
         self.equations, self.program = base.program.equations, base.program
         self.many = p.shape[1]
-        self.candidates = Candidates(base.solver)
+        self.candidates = base.candidates
         unit = base.unit
         self.local = {
             name: {point: Vector(at.x / unit, at.y / unit) for point, at in shape.points.items()}

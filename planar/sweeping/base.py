@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -47,6 +47,11 @@ class Base:
         self.slides = self.solver.slides(self.pair)
         self.scale = np.array([self.unit if self.solver.slides(name) else 1.0 for name in names])
         self.points = {each.name: each for each in named_points(mechanism)}
+
+    @cached_property
+    def candidates(self) -> Candidates:
+        """The assemblies of the base's groups."""
+        return Candidates(self.solver)
 
     @property
     def marched(self) -> bool:
@@ -137,7 +142,7 @@ class Base:
     _roots: tuple[tuple[Array, int], ...] | None = None
 
     def _searched(self):  # noqa: ANN202
-        candidates = Candidates(self.solver)
+        candidates = self.candidates
         nodes = [(0.0, np.zeros(len(self.solver.equations.unknowns)))]
         for stage in self.solver.equations.stages:
             ways = []

@@ -42,7 +42,7 @@ def nearby(
     many as
     the base has, if they are found again, or it lies where it does at the sketch, and so regular that no other is near.
     """
-    candidates = Candidates(base.solver)
+    candidates = base.candidates
     stages = [stage for stage in base.program.equations.stages if length(stage.unknowns)]
     at = {stage.level: candidates.sketched_at.get(stage.level, ()) for stage in stages}
     if candidates.counts or any(length(stage.unknowns) > MOST or not at[stage.level] for stage in stages):
