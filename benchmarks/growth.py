@@ -12,7 +12,7 @@ import planar
 from benchmarks import chain
 from benchmarks.comparison import error
 from benchmarks.timing import best
-from benchmarks.ways.trial import CRANK, STEPS
+from benchmarks.ways.trial import CRANK
 from planar.equations import build
 from planar.program import Program, structure
 from planar.solving.follow import run
@@ -69,7 +69,7 @@ def grow_far(links: int, whole: bool) -> Far:
     equations = build(structure(mechanism))
     done()
     if whole:
-        Program(equations).runs(STEPS)
+        _ = Program(equations).advance
         done()
         solver = Solver(mechanism)
         z = solver.assembly().z
@@ -90,7 +90,7 @@ def grow(links: int) -> Growth:
     times = best(
         {
             "equations": lambda: build(structure(mechanism)),
-            "program": lambda: Program(equations).runs(steps),
+            "program": lambda: Program(equations).advance,
             "assembly": solver.assembly,
             "position": lambda: solver.state(z),
             "run": lambda: run(solver, p, z, u),

@@ -7,6 +7,7 @@ second formula (A. Griewank, A. Walther, Evaluating Derivatives, SIAM 2008, ch. 
 
 from __future__ import annotations
 
+import math
 from math import comb
 from typing import Any
 
@@ -17,6 +18,8 @@ Scalar = Any
 
 
 def _by_its_own(name: str, x: Scalar) -> Scalar:
+    if type(x) is float:
+        return getattr(math, name)(x)
     method = getattr(x, name, None)
     return getattr(np, name)(x) if method is None else method()
 

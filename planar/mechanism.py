@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from math import isfinite
 from numbers import Real
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from planar.errors import BadInput
 from planar.pairs.base import Pair
@@ -38,6 +38,7 @@ __all__ = [
     "misfits",
     "motions",
     "named_points",
+    "unlawful",
     "with_inputs",
 ]
 
@@ -147,6 +148,17 @@ class Mechanism:
     published: tuple[Published, ...] = ()
     remarks: tuple[str, ...] = ()
 
+    def __hash__(self) -> int:
+        found = self.__dict__.get("_hash")
+        if found is None:
+            found = hash(tuple(getattr(self, each.name) for each in fields(self)))
+            object.__setattr__(self, "_hash", found)
+        return found
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without the hash, which another process would not share."""
+        return {name: value for name, value in self.__dict__.items() if name != "_hash"}
+
 
 class NamedPoint(NamedTuple):
     """A point under the name that results give it, and the (link, point) that lie there."""
@@ -160,6 +172,8 @@ def with_inputs(mechanism: Mechanism, drives: tuple[Drive, ...]) -> Mechanism:
 
     Raises BadInput where it has no such input.
     """
+    if not drives:
+        return mechanism
     for drive in drives:
         for value in drive[1:]:
             if value is not None and (isinstance(value, bool) or not isinstance(value, Real) or not isfinite(value)):
@@ -201,9 +215,18 @@ def check(mechanism: Mechanism) -> None:
     for given in mechanism.inputs:
         if given.pair not in named:
             raise BadInput(given.pair, f"there is no pair {given.pair!r} to be driven; pairs are {', '.join(named)}")
+    wrong = unlawful(mechanism)
+    if wrong:
+        raise BadInput(*wrong)
+
+
+def unlawful(mechanism: Mechanism) -> tuple[str, str] | None:
+    """The place of the first law that cannot be, and a sentence why."""
+    for given in mechanism.inputs:
         wrong = given.law and given.law.problem()
         if wrong:
-            raise BadInput(f"{given.pair}.law{wrong[0]}", wrong[1])
+            return f"{given.pair}.law{wrong[0]}", wrong[1]
+    return None
 
 
 def misfits(pairs: Sequence[Pair], shapes: Mapping[str, Shape], units: Units) -> Iterator[tuple[Pair, str]]:

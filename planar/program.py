@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property, lru_cache
+from math import hypot
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
 from planar.algebra import Scalar
+from planar.called import Called, Chained
+from planar.closed import Closed, closed
+from planar.elimination import stack
 from planar.equations import Equations, Stage, build
 from planar.mechanism import Input, Link, Mechanism, motions
 from planar.pairs import Kind, Pair
@@ -18,6 +22,8 @@ from planar.shapes import Shape, shape
 
 Array = np.ndarray
 
+POLISHED = 2
+"""Newton's steps that carry a closed form to round-off."""
 NEWTON_STEPS = 4
 """Unrolled steps of a position within a run: from a start a degree or so away, four square the error away."""
 
@@ -38,6 +44,30 @@ class Rates(NamedTuple):
     "(rows, unknowns)"
     drive_slope: Array
     "(rows, inputs)"
+
+
+class Assemblies:
+    """The two assemblies of one stage in closed form, carried to round-off by Newton's steps."""
+
+    def __init__(self, unknowns: slice, form: Called, polished: Called):
+        self._unknowns, self._form, self._polished = unknowns, form, polished
+
+    def __call__(self, z: Array, u: Array, p: Array) -> tuple[list[Array], float, float]:
+        """Both (unknowns,), what they leave open at most, and how near they are to where they meet (`closed.Closed`).
+
+        What is not there is not a number.
+        """
+        found, left, bend = [], 0.0, 0.0
+        for sign in (1.0, -1.0):
+            whole = z.copy()
+            own, bends = self._form(z, u, p, np.array([sign]))
+            bend = float(bends[0, 0])
+            whole[self._unknowns] = own[0]
+            for _ in range(POLISHED):
+                whole[self._unknowns] = self._polished(whole, u, p)[0][0]
+            left = np.maximum(left, self._polished(whole, u, p)[1][0, 0])
+            found.append(whole[self._unknowns])
+        return found, float(left), bend
 
 
 class Program:
@@ -61,11 +91,57 @@ class Program:
             for stage in e.stages
         }
 
+    def closed(self, stage: Stage) -> Called:
+        """The same, called on arrays: F and the slope's columns (unknowns, rows)."""
+        if stage.level not in self._closed:
+            self._closed[stage.level] = Called(self.closing(stage))
+        return self._closed[stage.level]
+
+    @cached_property
+    def _closed(self) -> dict[int, Called]:
+        return {}
+
+    def assemblies(self, stage: Stage) -> Assemblies | None:
+        """Both assemblies of a stage; None for one without a closed form."""
+        if stage.level not in self._assemblies:
+            form = closed(self.equations, stage)
+            self._assemblies[stage.level] = form and self._both(stage, form)
+        return self._assemblies[stage.level]
+
+    @cached_property
+    def _assemblies(self) -> dict[int, Assemblies | None]:
+        return {}
+
+    def _both(self, stage: Stage, form: Closed) -> Assemblies:
+        e = self.equations
+        found = stack(ca.atan2(each[1], each[0]) if len(each) == 2 else each[0] for each in form.found)
+        left, slope = self.closing(stage)(e.z, e.u, e.p)
+        polished = [e.z[stage.unknowns] - solved(slope, left), ca.norm_inf(left)]
+        return Assemblies(
+            stage.unknowns,
+            Called(ca.Function("assembly", [e.z, e.u, e.p, form.sign], [found, form.bend])),
+            Called(ca.Function("polished", [e.z, e.u, e.p], polished)),
+        )
+
     @cached_property
     def positions(self) -> ca.Function:
         """(z, u, p) -> w."""
         e = self.equations
         return ca.Function("positions", [e.z, e.u, e.p], [ca.densify(e.w)])
+
+    def coordinates(self, z: Array, u: Array, p: Array) -> Array:
+        """w (coordinates,) at z (unknowns,), or (samples, coordinates) at z (samples, unknowns), u alike."""
+        if z.ndim == 1:
+            return self._coordinates(z, u, p)[0][0]
+        return self._coordinates.over(len(z), z, u, p)[0][:, 0]
+
+    @cached_property
+    def _coordinates(self) -> Called:
+        return Called(self.positions)
+
+    @cached_property
+    def _called(self) -> tuple[Called, Called]:
+        return Called(self._kinematics), Called(self._slopes)
 
     @cached_property
     def _kinematics(self) -> ca.Function:
@@ -142,12 +218,10 @@ class Program:
         """Everything at one position, y = (z, u) with its first and second derivatives, or at samples (samples, y)."""
         rows, unknowns = self.equations.F.numel(), self.equations.z.numel()
         if y.ndim == 1:
-            parts, slopes = (each.full() for each in self._kinematics(y, y1, y2, p))
-            return Rates(*parts[:rows].T, *parts[rows:].T, slopes[:, :unknowns], slopes[:, unknowns:])
-        samples, width = y.shape
-        parts, slopes = (each.full() for each in self._kinematics(y.T, y1.T, y2.T, p))
-        parts = parts.reshape(-1, samples, 3).transpose(2, 1, 0)
-        slopes = slopes.reshape(rows, samples, width).transpose(1, 0, 2)
+            parts, slopes = self._called[0](y, y1, y2, p)
+            return Rates(*parts[:, :rows], *parts[:, rows:], slopes[:unknowns].T, slopes[unknowns:].T)
+        parts, slopes = self._called[0].over(len(y), y, y1, y2, p)
+        parts, slopes = parts.transpose(1, 0, 2), slopes.transpose(0, 2, 1)
         return Rates(*parts[..., :rows], *parts[..., rows:], slopes[..., :unknowns], slopes[..., unknowns:])
 
     @cached_property
@@ -158,22 +232,27 @@ class Program:
         """
         e = self.equations
         z, u, p = (ca.SX.sym(name, each.numel()) for name, each in (("z", e.z), ("u", e.u), ("p", e.p)))
-        now = ca.vertsplit(z)
-        for stage in e.stages:
-            for _ in range(NEWTON_STEPS if length(stage.unknowns) else 0):
-                left, slope = self.closing(stage)(ca.vertcat(*now), u, p)
-                now[stage.unknowns] = ca.vertsplit(ca.vertcat(*now[stage.unknowns]) - _solved(slope, left))
-        return ca.Function("advance", [z, u, p], [ca.vertcat(*now)])
+        return compact("advance", [z, u, p], [self.corrected(z, u, p, NEWTON_STEPS)[0]])
 
-    def runs(self, samples: int) -> ca.Function:
-        """(z, u of every sample, p of every sample) -> z of every sample, each from the one before."""
-        if samples not in self._runs:
-            self._runs[samples] = self.advance.mapaccum("runs", samples)
-        return self._runs[samples]
+    def corrected(self, z: ca.SX, u: ca.SX, p: ca.SX, steps: int = 1) -> tuple[ca.SX, ca.SX]:
+        """Unknowns after so many of Newton's steps, group after group, for structures as `advance` takes, and what each
+        group left open before its last step (rows,)."""
+        open_ = []
+        now = ca.vertsplit(z) if z.numel() else []
+        for stage in self.equations.stages:
+            for _ in range(steps if length(stage.unknowns) else 0):
+                left, slope = self.closing(stage)(ca.vertcat(*now), u, p)
+                now[stage.unknowns] = ca.vertsplit(ca.vertcat(*now[stage.unknowns]) - solved(slope, left))
+            open_ += [left] if length(stage.unknowns) else []
+        return stack(now), stack(open_)
+
+    def run(self, z: Array, u: Array, p: Array) -> Array:
+        """The unknowns at every sample of inputs u (samples, inputs), each from the one before, the first from z."""
+        return self._run(z, u, p)
 
     @cached_property
-    def _runs(self) -> dict[int, ca.Function]:
-        return {}
+    def _run(self) -> Chained:
+        return Chained(self.advance)
 
     @cached_property
     def _slopes(self) -> ca.Function:
@@ -187,10 +266,24 @@ class Program:
         rows, inputs = self.equations.F.numel(), u.shape[1]
         if rows == 0:
             return np.zeros((samples, 0, unknowns)), np.zeros((samples, 0, inputs))
-        both = self._slopes(z.T, u.T, p).full().reshape(rows, samples, unknowns + inputs).transpose(1, 0, 2)
+        called = self._called[1]
+        both = (called(z[0], u[0], p)[0][None] if samples == 1 else called.over(samples, z, u, p)[0]).transpose(0, 2, 1)
         return both[:, :, :unknowns], both[:, :, unknowns:]
 
-    @property
+    @cached_property
+    def _left(self) -> Called:
+        e = self.equations
+        slopes = ca.jacobian(e.F, ca.vertcat(e.z, e.u))
+        return Called(ca.Function("left", [e.z, e.u, e.p], [ca.densify(e.F), ca.densify(slopes)]))
+
+    def left(self, z: Array, u: Array, p: Array) -> tuple[Array, Array]:
+        """F (rows,) and its slope (rows, unknowns and inputs) at one position."""
+        if not len(self.equations.rows):
+            return np.zeros(0), np.zeros((0, len(z) + len(u)))
+        left, slope = self._left(z, u, p)
+        return left[0], slope.T
+
+    @cached_property
     def square(self) -> bool:
         """Whether every group has as many constraints as unknowns."""
         return all(length(stage.rows) == length(stage.unknowns) and not stage.free for stage in self.equations.stages)
@@ -207,12 +300,17 @@ def _derivatives(e: Equations, value: ca.SX) -> tuple[ca.SX, ...]:
     return y, y1, y2, first, ca.jtimes(first, y, y1) + ca.jtimes(value, y, y2)
 
 
+def compact(name: str, given: Sequence[ca.SX], wanted: Sequence[ca.SX]) -> ca.Function:
+    """A function in which what stands in several places is computed once."""
+    return ca.Function(name, given, ca.cse(list(wanted)))
+
+
 def length(part: slice) -> int:
     """How many entries a part of z or F has."""
     return part.stop - part.start
 
 
-def _solved(slope: ca.SX, left: ca.SX) -> ca.SX:
+def solved(slope: ca.SX, left: ca.SX) -> ca.SX:
     """slope^-1 left; two by two by the adjugate, larger by QR, neither of which needs a pivot to be chosen."""
     if slope.numel() == 1:
         return left / slope
@@ -252,34 +350,34 @@ def shapes(mechanism: Mechanism) -> dict[str, Shape]:
 def size(mechanism: Mechanism, shapes: Mapping[str, Shape]) -> float:
     """The mechanism's size (m): the greatest distance between two points of one link, else of a slide's travel."""
     named = motions(mechanism)
-    slides = [abs(g.position) for g in mechanism.inputs if named[g.pair].drive_kind is Kind.LENGTH]
-    return max(map(extent, shapes.values()), default=0.0) or max(slides, default=0.0) or 1.0
+    slide = [named[given.pair].drive_kind is Kind.LENGTH for given in mechanism.inputs]
+    return greatest(mechanism, {name: extent(shape) for name, shape in shapes.items()}, slide)
+
+
+def greatest(mechanism: Mechanism, extents: Mapping[str, float], slide: Sequence[bool]) -> float:
+    """The mechanism's size (m) from the extents of its links and from which of its inputs slide."""
+    slides = [abs(given.position) for given, slides in zip(mechanism.inputs, slide, strict=True) if slides]
+    return max(extents.values(), default=0.0) or max(slides, default=0.0) or 1.0
 
 
 def extent(shape: Shape) -> float:
     """The greatest distance between two points of a link (m)."""
-    spread = np.array(list(shape.points.values()), dtype=float)
-    return float(np.hypot(*(spread.max(axis=0) - spread.min(axis=0)))) if len(spread) else 0.0
+    x, y = [at.x for at in shape.points.values()], [at.y for at in shape.points.values()]
+    return hypot(max(x) - min(x), max(y) - min(y)) if x else 0.0
 
 
 def fitted(mechanism: Mechanism, shapes: Mapping[str, Shape], unit: float) -> Array:
     """p: the numbers of every pair, lengths divided by `unit`."""
+    measured = {pair.name: pair.measure([shapes[link] for link in pair.bodies]) for pair in mechanism.pairs}
+    return gathered(mechanism, measured, unit)
+
+
+def gathered(mechanism: Mechanism, numbers: Mapping[str, Sequence[float]], unit: float) -> Array:
+    """p from the numbers of every pair, lengths divided by `unit`."""
     found: list[float] = []
     for pair in mechanism.pairs:
-        found += scaled(pair.measure([shapes[link] for link in pair.bodies]), pair.measures, unit)
+        found += scaled(numbers[pair.name], pair.measures, unit)
     return np.array(found, dtype=float)
-
-
-def positions(mechanism: Mechanism, unit: float) -> Array:
-    """u: the positions of the inputs, lengths divided by `unit`."""
-    return rates(mechanism, "position", unit)
-
-
-def rates(mechanism: Mechanism, order: str, unit: float) -> Array:
-    """Position, velocity or acceleration of the inputs, lengths divided by `unit`."""
-    named = motions(mechanism)
-    kinds = [named[given.pair].drive_kind for given in mechanism.inputs]
-    return np.array(scaled([getattr(given, order) for given in mechanism.inputs], kinds, unit), dtype=float)
 
 
 def scaled(values: Sequence[float], kinds: Sequence[Kind], unit: float) -> list[float]:

@@ -117,8 +117,8 @@ def test_the_double_rockers_coupler_turns_fully_and_its_rockers_do_not():
         assert sum(increments(rocker)) == pytest.approx(0.0, abs=1e-12)
     # each turns back where the coupler and the other rocker are in line
     for angles, own, other in ((left, 0.100, 0.090), (np.pi - right, 0.090, 0.100)):
-        assert between(own, 0.120, other - 0.040) < min(angles)
-        assert max(angles) < between(own, 0.120, other + 0.040)
+        assert between(own, 0.120, other - 0.040) <= min(angles) + 1e-12
+        assert max(angles) <= between(own, 0.120, other + 0.040) + 1e-12
 
 
 @pytest.mark.parametrize("reach", [0.090 + 0.040, 0.090 - 0.040])

@@ -41,11 +41,8 @@ class Turn:
 
     def bare(self) -> Array:
         """z by one call of the run's program alone."""
-        steps = len(self.u) - 1
-        found = self.solver.program.runs(steps)(
-            self.start, self.u[1:].T, np.repeat(self.numbers[:, None], steps, axis=1)
-        )
-        return np.vstack([self.start, found.full().T])
+        found = self.solver.program.run(self.start, self.u[1:], self.numbers)
+        return np.vstack([self.start, found])
 
     def rates(self, z: Array) -> tuple[Array, Array, Array]:
         """z with its first and second rates: two calls of the program and two small systems a sample, ungated."""

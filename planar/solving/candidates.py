@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.equations import Stage
-from planar.mechanism import counting, named_points
 from planar.pairs import Kind
 from planar.plane import Vector
 from planar.program import length, placed
@@ -20,6 +19,8 @@ Array = np.ndarray
 
 SAME = 1e-6
 """Unknowns closer than this are one assembly: within it two would be a dead point to working precision."""
+MEETING = 1.0 - 1e-6
+"""Squared cosine beyond which two assemblies are too near to where they meet to be told apart by a closed form."""
 MOST_STARTS = 160
 LARGE, BATCH = 10, 16
 """Unknowns of a group from which on starts are tried in batches of so many."""
@@ -51,36 +52,30 @@ class Candidates:
         mechanism, unit = setup.mechanism, setup.unit
         self.program, self.u, self.p = setup.program, setup.station.u, setup.station.p
         self.equations, self.pairs, self.column = setup.equations, setup.pairs, setup.column
-        ends = np.cumsum([len(pair.measures) for pair in mechanism.pairs])
-        self.numbers = dict(zip(self.pairs, np.split(self.p, ends[:-1]), strict=True)) if self.pairs else {}
+        self.numbers, first = {}, 0
+        for pair in mechanism.pairs:
+            self.numbers[pair.name] = self.p[first : first + len(pair.measures)]
+            first += len(pair.measures)
         self.local = {
             name: {point: Vector(at.x / unit, at.y / unit) for point, at in shape.points.items()}
             for name, shape in setup.shapes.items()
         }
         self.sketch = {name: Vector(x / unit, y / unit) for name, x, y in mechanism.sketch}
-        self.counts = bool(counting(mechanism))
-        level = {link.name: self._level(link.name) for link in mechanism.links}
+        self.counts = setup.outline.counts
         # each point by the first of its links to be placed, and the points of each link
-        self.first: dict[str, tuple[int, str, str]] = {}
-        self.points_of: dict[str, list[tuple[str, str]]] = {link.name: [] for link in mechanism.links}
-        for each in named_points(mechanism):
-            self.first[each.name] = min((level[link], link, point) for link, point in each.members)
-            for link, point in each.members:
-                self.points_of[link].append((point, each.name))
+        self.first, self.points_of, _ = setup.outline.places
         self.sketched_at: dict[int, list[str]] = {}
         for name in self.sketch:
             self.sketched_at.setdefault(self.first[name][0], []).append(name)
-
-    def _level(self, link: str) -> int:
-        """The stage after which a link's position is known; -1 for the frame and links that follow from the inputs."""
-        columns = [self.column.get((link, part)) for part in ("x", "y", "angle")]
-        return max((self.equations.known_from[c] for c in columns if c is not None), default=-1)
 
     def of(self, stage: Stage, z: Array) -> tuple[list[Candidate], Array]:
         """All assemblies of a group that its starts lead to, the ones that an author would mean first.
 
         With all unknowns at the end of the best start, whether it closes the group or not.
         """
+        both = self._both(stage, z)
+        if both is not None:
+            return both, both[0].z
         closing = self.closing(stage, z, self.p)
         near, shown = self._near(stage, z)
         ended = newton(closing, self._with_lengths(stage, closing, near))
@@ -100,6 +95,17 @@ class Candidates:
         nearest[stage.unknowns] = ended.unknowns[int(np.argmin(ended.open))]
         return found, nearest
 
+    def _both(self, stage: Stage, z: Array) -> list[Candidate] | None:
+        """The two assemblies of a group in closed form; None where it has none, or where they all but meet."""
+        function = None if self.counts else self.program.assemblies(stage)
+        if function is None:
+            return None
+        found, left, bend = function(z, self.u, self.p)
+        # what is not a number is not below anything
+        if not (bend < MEETING and left <= CLOSED):
+            return None
+        return self._ordered(stage, z, found)
+
     def _searched(self, stage: Stage, closing: Closing) -> Iterator[Array]:
         """Starts all over the circles; of a large group in batches, since any assembly will do without a sketch."""
         starts = self._with_lengths(stage, closing, _spread(length(stage.unknowns)))
@@ -117,6 +123,9 @@ class Candidates:
         for root in closed:
             if not any(self._same(stage, z, root, other) for other in roots):
                 roots.append(polished(closing, root))
+        return self._ordered(stage, z, roots)
+
+    def _ordered(self, stage: Stage, z: Array, roots: list[Array]) -> list[Candidate]:
         return sorted(
             (self._candidate(stage, z, root) for root in roots),
             key=lambda each: (each.behind, -round(each.height, 9), -round(each.far, 9), *np.round(each.z, 6)),
@@ -129,7 +138,7 @@ class Candidates:
         pairs = {name: self.pairs[name] for name in stage.pairs}
         links = {*stage.links, *(link for pair in pairs.values() for link in pair.bodies)}
         links |= {link for _, link, _ in sketched.values()}
-        frames, own = placed(self._w(whole), self.column, links, pairs)
+        frames, own = placed(self._w(whole).tolist(), self.column, links, pairs)
         gaps = [
             frames[link].carry(self.local[link][point]) - self.sketch[name]
             for name, (_, link, point) in sketched.items()
@@ -144,25 +153,23 @@ class Candidates:
             whole,
             sum(float(gap.dot(gap)) for gap in gaps),
             sum(not pair.ahead(drive) for pair, drive in drives),
-            float(np.mean(heights)) if heights else 0.0,
+            sum(heights) / len(heights) if heights else 0.0,
             sum(drive for _, drive in drives),
         )
 
     def _w(self, z: Array) -> Array:
-        return self.program.positions(z, self.u, self.p).full().ravel()
+        return self.program.coordinates(z, self.u, self.p)
 
     def closing(self, stage: Stage, z: Array, p: Array) -> Closing:
         """A group's constraints at tries of its own unknowns, those of earlier groups and the pairs' numbers given."""
-        function = self.program.closing(stage)
-        rows, unknowns = length(stage.rows), length(stage.unknowns)
+        function = self.program.closed(stage)
 
         def closing(tried: Array) -> tuple[Array, Array]:
             count = len(tried)
-            whole = np.repeat(z[:, None], count, axis=1)
-            whole[stage.unknowns] = tried.T
-            left, slope = function(whole, self.u, p) if count > 1 else function(whole[:, 0], self.u, p)
-            slopes = slope.full().reshape(rows, count, unknowns, order="C") if unknowns else np.zeros((rows, count, 0))
-            return left.full().reshape(rows, count).T.copy(), slopes.transpose(1, 0, 2).copy()
+            whole = np.repeat(z[None], count, axis=0)
+            whole[:, stage.unknowns] = tried
+            left, slopes = function.over(count, whole, self.u, p) if count > 1 else function(whole[0], self.u, p)
+            return left.reshape(count, -1), slopes.reshape(count, *slopes.shape[-2:]).transpose(0, 2, 1)
 
         return closing
 
@@ -176,10 +183,10 @@ class Candidates:
             return False
         if not self.counts:
             return True
-        both = np.repeat(z[:, None], 2, axis=1)
-        both[stage.unknowns] = np.stack([a, b], axis=1)
+        both = np.repeat(z[None], 2, axis=0)
+        both[:, stage.unknowns] = a, b
         angles = np.array([c.kind is not Kind.LENGTH for c in self.equations.coordinates])
-        return bool(np.all(_apart(angles, *self.program.positions(both, self.u, self.p).full().T) < SAME))
+        return bool(np.all(_apart(angles, *self.program.coordinates(both, np.tile(self.u, (2, 1)), self.p)) < SAME))
 
     def _near(self, stage: Stage, z: Array) -> tuple[Array, bool]:
         """Starts about the angles that the sketch shows, and whether it shows a large group whole.

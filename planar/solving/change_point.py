@@ -99,7 +99,7 @@ def _refined(curve: Curve, y: Array, start: Array) -> Near | None:
             system[band, size * (1 + k) : size * (2 + k)] = slope
             # entry (j, k) of start^T null
             system[rows * (1 + count) + k :: count, size * (1 + k) : size * (2 + k)] = start.T
-        step = np.linalg.lstsq(system, -np.concatenate(left), rcond=1e-12)[0]
+        step = _shortest(system, -np.concatenate(left))
         if not np.all(np.isfinite(step)) or np.max(np.abs(step)) > 1.0:
             return None
         y = y + step[:size]
@@ -113,6 +113,15 @@ def _refined(curve: Curve, y: Array, start: Array) -> Near | None:
     if rank > size - 2:
         return None
     return Near(y, vt[rank:].T, float(np.max(np.abs(curve.left(y)), initial=0.0)))
+
+
+def _shortest(system: Array, known: Array) -> Array:
+    """The solution in the sense of least squares; where it is not determined, the shortest."""
+    q, r = np.linalg.qr(system)
+    diagonal = np.abs(np.diag(r))
+    if len(system) >= system.shape[1] and diagonal.min() > 1e-8 * diagonal.max():
+        return np.linalg.solve(r, q.T @ known)
+    return np.linalg.lstsq(system, known, rcond=1e-12)[0]
 
 
 class _Ways:

@@ -20,6 +20,14 @@ SMALLEST = 1e-6
 """A column of the slope is judged by its own size, down to this part of the size of the mechanism."""
 
 
+REGULAR = 1e-4
+"""A least singular value (columns of one size) from which on tangents are solved for without looking at all of them."""
+ASIDE = 100.0
+"""How many times longer than its part in the direction asked for a tangent may be for that."""
+FARTHEST = 1e3
+"""A longer step is that of a singular system, solved once more in the sense of least squares."""
+
+
 class Traced(Protocol):
     """What a curve needs of a solver."""
 
@@ -81,13 +89,20 @@ class Curve:
 
     def slope(self, y: Array) -> Array:
         """J (rows, n + 1)."""
-        dz, du = self.program.slopes(y[None, :-1], self.inputs(y)[None], self.p)
-        return np.hstack([dz[0], du[0] @ self.way[:, None]])
+        return self.opened(y)[1]
 
     def left(self, y: Array) -> Array:
         """F (rows,)."""
-        none = np.zeros(len(y) - 1 + len(self.way))
-        return self.program.kinematics(self.whole(y), none, none, self.p).F
+        return self.opened(y)[0]
+
+    def opened(self, y: Array) -> tuple[Array, Array]:
+        """F (rows,) and J (rows, n + 1)."""
+        left, slope = self.program.left(y[:-1], self.inputs(y), self.p)
+        many = len(y) - 1
+        narrow = np.empty((len(slope), many + 1))
+        narrow[:, :many] = slope[:, :many]
+        narrow[:, many] = slope[:, many:] @ self.way
+        return left, narrow
 
     def second(self, y: Array, way: Array) -> Array:
         """The second derivative of F along a direction (rows,)."""
@@ -101,39 +116,48 @@ class Curve:
     def at(self, y: Array, towards: Array) -> Point:
         """The point at y, its tangent less than a right angle from a direction."""
         slope = self.slope(y)
-        u, s, vt = np.linalg.svd(slope)
+        least = self._least(slope)
         many = len(y) - 1
+        if len(slope) == many and least > REGULAR:
+            system = np.vstack([slope, towards])
+            tangent = _solved(system, np.append(np.zeros(many), 1.0))
+            size = float(np.linalg.norm(tangent))
+            if size * float(np.linalg.norm(towards)) < ASIDE:
+                tangent /= size
+                system[many] = tangent
+                bend = _solved(system, np.append(-self.second(y, tangent), 0.0))
+                return Point(y, tangent, bend, self._clear(y, tangent, slope, least))
+        u, s, vt = np.linalg.svd(slope)
         tangent = vt[many] if vt[many] @ towards >= 0.0 else -vt[many]
         kept = s[:many] > NOTHING * max(s[0], 1.0) if many else np.zeros(0, dtype=bool)
         along = (u.T[:many] @ self.second(y, tangent)) if many else np.zeros(0)
         bend = -vt[:many].T @ np.where(kept, along / np.where(kept, s[:many], 1.0), 0.0)
-        return Point(y, tangent, bend, self._clear(y, tangent, slope))
+        return Point(y, tangent, bend, self._clear(y, tangent, slope, least))
 
-    def _clear(self, y: Array, tangent: Array, slope: Array) -> float:
-        """How far along the curve J keeps its rank: until it has changed by its least singular value (Weyl).
-
-        Columns of one size, so that a small link counts as much as a large one.
-        """
-        many = len(y) - 1
+    def _least(self, slope: Array) -> float:
+        """The least singular value of J, columns of one size, so that a small link counts as much as a large one."""
+        many = slope.shape[1] - 1
         if many == 0:
+            return 1.0
+        return float(np.linalg.svd(slope / _sizes(slope), compute_uv=False)[many - 1])
+
+    def _clear(self, y: Array, tangent: Array, slope: Array, least: float) -> float:
+        """How far along the curve J keeps its rank: until it has changed by its least singular value (Weyl)."""
+        if len(y) == 1:
             return np.inf
-        sizes = np.maximum(np.linalg.norm(slope, axis=0), SMALLEST)
-        change = np.linalg.norm((self.slope(y + NUDGE * tangent) - slope) / sizes) / NUDGE
-        least = np.linalg.svd(slope / sizes, compute_uv=False)[many - 1]
-        return float(least / max(change, 1e-300))
+        change = np.linalg.norm((self.slope(y + NUDGE * tangent) - slope) / _sizes(slope)) / NUDGE
+        return least / max(float(change), 1e-300)
 
     def corrected(self, y: Array, normal: Array) -> Array | None:
         """The point of the curve near y in the plane through y with this normal; None where Newton finds none."""
         y, before = y.copy(), np.inf
         for _ in range(CORRECTIONS):
-            whole = self.whole(y)
-            rates = self.program.kinematics(whole, 0.0 * whole, 0.0 * whole, self.p)
-            gap = float(np.max(np.abs(rates.F), initial=0.0))
+            left, slope = self.opened(y)
+            gap = float(np.max(np.abs(left), initial=0.0))
             if not gap < before:
                 break
             before = gap
-            slope = np.hstack([rates.slope, rates.drive_slope @ self.way[:, None]])
-            y = y + np.linalg.lstsq(np.vstack([slope, normal]), np.append(-rates.F, 0.0), rcond=1e-14)[0]
+            y = y + _solved(np.vstack([slope, normal]), np.append(-left, 0.0))
         return y if before <= 1e-10 else None
 
     def polished(self, y: Array, lost: int) -> Array:
@@ -150,6 +174,23 @@ class Curve:
         for _ in range(2):
             y = y - np.append(truncated(self.slope(y)[:, :-1], self.left(y), len(y) - 1 - lost), 0.0)
         return y
+
+
+def _solved(system: Array, known: Array) -> Array:
+    """The shortest solution in the sense of least squares; straight away where the system is square and regular."""
+    if system.shape[0] == system.shape[1]:
+        try:
+            found = np.linalg.solve(system, known)
+        except np.linalg.LinAlgError:
+            pass
+        else:
+            if np.max(np.abs(found), initial=0.0) < FARTHEST:
+                return found
+    return np.linalg.lstsq(system, known, rcond=1e-14)[0]
+
+
+def _sizes(slope: Array) -> Array:
+    return np.maximum(np.sqrt(np.einsum("rk,rk->k", slope, slope)), SMALLEST)
 
 
 def truncated(slope: Array, left: Array, rank: int) -> Array:

@@ -14,6 +14,7 @@ from planar.program import Program, length
 from planar.roots import root
 from planar.solving.branch import Branch, cancelling
 from planar.solving.curve import Arc, Curve, Point, Traced
+from planar.solving.straight import STRAIGHT, Told, course
 from planar.solving.walk import Missed, Passed, Walk
 
 Array = np.ndarray
@@ -25,8 +26,6 @@ RESTING = 1e-7
 """A rate of the inputs along the curve below this is none: the position is a dead point to rounding."""
 SEAM = 1e-9
 """rad or sizes: so near to the end of a way a change point is at that end."""
-STRAIGHT = 1e-12
-"""rad or sizes: inputs that are no further from a straight way are on it."""
 
 
 class Followed(Traced, Protocol):
@@ -67,6 +66,7 @@ class Run(NamedTuple):
     local: Mapping[int, Local] = MappingProxyType({})
     met: tuple[Met, ...] = ()
     missed: tuple[Missed, ...] = ()
+    told: Told | None = None
 
 
 class Piece(NamedTuple):
@@ -251,11 +251,19 @@ def followed(solver: Followed, p: Array, z: Array, start: Array, stop: Array) ->
     return Run(np.stack([z, found[0]]), 1, None, None, local, met(trip.walk, reach), tuple(trip.walk.missed))
 
 
-def run(solver: Followed, p: Array, z: Array, u: Array, branches: Sequence[int] = ()) -> Run:
+def run(
+    solver: Followed,
+    p: Array,
+    z: Array,
+    u: Array,
+    branches: Sequence[int] = (),
+    rates: tuple[Array, Array] | None = None,
+) -> Run:
     """The unknowns at every sample of a run of inputs u (samples, inputs), from those of the first.
 
     The whole run is one call of the compiled program; every sample then passes both parts of the gate, and from
-    one that does not the general path goes on until the compiled program can take over again.
+    one that does not the general path goes on until the compiled program can take over again. With first and second
+    `rates` of the inputs the run tells those of its samples as well, so far as they are surely sound.
     """
     samples = len(u)
     found = np.empty((samples, z.size))
@@ -264,9 +272,22 @@ def run(solver: Followed, p: Array, z: Array, u: Array, branches: Sequence[int] 
     local: dict[int, Local] = {}
     met_on_way: list[Met] = []
     missed: list[Missed] = []
+    told = _untold(solver, samples) if rates is not None else None
     while done < samples:
-        if solver.program.square:
-            found[done:] = _accumulated(solver.program, p, found[done - 1], u[done:], samples - 1)
+        rest = slice(done - 1, None)
+        sure = course(solver, found[done - 1], u[rest], *(each[rest] for each in rates)) if rates is not None else None
+        if sure is not None and told is not None:
+            through = len(sure.z)
+            if through:
+                # of what is beside a change point more is known than can be read off its slope
+                first = int(done - 1 in local)
+                same = slice(done - 1 + first, done - 1 + through)
+                found[same] = sure.z[first:]
+                told.parts[same], told.sure[same] = sure.parts[first:], True
+                told = told._replace(open=max(told.open, sure.open))
+                done += through - 1
+        elif solver.program.square:
+            found[done:] = solver.program.run(found[done - 1], u[done:], p)
             passed = _passing(solver, p, found[done - 1 :], u[done - 1 :])
             found[done : done + passed] = _settled(solver.program, p, found[done : done + passed], u[done:][:passed])
             done += passed
@@ -279,21 +300,27 @@ def run(solver: Followed, p: Array, z: Array, u: Array, branches: Sequence[int] 
         trip, places = _trip(solver, p, found[base], ahead, branches[len(met_on_way) :])
         before = len(met_on_way)
         for place, following in pairwise([*places, np.inf]):
-            told = trip.to(place)
+            at = trip.to(place)
             met_on_way[before:] = met(trip.walk, place)
-            if told is None:
+            if at is None:
                 missed += trip.walk.missed
                 last = trip.here.y[:-1], trip.curve.inputs(trip.here.y)
                 stopped = ended(solver, trip)
-                return Run(found[:done], general, stopped, last, local, tuple(met_on_way), tuple(missed))
-            found[done] = told[0]
-            if told[1] is not None:
-                local[done] = told[1]
+                known = told and told.cut(slice(done))
+                return Run(found[:done], general, stopped, last, local, tuple(met_on_way), tuple(missed), known)
+            found[done] = at[0]
+            if at[1] is not None:
+                local[done] = at[1]
             done, general = done + 1, general + 1
-            if told[1] is None and not trip.holds(following):
+            if at[1] is None and not trip.holds(following):
                 break
         missed += trip.walk.missed
-    return Run(found, general, None, None, local, tuple(met_on_way), tuple(missed))
+    return Run(found, general, None, None, local, tuple(met_on_way), tuple(missed), told)
+
+
+def _untold(solver: Followed, samples: int) -> Told:
+    many = len(solver.program.equations.coordinates)
+    return Told(np.empty((samples, 3, many)), np.zeros(samples, dtype=bool), 0.0)
 
 
 def _trip(solver: Followed, p: Array, z: Array, u: Array, branches: Sequence[int]) -> tuple[Trip, list[float]]:
@@ -316,14 +343,6 @@ def ended(solver: Followed, trip: Trip) -> NoAnswer:
     here = trip.here
     ending = Ending.ENDLESS if trip.walk.endless else Ending.LOST if trip.dead is None else Ending.DEAD_POINT
     return solver.ends(trip.curve.inputs(here.y), here.tangent, ending)
-
-
-def _accumulated(program: Program, p: Array, z: Array, u: Array, steps: int) -> Array:
-    """The unknowns at inputs u, by the program's one run of so many steps: a shorter one waits at its end."""
-    if z.size == 0:
-        return np.zeros((len(u), 0))
-    inputs = np.concatenate([u, np.repeat(u[-1:], steps - len(u), axis=0)])
-    return program.runs(steps)(z, inputs.T, np.repeat(p[:, None], steps, axis=1)).full().T[: len(u)]
 
 
 def _passing(solver: Followed, p: Array, z: Array, u: Array) -> int:
@@ -352,16 +371,16 @@ def corrected(program: Program, p: Array, z: Array, u: Array, last: int | None =
     for stage in program.equations.stages:
         if not length(stage.rows) or (last is not None and stage.level > last):
             continue
-        closing = program.closing(stage)
+        closing = program.closed(stage)
         before = np.inf
         for _ in range(CORRECTIONS):
-            left, slope = (each.full() for each in closing(z, u, p))
+            left, slope = closing(z, u, p)
             gap = float(np.max(np.abs(left), initial=0.0))
             if not gap < before:
                 break
             before = gap
             if slope.size:
-                z[stage.unknowns] -= np.linalg.lstsq(slope, left, rcond=1e-12)[0].ravel()
+                z[stage.unknowns] -= np.linalg.lstsq(slope.T, left[0], rcond=1e-12)[0]
         if not before <= 1e-10:
             return None
     return z

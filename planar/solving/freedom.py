@@ -8,7 +8,6 @@ import numpy as np
 
 from planar.equations import Stage
 from planar.errors import NoAnswer
-from planar.pairs import Kind
 from planar.program import Rates, length
 from planar.solving import refusals
 from planar.solving.follow import corrected
@@ -107,31 +106,12 @@ def _scaled(setup: Setup, slope: Array) -> Array:
     The size of an unknown's column is that in its own group, whatever large or small things later groups hang on it.
     A column that could reach further than it does now keeps what it lacks: it is that which vanishes.
     """
-    scaled = slope.copy()
+    scaled = slope / setup.by[:, None]
     sizes = np.maximum(np.linalg.norm(slope, axis=-2), 1.0)
     for stage in setup.equations.stages:
-        reach = _reach(setup, stage)
-        kinds = [row.kind for row in setup.equations.rows[stage.rows]]
-        scaled[..., stage.rows, :] /= np.array([reach if kind is Kind.LENGTH else 1.0 for kind in kinds])[:, None]
-        least = [_least_size(setup, column, reach) for column in setup.equations.unknowns[stage.unknowns]]
         own = np.linalg.norm(scaled[..., stage.rows, stage.unknowns], axis=-2)
-        sizes[..., stage.unknowns] = np.maximum(own, least)
+        sizes[..., stage.unknowns] = np.maximum(own, setup.least[stage.unknowns])
     return scaled / sizes[..., None, :]
-
-
-def _least_size(setup: Setup, column: int, reach: float) -> float:
-    """What the column of a coordinate could be at best in a group of this reach."""
-    coordinate = setup.equations.coordinates[column]
-    if coordinate.kind is Kind.LENGTH:
-        return 1.0 / reach
-    return setup.reach.get(coordinate.owner, reach) / reach or 1.0
-
-
-def _reach(setup: Setup, stage: Stage) -> float:
-    """The reach of a group's links (sizes); where they have but one point each, of the least link beside them."""
-    own = max((setup.reach[link] for link in stage.links), default=0.0)
-    beside = (setup.reach[link] for pair in stage.pairs for link in setup.pairs[pair].links)
-    return own or min((reach for reach in beside if reach > 0.0), default=1.0)
 
 
 def cancelled(slope: Array, known: Array) -> Array:

@@ -11,14 +11,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from planar.algebra import Jet
+from planar.judged import MOST_TURNS
 from planar.mechanism import Mechanism, motions
 from planar.pairs import Kind, Pair
 from planar.plane import Frame
 from planar.shapes import Shape
 
 Array = np.ndarray
-MOST_TURNS = 1e6
-"""Turns, or sizes: beyond them rounding leaves too little of an angle to judge anything by."""
 TOUCHING = 1e-6
 """Sizes: dimensions in files are rounded, so a contact that guides keep closed may be open by as much."""
 EPS = float(np.finfo(float).eps)
@@ -27,9 +26,11 @@ EPS = float(np.finfo(float).eps)
 class Gate:
     """The constraints of one mechanism (SI, lengths judged in units of its size)."""
 
-    def __init__(self, mechanism: Mechanism, shapes: Mapping[str, Shape], unit: float):
+    def __init__(
+        self, mechanism: Mechanism, shapes: Mapping[str, Shape], unit: float, named: Mapping[str, Pair] | None = None
+    ):
         self.mechanism, self.unit = mechanism, unit
-        self.motions = motions(mechanism)
+        self.motions = motions(mechanism) if named is None else named
         self.numbers = {
             pair.name: pair.measure([shapes[link] for link in pair.bodies])
             for pair in (*mechanism.pairs, *(self.motions[given.pair] for given in mechanism.inputs))
@@ -43,6 +44,13 @@ class Gate:
         # an entry of a residual is a sum of a few terms as long as the mechanism reaches, after one step of rounding
         # for each link on the way round a loop
         self.tolerance = 16.0 * EPS * (4 + len(mechanism.links)) * max(1.0, reach / unit)
+
+    def moved(self, mechanism: Mechanism) -> Gate:
+        """The same for a mechanism that differs from this one in its inputs' numbers alone."""
+        there = object.__new__(Gate)
+        there.__dict__.update(self.__dict__)
+        there.mechanism = mechanism
+        return there
 
     def gaps(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Array]], u: Array | None = None) -> Array:
         """How far every constraint is open (constraints, ...): lengths of the size, or rad; see `names`.

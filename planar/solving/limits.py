@@ -65,7 +65,7 @@ class Outputs(NamedTuple):
     def distance(self, curve: Curve, point: Point, pair: Pair, pin: tuple[str, str]) -> float:
         """How far the point that slides is from a pin of the frame (m)."""
         setup = self.setup
-        w = setup.program.positions(point.y[:-1], curve.inputs(point.y), curve.p).full().ravel() * setup.scale
+        w = setup.program.coordinates(point.y[:-1], curve.inputs(point.y), curve.p) * setup.scale
         frames, _ = placed(w.tolist(), setup.column, setup.shapes, setup.pairs)
         (link, name), _ = pair.rides()
         gap = frames[link].carry(setup.shapes[link].at(name)) - frames[pin[0]].carry(setup.shapes[pin[0]].at(pin[1]))

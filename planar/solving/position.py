@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -28,7 +29,9 @@ from planar.solving.freedom import (
     slope_at,
     strengths,
 )
+from planar.solving.placing import laid
 from planar.solving.setup import Setup
+from planar.solving.straight import Ways, sound, surely_determined
 
 if TYPE_CHECKING:
     from planar.solving.crossing import Passing
@@ -47,13 +50,16 @@ def solve(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = 
     """
     if isinstance(drives, Mapping):
         drives = [Drive(pair, position) for pair, position in drives.items()]
-    here = Solver(mechanism)
-    found = here.assembly()
+    known = known_of(mechanism)
+    here, found = known.solver, known.assembly
     if not drives:
-        return here.state(found.z, here.remarks(found))
-    there = Solver(with_inputs(mechanism, tuple(drives)))
+        return here.state(found.z, known.remarks)
+    there = here.moved(with_inputs(mechanism, tuple(drives)))
+    z = known.ways.to(there.station.u) if there.unit == here.unit else None
+    if z is not None:
+        return there.state(z, known.remarks)
     way = followed(there, there.station.p, found.z, here.station.u, there.station.u)
-    told = here.remarks(found)
+    told = known.remarks
     if way.met or way.missed:
         from planar.solving.passing import on_the_way
 
@@ -83,6 +89,8 @@ class Solver(Setup):
 
     def _is_sound(self, z: Array) -> bool:
         """Whether every group of an assembly is determined there."""
+        if surely_determined(self, z):
+            return True
         return bool(np.all(strengths(self, slope_at(self, z, self.station.u)) >= SINGULAR))
 
     def _unassembled(self, failure: Failure) -> NoAnswer:
@@ -105,6 +113,9 @@ class Solver(Setup):
 
     def state(self, z: Array, remarks: tuple[str, ...] = ()) -> State:
         """The state at given unknowns, once they and their rates have passed the gate. Raises NoAnswer."""
+        state = self._surely(z, remarks)
+        if state is not None:
+            return state
         gaps = self.gaps(z[None], self.station.u[None])[:, 0]
         residual = float(gaps.max(initial=0.0))
         if residual > self.tolerance:
@@ -126,6 +137,15 @@ class Solver(Setup):
         moving = self.program.kinematics(y, y1, given, s.p)
         y2 = np.concatenate([cancelled(moving.slope, moving.F2), s.u2])
         return self._stated(self.program.kinematics(y, y1, y2, s.p), found, residual, remarks)
+
+    def _surely(self, z: Array, remarks: tuple[str, ...]) -> State | None:
+        """The state by compiled functions alone, where they find nothing to look at."""
+        found = sound(self, z)
+        if found is None:
+            return None
+        frames, own = laid(self, found.parts)
+        mobility = len(self.station.u)
+        return State(self.mechanism, mobility, found.residual, remarks, frames, own, self.shapes)
 
     def ends(self, u: Array, tangent: Array, ending: Ending) -> NoAnswer:
         """What to say of a motion that ends at inputs u, towards which it went along a tangent."""
@@ -179,3 +199,43 @@ class Solver(Setup):
                 raise refusals.broken_rates(self, what, pair, float(np.max(gap)))
         self.refuse_gap(frames, own)
         return State(self.mechanism, found, residual, remarks, frames, own, self.shapes)
+
+
+class Known:
+    """What is kept of a mechanism from one solution to the next."""
+
+    def __init__(self, mechanism: Mechanism):
+        self.solver = Solver(mechanism)
+        self.ends: dict[Any, Any] = {}
+        "the ends of the ranges of its inputs"
+
+    @cached_property
+    def assembly(self) -> Assembly:
+        """The assembly nearest to the sketch. Raises NoAnswer."""
+        found = self.solver.assembly()
+        found.z.flags.writeable = False
+        return found
+
+    @cached_property
+    def remarks(self) -> tuple[str, ...]:
+        """What there is to say of it."""
+        return self.solver.remarks(self.assembly)
+
+    @cached_property
+    def ways(self) -> Ways:
+        """Positions to which it leads."""
+        return Ways(self.solver, self.assembly.z)
+
+
+@lru_cache(maxsize=64)
+def _known(mechanism: Mechanism) -> Known:
+    return Known(mechanism)
+
+
+def known_of(mechanism: Mechanism) -> Known:
+    """What is known of a mechanism. Raises BadInput."""
+    try:
+        hash(mechanism)
+    except TypeError:  # made in Python, of lists
+        return Known(mechanism)
+    return _known(mechanism)

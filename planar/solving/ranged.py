@@ -16,9 +16,10 @@ from planar.solving import limits
 from planar.solving.circuit import Circuit, circuit
 from planar.solving.curve import Curve
 from planar.solving.follow import Local, Run, Trip, ended, follow, met, onwards, pieces, run
-from planar.solving.position import Solver
+from planar.solving.position import known_of
 from planar.solving.rates import Given
 from planar.solving.rows import Rows, joined, motion, reversed_, rows, shortened, spliced
+from planar.solving.straight import Told, course
 from planar.solving.walk import ENDLESS, Missed, Walk
 from planar.words import listed
 
@@ -52,13 +53,14 @@ class Ranged:
             raise BadInput(pair, f"there is no input at {pair!r}; inputs are at {', '.join(names)}")
         self.index = names.index(pair) if pair is not None else 0
         still = tuple(Drive(name, None, 0.0, 0.0) for k, name in enumerate(names) if k != self.index)
-        self.solver = Solver(with_inputs(mechanism, still))
+        self.known = known_of(with_inputs(mechanism, still))
+        self.solver = self.known.solver
         self.pair = names[self.index]
         self.slides = self.solver.slides(self.pair)
         self.scale = self.solver.unit if self.slides else 1.0
         self.u, self.p = self.solver.station.u, self.solver.station.p
         self.branches, self.third = tuple(branches), third
-        self.found = self.solver.assembly()
+        self.found = self.known.assembly
 
     def between(self, steps: int, start: float | None, stop: float | None, back: bool) -> Motion:
         """The run over a range, or over the one that the input has by itself; and back again if wanted."""
@@ -74,7 +76,7 @@ class Ranged:
         found = self._through(grid[:-1])
         if found.stopped is not None:
             return self._told(self._stopped(found, self._given(grid)), back)
-        whole = found._replace(z=np.vstack([found.z, end.z]))
+        whole = found._replace(z=np.vstack([found.z, end.z]), told=found.told and found.told.padded(0, 1))
         return self._told(self._limited(rows(whole, self._given(grid), (steps,)), (end,)), back)
 
     def round(self, steps: int, start: float | None) -> Motion:
@@ -112,7 +114,8 @@ class Ranged:
 
     def _run(self, steps: int, first: float, last: float) -> Rows:
         grid = np.linspace(first, last, steps + 1)
-        found, given = self._through(grid), self._given(grid)
+        given = self._given(grid)
+        found = self._through(grid)
         return rows(found, given) if found.stopped is None else self._stopped(found, given)
 
     def _through(self, grid: Array) -> Run:
@@ -137,15 +140,20 @@ class Ranged:
 
     def _from_here(self, grid: Array) -> Run:
         here = self.u[self.index]
-        return run(self.solver, self.p, self.found.z, self._at(np.append(here, grid)), self.branches)
+        given = self._given(np.append(here, grid))
+        rates = None if self.third else (given.u1, given.u2)
+        return run(self.solver, self.p, self.found.z, given.u, self.branches, rates)
 
     def _whole(self, steps: int, here: float) -> Rows:
         """One turn on where the input makes it, else all between its limits."""
-        if not self.slides:
-            found = self._run(steps, here, here + 2.0 * pi)
-            if found.outcome is Outcome.SOLVED:
+        key = self.index, self.branches
+        if key not in self.known.ends:
+            found = None if self.slides else self._turn(steps, here)
+            if isinstance(found, Rows):
                 return found
-        low, high = (self._end(self.found.z, here, sign) for sign in (-1.0, 1.0))
+            high = found or self._end(self.found.z, here, 1.0)
+            self.known.ends[key] = self._end(self.found.z, here, -1.0), high
+        low, high = self.known.ends[key]
         if high.position - low.position < LEAST:
             self.solver.state(self.found.z)  # says why nothing goes on from a dead point or a change point
             at = self.solver.told(self.pair, here)
@@ -160,9 +168,23 @@ class Ranged:
                 return self._stopped(shortened(part), self._given(inner[: len(part.z)]))
         found = spliced(down, up)
         local = {row + 1: each for row, each in found.local.items()}
-        whole = found._replace(z=np.vstack([low.z, found.z, high.z]), local=local)
+        told = found.told and found.told.padded(1, 1)
+        whole = found._replace(z=np.vstack([low.z, found.z, high.z]), local=local, told=told)
         dead = tuple(index for index, end in ((0, low), (steps, high)) if end.dead)
         return self._limited(rows(whole, self._given(grid), dead), (low, high))
+
+    def _turn(self, steps: int, here: float) -> Rows | _End | None:
+        """One turn on, if the input makes it; else the end of its range, if that is known."""
+        given = self._given(np.linspace(here, here + 2.0 * pi, steps + 1))
+        sure = course(self.solver, self.found.z, *given[:3])
+        if sure is not None and len(sure.z) == steps + 1 and not self.third:
+            return Rows(sure.z, given, told=Told(sure.parts, np.ones(steps + 1, dtype=bool), sure.open))
+        if sure is not None and len(sure.z) <= steps:
+            end = self._end(self.found.z, here, 1.0)  # walking tells it sooner than a run would
+            if not end.open:
+                return end
+        found = self._run(steps, here, here + 2.0 * pi)
+        return found if found.outcome is Outcome.SOLVED else None
 
     def _limited(self, found: Rows, ends: tuple[_End, ...]) -> Rows:
         """Rows of a range that ends by itself, with what there is to say of it."""
@@ -192,6 +214,7 @@ class Ranged:
             z=np.vstack([reached.z, z]),
             given=Given(*(np.vstack(both) for both in zip(reached.given, ends_there, strict=True))),
             dead=(len(reached.z),),
+            told=reached.told and reached.told.padded(0, 1),
         )
         return reached.stopped(found.stopped)
 

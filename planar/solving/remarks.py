@@ -47,7 +47,7 @@ def _stands(setup: Setup, candidates: Candidates, stage: Stage, z: Array) -> str
     if not placed_here:
         return f"one assembly of {listed([repr(link) for link in stage.links])}"
     name, link, point = max(placed_here, key=lambda each: len(_sharing(candidates, each[0])))
-    w = setup.program.positions(z, setup.station.u, setup.station.p).full().ravel() * setup.scale
+    w = setup.program.coordinates(z, setup.station.u, setup.station.p) * setup.scale
     frames, _ = placed(w, setup.column, [link], {})
     length = unit(setup.mechanism.units.length)
     at = [f"{length.from_si(float(each)):.4g}" for each in frames[link].carry(setup.shapes[link].at(point))]

@@ -11,14 +11,15 @@ import numpy as np
 from planar.algebra import Jet
 from planar.errors import NoAnswer, Outcome
 from planar.motion import Course, Motion
-from planar.program import placed
 from planar.results import InputMotion, Jerked
 from planar.solving import refusals
 from planar.solving.assemble import Assembly
 from planar.solving.follow import Local, Met, Run
 from planar.solving.passing import on_the_way
+from planar.solving.placing import laid
 from planar.solving.position import Solver
 from planar.solving.rates import Given, rates
+from planar.solving.straight import Told, stacked
 from planar.solving.walk import Missed
 
 Array = np.ndarray
@@ -36,6 +37,18 @@ class Rows(NamedTuple):
     missed: tuple[Missed, ...] = ()
     outcome: Outcome = Outcome.SOLVED
     reason: str = ""
+    told: Told | None = None
+
+    def of(self, some: Array) -> Rows:
+        """Some of the rows, in their order, of which nothing is told."""
+        where = {int(row): k for k, row in enumerate(some)}
+        return self._replace(
+            z=self.z[some],
+            given=Given(*(each[some] for each in self.given)),
+            dead=tuple(where[row % len(self.z)] for row in self.dead),
+            local={where[row]: each for row, each in self.local.items()},
+            told=None,
+        )
 
     def stopped(self, problem: NoAnswer | None) -> Rows:
         """The same rows, of a run that stopped."""
@@ -45,7 +58,7 @@ class Rows(NamedTuple):
 def rows(found: Run, given: Given, dead: tuple[int, ...] = ()) -> Rows:
     """The rows of a run that was followed in one piece."""
     part = Given(*(each[: len(found.z)] for each in given))
-    return Rows(found.z, part, dead, found.local, found.met, found.missed)
+    return Rows(found.z, part, dead, found.local, found.met, found.missed, told=found.told)
 
 
 def spliced(down: Run, up: Run) -> Run:
@@ -61,13 +74,14 @@ def spliced(down: Run, up: Run) -> Run:
         local,
         (*down.met[::-1], *up.met),
         (*down.missed, *up.missed),
+        stacked(down.told and down.told.cut(slice(None, 0, -1)), up.told and up.told.cut(slice(1, None))),
     )
 
 
 def shortened(found: Run) -> Run:
     """A run without its first position, which is no row."""
     local = {row - 1: each for row, each in found.local.items() if row}
-    return found._replace(z=found.z[1:], local=local)
+    return found._replace(z=found.z[1:], local=local, told=found.told and found.told.cut(slice(1, None)))
 
 
 def joined(first: Rows, second: Rows) -> Rows:
@@ -83,6 +97,7 @@ def joined(first: Rows, second: Rows) -> Rows:
         missed=(*first.missed, *second.missed),
         outcome=second.outcome,
         reason=first.reason or second.reason,
+        told=stacked(first.told, second.told and second.told.cut(slice(1, None))),
     )
 
 
@@ -95,6 +110,7 @@ def reversed_(run: Rows) -> Rows:
         given=Given(u, -u1, u2, -u3),
         dead=tuple(sorted(last - row for row in run.dead)),
         local={last - row: each for row, each in run.local.items()},
+        told=run.told and run.told.backwards(),
     )
 
 
@@ -102,6 +118,38 @@ def motion(
     solver: Solver, assembly: Assembly, run: Rows, third: bool, course: Course, time: Array | None = None
 ) -> Motion:
     """The motion; raises NoAnswer where the gate does not let it pass."""
+    told = run.told if not third else None
+    if told is not None and told.sure.all():
+        parts, residual = list(told.parts.transpose(1, 0, 2)), told.open
+    elif told is not None:
+        rest = np.flatnonzero(~told.sure)
+        looked_at, residual = _looked_at(solver, run.of(rest), third)
+        whole = told.parts.copy()
+        whole[rest] = np.stack(looked_at, axis=1)
+        parts, residual = list(whole.transpose(1, 0, 2)), max(residual, told.open)
+    else:
+        parts, residual = _looked_at(solver, run, third)
+    inputs = {each.pair: _input(solver, run.given, index) for index, each in enumerate(solver.mechanism.inputs)}
+    frames, own = laid(solver, parts[:3])
+    return Motion(
+        mechanism=solver.mechanism,
+        inputs=inputs,
+        outcome=run.outcome,
+        reason=run.reason,
+        residual=residual,
+        remarks=(*solver.remarks(assembly), *on_the_way(solver, run.met, run.missed)),
+        frames=frames,
+        own=own,
+        shapes=solver.shapes,
+        time=time,
+        jerked=Jerked(*laid(solver, parts)) if third else None,
+        course=course,
+    )
+
+
+def _looked_at(solver: Solver, run: Rows, third: bool) -> tuple[list[Array], float]:
+    """w with its rates by the general path (rows, coordinates) of each order, and what the worst constraint leaves
+    open."""
     z, given = run.z, run.given
     gaps = solver.gaps(z, given.u)
     residual = float(gaps.max(initial=0.0))
@@ -112,8 +160,7 @@ def motion(
     for part in parts[1:]:
         # where the input turns back, no velocity of the rest goes with one of the input
         part[list(run.dead)] = np.nan
-    scaled = [part * solver.scale for part in parts]
-    frames, own = _placed(solver, scaled[:3])
+    frames, own = laid(solver, parts[:3])
     determined = ~np.isnan(parts[1]).any(axis=1) if parts[1].size else np.ones(len(z), dtype=bool)
     inputs = [_input(solver, given, index) for index in range(len(solver.mechanism.inputs))]
     gaps_of_rates = solver.gate.rate_gaps(frames, own, [Jet(*each) for each in inputs])
@@ -124,27 +171,9 @@ def motion(
             at = f"at {solver.where(given.u[row])}"
             raise refusals.broken_rates(solver, what, pair, float(of_rows[row]), at)
     solver.refuse_gap(frames, own)
-    return Motion(
-        mechanism=solver.mechanism,
-        inputs={each.pair: of for each, of in zip(solver.mechanism.inputs, inputs, strict=True)},
-        outcome=run.outcome,
-        reason=run.reason,
-        residual=residual,
-        remarks=(*solver.remarks(assembly), *on_the_way(solver, run.met, run.missed)),
-        frames=frames,
-        own=own,
-        shapes=solver.shapes,
-        time=time,
-        jerked=Jerked(*_placed(solver, scaled)) if third else None,
-        course=course,
-    )
+    return parts, residual
 
 
 def _input(solver: Solver, given: Given, index: int) -> InputMotion:
     size = solver.unit if solver.slides(solver.mechanism.inputs[index].pair) else 1.0
     return InputMotion(*(part[:, index] * size for part in given[:3]))
-
-
-def _placed(solver: Solver, parts: list[Array]):  # noqa: ANN202
-    jets = [Jet(*(part[:, column] for part in parts)) for column in range(parts[0].shape[1])]
-    return placed(jets, solver.column, solver.shapes, solver.pairs)

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from functools import cached_property
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from planar.algebra import Jet, Scalar
 from planar.errors import BadInput
-from planar.mechanism import Mechanism, check, misfits, motions
+from planar.judged import Judged
+from planar.mechanism import Mechanism, misfits
 from planar.pairs import Kind
 from planar.plane import Frame
-from planar.program import Program, extent, fitted, placed, positions, program, rates, shapes, size
+from planar.program import extent, gathered, greatest, placed, shapes
 from planar.solving.gate import Gate
+from planar.solving.outline import outline
 from planar.words import amount, listed
 
 Array = np.ndarray
@@ -32,26 +35,75 @@ class Setup:
     """What does not change from one position of a mechanism to the next, and what the file's own inputs are."""
 
     def __init__(self, mechanism: Mechanism):
-        check(mechanism)
+        self.outline = outline(mechanism)
         self.mechanism = mechanism
         self.shapes = shapes(mechanism)
+        self.program, self.equations = self.outline.program, self.outline.equations
+        self.column, self.pairs, self.named = self.outline.column, self.outline.pairs, self.outline.named
         for pair, wrong in misfits(mechanism.pairs, self.shapes, mechanism.units):
             raise BadInput(pair.name, wrong)
-        self.unit = size(mechanism, self.shapes)
-        self.program: Program = program(mechanism)
-        self.equations = self.program.equations
-        self.gate = Gate(mechanism, self.shapes, self.unit)
-        self.column = {(c.owner, c.part): index for index, c in enumerate(self.equations.coordinates)}
-        self.pairs = {pair.name: pair for pair in mechanism.pairs}
-        self.named = motions(mechanism)
-        self.scale = np.array([self.unit if c.kind is Kind.LENGTH else 1.0 for c in self.equations.coordinates])
-        self.reach = {name: extent(shape) / self.unit for name, shape in self.shapes.items()}
-        self.station = Station(
-            positions(mechanism, self.unit),
-            rates(mechanism, "velocity", self.unit),
-            rates(mechanism, "acceleration", self.unit),
-            fitted(mechanism, self.shapes, self.unit),
-        )
+        extents = {name: extent(shape) for name, shape in self.shapes.items()}
+        self.unit = greatest(mechanism, extents, self.outline.slide)
+        self.gate = Gate(mechanism, self.shapes, self.unit, self.named)
+        self.scale = np.where(self.outline.lengths, self.unit, 1.0)
+        self.reach = {name: each / self.unit for name, each in extents.items()}
+        self.extended = any(self.reach.values())
+        "whether the unit is a length of some link, and no slide's travel"
+        self.station = Station(*self._inputs(mechanism), gathered(mechanism, self.gate.numbers, self.unit))
+
+    def moved(self, mechanism: Mechanism) -> Self:
+        """The same for a mechanism that differs from this one in its inputs' numbers alone."""
+        lawful = any(given.law is not None for given in mechanism.inputs)
+        if lawful or not self.extended:
+            return type(self)(mechanism)
+        there = object.__new__(type(self))
+        there.__dict__.update(self.__dict__)
+        there.mechanism, there.gate = mechanism, self.gate.moved(mechanism)
+        there.station = Station(*self._inputs(mechanism), self.station.p)
+        return there
+
+    def _inputs(self, mechanism: Mechanism) -> tuple[Array, Array, Array]:
+        """Positions, velocities and accelerations of a mechanism's inputs (scaled)."""
+        by = [self.unit if slides else 1.0 for slides in self.outline.slide]
+        parts = [[value / size for value in given[1:4]] for given, size in zip(mechanism.inputs, by, strict=True)]
+        u, u1, u2 = np.array(parts, dtype=float).reshape(-1, 3).T.copy()
+        return u, u1, u2
+
+    @property
+    def judged(self) -> Judged | None:
+        """What judges positions in compiled functions, for the structures that have it."""
+        return self.outline.judged
+
+    @cached_property
+    def by(self) -> Array:
+        """What every row of a slope is divided by (rows,): lengths by the reach of their group."""
+        e = self.equations
+        by = np.ones(len(e.rows))
+        for stage, reach in zip(e.stages, self._reaches, strict=True):
+            by[stage.rows] = [reach if row.kind is Kind.LENGTH else 1.0 for row in e.rows[stage.rows]]
+        return by
+
+    @cached_property
+    def least(self) -> Array:
+        """What the column of every unknown could be at best in its group, rows divided so (unknowns,)."""
+        e = self.equations
+        least = np.ones(len(e.unknowns))
+        for stage, reach in zip(e.stages, self._reaches, strict=True):
+            own = [e.coordinates[column] for column in e.unknowns[stage.unknowns]]
+            least[stage.unknowns] = [
+                1.0 / reach if c.kind is Kind.LENGTH else self.reach.get(c.owner, reach) / reach or 1.0 for c in own
+            ]
+        return least
+
+    @cached_property
+    def _reaches(self) -> list[float]:
+        """The reach of every group's links (sizes); where they have but one point each, of the least link beside."""
+        found = []
+        for stage in self.equations.stages:
+            own = max((self.reach[link] for link in stage.links), default=0.0)
+            beside = (self.reach[link] for pair in stage.pairs for link in self.pairs[pair].links)
+            found.append(own or min((reach for reach in beside if reach > 0.0), default=1.0))
+        return found
 
     @property
     def tolerance(self) -> float:
@@ -60,7 +112,7 @@ class Setup:
 
     def gaps(self, z: Array, u: Array) -> Array:
         """What every constraint leaves open (constraints, samples); z (samples, unknowns), u (samples, inputs)."""
-        w = self.program.positions(z.T, u.T, self.station.p).full()
+        w = self.program.coordinates(z, u, self.station.p).T
         scale = np.array([self.unit if self.slides(given.pair) else 1.0 for given in self.mechanism.inputs])
         with np.errstate(invalid="ignore"):  # what is not a number counts as open, and is refused as such
             frames, own = placed(w * self.scale[:, None], self.column, self.shapes, self.pairs)

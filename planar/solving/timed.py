@@ -17,7 +17,7 @@ from planar.roots import root
 from planar.solving.follow import SEAM, Met, Run, followed, run
 from planar.solving.limits import STILL, Outputs, outputs
 from planar.solving.passing import crossed
-from planar.solving.position import Solver
+from planar.solving.position import known_of
 from planar.solving.rates import Given, rates
 from planar.solving.rows import Rows, motion, rows
 
@@ -28,10 +28,11 @@ class Timed:
     """All inputs of a mechanism at once, in time."""
 
     def __init__(self, mechanism: Mechanism, branches: Sequence[int], third: bool):
-        self.solver = Solver(mechanism)
+        known = known_of(mechanism)
+        self.solver = known.solver
         self.branches, self.third = tuple(branches), third
         self.scale = np.array([self.solver.unit if self.solver.slides(g.pair) else 1.0 for g in mechanism.inputs])
-        self.found = self.solver.assembly()
+        self.found = known.assembly
 
     def over(self, steps: int, duration: float | None) -> Motion:
         """The run from the start of the laws to the end of the longest, or for a duration (s)."""
@@ -42,14 +43,16 @@ class Timed:
             duration = max(laws)
         time = np.linspace(0.0, duration, steps + 1)
         given = self.given(time)
-        found = run(self.solver, self.solver.station.p, self.found.z, given.u, self.branches)
+        known = None if self.third else (given.u1, given.u2)
+        found = run(self.solver, self.solver.station.p, self.found.z, given.u, self.branches, known)
         told = rows(found, given).stopped(found.stopped)
         last = self._dead(found, given, time)
         time = time[: len(found.z)]
         if last is not None and found.last is not None:
             ends = self.given(np.array([last]))._replace(u=found.last[1][None])
             whole = Given(*(np.vstack(both) for both in zip(told.given, ends, strict=True)))
-            told = told._replace(z=np.vstack([told.z, found.last[0]]), given=whole, dead=(len(told.z),))
+            sure = told.told and told.told.padded(0, 1)
+            told = told._replace(z=np.vstack([told.z, found.last[0]]), given=whole, dead=(len(told.z),), told=sure)
             time = np.append(time, last)
         return motion(self.solver, self.found, told, self.third, _Course(self, told, time), time)
 

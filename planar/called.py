@@ -1,0 +1,118 @@
+"""A compiled function called on arrays as they lie in memory, at one position or at many."""
+
+from __future__ import annotations
+
+from threading import Lock
+from typing import Any
+
+import numpy as np
+
+Array = np.ndarray
+
+SIZES = (256, 32, 8)
+"""Positions that are worked on by one call."""
+
+
+class Called:
+    """A function of dense columns. Results are (columns, rows), or (positions, columns, rows).
+
+    A call through casadi's own interface costs some 30 us, one through its buffers less than one.
+    """
+
+    def __init__(self, function: Any):
+        self.function = function
+        self.lock = Lock()
+        self.given = [np.zeros(function.numel_in(k)) for k in range(function.n_in())]
+        self.found = [np.zeros(function.size_out(k)[::-1]) for k in range(function.n_out())]
+        self.run = self._bound()
+        self._mapped: dict[int, tuple[Any, Any]] = {}
+
+    def _bound(self) -> Any:
+        buffer, run = self.function.buffer()
+        for set_, arrays in ((buffer.set_arg, self.given), (buffer.set_res, self.found)):
+            for k, each in enumerate(arrays):
+                if each.size:
+                    set_(k, memoryview(each.reshape(-1)))
+        self._buffer = buffer  # has to live as long as what runs it
+        return run
+
+    def __call__(self, *arguments: Array) -> list[Array]:
+        """The results at one position, each argument as long as the function's."""
+        with self.lock:
+            for own, each in zip(self.given, arguments, strict=True):
+                own[:] = each
+            self.run()
+            return [each.copy() for each in self.found]
+
+    def over(self, many: int, *arguments: Array) -> list[Array]:
+        """The results at many positions; arguments (positions, entries), or (entries,) for all of them alike."""
+        room = -(-many // SIZES[-1]) * SIZES[-1]  # whole calls: what is over is not looked at
+        given, found = [], [np.empty((room, *own.shape)) for own in self.found]
+        for own, each in zip(self.given, arguments, strict=True):
+            alike = each.ndim == 1
+            array = np.empty((min(room, SIZES[0]) if alike else room, len(own)))
+            array[: len(array) if alike else many] = each
+            array[len(array) if alike else many :] = 0.0
+            given.append((array, alike))
+        views = [(k, memoryview(array.reshape(-1)), array[:1].size, alike) for k, (array, alike) in enumerate(given)]
+        told = [(k, memoryview(each.reshape(-1)), each[:1].size, False) for k, each in enumerate(found)]
+        done = 0
+        with self.lock:
+            for size in SIZES:
+                first = True
+                while room - done >= size:
+                    buffer, run = self._over(size)
+                    for set_, each in ((buffer.set_arg, views), (buffer.set_res, told)):
+                        for k, view, entries, alike in each:
+                            if entries and (first or not alike):
+                                start = 0 if alike else done
+                                set_(k, view[start * entries : (start + size) * entries])
+                    run()
+                    done, first = done + size, False
+        return [each[:many] for each in found]
+
+    def _over(self, size: int) -> tuple[Any, Any]:
+        if size not in self._mapped:
+            self._mapped[size] = self.function.map(size).buffer()
+        return self._mapped[size]
+
+
+class Chained:
+    """A function (state, argument, numbers) -> state, from one position to the next of a run."""
+
+    def __init__(self, function: Any):
+        self.function = function
+        self.lock = Lock()
+        self._made: dict[int, tuple[Any, Any, list[Array]]] = {}
+
+    def __call__(self, state: Array, arguments: Array, numbers: Array) -> Array:
+        """The states (positions, entries) at arguments (positions, inputs), each from the one before."""
+        many = len(arguments)
+        found = np.empty((many, len(state)))
+        done = 0
+        with self.lock:
+            for size in (*SIZES, 1):
+                if many - done < size or not found.size:
+                    continue
+                run, (before, given, fixed, after) = self._of(size)
+                fixed[:] = numbers
+                while many - done >= size:
+                    before[:] = found[done - 1] if done else state
+                    given[:] = arguments[done : done + size]
+                    run()
+                    found[done : done + size] = after
+                    done += size
+        return found
+
+    def _of(self, size: int) -> tuple[Any, list[Array]]:
+        if size not in self._made:
+            function = self.function.mapaccum("runs", size) if size > 1 else self.function
+            many = [self.function.numel_in(k) for k in range(3)]
+            arrays = [np.zeros(many[0]), *(np.zeros((size, each)) for each in (*many[1:], many[0]))]
+            buffer, run = function.buffer()
+            for k, each in enumerate(arrays[:3]):
+                if each.size:
+                    buffer.set_arg(k, memoryview(each.reshape(-1)))
+            buffer.set_res(0, memoryview(arrays[3].reshape(-1)))
+            self._made[size] = run, arrays, buffer
+        return self._made[size][:2]
