@@ -26,8 +26,11 @@ if TYPE_CHECKING:
     from planar.document.schema import schema
     from planar.errors import BadInput, NoAnswer, Outcome, PlanarError
     from planar.files import dumps, from_dict, load, loads, to_dict
+    from planar.grouped.each import sweep_each
+    from planar.grouped.result import Each, Swept
     from planar.mechanism import Along, At, Distances, Drive, Input, Link, Load, Mechanism, Point
     from planar.motion import Motion, State
+    from planar.pins import pinned
     from planar.solving.cycle import cycle
     from planar.solving.position import solve
     from planar.sweeping.prepared import prepared
@@ -52,6 +55,7 @@ _ROOMS = {
     "Distances": "mechanism",
     "Drive": "mechanism",
     "Dwell": "analysis.dwells",
+    "Each": "grouped.result",
     "Extreme": "analysis.output",
     "Extremes": "analysis.extremes",
     "Forces": "analysis.forces",
@@ -69,6 +73,7 @@ _ROOMS = {
     "State": "motion",
     "Stroke": "analysis.extremes",
     "Sweep": "sweeping.result",
+    "Swept": "grouped.result",
     "Swing": "analysis.extremes",
     "TimeRatio": "analysis.time_ratio",
     "Transmission": "analysis.transmission",
@@ -93,12 +98,14 @@ _ROOMS = {
     "load": "files",
     "loads": "files",
     "mobility": "analysis.mobility",
+    "pinned": "pins",
     "plot": "plot",
     "prepared": "sweeping.prepared",
     "schema": "document.schema",
     "solve": "solving.position",
     "stroke": "analysis.extremes",
     "sweep": "sweeping.sweep",
+    "sweep_each": "grouped.each",
     "swing": "analysis.extremes",
     "time_ratio": "analysis.time_ratio",
     "to_dict": "files",
@@ -122,6 +129,7 @@ __all__ = [
     "Distances",
     "Drive",
     "Dwell",
+    "Each",
     "Extreme",
     "Extremes",
     "Forces",
@@ -139,6 +147,7 @@ __all__ = [
     "State",
     "Stroke",
     "Sweep",
+    "Swept",
     "Swing",
     "TimeRatio",
     "Transmission",
@@ -163,12 +172,14 @@ __all__ = [
     "load",
     "loads",
     "mobility",
+    "pinned",
     "plot",
     "prepared",
     "schema",
     "solve",
     "stroke",
     "sweep",
+    "sweep_each",
     "swing",
     "time_ratio",
     "to_dict",
