@@ -12,16 +12,20 @@ from rich.text import Text
 
 from benchmarks import readme, tables
 from benchmarks.comparison import compare
-from benchmarks.contests import Contest, contests
+from benchmarks.compiling import compilings
+from benchmarks.contests import contests
 from benchmarks.curves import against_designs, against_links
 from benchmarks.growth import FAR, LINKS, grow, grow_far
 from benchmarks.imports import costs
 from benchmarks.linkages import LINKAGES, Linkage
+from benchmarks.long import long
 from benchmarks.memory import hold
+from benchmarks.mixed import STOPPING, Mixed
 from benchmarks.processes import ROOT, cold_starts
 from benchmarks.versions import versions
 
 DESIGNS, ROW = "time a position against the number of designs", "time a position against the number of links"
+LONG, CODE, COLD = "up to ten thousand links", "machine code", "cold start"
 
 
 def main() -> None:
@@ -33,7 +37,7 @@ def main() -> None:
     if not console.is_terminal:
         console = Console(width=160)
     hold()
-    held = contests()
+    held = (*contests(), Mixed(), Mixed(STOPPING, True))
     measurements: dict[str, Callable[[], Any]] = {
         **{contest.name: contest.measure for contest in held},
         DESIGNS: against_designs,
@@ -41,7 +45,9 @@ def main() -> None:
         **{linkage.name: _compared(linkage) for linkage in LINKAGES},
         "links": lambda: tables.growth(grow(links) for links in LINKS),
         "many links": lambda: tables.far(grow_far(*each) for each in FAR),
-        "cold start": lambda: tables.processes(cold_starts()),
+        LONG: long,
+        CODE: compilings,
+        COLD: cold_starts,
         "what costs what": lambda: tables.costs(costs()),
     }
     found: dict[str, Any] = {}
@@ -54,16 +60,21 @@ def main() -> None:
     console.print(Text(versions(), style="bold"))
     console.print(tables.notes())
     for name, each in found.items():
-        console.print(_shown(name, each, held))
+        console.print(_shown(name, each, {contest.name for contest in held}))
     if wanted.readme:
         results = [result for contest in held for result in found[contest.name]]
-        readme.write(ROOT, versions(), results, found[DESIGNS], found[ROW])
+        readme.write(
+            ROOT, versions(), results, found[DESIGNS], found[ROW], tables=(found[LONG], found[CODE], found[COLD])
+        )
 
 
-def _shown(name: str, found: Any, held: tuple[Contest, ...]) -> RenderableType:
+def _shown(name: str, found: Any, contested: set[str]) -> RenderableType:
+    if name in contested:
+        return tables.contest(found)
     if name in (DESIGNS, ROW):
         return tables.curves(name, found)
-    return tables.contest(found) if any(contest.name == name for contest in held) else found
+    kinds = {LONG: tables.long, CODE: tables.compiling, COLD: tables.processes}
+    return kinds[name](found) if name in kinds else found
 
 
 def _compared(linkage: Linkage) -> Callable[[], RenderableType]:

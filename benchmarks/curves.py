@@ -11,6 +11,7 @@ from benchmarks import by_planar, peers
 from benchmarks.contests import LIMIT, STEPS, TURN
 from benchmarks.entry import Array, Entry
 from benchmarks.limit import compiled
+from benchmarks.long import long_of, row
 from benchmarks.swept import SweptFourBar, angles
 from benchmarks.swept.row import Row
 from benchmarks.timing import best
@@ -51,7 +52,7 @@ def against_designs() -> tuple[Curve, ...]:
 
 
 def against_links() -> tuple[Curve, ...]:
-    """One row of four-bars over a turn, positions alone."""
+    """One row of four-bars over a turn, positions alone; longer ones where a solver takes them."""
     told: list[tuple[int, Entry]] = []
     theta = angles(TURN)
     exact = {}
@@ -68,7 +69,28 @@ def against_links() -> tuple[Curve, ...]:
                 continue
             entries = import_module(f"benchmarks.peers.{peers.PACKAGES[name]}").entries(row, theta)
             told += [(links, entry) for entry in entries if not entry.rates]
-    return _curves(told, exact)
+    return _lengthened(_curves(told, exact))
+
+
+def _lengthened(curves: tuple[Curve, ...]) -> tuple[Curve, ...]:
+    """The same, with rows of up to ten thousand links by `planar.sweep_each`, and by C."""
+    found = long_of("rows of four-bars")
+    # its error is a part of the greatest coordinate
+    error = found.error * float(np.abs(row(found.links[-1]).places).max())
+
+    def known(seconds: tuple[float | None, ...], after: int) -> list[tuple[int, float]]:
+        both = zip(found.links, seconds, strict=True)
+        return [(links, each * links) for links, each in both if each is not None and links > after]
+
+    told = []
+    for curve in curves:
+        more = known(found.limit, curve.grows[-1]) if curve.system == LIMIT else []
+        grows, seconds = (*curve.grows, *(n for n, _ in more)), (*curve.seconds, *(each for _, each in more))
+        told.append(Curve(curve.system, grows, seconds, curve.error))
+    ours = known(found.planar, 0)
+    if ours:
+        told.append(Curve("planar.sweep_each", *zip(*ours, strict=True), error))
+    return tuple(told)
 
 
 def _curves(told: list[tuple[int, Entry]], exact: dict[int, Array]) -> tuple[Curve, ...]:

@@ -10,9 +10,11 @@ from statistics import median
 from time import perf_counter
 
 import planar
+from benchmarks import peers
 
 MODEL = "002-E3.1"
-RUNS = 7
+RUNS, OF_PEERS = 7, 3
+"""How often every command is run, and those that only import another solver."""
 ROOT = Path(planar.__file__).parents[1]
 SOLVE = ("-m", "planar", "solve", MODEL)
 COMMANDS: tuple[tuple[str, ...], ...] = (
@@ -34,10 +36,12 @@ class Process:
 
 def cold_starts() -> tuple[Process, ...]:
     """Every command run in turn, again and again; the files are in the system's cache."""
-    times: dict[tuple[str, ...], list[float]] = {command: [] for command in COMMANDS}
-    for _ in range(RUNS):
+    others = tuple(("-c", f"import {name}") for name in peers.installed())
+    times: dict[tuple[str, ...], list[float]] = {command: [] for command in (*COMMANDS, *others)}
+    for run in range(RUNS):
         for command, seconds in times.items():
-            seconds.append(_timed(command)[0])
+            if run < OF_PEERS or command in COMMANDS:
+                seconds.append(_timed(command)[0])
     middle = {command: median(seconds) for command, seconds in times.items()}
     return tuple(
         Process(_shown(command), seconds, seconds / middle[COMMANDS[0]]) for command, seconds in middle.items()

@@ -6,16 +6,27 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from benchmarks import plots
+from benchmarks.compiling import Compiling
 from benchmarks.contests import Result
 from benchmarks.curves import Curve
+from benchmarks.long import Long
+from benchmarks.processes import Process
 from benchmarks.tables import time
 
 START, END = "<!-- benchmarks -->", "<!-- /benchmarks -->"
 PICTURES = {"designs": ".pictures/time-designs.png", "links": ".pictures/time-links.png"}
 
 
+Tables = tuple[Sequence[Long], Sequence[Compiling], Sequence[Process]]
+
+
 def write(
-    root: Path, versions: str, results: Iterable[Result], designs: Sequence[Curve], links: Sequence[Curve]
+    root: Path,
+    versions: str,
+    results: Iterable[Result],
+    designs: Sequence[Curve],
+    links: Sequence[Curve],
+    tables: Tables = ((), (), ()),
 ) -> None:
     """README.md and its two plots. Raises ValueError where README has no markers."""
     readme = root / "README.md"
@@ -24,16 +35,16 @@ def write(
         raise ValueError(f"README.md has no {START} before an {END}")
     for what, title, along, curves in (
         ("designs", "Four-bars, 200 steps round, positions", "designs in one call", designs),
-        ("links", "One row of four-bars, 360 steps round, positions", "links", links),
+        ("links", "One row of four-bars, over a turn, positions", "links", links),
     ):
         path = root / PICTURES[what]
         path.parent.mkdir(exist_ok=True)
         plots.save(path, title, along, curves)
     before, after = text.split(START)[0], text.split(END)[1]
-    readme.write_text(f"{before}{START}\n{section(versions, results)}\n{END}{after}", encoding="utf-8")
+    readme.write_text(f"{before}{START}\n{section(versions, results, tables)}\n{END}{after}", encoding="utf-8")
 
 
-def section(versions: str, results: Iterable[Result]) -> str:
+def section(versions: str, results: Iterable[Result], tables: Tables = ((), (), ())) -> str:
     """What stands between the markers, as Markdown."""
     lines = [
         f"{versions}.",
@@ -47,6 +58,8 @@ def section(versions: str, results: Iterable[Result]) -> str:
     for contest, systems in by_contest.items():
         for index, (system, found) in enumerate(sorted(systems.items(), key=lambda item: _key(item[1]))):
             lines.append(f"| {contest if not index else ''} | {system} | {_row(found)} |")
+    long, code, processes = tables
+    lines += [*_long(long), *_code(code), *_processes(processes)]
     lines += [
         "",
         f"![Time a position against the number of designs]({PICTURES['designs']})",
@@ -54,6 +67,40 @@ def section(versions: str, results: Iterable[Result]) -> str:
         f"![Time a position against the number of links]({PICTURES['links']})",
     ]
     return "\n".join(lines)
+
+
+def _long(measured: Sequence[Long]) -> list[str]:
+    """Time a position and link, as Markdown; planar's, with its ratio to that of C."""
+    if not measured:
+        return []
+    sizes = sorted({round(links, -1) for each in measured for links in each.links})
+    lines = ["", f"| a position and link, of links: | {' | '.join(f'{size:,}' for size in sizes)} | greatest error |"]
+    lines.append("|---|" + "---|" * (len(sizes) + 1))
+    for each in measured:
+        cells = []
+        for ours, theirs in zip(each.planar, each.limit, strict=True):
+            shown = "not waited for" if ours is None else time(ours)
+            cells.append(shown if ours is None or theirs is None else f"{shown} ({ours / theirs:.3g} times C)")
+        lines.append(f"| {each.structure} | {' | '.join(cells)} | {each.error:.0e} |")
+    return lines
+
+
+def _code(measured: Sequence[Compiling]) -> list[str]:
+    if not measured:
+        return []
+    lines = ["", "| machine code, with velocities and accelerations | printed | compiled | read by another process |"]
+    lines.append("|---|---|---|---|")
+    for each in measured:
+        times = " | ".join(time(seconds) for seconds in (each.printing, each.compiling, each.reading))
+        lines.append(f"| {each.structure} | {times} |")
+    return lines
+
+
+def _processes(measured: Sequence[Process]) -> list[str]:
+    if not measured:
+        return []
+    lines = ["", "| a whole process | time | ratio |", "|---|---|---|"]
+    return lines + [f"| `{each.command}` | {time(each.seconds)} | {each.ratio:.2g} |" for each in measured]
 
 
 def _key(found: dict[bool, Result]) -> float:

@@ -11,10 +11,12 @@ from rich.text import Text
 
 import planar
 from benchmarks.comparison import Row
+from benchmarks.compiling import Compiling
 from benchmarks.contests import Result
 from benchmarks.curves import Curve
 from benchmarks.growth import Far, Growth
 from benchmarks.imports import Cost
+from benchmarks.long import Long
 from benchmarks.processes import Process
 
 
@@ -115,6 +117,26 @@ def growth(measured: Iterable[Growth]) -> RenderableType:
             _step(each.run, first.run),
             _error(each.run_error),
         )
+    return table
+
+
+def long(measured: Iterable[Long]) -> RenderableType:
+    """Seconds a position and link, for each kind of linkage and number of links."""
+    table = _table("a position and link of linkages of many links", "linkage", "links", "planar", "C", "greatest error")
+    for each in measured:
+        for k, links in enumerate(each.links):
+            times = (each.planar[k], each.limit[k])
+            shown = ("" if seconds is None else time(seconds) for seconds in times)
+            error = _error(each.error) if each.planar[k] is not None else ""
+            table.add_row("" if k else each.structure, f"{links:,}", *shown, "" if k else error)
+    return table
+
+
+def compiling(measured: Iterable[Compiling]) -> RenderableType:
+    """How long machine code takes to be there."""
+    table = _table("machine code, with velocities and accelerations", "structure", "printed", "compiled", "from disk")
+    for each in measured:
+        table.add_row(each.structure, time(each.printing), time(each.compiling), time(each.reading))
     return table
 
 

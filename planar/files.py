@@ -1,10 +1,12 @@
-"""The only room that opens files: mechanism files, and the models that come along."""
+"""The only room that opens files: mechanism files, models that come along, what is kept for other processes."""
 
 from __future__ import annotations
 
 import json
+import os
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +52,42 @@ def save(path: Path, content: str | bytes) -> None:
         path.write_bytes(content.encode() if isinstance(content, str) else content)
     except OSError as problem:
         raise BadInput(str(path), f"the file cannot be written: {problem.strerror}") from None
+
+
+def own_bytes(path: Path) -> bytes | None:
+    """A file's content if it and its folder are this user's and nobody else may write there; else None."""
+    try:
+        if not _own(path.parent.stat()):
+            return None
+        with path.open("rb") as file:
+            return file.read() if _own(os.fstat(file.fileno())) else None
+    except OSError:
+        return None
+
+
+def put_whole(path: Path, content: bytes) -> bool:
+    """Write a file that only this user can read, all at once, into a folder of his own; whether that was possible.
+
+    A folder that is not there is made. A process that is killed leaves the old file or the new one, never a part.
+    """
+    part = path.with_name(f"{os.getpid()}-{os.urandom(6).hex()}.part")
+    try:
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        if not _own(path.parent.stat()):
+            return False
+        part.touch(mode=0o600, exist_ok=False)
+        part.write_bytes(content)
+        part.replace(path)
+    except OSError:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+        return False
+    return True
+
+
+def _own(known: os.stat_result) -> bool:
+    """Whether a file or folder is this user's, and nobody else may write to it; where there are no users it is."""
+    return not hasattr(os, "getuid") or (known.st_uid == os.getuid() and not known.st_mode & 0o022)
 
 
 def found(model: str | Path) -> Path:

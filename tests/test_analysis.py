@@ -9,7 +9,6 @@ import pytest
 import planar
 from planar.analysis.forces import efforts
 from planar.analysis.published import compare
-from planar.analysis.speed import measure
 from planar.mechanism import Drive, Published
 from planar.words import heading, hurrying, listed, turning
 from tests.command import run
@@ -78,22 +77,6 @@ def test_efforts_need_no_speed_and_are_those_of_each_input():
 
     assert found["A"] == pytest.approx(-moment(whole), rel=1e-12)
     assert found["B"] == pytest.approx(-moment(upper), rel=1e-12)
-
-
-@pytest.mark.parametrize("model", ["000-P1", "000-P2", "004-QR"])
-def test_speed_is_measured_over_a_run_that_the_linkage_makes(model):
-    speed = measure(planar.load(model), rounds=1)
-    assert min(speed.equations, speed.assembly, speed.position, speed.run) > 0
-    assert 0 < abs(speed.span) <= 2 * np.pi
-    assert json.loads(json.dumps(speed.record()))["links"] == len(planar.load(model).links)
-
-
-def test_bench_prints_a_table_and_a_record(tmp_path):
-    table = run(tmp_path, "bench", "000-P1").done()
-    assert "assembly" in table
-    assert "Four-bar" in table
-    (record,) = json.loads(run(tmp_path, "bench", "000-P1", "--json").done())
-    assert set(record) == {"name", "links", "unknowns", "equations", "assembly", "position", "run", "span"}
 
 
 @pytest.mark.parametrize(
@@ -165,12 +148,6 @@ def test_a_pin_at_constant_speed_is_steady_at_any_size(degrees):
     state = planar.solve(planar.from_dict(value | {"inputs": [given]}))
     assert state.point("P").sense.endswith("steady")
     assert state.link("a").sense == "anticlockwise, steady"
-
-
-def test_bare_bench_measures_models_that_come_along(tmp_path):
-    records = json.loads(run(tmp_path, "bench", "--json").done())
-    assert len(records) == 3
-    assert all(record["run"] > 0 for record in records)
 
 
 def test_relative_motion_in_the_table_and_the_record(tmp_path):

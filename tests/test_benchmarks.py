@@ -9,11 +9,14 @@ import numpy as np
 import pytest
 
 import planar
-from benchmarks import by_planar, peers, readme
+from benchmarks import by_planar, compiling, dyadic, long, peers, readme
 from benchmarks.contests import Contest, Result
 from benchmarks.curves import Curve
 from benchmarks.limit import LANES, compiled
-from benchmarks.swept import SWEPT, SweptFourBar, angles
+from benchmarks.linkages.base import THETA
+from benchmarks.mixed import Mixed
+from benchmarks.processes import Process
+from benchmarks.swept import RATES, SWEPT, SweptFourBar, angles
 from benchmarks.swept.row import Row
 
 NAMES = [swept.name for swept in SWEPT]
@@ -136,3 +139,116 @@ def test_readme_gets_its_table_and_plots_between_its_markers(tmp_path):
     assert text.startswith("before\n") and text.endswith("\nafter\n") and "old" not in text
     assert "|  | planar.sweep, native | 5 ns | 11 ns | 5 / 2.5 | 3e-15 | 1 of 10 (0) |" in text
     assert all((tmp_path / picture).stat().st_size > 5000 for picture in readme.PICTURES.values())
+
+
+def test_random_linkages_of_dyads_are_c_by_hand_and_numpys_closed_form(limit):
+    mixed = Mixed(30, True, 60)
+    stops = 0
+    for entry in mixed.entries()[:3]:
+        told = entry.solve()
+        for k in range(mixed.many):
+            exact = dyadic.closed(mixed.tape, mixed.turned, k, entry.rates)
+            found = entry.read(told, k)
+            assert np.array_equal(np.isnan(found[:, :2]), np.isnan(exact[:, :2]))
+            gone = np.isnan(exact).any(axis=(0, 1))
+            stops += bool(gone.any())
+            # rates grow towards a dead point
+            whole = ~gone if not gone.any() else np.flatnonzero(gone)[0] > np.arange(len(gone)) + 3
+            scale = np.abs(exact[..., whole]).max(axis=2, keepdims=True).max(axis=0, keepdims=True)
+            np.testing.assert_allclose((found / scale)[..., whole], (exact / scale)[..., whole], atol=1e-9)
+    assert stops >= 3
+
+
+def test_random_linkages_go_round_but_for_those_whose_last_dyad_stops():
+    tape = dyadic.drawn(40, True)
+    counts = np.diff(tape.first)
+    assert (counts.min(), counts.max()) >= (dyadic.FEWEST, 15) and counts.max() <= dyadic.MOST
+    gone = [np.isnan(dyadic.closed(tape, angles(400) - THETA, k, rates=False)).any(axis=(1, 2)) for k in range(40)]
+    # only the last joint is not there
+    assert not any(each[:-1].any() for each in gone)
+    assert 0 < sum(each[-1] for each in gone) < 12
+    assert all(dyadic.sketch(tape, k).shape == (counts[k], 2) for k in range(40))
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.skipif("pylinkage" not in peers.installed(), reason="pylinkage is not there")
+def test_pylinkage_finds_random_linkages_of_dyads():
+    mixed = Mixed(6, False, 90)
+    entries = [entry for entry in mixed.entries() if entry.system.startswith("pylinkage")]
+    assert [entry.rates for entry in entries] == [False, False, True, True]
+    for entry in entries:
+        assert mixed.result(entry, 1.0, 1.0).error < 1e-9
+
+
+@pytest.mark.skipif(not hasattr(planar, "sweep_each"), reason="planar.sweep_each is not there")
+def test_planar_finds_random_linkages_of_dyads_and_refuses_the_others():
+    mixed = Mixed(30, True, 60)
+    for entry in mixed.entries():
+        if entry.system.startswith("planar"):
+            result = mixed.result(entry, 1.0, 1.0)
+            assert result.error < 1e-9
+            assert result.wrong == 0
+            assert result.refused > 0
+
+
+@pytest.mark.parametrize("make", [long.row, long.scissors], ids=["row", "scissors"])
+def test_long_linkages_go_round_in_c_by_hand(limit, make):
+    linkage = make(40)
+    assert linkage.links in (40, 41)
+    turned = 2.0 * np.pi * np.linspace(0.0, 1.0, 61)
+    exact = dyadic.closed(linkage.tape, turned, 0, rates=True)
+    assert np.isfinite(exact).all()
+    np.testing.assert_allclose(exact[:, :2, 0], linkage.places, atol=1e-12)
+    np.testing.assert_allclose(limit.tape(linkage.tape, turned, RATES)(), exact, atol=1e-9 * np.abs(exact).max())
+    # the bars keep their lengths: the tape is the linkage of bars
+    for a, b, *more in linkage.bars:
+        for c in (b, *more):
+            far = np.hypot(*(exact[a, :2] - exact[c, :2]))
+            np.testing.assert_allclose(far, far[0], atol=1e-10)
+
+
+def test_long_chains_of_triads_go_round():
+    linkage = long.triads(14)
+    assert linkage.links == 14
+    links = {"frame": {"points": {f"P{pin}": linkage.places[pin].tolist() for pin in linkage.frame}}}
+    for k, (a, b, *more) in enumerate(linkage.bars):
+        (ax, ay), (bx, by) = linkage.places[[a, b]]
+        length = float(np.hypot(bx - ax, by - ay))
+        turn = np.array([[bx - ax, by - ay], [ay - by, bx - ax]]) / length
+        points = {f"P{c}": (turn @ (linkage.places[c] - linkage.places[a])).tolist() for c in more}
+        links[f"bar{k}"] = {"ends": [f"P{a}", f"P{b}"], "length": length, "points": points}
+    value = {
+        "planar": 1,
+        "frame": "frame",
+        "links": links,
+        "pairs": [{"turning": f"P{pin}"} for pin in range(len(linkage.places))],
+        "inputs": [{"pair": "P0", "position": THETA, "velocity": 1.0}],
+        "sketch": {f"P{k}": at.tolist() for k, at in enumerate(linkage.places) if k not in linkage.frame},
+    }
+    motion = planar.cycle(planar.from_dict(value), 24)
+    assert (motion.outcome, len(motion)) == (planar.Outcome.SOLVED, 25)
+    last = motion.point(f"P{linkage.bars[-1][1]}").position
+    assert 0.15 < np.ptp(last[:, 0]) < 0.3
+
+
+def test_code_is_printed_and_compiled_by_one_process_and_read_by_another():
+    pytest.importorskip("llvmlite")
+    first = compiling._told("four-bar")
+    assert min(first.printing, first.compiling, first.reading) > 0.0
+    assert first.reading < first.compiling
+
+
+def test_readme_has_the_other_tables_too():
+    tables = (
+        [
+            long.Long("rows", (10, 100), (2e-9, 3e-9), (1e-9, None), 1e-15),
+            long.Long("triads", (10, 102), (5e-9, None), (None, None), 0.0),
+        ],
+        [compiling.Compiling("four-bar", 0.01, 0.04, 0.002)],
+        [Process("python -c pass", 0.1, 1.0)],
+    )
+    text = readme.section("planar", [], tables)
+    assert "| rows | 2 ns (2 times C) | 3 ns | 1e-15 |" in text
+    assert "| triads | 5 ns | not waited for | 0e+00 |" in text
+    assert "| four-bar | 10 ms | 40 ms | 2 ms |" in text
+    assert "| `python -c pass` | 100 ms | 1 |" in text

@@ -14,10 +14,26 @@ from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import NamedTuple
 
 import numpy as np
 
 Array = np.ndarray
+
+
+class Tape(NamedTuple):
+    """Linkages of dyads as data, joint after joint; see `tape` in limit.c.
+
+    first (linkages + 1,): where the joints of each begin; kind (joints,), of (joints, 2): joints of the same linkage by
+    number, size (joints, 3).
+    """
+
+    first: Array
+    kind: Array
+    of: Array
+    size: Array
+
+
 Rates = tuple[float, float] | None
 
 SOURCE = Path(__file__).with_name("limit.c")
@@ -85,6 +101,29 @@ class Limit:
         """Rows (2, steps) of the last rocker's pin in a row of four-bars, cells (four-bars, 4) of a, b, c and g."""
         given = (len(cells), len(angles), _pointer(cells), *_even(angles))
         return self._kept("row", given, np.empty((2, len(angles))), cells)
+
+    def tape(self, tape: Tape, turned: Array, rates: Rates = None) -> Callable[[], Array]:
+        """Rows (joints, 2 or 6, steps) of all joints of all linkages, the crank turned on by angles (steps,)."""
+        if len(turned) > MOST:
+            raise ValueError(f"at most {MOST} angles are wanted")
+        cs = np.column_stack([np.cos(turned), np.sin(turned)])
+        function, long, pointer, number = self._library["tape"], ctypes.c_long, ctypes.c_void_p, ctypes.c_double
+        function.restype, function.argtypes = (
+            None,
+            [long, long, *5 * [pointer], number, number, ctypes.c_int, pointer],
+        )
+        held = tuple(np.ascontiguousarray(part, dtype=np.int_) for part in (tape.first, tape.kind, tape.of))
+        shape = (len(tape.kind), 2 if rates is None else 6, len(turned))
+        counts = len(tape.first) - 1, len(turned)
+        pointers = (*(each.ctypes.data for each in held), _pointer(tape.size), _pointer(cs))
+
+        def call() -> Array:
+            out = np.empty(shape)
+            function(*counts, *pointers, *(rates or (0.0, 0.0)), rates is not None, _pointer(out))
+            return out
+
+        call.holds = (held, tape, cs)  # type: ignore[attr-defined]
+        return call
 
     def _kept(self, name: str, given: tuple[float, ...], out: Array, holds: Array) -> Callable[[], Array]:
         function = self._function(name)

@@ -24,11 +24,12 @@ INLINE moving crank(double r, double c, double s, double w, double e) {
     return (moving){p, {-w * p.y, w * p.x}, {-e * p.y - w * w * p.x, e * p.x - w * w * p.y}};
 }
 
-/* The pin b from P and c from Q, to the left of the way from P to Q: one division and one root, another for rates. */
-INLINE moving dyad(moving P, moving Q, double b2, double c2, int rates) {
+/* The pin b from P and c from Q, to the left of the way from P to Q (side 1, else -1): one division and one root,
+ * another for rates. */
+INLINE moving joined(moving P, moving Q, double b2, double c2, double side, int rates) {
     two e = minus(Q.p, P.p);
     double inverse = 1.0 / dot(e, e), along = 0.5 + 0.5 * (b2 - c2) * inverse;
-    double across = sqrt(b2 * inverse - along * along);
+    double across = side * sqrt(b2 * inverse - along * along);
     two b = {along * e.x - across * e.y, along * e.y + across * e.x}, c = minus(b, e);
     moving C = {{P.p.x + b.x, P.p.y + b.y}, {0, 0}, {0, 0}};
     if (!rates) return C;
@@ -40,6 +41,8 @@ INLINE moving dyad(moving P, moving Q, double b2, double c2, int rates) {
     C.a = (two){(f * c.y - g * b.y) * whole, (g * b.x - f * c.x) * whole};
     return C;
 }
+
+INLINE moving dyad(moving P, moving Q, double b2, double c2, int rates) { return joined(P, Q, b2, c2, 1.0, rates); }
 
 INLINE void put(double *restrict at, long n, moving C, int rates) {
     at[0] = C.p.x, at[n] = C.p.y;
@@ -262,4 +265,57 @@ void stephenson(long n, long steps, const double *d, const double *cs, double w,
     long at = 0;
     for (; at + LANES <= n; at += LANES) { MARCH(LANES) }
     for (; at < n; at++) { MARCH(1) }
+}
+
+/* Linkages of any dyads, as data: joint j of linkage i is on the frame (kind 0, at size[0], size[1]), on the crank (1, at
+ * radius size[0] about joint of[0], in the direction size[1], size[2] where the crank starts), joins two joints (2, of[0]
+ * and of[1] at the squared distances size[0], size[1], on the side size[2]), or stands on a link with two others (3, from
+ * of[0] by size[0] of the way to of[1], and by size[1] of it to the left). Joints follow those that they need.
+ * cs: of how far the crank has turned. Row r of joint j at a step is out[(j * rows + r) * steps + step].
+ */
+INLINE moving get(const double *restrict at, long n, int rates) {
+    moving P = {{at[0], at[n]}, {0, 0}, {0, 0}};
+    if (rates) P.v = (two){at[2 * n], at[3 * n]}, P.a = (two){at[4 * n], at[5 * n]};
+    return P;
+}
+
+INLINE void joints(long n, long steps, const long *restrict kind, const long *restrict of, const double *restrict size,
+                   const double *restrict co, const double *restrict si, double w, double e, const int rates,
+                   double *restrict out) {
+    const long rows = (rates ? 6 : 2) * steps;
+    for (long j = 0; j < n; j++, size += 3) {
+        double *restrict to = out + j * rows;
+        const double *p = out + of[2 * j] * rows, *q = out + of[2 * j + 1] * rows;
+        const double a = size[0], b = size[1], c = size[2];
+        if (kind[j] == 0) {
+            moving P = {{a, b}, {0, 0}, {0, 0}};
+            for (long i = 0; i < steps; i++) put(to + i, steps, P, rates);
+        } else if (kind[j] == 1) {
+            _Pragma("GCC ivdep") for (long i = 0; i < steps; i++) {
+                moving P = crank(a, b * co[i] - c * si[i], c * co[i] + b * si[i], w, e);
+                P.p.x += p[i], P.p.y += p[steps + i];
+                put(to + i, steps, P, rates);
+            }
+        } else if (kind[j] == 3) {
+            for (long k = 0; k < (rates ? 6 : 2); k += 2, to += 2 * steps, p += 2 * steps, q += 2 * steps)
+                _Pragma("GCC ivdep") for (long i = 0; i < steps; i++) {
+                    const double x = q[i] - p[i], y = q[steps + i] - p[steps + i];
+                    to[i] = p[i] + a * x - b * y, to[steps + i] = p[steps + i] + a * y + b * x;
+                }
+        } else {
+            _Pragma("GCC ivdep") for (long i = 0; i < steps; i++)
+                put(to + i, steps, joined(get(p + i, steps, rates), get(q + i, steps, rates), a, b, c, rates), rates);
+        }
+    }
+}
+
+void tape(long n, long steps, const long *first, const long *kind, const long *of, const double *size, const double *cs,
+          double w, double e, int rates, double *out) {
+    double co[MOST], si[MOST];
+    for (long i = 0; i < steps; i++) co[i] = cs[2 * i], si[i] = cs[2 * i + 1];
+    for (long k = 0; k < n; k++) {
+        const long at = first[k], many = first[k + 1] - at;
+        if (rates) joints(many, steps, kind + at, of + 2 * at, size + 3 * at, co, si, w, e, 1, out + at * 6 * steps);
+        else joints(many, steps, kind + at, of + 2 * at, size + 3 * at, co, si, w, e, 0, out + at * 2 * steps);
+    }
 }

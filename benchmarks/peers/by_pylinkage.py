@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from pylinkage.actuators import Crank
 from pylinkage.bridge.solver_conversion import linkage_to_solver_data
@@ -12,6 +14,7 @@ from pylinkage.simulation import Linkage
 from pylinkage.solver.simulation import simulate, simulate_with_kinematics
 
 from benchmarks.entry import Array, Entry
+from benchmarks.limit import Tape
 from benchmarks.swept import RATES, Swept
 from benchmarks.swept.base import crank_pin, dyad_pin, fixed
 from benchmarks.swept.six_bars import BELL
@@ -115,3 +118,61 @@ def _told(parts: list, constraints: tuple[Array, ...], at: list, asked: int) -> 
 
 
 _SET_UP = {"four_bar": _four_bar, "watt": _watt, "quick_return": _quick_return}
+
+
+def mixed(tape: Tape, places: list[Array], steps: int) -> list[tuple]:
+    """Random linkages of dyads, one after the other: solved, solved with rates, and solved with what building takes."""
+    turn = 2.0 * np.pi / steps
+
+    def build() -> list[tuple]:
+        return [_built(tape, places, k, turn) for k in range(len(places))]
+
+    built = build()
+    rates = [np.array([rate]) for rate in RATES]
+
+    def positions(ready: list) -> list[Array]:
+        return [simulate(start.copy(), constraints, *arrays, steps, 1.0) for start, constraints, arrays, _ in ready]
+
+    def moving(ready: list) -> list[tuple[Array, Array, Array]]:
+        found = []
+        for start, constraints, arrays, crank in ready:
+            still = np.zeros_like(start), np.zeros_like(start)
+            found.append(
+                simulate_with_kinematics(start.copy(), *still, constraints, *arrays, *rates, crank, steps, 1.0)
+            )
+        return found
+
+    def read(found: list[Array], k: int) -> Array:
+        return np.moveaxis(found[k], 0, 2)
+
+    def read_moving(found: list[tuple[Array, Array, Array]], k: int) -> Array:
+        return np.concatenate([np.moveaxis(order, 0, 2) for order in found[k]], axis=1)
+
+    return [
+        (SYSTEM, False, lambda: positions(built), read, 1),
+        (f"{SYSTEM}, with building", False, lambda: positions(build()), read, 1),
+        (SYSTEM, True, lambda: moving(built), read_moving, 1),
+        (f"{SYSTEM}, with building", True, lambda: moving(build()), read_moving, 1),
+    ]
+
+
+def _built(tape: Tape, places: list[Array], linkage: int, turn: float) -> tuple:
+    """One linkage as its solver takes it: places, constraints, structure, its crank's joint."""
+    part, parts, crank = slice(tape.first[linkage], tape.first[linkage + 1]), [], 0
+    at = places[linkage]
+    size = tape.size[part].tolist()
+    for joint, (kind, (p, q)) in enumerate(zip(tape.kind[part].tolist(), tape.of[part].tolist(), strict=True)):
+        x, y = at[joint].tolist()
+        if kind == 0:
+            parts.append(Ground(x, y))
+        elif kind == 1:
+            crank = joint
+            parts.append(Crank(parts[p], radius=size[joint][0], angular_velocity=turn))
+        else:
+            first, second = (parts[k].output if isinstance(parts[k], Crank) else parts[k] for k in (p, q))
+            parts.append(RRRDyad(first, second, math.sqrt(size[joint][0]), math.sqrt(size[joint][1])))
+    data = linkage_to_solver_data(Linkage(parts))
+    constraints = data.constraints.copy()
+    constraints[int(data.constraint_offsets[crank]) + 1] = turn
+    arrays = (data.joint_types, data.parent_indices, data.constraint_offsets, data.solve_order)
+    return np.ascontiguousarray(at), constraints, arrays, np.array([crank], dtype=np.int32)

@@ -55,16 +55,27 @@ def models(as_json: bool) -> None:
 
 @main.command()
 @click.argument("model", required=False)
+@click.option(
+    "--seconds",
+    type=click.FloatRange(0.0, 1e4),
+    default=3.0,
+    show_default=True,
+    help="About how long the sweeps of a mechanism are timed.",
+)
 @as_json
-def bench(model: str | None, as_json: bool) -> None:
-    """Solver speed on this machine: assembly, one warm position, a position of a 360-step run."""
-    from planar.analysis.speed import measure
+def bench(model: str | None, seconds: float, as_json: bool) -> None:
+    """How fast it is solved on this machine: one position, a run, many designs, and what bounds it."""
     from planar.files import load
+    from planar.speed import measure
 
-    speeds = [measure(load(name)) for name in ([model] if model else ["four-bar", "slider-crank", "double-butterfly"])]
+    mechanisms = [load(name) for name in ([model] if model else ["four-bar", "slider-crank", "double-butterfly"])]
+    speeds = []
+    for mechanism in mechanisms:
+        with busy(mechanism.name):
+            speeds.append(measure(mechanism, seconds=seconds))
     if as_json:
         click.echo(json.dumps([speed.record() for speed in speeds], ensure_ascii=False))
         return
-    from planar.views.table import speeds as table
+    from planar.views.speeds import table
 
     show(table(speeds), None)

@@ -1,35 +1,78 @@
-"""LLVM IR compiled for this machine, once for each text."""
+"""LLVM IR compiled for this machine, once for each text; what is compiled is kept on disk for other processes."""
 
 from __future__ import annotations
 
 import ctypes
-from functools import lru_cache
+from functools import cache, lru_cache
+from hashlib import sha256
 from typing import Any
 
+import llvmlite
 import llvmlite.binding as llvm
 
+from planar.native import kept
 
-def _machine() -> Any:
-    """What to compile for; one for every module, since what is compiled owns it."""
-    llvm.initialize_native_target()
-    llvm.initialize_native_asmprinter()
-    return llvm.Target.from_default_triple().create_target_machine(
-        cpu=llvm.get_host_cpu_name(), features=llvm.get_host_cpu_features().flatten(), opt=2, jit=True
-    )
+SPEED, CODE = 1, 2
+"""How much the passes over the text, and the making of code, may take: more costs time and gives none back."""
+TYPES = {"int": ctypes.c_int64, "float": ctypes.c_double, "array": ctypes.c_void_p}
 
 
 @lru_cache(maxsize=64)
 def compiled(text: str, name: str, *kinds: str) -> Any:
     """The function of that name in a text, which takes arguments of these kinds ("int", "float", "array")."""
-    machine = _machine()
-    module = llvm.parse_assembly(text)
-    tuning = llvm.create_pipeline_tuning_options(speed_level=2)
+    engine = _engine(text)
+    function = ctypes.CFUNCTYPE(None, *(TYPES[kind] for kind in kinds))(engine.get_function_address(name))
+    function.engine = engine  # what was compiled lives as long as the function
+    return function
+
+
+def _engine(text: str) -> Any:
+    """The text's machine code, from the disk or new."""
+    key = fingerprint(text)
+    code = kept.read(key)
+    if code is None:
+        code = _made(text)
+        kept.write(key, code)
+    return _loaded(code)
+
+
+def fingerprint(text: str) -> str:
+    """Of a text and all that its code depends on: the processor, the compiler, and how it is told to compile."""
+    cpu, features = _processor()
+    llvm_is = ".".join(map(str, llvm.llvm_version_info))
+    said = (llvmlite.__version__, llvm_is, llvm.get_process_triple(), cpu, features, f"{SPEED} {CODE}", text)
+    return sha256("\0".join(said).encode()).hexdigest()
+
+
+@cache
+def _processor() -> tuple[str, str]:
+    """This processor's name and features, as LLVM has them."""
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    return llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
+
+
+def _machine() -> Any:
+    """What to compile for; one for every engine, which owns it."""
+    cpu, features = _processor()
+    target = llvm.Target.from_default_triple()
+    return target.create_target_machine(cpu=cpu, features=features, opt=CODE, jit=True)
+
+
+def _made(text: str) -> bytes:
+    """The text compiled, as an object file's content."""
+    machine, module = _machine(), llvm.parse_assembly(text)
+    tuning = llvm.create_pipeline_tuning_options(speed_level=SPEED)
     tuning.slp_vectorization = tuning.loop_vectorization = False
     builder = llvm.create_pass_builder(machine, tuning)
     builder.getModulePassManager().run(module, builder)
-    engine = llvm.create_mcjit_compiler(module, machine)
+    return machine.emit_object(module)
+
+
+def _loaded(code: bytes) -> Any:
+    """Machine code ready to run; LLVM does not look whether it is any."""
+    held = llvm.ObjectFileRef.from_data(code)
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine())
+    engine.add_object_file(held)
     engine.finalize_object()
-    of = {"int": ctypes.c_int64, "float": ctypes.c_double, "array": ctypes.c_void_p}
-    function = ctypes.CFUNCTYPE(None, *(of[kind] for kind in kinds))(engine.get_function_address(name))
-    function.engine = engine  # what was compiled lives as long as the function
-    return function
+    return engine

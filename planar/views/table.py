@@ -12,7 +12,6 @@ from rich.table import Table
 from rich.text import Text
 
 from planar.analysis.published import Comparison
-from planar.analysis.speed import Speed
 from planar.mechanism import QUANTITIES, motions
 from planar.motion import RelativeState, State
 from planar.pairs import Pair
@@ -81,32 +80,6 @@ def models(rows: Iterable[tuple[str, str, str]]) -> RenderableType:
     for row in rows:
         table.add_row(*row)
     return table
-
-
-def speeds(measured: Iterable[Speed]) -> RenderableType:
-    """How long the steps of solving take on this machine."""
-    headings = (
-        "mechanism",
-        "links",
-        "unknowns",
-        "equations",
-        "assembly",
-        "one position, with rates",
-        "a position of a run",
-    )
-    table = plain_table(None, *headings)
-    for each in measured:
-        times = (each.equations, each.assembly, each.position, each.run)
-        table.add_row(each.name, str(each.links), str(each.unknowns), *(_time(seconds) for seconds in times))
-    note = "run: 360 steps through the gate; equations are built once for a structure"
-    return Group(table, Text(note, style="italic"))
-
-
-def _time(seconds: float) -> str:
-    for size, name in ((1.0, "s"), (1e-3, "ms"), (1e-6, "us")):
-        if seconds >= size:
-            return f"{seconds / size:.3g} {name}"
-    return f"{seconds / 1e-9:.3g} ns"
 
 
 def _heading(state: State) -> RenderableType:

@@ -1,0 +1,191 @@
+"""Machine code on disk: found again by other processes, and never run where anything about it is amiss."""
+
+import ctypes
+import os
+import subprocess
+import sys
+from hashlib import sha256
+from pathlib import Path
+
+import pytest
+
+from planar import files
+from planar.native import compiled, kept
+
+TIMES = """
+define void @times(ptr %at) {
+  %is = load double, ptr %at
+  %made = fmul double %is, FACTOR
+  store double %made, ptr %at
+  ret void
+}
+"""
+
+
+def text(factor):
+    return TIMES.replace("FACTOR", f"{float(factor):e}")
+
+
+def times(factor):
+    """What the compiled function makes of 2."""
+    compiled.compiled.cache_clear()
+    function, number = compiled.compiled(text(factor), "times", "array"), ctypes.c_double(2.0)
+    function(ctypes.addressof(number))
+    return number.value
+
+
+@pytest.fixture
+def place(tmp_path, monkeypatch):
+    """An empty folder of code."""
+    monkeypatch.setenv("PLANAR_CACHE", str(tmp_path / "code"))
+    return tmp_path / "code"
+
+
+@pytest.fixture
+def made(monkeypatch):
+    """Whatever is compiled from now on, in turn."""
+    told, really = [], compiled._made
+
+    def making(asked):
+        told.append(asked)
+        return really(asked)
+
+    monkeypatch.setattr(compiled, "_made", making)
+    return told
+
+
+def only(place):
+    (path,) = place.iterdir()
+    return path
+
+
+def test_code_is_compiled_once_and_read_from_then_on(place, made):
+    assert (times(3), times(3), times(5), times(3)) == (6.0, 6.0, 10.0, 6.0)
+    assert made == [text(3), text(5)]
+    assert len(list(place.iterdir())) == 2
+
+
+def test_another_process_does_not_compile_again(place):
+    assert times(3) == 6.0
+    code = (
+        "import ctypes\nfrom planar.native import compiled\nimport tests.test_kept as here\n"
+        "compiled._made = None  # cannot be called\nprint(here.times(3))"
+    )
+    root = Path(files.__file__).parents[1]
+    ended = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, text=True, check=False)
+    assert (ended.stdout, ended.stderr) == ("6.0\n", "")
+
+
+@pytest.mark.parametrize("where", [0, kept.DIGEST - 1, kept.DIGEST, 200, -1])
+def test_a_damaged_file_is_compiled_again_and_replaced(place, made, where):
+    times(3)
+    path = only(place)
+    whole = bytearray(path.read_bytes())
+    right = bytes(whole)
+    whole[where] ^= 1
+    path.write_bytes(whole)
+    assert times(3) == 6.0
+    assert len(made) == 2
+    assert path.read_bytes() == right
+
+
+@pytest.mark.parametrize("length", [0, 10, kept.DIGEST, 300])
+def test_a_part_of_a_file_is_compiled_again(place, made, length):
+    times(3)
+    path = only(place)
+    path.write_bytes(path.read_bytes()[:length])
+    assert times(3) == 6.0
+    assert len(made) == 2
+
+
+def test_a_file_under_another_name_is_not_run(place, made):
+    times(3)
+    only(place).rename(place / f"{compiled.fingerprint(text(5))}{kept.ENDING}")
+    assert times(5) == 10.0
+    assert len(made) == 2
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="there are no users")
+def test_what_another_user_wrote_or_could_write_is_not_run(place, made, monkeypatch):
+    times(3)
+    path, mine = only(place), os.getuid()
+    assert (path.stat().st_mode & 0o777, place.stat().st_mode & 0o777) == (0o600, 0o700)
+    for each, mode in ((path, 0o620), (path, 0o602), (place, 0o770), (place, 0o707)):
+        usual = each.stat().st_mode
+        each.chmod(mode)
+        assert files.own_bytes(path) is None
+        each.chmod(usual)
+    assert files.own_bytes(path) is not None
+    monkeypatch.setattr(os, "getuid", lambda: mine + 1)
+    assert files.own_bytes(path) is None
+    before = path.stat().st_mtime_ns
+    assert times(3) == 6.0  # nor is anything written into a folder of another
+    assert (len(made), path.stat().st_mtime_ns) == (2, before)
+
+
+def test_code_runs_where_nothing_can_be_kept(tmp_path, made, monkeypatch):
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("PLANAR_CACHE", str(tmp_path / "file" / "below"))
+    assert (times(3), times(3)) == (6.0, 6.0)
+    monkeypatch.setenv("PLANAR_CACHE", " Off ")
+    monkeypatch.chdir(tmp_path)
+    assert times(3) == 6.0
+    assert len(made) == 3
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+def test_a_write_that_fails_leaves_nothing_behind(place, monkeypatch):
+    kept.write("a", b"one")
+    monkeypatch.setattr(Path, "replace", lambda self, target: (_ for _ in ()).throw(OSError("no room")))
+    assert not kept.write("b", b"two")
+    assert [path.name for path in place.iterdir()] == [f"a{kept.ENDING}"]
+    assert kept.read("a") == b"one"
+
+
+def test_what_was_not_read_for_longest_goes_first(place, monkeypatch):
+    size = len(b"code") + kept.DIGEST
+    monkeypatch.setattr(kept, "MOST", 3 * size)
+    for age, key in enumerate("abc"):
+        assert kept.write(key, b"code")
+        os.utime(place / f"{key}{kept.ENDING}", (1000 + age, 1000 + age))
+    assert kept.read("a") == b"code"
+    kept.write("d", b"code")
+    assert {path.stem for path in place.iterdir()} == {"a", "c", "d"}
+
+
+def test_the_folder_is_where_each_system_has_such_things(monkeypatch, tmp_path):
+    for name in ("PLANAR_CACHE", "XDG_CACHE_HOME", "LOCALAPPDATA"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(Path, "home", lambda: tmp_path)
+    monkeypatch.setattr(sys, "platform", "linux")
+    assert kept.folder() == tmp_path / ".cache" / "planar"
+    monkeypatch.setenv("XDG_CACHE_HOME", "not/absolute")
+    assert kept.folder() == tmp_path / ".cache" / "planar"
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "other"))
+    assert kept.folder() == tmp_path / "other" / "planar"
+    monkeypatch.setattr(sys, "platform", "darwin")
+    assert kept.folder() == tmp_path / "Library" / "Caches" / "planar"
+    monkeypatch.setattr(sys, "platform", "win32")
+    assert kept.folder() == tmp_path / "AppData" / "Local" / "planar" / "Cache"
+    monkeypatch.setenv("LOCALAPPDATA", str(tmp_path / "local"))
+    assert kept.folder() == tmp_path / "local" / "planar" / "Cache"
+    monkeypatch.setenv("PLANAR_CACHE", str(tmp_path / "told"))
+    assert kept.folder() == tmp_path / "told"
+
+
+def test_code_for_another_processor_or_compiler_has_another_fingerprint(monkeypatch):
+    usual = {compiled.fingerprint(text(3))}
+    assert usual == {compiled.fingerprint(text(3))}
+    for holder, name, value in (
+        (compiled, "_processor", lambda: ("another", compiled.llvm.get_host_cpu_features().flatten())),
+        (compiled, "_processor", lambda: (compiled.llvm.get_host_cpu_name(), "+none")),
+        (compiled.llvmlite, "__version__", "0.0"),
+        (compiled, "SPEED", 3),
+        (compiled, "CODE", 0),
+    ):
+        with monkeypatch.context() as patch:
+            patch.setattr(holder, name, value)
+            usual.add(compiled.fingerprint(text(3)))
+    usual.add(compiled.fingerprint(text(4)))
+    assert len(usual) == 7
+    assert all(len(each) == len(sha256().hexdigest()) for each in usual)
