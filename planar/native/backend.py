@@ -13,6 +13,7 @@ from planar.native.compiled import compiled
 from planar.native.kernel import Structure
 from planar.native.listing import NotPrinted
 from planar.native.march import KINDS, NAME, ORDER, Layout, march
+from planar.native.room import is_room, room
 from planar.program import Program, structure
 
 Array = np.ndarray
@@ -167,8 +168,9 @@ def _called(
         _stated(plan.drives, designs.start),
         np.concatenate([designs.u1, designs.u2]) if rates else np.zeros((0, many)),
     )
-    if out is None:
-        out = np.empty((steps, plan.out, many))
+    given = out
+    if out is None or not is_room(out):
+        out = room(steps, plan.out, many)
     good = np.empty(-(-many // lanes) * lanes)
     whole = many // lanes * lanes
     if whole:
@@ -176,9 +178,11 @@ def _called(
     if whole < many:
         # those that do not fill the lanes, with copies of the last beside them
         which = np.minimum(np.arange(whole, whole + lanes), many - 1)
-        last = np.empty((steps, plan.out, lanes))
+        last = room(steps, plan.out, lanes)
         _call(function, plan, [row[:, which] for row in rows], lanes, (table, counts), numbers, last, good[whole:])
         out[:, :, whole:] = last[:, :, : many - whole]
+    if given is not None and given is not out:
+        given[...] = out
     return out, good[:many].astype(int)
 
 

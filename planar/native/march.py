@@ -285,7 +285,7 @@ class _March(Points):
             many += [*(have[leaf] for leaf in self.state), t.load(self.strong)]
         for k, each in enumerate(many):
             place = t.new(f"add i64 {t.new('mul i64 %k, %time')}, {t.new(f'mul i64 %row, {k}')}")
-            t.store(each, t.at("%out", t.new(f"add i64 {place}, {self.lane}")))
+            t.stream(each, t.at("%out", t.new(f"add i64 {place}, {self.lane}")))
         # sums, since what is not a number stays so in them, and is not below anything
         worst = t.summed([t.constant(0.0), *(t.call("fabs", each) for each in (*left, *self.off_circle(have)))])
         flags = [*flags, t.compared("ole", worst, t.spread("%tolerance"))]

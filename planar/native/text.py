@@ -73,6 +73,10 @@ class Text:
     def store(self, value: str, pointer: str) -> None:
         self.line(f"store {self.vector} {value}, ptr {pointer}, align 8")
 
+    def stream(self, value: str, pointer: str) -> None:
+        """Store what is not read again soon, past the caches; where whole vectors begin."""
+        self.line(f"store {self.vector} {value}, ptr {pointer}, align 64, !nontemporal !0")
+
     def loop(self, counter: str, last: str, again: str, after: str) -> None:
         """Count on, and go round again up to the last."""
         self.line(f"%{counter}next = add i64 %{counter}, 1")
@@ -140,7 +144,7 @@ class Text:
             f"declare double @{name}({', '.join(['double'] * many)}) memory(none)" for name, many in LIBRARY.items()
         ]
         lines = [each for line in self.lines for each in ([line] if isinstance(line, str) else line)]
-        return "\n".join([*lines, *calls])
+        return "\n".join([*lines, *calls, "!0 = !{i32 1}"])
 
     def at(self, base: str, index: str) -> str:
         """A pointer to the double at an index."""

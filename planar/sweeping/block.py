@@ -10,11 +10,12 @@ import numpy as np
 
 from planar.errors import Outcome
 from planar.mechanism import Mechanism
+from planar.native.room import room
 from planar.sweeping.assembling import assembled
 from planar.sweeping.base import Base, base, spread
 from planar.sweeping.by_program import rows
 from planar.sweeping.designs import lifted, one
-from planar.sweeping.marching import March, Marching, NotMarched, Reaching, closing, marching, reaching, room
+from planar.sweeping.marching import March, Marching, NotMarched, Reaching, closing, marching, reaching
 from planar.sweeping.one_by_one import OUTCOMES, Solved, solve_one
 from planar.sweeping.stops import stopped
 

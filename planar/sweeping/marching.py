@@ -98,18 +98,6 @@ def reaching(name: str) -> Reaching | None:
     return getattr(import_module(BACKENDS[name]), "reached", None)
 
 
-def room(steps: int, rows: int, designs: int) -> Array:
-    """An array (steps, rows, designs), not filled, whose rows begin where vectors of the machine do."""
-    width = -(-designs // ALIGNED) * ALIGNED
-    made = np.empty(steps * rows * width + ALIGNED)
-    first = -(made.ctypes.data // made.itemsize) % ALIGNED
-    return made[first : first + steps * rows * width].reshape(steps, rows, width)[:, :, :designs]
-
-
-ALIGNED = 8
-"""Numbers of the widest vectors of a machine: rows that begin elsewhere are written twice as slowly."""
-
-
 def marching(backend: str) -> list[tuple[str, Marching]]:
     """The backends to try, in this order, each with its name; one that raises NotMarched leaves it to the next.
 

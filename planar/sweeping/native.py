@@ -9,6 +9,7 @@ import numpy as np
 from planar.native import backend
 from planar.native.backend import Designs, ended, run
 from planar.native.listing import NotPrinted
+from planar.native.room import room
 from planar.sweeping import by_program
 from planar.sweeping.marching import Closed, March, NotMarched
 
@@ -29,7 +30,7 @@ def march(task: March, out: Array) -> Array:
     for again in (lambda part, room: _run(part, room, MORE), by_program.march):
         left = np.flatnonzero(good < least)
         if left.size:
-            own = np.empty((*out.shape[:2], left.size))
+            own = room(*out.shape[:2], left.size)
             good[left] = again(task.of(left), own)
             out[:, :, left] = own
         least = 1

@@ -17,8 +17,8 @@ import numpy as np
 from planar.errors import BadInput, Outcome
 from planar.files import to_dict
 from planar.mechanism import Mechanism
+from planar.native.room import room
 from planar.sweeping.block import Done
-from planar.sweeping.marching import room
 from planar.sweeping.result import Sweep
 
 Array = np.ndarray
