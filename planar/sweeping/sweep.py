@@ -21,7 +21,7 @@ from planar.sweeping.marching import marching
 from planar.sweeping.result import Sweep
 from planar.sweeping.stores import Plan, sink
 
-BYTES = 64 * 2**20
+BYTES = 128 * 2**20
 """Bytes of a block's results."""
 LANES = 16
 """Blocks are multiples of so many designs, where there are enough."""
