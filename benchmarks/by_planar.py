@@ -70,6 +70,7 @@ def turns(swept: Swept, steps: int) -> list[Entry]:
     one, all_steps = np.arange(1), np.arange(steps + 1)
     return [
         Entry("planar, a run through the gate", False, one, all_steps, lambda: run(solver, p, z, u).z, read),
+        *(_prepared(mechanism, swept, steps, rates) for rates in (False, True)),
         Entry(
             "planar.cycle, from the sketch",
             True,
@@ -79,6 +80,16 @@ def turns(swept: Swept, steps: int) -> list[Entry]:
             lambda found: _read(found, swept.point, steps),
         ),
     ]
+
+
+def _prepared(mechanism: Mechanism, swept: Swept, steps: int, rates: bool) -> Entry:
+    ready = planar.prepared(mechanism, steps, swept.point, rates=rates)
+
+    def read(found: Any) -> Array:
+        orders = (found.position, found.velocity, found.acceleration)[: 3 if rates else 1]
+        return np.concatenate([order[swept.point].T for order in orders])[..., None]
+
+    return Entry("planar.prepared", rates, np.arange(1), np.arange(steps + 1), ready, read)
 
 
 def _swept(mechanism: Mechanism, swept: Swept, d: Array, steps: int, backend: str, rates: bool) -> Entry:
