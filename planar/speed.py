@@ -107,7 +107,7 @@ def measure(mechanism: Mechanism, rounds: int = 5, seconds: float = SECONDS) -> 
         swept, given_up = _sweeps_within(mechanism, along, seconds)
         told = [*map(_of_sweep, swept[:1]), *given_up, *told]
         if cycled < TOO_LONG:
-            parts = of_cycle(lambda: cycle(mechanism, TURN, *between), cycled)
+            parts = of_cycle(lambda: cycle(mechanism, TURN, *between))
             told.append(_shared("A cycle, which is the general path too", parts))
         cycled /= rows
         if find_spec(BACKENDS["native"]) is None:

@@ -57,12 +57,11 @@ def of_sweep(task: Callable[[], Any]) -> tuple[float, dict[str, float]]:
     return found.whole, shares
 
 
-def of_cycle(task: Callable[[], Any], whole: float) -> dict[str, float]:
-    """The parts of a cycle that takes so many seconds without a profiler, which slows all but casadi."""
-    own = spent(task).own
+def of_cycle(task: Callable[[], Any]) -> dict[str, float]:
+    """The parts of a cycle, each as a share of the whole."""
+    found = spent(task)
     # what is called through casadi's buffers counts to the function that calls it
-    within = sum(own.get(place, 0.0) for place in (CASADI, *CALLED))
-    share = min(1.0, within / whole)
+    share = sum(found.own.get(place, 0.0) for place in (CASADI, *CALLED)) / found.whole
     return {"in casadi": share, "in Python and numpy": 1.0 - share}
 
 

@@ -163,8 +163,8 @@ def test_casadis_share_of_a_cycle_is_what_its_calls_take():
     found = spent(lambda: cycle(mechanism, 60))
     inside = found.own[profiled.CASADI]
     assert 0.0 < inside < found.whole
-    assert of_cycle(lambda: None, 1.0)["in casadi"] == 0.0
-    assert sum(of_cycle(lambda: cycle(mechanism, 60), found.whole).values()) == pytest.approx(1.0)
+    assert of_cycle(lambda: None)["in casadi"] == 0.0
+    assert sum(of_cycle(lambda: cycle(mechanism, 60)).values()) == pytest.approx(1.0)
 
 
 def test_a_first_call_compiles_whatever_is_kept():
