@@ -234,6 +234,14 @@ class Program:
         z, u, p = (ca.SX.sym(name, each.numel()) for name, each in (("z", e.z), ("u", e.u), ("p", e.p)))
         return compact("advance", [z, u, p], [self.corrected(z, u, p, NEWTON_STEPS)[0]])
 
+    def advanced(self, z: Array, u: Array, p: Array) -> Array:
+        """The same at samples z (samples, unknowns), u and p alike, each by itself."""
+        return self._advanced.over(len(z), z, u, p)[0][:, 0]
+
+    @cached_property
+    def _advanced(self) -> Called:
+        return Called(self.advance)
+
     def corrected(self, z: ca.SX, u: ca.SX, p: ca.SX, steps: int = 1) -> tuple[ca.SX, ca.SX]:
         """Unknowns after so many of Newton's steps, group after group, for structures as `advance` takes, and what each
         group left open before its last step (rows,)."""

@@ -16,7 +16,6 @@ from planar.solving.assemble import ALIKE
 from planar.solving.candidates import CLEAR, SAME
 from planar.solving.newton import CLOSED, newton
 from planar.sweeping.base import Base, of_designs
-from planar.sweeping.columns import Over
 from planar.sweeping.judging import volume
 from planar.sweeping.marching import Closing
 from planar.sweeping.nearby import REGULAR, nearby
@@ -135,17 +134,16 @@ class _Assembling:
         each = np.tile(np.arange(len(ways)), len(starts) // len(ways))
         design, way = np.array(ways).T
         whole = here.z[:, design, way]
-        function = self.program.closing(stage)
+        function = self.program.closed(stage)
 
         def closing(tried: Array) -> tuple[Array, Array]:
             # the last entry tells the columns apart: nothing depends on it, so no step moves it
             which = np.rint(tried[:, -1]).astype(int)
-            over = Over(function, len(which))
             z = whole[:, which].T
             z[:, stage.unknowns] = tried[:, :-1]
-            left, slope = over(z, self.u.T[design[which]], self.p.T[design[which]])
+            left, slope = function.over(len(which), z, self.u.T[design[which]], self.p.T[design[which]])
             slope = np.concatenate([slope.transpose(0, 2, 1), np.zeros((len(which), left.shape[2], 1))], axis=2)
-            return left[:, 0].copy(), slope
+            return left[:, 0], slope
 
         ended = newton(closing, np.hstack([starts, each[:, None]]))
         # nearly closed is neither the one nor the other
@@ -227,10 +225,11 @@ class _Assembling:
         flat = z.reshape(len(z), -1)
         closed = np.zeros(flat.shape[1], dtype=bool)
         busy = np.flatnonzero(np.repeat(here.there[..., None], count, axis=2).ravel())
-        at, over = self._busy(stage, flat, busy, each)
+        at, *given = self._busy(flat, busy, each)
+        closing = self.program.closed(stage)
         self.spanned = np.zeros(flat.shape[1])
         for step in range(steps + 1):
-            left, slope = over(at, None, None)
+            left, slope = closing.over(len(at), at, *given)
             left, slope = left[:, 0], slope.transpose(0, 2, 1)
             # the error of the next step is the square of this one, which the march looks at again
             done = np.max(np.abs(left), axis=1, initial=0.0) <= NEARLY_CLOSED
@@ -248,16 +247,14 @@ class _Assembling:
                 busy = busy[~done & np.all(np.isfinite(at), axis=1)]
                 if not busy.size:
                     break
-                at, over = self._busy(stage, flat, busy, each)
+                at, *given = self._busy(flat, busy, each)
         if self.candidates.counts:
             flat = self._least(stage, flat, closed, each)
         return flat.reshape(z.shape), closed.reshape(shape)
 
-    def _busy(self, stage: Stage, flat: Array, busy: Array, each: Array) -> tuple[Array, Over]:
-        """Columns of z (columns, unknowns) that are not closed yet, and the constraints of a group over these."""
-        over = Over(self.program.closing(stage), busy.size)
-        over.given[1][...], over.given[2][...] = self.u.T[each[busy]], self.p.T[each[busy]]
-        return np.ascontiguousarray(flat[:, busy].T), over
+    def _busy(self, flat: Array, busy: Array, each: Array) -> tuple[Array, Array, Array]:
+        """Columns of z (columns, unknowns) that are not closed yet, with their inputs and numbers."""
+        return np.ascontiguousarray(flat[:, busy].T), self.u.T[each[busy]], self.p.T[each[busy]]
 
     def _least(self, stage: Stage, z: Array, closed: Array, each: Array) -> Array:
         """The same assemblies with angles at the turn nearest to none where that is closed too, as in `Candidates`."""
@@ -295,9 +292,8 @@ class _Assembling:
     def _measured(self, stage: Stage, here: _Partial) -> _Partial:
         """The partial assemblies with what a group adds to how they are told apart."""
         candidates, width = self.candidates, here.there.shape[1]
-        over = Over(self.program.positions, self.many * width)
         u, p = (np.repeat(part.T, width, axis=0) for part in (self.u, self.p))
-        found = over(here.z.reshape(len(here.z), -1).T, u, p)[0][:, 0]
+        found = self.program.coordinates(here.z.reshape(len(here.z), -1).T, u, p)
         w = np.ascontiguousarray(found.T).reshape(-1, self.many, width)
         sketched = {name: candidates.first[name] for name in candidates.sketched_at.get(stage.level, ())}
         pairs = {name: candidates.pairs[name] for name in stage.pairs}

@@ -85,7 +85,7 @@ class _Curves:
         return np.hstack([y[:, :-1], y[:, -1:] * self.way if tangent else self.inputs(y)])
 
     def slope(self, y: Array) -> Array:
-        dz, du = self.columns.slopes(y[:, :-1], self.inputs(y), self.columns.p)
+        dz, du = self.columns.slopes(y[:, :-1], self.inputs(y))
         return np.concatenate([dz, (du @ self.way)[..., None]], axis=2)
 
     def corrected(self, y: Array, normal: Array) -> tuple[Array, Array]:
