@@ -16,9 +16,8 @@ import numpy as np
 
 from planar.errors import BadInput, Outcome
 from planar.files import to_dict
-from planar.mechanism import Mechanism
 from planar.native.room import room
-from planar.sweeping.block import Done
+from planar.sweeping.block import Block, Done
 from planar.sweeping.result import Sweep
 
 Array = np.ndarray
@@ -30,30 +29,27 @@ LETTERS = {"position": ("", "m"), "velocity": ("v", "m/s"), "acceleration": ("a"
 
 
 class Plan(NamedTuple):
-    """All that a sweep's results depend on, and how many designs there are, in blocks of which size."""
+    """A sweep as one block of all its designs, and how many of them are solved together."""
 
-    mechanism: Mechanism
-    designs: Mapping[str, Array]
-    steps: int
-    points: tuple[str, ...]
-    rates: bool
-    start: float | None
-    stop: float | None
-    pair: str | None
-    many: int
+    whole: Block
     size: int
+
+    @property
+    def many(self) -> int:
+        """How many designs there are."""
+        return len(next(iter(self.whole.designs.values())))
 
     @property
     def orders(self) -> tuple[str, ...]:
         """What is told of every point."""
-        return ORDERS if self.rates else ORDERS[:1]
+        return ORDERS if self.whole.rates else ORDERS[:1]
 
     def fingerprint(self) -> str:
         """The same for two sweeps that have the same results."""
-        made = hashlib.sha256()
-        grid = [self.steps, self.points, self.rates, self.start, self.stop, self.pair]
-        made.update(json.dumps([to_dict(self.mechanism), grid], sort_keys=True, default=float).encode())
-        for name, values in sorted(self.designs.items()):
+        whole, made = self.whole, hashlib.sha256()
+        grid = [whole.steps, whole.points, whole.rates, whole.start, whole.stop, whole.pair]
+        made.update(json.dumps([to_dict(whole.mechanism), grid], sort_keys=True, default=float).encode())
+        for name, values in sorted(whole.designs.items()):
             made.update(name.encode() + b"\0" + np.ascontiguousarray(values).tobytes())
         return made.hexdigest()
 
@@ -110,8 +106,8 @@ class Sink(ABC):
         position, velocity, acceleration = (found.get(order) for order in ORDERS)
         assert position is not None
         return Sweep(
-            plan.points,
-            plan.designs,
+            plan.whole.points,
+            plan.whole.designs,
             position,
             velocity,
             acceleration,
@@ -141,13 +137,13 @@ def sink(store: str | Path | None, plan: Plan) -> Sink:
 class _Memory(Sink):
     def __init__(self, plan: Plan):
         super().__init__(plan)
-        self.wide = 2 * len(plan.points) * len(plan.orders)
-        self.shape = plan.steps + 1, self.wide, plan.many
+        self.wide = 2 * len(plan.whole.points) * len(plan.orders)
+        self.shape = plan.whole.steps + 1, self.wide, plan.many
         if np.prod(self.shape, dtype=float) * 8.0 > MOST:
             told = f"results of {np.prod(self.shape, dtype=float) * 8e-9:.0f} GB are too much for memory"
             raise BadInput("store", f"{told}; name a store, as 'sweep.zarr'")
         self.out = room(*self.shape)
-        self.status = np.zeros((plan.many, plan.steps + 1), dtype=np.int8)
+        self.status = np.zeros((plan.many, plan.whole.steps + 1), dtype=np.int8)
         self.inputs: Array | None = None
 
     def room(self, part: slice) -> Array:
@@ -169,11 +165,11 @@ class _Memory(Sink):
 def _views(out: Array, plan: Plan) -> dict[str, dict[str, Array]]:
     """out (steps + 1, rows, designs) as arrays (designs, steps + 1, 2) by order and point, without a copy."""
     turned = out.transpose(2, 0, 1)
-    many = len(plan.points)
+    many = len(plan.whole.points)
     return {
         order: {
             name: turned[:, :, 2 * (k * many + place) : 2 * (k * many + place) + 2]
-            for place, name in enumerate(plan.points)
+            for place, name in enumerate(plan.whole.points)
         }
         for k, order in enumerate(plan.orders)
     }
@@ -184,7 +180,7 @@ def _joined(whole: Array | None, own: Array, part: slice, plan: Plan) -> Array:
     if own.ndim == 1 and (whole is None or (whole.ndim == 1 and np.array_equal(whole, own))):
         return own
     if whole is None or whole.ndim == 1:
-        row = np.full(plan.steps + 1, np.nan) if whole is None else whole
+        row = np.full(plan.whole.steps + 1, np.nan) if whole is None else whole
         whole = np.tile(row, (plan.many, 1))
     whole[part] = own
     return whole
@@ -211,19 +207,21 @@ class _Zarr(Sink):
                 self.told[k] = (*map(int, general[k]), self.group.attrs.get(f"said {k}", ()))  # type: ignore[assignment]
             return
         self.group = group = zarr.open_group(str(path), mode="w")
-        rows, steps = plan.size, plan.steps + 1
+        rows, steps = plan.size, plan.whole.steps + 1
         for order in plan.orders:
-            for name in plan.points:
+            for name in plan.whole.points:
                 self._add(f"{order}/{_plain(name)}", (plan.many, steps, 2), (rows, steps, 2), float, "axis")
         self._add("status", (plan.many, steps), (rows, steps), np.int8)
         self._add("input", (plan.many, steps), (rows, steps), float)
         blocks = -(-plan.many // rows)
         group.create_array("blocks", shape=(blocks, 2), chunks=(1, 2), dtype="int64", fill_value=-1)
-        for name, values in plan.designs.items():
+        for name, values in plan.whole.designs.items():
             group.create_array(
                 f"designs/{_plain(name)}", data=np.ascontiguousarray(values), dimension_names=("design",)
             )
-        group.attrs.update({"mechanism": to_dict(plan.mechanism), "points": list(plan.points), "block": rows})
+        group.attrs.update(
+            {"mechanism": to_dict(plan.whole.mechanism), "points": list(plan.whole.points), "block": rows}
+        )
         group.attrs["outcomes"] = [each.value for each in Outcome]
         group.attrs["fingerprint"] = mark  # last: a store without it was not begun
 
@@ -246,7 +244,8 @@ class _Zarr(Sink):
     def result(self) -> Sweep:
         group = self.group
         found = {
-            order: {name: group[f"{order}/{_plain(name)}"] for name in self.plan.points} for order in self.plan.orders
+            order: {name: group[f"{order}/{_plain(name)}"] for name in self.plan.whole.points}
+            for order in self.plan.orders
         }
         return self.sweep(found, group["status"], _one_row(group["input"], self.size))
 
@@ -294,7 +293,7 @@ class _Parquet(Sink):
         columns: dict[str, Array] = {
             "design": np.repeat(np.arange(part.start, part.stop), steps),
             "step": np.tile(np.arange(steps, dtype=np.int32), designs),
-            **{name: np.repeat(values[part], steps) for name, values in self.plan.designs.items()},
+            **{name: np.repeat(values[part], steps) for name, values in self.plan.whole.designs.items()},
             "input": np.broadcast_to(done.input, done.status.shape).ravel(),
             "status": done.status.ravel(),
         }
@@ -325,7 +324,7 @@ class _Parquet(Sink):
         blocks = range(-(-self.plan.many // self.size))
         tables = [parquet.read_table(self._file(k), columns=list(columns)) for k in blocks]
         return [
-            np.concatenate([table[name].to_numpy() for table in tables]).reshape(-1, self.plan.steps + 1)
+            np.concatenate([table[name].to_numpy() for table in tables]).reshape(-1, self.plan.whole.steps + 1)
             for name in columns
         ]
 
@@ -342,16 +341,16 @@ class _Read(Mapping[str, Any]):
         self.of, self.order = of, order
 
     def __getitem__(self, name: str) -> Array:
-        if name not in self.of.plan.points:
+        if name not in self.of.plan.whole.points:
             raise KeyError(name)
         return np.stack(self.of._read(_columns(self.order, name)), axis=2)
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self.of.plan.points)
+        return iter(self.of.plan.whole.points)
 
     @cached_property
     def _many(self) -> int:
-        return len(self.of.plan.points)
+        return len(self.of.plan.whole.points)
 
     def __len__(self) -> int:
         return self._many

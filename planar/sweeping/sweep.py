@@ -78,13 +78,12 @@ def sweep(
     marching(backend)
     many = len(next(iter(values.values())))
     size = int(block) if block is not None else _size(many, steps, len(names), rates, executor)
-    plan = Plan(mechanism, values, int(steps), names, rates, start, stop, pair, many, size)
-    into = sink(store, plan)
+    whole = Block(mechanism, values, int(steps), names, rates, start, stop, pair, backend)
+    into = sink(store, Plan(whole, size))
     size = into.size
 
     def task(part: slice) -> Block:
-        own = {name: array[part] for name, array in values.items()}
-        return Block(mechanism, own, int(steps), names, rates, start, stop, pair, backend)
+        return whole._replace(designs={name: array[part] for name, array in values.items()})
 
     parts = dict(enumerate(blocks(many, size)))
     ready = sum(part.stop - part.start for k, part in parts.items() if k in into.finished)
