@@ -85,7 +85,9 @@ def run(
         raise NotPrinted("steps so long do not show what lies between them")
     plan = layout(program, structure(mechanism), tuple(links), rates)
     table, counts = _table(gone)
-    return _called(plan, designs, rates, table, counts + more, (tolerance, _astray(longest), scale), out)
+    out, good = _called(plan, designs, rates, table, counts + more, (tolerance, _astray(longest), scale), out)
+    # what is told of a step only at the next one condemns the step too
+    return out, np.where((good > 1) & (good < len(gone)), good - 1, good)
 
 
 def reached(

@@ -25,6 +25,8 @@ from planar.pairs import Kind
 from planar.plane import GROUND, Frame, frame_at
 from planar.program import length, placed
 
+FASTEST = 0.5
+"""rad that a link may turn from one step to the next: farther apart they do not show what lies between."""
 WEAK = 1e-2
 """A group whose slope is less regular than this (of more than two unknowns, than its power of 1.5: it is a volume) is
 left to the general path."""
@@ -179,7 +181,7 @@ def _minors(matrix: ca.SX) -> dict[tuple[int, ...], ca.SX]:
     rows, columns = matrix.shape
     here: dict[tuple[int, ...], ca.SX] = {(): ca.SX(1.0)}
     for first in range(0, rows, 2):
-        pair = matrix[first : first + 2, :]
+        pair = matrix[first : min(first + 2, rows), :]
         found: dict[tuple[int, ...], ca.SX] = {}
         for chosen, value in here.items():
             rest = [k for k in range(columns) if k not in chosen]

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from math import inf
 from typing import NamedTuple
 
-from planar.native.kernel import WEAK, Have, Leaf, Outside, Part, Structure
+from planar.native.kernel import FASTEST, WEAK, Have, Leaf, Outside, Part, Structure
 from planar.native.points import Points
 
 ORDER, RING = 6, 8
@@ -97,6 +97,7 @@ class _March(Points):
         self.moves = {part.stage.level: t.slot() for part in self.of.parts if part.form is None}
         self.bends = [[t.slot() for _ in range(2)] for _ in self.of.forms]
         self.strong, self.fine, self.good = (t.slot() for _ in range(3))
+        self.turns = [t.slot() for _ in range(self.counted().numel())]
         scale = t.spread("%scale")
         t.line("br label %block")
         have, at_start = self._block()
@@ -177,7 +178,8 @@ class _March(Points):
     def _closed(self, part: Part, have: Have) -> list[str]:
         """A group in closed form; flags that say where its two assemblies keep apart.
 
-        Between steps too: the bend does not reach one, by as much as it bends over the last three steps.
+        Between steps too: the bend does not reach one, by as much as it bends over the last three steps. So it may be
+        the step before at which a group had come too near.
         """
         t = self.text
         if self.levels is not None:
@@ -188,7 +190,9 @@ class _March(Points):
                 self._carried(k, have)
         before, earlier = (t.load(slot) for slot in self.bends[self.signs[part.stage.level]])
         change = t.binary("sub", t.binary("add", bend, earlier), t.binary("add", before, before))
-        room = t.binary("sub", t.constant(1.0), bend)
+        # of all three: the middle of the change may lie a step back, as where a run starts just before a dead point
+        most = t.call("maxnum", t.call("maxnum", bend, before), earlier)
+        room = t.binary("sub", t.constant(1.0), most)
         for slot, value in zip(self.bends[self.signs[part.stage.level]], (bend, before), strict=True):
             t.store(value, slot)
         change = t.binary("mul", t.call("fabs", change), t.constant(0.5))
@@ -266,6 +270,15 @@ class _March(Points):
         for leaf in own:
             t.store(have[leaf], t.place(self.rings[leaf], here))
 
+    def _gentle(self, angles: Sequence[str]) -> list[str]:
+        """Flags that say of counted angles that they are not far from where they were a step before."""
+        t, flags = self.text, []
+        for angle, slot in zip(angles, self.turns, strict=True):
+            far = t.call("fabs", t.binary("sub", angle, t.load(slot)))
+            t.store(angle, slot)
+            flags.append(t.either(t.compared("ole", far, t.constant(FASTEST)), t.spread_flag("%k", "sle", 0)))
+        return flags
+
     def _regular(self, spanned: str, lengths: str, count: int) -> str:
         """How regular a slope is, where that is told; else only whether it is enough: not below nothing."""
         t = self.text
@@ -277,7 +290,8 @@ class _March(Points):
     def _tell(self, have: Have, flags: list[str], scale: str) -> None:
         """The step ends: its results are written, and judged."""
         t, told = self.text, self.told()
-        left, *values = self.parted([self.of.gaps(), *told], have)
+        left, counted, *values = self.parted([self.of.gaps(), self.counted(), *told], have)
+        flags = [*flags, *self._gentle(counted)]
         many = [t.binary("mul", scale, each) for of in values for each in of]
         if self.levels is not None:
             nowhere = [t.constant(inf)] * 2

@@ -6,7 +6,9 @@ from collections.abc import Sequence
 
 import casadi as ca
 
+from planar.mechanism import counting
 from planar.native.kernel import Kernel, Leaf, Structure
+from planar.pairs import Kind
 from planar.plane import Vector
 
 
@@ -30,6 +32,19 @@ class Points(Kernel):
         q = self.symbols["q"]
         places = [self.of.frame(self.links[k]).carry(Vector(q[2 * k], q[2 * k + 1])) for k in points]
         return ca.vertcat(ca.SX(0, 1), *(part for place in places for part in place))
+
+    def counted(self) -> ca.SX:
+        """Angles of links that wheels or racks tie: they may turn much farther in a step than the inputs do."""
+        e, links = self.of.equations, counting(self.of.mechanism)
+        unknown = {column: k for k, column in enumerate(e.unknowns)}
+        columns = [
+            column
+            for column, each in enumerate(e.coordinates)
+            if each.owner in links and each.of_link and each.kind is Kind.ANGLE
+        ]
+        # what nothing is made of but cos and sin is as fast as the group that it is in
+        found = [e.w[k] for k in columns if k not in unknown or self.carries(("z", unknown[k]))]
+        return ca.vertcat(ca.SX(0, 1), *found)
 
     def told(self) -> list[ca.SX]:
         """The points' positions, and rates."""

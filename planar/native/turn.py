@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planar.native.compiled import compiled
-from planar.native.kernel import WEAK, Have, Leaf, Outside, Structure
+from planar.native.kernel import FASTEST, WEAK, Have, Leaf, Outside, Structure
 from planar.native.listing import NotPrinted
 from planar.native.points import Points
 from planar.native.text import Text
@@ -28,7 +28,7 @@ fine."""
 
 class Layout(NamedTuple):
     """numbers: what is the same at every position, one after the other; drives: rows of cos, sin and value of what is
-    given; out: rows that are told, of which the last are the groups' bends."""
+    given; out: rows that are told, of which the last are counted angles and the groups' bends."""
 
     numbers: tuple[Leaf, ...]
     drives: tuple[Leaf, ...]
@@ -69,15 +69,16 @@ class _Turn(Points):
         first = t.new(f"mul i64 %b, {t.lanes}")
         have |= {leaf: t.load(self._row("%drive", k, first)) for k, leaf in enumerate(self.drives)}
         bends = [self.found(part, have) for part in of.parts]
-        left, *values = self.parted([of.gaps(), *self.told()], have)
+        left, counted, *values = self.parted([of.gaps(), self.counted(), *self.told()], have)
         worst = t.summed([t.constant(0.0), *(t.call("fabs", each) for each in (*left, *self.off_circle(have)))])
         self._judged(t.compared("ole", worst, t.spread("%tolerance")))
-        rows = [*(t.binary("mul", scale, each) for part in values for each in part), *bends]
+        rows = [*(t.binary("mul", scale, each) for part in values for each in part), *counted, *bends]
         for k, each in enumerate(rows):
             t.store(each, self._row("%out", k, first))
         t.loop("b", "blocks", "block", "after")
         t.label("after")
-        self._clear(t, range(len(rows) - len(bends), len(rows)))
+        first_bend = len(rows) - len(bends)
+        self._clear(t, range(first_bend - len(counted), first_bend), range(first_bend, len(rows)))
         t.line("ret void")
         t.line("}")
         return Layout(self.numbers, self.drives, len(rows), t.module())
@@ -90,9 +91,10 @@ class _Turn(Points):
         t = self.text
         t.store(t.where(flag, t.load(self.fine)), self.fine)
 
-    def _clear(self, t: Text, bends: Sequence[int]) -> None:
-        """Between positions too no bend reaches one, by as much as it bends over three of them."""
-        if not bends:
+    def _clear(self, t: Text, angles: Sequence[int], bends: Sequence[int]) -> None:
+        """Between positions too no bend reaches one, by as much as it bends over three of them; no counted angle goes
+        far."""
+        if not bends and not angles:
             t.store(t.load(self.fine), "%fine")
             return
         t.line("br label %judge")
@@ -100,6 +102,11 @@ class _Turn(Points):
         t.line("%j = phi i64 [0, %after], [%jnext, %judge]")
         first = t.new(f"mul i64 %j, {t.lanes}")
         places = t.new(f"insertelement <{t.lanes} x i64> poison, i64 {t.new('sub i64 %positions, 2')}, i64 0")
+        for k in angles:
+            one, two, three = (t.load(self._row("%out", k, t.new(f"add i64 {first}, {ahead}"))) for ahead in range(3))
+            for before, after in ((one, two), (two, three)):
+                far = t.call("fabs", t.binary("sub", after, before))
+                self._judged(t.either(t.compared("ole", far, t.constant(FASTEST)), t.beyond(first, places)))
         for k in bends:
             one, two, three = (t.load(self._row("%out", k, t.new(f"add i64 {first}, {ahead}"))) for ahead in range(3))
             change = t.binary("sub", t.binary("add", one, three), t.binary("add", two, two))

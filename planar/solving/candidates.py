@@ -68,8 +68,10 @@ class Candidates:
         for name in self.sketch:
             self.sketched_at.setdefault(self.first[name][0], []).append(name)
 
-    def of(self, stage: Stage, z: Array) -> tuple[list[Candidate], Array]:
+    def of(self, stage: Stage, z: Array, every: bool = False) -> tuple[list[Candidate], Array]:
         """All assemblies of a group that its starts lead to, the ones that an author would mean first.
+
+        Where one lies clearly at the sketch others are looked for only if `every` one is wanted.
 
         With all unknowns at the end of the best start, whether it closes the group or not.
         """
@@ -83,7 +85,7 @@ class Candidates:
         sketched = len(self.sketched_at.get(stage.level, ()))
         lower = all(self.pairs[name].lower for name in stage.pairs)
         dyad = length(stage.unknowns) == 2 and len(stage.pairs) == 3 and lower and len(found) == 2  # there is no third
-        clear = shown and found and min(each.distance for each in found) <= sketched * CLEAR**2
+        clear = not every and shown and found and min(each.distance for each in found) <= sketched * CLEAR**2
         if not (dyad or clear):
             for starts in self._searched(stage, closing):
                 more = newton(closing, starts)

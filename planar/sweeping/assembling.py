@@ -18,7 +18,7 @@ from planar.solving.newton import CLOSED, newton
 from planar.sweeping.base import Base, of_designs
 from planar.sweeping.judging import volume
 from planar.sweeping.marching import Closing
-from planar.sweeping.nearby import REGULAR, nearby
+from planar.sweeping.nearby import NEAR, REGULAR, nearby
 
 Array = np.ndarray
 
@@ -84,7 +84,7 @@ def assembled(
 
 class _Assembling:
     def __init__(self, base: Base, shapes: Mapping[str, Shape], p: Array, u: Array):
-        self.base, self.p, self.u = base, p, u
+        self.base, self.shapes, self.p, self.u = base, shapes, p, u
         self.equations, self.program = base.program.equations, base.program
         self.many = p.shape[1]
         self.candidates = base.candidates
@@ -104,12 +104,27 @@ class _Assembling:
 
     def found(self) -> Assembled:
         """See `assembled`."""
+        here, hasty = self._joined(True)
+        found = self._chosen(here)
+        # a group that lies where it is meant may leave the later ones no place near the sketch
+        cost = np.where(here.there, here.distance, np.inf).min(axis=1)
+        again = np.flatnonzero(hasty & (cost > self._shown() * CLEAR**2))
+        if again.size:
+            own = {name: of_designs(shape, again) for name, shape in self.shapes.items()}
+            slow = _Assembling(self.base, own, self.p[:, again], self.u[:, again])
+            found.z[:, again], found.sure[again], found.ends[again] = slow._chosen(slow._joined(False)[0])
+        return found
+
+    def _joined(self, quick: bool) -> tuple[_Partial, Array]:
+        """All groups joined, and which designs had one that was clear by itself; without `quick` none is."""
+        hasty = np.zeros(self.many, dtype=bool)
         unknowns = len(self.equations.unknowns)
         zero = np.zeros((self.many, 1))
         here = _Partial(np.zeros((unknowns, self.many, 1)), zero == 0.0, zero)
         for stage, (roots, most) in zip(self.equations.stages, self.base.roots(), strict=True):
             if length(stage.rows):
-                on, rest = self._clear(stage, here, roots)
+                on, rest = self._clear(stage, here, roots) if quick else (here, np.arange(self.many))
+                hasty[np.setdiff1d(np.arange(self.many), rest)] = True
                 if rest.size:
                     part = self._part(rest)
                     on = self._beside(here, on, rest, part._on(stage, here.of(rest), roots, most))
@@ -119,7 +134,11 @@ class _Assembling:
                         self._refused(stage, none, here, roots)
                     on = self._measured(stage, on)
                 here = self._nearest(on)
-        return self._chosen(here)
+        return here, hasty
+
+    def _shown(self) -> int:
+        """How many points the sketch shows."""
+        return sum(map(len, self.candidates.sketched_at.values()))
 
     def _refused(self, stage: Stage, designs: Array, here: _Partial, roots: Array) -> None:
         """Of designs that no start has led to an assembly, those that have none: where the damped method says so too.
@@ -158,7 +177,8 @@ class _Assembling:
         """
         every = np.arange(self.many)
         sketched = len(self.candidates.sketched_at.get(stage.level, ()))
-        if not sketched or here.there.shape[1] > 1 or not length(stage.unknowns):
+        # of a group of two both assemblies may be near the sketch, where its links are short
+        if not sketched or here.there.shape[1] > 1 or length(stage.unknowns) <= 2:
             return here, every
         z, closed = self._newton(stage, here, roots[:1], FIRST)
         on = self._measured(stage, here._replace(z=z[:, :, :, 0], there=closed[:, :, 0]))
@@ -355,9 +375,12 @@ class _Assembling:
             best[tied] = np.argmax(left, axis=1)
             self.sure[tied[left.sum(axis=1) > 1]] = False
         z = np.take_along_axis(here.z, best[None, :, None], axis=2)[..., 0]
-        shown = len([name for names in self.candidates.sketched_at.values() for name in names])
+        shown = self._shown()
         clear = (least <= shown * CLEAR**2) & (shown > 0) & ~np.isin(np.arange(self.many), tied)
         sure = (self.sure | clear) & np.isfinite(least) & (least < self.dropped - ALIKE)
+        if any(length(stage.unknowns) > 2 for stage in self.equations.stages):
+            # a large group may have assemblies that no start has led to: none of these is nearer than what is near
+            sure &= least <= shown * NEAR**2
         return Assembled(z, sure, self.ends)
 
 

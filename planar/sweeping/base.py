@@ -147,7 +147,7 @@ class Base:
         for stage in self.solver.equations.stages:
             ways = []
             for cost, z in nodes:
-                found, nearest = candidates.of(stage, z)
+                found, nearest = candidates.of(stage, z, every=True)
                 ways.append([(cost + each.distance, each.z) for each in found] or [(cost + 1e3, nearest)])
             most = max(ways, key=len)
             starts = [z[stage.unknowns] for _, z in sorted((*most, *ways[0]), key=lambda each: each[0])]

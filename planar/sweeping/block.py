@@ -74,12 +74,12 @@ class _Solving:
         here = self.u[self.base.index] * self.scale
         self.first = here if block.start is None else np.full(self.many, float(block.start))
         self.own_range = self.base.slides and block.stop is None
+        "whether every design has a range of its own, from limit to limit"
         self.solved = np.full(self.many, -1)
         "how many steps are solved of a design that was followed to its end, or to a dead point"
         self.followed = 0
         self.ends = np.full(self.many, -1)
         "the group that cannot be joined, where a design surely cannot be assembled"
-        "whether every design has a range of its own, from limit to limit"
         length = TURN if block.stop is None else block.stop - self.first
         self.length = np.broadcast_to(np.asarray(length, dtype=float), (self.many,))
 

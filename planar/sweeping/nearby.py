@@ -21,6 +21,10 @@ CORRECTIONS = 6
 """Newton's steps from the assembly of the base."""
 REGULAR = 0.2
 """The volume that the columns of a slope span, each of length one, from which on no other assembly is near."""
+NEAR = 0.15
+"""Lengths of the size, on average, from the sketch: a large group that lies farther off may have another assembly that
+is
+nearer, of which no start tells."""
 MOST = 4
 """Unknowns of the largest group whose regularity a backend tells as that volume."""
 
@@ -102,7 +106,8 @@ class _Near:
             own = np.array(self.levels) == stage.level
             cost, other = costs[own].sum(axis=0), others[own].sum(axis=0)
             if np.all(np.isinf(other)):
-                near = (cost <= np.count_nonzero(own) * CLEAR**2) & (found.regular > REGULAR)
+                clear &= (cost <= np.count_nonzero(own) * NEAR**2) & (found.regular > REGULAR)
+                near = cost <= np.count_nonzero(own) * CLEAR**2
                 clear &= near if near.all() else near | (before + self._next(stage, found, own) > total + ALIKE)
             else:
                 clear &= before + other > total + ALIKE

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from threading import Lock
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from planar.errors import BadInput
 from planar.mechanism import Mechanism
 from planar.sweeping.assembling import assembled
 from planar.sweeping.base import base
@@ -51,6 +53,8 @@ def prepared(
 class Prepared:
     """A mechanism ready to run: calling it solves one design, `values` by name as in `planar.sweep`, a number each.
 
+    May be called from several threads; what other processes are given is the mechanism.
+
     `input`: positions of the running input (steps + 1,), rad or m.
     """
 
@@ -79,7 +83,9 @@ class Prepared:
         self.known: dict[str, float] | None = None
         self.numbers = np.zeros(0)
         self.tolerance = 0.0
-        self.still = np.zeros(steps + 1, dtype=np.int8)
+        self.solved = np.zeros(steps + 1, dtype=np.int8)
+        self.solved.flags.writeable = False
+        self.lock = Lock()
 
     def _turn(self) -> Any:
         """The compiled function; None where there is none for this structure."""
@@ -106,18 +112,21 @@ class Prepared:
 
     def __call__(self, values: Mapping[str, float] | None = None) -> Ran:
         """The run of one design. Raises BadInput for a name that is not there."""
-        values = dict(values or {})
-        if self.turn is None or (values != self.known and not self._set(values)):
+        values = {name: _number(name, value) for name, value in (values or {}).items()}
+        found = None
+        if self.turn is not None:
+            with self.lock:  # what is known of a design is kept from call to call
+                if values == self.known or self._set(values):
+                    found = self.turn(self.numbers, self.tolerance, self.base.unit)
+        if found is None or not found[1]:
             return self._swept(values)
-        out, fine = self.turn(self.numbers, self.tolerance, self.base.unit)
-        if not fine:
-            return self._swept(values)
+        out, _ = found
         turned, many = out.T, len(self.points)
         orders = [
             {name: turned[:, 2 * (k * many + n) : 2 * (k * many + n) + 2] for n, name in enumerate(self.points)}
             for k in range(3 if self.rates else 1)
         ]
-        return Ran(orders[0], *(orders[1:] if self.rates else (None, None)), self.still)
+        return Ran(orders[0], *(orders[1:] if self.rates else (None, None)), self.solved)
 
     def _set(self, values: dict[str, float]) -> bool:
         """Take over a design's numbers; whether its assembly is surely the one nearest to the sketch."""
@@ -157,3 +166,9 @@ class Prepared:
             for order in (found.position, found.velocity, found.acceleration)
         ]
         return Ran(*orders, np.asarray(found.status)[0], found.said)
+
+
+def _number(name: str, value: Any) -> float:
+    if np.ndim(value) != 0:
+        raise BadInput(str(name), "one number is wanted; many designs at once are a sweep")
+    return value
