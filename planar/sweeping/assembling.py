@@ -18,7 +18,7 @@ from planar.solving.newton import CLOSED, newton
 from planar.sweeping.base import Base, of_designs
 from planar.sweeping.judging import volume
 from planar.sweeping.marching import Closing
-from planar.sweeping.nearby import NEAR, REGULAR, nearby
+from planar.sweeping.nearby import MOST, NEAR, REGULAR, nearby
 
 Array = np.ndarray
 
@@ -378,9 +378,10 @@ class _Assembling:
         shown = self._shown()
         clear = (least <= shown * CLEAR**2) & (shown > 0) & ~np.isin(np.arange(self.many), tied)
         sure = (self.sure | clear) & np.isfinite(least) & (least < self.dropped - ALIKE)
-        if any(length(stage.unknowns) > 2 for stage in self.equations.stages):
-            # a large group may have assemblies that no start has led to: none of these is nearer than what is near
-            sure &= least <= shown * NEAR**2
+        largest = max((length(stage.unknowns) for stage in self.equations.stages), default=0)
+        if largest > 2:
+            # it may have assemblies that no start has led to: none of these is nearer than what is near
+            sure &= least <= shown * (NEAR if largest <= MOST else CLEAR) ** 2
         return Assembled(z, sure, self.ends)
 
 
