@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from planar.grouped.each import sweep_each
     from planar.grouped.result import Each, Swept
     from planar.mechanism import Along, At, Distances, Drive, Input, Link, Load, Mechanism, Point
+    from planar.modes.modes import Mode, Modes, modes
     from planar.motion import Motion, State
     from planar.pins import pinned
     from planar.solving.cycle import cycle
@@ -65,6 +66,8 @@ _ROOMS = {
     "Load": "mechanism",
     "Mechanism": "mechanism",
     "Mobility": "analysis.mobility",
+    "Mode": "modes.modes",
+    "Modes": "modes.modes",
     "Motion": "motion",
     "NoAnswer": "errors",
     "Outcome": "errors",
@@ -98,6 +101,7 @@ _ROOMS = {
     "load": "files",
     "loads": "files",
     "mobility": "analysis.mobility",
+    "modes": "modes",
     "pinned": "pins",
     "plot": "plot",
     "prepared": "sweeping.prepared",
@@ -139,6 +143,8 @@ __all__ = [
     "Load",
     "Mechanism",
     "Mobility",
+    "Mode",
+    "Modes",
     "Motion",
     "NoAnswer",
     "Outcome",
@@ -172,6 +178,7 @@ __all__ = [
     "load",
     "loads",
     "mobility",
+    "modes",
     "pinned",
     "plot",
     "prepared",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from planar.analysis.centres import centres as all_centres
 from planar.drawing import animation
+from planar.drawing.assemblies import sheets_of
 from planar.drawing.centres import REACH, centres_picture, chosen
 from planar.drawing.centrodes import centrodes_picture
 from planar.drawing.circle import circle_picture
@@ -22,6 +23,8 @@ from planar.drawing.positions import positions as positions_picture
 from planar.drawing.scheme import scheme as scheme_picture
 from planar.files import save as write
 from planar.mechanism import Mechanism
+from planar.modes.modes import Modes
+from planar.modes.modes import modes as all_modes
 from planar.motion import Motion, State
 
 if TYPE_CHECKING:
@@ -34,6 +37,7 @@ __all__ = [
     "centrodes",
     "diagrams",
     "loci",
+    "modes",
     "positions",
     "save",
     "scheme",
@@ -97,6 +101,15 @@ def centrodes(
     Without a `link` those of the first coupler. Raises BadInput for a link that is not there, or a scale that is none.
     """
     return figure([centrodes_picture(motion, link, other, scales(scale, ["length"]).get("length"))])
+
+
+def modes(assemblies: Modes | Mechanism, scale: Scales = None) -> list[Figure]:
+    """Every assembly drawn small, numbered, to one scale, the sketch's own marked: sheets of 24, four at the most.
+
+    Raises BadInput for a scale that is none, and NoAnswer where there is no assembly.
+    """
+    found = assemblies if isinstance(assemblies, Modes) else all_modes(assemblies)
+    return [figure(*sheet) for sheet in sheets_of(found, scales(scale, ["length"]).get("length"))]
 
 
 def solution(state: State, scale: Scales = None) -> list[Figure]:

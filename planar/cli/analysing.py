@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from planar.cli.shared import as_json, at, busy, drives, main, output, show, spare
+from planar.cli.shared import as_json, at, busy, drives, loaded, main, moded, output, show, spare
 from planar.errors import BadInput
 
 
@@ -16,14 +16,21 @@ from planar.errors import BadInput
 @click.option("--pair", "pairs", multiple=True, metavar="NAME", help="A slide; left out, all that the frame guides.")
 @click.option("--point", "points", multiple=True, metavar="NAME", help="A point: harmonics of its x and y.")
 @click.option("--input", "running", metavar="PAIR", help="The input that turns, where there are several.")
+@moded
 @as_json
-def harmonics(model: str, pairs: tuple[str, ...], points: tuple[str, ...], running: str | None, as_json: bool) -> None:
+def harmonics(
+    model: str,
+    pairs: tuple[str, ...],
+    points: tuple[str, ...],
+    running: str | None,
+    mode: int | None,
+    as_json: bool,
+) -> None:
     """Strokes, harmonics and the two-term formula of pistons, over a turn."""
     from planar.analysis.analytical import routes
-    from planar.files import load
     from planar.views.analytical import analytical, record
 
-    mechanism = load(model)
+    mechanism = loaded(model, mode)
     with busy(mechanism.name):
         found = routes(mechanism, pairs, points, running)
     if as_json:
@@ -36,17 +43,17 @@ def harmonics(model: str, pairs: tuple[str, ...], points: tuple[str, ...], runni
 @click.argument("model")
 @as_json
 @at
+@moded
 @output("Write the table to a .txt, .svg or .html file.")
-def centres(model: str, as_json: bool, at: tuple[str, ...], output: Path | None) -> None:
+def centres(model: str, as_json: bool, at: tuple[str, ...], mode: int | None, output: Path | None) -> None:
     """All instantaneous centres, with the lines of centres that show each."""
     from planar.analysis.centres import centres as all_centres
     from planar.analysis.standing import standing
-    from planar.files import load
     from planar.views.centres import record, table
 
     if as_json and output is not None:
         raise BadInput("-o", "the table goes to a file or SI values are printed with --json; give one of the two")
-    mechanism = load(model)
+    mechanism = loaded(model, mode)
     spare(model, output)
     with busy(mechanism.name):
         found = all_centres(standing(mechanism, drives(mechanism, at)))
@@ -60,19 +67,19 @@ def centres(model: str, as_json: bool, at: tuple[str, ...], output: Path | None)
 @click.argument("model")
 @as_json
 @at
+@moded
 @output("Write the tables to a .txt, .svg or .html file.")
-def forces(model: str, as_json: bool, at: tuple[str, ...], output: Path | None) -> None:
+def forces(model: str, as_json: bool, at: tuple[str, ...], mode: int | None, output: Path | None) -> None:
     """What the inputs supply against the loads, power, mechanical advantage."""
     from planar.analysis.advantage import advantages
     from planar.analysis.forces import forces as of_inputs
     from planar.analysis.published import compare
-    from planar.files import load
     from planar.solving.position import solve
     from planar.views.loads import record, tables, where_to_write
 
     if as_json and output is not None:
         raise BadInput("-o", "tables go to a file or SI values are printed with --json; give one of the two")
-    mechanism = load(model)
+    mechanism = loaded(model, mode)
     spare(model, output)
     if not mechanism.loads:
         raise BadInput("$.loads", where_to_write(mechanism))

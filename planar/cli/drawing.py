@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 from click.core import ParameterSource
 
-from planar.cli.shared import advancing, at, busy, drives, main, output, ranged, run, scaled, spare
+from planar.cli.shared import advancing, at, busy, drives, loaded, main, moded, output, ranged, run, scaled, spare
 from planar.errors import BadInput
 
 if TYPE_CHECKING:
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from planar.motion import Motion
 
 POSITION = ("scheme", "velocity", "acceleration", "centres")
+ASSEMBLIES = ("modes",)
 MOTION = ("positions", "loci", "centrodes", "diagrams")
 SMOOTH = 360
 """Steps of a run that is drawn."""
@@ -23,7 +24,7 @@ SMOOTH = 360
 
 @main.command()
 @click.argument("model")
-@click.argument("what", type=click.Choice((*POSITION, *MOTION)))
+@click.argument("what", type=click.Choice((*POSITION, *MOTION, *ASSEMBLIES)))
 @output("Write the drawing to a .png, .svg or .pdf file.", required=True)
 @scaled
 @at
@@ -41,6 +42,7 @@ SMOOTH = 360
 @click.option("--steps", default=12, show_default=True, metavar="N", help="Positions, or chords of the diagrams.")
 @click.option("--chords", is_flag=True, help="Diagrams with graphical differentiation beside the curves.")
 @ranged
+@moded
 def plot(
     model: str,
     what: str,
@@ -55,10 +57,10 @@ def plot(
     pair: str | None,
     start: str | None,
     stop: str | None,
+    mode: int | None,
 ) -> None:
     """A drawing to scale: scheme, polygons and centres of a position; loci, centrodes, diagrams and more of a run."""
     from planar import plot as drawn
-    from planar.files import load
     from planar.solving.position import solve
 
     steps_told = click.get_current_context().get_parameter_source("steps") is ParameterSource.COMMANDLINE
@@ -68,16 +70,23 @@ def plot(
         ("--link", links, ("centres", "centrodes")),
         ("--chords", chords, ("diagrams",)),
         ("--steps", steps_told, ("positions", "diagrams") if chords else ("positions",)),
-        ("--scale", scales, (*POSITION, "positions", "loci", "centrodes")),
+        ("--scale", scales, (*POSITION, "positions", "loci", "centrodes", *ASSEMBLIES)),
+        ("--mode", mode is not None, (*POSITION, *MOTION)),
     ):
         if told and what not in kinds:
             raise BadInput(option, f"this is for {' and '.join(kinds)}; {what} would not heed it")
-    mechanism = load(model)
+    mechanism = loaded(model, mode)
     spare(model, output)
     with busy(f"{mechanism.name}: {what}"):
+        if (pair or start or stop) and what not in MOTION:
+            told = f"{what} are" if what in ASSEMBLIES else f"a {what} is"
+            raise BadInput("--input", f"{told} of one position; move an input there with --at")
+        if what in ASSEMBLIES:
+            from planar.modes.modes import modes
+
+            drawn.save(drawn.modes(modes(mechanism, drives(mechanism, at)), scales), output)
+            return
         if what in POSITION:
-            if pair or start or stop:
-                raise BadInput("--input", f"a {what} is of one position; move an input there with --at")
             state = solve(mechanism, drives(mechanism, at))
             figure = drawn.centres(state, scales, links) if what == "centres" else getattr(drawn, what)(state, scales)
         else:
@@ -104,14 +113,20 @@ def plot(
 @output("Write the moving picture to a .gif or .mp4 file.", required=True)
 @click.option("--point", "points", multiple=True, metavar="NAME", help="A point whose path is drawn as it moves.")
 @ranged
+@moded
 def animate(
-    model: str, output: Path, points: tuple[str, ...], pair: str | None, start: str | None, stop: str | None
+    model: str,
+    output: Path,
+    points: tuple[str, ...],
+    pair: str | None,
+    start: str | None,
+    stop: str | None,
+    mode: int | None,
 ) -> None:
     """The mechanism in motion, to and fro or round and round."""
     from planar import plot as drawn
-    from planar.files import load
 
-    mechanism = load(model)
+    mechanism = loaded(model, mode)
     spare(model, output)
     with advancing(mechanism.name) as progress:
         drawn.animate(_run(mechanism, pair, start, stop), output, points or None, progress)

@@ -49,6 +49,28 @@ scaled = click.option(
 )
 
 
+moded = click.option(
+    "--mode",
+    "mode",
+    type=click.IntRange(1),
+    metavar="N",
+    help="The assembly of this number in `planar modes`, and not the one nearest to the sketch.",
+)
+
+
+def loaded(model: str, mode: int | None) -> Mechanism:
+    """The mechanism of a file, the assembly chosen that `--mode` names."""
+    from planar.files import load
+
+    mechanism = load(model)
+    if mode is None:
+        return mechanism
+    from planar.modes.choice import chosen
+
+    with busy(f"{mechanism.name}: assemblies"):
+        return chosen(mechanism, mode)
+
+
 def ranged(command: Any) -> Any:
     """The options of a run: which input runs, from where to where."""
     for option in (

@@ -10,7 +10,21 @@ from typing import TYPE_CHECKING
 import click
 
 from planar.cli.ending import NO_ANSWER
-from planar.cli.shared import as_json, at, busy, drives, main, output, ranged, run, scaled, show, spare
+from planar.cli.shared import (
+    as_json,
+    at,
+    busy,
+    drives,
+    loaded,
+    main,
+    moded,
+    output,
+    ranged,
+    run,
+    scaled,
+    show,
+    spare,
+)
 from planar.errors import BadInput, Outcome
 
 if TYPE_CHECKING:
@@ -24,6 +38,7 @@ if TYPE_CHECKING:
 @click.argument("model")
 @as_json
 @at
+@moded
 @click.option(
     "--relative",
     "relative",
@@ -32,9 +47,11 @@ if TYPE_CHECKING:
     help="Also how the first point moves against the second, in parts, in the axes of a link that carries the second.",
 )
 @output("Write the tables to a .txt, .svg or .html file.")
-def solve(model: str, as_json: bool, at: tuple[str, ...], relative: tuple[str, ...], output: Path | None) -> None:
+def solve(
+    model: str, as_json: bool, at: tuple[str, ...], mode: int | None, relative: tuple[str, ...], output: Path | None
+) -> None:
     """This position: mobility, all positions, velocities, accelerations, rubbing speeds."""
-    state, comparisons = _solved(model, at, as_json, output)
+    state, comparisons = _solved(model, mode, at, as_json, output)
     relatives = {text: _relative(state, text) for text in relative}
     if as_json:
         from planar.views.record import record
@@ -50,13 +67,16 @@ def solve(model: str, as_json: bool, at: tuple[str, ...], relative: tuple[str, .
 @click.argument("model")
 @as_json
 @at
+@moded
 @scaled
 @output("Write the text to a .txt, .svg or .html file, or pages with drawings to scale to a .pdf or .png file.")
-def explain(model: str, as_json: bool, at: tuple[str, ...], scales: tuple[str, ...], output: Path | None) -> None:
+def explain(
+    model: str, as_json: bool, at: tuple[str, ...], mode: int | None, scales: tuple[str, ...], output: Path | None
+) -> None:
     """The worked solution: vector equations and tables, both polygons step by step, results."""
     from planar.drawing.paper import scales as read
 
-    state, comparisons = _solved(model, at, as_json, output)
+    state, comparisons = _solved(model, mode, at, as_json, output)
     given = read(scales)
     if output is not None and output.suffix.lower() in (".pdf", ".png"):
         from planar.drawing.page import sheets, solution_pages
@@ -76,16 +96,15 @@ def explain(model: str, as_json: bool, at: tuple[str, ...], scales: tuple[str, .
 
 
 def _solved(
-    model: str, at: tuple[str, ...], as_json: bool, output: Path | None
+    model: str, mode: int | None, at: tuple[str, ...], as_json: bool, output: Path | None
 ) -> tuple[State, tuple[Comparison, ...]]:
     """A model's position, moved to where `--at` says, with its published values unless it was moved."""
     from planar.analysis.published import compare
-    from planar.files import load
     from planar.solving.position import solve
 
     if as_json and output is not None:
         raise BadInput("-o", "tables go to a file or SI values are printed with --json; give one of the two")
-    mechanism = load(model)
+    mechanism = loaded(model, mode)
     spare(model, output)
     moved = drives(mechanism, at)
     state = solve(mechanism, moved)
@@ -97,6 +116,7 @@ def _solved(
 @as_json
 @click.option("--steps", default=360, show_default=True, metavar="N", help="Parts that the range is divided into.")
 @ranged
+@moded
 @click.option("--there-and-back", is_flag=True, help="Come back through the range by the same positions.")
 @click.option("--circuit", is_flag=True, help="Go through dead points, all round the circuit of this assembly.")
 @click.option(
@@ -126,6 +146,7 @@ def cycle(
     pair: str | None,
     start: str | None,
     stop: str | None,
+    mode: int | None,
     there_and_back: bool,
     circuit: bool,
     branches: tuple[int, ...],
@@ -136,11 +157,11 @@ def cycle(
 ) -> None:
     """The whole motion: position to position through the range of an input, or in time by the inputs' laws."""
     from planar.document import read_time
-    from planar.files import load, save
+    from planar.files import save
 
     if as_json and output is not None:
         raise BadInput("-o", "a run goes to a file or is printed with --json; give one of the two")
-    mechanism = load(model)
+    mechanism = loaded(model, mode)
     spare(model, output)
     if output is not None:
         from planar.views.run import writable

@@ -79,6 +79,8 @@ def sheets(figures: Sequence[Figure], suffix: str) -> bytes:
             canvas.draw()
             found.append(np.asarray(canvas.buffer_rgba())[..., :3].copy())
     out = BytesIO()
+    wide = max(page.shape[1] for page in found)
+    found = [np.pad(page, ((0, 0), (0, wide - page.shape[1]), (0, 0)), constant_values=255) for page in found]
     imsave(out, np.vstack(found), format="png", dpi=dots, metadata={"Software": None})
     return out.getvalue()
 

@@ -22,7 +22,7 @@ from planar.pairs.marks import Block, Guide, Opening, Pin, PitchLine, Wheel
 from planar.plane import Frame, Vector, direction
 from planar.shapes import Shape
 
-__all__ = ["body_marks", "ground_marks", "scheme", "space_scale", "standing"]
+__all__ = ["body_marks", "ground_marks", "point_letters", "scheme", "space_scale", "standing"]
 
 SMALLEST = 60.0
 """mm: a figure that would be smaller may be higher than others."""
@@ -65,7 +65,7 @@ def scheme(
     if numbers:
         strokes += _numbers(scene, strokes, clear)
     if letters:
-        strokes += _letters(scene)
+        strokes += point_letters(scene)
     return Picture(tuple(strokes), mechanism.name, (f"Space diagram, {scale}",))
 
 
@@ -98,7 +98,7 @@ def _fixed_points(scene: Scene) -> Iterator[Mark]:
             yield symbols.dot(scene.place(frame, scene.shapes[frame].at(at)), f"point {each.name}", Pen.PIN)
 
 
-def _letters(scene: Scene) -> Iterator[Letter]:
+def point_letters(scene: Scene, size: float = 9.0) -> Iterator[Letter]:
     """The names of the points."""
     blocks = {mark.name for mark in scene.marks if isinstance(mark, Block)} - scene.tubes.keys()
     on_blocks = {scene.named(name) for name in blocks}
@@ -109,7 +109,7 @@ def _letters(scene: Scene) -> Iterator[Letter]:
         if each.name in on_blocks:
             away = symbols.BLOCK[1] / 2.0 + 0.6
         at = scene.place(link, scene.shapes[link].at(point))
-        yield Letter(each.name, spot(at), f"point {each.name}", 9.0, away)
+        yield Letter(each.name, spot(at), f"point {each.name}", size, away)
 
 
 def _numbers(scene: Scene, strokes: list[Mark], clear: Clearance) -> Iterator[Letter]:

@@ -1,0 +1,56 @@
+"""The command that lists every assembly."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+
+from planar.cli.shared import as_json, busy, drives, main, output, show, spare
+from planar.errors import BadInput
+
+
+@main.command()
+@click.argument("model")
+@as_json
+@click.option(
+    "--at",
+    "at",
+    multiple=True,
+    metavar="PAIR=POSITION",
+    help="The assemblies with an input there: A=75deg, stroke=20mm, or a number in the file's units.",
+)
+@click.option(
+    "--limit", type=click.IntRange(1), default=64, show_default=True, metavar="N", help="Most that are listed."
+)
+@click.option("--point", "points", multiple=True, metavar="NAME", help="A point whose place is printed.")
+@click.option("--certify/--no-certify", default=True, help="Prove every assembly by intervals, or leave it.")
+@output("Write the tables to a .txt, .svg or .html file.")
+def modes(
+    model: str,
+    as_json: bool,
+    at: tuple[str, ...],
+    limit: int,
+    points: tuple[str, ...],
+    certify: bool,
+    output: Path | None,
+) -> None:
+    """Every assembly at the given inputs, and whether these are all."""
+    from planar.files import load
+    from planar.modes.modes import modes as assemblies
+    from planar.views.modes import record, table
+
+    if as_json and output is not None:
+        raise BadInput("-o", "tables go to a file or SI values are printed with --json; give one of the two")
+    mechanism = load(model)
+    spare(model, output)
+    with busy(f"{mechanism.name}: assemblies"):
+        found = assemblies(mechanism, drives(mechanism, at), certify=certify)
+        if not found:
+            raise found.refusal()
+        told = record(found, limit) if as_json else table(found, limit, points)
+    if as_json:
+        click.echo(json.dumps(told, ensure_ascii=False, indent=1, allow_nan=False))
+        return
+    show(told, output)

@@ -1,0 +1,336 @@
+"""Every real assembly of a mechanism at given inputs, as a list that is made as it is read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from importlib.util import find_spec
+from math import hypot, prod, sqrt
+from typing import NamedTuple, overload
+
+import numpy as np
+
+from planar.errors import NoAnswer, Outcome
+from planar.mechanism import Drive, Mechanism, NamedPoint, named_points, with_inputs
+from planar.modes.roots import Completeness
+from planar.modes.tree import WORST, Path, Tree
+from planar.motion import State
+from planar.plane import Frame
+from planar.program import length, placed
+from planar.shapes import Shape
+from planar.solving import refusals
+from planar.solving.position import Solver, known_of, solve
+from planar.words import listed, many
+
+Array = np.ndarray
+
+MOST = 4096
+"""Dyads, or larger groups by what they take, that are solved for the sake of a number alone."""
+
+
+def modes(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = (), *, certify: bool = True) -> Modes:
+    """Every real assembly of a mechanism at its inputs.
+
+    `drives` change inputs, as {pair: position} (rad or m). With `certify` every assembly is proved by intervals, group
+    after group: dimensions, inputs and the groups before it are taken as the floats they are. It needs python-flint.
+
+    Raises NoAnswer where the inputs leave links free whatever the dimensions.
+    """
+    if isinstance(drives, Mapping):
+        drives = [Drive(pair, position) for pair, position in drives.items()]
+    solver = known_of(mechanism).solver
+    if any(stage.free for stage in solver.equations.stages):
+        raise refusals.free(solver)
+    moved = tuple(drives)
+    return Modes(solver.moved(with_inputs(mechanism, moved)) if moved else solver, mechanism, moved, certify)
+
+
+class Group(NamedTuple):
+    """One group of links that are assembled together, those before it given.
+
+    `expected` complex solutions are there by the count for this structure (None: it is not known), `found` of them
+    were; `real` are assemblies. Where the group hangs on choices before it these are the least and the most.
+    """
+
+    links: tuple[str, ...]
+    pairs: tuple[str, ...]
+    expected: int | None
+    found: tuple[int, int]
+    real: tuple[int, int]
+    complete: Completeness
+    curve: bool
+    "whether its links can move, the inputs held: a curve of assemblies"
+    said: str
+    solved: int
+    "for how many of the choices before it"
+
+
+class Modes(Sequence["Mode"]):
+    """All assemblies in a fixed order, which does not depend on the sketch: group after group of links.
+
+    The list is made as it is read. It has a length where that can be told by solving a few thousand groups, those that
+    do not hang on each other not listed together; else TypeError is raised, and `bound` says how many there may be.
+    """
+
+    def __init__(self, solver: Solver, mechanism: Mechanism, drives: tuple[Drive, ...], certify: bool):
+        self._solver, self._source, self._drives = solver, mechanism, drives
+        self._missing = certify and find_spec("flint") is None
+        self._tree = Tree(solver, certify and not self._missing)
+        self._bare = Tree(solver, False) if self._tree.certify else self._tree  # to count with
+        self._paths = self._tree.paths()
+        self._ended = False
+        self._listed: list[Mode] = []
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """The mechanism at the inputs of these assemblies."""
+        return self._solver.mechanism
+
+    def __iter__(self) -> Iterator[Mode]:
+        number = 0
+        while self._reach(number + 1):
+            yield self._listed[number]
+            number += 1
+
+    @overload
+    def __getitem__(self, index: int) -> Mode: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[Mode]: ...
+    def __getitem__(self, index: int | slice) -> Mode | Sequence[Mode]:
+        if isinstance(index, slice):
+            ends = [end for end in (index.start, index.stop) if end is not None]
+            if index.stop is None or min(ends) < 0 or (index.step or 1) < 0:
+                return [self[k] for k in range(*index.indices(len(self)))]
+            self._reach(index.stop)
+            return self._listed[index]
+        if index < 0:
+            index += len(self)
+        if index < 0 or not self._reach(index + 1):
+            raise IndexError(f"there are {many(len(self._listed), 'assembly', 'assemblies')}")
+        return self._listed[index]
+
+    def __bool__(self) -> bool:
+        return self._reach(1)
+
+    def __len__(self) -> int:
+        if self.total is None:
+            bound = "" if self.bound is None else f": up to {self.bound}"
+            raise TypeError(f"there are more assemblies than are listed for their number{bound}; read them one by one")
+        return self.total
+
+    @property
+    def total(self) -> int | None:
+        """How many assemblies there are; None where that cannot be told by solving a few thousand groups."""
+        return len(self._listed) if self._ended else self._counted
+
+    @cached_property
+    def _counted(self) -> int | None:
+        return self._bare.count(MOST)
+
+    @property
+    def bound(self) -> int | None:
+        """How many complex solutions there may be: the product over the groups; None where one is not known."""
+        return None if None in self._expected else prod(self._expected)
+
+    @property
+    def _expected(self) -> list[int | None]:
+        """Of every group how many complex solutions its structure has."""
+        self._reach(1)
+        solved = [self._tree.solved(index) for index in range(len(self._tree.stages))]
+        return [_most([each.expected for each in of]) if of else None for of in solved]
+
+    @property
+    def complete(self) -> Completeness:
+        """Whether these are all: as the worst of the groups, of what has been solved so far."""
+        self._reach(1)
+        return max((group.complete for group in self.groups), key=WORST.index, default=Completeness.PROVED)
+
+    @property
+    def groups(self) -> tuple[Group, ...]:
+        """The groups of links in the order in which they are assembled, with what has been found of them so far."""
+        self._reach(1)
+        found = []
+        for index, stage in enumerate(self._tree.stages):
+            solved = self._tree.solved(index)
+            if not solved or not length(stage.unknowns):
+                continue
+            counts = [each.found for each in solved]
+            real = [len(each.real) for each in solved]
+            worst = max(solved, key=lambda each: WORST.index(each.complete))
+            found.append(
+                Group(
+                    stage.links,
+                    stage.pairs,
+                    _most([each.expected for each in solved]),
+                    (min(counts), max(counts)),
+                    (min(real), max(real)),
+                    worst.complete,
+                    any(each.curve for each in solved),
+                    worst.said,
+                    len(solved),
+                )
+            )
+        return tuple(found)
+
+    @property
+    def said(self) -> tuple[str, ...]:
+        """What there is to say of the list: how the groups were solved, and what is not proved."""
+        how: dict[str, list[int]] = {}
+        for number, group in enumerate(self.groups, start=1):
+            how.setdefault(group.said, []).append(number)
+        told = [f"group{'s' * (len(of) > 1)} {_in_words(of)}: {said}" for said, of in how.items()]
+        if any(group.curve for group in self.groups):
+            told.append(
+                "some links can move while the inputs are held: what is listed stands for a curve of assemblies"
+            )
+        if self._solver.outline.counts:
+            told.append("of angles that count turns the least are taken")
+        if self._missing:
+            told.append("nothing is certified: that needs python-flint (pip install 'planar[modes]')")
+        return tuple(told)
+
+    @cached_property
+    def reason(self) -> str:
+        """Why there is no assembly; empty where there is one."""
+        return "" if self else self.refusal().reason
+
+    def refusal(self) -> NoAnswer:
+        """The same to be raised, where there is no assembly."""
+        try:
+            self._solver.assembly()
+        except NoAnswer as problem:
+            return problem
+        return NoAnswer(Outcome.CANNOT_BE_ASSEMBLED, f"{self._solver.at()} no assembly was found")
+
+    @cached_property
+    def places(self) -> dict[str, int]:
+        """Every named point, and after which of the groups it stands (from 0; -1 where the inputs alone say so)."""
+        return {name: level for name, (level, _, _) in self._solver.outline.places.first.items()}
+
+    @cached_property
+    def nearest(self) -> Mode | None:
+        """The assembly that the sketch means, or to which it leads where inputs are moved; None where it is none."""
+        try:
+            if self._drives:
+                state = solve(self._source, self._drives)
+                z = self._solver.coordinates(state.frames, state.own)[list(self._solver.equations.unknowns)]
+            else:
+                z = known_of(self._source).assembly.z
+        except NoAnswer:
+            return None
+        path = self._tree.towards(z)
+        if path is None:
+            return None
+        number = self._bare.before(path, MOST)
+        return self._mode(None if number is None else number + 1, path)
+
+    def _reach(self, number: int) -> bool:
+        """Whether there are so many assemblies; they are listed up to there."""
+        while len(self._listed) < number:
+            path = next(self._paths, None)
+            if path is None:
+                self._ended = True
+                return False
+            self._listed.append(self._mode(len(self._listed) + 1, path))
+        return True
+
+    def _mode(self, number: int | None, path: Path) -> Mode:
+        shown = [
+            rank + 1 for stage, rank in zip(self._tree.stages, path.choices, strict=True) if length(stage.unknowns)
+        ]
+        return Mode(number, tuple(shown), path.certified, path.double, path.z, self._solver)
+
+
+def _in_words(numbers: Sequence[int]) -> str:
+    """Numbers that rise: 1 to 4, 6 and 8."""
+    runs: list[list[int]] = []
+    for number in numbers:
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    told = [[f"{run[0]} to {run[-1]}"] if len(run) > 2 else [str(each) for each in run] for run in runs]
+    return listed([each for part in told for each in part])
+
+
+def _most(numbers: Sequence[int | None]) -> int | None:
+    """The greatest number; None where one is not known."""
+    known = [each for each in numbers if each is not None]
+    return max(known) if len(known) == len(numbers) else None
+
+
+@dataclass(frozen=True, eq=False)
+class Mode:
+    """One assembly. Its number counts from 1, None where counting so far would take too long."""
+
+    number: int | None
+    choices: tuple[int, ...]
+    "of every group the number of its assembly, those of the groups before it given"
+    certified: bool
+    "whether of every group this one is proved to be there, alone, for all numbers as the floats they are"
+    double: bool
+    "whether two assemblies meet here: a dead point"
+    z: Array
+    "(unknowns,) of the equations"
+    _solver: Solver
+
+    @cached_property
+    def _answer(self) -> State | NoAnswer:
+        try:
+            return self._solver.state(self.z, self._solver.mechanism.remarks)
+        except NoAnswer as problem:
+            return problem
+
+    @property
+    def state(self) -> State | None:
+        """The solved position with its rates; None where these are not determined, for which `reason` says why."""
+        return self._answer if isinstance(self._answer, State) else None
+
+    @property
+    def outcome(self) -> Outcome:
+        """Solved, or why there is no state."""
+        return self._answer.outcome if isinstance(self._answer, NoAnswer) else Outcome.SOLVED
+
+    @property
+    def reason(self) -> str:
+        """Why there is no state; empty where there is one."""
+        return self._answer.reason if isinstance(self._answer, NoAnswer) else ""
+
+    @property
+    def shapes(self) -> dict[str, Shape]:
+        """The points of every link in its own axes (m)."""
+        return self._solver.shapes
+
+    @cached_property
+    def frames(self) -> dict[str, Frame]:
+        """Where every link is (m, rad), without rates."""
+        setup = self._solver
+        w = setup.program.coordinates(self.z, setup.station.u, setup.station.p) * setup.scale
+        return placed(w.tolist(), setup.column, setup.shapes, {})[0]
+
+    @cached_property
+    def points(self) -> dict[str, Array]:
+        """Where every named point is (2,) (m)."""
+
+        def at(named: NamedPoint) -> Array:
+            link, point = named.members[0]
+            return np.array([*self.frames[link].carry(self.shapes[link].at(point))], dtype=float)
+
+        return {each.name: at(each) for each in named_points(self._solver.mechanism)}
+
+    @property
+    def distance(self) -> float | None:
+        """How far the sketched points are from the sketch (m), the root of the mean square; None without a sketch."""
+        sketch = self._solver.mechanism.sketch
+        gaps = [hypot(self.points[name][0] - x, self.points[name][1] - y) for name, x, y in sketch]
+        return sqrt(sum(gap * gap for gap in gaps) / len(gaps)) if gaps else None
+
+    @cached_property
+    def mechanism(self) -> Mechanism:
+        """The same mechanism, its sketch this assembly with every named point: what solves it takes this one.
+
+        Where angles count turns assemblies may differ in these alone; then the one with the places sketched is taken.
+        """
+        sketch = tuple((name, float(at[0]), float(at[1])) for name, at in self.points.items())
+        return replace(self._solver.mechanism, sketch=sketch)
