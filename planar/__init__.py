@@ -23,13 +23,13 @@ if TYPE_CHECKING:
     from planar.analysis.time_ratio import TimeRatio, time_ratio
     from planar.analysis.transmission import Transmission, transmission
     from planar.analysis.two_directions import centre_of
+    from planar.assemblies.modes import Mode, Modes, modes
     from planar.document.schema import schema
     from planar.errors import BadInput, NoAnswer, Outcome, PlanarError
     from planar.files import dumps, from_dict, load, loads, to_dict
     from planar.grouped.each import sweep_each
     from planar.grouped.result import Each, Swept
     from planar.mechanism import Along, At, Distances, Drive, Input, Link, Load, Mechanism, Point
-    from planar.modes.modes import Mode, Modes, modes
     from planar.motion import Motion, State
     from planar.pins import pinned
     from planar.solving.cycle import cycle
@@ -66,8 +66,8 @@ _ROOMS = {
     "Load": "mechanism",
     "Mechanism": "mechanism",
     "Mobility": "analysis.mobility",
-    "Mode": "modes.modes",
-    "Modes": "modes.modes",
+    "Mode": "assemblies.modes",
+    "Modes": "assemblies.modes",
     "Motion": "motion",
     "NoAnswer": "errors",
     "Outcome": "errors",
@@ -101,7 +101,7 @@ _ROOMS = {
     "load": "files",
     "loads": "files",
     "mobility": "analysis.mobility",
-    "modes": "modes",
+    "modes": "assemblies.modes",
     "pinned": "pins",
     "plot": "plot",
     "prepared": "sweeping.prepared",

@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from planar.analysis.centres import centres as all_centres
+from planar.assemblies.modes import Modes
+from planar.assemblies.modes import modes as all_modes
 from planar.drawing import animation
 from planar.drawing.assemblies import sheets_of
 from planar.drawing.centres import REACH, centres_picture, chosen
@@ -23,8 +25,6 @@ from planar.drawing.positions import positions as positions_picture
 from planar.drawing.scheme import scheme as scheme_picture
 from planar.files import save as write
 from planar.mechanism import Mechanism
-from planar.modes.modes import Modes
-from planar.modes.modes import modes as all_modes
 from planar.motion import Motion, State
 
 if TYPE_CHECKING:

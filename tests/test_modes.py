@@ -1,7 +1,6 @@
 """Every assembly at given inputs: as many as closed forms say, each solved by its number, listed as it is read."""
 
 import json
-from importlib.util import find_spec
 from itertools import islice
 from math import cos, hypot, pi, sin, sqrt
 
@@ -10,18 +9,15 @@ import pytest
 from PIL import Image
 
 import planar
+from planar.assemblies.roots import Completeness
 from planar.drawing.assemblies import SHEET, sheets_of
 from planar.drawing.paper import given
 from planar.drawing.picture import Letter
 from planar.files import models
-from planar.modes.roots import Completeness
 from tests import command
 from tests.linkages import conditioning, determinate, random_linkage
 
 MODELS = [(file.stem, mechanism) for file, mechanism in models()]
-needs_the_engine = pytest.mark.skipif(
-    find_spec("planar.modes.isotropic") is None, reason="groups are searched by starts, which proves nothing"
-)
 
 
 def bars(frame: dict, links: dict, driven: tuple[str, float], sketch: dict | None = None) -> planar.Mechanism:
@@ -98,7 +94,6 @@ def test_a_slider_crank_has_two_by_the_closed_form():
     assert sorted(mode.points["B"][0] for mode in modes) == pytest.approx([r * cos(at) - half, r * cos(at) + half])
 
 
-@needs_the_engine
 @pytest.mark.parametrize("name", ["four-bar", "slider-crank", "stephenson-3-five-bar", "jansen-leg", "scotch-yoke"])
 def test_where_all_complex_solutions_are_certified_the_list_is_called_complete(name):
     modes = planar.modes(planar.load(name))
@@ -114,7 +109,7 @@ def test_without_certifying_nothing_is_called_proved():
 
 
 def test_without_the_library_of_intervals_that_is_said(monkeypatch):
-    monkeypatch.setattr("planar.modes.modes.find_spec", lambda name: None)
+    monkeypatch.setattr("planar.assemblies.modes.find_spec", lambda name: None)
     modes = planar.modes(planar.load("four-bar"))
     assert modes.complete is Completeness.NUMERICALLY
     assert any("planar[modes]" in sentence for sentence in modes.said)
@@ -172,8 +167,6 @@ def test_of_random_linkages_the_assembly_that_was_built_is_listed(seed):
         return
     modes = planar.modes(mechanism, certify=False)
     solver = modes._solver
-    if any(len(stage.links) > 4 for stage in solver.equations.stages) and find_spec("planar.modes.isotropic") is None:
-        return
     names = {name: frame for name, frame in built.frames.items() if name in dict.fromkeys(mode_links(mechanism))}
 
     def apart(mode: planar.Mode) -> float:
@@ -235,8 +228,7 @@ def test_a_dead_point_is_an_assembly_without_rates():
     assert all(mode.state is None and mode.outcome is planar.Outcome.DEAD_POINT for mode in modes)
     assert all("cannot move" in mode.reason for mode in modes)
     assert modes[0].points["C"] == pytest.approx([1.6, 1.8], abs=1e-6)
-    if find_spec("planar.modes.isotropic") is not None:
-        assert [mode.double for mode in modes] == [True]
+    assert [mode.double for mode in modes] == [True]
 
 
 def tower(many: int) -> planar.Mechanism:

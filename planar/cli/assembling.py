@@ -37,8 +37,8 @@ def modes(
     output: Path | None,
 ) -> None:
     """Every assembly at the given inputs, and whether these are all."""
+    from planar.assemblies.modes import modes as assemblies
     from planar.files import load
-    from planar.modes.modes import modes as assemblies
     from planar.views.modes import record, table
 
     if as_json and output is not None:

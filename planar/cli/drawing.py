@@ -82,7 +82,7 @@ def plot(
             told = f"{what} are" if what in ASSEMBLIES else f"a {what} is"
             raise BadInput("--input", f"{told} of one position; move an input there with --at")
         if what in ASSEMBLIES:
-            from planar.modes.modes import modes
+            from planar.assemblies.modes import modes
 
             drawn.save(drawn.modes(modes(mechanism, drives(mechanism, at)), scales), output)
             return

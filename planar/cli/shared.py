@@ -65,7 +65,7 @@ def loaded(model: str, mode: int | None) -> Mechanism:
     mechanism = load(model)
     if mode is None:
         return mechanism
-    from planar.modes.choice import chosen
+    from planar.assemblies.choice import chosen
 
     with busy(f"{mechanism.name}: assemblies"):
         return chosen(mechanism, mode)

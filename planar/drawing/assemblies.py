@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from math import floor, log10
 
+from planar.assemblies.modes import Mode, Modes
 from planar.drawing.bodies import bodies
 from planar.drawing.ground import fixed
 from planar.drawing.paper import Scale
@@ -14,7 +15,6 @@ from planar.drawing.scene import Scene
 from planar.drawing.scheme import point_letters, space_scale
 from planar.drawing.strokes import moving
 from planar.errors import Outcome
-from planar.modes.modes import Mode, Modes
 from planar.units import unit
 from planar.words import many
 

@@ -10,7 +10,7 @@ import numpy as np
 from planar.equations import Stage
 from planar.pairs import Kind
 from planar.plane import Vector
-from planar.program import length, placed
+from planar.program import Program, length, placed
 from planar.solving.newton import CLOSED, Closing, Found, newton, polished
 from planar.solving.setup import Setup
 from planar.solving.sketched import turn_between
@@ -164,16 +164,14 @@ class Candidates:
 
     def closing(self, stage: Stage, z: Array, p: Array) -> Closing:
         """A group's constraints at tries of its own unknowns, those of earlier groups and the pairs' numbers given."""
-        function = self.program.closed(stage)
+        return closing_of(self.program, stage, z, self.u, p)
 
-        def closing(tried: Array) -> tuple[Array, Array]:
-            count = len(tried)
-            whole = np.repeat(z[None], count, axis=0)
-            whole[:, stage.unknowns] = tried
-            left, slopes = function.over(count, whole, self.u, p) if count > 1 else function(whole[0], self.u, p)
-            return left.reshape(count, -1), slopes.reshape(count, *slopes.shape[-2:]).transpose(0, 2, 1)
-
-        return closing
+    def everywhere(self, stage: Stage, z: Array) -> list[Candidate]:
+        """All assemblies of a group that starts about the sketch and all over the circles lead to."""
+        closing = self.closing(stage, z, self.p)
+        starts = np.concatenate([self._near(stage, z)[0], _spread(length(stage.unknowns))])
+        ended = newton(closing, self._with_lengths(stage, closing, starts))
+        return self._candidates(stage, z, closing, ended.unknowns[ended.closed])
 
     def _is_angle(self, stage: Stage) -> Array:
         columns = self.equations.unknowns[stage.unknowns]
@@ -235,6 +233,20 @@ class Candidates:
             if angle is not None:
                 angles[link] = angle
         return angles
+
+
+def closing_of(program: Program, stage: Stage, z: Array, u: Array, p: Array) -> Closing:
+    """A group's constraints at tries of its own unknowns, those of earlier groups and all numbers given."""
+    function = program.closed(stage)
+
+    def closing(tried: Array) -> tuple[Array, Array]:
+        count = len(tried)
+        whole = np.repeat(z[None], count, axis=0)
+        whole[:, stage.unknowns] = tried
+        left, slopes = function.over(count, whole, u, p) if count > 1 else function(whole[0], u, p)
+        return left.reshape(count, -1), slopes.reshape(count, *slopes.shape[-2:]).transpose(0, 2, 1)
+
+    return closing
 
 
 def _apart(angles: Array, a: Array, b: Array) -> Array:

@@ -11,9 +11,9 @@ from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from planar.assemblies.modes import Group, Mode, Modes
 from planar.errors import BadInput, Outcome
 from planar.mechanism import motions
-from planar.modes.modes import Group, Mode, Modes
 from planar.units import unit
 from planar.views.table import DIGITS, paragraphs, plain_table
 from planar.words import amount, listed, many

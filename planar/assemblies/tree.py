@@ -8,8 +8,8 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
+from planar.assemblies.roots import Completeness, Roots, roots
 from planar.equations import Stage
-from planar.modes.roots import Completeness, Roots, roots
 from planar.pairs import Kind
 from planar.program import POLISHED, length
 from planar.solving.candidates import MEETING

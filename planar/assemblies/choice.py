@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from planar.assemblies.modes import Mode, Modes, modes
 from planar.errors import BadInput, NoAnswer
 from planar.mechanism import Mechanism
-from planar.modes.modes import Mode, Modes, modes
 from planar.solving.position import solve
 from planar.words import many
 

@@ -11,10 +11,10 @@ from typing import NamedTuple, overload
 
 import numpy as np
 
+from planar.assemblies.roots import Completeness
+from planar.assemblies.tree import WORST, Path, Tree
 from planar.errors import NoAnswer, Outcome
 from planar.mechanism import Drive, Mechanism, NamedPoint, named_points, with_inputs
-from planar.modes.roots import Completeness
-from planar.modes.tree import WORST, Path, Tree
 from planar.motion import State
 from planar.plane import Frame
 from planar.program import length, placed

@@ -1,0 +1,1 @@
+"""Every assembly of a mechanism at given inputs, found completely and certified."""

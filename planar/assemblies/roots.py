@@ -1,0 +1,332 @@
+"""Every assembly of one group of links, those before it given, and how surely there is no other."""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import NamedTuple
+from weakref import WeakKeyDictionary
+
+import casadi as ca
+import numpy as np
+
+from planar.assemblies.certified import able, certified, regular
+from planar.assemblies.eigenvalues import MOST, by_eigenvalues
+from planar.assemblies.family import family
+from planar.assemblies.homotopy import Between, Ends, Generic, at_finite, doubles, ended, followed, generic, normed
+from planar.assemblies.isotropic import Form, Polynomials, constant_slope, form
+from planar.equations import Stage
+from planar.program import Program, length
+from planar.solving.candidates import SAME, Candidates, closing_of
+from planar.solving.newton import CLOSED, Closing, newton, polished
+from planar.solving.setup import Setup
+
+Array = np.ndarray
+
+MOST_PATHS = 1000
+"""Bezout's number up to which paths are followed."""
+REAL = 1e-9
+"""A single solution that differs from its mirror image by less (of its size) is taken for real as it stands."""
+NEARLY = 0.05
+"""One that differs by less is tried on the real equations."""
+DOUBLE = 3e-7
+"""Least singular value of the real slope, of the greatest, below which two assemblies meet."""
+ABSENT = 1e-13
+"""Coefficients below this part of the greatest are none: the structure is one without them."""
+OPEN = 1e-5
+"""Least singular value, of the greatest, below which a direction may be open."""
+MEETING = 1e-3
+"""Assemblies that leave a direction open and are nearer to each other than this are one."""
+ALONG = 0.05
+"""How far along the direction that is open a curve of assemblies is looked for (rad, sizes)."""
+
+
+class Completeness(Enum):
+    """How surely a list is the whole of it."""
+
+    PROVED = "complete"
+    NUMERICALLY = "numerically complete"
+    NOT = "not known to be complete"
+
+
+class Roots(NamedTuple):
+    """All assemblies of one group of links, those before it given.
+
+    `real`: (roots, unknowns) as in z[stage.unknowns] (rad, sizes), sorted, angles between -pi and pi; `double`:
+    (roots,) where two meet, at a dead point; `certified`: (roots,) whether a box of its own is proved to hold each;
+    `expected`: complex solutions at finite places that the structure has, None where no number is known; `found`: those
+    that were found, as often as they count; `curve`: whether a whole curve of assemblies is there, of which `real` has
+    one place; `said`: how it was solved.
+    """
+
+    real: Array
+    double: Array
+    certified: Array
+    expected: int | None
+    found: int
+    complete: Completeness
+    curve: bool
+    said: str
+
+
+class _Known(NamedTuple):
+    """What is kept of a group's structure: the slope of equations that are linear; else its form, and an instance with
+    all its solutions for each set of absent coefficients."""
+
+    straight: ca.Function | None
+    form: Form | None
+    instances: dict[bytes, Generic]
+
+
+_KNOWN: WeakKeyDictionary[Program, dict[int, _Known]] = WeakKeyDictionary()
+
+
+def roots(setup: Setup, stage: Stage, z: Array, certify: bool = True) -> Roots:
+    """Every assembly of a group at the setup's inputs, all groups before it standing at z (unknowns,)."""
+    known = _known(setup, stage)
+    unknowns = length(stage.unknowns)
+    if not unknowns:
+        return Roots(
+            np.zeros((1, 0)), *np.zeros((2, 1), dtype=bool), 1, 1, Completeness.PROVED, False, "nothing is open"
+        )
+    if known.straight is not None:
+        return _straight(setup, stage, z, known.straight, certify)
+    if known.form is None:
+        return _searched(setup, stage, z, "its equations are no polynomials of this kind")
+    if known.form.bound > MOST_PATHS:
+        return _searched(setup, stage, z, f"there may be up to {known.form.bound} complex ones")
+    found = _Solving(setup, stage, z, known).roots(certify)
+    return found or _searched(setup, stage, z, "linkages of this structure have no single solutions")
+
+
+def _known(setup: Setup, stage: Stage) -> _Known:
+    kept = _KNOWN.setdefault(setup.program, {})
+    if stage.level not in kept:
+        slope = constant_slope(setup.equations, stage)
+        kept[stage.level] = _Known(slope, None if slope else form(setup.equations, stage), {})
+    return kept[stage.level]
+
+
+class _Complex(NamedTuple):
+    """All complex solutions that were found: those that count once, those where several meet or that go on, whether
+    every path came to an end, how many there are at finite places, and how they were found."""
+
+    single: Array
+    several: Array
+    ended: bool
+    expected: int
+    how: str
+
+
+class _Solving:
+    """One group with its numbers."""
+
+    def __init__(self, setup: Setup, stage: Stage, z: Array, known: _Known):
+        self.setup, self.stage, self.z, self.known = setup, stage, z, known
+        self.form = known.form
+        self.given = (z, setup.station.u, setup.station.p)
+        self.polynomials: Polynomials = self.form.polynomials(*self.given)
+        self.closing: Closing = closing_of(setup.program, stage, z, *self.given[1:])
+
+    def roots(self, certify: bool) -> Roots | None:
+        """See `roots`; None where not even a random linkage of the structure has solutions that count once."""
+        found = self._at_once() or self._followed()
+        if found is None:
+            return None
+        single = found.single[at_finite(found.single)]
+        real, curve = self._real(found, single)
+        proofs, proved, said = np.zeros(len(real), dtype=bool), False, found.how
+        if certify and self.form.redundant:
+            said += "; it holds more than it needs, which no box proves"
+        elif certify and not able():
+            said += "; python-flint is not there to certify them"
+        elif certify:
+            proofs, proved = self._proved(found, real)
+            said += "; each proved to be the only one in a box of its own" if proved else ""
+        finite = len(single) + int(np.sum(at_finite(found.several, 1e-4)))
+        whole = Completeness.NUMERICALLY if found.ended else Completeness.NOT
+        double, complete = _open(self.closing, real), Completeness.PROVED if proved else whole
+        return Roots(real, double, proofs, found.expected, finite, complete, curve, said)
+
+    def _at_once(self) -> _Complex | None:
+        """By eigenvalues, where there are as many single solutions as Bezout's number."""
+        if self.form.dimension > MOST:
+            return None
+        V = by_eigenvalues(self.form, self.polynomials)
+        if V is None or not np.all(np.isfinite(V)):
+            return None
+        ends = ended(self._itself(), normed(V), np.zeros(len(V), dtype=bool))
+        if not ends.single.all() or doubles(ends.V).any():
+            return None
+        finite = int(np.sum(at_finite(ends.V)))
+        away = f", {len(V) - finite} of them at infinity" if finite < len(V) else ""
+        said = f"all {len(V)} complex solutions that Bezout's theorem allows, as eigenvalues{away}"
+        return _Complex(ends.V, ends.V[:0], True, finite, said)
+
+    def _itself(self) -> Between:
+        return Between(self.form, self.polynomials, self.polynomials)
+
+    def _followed(self) -> _Complex | None:
+        """By paths from a random instance of the structure."""
+        instance = self._instance()
+        if not len(instance.V):
+            return None
+        between = Between(self.form, instance.begin, self.polynomials)
+        ends = followed(between, instance.V)
+        for near in (1e-6, 1e-8):
+            again = ~ends.near | _met(ends)
+            if not again.any():
+                break
+            closer = followed(between, instance.V[again], near)
+            for whole, part in zip(ends, closer, strict=True):
+                whole[again] = part
+        # where several meet they arrive at one place by right
+        several = _met(ends) & (ends.regular < OPEN)
+        single = ends.single & ~several
+        lost = int(np.sum(~ends.near | (_met(ends) & ~several)))
+        said = f"{len(instance.V)} paths from a random linkage of this structure, which has {instance.finite} solutions"
+        if lost:
+            said += f"; {lost} came to no end"
+        return _Complex(ends.V[single], ends.V[~single], not lost, instance.finite, said)
+
+    def _instance(self) -> Generic:
+        coefficients = self.polynomials.flat[0]
+        absent = np.abs(coefficients) < ABSENT * max(float(np.abs(coefficients).max(initial=0.0)), 1.0)
+        key = absent.tobytes()
+        if key not in self.known.instances:
+            drawn = family(self.setup.equations, self.form, absent).drawn
+            self.known.instances[key] = generic(self.form, drawn)
+        return self.known.instances[key]
+
+    def _real(self, found: _Complex, single: Array) -> tuple[Array, bool]:
+        """The assemblies among the solutions (roots, unknowns), sorted, and whether there is a curve of them."""
+        X, Y = single[:, : self.form.many], single[:, self.form.many :]
+        X, Y = X / X[:, :1], Y / Y[:, :1]
+        off = np.max(np.abs(X - Y.conj()) / np.maximum(1.0, np.abs(X)), axis=1, initial=0.0)
+        near = self.form.nearest(X, Y)
+        sure = [polished(self.closing, each) for each in near[off < REAL]]
+        tried = self._closed(near[(off >= REAL) & (off < NEARLY)])
+        several = found.several[at_finite(found.several, 1e-6)]
+        met = self._closed(self.form.nearest(several[:, : self.form.many], several[:, self.form.many :]))
+        curve, kept = False, list(met)
+        if len(found.several):
+            kept = [each for each in met if not goes_on(self.closing, each)]
+            going = [each for each in met if not any(each is other for other in kept)]
+            if not going:
+                searched = Candidates(self.setup).everywhere(self.stage, self.z)
+                there = [each.z[self.stage.unknowns] for each in searched]
+                going = [each for each in there if goes_on(self.closing, each)]
+                kept += [each for each in there if not any(each is other for other in going)]
+            curve = bool(going)
+            kept += going[:1]
+        every = [self._wrapped(each) for each in (*sure, *tried, *kept)]
+        distinct: list[Array] = []
+        weak: list[bool] = []
+        for each in every:
+            if not self._closes(each):
+                continue
+            open_ = bool(_open(self.closing, each[None], OPEN)[0])
+            # where several meet each is found to a root of round-off only
+            near = [MEETING if open_ and other else SAME for other in weak]
+            if not any(self._same(each, other, within) for other, within in zip(distinct, near, strict=True)):
+                distinct.append(each)
+                weak.append(open_)
+        distinct.sort(key=lambda each: tuple(np.round(each, 7)))
+        return np.array(distinct).reshape(-1, self.form.many - 1), curve
+
+    def _closed(self, near: Array) -> list[Array]:
+        """Where Newton's method on the real equations leads to from near by, if there."""
+        if not len(near):
+            return []
+        ended_ = newton(self.closing, near)
+        return [polished(self.closing, each) for each in ended_.unknowns[ended_.closed]]
+
+    def _closes(self, root: Array) -> bool:
+        """Whether all rows are met, those too that a redundant group has more."""
+        return bool(np.max(np.abs(self.closing(root[None])[0]), initial=0.0) <= CLOSED)
+
+    def _wrapped(self, root: Array) -> Array:
+        angles = list(self.form.angles)
+        root = root.copy()
+        root[angles] = np.arctan2(np.sin(root[angles]), np.cos(root[angles]))
+        return root
+
+    def _same(self, one: Array, other: Array, within: float = SAME) -> bool:
+        angles = list(self.form.angles)
+        apart = np.abs(one - other)
+        apart[angles] = np.abs(np.exp(1j * one[angles]) - np.exp(1j * other[angles]))
+        return bool(np.all(apart < within))
+
+    def _proved(self, found: _Complex, real: Array) -> tuple[Array, bool]:
+        """Which assemblies are proved, and whether it is proved that there are no others."""
+        proof = certified(self.form, self.given, found.single)
+        many = self.form.many
+        proofs = np.zeros(len(real), dtype=bool)
+        of = found.single[proof.real]
+        for near in self.form.nearest(of[:, :many], of[:, many:]):
+            proofs |= np.array([self._same(each, near) for each in real], dtype=bool)
+        whole = len(found.single) == self.form.bound and bool(np.all(proof.proved & proof.decided))
+        return proofs, whole and int(proof.real.sum()) == len(real)
+
+
+def _met(ends: Ends) -> Array:
+    """Which single solutions several paths came to: one of them took another's."""
+    met = np.zeros(len(ends.V), dtype=bool)
+    met[ends.single] = doubles(ends.V[ends.single])
+    return met
+
+
+def _searched(setup: Setup, stage: Stage, z: Array, why: str) -> Roots:
+    """What starts all over the circles lead to."""
+    closing = closing_of(setup.program, stage, z, setup.station.u, setup.station.p)
+    there = [each.z[stage.unknowns] for each in Candidates(setup).everywhere(stage, z)]
+    going = [each for each in there if goes_on(closing, each)]
+    found = [each for each in there if not any(each is other for other in going)] + going[:1]
+    found.sort(key=lambda each: tuple(np.round(each, 7)))
+    real = np.array(found).reshape(-1, length(stage.unknowns))
+    none = np.zeros(len(real), dtype=bool)
+    said = f"searched by starts only: {why}"
+    return Roots(real, _open(closing, real), none, None, len(real), Completeness.NOT, bool(going), said)
+
+
+def _straight(setup: Setup, stage: Stage, z: Array, slope: ca.Function, certify: bool) -> Roots:
+    """The one assembly of a group whose equations are linear."""
+    given = (z, setup.station.u, setup.station.p)
+    closing = closing_of(setup.program, stage, z, *given[1:])
+    unknowns, rows = length(stage.unknowns), length(stage.rows)
+    said = "its equations are linear"
+    left, there = closing(np.zeros((1, unknowns)))
+    values = np.linalg.svd(there[0], compute_uv=False)
+    root = polished(closing, -np.linalg.lstsq(there[0], left[0], rcond=1e-12)[0])
+    one = np.ones(1, dtype=bool)
+    if np.max(np.abs(closing(root[None])[0])) > CLOSED:
+        none = np.zeros((0, unknowns))
+        return Roots(none, one[:0], one[:0], 0, 0, Completeness.NUMERICALLY, False, f"{said}, and at odds")
+    if values[-1] <= 1e-12 * values[0]:
+        return Roots(root[None], one, ~one, 0, 0, Completeness.NUMERICALLY, True, f"{said}, and leave it free")
+    proved = certify and rows == unknowns and able() and regular(slope, given)
+    whole = Completeness.PROVED if proved else Completeness.NUMERICALLY
+    return Roots(root[None], ~one, one & proved, 1, 1, whole, False, said)
+
+
+def _open(closing: Closing, real: Array, part: float = DOUBLE) -> Array:
+    """Where a group's slope all but leaves a direction open, as where two assemblies meet (roots,)."""
+    if not real.size:
+        return np.zeros(len(real), dtype=bool)
+    values = np.linalg.svd(closing(real)[1], compute_uv=False)
+    return values[:, -1] < part * np.maximum(values[:, 0], 1e-300)
+
+
+def goes_on(closing: Closing, root: Array) -> bool:
+    """Whether an assembly is one of a whole curve: along the direction that is open there are others like it."""
+    slope = closing(root[None])[1][0]
+    _, values, ways = np.linalg.svd(slope)
+    if len(values) == slope.shape[1] and values[-1] > OPEN * values[0]:
+        return False
+    beside = root + ALONG * np.array([[1.0], [-1.0]]) * ways[-1]
+    found = newton(closing, beside)
+    for each, closed in zip(found.unknowns, found.closed, strict=True):
+        if closed and np.linalg.norm(each - root) > 0.3 * ALONG:
+            there = np.linalg.svd(closing(each[None])[1][0], compute_uv=False)
+            if there[-1] < OPEN * there[0]:
+                return True
+    return False
