@@ -363,3 +363,38 @@ def test_the_sheet_has_a_window_for_each_with_its_number(tmp_path):
         assert drawn.size[0] > 1000
     command.run(tmp_path, "plot", "four-bar", "modes", "--scale", "1:2", "--at", "A=80deg", "-o", "modes.pdf").done()
     assert (tmp_path / "modes.pdf").stat().st_size > 1000
+
+
+def test_two_assemblies_that_lie_very_near_are_two():
+    modes = planar.modes(four_bar(1.0, 1.7, 1.3 + 1e-11, 4.0, 0.0))
+    assert [(mode.certified, mode.double) for mode in modes] == [(True, False)] * 2
+    assert modes.complete.value == "complete"
+
+
+def test_a_list_that_was_interrupted_is_taken_up_again(monkeypatch):
+    modes, many = planar.modes(tower(3), certify=False), iter(range(100))
+    own = modes._tree.roots
+
+    def interrupted(index, z):
+        if next(many) == 4:
+            raise KeyboardInterrupt
+        return own(index, z)
+
+    monkeypatch.setattr(modes._tree, "roots", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        list(iter(modes))
+    assert len(list(iter(modes))) == 8
+
+
+def test_a_curve_ahead_of_another_group_leaves_the_list_open():
+    frame = {"A": [0.0, 0.0], "D": [1.0, 0.0], "Q": [3.5, 0.0]}
+    links = {
+        "crank": ("A", "B", 1.0),
+        "c": ("B", "C", 1.0),
+        "r": ("D", "C", 1.0),
+        "e": ("C", "E", 0.9),
+        "f": ("Q", "E", 0.9),
+    }
+    modes = planar.modes(bars(frame, links, ("A", 0.0)), certify=False)
+    list(iter(modes))
+    assert modes.complete.value == "not known to be complete"

@@ -38,7 +38,7 @@ def chosen(mechanism: Mechanism, number: int) -> Mechanism:
     if not _leads_back(kept, mode):
         raise BadInput(
             "--mode",
-            f"assembly {number} has the places of another and differs in whole turns, which no sketch can show",
+            f"a sketch of assembly {number} is solved to another one: the two lie near each other, or differ in turns",
         )
     return replace(kept, remarks=(*kept.remarks, told), published=kept.published if own else ())
 

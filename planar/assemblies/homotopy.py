@@ -220,7 +220,8 @@ def normed(V: Array) -> Array:
     """X and Y of length one each."""
     half = V.shape[1] // 2
     parts = (V[:, :half], V[:, half:])
-    return np.concatenate([each / np.linalg.norm(each, axis=1, keepdims=True) for each in parts], axis=1)
+    with np.errstate(all="ignore"):  # what has gone astray ends as what is no number
+        return np.concatenate([each / np.linalg.norm(each, axis=1, keepdims=True) for each in parts], axis=1)
 
 
 def doubles(V: Array) -> Array:

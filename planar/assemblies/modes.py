@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.util import find_spec
+from itertools import islice
 from math import hypot, prod, sqrt
 from typing import NamedTuple, overload
 
@@ -144,6 +145,9 @@ class Modes(Sequence["Mode"]):
     def complete(self) -> Completeness:
         """Whether these are all: as the worst of the groups, of what has been solved so far."""
         self._reach(1)
+        before = (self._tree.solved(index) for index in range(len(self._tree.stages) - 1))
+        if any(each.curve for of in before for each in of):
+            return Completeness.NOT  # of a curve one place is listed: what comes after it may stand at others only
         return max((group.complete for group in self.groups), key=WORST.index, default=Completeness.PROVED)
 
     @property
@@ -228,7 +232,11 @@ class Modes(Sequence["Mode"]):
     def _reach(self, number: int) -> bool:
         """Whether there are so many assemblies; they are listed up to there."""
         while len(self._listed) < number:
-            path = next(self._paths, None)
+            try:
+                path = next(self._paths, None)
+            except BaseException:  # a list that was interrupted has not ended: it is taken up again where it was
+                self._paths = islice(self._tree.paths(), len(self._listed), None)
+                raise
             if path is None:
                 self._ended = True
                 return False

@@ -221,7 +221,7 @@ class _Solving:
         every = [self._wrapped(each) for each in (*sure, *tried, *kept)]
         distinct: list[Array] = []
         weak: list[bool] = []
-        for each in every:
+        for number, each in enumerate(every):
             if not self._closes(each):
                 continue
             open_ = bool(_open(self.closing, each[None], OPEN)[0])
@@ -229,7 +229,7 @@ class _Solving:
             near = [MEETING if open_ and other else SAME for other in weak]
             if not any(self._same(each, other, within) for other, within in zip(distinct, near, strict=True)):
                 distinct.append(each)
-                weak.append(open_)
+                weak.append(open_ and number >= len(sure))  # of single solutions each stands for itself
         distinct.sort(key=lambda each: tuple(np.round(each, 7)))
         return np.array(distinct).reshape(-1, self.form.many - 1), curve
 

@@ -61,7 +61,8 @@ def counted(modes: Modes, listed: int) -> str:
         return f"more than {many(listed, 'assembly', 'assemblies')}{most}; {modes.complete.value} as far as listed"
     beside = f" of {bound} complex solutions" if bound is not None and bound != modes.total else ""
     left = f"; the first {listed} are listed" if listed < modes.total else ""
-    return f"{many(modes.total, 'assembly', 'assemblies')}{beside}, {modes.complete.value}{left}"
+    far = " as far as listed" if left else ""
+    return f"{many(modes.total, 'assembly', 'assemblies')}{beside}, {modes.complete.value}{far}{left}"
 
 
 def _groups(modes: Modes) -> Table:
@@ -177,6 +178,7 @@ def record(modes: Modes, limit: int) -> dict[str, Any]:
         "inputs": {given.pair: given.position for given in modes.mechanism.inputs},
         "assemblies": modes.total,
         "bound": modes.bound,
+        "listed": len(shown),
         "complete": modes.complete.value,
         "nearest": None if near is None else near.number,
         "groups": [group._asdict() | {"complete": group.complete.value} for group in modes.groups],
