@@ -21,7 +21,7 @@ CORRECTIONS = 6
 """Newton's steps from the assembly of the base."""
 REGULAR = 0.2
 """The volume that the columns of a slope span, each of length one, from which on no other assembly is near."""
-NEAR = 0.13
+NEAR = 0.15
 """Lengths of the size, on average, from the sketch: a large group that lies farther off may have another assembly that
 is
 nearer, of which no start tells."""
