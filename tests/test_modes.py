@@ -1,6 +1,7 @@
 """Every assembly at given inputs: as many as closed forms say, each solved by its number, listed as it is read."""
 
 import json
+import pickle
 from itertools import islice
 from math import cos, hypot, pi, sin, sqrt
 
@@ -15,35 +16,10 @@ from planar.drawing.paper import given
 from planar.drawing.picture import Letter
 from planar.files import models
 from tests import command
+from tests.bars import bars, four_bar, tower
 from tests.linkages import conditioning, determinate, random_linkage
 
 MODELS = [(file.stem, mechanism) for file, mechanism in models()]
-
-
-def bars(frame: dict, links: dict, driven: tuple[str, float], sketch: dict | None = None) -> planar.Mechanism:
-    """A linkage of bars between pins: {name: (end, end, length)}; a pin is wherever two links name it."""
-    value = {
-        "planar": 1,
-        "name": "bars",
-        "units": {"length": "m", "angle": "rad"},
-        "frame": "frame",
-        "links": {"frame": {"points": frame}}
-        | {name: {"ends": [a, b], "length": length} for name, (a, b, length) in links.items()},
-        "pairs": [{"turning": pin} for pin in dict.fromkeys(end for a, b, _ in links.values() for end in (a, b))],
-        "inputs": [{"pair": driven[0], "position": driven[1], "velocity": 1.0}],
-        "sketch": sketch or {},
-    }
-    value["pairs"] = [
-        pair
-        for pair in value["pairs"]
-        if sum(pair["turning"] in each[:2] for each in links.values()) + (pair["turning"] in frame) > 1
-    ]
-    return planar.from_dict(value)
-
-
-def four_bar(crank: float, coupler: float, rocker: float, ground: float, at: float) -> planar.Mechanism:
-    links = {"crank": ("A", "B", crank), "coupler": ("B", "C", coupler), "rocker": ("D", "C", rocker)}
-    return bars({"A": [0.0, 0.0], "D": [ground, 0.0]}, links, ("A", at))
 
 
 def meeting(p, q, r, s) -> list[np.ndarray]:
@@ -100,19 +76,6 @@ def test_where_all_complex_solutions_are_certified_the_list_is_called_complete(n
     assert modes.complete is Completeness.PROVED
     assert all(mode.certified for mode in modes)
     assert all(group.found == (group.expected,) * 2 for group in modes.groups)
-
-
-def test_without_certifying_nothing_is_called_proved():
-    modes = planar.modes(planar.load("watt-six-bar"), certify=False)
-    assert modes.complete is Completeness.NUMERICALLY
-    assert not any(mode.certified for mode in modes)
-
-
-def test_without_the_library_of_intervals_that_is_said(monkeypatch):
-    monkeypatch.setattr("planar.assemblies.modes.find_spec", lambda name: None)
-    modes = planar.modes(planar.load("four-bar"))
-    assert modes.complete is Completeness.NUMERICALLY
-    assert any("planar[modes]" in sentence for sentence in modes.said)
 
 
 def test_a_watt_six_bar_has_four_two_for_each_of_the_first_loop():
@@ -196,19 +159,6 @@ def test_several_inputs_and_moved_ones_are_heeded():
     assert same_places(planar.solve(mechanism, moved), there.nearest)
 
 
-def test_what_cannot_be_assembled_has_none_and_a_sentence():
-    mechanism = four_bar(1.0, 0.5, 0.5, 3.2, 0.8)
-    modes = planar.modes(mechanism)
-    assert not modes
-    assert len(modes) == 0
-    assert list(modes) == []
-    assert modes.nearest is None
-    with pytest.raises(planar.NoAnswer) as refused:
-        planar.solve(mechanism)
-    assert modes.reason == refused.value.reason
-    assert [group.real for group in modes.groups] == [(0, 0)]
-
-
 def test_what_the_inputs_leave_free_is_refused():
     five = bars(
         {"A": [0.0, 0.0], "E": [3.0, 0.0]},
@@ -218,28 +168,6 @@ def test_what_the_inputs_leave_free_is_refused():
     with pytest.raises(planar.NoAnswer) as refused:
         planar.modes(five)
     assert refused.value.outcome is planar.Outcome.TOO_FEW_INPUTS
-
-
-def test_a_dead_point_is_an_assembly_without_rates():
-    # B at (0, 3), D at (4, 0), so that coupler and rocker are in line
-    stretched = four_bar(3.0, 2.0, 3.0, 4.0, pi / 2.0)
-    modes = planar.modes(stretched)
-    assert modes
-    assert all(mode.state is None and mode.outcome is planar.Outcome.DEAD_POINT for mode in modes)
-    assert all("cannot move" in mode.reason for mode in modes)
-    assert modes[0].points["C"] == pytest.approx([1.6, 1.8], abs=1e-6)
-    assert [mode.double for mode in modes] == [True]
-
-
-def tower(many: int) -> planar.Mechanism:
-    """Triangles one on a side of the other, each of which can be turned over: two assemblies each, whatever before."""
-    links = {"crank": ("A", "B", 1.0)}
-    ends = ["A", "B"]
-    for k in range(many):
-        new = f"P{k}"
-        links |= {f"a{k}": (ends[-2], new, 1.1), f"b{k}": (ends[-1], new, 0.9)}
-        ends.append(new)
-    return bars({"A": [0.0, 0.0]}, links, ("A:frame,crank" if many else "A", 1.0))
 
 
 def test_a_chain_of_twenty_dyads_is_listed_lazily_from_its_start():
@@ -365,12 +293,6 @@ def test_the_sheet_has_a_window_for_each_with_its_number(tmp_path):
     assert (tmp_path / "modes.pdf").stat().st_size > 1000
 
 
-def test_two_assemblies_that_lie_very_near_are_two():
-    modes = planar.modes(four_bar(1.0, 1.7, 1.3 + 1e-11, 4.0, 0.0))
-    assert [(mode.certified, mode.double) for mode in modes] == [(True, False)] * 2
-    assert modes.complete.value == "complete"
-
-
 def test_a_list_that_was_interrupted_is_taken_up_again(monkeypatch):
     modes, many = planar.modes(tower(3), certify=False), iter(range(100))
     own = modes._tree.roots
@@ -386,15 +308,12 @@ def test_a_list_that_was_interrupted_is_taken_up_again(monkeypatch):
     assert len(list(iter(modes))) == 8
 
 
-def test_a_curve_ahead_of_another_group_leaves_the_list_open():
-    frame = {"A": [0.0, 0.0], "D": [1.0, 0.0], "Q": [3.5, 0.0]}
-    links = {
-        "crank": ("A", "B", 1.0),
-        "c": ("B", "C", 1.0),
-        "r": ("D", "C", 1.0),
-        "e": ("C", "E", 0.9),
-        "f": ("Q", "E", 0.9),
-    }
-    modes = planar.modes(bars(frame, links, ("A", 0.0)), certify=False)
-    list(iter(modes))
-    assert modes.complete.value == "not known to be complete"
+def test_a_mode_and_a_list_go_to_another_process():
+    modes = planar.modes(planar.load("watt-six-bar"), {"A0": 1.1})
+    again = pickle.loads(pickle.dumps(modes))
+    assert [mode.choices for mode in again] == [mode.choices for mode in modes]
+    assert again.complete is modes.complete
+    sent = pickle.loads(pickle.dumps(modes[1]))
+    assert (sent.number, sent.choices, sent.certified) == (2, modes[1].choices, True)
+    assert same_places(sent.state, modes[1])
+    assert sent.mechanism == modes[1].mechanism

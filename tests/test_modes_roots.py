@@ -252,6 +252,21 @@ def test_a_kite_folded_on_itself_is_a_curve_of_assemblies():
     assert (len(apart.real), apart.complete) == (2, PROVED)
 
 
+def test_of_two_curves_of_assemblies_one_place_each_is_listed():
+    """Legs pinned at one point of the frame and to three points of a line: with it they turn right round as one, the
+    point on this side of the line or on that."""
+    own = [(-1.0, 0.0), (0.2, 0.0), (0.9, 0.0)]
+    setup, found = first(platform([(0.0, 0.0)] * 3, own, [float(np.hypot(x, 0.7)) for x, _ in own]))
+    assert found.curve
+    assert found.complete is NOT
+    assert not found.double.any()
+    column = [setup.equations.coordinates[c].owner for c in setup.equations.unknowns].index("leg0")
+    angle = [setup.equations.coordinates[c].owner for c in setup.equations.unknowns].index("platform")
+    sides = {float(np.sign(np.sin(root[angle] - root[column]))) for root in found.real}
+    assert len(found.real) == 2
+    assert sides == {1.0, -1.0}
+
+
 def test_at_a_dead_point_two_assemblies_are_one_that_counts_double():
     value = {
         "planar": 1,
@@ -288,6 +303,31 @@ def test_a_triad_at_a_dead_point_has_a_double_assembly_among_others():
     assert found.complete is NUMERICALLY
     assert (found.expected, found.found) == (6, 6)
     assert len(found.real) % 2 == 1
+
+
+@pytest.mark.parametrize(("first_leg", "second_leg"), [(0.4, 0.7), (0.9, 0.2), (-0.4, 0.3)])
+def test_where_three_assemblies_of_a_triad_meet_they_are_one_found_to_the_cube_root_of_rounding(first_leg, second_leg):
+    """Legs in lines through one point, and so long that the platform's way off is closed to second order too.
+
+    With r from that point and legs (1 + l) r, the ends turn about it and shift by a: (1 + l) r.a = -l r.r for all.
+    """
+    own = np.array(PLATFORMS[6][1])
+    pole, ends = np.array([0.3, -0.2]), own + np.array([0.1, 0.25])
+    r = ends - pole
+    legs = [first_leg, second_leg, 0.0]
+
+    def closing(third):
+        factors = np.array([*legs[:2], third])[:, None]
+        return np.linalg.det(np.hstack([(1.0 + factors) * r, factors * np.sum(r * r, axis=1, keepdims=True)]))
+
+    legs[2] = closing(0.0) / (closing(0.0) - closing(1.0))  # linear in it
+    pins = pole - r * np.array(legs)[:, None]
+    setup, found = first(platform(pins.tolist(), own.tolist(), np.linalg.norm(ends - pins, axis=1).tolist()))
+    assert (found.expected, found.found, found.complete) == (6, 6, NUMERICALLY)
+    assert found.double.sum() == 1
+    e = setup.equations
+    platforms = [e.coordinates[column].owner for column in e.unknowns].index("platform")
+    assert found.real[found.double][0, platforms] == pytest.approx(0.0, abs=3e-5)
 
 
 def test_redundant_cranks_stand_in_one_way_only():

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
+from planar.assemblies.instructions import computed
 from planar.assemblies.isotropic import Form
 
 Array = np.ndarray
@@ -255,36 +256,9 @@ def _evaluated(function: ca.Function, given: Sequence[Array]) -> list[list[list[
     from flint import arb
 
     inputs = [[arb(float(each)) for each in values] for values in given]
-    work: dict[int, Any] = {}
-    found: list[list[Any]] = [[arb(0)] * function.numel_out(k) for k in range(function.n_out())]
-    for k in range(function.n_instructions()):
-        code, out, of = function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)
-        if code == ca.OP_INPUT:
-            work[out[0]] = inputs[of[0]][of[1]]
-        elif code == ca.OP_CONST:
-            work[out[0]] = arb(function.instruction_constant(k))
-        elif code == ca.OP_OUTPUT:
-            found[out[0]][out[1]] = work[of[0]]
-        else:
-            work[out[0]] = _DONE[code](*(work[each] for each in of))
+    found = computed(function, inputs, arb)
     sizes = [function.size_out(k) for k in range(function.n_out())]
     return [
         [[values[r + rows * c] for c in range(columns)] for r in range(rows)]
         for values, (rows, columns) in zip(found, sizes, strict=True)
     ]
-
-
-_DONE = {
-    ca.OP_ADD: lambda a, b: a + b,
-    ca.OP_SUB: lambda a, b: a - b,
-    ca.OP_MUL: lambda a, b: a * b,
-    ca.OP_DIV: lambda a, b: a / b,
-    ca.OP_NEG: lambda a: -a,
-    ca.OP_COS: lambda a: a.cos(),
-    ca.OP_SIN: lambda a: a.sin(),
-    ca.OP_SQ: lambda a: a * a,
-    ca.OP_TWICE: lambda a: a + a,
-    ca.OP_INV: lambda a: 1 / a,
-    ca.OP_ASSIGN: lambda a: a,
-}
-"""What a coefficient may be made of."""

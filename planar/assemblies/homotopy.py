@@ -161,13 +161,14 @@ def ended(at: At, V: Array, arrived: Array) -> Ends:
     for _ in range(3):
         with np.errstate(all="ignore"):
             step, slope = _newton(at, V, V, one)
-            good = np.linalg.norm(step, axis=1) < 1e-3
+            moved = np.linalg.norm(step, axis=1)
+            good = moved < 1e-3
         V = np.where(good[:, None], normed(V + step), V) if len(V) else V
     if not len(V):
         return Ends(V, np.zeros(0), arrived, arrived)
     values = np.linalg.svd(slope, compute_uv=False)
     regular = values[:, -1] / values[:, 0]
-    arrived |= good & (np.linalg.norm(step, axis=1) < EXACT) & (regular > SINGULAR)
+    arrived |= good & (moved < EXACT) & (regular > SINGULAR)
     return Ends(V, regular, arrived, arrived.copy())
 
 

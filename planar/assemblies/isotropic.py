@@ -11,20 +11,23 @@ With X = (1, e's, S's) and Y = (1, 1/e's, conjugates of the S's), both up to a f
     X[j] Y[j] = X0 Y0                                 an angle
     X[m] Y[j] = X[j] Y[m]   or   X[m] Y0 = X0 Y[m]    a length along a direction that turns with e[j], or is known
 
-Once A and B are solved, X and Y lie in projective spaces of some dimension d each, and 2d equations of bidegree (1, 1)
-remain: by Bezout's theorem for two groups of unknowns C(2d, d) isolated solutions at most, counted as often as they
-stand for, those at infinity with the others.
+and where gears tie angles, powers of e are entries too (see `gears`). Once A and B are solved, X and Y lie in
+projective spaces of some dimension d each, and 2d equations of bidegree (1, 1) remain: by Bezout's theorem for two
+groups of unknowns C(2d, d) isolated solutions at most, counted as often as they stand for, those at infinity with the
+others.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from math import comb
+from operator import add
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
+from planar.assemblies.gears import Arguments, Gears, arguments, gears
 from planar.called import Called
 from planar.equations import Equations, Stage
 from planar.pairs import Kind
@@ -57,10 +60,11 @@ class Polynomials(NamedTuple):
 class Form(NamedTuple):
     """How the group of one structure is written.
 
-    `angles`, `lengths`: the group's unknowns that are X[1:] in this order; `turning`: for each length the place in X of
-    the direction that it turns with, 0 for a direction that is known; `real`: what X is multiplied by in every real
-    row, as a function of (z, u, p): twice its factors (rows, X) with half the constants; `combined`: the rows put
-    together to loops (loops, rows); `single`: to rows of which the other half is missing (singles, rows).
+    `angles`, `lengths`: the group's unknowns whose directions and which are X[1:] in this order; `turning`: for each
+    length the place in X of the direction that it turns with, 0 for a direction that is known; `real`: what X is
+    multiplied by in every real row, as a function of (z, u, p): twice its factors (rows, X) with half the constants;
+    `combined`: the rows put together to loops (loops, rows); `single`: to rows of which the other half is missing
+    (singles, rows).
     """
 
     angles: tuple[int, ...]
@@ -71,17 +75,25 @@ class Form(NamedTuple):
     combined: Array
     single: Array
     redundant: bool
+    gears: Gears | None
+    "where directions are powers of those of new angles, which are X[1:] then"
+    start: ca.Function
+    "angles (angles, 1) that meet all rows between angles alone, as a function of (z, u, p)"
+
+    @property
+    def first(self) -> int:
+        """The place of the first length in X."""
+        return 1 + (self.gears.powers if self.gears else len(self.angles))
 
     @property
     def many(self) -> int:
         """Entries of X."""
-        return 1 + len(self.angles) + len(self.lengths)
+        return self.first + len(self.lengths)
 
     @property
     def known(self) -> list[int]:
         """The entries of X that are real, or lengths along a direction that is known."""
-        first = len(self.angles) + 1
-        return [0, *(first + m for m, j in enumerate(self.turning) if not j)]
+        return [0, *(self.first + m for m, j in enumerate(self.turning) if not j)]
 
     @property
     def dimension(self) -> int:
@@ -96,9 +108,8 @@ class Form(NamedTuple):
     @property
     def products(self) -> Array:
         """(equations, 4): X[i] Y[j] - X[k] Y[l] = 0."""
-        turned = [(j, j, 0, 0) for j in range(1, len(self.angles) + 1)]
-        first = len(self.angles) + 1
-        slid = [(first + m, j, j, first + m) for m, j in enumerate(self.turning)]
+        turned = self.gears.products if self.gears else [(j, j, 0, 0) for j in range(1, self.first)]
+        slid = [(self.first + m, j, j, self.first + m) for m, j in enumerate(self.turning)]
         return np.array([*turned, *slid], dtype=int).reshape(-1, 4)
 
     def polynomials(self, z: Array, u: Array, p: Array) -> Polynomials:
@@ -110,25 +121,39 @@ class Form(NamedTuple):
         loops[:, self.known] *= 2.0
         return Polynomials(loops, loops.conj(), self.single @ alpha, self.single @ alpha.conj())
 
-    def nearest(self, X: Array, Y: Array) -> Array:
-        """The real unknowns of the group (solutions, unknowns) that lie nearest to solutions at finite places."""
-        found = np.zeros((len(X), self.many - 1))
+    def nearest(self, X: Array, Y: Array, given: Sequence[Array]) -> Array:
+        """The real unknowns of the group (solutions, unknowns) that lie nearest to solutions at finite places, at
+        (z, u, p)."""
+        found = np.zeros((len(X), len(self.angles) + len(self.lengths)))
         X, Y = X / X[:, :1], Y / Y[:, :1]
-        turned = X + Y.conj()
-        for k, own in enumerate(self.angles, 1):
-            found[:, own] = np.angle(turned[:, k])
-        first = len(self.angles) + 1
-        for k, (own, j) in enumerate(zip(self.lengths, self.turning, strict=True), first):
+        turned = np.angle(X + Y.conj())[:, 1:]
+        if self.gears:
+            back = self.gears.back
+            found[:, list(self.angles)] = turned[:, : back.shape[1]] @ back.T + self.start(*given).full().T
+        else:
+            found[:, list(self.angles)] = turned[:, : len(self.angles)]
+        for k, (own, j) in enumerate(zip(self.lengths, self.turning, strict=True), self.first):
             found[:, own] = (X[:, k] * (Y[:, j] if j else 1.0)).real
         return found
 
+    def wrapped(self, root: Array) -> Array:
+        """The same assembly (unknowns,) with angles between -pi and pi, or the least that count turns."""
+        angles, root = list(self.angles), root.copy()
+        own = root[angles]
+        root[angles] = self.gears.least(own) if self.gears else np.arctan2(np.sin(own), np.cos(own))
+        return root
 
-def form(e: Equations, stage: Stage) -> Form | None:
-    """How a group is written; None where its equations are no such polynomials, or leave it free."""
+
+def form(e: Equations, stage: Stage, p: Array | None = None) -> Form | None:
+    """How a group is written; None where its equations are no such polynomials, or leave it free.
+
+    Where angles count turns the numbers p of the pairs are needed: the form is that for their ratios.
+    """
     unknowns, rows = stage.unknowns.stop - stage.unknowns.start, stage.rows.stop - stage.rows.start
     if stage.free or rows < unknowns or not unknowns:
         return None
-    if any(row.kind is not Kind.LENGTH for row in e.rows[stage.rows]):
+    written = (Kind.LENGTH,) if p is None else (Kind.LENGTH, Kind.TURNS)
+    if any(row.kind not in written for row in e.rows[stage.rows]):
         return None
     own = [e.coordinates[column].kind for column in e.unknowns[stage.unknowns]]
     angles = tuple(k for k, kind in enumerate(own) if kind is Kind.ANGLE)
@@ -138,9 +163,15 @@ def form(e: Equations, stage: Stage) -> Form | None:
     (slope,) = at_places(e, [ca.jacobian(e.F[stage.rows], e.z[stage.unknowns])])
     if np.linalg.matrix_rank(slope, tol=VANISHES).max() < unknowns:
         return None
-    parts = _Parts(e, stage, angles, lengths)
+    turns, tied = None, None
+    if p is not None:
+        turns = arguments(e, stage, angles, p)
+        tied = gears(turns.rates, turns.relations) if turns else None
+        if tied is None:
+            return None
+    parts = _Parts(e, stage, angles, lengths, turns)
     turning = parts.turning()
-    return turning and _paired(e, parts, turning, rows - unknowns)
+    return turning and _paired(e, parts, turning[0], tied, rows - unknowns)
 
 
 def constant_slope(e: Equations, stage: Stage) -> ca.Function | None:
@@ -157,11 +188,14 @@ def constant_slope(e: Equations, stage: Stage) -> ca.Function | None:
 class _Parts:
     """The rows of a group taken apart: by what the cos and sin of angles, and lengths along directions, multiply."""
 
-    def __init__(self, e: Equations, stage: Stage, angles: Sequence[int], lengths: Sequence[int]):
-        self.e, self.rows = e, e.F[stage.rows]
-        self.angles, self.lengths = angles, lengths
+    def __init__(self, e: Equations, stage: Stage, angles: Sequence[int], lengths: Sequence[int], of: Arguments | None):
+        self.e, self.rows = e, of.rows if of else e.F[stage.rows]
+        self.angles, self.lengths = tuple(angles), tuple(lengths)
         own = e.z[stage.unknowns]
-        self.turns, self.slides = [own[k] for k in angles], [own[k] for k in lengths]
+        self.turns, self.slides = list(of.symbols) if of else [own[k] for k in angles], [own[k] for k in lengths]
+        self.still, self.start = (of.still, of.start) if of else ((), ca.SX.zeros(len(self.angles)))
+        self.symbols = of.symbols if of else ()
+        own = ca.vertcat(own, *self.symbols)
         none = ca.SX.zeros(own.numel())
 
         def at_none(expression: ca.SX) -> ca.SX:
@@ -191,7 +225,7 @@ class _Parts:
                 model = model + slide * (cosine * ca.cos(angle) + sine * ca.sin(angle))
         parts = [still for _, still in self.along]
         parts += [each for turned, _ in self.along for both in turned for each in both]
-        gap, *sizes = at_places(self.e, [self.rows - model, *parts])
+        gap, *sizes = at_places(self.e, [self.rows - model, *parts], self.symbols)
         if not np.all(np.abs(gap) < VANISHES):
             return None
         there = [bool(np.any(np.abs(each) > VANISHES)) for each in sizes]
@@ -205,29 +239,38 @@ class _Parts:
             found.append(with_[0])
         return (tuple(found),)
 
-    def factors(self, turning: Sequence[int]) -> tuple[ca.SX, ca.SX]:
+    def factors(self, turning: Sequence[int], tied: Gears | None) -> tuple[ca.SX, ca.SX]:
         """Of every real row what X is multiplied by, real and imaginary part: the row is this and its conjugate's."""
         columns = [(0.5 * self.rest, 0.0 * self.rest)]
-        columns += [(0.5 * cosine, -0.5 * sine) for cosine, sine in self.turned]
+        columns += [(0.0 * self.rest, 0.0 * self.rest)] * (tied.powers if tied else len(self.turns))
+        for j, factor in enumerate(self.turned, 1):
+            k = tied.places[j - 1] if tied else j
+            columns[k] = tuple(map(add, columns[k], self._turned(j, factor, k)))
         for (turned, still), j in zip(self.along, turning, strict=True):
-            if j:
-                cosine, sine = turned[j - 1]
-                columns.append((0.5 * cosine, -0.5 * sine))
-            else:
-                columns.append((0.5 * still, 0.0 * still))
+            k = tied.places[j - 1] if tied and j else j
+            columns.append(self._turned(j, turned[j - 1], k) if j else (0.5 * still, 0.0 * still))
         real, imaginary = (ca.horzcat(*each) for each in zip(*columns, strict=True))
         return ca.densify(real), ca.densify(imaginary)
 
+    def _turned(self, j: int, factor: tuple[ca.SX, ca.SX], place: int) -> tuple[ca.SX, ca.SX]:
+        """What a direction is multiplied by, or the power in X that it is but for a direction that is known."""
+        real, imaginary = 0.5 * factor[0], -0.5 * factor[1]
+        if self.still:
+            cosine, sine = ca.cos(self.still[j - 1]), ca.sin(self.still[j - 1])
+            real, imaginary = real * cosine - imaginary * sine, real * sine + imaginary * cosine
+        # what stands beside X0 is real: half of it belongs to X, half to Y
+        return real, imaginary if place else 0.0 * imaginary
 
-def _paired(e: Equations, parts: _Parts, turning: tuple[tuple[int, ...]], surplus: int) -> Form | None:
+
+def _paired(e: Equations, parts: _Parts, turning: Sequence[int], tied: Gears | None, surplus: int) -> Form | None:
     """Rows put together two by two, so that of each two X alone, and Y alone, is left."""
-    real, imaginary = parts.factors(turning[0])
+    real, imaginary = parts.factors(turning, tied)
     function = ca.Function("factors", [e.z, e.u, e.p], [real, imaginary])
     values = at_places(e, [real, imaginary])
     alpha = values[0] + 1j * values[1]  # (places, rows, X)
     rows = alpha.shape[1]
     # what stands beside X0 and lengths along known directions is real and belongs to both
-    known = [1 + len(parts.angles) + m for m, j in enumerate(turning[0]) if not j]
+    known = [alpha.shape[2] - len(turning) + m for m, j in enumerate(turning) if not j]
     bent = [k for k in range(1, alpha.shape[2]) if k not in known]
     taken: set[int] = set()
     combined, single = [], []
@@ -250,7 +293,9 @@ def _paired(e: Equations, parts: _Parts, turning: tuple[tuple[int, ...]], surplu
     singles = np.array(single, dtype=float).reshape(-1, rows)
     if surplus:
         loops, singles = _squared(loops, singles, rows - surplus)
-    return Form(parts.angles, parts.lengths, turning[0], function, Called(function), loops, singles, bool(surplus))
+    turning = tuple(tied.places[j - 1] if tied and j else j for j in turning)
+    called, start = Called(function), ca.Function("start", [e.z, e.u, e.p], [parts.start])
+    return Form(parts.angles, parts.lengths, turning, function, called, loops, singles, bool(surplus), tied, start)
 
 
 def _other(alpha: Array, i: int, k: int, bent: Sequence[int]) -> tuple[int, float] | None:
@@ -280,12 +325,13 @@ def _squared(loops: Array, singles: Array, wanted: int) -> tuple[Array, Array]:
     return loops, rng.normal(size=(left, len(pool))) @ pool
 
 
-def at_places(e: Equations, parts: Sequence[ca.SX]) -> list[Array]:
+def at_places(e: Equations, parts: Sequence[ca.SX], more: Sequence[ca.SX] = ()) -> list[Array]:
     """Expressions in numbers (places, rows, columns): at random places an identity holds by accident nowhere."""
-    function = ca.Function("parts", [e.z, e.u, e.p], [ca.densify(part) for part in parts])
+    symbols = [e.z, e.u, e.p, ca.vertcat(*more)]
+    function = ca.Function("parts", symbols, [ca.densify(part) for part in parts])
     rng = np.random.default_rng(0)
     found = []
     for _ in range(PLACES):
-        values = function(*(rng.uniform(0.5, 2.0, symbol.numel()) for symbol in (e.z, e.u, e.p)))
+        values = function(*(rng.uniform(0.5, 2.0, symbol.numel()) for symbol in symbols))
         found.append([each.full() for each in (values if isinstance(values, tuple) else (values,))])
     return [np.array(each) for each in zip(*found, strict=True)]

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from importlib.util import find_spec
 from itertools import islice
 from math import hypot, prod, sqrt
-from typing import NamedTuple, overload
+from typing import Any, NamedTuple, overload
 
 import numpy as np
 
@@ -28,6 +28,8 @@ Array = np.ndarray
 
 MOST = 4096
 """Dyads, or larger groups by what they take, that are solved for the sake of a number alone."""
+MOST_CERTIFIED = 256
+"""The same, certified, for the sake of a claim about the whole list."""
 
 
 def modes(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = (), *, certify: bool = True) -> Modes:
@@ -76,12 +78,17 @@ class Modes(Sequence["Mode"]):
 
     def __init__(self, solver: Solver, mechanism: Mechanism, drives: tuple[Drive, ...], certify: bool):
         self._solver, self._source, self._drives = solver, mechanism, drives
+        self._certify = certify
         self._missing = certify and find_spec("flint") is None
         self._tree = Tree(solver, certify and not self._missing)
         self._bare = Tree(solver, False) if self._tree.certify else self._tree  # to count with
         self._paths = self._tree.paths()
         self._ended = False
         self._listed: list[Mode] = []
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # compiled equations stay in their process: another one lists them again
+        return partial(modes, certify=self._certify), (self._source, self._drives)
 
     @property
     def mechanism(self) -> Mechanism:
@@ -143,12 +150,13 @@ class Modes(Sequence["Mode"]):
 
     @property
     def complete(self) -> Completeness:
-        """Whether these are all: as the worst of the groups, of what has been solved so far."""
-        self._reach(1)
-        before = (self._tree.solved(index) for index in range(len(self._tree.stages) - 1))
-        if any(each.curve for of in before for each in of):
-            return Completeness.NOT  # of a curve one place is listed: what comes after it may stand at others only
-        return max((group.complete for group in self.groups), key=WORST.index, default=Completeness.PROVED)
+        """Whether the list, read to its end, is the whole: as the worst of the groups for whatever choices before them.
+
+        All are solved for that, the first few hundred certified; of more than a few thousand it is not known.
+        """
+        if self._ended or self._tree.count(MOST_CERTIFIED) is not None:
+            return self._tree.complete
+        return Completeness.NOT if self.total is None else self._bare.complete
 
     @property
     def groups(self) -> tuple[Group, ...]:
@@ -186,7 +194,8 @@ class Modes(Sequence["Mode"]):
         told = [f"group{'s' * (len(of) > 1)} {_in_words(of)}: {said}" for said, of in how.items()]
         if any(group.curve for group in self.groups):
             told.append(
-                "some links can move while the inputs are held: what is listed stands for a curve of assemblies"
+                "some links can move while the inputs are held: of each curve of assemblies that was found one place "
+                "is listed, with what goes together there"
             )
         if self._solver.outline.counts:
             told.append("of angles that count turns the least are taken")
@@ -201,8 +210,16 @@ class Modes(Sequence["Mode"]):
 
     def refusal(self) -> NoAnswer:
         """The same to be raised, where there is no assembly."""
+        moving = () if self else self._tree.moving()
+        if moving:
+            return NoAnswer(
+                Outcome.CHANGE_POINT,
+                f"{self._solver.at()} {listed(moving)} can move while the inputs are held; what comes after does not "
+                f"go together with the places of theirs that were tried, but may with others: move the input, or give "
+                f"one more",
+            )
         try:
-            self._solver.assembly()
+            self._solver.state(self._solver.assembly().z)
         except NoAnswer as problem:
             return problem
         return NoAnswer(Outcome.CANNOT_BE_ASSEMBLED, f"{self._solver.at()} no assembly was found")
@@ -283,6 +300,11 @@ class Mode:
     "(unknowns,) of the equations"
     _solver: Solver
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # compiled equations stay in their process: another one makes them again
+        of = (self.number, self.choices, self.certified, self.double, self.z)
+        return _again, (of, self._solver.mechanism)
+
     @cached_property
     def _answer(self) -> State | NoAnswer:
         try:
@@ -342,3 +364,8 @@ class Mode:
         """
         sketch = tuple((name, float(at[0]), float(at[1])) for name, at in self.points.items())
         return replace(self._solver.mechanism, sketch=sketch)
+
+
+def _again(of: tuple[Any, ...], mechanism: Mechanism) -> Mode:
+    """A mode where it has been sent to."""
+    return Mode(*of, known_of(mechanism).solver)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import Enum
 from typing import NamedTuple
 from weakref import WeakKeyDictionary
@@ -10,11 +11,13 @@ import casadi as ca
 import numpy as np
 
 from planar.assemblies.certified import able, certified, regular
+from planar.assemblies.curves import ALONG, OPEN, goes_on, one_of_each
 from planar.assemblies.eigenvalues import MOST, by_eigenvalues
 from planar.assemblies.family import family
 from planar.assemblies.homotopy import Between, Ends, Generic, at_finite, doubles, ended, followed, generic, normed
 from planar.assemblies.isotropic import Form, Polynomials, constant_slope, form
 from planar.equations import Stage
+from planar.pairs import Kind
 from planar.program import Program, length
 from planar.solving.candidates import SAME, Candidates, closing_of
 from planar.solving.newton import CLOSED, Closing, newton, polished
@@ -24,20 +27,29 @@ Array = np.ndarray
 
 MOST_PATHS = 1000
 """Bezout's number up to which paths are followed."""
+MOST_GEARED = 300
+"""The same where gears tie angles: most paths then go to infinity, and slowly."""
+MOST_KEPT = 100
+"""Structures of one program that are kept: with gears each ratio makes one."""
 REAL = 1e-9
 """A single solution that differs from its mirror image by less (of its size) is taken for real as it stands."""
 NEARLY = 0.05
 """One that differs by less is tried on the real equations."""
 DOUBLE = 3e-7
-"""Least singular value of the real slope, of the greatest, below which two assemblies meet."""
+"""Least singular value of the real slope, of the greatest, below which two assemblies may meet."""
+SETTLED = 12
+"""Steps that put what else moves in its place on a way off along an open direction."""
+CLOSES, ROUNDED = 30.0, 1e-9
+"""How much less open a direction has to be there; below what part of the greatest singular value it is open in full."""
+MULTIPLE = 40
+"""Newton's steps to a root where several may meet: towards three each leaves two thirds of the way."""
+VANISHES = 1e-13
+"""Singular values below this part of the greatest are none."""
+EPS = float(np.finfo(float).eps)
 ABSENT = 1e-13
 """Coefficients below this part of the greatest are none: the structure is one without them."""
-OPEN = 1e-5
-"""Least singular value, of the greatest, below which a direction may be open."""
 MEETING = 1e-3
 """Assemblies that leave a direction open and are nearer to each other than this are one."""
-ALONG = 0.05
-"""How far along the direction that is open a curve of assemblies is looked for (rad, sizes)."""
 
 
 class Completeness(Enum):
@@ -51,11 +63,12 @@ class Completeness(Enum):
 class Roots(NamedTuple):
     """All assemblies of one group of links, those before it given.
 
-    `real`: (roots, unknowns) as in z[stage.unknowns] (rad, sizes), sorted, angles between -pi and pi; `double`:
+    `real`: (roots, unknowns) as in z[stage.unknowns] (rad, sizes), sorted, angles between -pi and pi or, if
+    they count turns, the least; `double`:
     (roots,) where two meet, at a dead point; `certified`: (roots,) whether a box of its own is proved to hold each;
     `expected`: complex solutions at finite places that the structure has, None where no number is known; `found`: those
-    that were found, as often as they count; `curve`: whether a whole curve of assemblies is there, of which `real` has
-    one place; `said`: how it was solved.
+    that were found, as often as they count; `curve`: whether a whole curve of assemblies is there, or several, of each
+    of which `real` has one place at least; `said`: how it was solved.
     """
 
     real: Array
@@ -77,7 +90,7 @@ class _Known(NamedTuple):
     instances: dict[bytes, Generic]
 
 
-_KNOWN: WeakKeyDictionary[Program, dict[int, _Known]] = WeakKeyDictionary()
+_KNOWN: WeakKeyDictionary[Program, dict[tuple[int, bytes], _Known]] = WeakKeyDictionary()
 
 
 def roots(setup: Setup, stage: Stage, z: Array, certify: bool = True) -> Roots:
@@ -92,7 +105,7 @@ def roots(setup: Setup, stage: Stage, z: Array, certify: bool = True) -> Roots:
         return _straight(setup, stage, z, known.straight, certify)
     if known.form is None:
         return _searched(setup, stage, z, "its equations are no polynomials of this kind")
-    if known.form.bound > MOST_PATHS:
+    if known.form.bound > (MOST_GEARED if known.form.gears else MOST_PATHS):
         return _searched(setup, stage, z, f"there may be up to {known.form.bound} complex ones")
     found = _Solving(setup, stage, z, known).roots(certify)
     return found or _searched(setup, stage, z, "linkages of this structure have no single solutions")
@@ -100,10 +113,14 @@ def roots(setup: Setup, stage: Stage, z: Array, certify: bool = True) -> Roots:
 
 def _known(setup: Setup, stage: Stage) -> _Known:
     kept = _KNOWN.setdefault(setup.program, {})
-    if stage.level not in kept:
+    numbers = setup.station.p if setup.outline.counts else None
+    key = (stage.level, b"" if numbers is None else numbers.tobytes())
+    if key not in kept:
+        if len(kept) >= MOST_KEPT:
+            kept.clear()
         slope = constant_slope(setup.equations, stage)
-        kept[stage.level] = _Known(slope, None if slope else form(setup.equations, stage), {})
-    return kept[stage.level]
+        kept[key] = _Known(slope, None if slope else form(setup.equations, stage, numbers), {})
+    return kept[key]
 
 
 class _Complex(NamedTuple):
@@ -137,14 +154,17 @@ class _Solving:
         proofs, proved, said = np.zeros(len(real), dtype=bool), False, found.how
         if certify and self.form.redundant:
             said += "; it holds more than it needs, which no box proves"
+        elif certify and self.form.gears and not self.form.gears.exact:
+            said += "; a ratio of its gears is no float, so that no box proves them"
         elif certify and not able():
             said += "; python-flint is not there to certify them"
         elif certify:
             proofs, proved = self._proved(found, real)
             said += "; each proved to be the only one in a box of its own" if proved else ""
         finite = len(single) + int(np.sum(at_finite(found.several, 1e-4)))
-        whole = Completeness.NUMERICALLY if found.ended else Completeness.NOT
-        double, complete = _open(self.closing, real), Completeness.PROVED if proved else whole
+        # paths end on a curve at complex places, so that of real curves only starts tell
+        whole = Completeness.NUMERICALLY if found.ended and not curve else Completeness.NOT
+        double, complete = _double(self.closing, real) & ~proofs, Completeness.PROVED if proved else whole
         return Roots(real, double, proofs, found.expected, finite, complete, curve, said)
 
     def _at_once(self) -> _Complex | None:
@@ -202,53 +222,41 @@ class _Solving:
         X, Y = single[:, : self.form.many], single[:, self.form.many :]
         X, Y = X / X[:, :1], Y / Y[:, :1]
         off = np.max(np.abs(X - Y.conj()) / np.maximum(1.0, np.abs(X)), axis=1, initial=0.0)
-        near = self.form.nearest(X, Y)
+        near = self.form.nearest(X, Y, self.given)
         sure = [polished(self.closing, each) for each in near[off < REAL]]
         tried = self._closed(near[(off >= REAL) & (off < NEARLY)])
         several = found.several[at_finite(found.several, 1e-6)]
-        met = self._closed(self.form.nearest(several[:, : self.form.many], several[:, self.form.many :]))
-        curve, kept = False, list(met)
+        met = self._closed(self.form.nearest(several[:, : self.form.many], several[:, self.form.many :], self.given))
+        kept, curves = list(met), []
         if len(found.several):
-            kept = [each for each in met if not goes_on(self.closing, each)]
-            going = [each for each in met if not any(each is other for other in kept)]
-            if not going:
-                searched = Candidates(self.setup).everywhere(self.stage, self.z)
-                there = [each.z[self.stage.unknowns] for each in searched]
-                going = [each for each in there if goes_on(self.closing, each)]
-                kept += [each for each in there if not any(each is other for other in going)]
-            curve = bool(going)
-            kept += going[:1]
-        every = [self._wrapped(each) for each in (*sure, *tried, *kept)]
+            kept, curves = _parted(self.setup, self.stage, self.z, self.closing, met)
+        every = [self.form.wrapped(each) for each in (*sure, *tried, *kept, *curves)]
         distinct: list[Array] = []
         weak: list[bool] = []
         for number, each in enumerate(every):
-            if not self._closes(each):
+            # beside a root that counts once there is an exact one; what else stays open by more than rounding is none
+            exact = number < len(sure) and not self.form.redundant
+            if not self._closes(each, CLOSED if exact else self.setup.tolerance):
                 continue
-            open_ = bool(_open(self.closing, each[None], OPEN)[0])
+            open_ = bool(_weakest(self.closing, each[None])[0] < OPEN)
             # where several meet each is found to a root of round-off only
             near = [MEETING if open_ and other else SAME for other in weak]
             if not any(self._same(each, other, within) for other, within in zip(distinct, near, strict=True)):
                 distinct.append(each)
                 weak.append(open_ and number >= len(sure))  # of single solutions each stands for itself
         distinct.sort(key=lambda each: tuple(np.round(each, 7)))
-        return np.array(distinct).reshape(-1, self.form.many - 1), curve
+        return np.array(distinct).reshape(-1, length(self.stage.unknowns)), bool(curves)
 
     def _closed(self, near: Array) -> list[Array]:
         """Where Newton's method on the real equations leads to from near by, if there."""
         if not len(near):
             return []
         ended_ = newton(self.closing, near)
-        return [polished(self.closing, each) for each in ended_.unknowns[ended_.closed]]
+        return [_multiple(self.closing, each) for each in ended_.unknowns[ended_.closed]]
 
-    def _closes(self, root: Array) -> bool:
+    def _closes(self, root: Array, within: float) -> bool:
         """Whether all rows are met, those too that a redundant group has more."""
-        return bool(np.max(np.abs(self.closing(root[None])[0]), initial=0.0) <= CLOSED)
-
-    def _wrapped(self, root: Array) -> Array:
-        angles = list(self.form.angles)
-        root = root.copy()
-        root[angles] = np.arctan2(np.sin(root[angles]), np.cos(root[angles]))
-        return root
+        return bool(np.max(np.abs(self.closing(root[None])[0]), initial=0.0) <= within)
 
     def _same(self, one: Array, other: Array, within: float = SAME) -> bool:
         angles = list(self.form.angles)
@@ -262,7 +270,7 @@ class _Solving:
         many = self.form.many
         proofs = np.zeros(len(real), dtype=bool)
         of = found.single[proof.real]
-        for near in self.form.nearest(of[:, :many], of[:, many:]):
+        for near in self.form.nearest(of[:, :many], of[:, many:], self.given):
             proofs |= np.array([self._same(each, near) for each in real], dtype=bool)
         whole = len(found.single) == self.form.bound and bool(np.all(proof.proved & proof.decided))
         return proofs, whole and int(proof.real.sum()) == len(real)
@@ -278,14 +286,31 @@ def _met(ends: Ends) -> Array:
 def _searched(setup: Setup, stage: Stage, z: Array, why: str) -> Roots:
     """What starts all over the circles lead to."""
     closing = closing_of(setup.program, stage, z, setup.station.u, setup.station.p)
-    there = [each.z[stage.unknowns] for each in Candidates(setup).everywhere(stage, z)]
-    going = [each for each in there if goes_on(closing, each)]
-    found = [each for each in there if not any(each is other for other in going)] + going[:1]
-    found.sort(key=lambda each: tuple(np.round(each, 7)))
-    real = np.array(found).reshape(-1, length(stage.unknowns))
+    isolated, curves = _parted(setup, stage, z, closing)
+    real = np.array([*isolated, *curves]).reshape(-1, length(stage.unknowns))
+    if not setup.outline.counts:
+        real = np.where(_angles(setup, stage), np.arctan2(np.sin(real), np.cos(real)), real)
+    real = np.array(sorted(real, key=lambda each: tuple(np.round(each, 7)))).reshape(real.shape)
     none = np.zeros(len(real), dtype=bool)
     said = f"searched by starts only: {why}"
-    return Roots(real, _open(closing, real), none, None, len(real), Completeness.NOT, bool(going), said)
+    return Roots(real, _double(closing, real), none, None, len(real), Completeness.NOT, bool(curves), said)
+
+
+def _parted(
+    setup: Setup, stage: Stage, z: Array, closing: Closing, met: Sequence[Array] = ()
+) -> tuple[list[Array], list[Array]]:
+    """Assemblies that stand alone, and one of every curve: of those given and of where starts all over lead to."""
+    there = [*met, *(each.z[stage.unknowns] for each in Candidates(setup).everywhere(stage, z))]
+    going = [goes_on(closing, each) for each in there]
+    on_curves = [each for each, on in zip(there, going, strict=True) if on]
+    isolated = [each for each, on in zip(there, going, strict=True) if not on]
+    return isolated, one_of_each(closing, on_curves, _angles(setup, stage))
+
+
+def _angles(setup: Setup, stage: Stage) -> Array:
+    """Which unknowns of a group are angles (unknowns,)."""
+    own = (setup.equations.coordinates[column] for column in setup.equations.unknowns[stage.unknowns])
+    return np.array([each.kind is not Kind.LENGTH for each in own], dtype=bool)
 
 
 def _straight(setup: Setup, stage: Stage, z: Array, slope: ca.Function, certify: bool) -> Roots:
@@ -308,25 +333,44 @@ def _straight(setup: Setup, stage: Stage, z: Array, slope: ca.Function, certify:
     return Roots(root[None], ~one, one & proved, 1, 1, whole, False, said)
 
 
-def _open(closing: Closing, real: Array, part: float = DOUBLE) -> Array:
-    """Where a group's slope all but leaves a direction open, as where two assemblies meet (roots,)."""
+def _multiple(closing: Closing, root: Array) -> Array:
+    """The place with the least left open on Newton's way from near a root to which several may come.
+
+    A step along what is all but open bends away before the next one brings it nearer, so none is refused.
+    """
+    best, least = root, np.inf
+    for _ in range(MULTIPLE):
+        left, slope = closing(root[None])
+        left_open = float(np.abs(left).max())
+        if left_open < least:
+            best, least = root, left_open
+        step = np.linalg.pinv(slope[0], rcond=VANISHES) @ left[0]
+        if not EPS < np.abs(step).max() < MEETING:
+            break
+        root = root - step
+    return best
+
+
+def _weakest(closing: Closing, real: Array) -> Array:
+    """The least singular value of a group's slope, of the greatest (roots,): none where a direction is open."""
     if not real.size:
-        return np.zeros(len(real), dtype=bool)
+        return np.ones(len(real))
     values = np.linalg.svd(closing(real)[1], compute_uv=False)
-    return values[:, -1] < part * np.maximum(values[:, 0], 1e-300)
+    return values[:, -1] / np.maximum(values[:, 0], 1e-300)
 
 
-def goes_on(closing: Closing, root: Array) -> bool:
-    """Whether an assembly is one of a whole curve: along the direction that is open there are others like it."""
-    slope = closing(root[None])[1][0]
-    _, values, ways = np.linalg.svd(slope)
-    if len(values) == slope.shape[1] and values[-1] > OPEN * values[0]:
-        return False
-    beside = root + ALONG * np.array([[1.0], [-1.0]]) * ways[-1]
-    found = newton(closing, beside)
-    for each, closed in zip(found.unknowns, found.closed, strict=True):
-        if closed and np.linalg.norm(each - root) > 0.3 * ALONG:
-            there = np.linalg.svd(closing(each[None])[1][0], compute_uv=False)
-            if there[-1] < OPEN * there[0]:
-                return True
-    return False
+def _double(closing: Closing, real: Array) -> Array:
+    """Where two assemblies or more meet (roots,): a direction is open there, and a way off along it is not.
+
+    Beside a curve of assemblies it is open, or all but open, all along; there they lie apart.
+    """
+    double = _weakest(closing, real) < DOUBLE
+    for k in np.flatnonzero(double):
+        slope = closing(real[k][None])[1][0]
+        values, way = np.linalg.svd(slope)[1:]
+        others, off = np.linalg.pinv(slope, rcond=OPEN), real[k] + ALONG * way[-1]
+        for _ in range(SETTLED):  # the other directions only
+            off = off - others @ closing(off[None])[0][0]
+        weakest = _weakest(closing, off[None])[0]
+        double[k] = weakest > CLOSES * max(values[-1] / values[0], ROUNDED)
+    return double

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import casadi as ca
@@ -79,6 +79,34 @@ class Tree:
     def solved(self, index: int) -> tuple[Roots, ...]:
         """What has been found of one group so far, once for each of the places of those before it."""
         return tuple(self._solved[index].values())
+
+    @property
+    def complete(self) -> Completeness:
+        """How surely what has been solved of the groups is all: of a curve only one place is taken further."""
+        found = [self.solved(index) for index in range(len(self.stages))]
+        if any(each.curve for of in found[:-1] for each in of):
+            return Completeness.NOT
+        return max((each.complete for of in found for each in of), key=WORST.index, default=Completeness.PROVED)
+
+    def moving(self) -> Sequence[str]:
+        """Where there is no assembly: links with a curve of them, of which another place might go on to one.
+
+        None of them where some group never goes together that does not hang on any such curve.
+        """
+        moving: list[str] = []
+        hanging: set[int] = set()
+        for index, stage in enumerate(self.stages):
+            if not self._hangs_on[index].size:  # the list may have ended before it came to this one
+                self.roots(index, np.zeros(len(self.setup.equations.unknowns)))
+            found = self.solved(index)
+            if any(each.curve for each in found):
+                moving += stage.links
+            elif not hanging.intersection(self._hangs_on[index].tolist()):
+                if found and not any(len(each.real) for each in found):
+                    return ()
+                continue
+            hanging.update(range(stage.unknowns.start, stage.unknowns.stop))
+        return moving
 
     def paths(self) -> Iterator[Path]:
         """All assemblies: of the first group the first, and with it those of the next in order, and so on."""

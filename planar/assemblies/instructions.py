@@ -1,0 +1,45 @@
+"""The instructions of a casadi function carried out on numbers of another kind: balls, or symbols."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import casadi as ca
+
+DONE: Mapping[int, Callable[..., Any]] = {
+    ca.OP_ADD: lambda a, b: a + b,
+    ca.OP_SUB: lambda a, b: a - b,
+    ca.OP_MUL: lambda a, b: a * b,
+    ca.OP_DIV: lambda a, b: a / b,
+    ca.OP_NEG: lambda a: -a,
+    ca.OP_COS: lambda a: a.cos(),
+    ca.OP_SIN: lambda a: a.sin(),
+    ca.OP_SQ: lambda a: a * a,
+    ca.OP_TWICE: lambda a: a + a,
+    ca.OP_INV: lambda a: 1 / a,
+    ca.OP_ASSIGN: lambda a: a,
+}
+"""What the coefficients of a linkage are made of."""
+
+
+def computed(
+    function: ca.Function,
+    inputs: Sequence[Sequence[Any]],
+    number: Callable[[float], Any],
+    done: Mapping[int, Callable[..., Any]] = DONE,
+) -> list[list[Any]]:
+    """The results of a function of dense matrices, column by column. Raises KeyError where it holds anything else."""
+    work: dict[int, Any] = {}
+    found: list[list[Any]] = [[number(0.0)] * function.numel_out(k) for k in range(function.n_out())]
+    for k in range(function.n_instructions()):
+        code, out, of = function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)
+        if code == ca.OP_INPUT:
+            work[out[0]] = inputs[of[0]][of[1]]
+        elif code == ca.OP_CONST:
+            work[out[0]] = number(function.instruction_constant(k))
+        elif code == ca.OP_OUTPUT:
+            found[out[0]][out[1]] = work[of[0]]
+        else:
+            work[out[0]] = done[code](*(work[each] for each in of))
+    return found
