@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from planar.analysis.transmission import Transmission, transmission
     from planar.analysis.two_directions import centre_of
     from planar.assemblies.modes import Mode, Modes, modes
+    from planar.branches.circuits import Branch, Circuit, Circuits, circuits
     from planar.document.schema import schema
     from planar.errors import BadInput, NoAnswer, Outcome, PlanarError
     from planar.files import dumps, from_dict, load, loads, to_dict
@@ -49,9 +50,12 @@ _ROOMS = {
     "Area": "analysis.area",
     "At": "mechanism",
     "BadInput": "errors",
+    "Branch": "branches.circuits",
     "Centre": "analysis.centres",
     "Centres": "analysis.centres",
     "Centrodes": "analysis.centrodes",
+    "Circuit": "branches.circuits",
+    "Circuits": "branches.circuits",
     "Curvature": "analysis.curvature",
     "Distances": "mechanism",
     "Drive": "mechanism",
@@ -87,6 +91,7 @@ _ROOMS = {
     "centre_of": "analysis.two_directions",
     "centres": "analysis.centres",
     "centrodes": "analysis.centrodes",
+    "circuits": "branches.circuits",
     "curvature": "analysis.curvature",
     "cycle": "solving.cycle",
     "dataset": "views.dataset",
@@ -126,9 +131,12 @@ __all__ = [
     "Area",
     "At",
     "BadInput",
+    "Branch",
     "Centre",
     "Centres",
     "Centrodes",
+    "Circuit",
+    "Circuits",
     "Curvature",
     "Distances",
     "Drive",
@@ -164,6 +172,7 @@ __all__ = [
     "centre_of",
     "centres",
     "centrodes",
+    "circuits",
     "curvature",
     "cycle",
     "dataset",

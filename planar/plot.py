@@ -9,11 +9,15 @@ from typing import TYPE_CHECKING
 from planar.analysis.centres import centres as all_centres
 from planar.assemblies.modes import Modes
 from planar.assemblies.modes import modes as all_modes
+from planar.branches.circuits import Circuits
+from planar.branches.circuits import circuits as all_circuits
+from planar.branches.located import located
 from planar.drawing import animation
 from planar.drawing.assemblies import sheets_of
 from planar.drawing.centres import REACH, centres_picture, chosen
 from planar.drawing.centrodes import centrodes_picture
 from planar.drawing.circle import circle_picture
+from planar.drawing.circuits import circuits_figures
 from planar.drawing.diagrams import diagrams
 from planar.drawing.directions import directions_picture
 from planar.drawing.figure import figure, saved
@@ -35,6 +39,7 @@ __all__ = [
     "animate",
     "centres",
     "centrodes",
+    "circuits",
     "diagrams",
     "loci",
     "modes",
@@ -110,6 +115,18 @@ def modes(assemblies: Modes | Mechanism, scale: Scales = None) -> list[Figure]:
     """
     found = assemblies if isinstance(assemblies, Modes) else all_modes(assemblies)
     return [figure(*sheet) for sheet in sheets_of(found, scales(scale, ["length"]).get("length"))]
+
+
+def circuits(found: Circuits | Mechanism, of: str | None = None, assemblies: Modes | None = None) -> list[Figure]:
+    """All circuits, an output over the input that runs: each in a panel of its own, its branches and dead points told.
+
+    `of` is a slide, a link, a pair, or a point (its x, then its y), chosen as for diagrams where it is left out.
+    `assemblies` are marked, left out those at the mechanism's inputs. Raises BadInput for an output that is not there,
+    and NoAnswer where no circuit was found.
+    """
+    of_all = found if isinstance(found, Circuits) else all_circuits(found)
+    here = all_modes(of_all.mechanism, certify=False) if assemblies is None else assemblies
+    return circuits_figures(of_all, located(of_all, here), of)
 
 
 def solution(state: State, scale: Scales = None) -> list[Figure]:

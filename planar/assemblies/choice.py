@@ -1,4 +1,4 @@
-"""One of all assemblies by its number, in place of the one nearest to the sketch."""
+"""Which of all assemblies is taken: the one of a number, else the one nearest to the sketch, and its number."""
 
 from __future__ import annotations
 
@@ -7,13 +7,47 @@ from dataclasses import replace
 import numpy as np
 
 from planar.assemblies.modes import Mode, Modes, modes
+from planar.assemblies.roots import Completeness
+from planar.assemblies.tree import Tree
 from planar.errors import BadInput, NoAnswer
 from planar.mechanism import Mechanism
-from planar.solving.position import solve
+from planar.solving.position import known_of, solve
 from planar.words import many
 
 NEAR = 1e-6
 """Places of points are the same within this part of the greatest coordinate."""
+
+FEW = 32
+"""Dyads, or larger groups by what they take, that are solved with every position for the sake of a remark."""
+
+
+def numbered(mechanism: Mechanism) -> Mechanism:
+    """The mechanism with a remark of which assembly the sketch means, where that is told within some milliseconds.
+
+    Where there is nothing to choose, or the numbers are not sure, the mechanism as it is.
+    """
+    known = known_of(mechanism)
+    stages = known.solver.equations.stages
+    if len(stages) > FEW:
+        return mechanism
+    try:
+        z = known.assembly.z
+    except NoAnswer:
+        return mechanism  # as it will be said
+    tree = Tree(known.solver, certify=False)
+    total = tree.count(FEW)
+    if total is None or total < 2:
+        return mechanism
+    path = tree.towards(z)
+    before = None if path is None else tree.before(path, FEW)
+    solved = (each for index in range(len(stages)) for each in tree.solved(index))
+    if before is None or any(each.complete is Completeness.NOT for each in solved):
+        return mechanism
+    why = "the nearest to the sketch" if mechanism.sketch else "without a sketch"
+    told = (
+        f"assembly {before + 1} of {total} at the file's inputs, {why}; `planar modes` lists them, --mode takes another"
+    )
+    return replace(mechanism, remarks=(*mechanism.remarks, told))
 
 
 def chosen(mechanism: Mechanism, number: int) -> Mechanism:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from planar.cli.shared import as_json, busy, drives, main, output, show, spare
+from planar.cli.shared import as_json, busy, drives, main, output, running, show, spare
 from planar.errors import BadInput
 
 
@@ -26,6 +26,8 @@ from planar.errors import BadInput
 )
 @click.option("--point", "points", multiple=True, metavar="NAME", help="A point whose place is printed.")
 @click.option("--certify/--no-certify", default=True, help="Prove every assembly by intervals, or leave it.")
+@click.option("--circuits", "circled", is_flag=True, help="Also the circuit and the branch on which each lies.")
+@running
 @output("Write the tables to a .txt, .svg or .html file.")
 def modes(
     model: str,
@@ -34,22 +36,28 @@ def modes(
     limit: int,
     points: tuple[str, ...],
     certify: bool,
+    circled: bool,
+    pair: str | None,
     output: Path | None,
 ) -> None:
     """Every assembly at the given inputs, and whether these are all."""
     from planar.assemblies.modes import modes as assemblies
+    from planar.branches.circuits import circuits
     from planar.files import load
     from planar.views.modes import record, table
 
     if as_json and output is not None:
         raise BadInput("-o", "tables go to a file or SI values are printed with --json; give one of the two")
+    if pair is not None and not circled:
+        raise BadInput("--input", "without --circuits no input runs")
     mechanism = load(model)
     spare(model, output)
     with busy(f"{mechanism.name}: assemblies"):
         found = assemblies(mechanism, drives(mechanism, at), certify=certify)
         if not found:
             raise found.refusal()
-        told = record(found, limit) if as_json else table(found, limit, points)
+        on = circuits(found.mechanism, pair) if circled else None
+        told = record(found, limit, on) if as_json else table(found, limit, points, on)
     if as_json:
         click.echo(json.dumps(told, ensure_ascii=False, indent=1, allow_nan=False))
         return

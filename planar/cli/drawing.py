@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.core import ParameterSource
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 POSITION = ("scheme", "velocity", "acceleration", "centres")
 ASSEMBLIES = ("modes",)
+BRANCHES = ("circuits",)
 MOTION = ("positions", "loci", "centrodes", "diagrams")
 SMOOTH = 360
 """Steps of a run that is drawn."""
@@ -24,14 +25,14 @@ SMOOTH = 360
 
 @main.command()
 @click.argument("model")
-@click.argument("what", type=click.Choice((*POSITION, *MOTION, *ASSEMBLIES)))
+@click.argument("what", type=click.Choice((*POSITION, *MOTION, *ASSEMBLIES, *BRANCHES)))
 @output("Write the drawing to a .png, .svg or .pdf file.", required=True)
 @scaled
 @at
 @click.option(
     "--point", "points", multiple=True, metavar="NAME", help="A point to be lettered, or whose path is drawn."
 )
-@click.option("--of", "of", metavar="NAME", help="Diagrams of this slide, point or link.")
+@click.option("--of", "of", metavar="NAME", help="Diagrams, or circuits, of this slide, point or link.")
 @click.option(
     "--link",
     "links",
@@ -59,14 +60,14 @@ def plot(
     stop: str | None,
     mode: int | None,
 ) -> None:
-    """A drawing to scale: scheme, polygons and centres of a position; loci, centrodes, diagrams and more of a run."""
+    """A drawing to scale: scheme, polygons and centres of a position; loci, diagrams and more of a run; circuits."""
     from planar import plot as drawn
     from planar.solving.position import solve
 
     steps_told = click.get_current_context().get_parameter_source("steps") is ParameterSource.COMMANDLINE
     for option, told, kinds in (
         ("--point", points, ("positions", "loci")),
-        ("--of", of, ("diagrams",)),
+        ("--of", of, ("diagrams", *BRANCHES)),
         ("--link", links, ("centres", "centrodes")),
         ("--chords", chords, ("diagrams",)),
         ("--steps", steps_told, ("positions", "diagrams") if chords else ("positions",)),
@@ -78,13 +79,15 @@ def plot(
     mechanism = loaded(model, mode)
     spare(model, output)
     with busy(f"{mechanism.name}: {what}"):
-        if (pair or start or stop) and what not in MOTION:
-            told = f"{what} are" if what in ASSEMBLIES else f"a {what} is"
-            raise BadInput("--input", f"{told} of one position; move an input there with --at")
-        if what in ASSEMBLIES:
+        _refuse_range(what, pair, start, stop)
+        if what in (*ASSEMBLIES, *BRANCHES):
             from planar.assemblies.modes import modes
+            from planar.branches.circuits import circuits
 
-            drawn.save(drawn.modes(modes(mechanism, drives(mechanism, at)), scales), output)
+            every = what in ASSEMBLIES
+            here = modes(mechanism, drives(mechanism, at), certify=every)
+            sheets = drawn.modes(here, scales) if every else drawn.circuits(circuits(here.mechanism, pair), of, here)
+            drawn.save(sheets, output)
             return
         if what in POSITION:
             state = solve(mechanism, drives(mechanism, at))
@@ -93,19 +96,41 @@ def plot(
             if at:
                 raise BadInput("--at", f"{what} are of a run; say where it starts with --from")
             moving = _run(mechanism, pair, start, stop)
-            if what == "diagrams":
-                figure = drawn.diagrams(moving, of, steps if chords else None)
-            elif what == "centrodes":
-                if len(links) > 2:
-                    raise BadInput(
-                        "--link", "centrodes are of two links; name one, or one and the link that it is seen from"
-                    )
-                figure = drawn.centrodes(moving, *links, scale=scales)
-            elif what == "positions":
-                figure = drawn.positions(moving, steps, points or None, scales)
-            else:
-                figure = drawn.loci(moving, points or None, scales)
+            figure = _of_run(moving, what, scales, points, of, links, (steps, chords))
         drawn.save(figure, output)
+
+
+def _refuse_range(what: str, pair: str | None, start: str | None, stop: str | None) -> None:
+    """Raise BadInput for a range that a drawing would not heed."""
+    if what in BRANCHES and (start or stop):
+        raise BadInput("--from", f"{what} are of the whole range of an input")
+    if (pair or start or stop) and what in (*POSITION, *ASSEMBLIES):
+        told = f"{what} are" if what in ASSEMBLIES else f"a {what} is"
+        raise BadInput("--input", f"{told} of one position; move an input there with --at")
+
+
+def _of_run(
+    moving: Mechanism | Motion,
+    what: str,
+    scales: tuple[str, ...],
+    points: tuple[str, ...],
+    of: str | None,
+    links: tuple[str, ...],
+    divided: tuple[int, bool],
+) -> Any:
+    """A drawing of a whole run; `divided` are its steps and whether chords are drawn."""
+    from planar import plot as drawn
+
+    steps, chords = divided
+    if what == "diagrams":
+        return drawn.diagrams(moving, of, steps if chords else None)
+    if what == "centrodes":
+        if len(links) > 2:
+            raise BadInput("--link", "centrodes are of two links; name one, or one and the link that it is seen from")
+        return drawn.centrodes(moving, *links, scale=scales)
+    if what == "positions":
+        return drawn.positions(moving, steps, points or None, scales)
+    return drawn.loci(moving, points or None, scales)
 
 
 @main.command()

@@ -59,16 +59,18 @@ moded = click.option(
 
 
 def loaded(model: str, mode: int | None) -> Mechanism:
-    """The mechanism of a file, the assembly chosen that `--mode` names."""
+    """The mechanism of a file, the assembly chosen that `--mode` names, else with the number of the sketch's own."""
+    from planar.assemblies.choice import chosen, numbered
     from planar.files import load
 
     mechanism = load(model)
     if mode is None:
-        return mechanism
-    from planar.assemblies.choice import chosen
-
+        return numbered(mechanism)
     with busy(f"{mechanism.name}: assemblies"):
         return chosen(mechanism, mode)
+
+
+running = click.option("--input", "pair", metavar="PAIR", help="The input that runs, where there are several.")
 
 
 def ranged(command: Any) -> Any:
@@ -76,7 +78,7 @@ def ranged(command: Any) -> Any:
     for option in (
         click.option("--to", "stop", metavar="POSITION", help="Where it stops; left out, a turn on, or to its limits."),
         click.option("--from", "start", metavar="POSITION", help="Where the range starts: 30deg, 20mm, a bare number."),
-        click.option("--input", "pair", metavar="PAIR", help="The input that runs, where there are several."),
+        running,
     ):
         command = option(command)
     return command

@@ -12,7 +12,6 @@ from planar.drawing.runs import Run, frame_slides
 from planar.errors import BadInput
 from planar.graph import numbered
 from planar.mechanism import Mechanism, motions, named_points
-from planar.motion import Motion
 from planar.pairs import Kind
 
 Array = np.ndarray
@@ -133,13 +132,15 @@ def _subject(run: Run, of: str) -> Subject:
     named = motions(motion.mechanism)
     if of in named:
         return Subject(f"pair {of}", True, (Curve("", *_reported(run, of)),))
-    raise BadInput(of, f"there is no pair, point or link of this name; {_known(motion)}")
+    raise BadInput(of, f"there is no pair, point or link of this name; {known(motion.mechanism)}")
 
 
-def _known(motion: Motion) -> str:
-    links = [link.name for link in motion.mechanism.links if link.name != motion.mechanism.frame]
-    slides = [name for name, pair in motions(motion.mechanism).items() if pair.drive_kind is Kind.LENGTH]
-    told = [("slides", slides), ("points", motion.point_names), ("links", links)]
+def known(mechanism: Mechanism) -> str:
+    """What could be drawn, for those who named something else."""
+    links = [link.name for link in mechanism.links if link.name != mechanism.frame]
+    slides = [name for name, pair in motions(mechanism).items() if pair.drive_kind is Kind.LENGTH]
+    points = [each.name for each in named_points(mechanism)]
+    told = [("slides", slides), ("points", points), ("links", links)]
     return "; ".join(f"{what} are {', '.join(names)}" for what, names in told if names)
 
 

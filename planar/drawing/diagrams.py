@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import ceil, degrees, floor, isclose, log10
+from math import ceil, degrees, floor, isclose
 from numbers import Integral, Real
 from typing import TYPE_CHECKING
 
@@ -11,8 +11,8 @@ import numpy as np
 from planar.drawing.curves import Chords, Curve, chords, default_subject, slide_of, subject
 from planar.drawing.diagram_notes import Ordinate, Sheet, caption, inner, raised
 from planar.drawing.ink import POINT, ready
-from planar.drawing.lettering import FAMILY, measured, shown
-from planar.drawing.paper import fitting
+from planar.drawing.lettering import FAMILY, clipped, signed
+from planar.drawing.paper import DEGREES, PLAIN, fitting, round_step
 from planar.drawing.runs import steady
 from planar.errors import BadInput
 from planar.mechanism import Mechanism, motions
@@ -125,11 +125,6 @@ def _ordinate(sheet: Sheet, index: int) -> Ordinate:
     return Ordinate(name, SYMBOLS[angle][index], scale, written, si, foot, top)
 
 
-def _shown(value: float) -> str:
-    """A number of an axis with a proper minus sign."""
-    return f"{value:.6g}".replace("-", "−") if value else "0"
-
-
 def _chart(axes: Axes, sheet: Sheet, ordinate: Ordinate, index: int) -> None:
     """One diagram with its grid, its zero line and its curves."""
     per_mm = unit(ordinate.scale.unit).from_si(ordinate.scale.per_mm)
@@ -138,7 +133,7 @@ def _chart(axes: Axes, sheet: Sheet, ordinate: Ordinate, index: int) -> None:
     axes.set_ylim(ordinate.low * per_mm, ordinate.high * per_mm)
     ticks = [10.0 * k for k in range(ceil(ordinate.low / 10.0), floor(ordinate.high / 10.0) + 1)]
     axes.set_yticks(
-        [tick * per_mm for tick in ticks], [_shown(tick * per_mm) for tick in ticks], family=FAMILY, fontsize=SMALL
+        [tick * per_mm for tick in ticks], [signed(tick * per_mm) for tick in ticks], family=FAMILY, fontsize=SMALL
     )
     axes.set_ylabel(f"{ordinate.symbol} ({raised(ordinate.written)})", family=FAMILY, fontsize=NORMAL, labelpad=3.0)
     every = ceil(4.5 * sheet.count / sheet.width)
@@ -212,11 +207,11 @@ def _angle_axis(axes: Axes, sheet: Sheet) -> None:
     size = unit(written)
     last = size.from_si(float(sheet.run.turned[-1]))
     in_degrees = not sheet.run.slides and isclose(degrees(sheet.run.turned[-1]), last)
-    _ruler(axes, sheet, last, f"{symbol} ({written})", (1, 2, 3, 4.5, 6, 9, 1.5) if in_degrees else (1, 2, 5), "angle")
+    _ruler(axes, sheet, last, f"{symbol} ({written})", DEGREES if in_degrees else PLAIN, "angle")
 
 
 def _time_axis(axes: Axes, sheet: Sheet) -> None:
-    _ruler(axes, sheet, sheet.span, "t (s)", (1, 2, 5), "time")
+    _ruler(axes, sheet, sheet.span, "t (s)", PLAIN, "time")
 
 
 def _ruler(axes: Axes, sheet: Sheet, last: float, label: str, firsts: tuple[float, ...], name: str) -> None:
@@ -227,9 +222,9 @@ def _ruler(axes: Axes, sheet: Sheet, last: float, label: str, firsts: tuple[floa
     for side in ("left", "right", "top"):
         axes.spines[side].set_visible(False)
     axes.spines["bottom"].set_linewidth(0.5)
-    step = _round_step(last * 9.0 / sheet.width, firsts)
+    step = round_step(last * 9.0 / sheet.width, firsts)
     ticks = [step * k for k in range(floor(last / step * (1.0 + 1e-9)) + 1)]
-    axes.set_xticks(ticks, [_shown(tick) for tick in ticks], family=FAMILY, fontsize=SMALL)
+    axes.set_xticks(ticks, [signed(tick) for tick in ticks], family=FAMILY, fontsize=SMALL)
     axes.tick_params(length=2.0, width=0.5, pad=1.5)
     ends = (1.0, 0.5)
     axes.annotate(
@@ -246,13 +241,6 @@ def _ruler(axes: Axes, sheet: Sheet, last: float, label: str, firsts: tuple[floa
     )
 
 
-def _round_step(least: float, firsts: tuple[float, ...]) -> float:
-    """The smallest step of the form first * 10^k that is not below the least."""
-    power = 10.0 ** (floor(log10(least)) - 1)
-    steps = sorted(first * power * more for first in firsts for more in (1.0, 10.0, 100.0))
-    return next(step for step in steps if step >= least * (1.0 - 1e-9))
-
-
 def _head(made: Figure, sheet: Sheet, chart: Axes, size: tuple[float, float]) -> None:
     """Title, dead centres, stroke, and which curve is which."""
     mechanism = sheet.run.motion.mechanism
@@ -261,7 +249,7 @@ def _head(made: Figure, sheet: Sheet, chart: Axes, size: tuple[float, float]) ->
         made.text(
             0.5,
             1.0 - down / size[1],
-            _clipped(text, points, size[0] - 8.0),
+            clipped(text, points, size[0] - 8.0),
             family=FAMILY,
             fontsize=points,
             ha="center",
@@ -351,11 +339,3 @@ def _stroke(axes: Axes, sheet: Sheet, length: float) -> None:
         annotation_clip=False,
         gid="stroke",
     )
-
-
-def _clipped(text: str, points: float, room: float) -> str:
-    """A plain text on one line of at most so many mm, the rest left out."""
-    text = shown(text)
-    while len(text) > 1 and measured(text, points).width > room:
-        text = f"{text[: min(len(text) - 2, int(len(text) * room / measured(text, points).width))]}…"
-    return text

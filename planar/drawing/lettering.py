@@ -116,3 +116,16 @@ def wrapped(text: str, points: float, width: float, heavy: bool = False) -> list
             rest = rest[cut:]
         line = rest
     return [*lines, line] if line else lines
+
+
+def clipped(text: str, points: float, room: float) -> str:
+    """A plain text on one line of at most so many mm, the rest left out."""
+    text = shown(text)
+    while len(text) > 1 and measured(text, points).width > room:
+        text = f"{text[: min(len(text) - 2, int(len(text) * room / measured(text, points).width))]}…"
+    return text
+
+
+def signed(value: float) -> str:
+    """A number of an axis with a proper minus sign."""
+    return f"{value:.6g}".replace("-", "−") if value else "0"

@@ -14,6 +14,9 @@ WIDTH, HEIGHT = 150.0, 110.0
 """mm on paper that one drawing takes at the most, unless its scale is given."""
 ROUND = (1.0, 2.0, 5.0, 10.0)
 """First digits of a scale that a ruler reads easily."""
+PLAIN = (1.0, 2.0, 5.0)
+DEGREES = (1.0, 2.0, 3.0, 4.5, 6.0, 9.0, 1.5)
+"""First digits of the step between two numbers of an axis."""
 SYMBOLS = {"length": "μₗ", "velocity": "μᵥ", "acceleration": "μₐ"}
 """Of the calculating scales of a space diagram and its polygons."""
 
@@ -56,6 +59,13 @@ def fitting(kind: str, written: str, width: float, height: float, room: tuple[fl
     # a hair of slack, so that what fits exactly fits
     first = next(digit for digit in ROUND if digit * power >= per_cm * (1.0 - 1e-9))
     return Scale(kind, size.to_si(first * power) / 10.0, written)
+
+
+def round_step(least: float, firsts: Sequence[float] = PLAIN) -> float:
+    """The smallest step of the form first * 10^k that is not below the least."""
+    power = 10.0 ** (floor(log10(least)) - 1)
+    steps = sorted(first * power * more for first in firsts for more in (1.0, 10.0, 100.0))
+    return next(step for step in steps if step >= least * (1.0 - 1e-9))
 
 
 def raised(written: str) -> str:

@@ -12,6 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from planar.assemblies.modes import Group, Mode, Modes
+from planar.branches.circuits import Circuits
 from planar.errors import BadInput, Outcome
 from planar.mechanism import motions
 from planar.units import unit
@@ -30,8 +31,8 @@ ZERO = 1e-12
 """A coordinate below this part of the greatest is printed as 0."""
 
 
-def table(modes: Modes, limit: int, points: Sequence[str] = ()) -> RenderableType:
-    """The first assemblies: how many there are, group by group, and where each has the points."""
+def table(modes: Modes, limit: int, points: Sequence[str] = (), circuits: Circuits | None = None) -> RenderableType:
+    """The first assemblies: how many there are, group by group, and where each has the points; on which circuit."""
     mechanism = modes.mechanism
     shown = list(islice(modes, limit))
     head = [Text(mechanism.name, style="bold"), Text(_at(modes)), Text(counted(modes, len(shown)))]
@@ -50,7 +51,7 @@ def table(modes: Modes, limit: int, points: Sequence[str] = ()) -> RenderableTyp
     for reason, which in why.items():
         told.append(f"{listed([*which[:LISTED], 'more'] if len(which) > LISTED else which)}: {reason}")
     notes = paragraphs((" -", sentence) for sentence in told)
-    return Stack(*head, Text(), _groups(modes), _rows(modes, shown, names), Text(), notes)
+    return Stack(*head, Text(), _groups(modes), _rows(modes, shown, names, circuits), Text(), notes)
 
 
 def counted(modes: Modes, listed: int) -> str:
@@ -94,21 +95,23 @@ def _range(ends: tuple[int, int]) -> str:
     return str(ends[0]) if ends[0] == ends[1] else f"{ends[0]} to {ends[1]}"
 
 
-def _rows(modes: Modes, shown: Sequence[Mode], names: Sequence[str]) -> Table:
+def _rows(modes: Modes, shown: Sequence[Mode], names: Sequence[str], circuits: Circuits | None) -> Table:
     length = modes.mechanism.units.length
     several = 1 < len(modes.groups) <= CHOICES
+    leading = several + (0 if circuits is None else 2)
     near = modes.nearest
     rows = plain_table(
         "Assemblies",
         "",
         *(["groups"] if several else []),
+        *([] if circuits is None else ["circuit", "branch"]),
         *(f"{name}: x y, {length}" for name in names),
         f"off, {length}",
         "proved",
         "",
-        left=(len(names) + several + 2, len(names) + several + 3),
+        left=(len(names) + leading + 2, len(names) + leading + 3),
     )
-    for column in rows.columns[1 + several : 1 + several + len(names)]:
+    for column in rows.columns[1 + leading : 1 + leading + len(names)]:
         column.no_wrap, column.min_width = False, WIDE  # on a narrow screen y goes below x
     by = unit(length)
     for mode in shown:
@@ -116,12 +119,19 @@ def _rows(modes: Modes, shown: Sequence[Mode], names: Sequence[str]) -> Table:
         rows.add_row(
             str(mode.number),
             *([".".join(map(str, mode.choices))] if several else []),
+            *([] if circuits is None else [str(each or "-") for each in _lying(circuits, mode)]),
             *(_place(mode, name, by) for name in names),
             "-" if distance is None else f"{by.from_si(distance):.4g}",
             "yes" if mode.certified else "no",
             listed(_marks(mode, near)) if _marks(mode, near) else "",
         )
     return rows
+
+
+def _lying(circuits: Circuits, mode: Mode) -> tuple[int | None, int | None]:
+    """The numbers of the circuit and the branch on which an assembly lies."""
+    place = circuits.of(mode)
+    return (None, None) if place is None else (place[0].number, place[1].number)
 
 
 def _marks(mode: Mode, near: Mode | None) -> list[str]:
@@ -168,8 +178,8 @@ def _at(modes: Modes) -> str:
     return f"at {listed(told)}" if told else "without inputs"
 
 
-def record(modes: Modes, limit: int) -> dict[str, Any]:
-    """The first assemblies as a JSON value, in SI units."""
+def record(modes: Modes, limit: int, circuits: Circuits | None = None) -> dict[str, Any]:
+    """The first assemblies as a JSON value, in SI units; "circuit" and "branch" where circuits are given."""
     shown = list(islice(modes, limit))
     near = modes.nearest
     return {
@@ -192,6 +202,7 @@ def record(modes: Modes, limit: int) -> dict[str, Any]:
                 "outcome": mode.outcome.value,
                 "reason": mode.reason,
                 "points": {name: at.tolist() for name, at in mode.points.items()},
+                **({} if circuits is None else dict(zip(("circuit", "branch"), _lying(circuits, mode), strict=True))),
             }
             for mode in shown
         ],

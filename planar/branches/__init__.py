@@ -1,0 +1,1 @@
+"""All circuits of a mechanism and their branches, while one input runs."""
