@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from planar.analysis.time_ratio import TimeRatio, time_ratio
     from planar.analysis.transmission import Transmission, transmission
     from planar.analysis.two_directions import centre_of
+    from planar.assemblies.conflict import Conflict, conflict
     from planar.assemblies.modes import Mode, Modes, modes
     from planar.branches.circuits import Branch, Circuit, Circuits, circuits
     from planar.document.schema import schema
@@ -56,6 +57,7 @@ _ROOMS = {
     "Centrodes": "analysis.centrodes",
     "Circuit": "branches.circuits",
     "Circuits": "branches.circuits",
+    "Conflict": "assemblies.conflict",
     "Curvature": "analysis.curvature",
     "Distances": "mechanism",
     "Drive": "mechanism",
@@ -92,6 +94,7 @@ _ROOMS = {
     "centres": "analysis.centres",
     "centrodes": "analysis.centrodes",
     "circuits": "branches.circuits",
+    "conflict": "assemblies.conflict",
     "curvature": "analysis.curvature",
     "cycle": "solving.cycle",
     "dataset": "views.dataset",
@@ -137,6 +140,7 @@ __all__ = [
     "Centrodes",
     "Circuit",
     "Circuits",
+    "Conflict",
     "Curvature",
     "Distances",
     "Drive",
@@ -173,6 +177,7 @@ __all__ = [
     "centres",
     "centrodes",
     "circuits",
+    "conflict",
     "curvature",
     "cycle",
     "dataset",

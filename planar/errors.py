@@ -1,6 +1,7 @@
 """What can go wrong, and the sentence in which it is said."""
 
 from enum import StrEnum
+from typing import Any
 
 
 class Outcome(StrEnum):
@@ -48,9 +49,10 @@ class BadInput(PlanarError):
 
 
 class NoAnswer(PlanarError):
-    """The mechanism is well described but has no answer here; `outcome` says which kind."""
+    """The mechanism is well described but has no answer here; `outcome` says which kind, `more` what a program asks."""
 
     def __init__(self, outcome: Outcome, reason: str):
         super().__init__(f"{outcome.value}: {reason}")
         self.outcome = outcome
         self.reason = reason
+        self.more: dict[str, Any] = {}

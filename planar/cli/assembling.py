@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from planar.cli.shared import as_json, busy, drives, main, output, running, show, spare
 from planar.errors import BadInput
+
+if TYPE_CHECKING:
+    from planar.assemblies.modes import Modes
+    from planar.errors import NoAnswer
 
 
 @main.command()
@@ -55,10 +60,26 @@ def modes(
     with busy(f"{mechanism.name}: assemblies"):
         found = assemblies(mechanism, drives(mechanism, at), certify=certify)
         if not found:
-            raise found.refusal()
+            raise _refused(found, as_json, output)
         on = circuits(found.mechanism, pair) if circled else None
         told = record(found, limit, on) if as_json else table(found, limit, points, on)
     if as_json:
         click.echo(json.dumps(told, ensure_ascii=False, indent=1, allow_nan=False))
         return
     show(told, output)
+
+
+def _refused(found: Modes, as_json: bool, output: Path | None) -> NoAnswer:
+    """The refusal to be raised, once it has been told why no assembly was found."""
+    from planar.assemblies.conflict import conflict
+    from planar.branches.circuits import circuits
+    from planar.views.conflict import conflict_record, conflict_table
+
+    problem, why = found.refusal(), conflict(found.mechanism)
+    if why is not None:
+        runs = [circuits(why.mechanism, pair) for pair in why.inputs]
+        if as_json:
+            problem.more = {"conflict": conflict_record(why, runs)}
+        else:
+            show(conflict_table(why, runs), output)
+    return problem

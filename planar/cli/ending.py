@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext
+from types import MappingProxyType
 from typing import Any
 
 import click
@@ -38,7 +39,7 @@ def _ending() -> Iterator[None]:
     except BadInput as problem:
         _refuse(str(problem), "bad input", str(problem), BAD_INPUT)
     except NoAnswer as problem:
-        _refuse(str(problem), problem.outcome.value, problem.reason, NO_ANSWER)
+        _refuse(str(problem), problem.outcome.value, problem.reason, NO_ANSWER, problem.more)
     except click.UsageError as problem:
         told = problem.format_message().rstrip(".").replace(". Did", "; did").replace(". (", " (")
         if not told.endswith(("?", "?)")):
@@ -47,9 +48,11 @@ def _ending() -> Iterator[None]:
         _refuse(wrong, "bad input", wrong, BAD_INPUT)
 
 
-def _refuse(sentence: str, outcome: str, reason: str, status: int) -> None:
+def _refuse(
+    sentence: str, outcome: str, reason: str, status: int, more: Mapping[str, Any] = MappingProxyType({})
+) -> None:
     if "--json" in sys.argv:
-        click.echo(json.dumps({"outcome": outcome, "reason": reason}, ensure_ascii=False))
+        click.echo(json.dumps({"outcome": outcome, "reason": reason, **more}, ensure_ascii=False))
     shown = "".join(each if each.isprintable() else repr(each)[1:-1] for each in sentence)
     click.echo(f"planar: {shown}", err=True)
     sys.exit(status)

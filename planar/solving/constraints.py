@@ -6,6 +6,7 @@ W. Squire, G. Trapp, Using Complex Variables to Estimate Derivatives of Real Fun
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -36,11 +37,11 @@ SINGULAR = 1e-6
 
 
 class Constraints:
-    """The residuals of all pairs at coordinates w (coordinates,), as `Equations.coordinates` has them."""
+    """The residuals of all pairs, or of some, at coordinates w (coordinates,), as `Equations.coordinates` has them."""
 
-    def __init__(self, setup: Setup):
+    def __init__(self, setup: Setup, pairs: Sequence[Pair] | None = None):
         self.setup = setup
-        self.pairs = tuple(setup.mechanism.pairs)
+        self.pairs = tuple(setup.mechanism.pairs if pairs is None else pairs)
         self.coordinates = setup.equations.coordinates
         self.pair_of_row = tuple(pair.name for pair in self.pairs for _ in pair.constrains)
         self._numbers = {

@@ -1,18 +1,23 @@
-"""The single dimension whose change lets a mechanism go together that does not, and by how much."""
+"""Changes of one number, a dimension or an input, that let a mechanism go together that does not, and by how much."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass
+from itertools import islice
 from math import ceil, floor, log10
+from typing import NamedTuple
 
 import numpy as np
 
-from planar.dimensions import Dimension, changed, dimensions
-from planar.mechanism import Mechanism
+from planar.dimensions import changed, dimensions
+from planar.equations import Stage
+from planar.mechanism import Drive, Mechanism, with_inputs
 from planar.program import fitted, shapes
 from planar.shapes import Unplaced
 from planar.solving.assemble import Assembly, Failure, search
-from planar.solving.candidates import Candidates
-from planar.solving.newton import newton
+from planar.solving.candidates import Candidates, closing_of
+from planar.solving.newton import newton, polished
 from planar.solving.setup import Setup
 from planar.units import unit
 from planar.words import amount
@@ -21,78 +26,238 @@ Array = np.ndarray
 
 MOST = 40
 """Dimensions that are looked at."""
-LONGEST = 15
-"""Newton's steps of a dimension; what stays open falls about linearly with it, so a few do."""
+LONGEST = 30
+"""Newton's steps of a number; what stays open falls about linearly with it, so a few do."""
+RETREATS = 4
+"""Times that a step is halved since the groups before do not go together where it leads."""
+FARTHEST = 1.0
+"""The farthest that a step goes (sizes, rad)."""
 CLOSED = 1e-9
+FALLING = 0.1
+"""Below CLOSED steps go on as long as each leaves only so much of what the one before left open."""
+NEARLY = 1e-4
+"""Where so much of the last step less leaves a group open, the step did not go too far."""
+ROUNDED = 1e-6
+LESS = 0.99
+"""Part of a change that is tried for whether it will do."""
+FLAT = 1e-3
+"""A number by whose change (sizes, rad) less than this part of it closes hardly matters."""
 PROVED = 4
-"""Dimensions, the least change first, that are tried by assembling the whole."""
-DIGITS = 5
+"""Changes, the least first, that are tried by assembling the whole."""
+DIGITS, ALL_DIGITS = 5, 15
+
+
+class Change(NamedTuple):
+    """A dimension, or the input at a pair, at another value (m or rad), with which the whole goes together."""
+
+    name: str
+    kind: str
+    "length or angle"
+    was: float
+    value: float
+    shown: str
+    "the value with its unit; the whole goes together with it as it stands there"
+
+
+@dataclass(frozen=True)
+class _Number:
+    """A number of a mechanism that may be changed."""
+
+    name: str
+    kind: str
+    was: float
+    size: float
+    "what is large for it (m or rad)"
+    least: float
+    changed: Callable[[float], Mechanism]
 
 
 def remedy(setup: Setup, failure: Failure) -> str | None:
-    """A clause that says which dimension to make how long; None where no single one was found.
+    """A clause that says which dimension to make how long, or where to move an input; None where nothing was found.
 
     A change is offered only after the mechanism with it, rounded as it is printed, has been assembled.
     """
     beside = (link for name in failure.stage.pairs for link in setup.pairs[name].bodies)
     links = frozenset((*failure.stage.links, *beside))
-    found = []
-    for dimension in list(dimensions(setup.mechanism, links))[:MOST]:
-        value = _closing_value(setup, failure, dimension)
-        if value is not None:
-            found.append((abs(value - dimension.value), dimension, value))
-    length = unit(setup.mechanism.units.length)
-    # of changes that are as small, that of a link's length
-    found.sort(key=lambda each: (round(each[0] / setup.unit, 6), not each[1].name.endswith(".length")))
-    for _, dimension, value in found[:PROVED]:
-        near = length.from_si(value)
-        # first a little beyond, where it goes together with ease; what is held twice needs the very value
-        for shown in (_rounded(near, up=value > dimension.value), float(f"{near:.{DIGITS}g}")):
-            if _goes_together(changed(setup.mechanism, dimension, length.to_si(shown))):
-                units = setup.mechanism.units
-                return (
-                    f"it would go together with {dimension.name} = {shown:.6g} {units.length} "
-                    f"instead of {amount(dimension.value, 'length', units)}"
-                )
-    return None
+    told = [
+        f"with {each.name} = {each.shown} instead of {amount(each.was, each.kind, setup.mechanism.units)}"
+        for each in islice(mending(setup, failure, links), 1)
+    ]
+    told += [f"at {each.name} = {each.shown}" for each in islice(moving(setup, failure), 1)]
+    return f"it would go together {', or '.join(told)}" if told else None
 
 
-def _closing_value(setup: Setup, failure: Failure, dimension: Dimension) -> float | None:
-    """The value (m) of a dimension at which the group that stays open just closes; None where there is none.
+def mending(setup: Setup, failure: Failure, links: frozenset[str], thorough: bool = False) -> Iterator[Change]:
+    """Changes of one dimension of these links each that let the whole go together, the least first.
 
-    What stays open at the nearest position falls as the dimension changes by its share in it: Newton's method for a
-    zero of the distance, the position being found anew at each step.
+    Each is the least with which the assembly goes together that comes nearest without it; only a `thorough` search
+    looks whether another does with less, and tries all changes on the whole.
     """
-    candidates = Candidates(setup)
-    value, z = dimension.value, failure.z[failure.stage.unknowns]
-    nudge = 1e-7 * setup.unit
+    mechanism = setup.mechanism
+    return _least_first(
+        setup,
+        failure,
+        [
+            _Number(
+                each.name,
+                "length",
+                each.value,
+                setup.unit,
+                0.0 if each.name == f"{each.link}.length" else -np.inf,
+                lambda value, each=each: changed(mechanism, each, value),
+            )
+            for each in islice(dimensions(mechanism, links), MOST)
+        ],
+        thorough,
+    )
+
+
+def moving(
+    setup: Setup, failure: Failure, inputs: Collection[str] | None = None, thorough: bool = False
+) -> Iterator[Change]:
+    """Positions of one input each, of these or of all, at which the whole goes together: as `mending`."""
+    mechanism = setup.mechanism
+    return _least_first(
+        setup,
+        failure,
+        [
+            _Number(
+                given.pair,
+                "length" if setup.slides(given.pair) else "angle",
+                given.position,
+                setup.unit if setup.slides(given.pair) else 1.0,
+                -np.inf,
+                lambda value, given=given: with_inputs(mechanism, (Drive(given.pair, value),)),
+            )
+            for given in mechanism.inputs
+            if inputs is None or given.pair in inputs
+        ],
+        thorough,
+    )
+
+
+def _least_first(setup: Setup, failure: Failure, numbers: list[_Number], thorough: bool) -> Iterator[Change]:
+    found = []
+    for number in numbers:
+        value = _closing_value(setup, failure, number)
+        if value is not None:
+            value = _with_less(number, value) if thorough else value
+            found.append((abs(value - number.was) / number.size, number, value))
+    # of changes that are as small, that of a link's length
+    found.sort(key=lambda each: (round(each[0], 6), not each[1].name.endswith(".length")))
+    units = setup.mechanism.units
+    for _, number, value in found if thorough else found[:PROVED]:
+        name = units.length if number.kind == "length" else units.angle
+        by = unit(name)
+        near = by.from_si(value)
+        # first a little beyond, where it goes together with ease; what is held twice needs the very value
+        for shown in (f"{_rounded(near, value > number.was):.6g}", f"{near:.{DIGITS}g}", f"{near:.{ALL_DIGITS}g}"):
+            there = by.to_si(float(shown))
+            if goes_together(number.changed(there)):
+                yield Change(number.name, number.kind, number.was, there, f"{shown} {name}")
+                break
+
+
+def _with_less(number: _Number, value: float) -> float:
+    """A value at which another assembly just goes together, if less of the change will do for that."""
+    open_, closed = number.was, number.was + LESS * (value - number.was)
+    if not goes_together(number.changed(closed)):
+        return value
+    while abs(closed - open_) > ROUNDED * number.size:
+        tried = 0.5 * (open_ + closed)
+        open_, closed = (open_, tried) if goes_together(number.changed(tried)) else (tried, closed)
+    return closed
+
+
+def _closing_value(setup: Setup, failure: Failure, number: _Number) -> float | None:
+    """The value (m or rad) of a number at which what stays open just closes; None where there is none.
+
+    What stays open at the nearest position falls as the number changes by its share in it: Newton's method for a zero
+    of the distance, the position being found anew at each step.
+    """
+    value, z, nudge = number.was, failure.z, 1e-7 * number.size
+    open_at, way, least, found, retreats = number.was, 0.0, CLOSED, None, 0
     for _ in range(LONGEST):
-        closings = []
-        for tried in (value, value + nudge):
-            p = _numbers(setup, changed(setup.mechanism, dimension, tried))
-            if p is None:
-                return None
-            closings.append(candidates.closing(failure.stage, failure.z, p))
-        ended = newton(closings[0], z[None])
-        z = ended.unknowns[0]
-        left, ahead = (closing(z[None])[0][0] for closing in closings)
-        gap = float(np.linalg.norm(left))
-        if gap <= CLOSED:
-            return value if value != dimension.value else None
-        slope = float(left @ (ahead - left)) / gap / nudge
-        if abs(slope) * setup.unit < 1e-3:
-            return None  # it hardly matters here
-        value -= gap / slope
-        if abs(value) > 1e3 * setup.unit or (dimension.name == f"{dimension.link}.length" and value <= 0.0):
-            return None
-    return None
+        here = _at(setup, failure.stage, number.changed(value), z)
+        beside = here and _at(setup, failure.stage, number.changed(value + nudge), z)
+        if here is None or beside is None:
+            if retreats == RETREATS:
+                break
+            value, retreats = 0.5 * (open_at + value), retreats + 1  # there the groups before it do not close
+            continue
+        nearest = here.nearest()
+        gap = float(np.linalg.norm(here.left(nearest)))
+        if found is not None and gap > least:
+            break
+        slope = float(here.left(nearest) @ (beside.left(nearest) - here.left(nearest))) / (gap or 1.0) / nudge
+        way = way or -np.sign(slope)
+        if gap <= least:
+            found, least = value, FALLING * gap
+        elif way * slope > 0.0:
+            value = 0.5 * (open_at + value)  # it went over where it closes, and out on the other side
+            continue
+        else:
+            open_at, z = value, nearest
+        if abs(slope) * number.size < FLAT:
+            break  # it hardly matters here, or nothing is left open
+        step = float(np.clip(-gap / slope, -FARTHEST * number.size, FARTHEST * number.size))
+        value = max(value + step, 0.5 * (value + number.least))
+    if found is None or found == number.was:
+        return None
+    return _least_closed(setup, failure.stage, number, (open_at, found), z)
 
 
-def _numbers(setup: Setup, mechanism: Mechanism) -> Array | None:
+def _least_closed(setup: Setup, stage: Stage, number: _Number, between: tuple[float, float], z: Array) -> float:
+    """Of a value at which a group is open and one at which it is closed, the one between them where that changes.
+
+    The last step of Newton's method may have gone too far.
+    """
+    open_, closed = between
+    part = NEARLY
+    while abs(closed - open_) > ROUNDED * number.size:
+        tried = closed + part * (open_ - closed)
+        there = _at(setup, stage, number.changed(tried), z)
+        gap = np.inf if there is None else float(np.linalg.norm(there.left(there.nearest())))
+        if gap > CLOSED and part == NEARLY:
+            break
+        open_, closed = (tried, closed) if gap > CLOSED else (open_, tried)
+        part = 0.5
+    return closed
+
+
+class _There:
+    """What a group leaves open when numbers have been changed, the groups before it standing where they then do."""
+
+    def __init__(self, setup: Setup, stage: Stage, z: Array, u: Array, p: Array):
+        self._stage, self._z = stage, z
+        self._closing = closing_of(setup.program, stage, z, u, p)
+
+    def nearest(self) -> Array:
+        """All unknowns (unknowns,), those of the group where it is nearest to closing."""
+        z = self._z.copy()
+        z[self._stage.unknowns] = newton(self._closing, self._z[None, self._stage.unknowns]).unknowns[0]
+        return z
+
+    def left(self, z: Array) -> Array:
+        """What is left open (rows,) with the group's unknowns as in z (unknowns,)."""
+        return self._closing(z[None, self._stage.unknowns])[0][0]
+
+
+def _at(setup: Setup, stage: Stage, mechanism: Mechanism, z: Array) -> _There | None:
+    """A group of a mechanism with other numbers, those before it moved on from z; None where they cannot be."""
     try:
-        return fitted(mechanism, shapes(mechanism), setup.unit)
+        p = fitted(mechanism, shapes(mechanism), setup.unit)
     except Unplaced:
         return None
+    by = [setup.unit if slides else 1.0 for slides in setup.outline.slide]
+    u = np.array([given.position / size for given, size in zip(mechanism.inputs, by, strict=True)])
+    z = z.copy()
+    for before in setup.equations.stages[: stage.level]:
+        closing = closing_of(setup.program, before, z, u, p)
+        z[before.unknowns] = polished(closing, z[before.unknowns])
+        if np.max(np.abs(closing(z[None, before.unknowns])[0]), initial=0.0) > CLOSED:
+            return None
+    return _There(setup, stage, z, u, p)
 
 
 def _rounded(value: float, up: bool) -> float:
@@ -101,7 +266,8 @@ def _rounded(value: float, up: bool) -> float:
     return (ceil if up else floor)(value / size) * size
 
 
-def _goes_together(mechanism: Mechanism) -> bool:
+def goes_together(mechanism: Mechanism) -> bool:
+    """Whether the whole can be assembled at its inputs."""
     try:
         return isinstance(search(Candidates(Setup(mechanism))), Assembly)
     except Unplaced:

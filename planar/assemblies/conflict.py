@@ -1,0 +1,211 @@
+"""Why a mechanism does not go together: pairs and inputs in conflict, and the changes that mend it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import hypot
+
+from planar.assemblies.joining import Joining, Member
+from planar.assemblies.modes import modes
+from planar.assemblies.roots import Completeness
+from planar.errors import NoAnswer
+from planar.graph import farthest_first
+from planar.mechanism import Drive, Mechanism, with_inputs
+from planar.pairs import Kind, Pair
+from planar.plane import Vector
+from planar.solving.assemble import Failure, search
+from planar.solving.candidates import Candidates
+from planar.solving.position import Solver, known_of
+from planar.solving.remedy import Change, mending, moving
+from planar.words import listed
+
+MARGIN = 1e-9
+"""By so much more a side of a ring is called too long: part of the others together."""
+LARGE = 8
+"""Pairs and inputs: where a set has more, no other is looked for."""
+MOST = 12
+"""Moving links among which a conflict is looked for."""
+SEEDS = 6
+"""Pairs of the group that stays open about which a smallest set is looked for."""
+
+
+@dataclass(frozen=True, eq=False)
+class Conflict:
+    """Pairs and inputs of a mechanism that cannot be met together, and what would mend it.
+
+    `pairs` (by the names of the file's entries) and `inputs` (by their pairs) are irreducible: without any one of them
+    the others can be met, by positions that were found. Of the irreducible sets found it is the smallest.
+    """
+
+    mechanism: Mechanism
+    pairs: tuple[str, ...]
+    inputs: tuple[str, ...]
+    links: tuple[str, ...]
+    "those that these relate: only a dimension of one of them can mend it"
+    complete: Completeness
+    "how surely there is no position that meets them: whether the list of these is complete"
+    _solver: Solver
+    _failure: Failure
+
+    @cached_property
+    def dimensions(self) -> tuple[Change, ...]:
+        """Changes of one dimension each that let the whole go together, the least first of those found."""
+        return tuple(mending(self._solver, self._failure, frozenset(self.links), thorough=True))
+
+    @cached_property
+    def positions(self) -> tuple[Change, ...]:
+        """Positions of one input each, the others standing still, with which it goes together: the nearest found."""
+        return tuple(moving(self._solver, self._failure, self.inputs, thorough=True))
+
+    @property
+    def said(self) -> tuple[str, ...]:
+        """What is in conflict, and how surely."""
+        names = [repr(name) for name in self.pairs]
+        held = f"pair{'s' * (len(names) != 1)} {listed(names)}"
+        if self.inputs:
+            held += f" and the input{'s' * (len(self.inputs) != 1)} at {listed([repr(name) for name in self.inputs])}"
+        others = [repr(given.pair) for given in self.mechanism.inputs if given.pair not in self.inputs]
+        moved = f"moving the input{'s' * (len(others) != 1)} at {listed(others)} does not mend it" if others else ""
+        if self.complete is Completeness.NOT:
+            sure = "no position was found by a search from many starts, which is no proof"
+            sure += f"; if there is none, {moved}" if moved else ""
+        else:
+            sure = f"the list of their positions is {self.complete.value}, and empty"
+            sure += f"; {moved}" if moved else ""
+        return (f"in conflict: {held}; without any one of these the others can be met", sure)
+
+
+def conflict(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = ()) -> Conflict | None:
+    """The pairs and inputs that keep a mechanism from going together at its inputs; None where it goes together.
+
+    None too where those in conflict join more than MOST moving links: they are too many to be told apart.
+    `drives` change inputs, as {pair: position} (rad or m). Raises NoAnswer where the inputs leave links free.
+    """
+    if isinstance(drives, Mapping):
+        drives = [Drive(pair, position) for pair, position in drives.items()]
+    mechanism = with_inputs(mechanism, tuple(drives))
+    if modes(mechanism, certify=False):
+        return None
+    solver = known_of(mechanism).solver
+    failure = search(Candidates(solver))
+    joining = Joining(solver)
+    if not isinstance(failure, Failure):
+        return None
+    joining.part(joining.members)
+    found: dict[tuple[Member, ...], Completeness] = {}
+    for order in _orders(joining, failure):
+        held = _reduced(joining, order)
+        while held and held not in found:
+            alone = _listed(joining, held)
+            if alone is not None:
+                found[held] = alone
+            else:
+                joining.meet(held)
+                held = _reduced(joining, order)
+        if len(held) > LARGE:
+            break
+    if not found:
+        return None
+    least = min(found, key=len)
+    return Conflict(
+        mechanism,
+        tuple(each.name for each in least if not each.input),
+        tuple(each.name for each in least if each.input),
+        tuple(link.name for link in mechanism.links if any(link.name in joining.bodies(each) for each in least)),
+        found[least],
+        solver,
+        failure,
+    )
+
+
+def _orders(joining: Joining, failure: Failure) -> list[list[Member]]:
+    """All members in several orders: from some pair of the group that stays open, those next to it first."""
+    mechanism = joining.setup.mechanism
+    entry_of = {pair.name: pair.entry_name() for pair in mechanism.pairs}
+    orders = []
+    for seed in dict.fromkeys(entry_of[name] for name in (failure.stage.pairs or entry_of)):
+        first = next(name for name, entry in entry_of.items() if entry == seed)
+        names = [seed, *(entry_of[name] for name in reversed(farthest_first(mechanism, first)))]
+        rank = {name: index for index, name in reversed(list(enumerate(names)))}
+        orders.append(sorted(joining.members, key=lambda each: (rank[joining.entry(each)], each.input)))
+    return orders[:SEEDS]
+
+
+def _reduced(joining: Joining, order: Sequence[Member]) -> tuple[Member, ...]:
+    """An irreducible set among members that do not agree, of the first as far as can be; none if it is too large.
+
+    Of the first ones that do not agree one after the other is left out that is not needed for that: the deletion
+    filter of J. Chinneck, E. Dravnieks, Locating Minimal Infeasible Constraint Sets in Linear Programs, ORSA J.
+    Comput. 3, 1991.
+    """
+    near = [each for many, each in enumerate(order, start=1) if len(joining.moved(order[:many])) <= MOST]
+    if len(near) < len(order) and joining.agree(near):
+        return ()
+    agreeing, not_so = 0, 1
+    order = near
+    while not_so < len(order) and joining.agree(order[:not_so]):
+        agreeing, not_so = not_so, min(2 * not_so, len(order))
+    while not_so - agreeing > 1:
+        middle = (agreeing + not_so) // 2
+        agreeing, not_so = (middle, not_so) if joining.agree(order[:middle]) else (agreeing, middle)
+    held = order[:not_so]
+    for each in reversed(order[: not_so - 1]):
+        rest = [other for other in held if other != each]
+        if not joining.agree(rest):
+            held = rest
+    return tuple(each for each in joining.members if each in held)
+
+
+def _listed(joining: Joining, members: Sequence[Member]) -> Completeness | None:
+    """How complete the list of positions that meet these is, which is empty; None where it is not."""
+    alone = _alone(joining, members)
+    if alone is None:
+        return Completeness.NOT
+    try:
+        found = modes(alone)
+    except NoAnswer:  # some links are free
+        return Completeness.NUMERICALLY if _too_long(joining, alone.pairs) else Completeness.NOT
+    return None if found else found.complete
+
+
+def _too_long(joining: Joining, pairs: Sequence[Pair]) -> bool:
+    """Whether these are pins that join links to one ring in which one is longer than all others together."""
+    ends: dict[str, list[Vector]] = {}
+    for pair in pairs:
+        if not pair.lower or pair.drive_kind is not Kind.ANGLE:
+            return False
+        for link, point in pair.coincident():
+            ends.setdefault(link, []).append(joining.setup.shapes[link].points[point])
+    if any(len(each) != 2 for each in ends.values()):
+        return False
+    sides = [hypot(*(one - other)) for one, other in ends.values()]
+    return max(sides) > (sum(sides) - max(sides)) * (1.0 + MARGIN)
+
+
+def _alone(joining: Joining, members: Sequence[Member]) -> Mechanism | None:
+    """The mechanism of these alone, without links that dangle; None where an input's pair is not among them."""
+    mechanism = joining.setup.mechanism
+    held = [link for member in members for link in joining.bodies(member)]
+    needed = {link for link in held if held.count(link) > 1} | {mechanism.frame}
+    pairs: list[Pair] = []
+    for member in members:
+        if not member.input:
+            group = joining.pairs[member]
+            among = [pair for pair in type(group[0]).motions(group) if needed.issuperset(pair.links)]
+            pairs += [pair for pair in among if pair.links[0] == among[0].links[0]]
+    links = tuple(link for link in mechanism.links if any(link.name in pair.bodies for pair in pairs))
+    inputs = [member.name for member in members if member.input]
+    if not {Member(joining.entry(member)) for member in members} <= set(members):
+        return None
+    return replace(
+        mechanism,
+        frame=mechanism.frame if mechanism.frame in {link.name for link in links} else links[0].name,
+        links=links,
+        pairs=tuple(pairs),
+        inputs=tuple(given for given in mechanism.inputs if given.pair in inputs),
+        loads=(),
+        sketch=(),
+        published=(),
+    )
