@@ -59,10 +59,10 @@ def counted(modes: Modes, listed: int) -> str:
     bound = modes.bound
     most = "" if bound is None else f", {bound} at most"
     if modes.total is None:
-        return f"more than {many(listed, 'assembly', 'assemblies')}{most}; {modes.complete.value} as far as listed"
+        return f"more than {many(listed, 'assembly', 'assemblies')}{most}; {modes.complete.value}"
     beside = f" of {bound} complex solutions" if bound is not None and bound != modes.total else ""
     left = f"; the first {listed} are listed" if listed < modes.total else ""
-    far = " as far as listed" if left else ""
+    far = ""
     return f"{many(modes.total, 'assembly', 'assemblies')}{beside}, {modes.complete.value}{far}{left}"
 
 
