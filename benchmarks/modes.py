@@ -18,7 +18,8 @@ from rich.progress import Progress
 from rich.table import Table
 
 from benchmarks.timing import best
-from planar.assemblies.roots import Completeness, roots
+from planar.assemblies.completeness import Completeness
+from planar.assemblies.roots import roots
 from tests.inversions import group, listed, missed, structures
 
 CHUNK = 50

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar import files
-from planar.assemblies.roots import Roots
+from planar.assemblies.completeness import Roots
 from planar.program import length
 from planar.solving.candidates import SAME, closing_of
 from planar.solving.newton import newton

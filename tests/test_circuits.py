@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import planar
-from planar.assemblies.roots import Completeness
+from planar.assemblies.completeness import Completeness
 from planar.branches.series import Value, zeros
 from tests.linkages import random_linkage
 from tests.test_modes import four_bar
@@ -177,6 +177,22 @@ def test_near_a_change_point_the_number_is_right_or_not_claimed(off):
         assert found.complete is CLAIMED or abs(off) < 1e-9
 
 
+@pytest.mark.parametrize(
+    ("sizes", "ends"),
+    [
+        ((2.6317247148879606, 6.726347374138128, 2.626533937612866, 1.4680887221786225), [2]),
+        ((1.6415436074204666, 2.008758315150048, 4.764488721558837, 1.1141867991730539), [2]),
+        ((2.4107410406747265, 1.3013485872118156, 1.630615209442886, 0.5212227560976578), [2]),
+        ((1.048358912139295, 1.431504824072348, 1.0219752212651174, 1.405121133202041), [2, 2]),
+    ],
+)
+def test_where_links_all_but_lie_in_line_each_dead_point_is_met_once(sizes, ends):
+    """One is longer than the others allow for a whole turn, or all but too long to go together, by 1e-9 or less."""
+    found = planar.circuits(four_bar(*sizes, 1.0))
+    assert [len(each.branches) for each in found] == ends
+    assert all(branch.high - branch.low > 1e-6 for each in found for branch in each.branches)
+
+
 def test_an_assembly_lies_on_the_branch_of_its_side():
     found = planar.circuits(four_bar(2.5, 1.0, 3.2, 3.0, 0.8))
     sides = {}
@@ -260,6 +276,7 @@ def test_the_order_does_not_depend_on_the_sketch():
         ("umbrella", "branches cross"),
         ("geared-five-bar", "turns"),
         ("rapsons-slide", "without end"),
+        ("peaucellier-lipkin", "branches cross"),  # of some assemblies no way on is found at all
     ],
 )
 def test_what_is_not_known_is_not_claimed(name, why):

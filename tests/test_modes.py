@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 import planar
-from planar.assemblies.roots import Completeness
+from planar.assemblies.completeness import Completeness
 from planar.drawing.assemblies import SHEET, sheets_of
 from planar.drawing.paper import given
 from planar.drawing.picture import Letter

@@ -5,7 +5,7 @@ from math import pi
 import pytest
 
 import planar
-from planar.assemblies.roots import Completeness
+from planar.assemblies.completeness import Completeness
 from tests.bars import bars, four_bar, tower
 
 

@@ -8,9 +8,10 @@ import pytest
 
 import planar
 from planar import files
+from planar.assemblies.completeness import Completeness
 from planar.assemblies.gears import gears
 from planar.assemblies.isotropic import form
-from planar.assemblies.roots import Completeness, roots
+from planar.assemblies.roots import roots
 from planar.program import length
 from planar.solving.candidates import Candidates
 from planar.solving.setup import Setup

@@ -10,10 +10,11 @@ import pytest
 import planar
 from planar import files
 from planar.assemblies.certified import certified
+from planar.assemblies.completeness import Completeness
 from planar.assemblies.family import family
 from planar.assemblies.homotopy import generic
 from planar.assemblies.isotropic import form
-from planar.assemblies.roots import Completeness, roots
+from planar.assemblies.roots import roots
 from planar.program import length
 from planar.solving.setup import Setup
 from tests.inversions import group, listed, missed, one_group, structures, unknowns_of

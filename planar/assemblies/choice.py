@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planar.assemblies.modes import Mode, Modes, modes
-from planar.assemblies.roots import Completeness
+from planar.assemblies.completeness import Completeness
 from planar.assemblies.tree import Tree
 from planar.errors import BadInput, NoAnswer
 from planar.mechanism import Mechanism
 from planar.solving.position import known_of, solve
 from planar.words import many
+
+if TYPE_CHECKING:
+    from planar.assemblies.modes import Mode, Modes
 
 NEAR = 1e-6
 """Places of points are the same within this part of the greatest coordinate."""
@@ -56,6 +59,8 @@ def chosen(mechanism: Mechanism, number: int) -> Mechanism:
     What a book prints of another assembly is left out. Raises BadInput where there are not so many, NoAnswer where
     there is none.
     """
+    from planar.assemblies.modes import modes
+
     found = modes(mechanism, certify=False)
     if not found:
         raise found.refusal()

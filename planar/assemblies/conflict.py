@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from math import hypot
 
+from planar.assemblies.completeness import Completeness
 from planar.assemblies.joining import Joining, Member
 from planar.assemblies.modes import modes
-from planar.assemblies.roots import Completeness
 from planar.errors import NoAnswer
 from planar.graph import farthest_first
 from planar.mechanism import Drive, Mechanism, with_inputs

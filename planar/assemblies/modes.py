@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, overload
 
 import numpy as np
 
-from planar.assemblies.roots import Completeness
+from planar.assemblies.completeness import Completeness
 from planar.assemblies.tree import WORST, Path, Tree
 from planar.errors import NoAnswer, Outcome
 from planar.mechanism import Drive, Mechanism, NamedPoint, named_points, with_inputs

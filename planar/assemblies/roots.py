@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from enum import Enum
 from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
@@ -11,12 +10,13 @@ import casadi as ca
 import numpy as np
 
 from planar.assemblies.certified import able, certified, regular
+from planar.assemblies.completeness import Completeness, Roots
 from planar.assemblies.curves import ALONG, OPEN, goes_on, one_of_each
 from planar.assemblies.eigenvalues import MOST, by_eigenvalues
 from planar.assemblies.family import family
 from planar.assemblies.homotopy import Between, Ends, Generic, at_finite, doubles, ended, followed, generic, normed
 from planar.assemblies.isotropic import Form, Polynomials, constant_slope, form
-from planar.equations import Stage
+from planar.equations import Equations, Stage
 from planar.pairs import Kind
 from planar.program import Program, length
 from planar.solving.candidates import SAME, Candidates, closing_of
@@ -50,35 +50,6 @@ ABSENT = 1e-13
 """Coefficients below this part of the greatest are none: the structure is one without them."""
 MEETING = 1e-3
 """Assemblies that leave a direction open and are nearer to each other than this are one."""
-
-
-class Completeness(Enum):
-    """How surely a list is the whole of it."""
-
-    PROVED = "complete"
-    NUMERICALLY = "numerically complete"
-    NOT = "not known to be complete"
-
-
-class Roots(NamedTuple):
-    """All assemblies of one group of links, those before it given.
-
-    `real`: (roots, unknowns) as in z[stage.unknowns] (rad, sizes), sorted, angles between -pi and pi or, if
-    they count turns, the least; `double`:
-    (roots,) where two meet, at a dead point; `certified`: (roots,) whether a box of its own is proved to hold each;
-    `expected`: complex solutions at finite places that the structure has, None where no number is known; `found`: those
-    that were found, as often as they count; `curve`: whether a whole curve of assemblies is there, or several, of each
-    of which `real` has one place at least; `said`: how it was solved.
-    """
-
-    real: Array
-    double: Array
-    certified: Array
-    expected: int | None
-    found: int
-    complete: Completeness
-    curve: bool
-    said: str
 
 
 class _Known(NamedTuple):
@@ -121,6 +92,29 @@ def _known(setup: Setup, stage: Stage) -> _Known:
         slope = constant_slope(setup.equations, stage)
         kept[key] = _Known(slope, None if slope else form(setup.equations, stage, numbers), {})
     return kept[key]
+
+
+def at_once(form: Form, polynomials: Polynomials) -> Array | None:
+    """All complex solutions that Bezout's theorem allows (solutions, 2 many), as eigenvalues.
+
+    None where they are too many for that, or do not all count once.
+    """
+    V = by_eigenvalues(form, polynomials) if form.dimension <= MOST else None
+    if V is None or not np.all(np.isfinite(V)):
+        return None
+    ends = ended(Between(form, polynomials, polynomials), normed(V), np.zeros(len(V), dtype=bool))
+    return ends.V if ends.single.all() and not doubles(ends.V).any() else None
+
+
+def absent(polynomials: Polynomials) -> Array:
+    """Which coefficients a linkage's polynomials do not have."""
+    coefficients = np.abs(polynomials.flat[0])
+    return coefficients < ABSENT * max(float(coefficients.max(initial=0.0)), 1.0)
+
+
+def instance(equations: Equations, form: Form, polynomials: Polynomials) -> Generic:
+    """A random linkage of the structure that a linkage's polynomials have, with all its solutions that count once."""
+    return generic(form, family(equations, form, absent(polynomials)).drawn)
 
 
 class _Complex(NamedTuple):
@@ -169,21 +163,13 @@ class _Solving:
 
     def _at_once(self) -> _Complex | None:
         """By eigenvalues, where there are as many single solutions as Bezout's number."""
-        if self.form.dimension > MOST:
+        V = at_once(self.form, self.polynomials)
+        if V is None:
             return None
-        V = by_eigenvalues(self.form, self.polynomials)
-        if V is None or not np.all(np.isfinite(V)):
-            return None
-        ends = ended(self._itself(), normed(V), np.zeros(len(V), dtype=bool))
-        if not ends.single.all() or doubles(ends.V).any():
-            return None
-        finite = int(np.sum(at_finite(ends.V)))
+        finite = int(np.sum(at_finite(V)))
         away = f", {len(V) - finite} of them at infinity" if finite < len(V) else ""
         said = f"all {len(V)} complex solutions that Bezout's theorem allows, as eigenvalues{away}"
-        return _Complex(ends.V, ends.V[:0], True, finite, said)
-
-    def _itself(self) -> Between:
-        return Between(self.form, self.polynomials, self.polynomials)
+        return _Complex(V, V[:0], True, finite, said)
 
     def _followed(self) -> _Complex | None:
         """By paths from a random instance of the structure."""
@@ -209,12 +195,9 @@ class _Solving:
         return _Complex(ends.V[single], ends.V[~single], not lost, instance.finite, said)
 
     def _instance(self) -> Generic:
-        coefficients = self.polynomials.flat[0]
-        absent = np.abs(coefficients) < ABSENT * max(float(np.abs(coefficients).max(initial=0.0)), 1.0)
-        key = absent.tobytes()
+        key = absent(self.polynomials).tobytes()
         if key not in self.known.instances:
-            drawn = family(self.setup.equations, self.form, absent).drawn
-            self.known.instances[key] = generic(self.form, drawn)
+            self.known.instances[key] = instance(self.setup.equations, self.form, self.polynomials)
         return self.known.instances[key]
 
     def _real(self, found: _Complex, single: Array) -> tuple[Array, bool]:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
-from planar.assemblies.roots import Completeness, Roots, roots
+from planar.assemblies.completeness import Completeness, Roots
 from planar.equations import Stage
 from planar.pairs import Kind
 from planar.program import POLISHED, length
@@ -55,7 +55,7 @@ class Tree:
     def __init__(self, setup: Setup, certify: bool):
         self.setup, self.certify = setup, certify
         self.stages = setup.equations.stages
-        touched = _touched(setup)
+        touched = hanging(setup)
         self._hangs_on = [np.array(sorted(columns), dtype=int) for columns in touched]
         # what is chosen before a group and matters for it or for a later one
         self._matters: list[Array] = []
@@ -222,7 +222,7 @@ class Tree:
         return z[self._matters[index]].tobytes()
 
 
-def _touched(setup: Setup) -> list[set[int]]:
+def hanging(setup: Setup) -> list[set[int]]:
     """The unknowns of earlier groups on which each group hangs."""
     e = setup.equations
     columns: list[set[int]] = [set() for _ in range(len(e.rows))]
@@ -244,6 +244,9 @@ def _solved(setup: Setup, stage: Stage, z: Array, certify: bool) -> Roots:
     known = _linear(setup, stage, z) or _dyad(setup, stage, z)
     if known is not None and not certify:
         return known
+    # positions of dyads alone are told without what larger groups need
+    from planar.assemblies.roots import roots
+
     found = roots(setup, stage, z, certify)
     return found if known is None else _ordered(known, found)
 
@@ -265,12 +268,16 @@ def _known(real: Array, expected: int, said: str) -> Roots:
     return Roots(real, none, none, expected, expected, Completeness.NUMERICALLY, False, said)
 
 
-def _linear(setup: Setup, stage: Stage, z: Array) -> Roots | None:
-    """The one assembly of a group whose constraints are linear in its unknowns; None where they are not."""
-    e, many = setup.equations, length(stage.unknowns)
-    rows = e.rows[stage.rows]
-    if len(rows) != many or (many > 1 and any(row.kind is Kind.ANGLE for row in rows)):
-        return None
+def straight(setup: Setup, stage: Stage, z: Array) -> bool:
+    """Whether the slope of a group does not depend on its own unknowns, those before it given in z (unknowns,)."""
+    rng, closing, many = np.random.default_rng(0), _closing(setup, stage, z), length(stage.unknowns)
+    slope = closing(np.zeros(many))[1]
+    others = (closing(rng.uniform(0.5, 2.0, many))[1] for _ in range(2))
+    return all(np.abs(other - slope).max(initial=0.0) <= VANISHES for other in others)
+
+
+def _closing(setup: Setup, stage: Stage, z: Array) -> Callable[[Array], tuple[Array, Array]]:
+    """What a group leaves open (rows,) and its slope (rows, unknowns) at its own unknowns."""
 
     def closing(own: Array) -> tuple[Array, Array]:
         whole = z.copy()
@@ -278,10 +285,20 @@ def _linear(setup: Setup, stage: Stage, z: Array) -> Roots | None:
         left, slope = setup.program.closed(stage)(whole, setup.station.u, setup.station.p)
         return left[0], slope.T
 
-    rng = np.random.default_rng(0)
+    return closing
+
+
+def _linear(setup: Setup, stage: Stage, z: Array) -> Roots | None:
+    """The one assembly of a group whose constraints are linear in its unknowns; None where they are not."""
+    e, many = setup.equations, length(stage.unknowns)
+    rows = e.rows[stage.rows]
+    if len(rows) != many or (many > 1 and any(row.kind is Kind.ANGLE for row in rows)):
+        return None
+
+    closing = _closing(setup, stage, z)
     at = np.zeros(many)
     left, slope = closing(at)
-    if any(np.abs(closing(rng.uniform(0.5, 2.0, many))[1] - slope).max() > VANISHES for _ in range(2)):
+    if not straight(setup, stage, z):
         return None
     values = np.linalg.svd(slope, compute_uv=False)
     turns = any(row.kind is Kind.ANGLE for row in rows) and abs(abs(slope[0, 0]) - 1.0) > VANISHES

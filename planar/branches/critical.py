@@ -15,8 +15,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.assemblies.isotropic import constant_slope, form
-from planar.assemblies.roots import MOST_PATHS, Completeness, roots
+from planar.assemblies.completeness import Completeness
+from planar.assemblies.isotropic import form
+from planar.assemblies.roots import MOST_PATHS, roots
+from planar.assemblies.tree import hanging, straight
 from planar.branches.series import NONE, Value, Zeros, zeros
 from planar.branches.solutions import Solutions, Unclaimed
 from planar.equations import Stage
@@ -66,7 +68,8 @@ class _Searching:
         self.stages = setup.equations.stages
         self.pair = setup.mechanism.inputs[index].pair
         self.slides = setup.slides(self.pair)
-        self.hangs_on = _hangs_on(setup)
+        self.hangs_on = _before(setup)
+        self.anywhere = np.random.default_rng(1).uniform(0.5, 2.0, len(setup.equations.unknowns))
         self.solutions: dict[int, Solutions | None] = {}
         self.budget = BUDGET
         reach = BEYOND * sum(setup.reach.values()) or 1.0
@@ -207,8 +210,7 @@ class _Searching:
                 raise Unclaimed("its links have no length")
             return _valued(bend)
         if level not in self.solutions:
-            straight = constant_slope(setup.equations, stage) is not None or _linear(setup, stage)
-            self.solutions[level] = None if straight else self._solutions(stage)
+            self.solutions[level] = None if straight(setup, stage, self.anywhere) else self._solutions(stage)
         of = self.solutions[level]
         if of is None:
             slope = setup.program.closed(stage)(z, u, setup.station.p)[1]
@@ -248,29 +250,12 @@ def _at(setup: Setup, u: Array) -> Setup:
     return there
 
 
-def _linear(setup: Setup, stage: Stage) -> bool:
-    """Whether the slope of a group does not depend on its own unknowns."""
-    rng = np.random.default_rng(0)
-    z = rng.uniform(0.5, 2.0, len(setup.equations.unknowns))
-    slopes = []
-    for _ in range(3):
-        z[stage.unknowns] = rng.uniform(0.5, 2.0, length(stage.unknowns))
-        slopes.append(setup.program.closed(stage)(z, setup.station.u, setup.station.p)[1])
-    return all(np.allclose(each, slopes[0], rtol=0.0, atol=1e-12) for each in slopes)
-
-
-def _hangs_on(setup: Setup) -> list[set[int]]:
+def _before(setup: Setup) -> list[set[int]]:
     """The earlier groups on which each group hangs, itself or through others."""
-    e = setup.equations
-    rng = np.random.default_rng(1)
-    z, u = (rng.uniform(0.5, 2.0, (3, many)) for many in (len(e.unknowns), len(setup.station.u)))
-    slopes, _ = setup.program.slopes(z, u, setup.station.p)
-    there = np.any(slopes != 0.0, axis=0)
+    stages = setup.equations.stages
+    of = {column: k for k, stage in enumerate(stages) for column in range(stage.unknowns.start, stage.unknowns.stop)}
     found: list[set[int]] = []
-    for level, stage in enumerate(e.stages):
-        columns = np.flatnonzero(there[stage.rows].any(axis=0))
-        direct = {
-            k for k in range(level) if any(e.stages[k].unknowns.start <= c < e.stages[k].unknowns.stop for c in columns)
-        }
+    for columns in hanging(setup):
+        direct = {of[column] for column in columns}
         found.append(direct.union(*(found[k] for k in direct)))
     return found

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.assemblies.completeness import Completeness
 from planar.assemblies.modes import Mode, Modes
-from planar.assemblies.roots import Completeness
 from planar.branches.critical import CROSS, ROUNDING, Critical, critical
 from planar.branches.traced import Traced, traced
 from planar.mechanism import Drive, Mechanism, with_inputs
@@ -156,7 +156,7 @@ class Search:
         unknowns = [place.unknowns for place in places]
         taken = [np.zeros(len(place.modes), dtype=int) for place in places]
         circuits: list[tuple[Traced, Mode]] = []
-        strange = 0
+        strange, between = 0, False
         for place, own in zip(places, taken, strict=True):
             for number, mode in enumerate(place.modes):
                 if own[number] or mode.double:  # from where branches meet none is followed
@@ -165,16 +165,21 @@ class Search:
                 if not each.branches:
                     continue
                 circuits.append((each, mode))
+                passed = set()
                 for k, other in enumerate(places):
-                    for _, at in each.at(other.position):
+                    for branch, at in each.at(other.position):
+                        passed.add(branch)
                         here = same(other.solver, at, unknowns[k])
                         taken[k] += here
                         strange += not here.any()
+                between |= len(passed) < len(each.branches)
         twice = sum(int(np.sum(count > 1)) for count in taken)
         missed = sum(int(np.sum(count == 0)) for count in taken)
         differing = []
         if strange:
             differing.append("circuits run through assemblies that are not listed")
+        if between:
+            differing.append("some branches lie between dead points that are one to rounding")
         if twice or missed:
             differing.append("some assemblies lie on more than one circuit, or on none")
         return circuits, differing
@@ -212,7 +217,8 @@ class Search:
             doubts.append(CROSS)
         if any(not each.closed and not each.lost for each, _ in circuits):
             doubts.append("slides run out without an end, and may come back from there")
-        return doubts + [f"one was lost: {each.lost}" for each, _ in circuits if each.lost]
+        lost = dict.fromkeys(each.lost for each, _ in circuits if each.lost)
+        return doubts + [f"one was lost: {why}" for why in lost][:1]
 
     def _said(self, kept: Sequence[float], doubts: Sequence[str]) -> tuple[Completeness, tuple[str, ...]]:
         if doubts:

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from planar.assemblies.eigenvalues import MOST, by_eigenvalues
-from planar.assemblies.family import family
-from planar.assemblies.homotopy import Between, Ends, at_finite, doubles, ended, followed, generic, normed
+from planar.assemblies.homotopy import Between, Ends, at_finite, doubles, followed
 from planar.assemblies.isotropic import Form, Polynomials
+from planar.assemblies.roots import at_once, instance
 from planar.branches.series import NONE, Value
 from planar.equations import Equations
 
@@ -19,8 +18,6 @@ Array = np.ndarray
 
 BESIDE = 0.5 + 0.3j
 """Of the way from one position to another: the complex place between."""
-ABSENT = 1e-13
-"""Coefficients below this part of the greatest are none."""
 MULTIPLE = 1e-4
 """A solution that does not count once is at infinity where X0 or Y0 is smaller."""
 
@@ -34,7 +31,7 @@ class Solutions:
 
     def __init__(self, equations: Equations, form: Form):
         self.equations, self.form = equations, form
-        self._at_once = form.dimension <= MOST
+        self._at_once = True
         self._before: tuple[Polynomials, Array] | None = None
         self._many: int | None = None
 
@@ -45,7 +42,7 @@ class Solutions:
         Unclaimed where there are not always as many.
         """
         numbers, many = self.form.polynomials(z, u, p), self.form.many
-        V = self._eigenvalues(numbers) if self._at_once else None
+        V = at_once(self.form, numbers) if self._at_once else None
         if V is None and (self._many is None or not self._at_once):
             self._at_once = False
             V = self._followed(numbers)
@@ -64,21 +61,11 @@ class Solutions:
         part = whole.real if abs(whole.real) > abs(whole.imag) else whole.imag
         return Value(float(np.sign(part)), float(np.sum(sizes)))
 
-    def _eigenvalues(self, numbers: Polynomials) -> Array | None:
-        """All that Bezout's theorem allows; None where they do not all count once."""
-        V = by_eigenvalues(self.form, numbers)
-        if V is None or not np.all(np.isfinite(V)):
-            return None
-        ends = ended(Between(self.form, numbers, numbers), normed(V), np.zeros(len(V), dtype=bool))
-        return ends.V if ends.single.all() and not doubles(ends.V).any() else None
-
     def _followed(self, numbers: Polynomials) -> Array | None:
         """All that count once at the position before; None where they do not here."""
         if self._before is None:
-            coefficients = np.abs(numbers.flat[0])
-            absent = coefficients < ABSENT * max(float(coefficients.max(initial=0.0)), 1.0)
-            instance = generic(self.form, family(self.equations, self.form, absent).drawn)
-            found = _ended(followed(Between(self.form, instance.begin, numbers), instance.V))
+            begin = instance(self.equations, self.form, numbers)
+            found = _ended(followed(Between(self.form, begin.begin, numbers), begin.V))
             if found is None:
                 raise Unclaimed("its complex solutions do not all count once")
         else:

@@ -162,7 +162,8 @@ def _open(solver: Solver, index: int, z: Array, reason: str) -> Traced:
             lost = reason
         sides.append([Leg(walk.curve, tuple(each), first, way) for each in found if each])
     back, ahead = sides
-    branches = [*((leg,) for leg in back[:0:-1]), (*back[:1], *ahead[:1]), *((leg,) for leg in ahead[1:])]
+    home = (*back[:1], *ahead[:1])  # none where no way on is found at all
+    branches = [*((leg,) for leg in back[:0:-1]), home, *((leg,) for leg in ahead[1:])] if home else []
     return Traced(solver, tuple(branches), max(len(back) - 1, 0), tuple(rests), crossed, False, lost, turns)
 
 

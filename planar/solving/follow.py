@@ -190,11 +190,13 @@ def onwards(curve: Curve, y: Array, branches: list[int]) -> Point:
 def turning(curve: Curve, arc: Arc, before: Point, first: float, last: float) -> Point | None:
     """The first dead point on an arc between two places on its axis, at which the inputs turn back, if there is one."""
     g0 = before.advance
-    if rests(before):
+    # of a dead point that was found on the arc rounding may leave more, on a small curve, than is a rest anywhere
+    from_dead = before is not arc.before or rests(before)
+    if from_dead:
         g0 = RESTING * float(np.sign(before.bend[-1]))
     sense = float(np.sign(g0))
     g0, g1 = abs(g0), sense * arc.after.advance
-    if rests(arc.after) and not rests(before) and sense * arc.after.bend[-1] < 0.0:
+    if rests(arc.after) and not from_dead and sense * arc.after.bend[-1] < 0.0:
         # at its very end, whichever sign rounding gives what is left of the rate
         left = arc.after.advance / abs(float(arc.after.bend[-1]))
         return arc.after if arc.exact else arc.at(curve, last + sense * left * float(np.sign(last - first)))

@@ -40,6 +40,8 @@ NEARLY = 1e-4
 ROUNDED = 1e-6
 LESS = 0.99
 """Part of a change that is tried for whether it will do."""
+BESIDE = 0.01
+"""Of what is large for a number: where it is looked at once more."""
 FLAT = 1e-3
 """A number by whose change (sizes, rad) less than this part of it closes hardly matters."""
 PROVED = 4
@@ -199,7 +201,10 @@ def _closing_value(setup: Setup, failure: Failure, number: _Number) -> float | N
         else:
             open_at, z = value, nearest
         if abs(slope) * number.size < FLAT:
-            break  # it hardly matters here, or nothing is left open
+            if found is not None or value != number.was:
+                break  # it hardly matters here, or nothing is left open
+            value, way = number.was + BESIDE * number.size, 0.0  # where it is farthest off it may yet matter
+            continue
         step = float(np.clip(-gap / slope, -FARTHEST * number.size, FARTHEST * number.size))
         value = max(value + step, 0.5 * (value + number.least))
     if found is None or found == number.was:

@@ -8,8 +8,8 @@ from typing import Any
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from planar.assemblies.completeness import Completeness
 from planar.assemblies.conflict import Conflict
-from planar.assemblies.roots import Completeness
 from planar.branches.circuits import Circuits
 from planar.mechanism import motions
 from planar.solving.remedy import Change

@@ -62,8 +62,7 @@ def counted(modes: Modes, listed: int) -> str:
         return f"more than {many(listed, 'assembly', 'assemblies')}{most}; {modes.complete.value}"
     beside = f" of {bound} complex solutions" if bound is not None and bound != modes.total else ""
     left = f"; the first {listed} are listed" if listed < modes.total else ""
-    far = ""
-    return f"{many(modes.total, 'assembly', 'assemblies')}{beside}, {modes.complete.value}{far}{left}"
+    return f"{many(modes.total, 'assembly', 'assemblies')}{beside}, {modes.complete.value}{left}"
 
 
 def _groups(modes: Modes) -> Table:
