@@ -289,3 +289,18 @@ def test_the_command_says_why_before_it_refuses(tmp_path):
     assert (conflict["pairs"], conflict["inputs"]) == (["A", "B", "C", "D"], ["A"])
     assert conflict["assembles"]["A"]["intervals"] == [pytest.approx([2.0 * pi - limit, 2.0 * pi + limit], abs=1e-7)]
     assert conflict["positions"][0]["value"] == pytest.approx(limit, abs=1e-4)
+
+
+def test_where_two_conflicts_stand_side_by_side_no_single_change_is_offered_and_that_is_said():
+    links = {
+        "crank": ("A", "B", 60.0),
+        "rod": ("B", "C", 100.0),
+        "rocker": ("D", "C", 120.0),
+        "other rod": ("B", "F", 100.0),
+        "other rocker": ("E", "F", 120.0),
+    }
+    frame = {"A": [0.0, 0.0], "D": [300.0, 0.0], "E": [-300.0, 0.0]}
+    found = planar.conflict(bars(frame, links, ("A", 1.7)))
+    assert set(found.pairs) in ({"A", "B", "C", "D"}, {"A", "B", "E", "F"})
+    assert (found.dimensions, found.positions) == ((), ())
+    assert "no change of one dimension" in found.said[-1]

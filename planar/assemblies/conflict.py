@@ -74,7 +74,12 @@ class Conflict:
         else:
             sure = f"the list of their positions is {self.complete.value}, and empty"
             sure += f"; {moved}" if moved else ""
-        return (f"in conflict: {held}; without any one of these the others can be met", sure)
+        told = [f"in conflict: {held}; without any one of these the others can be met", sure]
+        if not self.dimensions and not self.positions:
+            told.append(
+                "no change of one dimension or one input was found that mends it; others may be in conflict beside"
+            )
+        return tuple(told)
 
 
 def conflict(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = ()) -> Conflict | None:
