@@ -17,7 +17,7 @@ FLOORS = [
     {"plane", "units"},
     {"laws"},
     {"shapes"},
-    {"pairs"},
+    {"applied", "pairs"},
     {"mechanism"},
     {"dimensions", "document", "elimination", "graph", "groups", "pins", "words"},
     {"called", "equations", "files", "results"},
