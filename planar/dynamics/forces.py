@@ -10,13 +10,13 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.dynamics.acting import Acting, Field, acting, power
+from planar.dynamics.balance import Balancing, balancing
 from planar.dynamics.checked import check
 from planar.dynamics.courses import factors
 from planar.dynamics.free_bodies import left_open
 from planar.dynamics.reactions import Reactions
 from planar.dynamics.told import Reaction, efforts, reaction
 from planar.dynamics.unit_rates import alone, refuse_surplus, slides
-from planar.dynamics.work import Work, work
 from planar.errors import BadInput, NoAnswer, Outcome
 from planar.mechanism import Mechanism
 from planar.motion import Motion, State
@@ -108,9 +108,9 @@ def forces(moving: State | Motion, inertia: bool = True) -> Forces:
     time = np.zeros(1) if one else moving.time
     if time is None and any(load.varies is not None and load.varies.input is None for load in mechanism.loads):
         raise BadInput("loads", "a load varies with time, which this motion has not; give it a duration")
-    body = work(mechanism)
-    field = Field(moving, body.shapes)
-    reactions = _balanced(body, field, time, inertia)
+    equations = balancing(mechanism)
+    field = Field(moving, equations.work.shapes)
+    reactions = _balanced(equations, field, time, inertia)
     solved = reactions.solved()
     if one and not solved.balanced.all():
         told = listed([repr(given.pair) for given in mechanism.inputs])
@@ -141,16 +141,15 @@ def forces(moving: State | Motion, inertia: bool = True) -> Forces:
     return _at_one(found) if one else found
 
 
-def _balanced(body: Work, field: Field, time: Array | None, inertia: bool) -> Reactions:
+def _balanced(equations: Balancing, field: Field, time: Array | None, inertia: bool) -> Reactions:
     """The balance of every position."""
-    mechanism, moving = body.mechanism, field.moving
+    body, moving = equations.work, field.moving
     inputs = {name: np.broadcast_to(each.position, (field.many,)) for name, each in moving.inputs.items()}
-    by = factors(mechanism, inputs, time, field.many)
     q, q1, q2 = body.coordinates(moving)
-    balance = body.over(q, q1, q2, by, body.wound(q[0]))
+    balance = equations.over(q, q1, q2, factors(body.mechanism, inputs, time, field.many), body.wound(q[0]))
     if not inertia:
         balance = balance._replace(inertia=np.zeros_like(balance.inertia))
-    return Reactions(body, balance, field)
+    return Reactions(equations, balance, field)
 
 
 def _open(powers: Array) -> float | None:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.dynamics.acting import Field
-from planar.dynamics.work import Balance, Work
+from planar.dynamics.balance import Balance, Balancing
 from planar.pairs import Pair
 from planar.pairs.base import Contact
 from planar.plane import Vector
@@ -58,16 +58,16 @@ class Solved(NamedTuple):
 class Reactions:
     """One mechanism at n positions, its balance filled in."""
 
-    def __init__(self, work: Work, balance: Balance, field: Field):
-        self.work, self.balance = work, balance
-        self.pairs = {pair.name: pair for pair in work.mechanism.pairs}
+    def __init__(self, balancing: Balancing, balance: Balance, field: Field):
+        self.work, self.rows, self.balance = balancing.work, balancing.rows, balance
+        self.pairs = {pair.name: pair for pair in self.work.mechanism.pairs}
         self.many = len(balance.loads)
         self.frames = field.frames
-        self.arm = size(work.mechanism, work.shapes)
-        self.scale = np.tile([1.0, 1.0, 1.0 / self.arm], len(work.links))
+        self.arm = size(self.work.mechanism, self.work.shapes)
+        self.scale = np.tile([1.0, 1.0, 1.0 / self.arm], len(self.work.links))
         rows = balance.constraints.copy()
         for name, contact in self.contacts.items():
-            rows[:, work.rows[name]] = self._along(self.pairs[name], contact, contact.way)
+            rows[:, self.rows[name]] = self._along(self.pairs[name], contact, contact.way)
         held = np.concatenate([rows, balance.drives], axis=1) * self.scale
         self.size = np.maximum(np.linalg.norm(held, axis=2), 1e-300)  # (n, forces)
         self.held = (held / self.size[:, :, None]).transpose(0, 2, 1)  # (n, links, forces)
@@ -90,7 +90,7 @@ class Reactions:
         found, ways, balanced = self._carried(asked[:, :, None])
         pushed = {}
         for name, contact in self.contacts.items():
-            pair, rows = self.pairs[name], self.work.rows[name]
+            pair, rows = self.pairs[name], self.rows[name]
             press = np.abs(found[:, rows, 0] / self.size[:, rows])
             pushed[name] = self._along(pair, contact, contact.apart) * (contact.slope * press)[:, :, None]
         if pushed:
@@ -98,14 +98,14 @@ class Reactions:
             found, ways, balanced = self._carried((asked - off)[:, :, None])
         because = ("",) * ways.shape[2] + tuple(name for name in self.unshared for _ in range(2))
         ways = np.concatenate([ways, *(self._share(self.pairs[name]) for name in self.unshared)], axis=2)
-        wrenches = {name: self._wrenches(pair, found[:, self.work.rows[name]]) for name, pair in self.pairs.items()}
+        wrenches = {name: self._wrenches(pair, found[:, self.rows[name]]) for name, pair in self.pairs.items()}
         for name, push in pushed.items():
             also = self._on_bodies(self.pairs[name], push[:, 0, :, None])
             wrenches[name] = {
                 link: Wrench(each.force + also[link].force, each.moment + also[link].moment)
                 for link, each in wrenches[name].items()
             }
-        changes = {name: self._wrenches(pair, ways[:, self.work.rows[name]]) for name, pair in self.pairs.items()}
+        changes = {name: self._wrenches(pair, ways[:, self.rows[name]]) for name, pair in self.pairs.items()}
         inputs = slice(self.balance.constraints.shape[1], None)
         by = self.size[:, inputs, None]
         return Solved(
@@ -178,7 +178,7 @@ class Reactions:
 
     def _wrenches(self, pair: Pair, forces: Array) -> dict[str, Wrench]:
         """What a pair does to each of its bodies (n, ways) by forces of its own (n, rows, ways)."""
-        own = (self.held[:, :, self.work.rows[pair.name]] @ forces) / self.scale[None, :, None]
+        own = (self.held[:, :, self.rows[pair.name]] @ forces) / self.scale[None, :, None]
         return self._on_bodies(pair, own)
 
     def _on_bodies(self, pair: Pair, own: Array) -> dict[str, Wrench]:

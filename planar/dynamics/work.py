@@ -11,14 +11,12 @@ inputs, whose drives are D q',
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
-from typing import NamedTuple
+from functools import cached_property, lru_cache
 
 import casadi as ca
 import numpy as np
 
 from planar.applied import Load, Spring
-from planar.called import Called
 from planar.dynamics.acting import carriers
 from planar.mechanism import Mechanism, motions
 from planar.motion import Moving
@@ -27,19 +25,6 @@ from planar.plane import GROUND, Frame, Vector, frame_at
 from planar.program import shapes
 
 Array = np.ndarray
-
-
-class Balance(NamedTuple):
-    """Everything at positions (n, ...), over the coordinates of the links alone (links: 3 per moving link).
-
-    `constraints` (n, rows, links) with the pairs' own coordinates gone, `drives` (n, inputs, links), `loads` (n, links)
-    what loads, weights, springs and dampers put on them, `inertia` (n, links) the left side above.
-    """
-
-    constraints: Array
-    drives: Array
-    loads: Array
-    inertia: Array
 
 
 class Work:
@@ -60,23 +45,12 @@ class Work:
         self.frames = {mechanism.frame: GROUND} | {
             link: frame_at(*(self.q[at + k] for k in range(3))) for link, at in self.column.items()
         }
-        self._own: dict[str, slice] = {}
+        self.own: dict[str, slice] = {}
+        "of every pair: its own coordinates"
         at = self.many
         for name, count in own.items():
-            self._own[name] = slice(at, at + count)
+            self.own[name] = slice(at, at + count)
             at += count
-        self.rows: dict[str, slice] = {}
-        "of every pair: its rows of the constraints once its own coordinates are gone"
-        at = 0
-        for pair in mechanism.pairs:
-            self.rows[pair.name] = slice(at, at + len(pair.constrains) - len(pair.coordinates))
-            at = self.rows[pair.name].stop
-        self._called = Called(self._function())
-
-    def at(self, moving: Moving, factors: Array) -> Balance:
-        """Everything at the positions of a state or a motion; factors of its loads (n, loads)."""
-        q, q1, q2 = self.coordinates(moving)
-        return self.over(q, q1, q2, factors, self.wound(q[0]))
 
     def wound(self, q: Array) -> Array:
         """The whole turns (rad) by which links stand apart whose torsional springs do not count them (springs,).
@@ -90,29 +64,6 @@ class Work:
                 found[number] = 2.0 * np.pi * np.round((second - first - spring.free) / (2.0 * np.pi))
         return found
 
-    def over(self, q: Array, q1: Array, q2: Array, factors: Array, wound: Array) -> Balance:
-        """Everything at coordinates with their rates (n, coordinates), each alike; `wound` as above."""
-        slopes, drives, loads, inertia, efforts = self._called.over(len(q), q, q1, q2, factors, wound)
-        slopes, drives, efforts = (each.transpose(0, 2, 1) for each in (slopes, drives, efforts))
-        constraints = np.zeros((len(q), max((rows.stop for rows in self.rows.values()), default=0), self.many))
-        carried, pushed = drives[:, :, : self.many].copy(), efforts[:, :, : self.many].copy()
-        first = 0
-        for pair in self.mechanism.pairs:
-            rows, own = slice(first, first + len(pair.constrains)), self._own[pair.name]
-            first = rows.stop
-            of_links, of_own = slopes[:, rows, : self.many], slopes[:, rows, own]
-            if of_own.shape[2]:
-                # what follows of its own coordinates from those of the links, and what is left to hold these
-                basis, upper = np.linalg.qr(of_own, mode="complete")
-                count = of_own.shape[2]
-                turned = basis.transpose(0, 2, 1) @ of_links
-                follows = -np.linalg.solve(upper[:, :count], turned[:, :count])
-                of_links = turned[:, count:]
-                carried += drives[:, :, own] @ follows
-                pushed += efforts[:, :, own] @ follows
-            constraints[:, self.rows[pair.name]] = of_links
-        return Balance(constraints, carried, loads[:, 0, : self.many] + pushed.sum(axis=1), inertia[:, 0, : self.many])
-
     def coordinates(self, moving: Moving) -> tuple[Array, Array, Array]:
         """The coordinates of a state or a motion with their two rates (n, coordinates)."""
         values = [getattr(moving.frames[link], part) for link in self.links for part in ("x", "y", "angle")]
@@ -122,35 +73,50 @@ class Work:
         found = np.array([[np.broadcast_to(part, (many,)) for part in each] for each in parts], dtype=float)
         return tuple(found.reshape(-1, 3, many).transpose(1, 2, 0))  # type: ignore[return-value]
 
-    def _function(self) -> ca.Function:
-        q, q1, q2 = self.q, self.q1, self.q2
+    @cached_property
+    def gaps(self) -> ca.SX:
+        """What every constraint leaves open (rows,), m or rad."""
         gaps = [row for pair in self.mechanism.pairs for row in pair.residual(*self.of(pair))]
+        return ca.vertcat(*gaps) if gaps else ca.SX.zeros(0)
+
+    @cached_property
+    def drives(self) -> ca.SX:
+        """The positions of the inputs (inputs,)."""
         drives = [self.named[given.pair].drive(*self.of(self.named[given.pair])) for given in self.mechanism.inputs]
-        kinetic, potential, lost = self.energies()
-        momentum = ca.gradient(kinetic, q1)
-        inertia = ca.jtimes(momentum, q, q1) + ca.jtimes(momentum, q1, q2) - ca.gradient(kinetic, q)
-        loads = -ca.gradient(potential, q) - ca.gradient(lost, q1)
-        efforts = []
+        return ca.vertcat(*drives) if drives else ca.SX.zeros(0)
+
+    @cached_property
+    def momentum(self) -> ca.SX:
+        """dT/dq'."""
+        return ca.gradient(self.energies[0], self.q1)
+
+    @cached_property
+    def inertia(self) -> ca.SX:
+        """d/dt dT/dq' - dT/dq."""
+        rate = ca.jtimes(self.momentum, self.q, self.q1) + ca.jtimes(self.momentum, self.q1, self.q2)
+        return rate - ca.gradient(self.energies[0], self.q)
+
+    @cached_property
+    def kept(self) -> ca.SX:
+        """-dV/dq: weights and springs."""
+        return -ca.gradient(self.energies[1], self.q)
+
+    @cached_property
+    def pushed(self) -> tuple[ca.SX, ca.SX]:
+        """Loads and dampers on the coordinates, and efforts between the links of pairs."""
+        loads, efforts = -ca.gradient(self.energies[2], self.q1), ca.SX.zeros(self.q.numel())
         for k, load in enumerate(self.mechanism.loads):
             at, relative = self._load(load)
-            loads += at * self.factors[k]
-            if relative is not None:
-                efforts.append(relative * self.factors[k])
-        outputs = [
-            ca.jacobian(ca.vertcat(*gaps) if gaps else ca.SX.zeros(0), q),
-            ca.jacobian(ca.vertcat(*drives) if drives else ca.SX.zeros(0), q),
-            loads,
-            inertia,
-            ca.vertcat(*efforts) if efforts else ca.SX.zeros(1, q.numel()),
-        ]
-        return ca.Function("balance", [q, q1, q2, self.factors, self.turns], [ca.densify(each) for each in outputs])
+            loads, efforts = loads + at * self.factors[k], efforts + relative * self.factors[k]
+        return loads, efforts
 
     def of(self, pair: Pair) -> tuple[list[Frame], Sequence[float], list[ca.SX]]:
         """What a pair's formulas take."""
-        own = self._own[pair.name] if pair.name in self._own else slice(0, 0)
+        own = self.own.get(pair.name, slice(0, 0))
         numbers = pair.measure([self.shapes[link] for link in pair.bodies])
-        return [self.frames[link] for link in pair.bodies], numbers, ca.vertsplit(self.q[own]) if own.stop else []
+        return [self.frames[link] for link in pair.bodies], numbers, [self.q[k] for k in range(own.start, own.stop)]
 
+    @cached_property
     def energies(self) -> tuple[ca.SX, ca.SX, ca.SX]:
         """Kinetic energy, potential of weights and springs (J), and what dampers take up, halved (W)."""
         kinetic = potential = lost = ca.SX(0.0)
@@ -181,10 +147,10 @@ class Work:
         taken = 0.5 * spring.damping * (ca.dot(apart, self._rate(apart)) / away) ** 2 if spring.damping else ca.SX(0.0)
         return stored, taken
 
-    def _load(self, load: Load) -> tuple[ca.SX, ca.SX | None]:
-        """A load on the coordinates; an effort between the links of a pair as a row of its own."""
+    def _load(self, load: Load) -> tuple[ca.SX, ca.SX]:
+        """A load on the coordinates, and an effort between the links of a pair."""
         q = self.q
-        found = ca.SX.zeros(q.numel())
+        found, effort = ca.SX.zeros(q.numel()), ca.SX.zeros(q.numel())
         if load.point is not None and load.force is not None:
             force = Vector(*load.force)
             at = ca.vertcat(*self.point(load.point))
@@ -192,10 +158,10 @@ class Work:
             found += ca.jtimes(at, q, ca.vertcat(*turned), True)
         if load.link is not None and load.torque is not None and load.link in self.column:
             found[self.column[load.link] + 2] += load.torque
-        if load.pair is None or load.effort is None:
-            return found, None
-        pair = self.named[load.pair]
-        return found, load.effort * ca.jacobian(pair.drive(*self.of(pair)), q)
+        if load.pair is not None and load.effort is not None:
+            pair = self.named[load.pair]
+            effort += load.effort * ca.gradient(pair.drive(*self.of(pair)), q)
+        return found, effort
 
     def point(self, name: str) -> Vector:
         """Where a named point is."""
