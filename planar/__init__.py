@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from planar.analysis.curvature import Curvature, curvature
     from planar.analysis.dwells import Dwell, dwells
     from planar.analysis.extremes import Extremes, Stroke, Swing, extremes, greatest, stroke, swing
-    from planar.analysis.forces import Forces, forces
     from planar.analysis.harmonics import harmonics
     from planar.analysis.inspection import Inspection, inspect
     from planar.analysis.mobility import Mobility, mobility
@@ -25,11 +24,27 @@ if TYPE_CHECKING:
     from planar.analysis.two_directions import centre_of
     from planar.assemblies.modes import Mode, Modes, modes
     from planar.document.schema import schema
+    from planar.dynamics.forces import Forces, forces
+    from planar.dynamics.simulated import Simulation, simulate
+    from planar.dynamics.told import Reaction
     from planar.errors import BadInput, NoAnswer, Outcome, PlanarError
     from planar.files import dumps, from_dict, load, loads, to_dict
     from planar.grouped.each import sweep_each
     from planar.grouped.result import Each, Swept
-    from planar.mechanism import Along, At, Distances, Drive, Input, Link, Load, Mechanism, Point
+    from planar.mechanism import (
+        Along,
+        At,
+        Course,
+        Distances,
+        Drive,
+        Input,
+        Link,
+        Load,
+        Mass,
+        Mechanism,
+        Point,
+        Spring,
+    )
     from planar.motion import Motion, State
     from planar.pins import pinned
     from planar.solving.cycle import cycle
@@ -53,17 +68,19 @@ _ROOMS = {
     "Centres": "analysis.centres",
     "Centrodes": "analysis.centrodes",
     "Curvature": "analysis.curvature",
+    "Course": "mechanism",
     "Distances": "mechanism",
     "Drive": "mechanism",
     "Dwell": "analysis.dwells",
     "Each": "grouped.result",
     "Extreme": "analysis.output",
     "Extremes": "analysis.extremes",
-    "Forces": "analysis.forces",
+    "Forces": "dynamics.forces",
     "Input": "mechanism",
     "Inspection": "analysis.inspection",
     "Link": "mechanism",
     "Load": "mechanism",
+    "Mass": "mechanism",
     "Mechanism": "mechanism",
     "Mobility": "analysis.mobility",
     "Mode": "assemblies.modes",
@@ -73,6 +90,9 @@ _ROOMS = {
     "Outcome": "errors",
     "PlanarError": "errors",
     "Point": "mechanism",
+    "Reaction": "dynamics.told",
+    "Simulation": "dynamics.simulated",
+    "Spring": "mechanism",
     "State": "motion",
     "Stroke": "analysis.extremes",
     "Sweep": "sweeping.result",
@@ -93,7 +113,7 @@ _ROOMS = {
     "dumps": "files",
     "dwells": "analysis.dwells",
     "extremes": "analysis.extremes",
-    "forces": "analysis.forces",
+    "forces": "dynamics.forces",
     "from_dict": "files",
     "greatest": "analysis.extremes",
     "harmonics": "analysis.harmonics",
@@ -106,6 +126,7 @@ _ROOMS = {
     "plot": "plot",
     "prepared": "sweeping.prepared",
     "schema": "document.schema",
+    "simulate": "dynamics.simulated",
     "solve": "solving.position",
     "stroke": "analysis.extremes",
     "sweep": "sweeping.sweep",
@@ -129,6 +150,7 @@ __all__ = [
     "Centre",
     "Centres",
     "Centrodes",
+    "Course",
     "Curvature",
     "Distances",
     "Drive",
@@ -141,6 +163,7 @@ __all__ = [
     "Inspection",
     "Link",
     "Load",
+    "Mass",
     "Mechanism",
     "Mobility",
     "Mode",
@@ -150,6 +173,9 @@ __all__ = [
     "Outcome",
     "PlanarError",
     "Point",
+    "Reaction",
+    "Simulation",
+    "Spring",
     "State",
     "Stroke",
     "Sweep",
@@ -183,6 +209,7 @@ __all__ = [
     "plot",
     "prepared",
     "schema",
+    "simulate",
     "solve",
     "stroke",
     "sweep",
