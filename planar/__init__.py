@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from planar.analysis.two_directions import centre_of
     from planar.assemblies.modes import Mode, Modes, modes
     from planar.document.schema import schema
+    from planar.dynamics.flywheel import Flywheel, flywheel
     from planar.dynamics.forces import Forces, forces
     from planar.dynamics.simulated import Simulation, simulate
     from planar.dynamics.told import Reaction
@@ -75,6 +76,7 @@ _ROOMS = {
     "Each": "grouped.result",
     "Extreme": "analysis.output",
     "Extremes": "analysis.extremes",
+    "Flywheel": "dynamics.flywheel",
     "Forces": "dynamics.forces",
     "Input": "mechanism",
     "Inspection": "analysis.inspection",
@@ -113,6 +115,7 @@ _ROOMS = {
     "dumps": "files",
     "dwells": "analysis.dwells",
     "extremes": "analysis.extremes",
+    "flywheel": "dynamics.flywheel",
     "forces": "dynamics.forces",
     "from_dict": "files",
     "greatest": "analysis.extremes",
@@ -158,6 +161,7 @@ __all__ = [
     "Each",
     "Extreme",
     "Extremes",
+    "Flywheel",
     "Forces",
     "Input",
     "Inspection",
@@ -196,6 +200,7 @@ __all__ = [
     "dumps",
     "dwells",
     "extremes",
+    "flywheel",
     "forces",
     "from_dict",
     "greatest",

@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from planar.mechanism import Mechanism
     from planar.motion import Motion
 
-POSITION = ("scheme", "velocity", "acceleration", "centres")
+POSITION = ("scheme", "velocity", "acceleration", "centres", "forces")
 ASSEMBLIES = ("modes",)
-MOTION = ("positions", "loci", "centrodes", "diagrams")
+MOTION = ("positions", "loci", "centrodes", "diagrams", "torque", "bearings")
 SMOOTH = 360
 """Steps of a run that is drawn."""
 
@@ -31,13 +31,20 @@ SMOOTH = 360
 @click.option(
     "--point", "points", multiple=True, metavar="NAME", help="A point to be lettered, or whose path is drawn."
 )
-@click.option("--of", "of", metavar="NAME", help="Diagrams of this slide, point or link.")
+@click.option("--of", "of", metavar="NAME", help="Diagrams of this slide, point or link; torque of this input.")
 @click.option(
     "--link",
     "links",
     multiple=True,
     metavar="NAME",
     help="Centres of this link, of several those between them; centrodes of the first in the axes of the second.",
+)
+@click.option("--pair", "pairs", multiple=True, metavar="NAME", help="A pair whose bearing load is drawn.")
+@click.option(
+    "--fluctuation",
+    type=float,
+    metavar="C",
+    help="The flywheel's coefficient of fluctuation of speed, (greatest - least) / mean; 0.02 where left out.",
 )
 @click.option("--steps", default=12, show_default=True, metavar="N", help="Positions, or chords of the diagrams.")
 @click.option("--chords", is_flag=True, help="Diagrams with graphical differentiation beside the curves.")
@@ -52,6 +59,8 @@ def plot(
     points: tuple[str, ...],
     of: str | None,
     links: tuple[str, ...],
+    pairs: tuple[str, ...],
+    fluctuation: float | None,
     steps: int,
     chords: bool,
     pair: str | None,
@@ -59,14 +68,17 @@ def plot(
     stop: str | None,
     mode: int | None,
 ) -> None:
-    """A drawing to scale: scheme, polygons and centres of a position; loci, centrodes, diagrams and more of a run."""
+    """A drawing to scale: scheme, polygons, centres and free bodies of a position; loci, diagrams, loads of a run."""
     from planar import plot as drawn
+    from planar.dynamics.flywheel import FLUCTUATION
     from planar.solving.position import solve
 
     steps_told = click.get_current_context().get_parameter_source("steps") is ParameterSource.COMMANDLINE
     for option, told, kinds in (
         ("--point", points, ("positions", "loci")),
-        ("--of", of, ("diagrams",)),
+        ("--of", of, ("diagrams", "torque")),
+        ("--pair", pairs, ("bearings",)),
+        ("--fluctuation", fluctuation is not None, ("torque",)),
         ("--link", links, ("centres", "centrodes")),
         ("--chords", chords, ("diagrams",)),
         ("--steps", steps_told, ("positions", "diagrams") if chords else ("positions",)),
@@ -93,18 +105,18 @@ def plot(
             if at:
                 raise BadInput("--at", f"{what} are of a run; say where it starts with --from")
             moving = _run(mechanism, pair, start, stop)
-            if what == "diagrams":
-                figure = drawn.diagrams(moving, of, steps if chords else None)
-            elif what == "centrodes":
-                if len(links) > 2:
-                    raise BadInput(
-                        "--link", "centrodes are of two links; name one, or one and the link that it is seen from"
-                    )
-                figure = drawn.centrodes(moving, *links, scale=scales)
-            elif what == "positions":
-                figure = drawn.positions(moving, steps, points or None, scales)
-            else:
-                figure = drawn.loci(moving, points or None, scales)
+            if len(links) > 2:
+                raise BadInput(
+                    "--link", "centrodes are of two links; name one, or one and the link that it is seen from"
+                )
+            figure = {
+                "positions": lambda: drawn.positions(moving, steps, points or None, scales),
+                "loci": lambda: drawn.loci(moving, points or None, scales),
+                "centrodes": lambda: drawn.centrodes(moving, *links, scale=scales),
+                "diagrams": lambda: drawn.diagrams(moving, of, steps if chords else None),
+                "torque": lambda: drawn.torque(moving, of, FLUCTUATION if fluctuation is None else fluctuation),
+                "bearings": lambda: drawn.bearings(moving, pairs or None),
+            }[what]()
         drawn.save(figure, output)
 
 

@@ -45,7 +45,7 @@ scaled = click.option(
     "scales",
     multiple=True,
     metavar="SCALE",
-    help='Of what is drawn: "1 cm = 100 mm", "1:5", "1 cm = 0.1 m/s", "1 cm = 2 m/s^2"; left out, round ones that fit.',
+    help='Of what is drawn: "1 cm = 100 mm", "1:5", "1 cm = 0.1 m/s", "1 cm = 500 N"; left out, round ones that fit.',
 )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import ceil, degrees, floor, isclose, log10
+from math import ceil, degrees, floor, isclose
 from numbers import Integral, Real
 from typing import TYPE_CHECKING
 
@@ -12,7 +12,7 @@ from planar.drawing.curves import Chords, Curve, chords, default_subject, slide_
 from planar.drawing.diagram_notes import Ordinate, Sheet, caption, inner, raised
 from planar.drawing.ink import POINT, ready
 from planar.drawing.lettering import FAMILY, measured, shown
-from planar.drawing.paper import fitting
+from planar.drawing.paper import fitting, round_step
 from planar.drawing.runs import steady
 from planar.errors import BadInput
 from planar.mechanism import Mechanism, motions
@@ -227,7 +227,7 @@ def _ruler(axes: Axes, sheet: Sheet, last: float, label: str, firsts: tuple[floa
     for side in ("left", "right", "top"):
         axes.spines[side].set_visible(False)
     axes.spines["bottom"].set_linewidth(0.5)
-    step = _round_step(last * 9.0 / sheet.width, firsts)
+    step = round_step(last * 9.0 / sheet.width, firsts)
     ticks = [step * k for k in range(floor(last / step * (1.0 + 1e-9)) + 1)]
     axes.set_xticks(ticks, [_shown(tick) for tick in ticks], family=FAMILY, fontsize=SMALL)
     axes.tick_params(length=2.0, width=0.5, pad=1.5)
@@ -244,13 +244,6 @@ def _ruler(axes: Axes, sheet: Sheet, last: float, label: str, firsts: tuple[floa
         ha="left",
         gid=name,
     )
-
-
-def _round_step(least: float, firsts: tuple[float, ...]) -> float:
-    """The smallest step of the form first * 10^k that is not below the least."""
-    power = 10.0 ** (floor(log10(least)) - 1)
-    steps = sorted(first * power * more for first in firsts for more in (1.0, 10.0, 100.0))
-    return next(step for step in steps if step >= least * (1.0 - 1e-9))
 
 
 def _head(made: Figure, sheet: Sheet, chart: Axes, size: tuple[float, float]) -> None:

@@ -14,6 +14,9 @@ WIDTH, HEIGHT = 150.0, 110.0
 """mm on paper that one drawing takes at the most, unless its scale is given."""
 ROUND = (1.0, 2.0, 5.0, 10.0)
 """First digits of a scale that a ruler reads easily."""
+THOUSANDS = (("G", 1e9), ("M", 1e6), ("k", 1e3))
+LARGE, SMALL = 10.0, 0.01
+"""A force or a couple is said in the next larger unit from so many of these on, below so many in thousandths."""
 SYMBOLS = {"length": "μₗ", "velocity": "μᵥ", "acceleration": "μₐ"}
 """Of the calculating scales of a space diagram and its polygons."""
 
@@ -56,6 +59,25 @@ def fitting(kind: str, written: str, width: float, height: float, room: tuple[fl
     # a hair of slack, so that what fits exactly fits
     first = next(digit for digit in ROUND if digit * power >= per_cm * (1.0 - 1e-9))
     return Scale(kind, size.to_si(first * power) / 10.0, written)
+
+
+def round_step(least: float, firsts: tuple[float, ...] = (1, 2, 5)) -> float:
+    """The smallest step of the form first * 10^k that is not below the least."""
+    power = 10.0 ** (floor(log10(least)) - 1)
+    steps = sorted(first * power * more for first in firsts for more in (1.0, 10.0, 100.0))
+    return next(step for step in steps if step >= least * (1.0 - 1e-9))
+
+
+def prefixed(value: float) -> tuple[str, float]:
+    """The prefix of the unit in which so much force (N) or couple (N m) is said, and how many SI units that has."""
+    small = ("m", 1e-3) if 0.0 < abs(value) < SMALL else ("", 1.0)
+    return next((each for each in THOUSANDS if abs(value) >= LARGE * each[1]), small)
+
+
+def said(value: float, measure: str) -> str:
+    """A force (N) or a couple (N m) with its unit: 46.65 kN."""
+    prefix, by = prefixed(value)
+    return f"{value / by:.4g} {prefix}{measure}".replace("-", "−")
 
 
 def raised(written: str) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 
 from planar.analysis.extremes import Stroke, stroke
 from planar.drawing.scene import standing
+from planar.dynamics.flywheel import running
 from planar.errors import BadInput, Outcome, PlanarError
 from planar.mechanism import Drive, Input, Mechanism, with_inputs
 from planar.motion import Motion, Unknown
@@ -161,7 +162,7 @@ def steady(
     centre, else where the motion starts; acceleration of the input is left out. Raises BadInput and NoAnswer.
     """
     mechanism = what.mechanism if isinstance(what, Motion) else what
-    pair = _runs(what) if isinstance(what, Motion) else pair or _only(mechanism)
+    pair = running(what) if isinstance(what, Motion) else pair or _only(mechanism)
     given = next((each for each in mechanism.inputs if each.pair == pair), None)
     if given is None:
         raise BadInput(pair, f"there is no input at {pair!r}; inputs are at {_named(mechanism)}")
@@ -249,12 +250,6 @@ def _only(mechanism: Mechanism) -> str:
 
 def _named(mechanism: Mechanism) -> str:
     return ", ".join(given.pair for given in mechanism.inputs) or "none"
-
-
-def _runs(motion: Motion) -> str:
-    """The input that runs in a motion."""
-    spans = {name: float(np.ptp(given.position)) for name, given in motion.inputs.items()}
-    return max(spans, key=spans.__getitem__)
 
 
 def _same(motion: Motion, driven: Mechanism, pair: str, steps: int) -> Motion:
