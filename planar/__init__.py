@@ -55,7 +55,7 @@ if TYPE_CHECKING:
     from planar.sweeping.sweep import sweep
     from planar.views.dataset import dataset
 
-__version__ = "0.6.0"
+__version__ = "0.7.0"
 
 _ROOMS = {
     "Advantage": "analysis.advantage",

@@ -192,7 +192,7 @@ def test_an_exponent_without_its_mark_is_not_taken_for_one() -> None:
         ("5 kHz", "angular velocity", ["turns or radians"]),
         ("5 s^-1", "angular velocity", ["'s^-1'", "measures none of"]),
         ("5 kg", "force", ["is a mass", "a force is wanted"]),
-            ("5 K", "force", ["'K'", "measures none of"]),
+        ("5 K", "force", ["'K'", "measures none of"]),
         ("5 m^2", "length", ["measures none of"]),
         ("5 degC", "angle", ["measures none of"]),
         ("5 parsnips", "length", ["'parsnips'", "not a known unit"]),

@@ -79,30 +79,28 @@ def _spring(cursor: Cursor, points: Mapping[str, str]) -> Spring:
     if not cursor.has("stiffness") and not cursor.has("damping"):
         raise cursor.refuse(None, "a spring has a 'stiffness', a 'damping', or both")
     kinds = ("torsional stiffness", "torsional damping") if turns else ("stiffness", "damping")
-    found = [cursor.quantity(key, kind, 0.0) for key, kind in zip(("stiffness", "damping"), kinds, strict=True)]
-    for key, value in zip(("stiffness", "damping"), found, strict=True):
-        if value < 0.0:
-            raise cursor.refuse(key, f"a {key} from zero on is wanted here, not {cursor[key].value!r}")
+    found = [_from_zero(cursor, key, kind, 0.0) for key, kind in zip(("stiffness", "damping"), kinds, strict=True)]
     if turns:
         links = cursor.two_links("links")
         return Spring(None, links, found[0], cursor.quantity("free_angle", "angle", 0.0), found[1])
     ends = tuple(point_named(item, item.as_text(), points) for item in cursor["points"].items())
     if len(ends) != 2 or ends[0] == ends[1]:
         raise cursor.refuse("points", "a spring stands between two different points")
-    free = cursor.quantity("free_length", "length", 0.0)
-    if free < 0.0:
-        raise cursor.refuse("free_length", "a length from zero on is wanted here")
-    return Spring((ends[0], ends[1]), None, found[0], free, found[1])
+    return Spring((ends[0], ends[1]), None, found[0], _from_zero(cursor, "free_length", "length", 0.0), found[1])
 
 
 def _mass(cursor: Cursor) -> Mass:
     cursor.only(*MASS)
     link = cursor.link("link")
-    found = [cursor.quantity("mass", "mass"), cursor.quantity("inertia", "moment of inertia", 0.0)]
-    for key, value in zip(("mass", "inertia"), found, strict=True):
-        if value < 0.0:
-            raise cursor.refuse(key, f"a {key} from zero on is wanted here, not {cursor[key].value!r}")
-    return Mass(link, found[0], cursor.place("at", link), found[1])
+    mass, inertia = _from_zero(cursor, "mass", "mass"), _from_zero(cursor, "inertia", "moment of inertia", 0.0)
+    return Mass(link, mass, cursor.place("at", link), inertia)
+
+
+def _from_zero(cursor: Cursor, key: str, kind: str, default: float | None = None) -> float:
+    value = cursor.quantity(key, kind, default)
+    if value < 0.0:
+        raise cursor.refuse(key, f"{kind} from zero on is wanted here, not {cursor[key].value!r}")
+    return value
 
 
 def write_applied(mechanism: Mechanism, quantity: Quantity) -> dict[str, list[Any]]:

@@ -23,6 +23,7 @@ SENSES = ("clockwise", "anticlockwise", "to the left", "to the right", "upwards"
 _TEXT: Schema = {"type": "string"}
 _TEXTS: Schema = {"type": "array", "items": _TEXT}
 _BOUNDED: Schema = {"type": "number", "exclusiveMinimum": -HUGE, "exclusiveMaximum": HUGE}
+_FROM_ZERO: Schema = {"type": "number", "minimum": 0, "exclusiveMaximum": HUGE}
 _SIZE: Schema = {"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": HUGE}
 _NUMBER = r"([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\s*(?![eE][+-]?[0-9])[A-Za-zµμΩ°]"
 """A number and the beginning of its unit."""
@@ -87,21 +88,21 @@ EFFORT: Schema = {
 }
 SPRING: Schema = {
     "points": several("text", 2, 2) | {"uniqueItems": True},
-    "stiffness": described("quantity"),
-    "free_length": described("length"),
-    "damping": described("quantity"),
+    "stiffness": described("amount"),
+    "free_length": described("amount"),
+    "damping": described("amount"),
 }
 TORSION: Schema = {
     "links": several("name", 2, 2) | {"uniqueItems": True},
-    "stiffness": described("quantity"),
+    "stiffness": described("amount"),
     "free_angle": described("angle"),
-    "damping": described("quantity"),
+    "damping": described("amount"),
 }
 MASS: Schema = {
     "link": _TEXT,
-    "mass": described("quantity"),
+    "mass": described("amount"),
     "at": described("spot"),
-    "inertia": described("quantity"),
+    "inertia": described("amount"),
 }
 PUBLISHED: Schema = {
     "symbol": _TEXT,
@@ -174,6 +175,7 @@ def schema() -> dict[str, Any]:
             "number": _BOUNDED,
             "quantity": _quantity(_BOUNDED, "[+−-]?", "10.5 rad/s"),
             "length": _quantity(_BOUNDED, "[+−-]?", "50 mm"),
+            "amount": _quantity(_FROM_ZERO, "[+]?", "2 kg"),
             "size": _quantity(_SIZE, "[+]?", "50 mm"),
             "angle": _quantity(_BOUNDED, "[+−-]?", "60 deg"),
             "spot": {"anyOf": [_TEXT, _vector("length")], "description": "a point of the link, or [x, y]"},

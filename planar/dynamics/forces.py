@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -15,7 +15,7 @@ from planar.dynamics.checked import check
 from planar.dynamics.courses import factors
 from planar.dynamics.free_bodies import left_open
 from planar.dynamics.reactions import Reactions
-from planar.dynamics.told import Reaction, efforts, reaction
+from planar.dynamics.told import ROUNDED, Reaction, efforts, reaction
 from planar.dynamics.unit_rates import alone, refuse_surplus, slides
 from planar.errors import BadInput, NoAnswer, Outcome
 from planar.mechanism import Mechanism
@@ -29,9 +29,10 @@ class Proof(NamedTuple):
     """How far laws are from being kept, each beside what it balances; None where a law says nothing.
 
     `power`: what everything supplies together, inertia included, beside the greatest part of it; None where nothing
-    moves. `routes`: between the efforts and those by virtual power with each input alone at unit rate, which takes
-    the velocities of the solved position instead of multipliers; None for a motion. `equilibrium`: the worst force or
-    moment that a link is left with as a free body, under all that is told to act on it, beside the greatest force.
+    that is loaded moves. `routes`: between the efforts and those by virtual power with each input alone at unit rate,
+    which takes the velocities of the solved position instead of multipliers; None for a motion, and where no input
+    moves anything. `equilibrium`: the worst force or moment that a link is left with as a free body, under all
+    that is told to act on it, beside the greatest force.
     """
 
     power: float | None
@@ -135,7 +136,7 @@ def forces(moving: State | Motion, inertia: bool = True) -> Forces:
         told,
         tuple(all_of),
         undetermined,
-        Proof(_open(powers), routes, equilibrium),
+        Proof(_open(powers, field, all_of), routes, equilibrium),
         bodies,
     )
     return _at_one(found) if one else found
@@ -152,11 +153,24 @@ def _balanced(equations: Balancing, field: Field, time: Array | None, inertia: b
     return Reactions(equations, balance, field)
 
 
-def _open(powers: Array) -> float | None:
-    """What all powers (acting, n) add up to, beside the greatest of them."""
+def _open(powers: Array, field: Field, all_of: Sequence[Acting]) -> float | None:
+    """What all powers (acting, n) add up to, beside the greatest of them; None where that is rounding alone."""
     told = np.isfinite(powers).all(axis=0)
     greatest = float(np.abs(powers[:, told]).max(initial=0.0))
-    return float(np.abs(powers[:, told].sum(axis=0)).max(initial=0.0)) / greatest if greatest else None
+    if greatest <= ROUNDED * _could(field, all_of):
+        return None
+    return float(np.abs(powers[:, told].sum(axis=0)).max(initial=0.0)) / greatest
+
+
+def _could(field: Field, all_of: Sequence[Acting]) -> float:
+    """The power that the greatest force would have at the greatest speed: powers are rounding beside it."""
+    pushed, fastest = _most(each.force for each in all_of), _most(field.velocity(each.link, each.at) for each in all_of)
+    turned, spun = _most(each.couple for each in all_of), _most(field.turning(each.link) for each in all_of)
+    return pushed * fastest + turned * spun
+
+
+def _most(values: Iterable[Array | float]) -> float:
+    return max((float(np.abs(np.nan_to_num(each)).max(initial=0.0)) for each in values), default=0.0)
 
 
 def _routes(state: State, field: Field, all_of: Sequence[Acting], supplied: Array) -> float | None:
@@ -164,10 +178,13 @@ def _routes(state: State, field: Field, all_of: Sequence[Acting], supplied: Arra
     worst = None
     for given, effort in zip(state.mechanism.inputs, supplied, strict=True):
         others = [each for each in all_of if each.kind != "input"]
-        parts = power(Field(alone(state, given.pair), field.shapes), others)
+        unit = Field(alone(state, given.pair), field.shapes)
+        parts = power(unit, others)
         whole = float(np.abs(parts).sum())
-        if whole and np.isfinite(effort):
-            worst = max(worst or 0.0, abs(float(parts.sum() + effort)) / whole)
+        could = _could(unit, others)
+        beside = whole if whole > ROUNDED * could else could
+        if beside and np.isfinite(effort):
+            worst = max(worst or 0.0, abs(float(parts.sum() + effort)) / beside)
     return worst
 
 

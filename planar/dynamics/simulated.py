@@ -27,6 +27,8 @@ RELATIVE = 1e-12
 LONGEST, MOST_STEPS = 1e4, 10**5
 LEAST = 1e-9
 """Of the time: steps shorter than this get nowhere."""
+STEADY = 1e-12
+"""Energies that change by less than this part of the greatest do not change."""
 Tick = Callable[[float], None]
 """Told how much of the time is done, from 0 to 1."""
 
@@ -47,17 +49,22 @@ class Simulation:
 
     @property
     def balance(self) -> float:
-        """How well energy is kept: the greatest change of what should not change, beside what goes to and fro."""
+        """How well energy is kept: the greatest change of what should not change, beside what goes to and fro.
+
+        Where nothing goes to and fro, beside the greatest of the energies.
+        """
         whole = self.kinetic + self.potential - self.work
         swing = max(float(np.ptp(each)) for each in (self.kinetic, self.potential, self.work))
-        return float(np.ptp(whole)) / swing if swing else 0.0
+        most = max(float(np.abs(each).max()) for each in (self.kinetic, self.potential, self.work))
+        beside = swing if swing > STEADY * most else most
+        return float(np.ptp(whole)) / beside if beside else 0.0
 
 
 def simulate(
     mechanism: Mechanism,
     duration: float,
     steps: int = 360,
-    driven: Sequence[str] | None = None,
+    driven: Sequence[str] = (),
     *,
     moving: bool = False,
     tick: Tick | None = None,
@@ -66,8 +73,8 @@ def simulate(
 
     Inputs that have a law keep to it, the others only say where the motion starts; `driven` names others that are to
     keep to their laws, or to the file's velocity and acceleration. From rest, or `moving` with the file's velocities.
-    Accelerations come from masses, loads, weights, springs and dampers; they are integrated by the method of Dormand and
-    Prince of order 8 (scipy), and after every step the position is brought back onto the constraints.
+    Accelerations come from masses, loads, weights, springs and dampers; they are integrated by the method of Dormand
+    and Prince of order 8 (scipy), and after every step the position is brought back onto the constraints.
 
     A motion that cannot go on says so in its `outcome` and `reason`. Raises BadInput for a duration or names that are
     none, NoAnswer where there is no position to start from, or something can move that has no mass.
@@ -77,12 +84,12 @@ def simulate(
     if isinstance(steps, bool) or not 1 <= steps <= MOST_STEPS:
         raise BadInput("steps", f"a whole number of steps from 1 to {MOST_STEPS} is wanted, not {steps!r:.40}")
     names = [given.pair for given in mechanism.inputs]
-    kept = [given.pair for given in mechanism.inputs if given.law is not None] if driven is None else list(driven)
-    for pair in kept:
+    for pair in driven:
         if pair not in names:
             raise BadInput(
                 "driven", f"there is no input at {pair!r} to be driven; the inputs are at {', '.join(names)}"
             )
+    kept = [given.pair for given in mechanism.inputs if given.law is not None or given.pair in driven]
     check(mechanism)
     started = (
         mechanism if moving else replace(mechanism, inputs=tuple(_resting(each, kept) for each in mechanism.inputs))
