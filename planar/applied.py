@@ -6,6 +6,9 @@ from typing import NamedTuple
 
 from planar.shapes import Spot
 
+MET = 1e-12
+"""Of a mechanism's size: ends of a spring that are nearer to each other have met, and nothing tells its direction."""
+
 
 class Course(NamedTuple):
     """How a load varies: `factors` times what it says, over the positions `at` of an input, or over the time.
@@ -41,7 +44,8 @@ class Spring(NamedTuple):
     """A spring with a damper between two points, or a torsional one between two links.
 
     `stiffness` in N/m and `damping` in N s/m, `free` the length without force (m); between links N m/rad, N m s/rad,
-    and the angle of the second against the first (rad).
+    and the angle of the second against the first (rad). How often they have turned is not said: at the start the spring
+    is wound up the least, but for a free angle beyond half a turn, which is off the angle between -pi and pi.
     """
 
     points: tuple[str, str] | None = None
@@ -64,7 +68,8 @@ class Spring(NamedTuple):
 class Mass(NamedTuple):
     """The mass of a link (kg), where it is centred, and its moment of inertia about that (kg m^2).
 
-    `at` is a point of the link, or x and y in the link's own axes (m). What is said of a link several times adds up.
+    `at` is a point of the link, or x and y in the axes in which the link was drawn (m). What is said of a link several
+    times adds up.
     """
 
     link: str

@@ -33,10 +33,14 @@ CLOSED, STEPS = 1e-14, 8
 
 
 class Pushed(NamedTuple):
-    """Accelerations of the coordinates, and the power (W) of what stores none: loads, dampers and driven inputs."""
+    """Accelerations of the coordinates, and the power (W) of what stores none: loads, dampers and driven inputs.
+
+    `firm` is the weakest constraint beside the strongest: nothing on a change point.
+    """
 
     q2: Array
     power: float
+    firm: float
 
 
 class Driven:
@@ -88,8 +92,11 @@ class Accelerations:
         if self.driven.index:
             wanted[-len(self.driven.index) :] += self.driven.at(time)[2]
         held = slope.T * self.scale
+        if not np.all(np.isfinite(held)):  # of a stage far out, which the integrator takes back
+            return Pushed(np.full(len(q), np.nan), np.nan, 1.0)
         u, s, v = np.linalg.svd(held)
         many = self._held(s)
+        firm = float(s[many - 1] / s[0]) if many else 1.0
         ways = v[many:].T
         asked = v[:many].T @ ((u[:, :many].T @ wanted) / s[:many])
         mass = inertia.T * self.scale * self.scale[:, None]
@@ -103,7 +110,7 @@ class Accelerations:
             # what holds the links does no work, but for the inputs, which move
             carried = np.linalg.lstsq(held.T, mass @ scaled - push, rcond=NONE)[0]
             power += float(carried[-len(self.driven.index) :] @ self.driven.at(time)[1])
-        return Pushed(scaled * self.scale, power)
+        return Pushed(scaled * self.scale, power, firm)
 
     def closed(self, time: float, q: Array, q1: Array) -> tuple[Array, Array]:
         """The nearest coordinates and rates that the constraints allow."""

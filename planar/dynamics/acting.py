@@ -12,11 +12,12 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.algebra import Jet, Scalar
-from planar.applied import Load, Spring
+from planar.applied import MET, Load, Spring
 from planar.dynamics.courses import factors
 from planar.mechanism import Mechanism, motions, named_points
 from planar.motion import Moving
 from planar.plane import Frame, Vector
+from planar.program import size
 from planar.shapes import Shape
 
 Array = np.ndarray
@@ -165,9 +166,10 @@ def _spring(field: Field, spring: Spring, name: str) -> list[Acting]:
     """A spring with its damper on both its ends: it pulls where it is longer than free, or grows."""
     first, second = spring.ends
     if spring.turns:
-        angle = field.turning(second, 0) - field.turning(first, 0) - spring.free
-        angle = angle - 2.0 * np.pi * np.round(angle[0] / (2.0 * np.pi))
-        couple = spring.stiffness * angle + spring.damping * (field.turning(second) - field.turning(first))
+        angle = field.turning(second, 0) - field.turning(first, 0)
+        start = angle[0] - (spring.free if abs(spring.free) <= np.pi else 0.0)
+        wound = angle - 2.0 * np.pi * np.round(start / (2.0 * np.pi)) - spring.free
+        couple = spring.stiffness * wound + spring.damping * (field.turning(second) - field.turning(first))
         none = np.zeros((field.many, 2))
         return [
             Acting("spring", name, link, field.at(link, Vector(0.0, 0.0)), none, sense * couple)
@@ -178,12 +180,12 @@ def _spring(field: Field, spring: Spring, name: str) -> list[Acting]:
     way = at[1] - at[0]
     length = np.hypot(*way.T)
     pull = spring.stiffness * way
-    with np.errstate(invalid="ignore", divide="ignore"):  # ends that meet have no direction, which nothing asks for
-        unit = way / length[:, None]
-        if spring.free:
-            pull = pull - spring.stiffness * spring.free * unit
-        if spring.damping:
-            pull = pull + spring.damping * ((rate[1] - rate[0]) * unit).sum(axis=1)[:, None] * unit
+    met = length <= MET * size(field.mechanism, field.shapes)
+    unit = way / np.where(met, np.nan, length)[:, None]
+    if spring.free:
+        pull = pull - spring.stiffness * spring.free * unit
+    if spring.damping:
+        pull = pull + spring.damping * ((rate[1] - rate[0]) * unit).sum(axis=1)[:, None] * unit
     return [
         Acting("spring", name, link, place, sense * pull, 0.0 * length)
         for (link, _), place, sense in zip(ends, at, (1.0, -1.0), strict=True)

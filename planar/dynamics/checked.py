@@ -69,7 +69,7 @@ class _Known:
         yield from self._unknown(link=mass.link)
         if isinstance(mass.at, str) and mass.at not in self.own[mass.link]:
             yield f"link {mass.link!r} has no point {mass.at!r}"
-        yield from _infinite((mass.mass, mass.inertia))
+        yield from _infinite((mass.mass, mass.inertia, *(() if isinstance(mass.at, str) else mass.at)))
         if min(mass.mass, mass.inertia) < 0.0:
             yield "mass and inertia are zero or more"
 

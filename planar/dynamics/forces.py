@@ -113,6 +113,11 @@ def forces(moving: State | Motion, inertia: bool = True) -> Forces:
     field = Field(moving, equations.work.shapes)
     reactions = _balanced(equations, field, time, inertia)
     solved = reactions.solved()
+    if one and not np.isfinite(reactions.balance.loads).all():
+        raise NoAnswer(
+            Outcome.DEAD_POINT,
+            "the ends of a spring or damper meet here, so that its force has no direction; move the input",
+        )
     if one and not solved.balanced.all():
         told = listed([repr(given.pair) for given in mechanism.inputs])
         raise NoAnswer(

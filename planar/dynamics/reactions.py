@@ -23,6 +23,8 @@ Array = np.ndarray
 
 NONE = 1e-9
 """A singular value below this part of the greatest is none: what it would hold is held by others, or by nothing."""
+BARRED = 1e-7
+"""What takes efforts, or is not held, by more than this beside a force of one is no way in which wheels load pairs."""
 OPEN = 1e-8
 """Links that stay out of balance by more than this part of the greatest force are not held by any."""
 
@@ -96,7 +98,7 @@ class Reactions:
         if pushed:
             off = sum(each[:, 0] for each in pushed.values()) * self.scale
             found, ways, balanced = self._carried((asked - off)[:, :, None])
-        because = ("",) * ways.shape[2] + tuple(name for name in self.unshared for _ in range(2))
+        because = ("",) * ways.shape[2] + tuple(name for name in self.unshared for _ in range(4))
         ways = np.concatenate([ways, *(self._share(self.pairs[name]) for name in self.unshared)], axis=2)
         wrenches = {name: self._wrenches(pair, found[:, self.rows[name]]) for name, pair in self.pairs.items()}
         for name, push in pushed.items():
@@ -124,17 +126,20 @@ class Reactions:
     def _inverse(self) -> tuple[Array, Array]:
         """The inverse (n, forces, links) as far as there is one, and the ways (n, forces, ways) in which forces that
         nothing asks for may stand against each other."""
-        if not self.held.size:
-            return np.zeros(self.held.shape).transpose(0, 2, 1), np.zeros((self.many, self.held.shape[2], 0))
-        u, s, v = np.linalg.svd(self.held)
-        strong = s > NONE * s[:, :1]
-        few, back = s.shape[1], v.transpose(0, 2, 1)
-        inverse = (back[:, :, :few] * np.where(strong, 1.0 / np.where(strong, s, 1.0), 0.0)[:, None]) @ u.transpose(
-            0, 2, 1
-        )[:, :few]
-        spare = np.ones((self.many, back.shape[2]), dtype=bool)
-        spare[:, :few] = ~strong
-        return inverse, (back * spare[:, None, :])[:, :, spare.any(axis=0)]
+        many, links, forces = self.held.shape
+        inverse, ways = np.zeros((many, forces, links)), np.zeros((many, forces, 0))
+        weak = np.full(many, bool(self.held.size))
+        if links == forces:
+            # the norms tell that no singular value is weak, in a tenth of the time that it takes to find them
+            whole = np.linalg.slogdet(self.held)[0] != 0.0
+            inverse[whole] = np.linalg.inv(self.held[whole])
+            sizes = [np.linalg.norm(each, axis=(1, 2)) for each in (self.held, inverse)]
+            weak = ~whole | (sizes[0] * sizes[1] >= 1.0 / NONE)
+        if weak.any():
+            inverse[weak], spare = _pseudo_inverse(self.held[weak])
+            ways = np.zeros((many, forces, spare.shape[2]))
+            ways[weak] = spare
+        return inverse, ways
 
     def _carried(self, asked: Array) -> tuple[Array, Array, Array]:
         """The forces (n, forces, 1) that do what is asked (n, links, 1), how else they may be, and whether they can."""
@@ -152,29 +157,33 @@ class Reactions:
             self._add(found, link, contact.at, way, sense)
         return found
 
-    def _add(self, found: Array, link: str, at: Vector, way: Vector, sense: float) -> None:
+    def _add(self, found: Array, link: str, at: Vector, way: Vector | None, sense: float) -> None:
+        """Add a force of one along a way at a place of a link, or a couple of one at the mechanism's size."""
         if link in self.work.column:
             first, frame = self.work.column[link], self.frames[link]
             arm = at - Vector(frame.x, frame.y)
-            for k, part in enumerate((way.x, way.y, arm.cross(way))):
+            for k, part in enumerate((0.0, 0.0, self.arm) if way is None else (way.x, way.y, arm.cross(way))):
                 found[:, 0, first + k] += sense * part
 
     def _share(self, pair: Pair) -> Array:
-        """How forces change with an unknown one between two wheels, in x and in y, at their centres (n, forces, 2)."""
-        found = []
-        for way in (Vector(1.0, 0.0), Vector(0.0, 1.0)):
-            share = np.zeros((self.many, 1, self.work.many))
-            places = []
-            centres = pair.centres(self.work.mechanism.pairs)
-            for (link, point), sense in zip(centres, (-1.0, 1.0), strict=True) if centres else ():
-                at = self.frames[link].carry(self.work.shapes[link].at(point))
-                self._add(share, link, at, way, sense)
-                places.append(at)
-            carrier = pair.bodies[-1]
-            if places and carrier in self.work.column:
-                share[:, 0, self.work.column[carrier] + 2] -= (places[1] - places[0]).cross(way)
-            found.append((share[:, 0] * self.scale)[:, :, None])
-        return -self._inverse[0] @ np.concatenate(found, axis=2)
+        """How forces change with an unknown wrench between two wheels beside the couples of their row (n, forces, 4).
+
+        A force at a place and a couple between the wheels, and a couple between one and their carrier; of these only
+        what the pairs alone hold, for efforts follow from the couples.
+        """
+        first, second, carrier = pair.bodies
+        x, y = Vector(1.0, 0.0), Vector(0.0, 1.0)
+        at = Vector(self.frames[second].x, self.frames[second].y)
+        share = np.zeros((self.many, self.work.many, 4))
+        for k, (way, against) in enumerate(((x, first), (y, first), (None, first), (None, carrier))):
+            for link, sense in ((against, -1.0), (second, 1.0)):
+                self._add(share[:, None, :, k], link, at, way, sense)
+        share *= self.scale[:, None]
+        change = -self._inverse[0] @ share
+        own, inputs = self.rows[pair.name], slice(self.balance.constraints.shape[1], None)
+        barred = np.concatenate([change[:, own], change[:, inputs], share + self.held @ change], axis=1)
+        s, v = np.linalg.svd(barred)[1:]
+        return change @ (v.transpose(0, 2, 1) * (s <= BARRED)[:, None]) @ v
 
     def _wrenches(self, pair: Pair, forces: Array) -> dict[str, Wrench]:
         """What a pair does to each of its bodies (n, ways) by forces of its own (n, rows, ways)."""
@@ -192,3 +201,14 @@ class Reactions:
         at, frame = self.work.column[link], self.frames[link]
         force = own[:, at : at + 2].transpose(0, 2, 1)
         return Wrench(force, own[:, at + 2] + frame.x[:, None] * force[..., 1] - frame.y[:, None] * force[..., 0])
+
+
+def _pseudo_inverse(held: Array) -> tuple[Array, Array]:
+    """Those of `Reactions._inverse` by singular values."""
+    u, s, v = np.linalg.svd(held)
+    strong = s > NONE * s[:, :1]
+    few, back = s.shape[1], v.transpose(0, 2, 1)
+    inverse = back[:, :, :few] * np.where(strong, 1.0 / np.where(strong, s, 1.0), 0.0)[:, None]
+    spare = np.ones((len(held), back.shape[2]), dtype=bool)
+    spare[:, :few] = ~strong
+    return inverse @ u.transpose(0, 2, 1)[:, :few], (back * spare[:, None, :])[:, :, spare.any(axis=0)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -19,16 +20,22 @@ from planar.plane import Frame, frame_at
 from planar.program import size
 from planar.results import InputMotion
 from planar.solving.position import Solver, solve
+from planar.words import listed
 
 Array = np.ndarray
 
 RELATIVE = 1e-12
 """What a step may be off, of sizes and turns and of the rates that are reached."""
 LONGEST, MOST_STEPS = 1e4, 10**5
-LEAST = 1e-9
-"""Of the time: steps shorter than this get nowhere."""
 STEADY = 1e-12
 """Energies that change by less than this part of the greatest do not change."""
+LEAST, MOST_TINY = 1e-10, 20
+"""Of the time: so many steps in a row that are shorter than this get nowhere."""
+WEAK, KEPT, MEMORY, SMOOTH = 5e-3, 6, 200, 1e-5
+"""A weakest constraint beside the strongest as near a change point; from how many of the steps before, and of how many,
+the motion goes on beyond, and by how much these may miss."""
+FIRM = 1e-5
+"""Nearer to a change point accelerations are no more told by the constraints."""
 Tick = Callable[[float], None]
 """Told how much of the time is done, from 0 to 1."""
 
@@ -73,8 +80,9 @@ def simulate(
 
     Inputs that have a law keep to it, the others only say where the motion starts; `driven` names others that are to
     keep to their laws, or to the file's velocity and acceleration. From rest, or `moving` with the file's velocities.
-    Accelerations come from masses, loads, weights, springs and dampers; they are integrated by the method of Dormand
-    and Prince of order 8 (scipy), and after every step the position is brought back onto the constraints.
+    Accelerations come from masses, loads, weights, springs and dampers; they are integrated by the method of order 8 of
+    Dormand and Prince (E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 1993, II.5), and
+    after every step the position is brought back onto the constraints.
 
     A motion that cannot go on says so in its `outcome` and `reason`. Raises BadInput for a duration or names that are
     none, NoAnswer where there is no position to start from, or something can move that has no mass.
@@ -125,7 +133,8 @@ class _Run:
         rows, stopped = self._integrated(tick)
         time = self.time[: len(rows)]
         q, q1 = rows[:, : self.many], rows[:, self.many : 2 * self.many]
-        q2 = np.array([self.law.of(*each).q2 for each in zip(time, q, q1, strict=True)])
+        pushed = [self.law.of(*each) for each in zip(time, q, q1, strict=True)]
+        q2 = np.array([each.q2 if each.firm > FIRM else np.full(self.many, np.nan) for each in pushed])
         energies = np.array([self.law.energy(*each) for each in zip(time, q, q1, strict=True)])
         motion = self._motion(time, q, q1, q2)
         if stopped:
@@ -134,39 +143,98 @@ class _Run:
 
     def _integrated(self, tick: Tick | None) -> tuple[Array, str]:
         """The rows at all times that were reached, and why not all of them were."""
+        last = float(self.time[-1])
+        if not np.all(np.isfinite(self.law.of(0.0, *self._parts(self.first)).q2)):
+            return self.first[None], f"the motion can be told only to 0 s{self._why(0.0, self.first)}"
+        solver, rows, good, tiny = self._integrator(0.0, self.first), [self.first], [], 0
+        while solver.status == "running":
+            failed = False
+            try:
+                solver.step()
+            except FloatingPointError:
+                failed = True
+            firm = self.law.of(solver.t, *self._parts(solver.y)).firm
+            tiny = tiny + 1 if (solver.step_size or 0.0) < LEAST * last else 0
+            if failed or solver.status == "failed" or tiny > MOST_TINY:
+                over = self._over(good, solver.t) if firm < WEAK else None
+                if over is None:
+                    why = self._why(solver.t, solver.y)
+                    return np.array(rows), f"the motion can be told only to {solver.t:.6g} s{why}"
+                at, inner = over
+                while len(rows) < len(self.time) and self.time[len(rows)] <= at:
+                    rows.append(self._back(float(self.time[len(rows)]), inner(self.time[len(rows)])))
+                solver, good, tiny = self._integrator(at, self._back(at, inner(at))), [], 0
+                continue
+            inner = solver.dense_output()
+            while len(rows) < len(self.time) and self.time[len(rows)] <= solver.t:
+                rows.append(self._back(float(self.time[len(rows)]), inner(self.time[len(rows)])))
+            y = self._back(solver.t, solver.y)
+            solver.y, solver.f = y, self._rate(solver.t, y)
+            if firm > WEAK:
+                good = [*good[-MEMORY:], (solver.t, y)]
+            if tick is not None:
+                tick(solver.t / last)
+        return np.array(rows), ""
+
+    def _integrator(self, time: float, y: Array) -> Any:
         from scipy.integrate import DOP853  # slow to load, and only needed here
 
         last, n = float(self.time[-1]), self.many
         scales = np.concatenate([self.law.scale, self.law.scale / last, [1.0]])
         fastest = max(float(np.abs(self.first[n : 2 * n] / self.law.scale).max(initial=0.0)) * last, 1.0)
         scales[n : 2 * n] *= fastest
-        scales[-1] = max(float(np.abs(self.law.energy(0.0, *np.split(self.first[:-1], 2))).max()), 1e-9)
-        solver = DOP853(self._rate, 0.0, self.first, last, rtol=RELATIVE, atol=RELATIVE * scales)
-        rows = [self.first]
-        while solver.status == "running":
-            told = solver.step()
-            if solver.status == "failed" or not np.all(np.isfinite(solver.y)):
-                at = f"{solver.t:.6g} s"
-                return np.array(
-                    rows
-                ), f"the motion can be told only to {at}: {told or 'accelerations grow without end'}"
-            inner = solver.dense_output()
-            while len(rows) < len(self.time) and self.time[len(rows)] <= solver.t:
-                rows.append(self._back(float(self.time[len(rows)]), inner(self.time[len(rows)])))
-            y = self._back(solver.t, solver.y)
-            solver.y, solver.f = y, self._rate(solver.t, y)
-            if tick is not None:
-                tick(solver.t / last)
-        return np.array(rows), ""
+        scales[-1] = max(float(np.abs(self.law.energy(0.0, *self._parts(self.first))).max()), 1e-9)
+        return DOP853(self._rate, time, y, last, rtol=RELATIVE, atol=RELATIVE * scales)
+
+    def _why(self, time: float, y: Array) -> str:
+        pushed = self.law.of(time, *self._parts(y))
+        if pushed.firm < WEAK:
+            driven = f"a dead point of what is driven at {listed(self.kept)}, or " if self.kept else ""
+            return f", near {driven}a change point, where branches of the motion cross"
+        if not np.all(np.isfinite(pushed.q2)):
+            return ", where the ends of a spring or damper meet, so that it has no direction"
+        return ", where accelerations grow without end"
+
+    def _over(self, good: Sequence[tuple[float, Array]], stalled: float) -> tuple[float, Callable[..., Array]] | None:
+        """Half as far beyond a change point as the last good step is before it, and the polynomial to there.
+
+        There constraints do not tell accelerations, but the motion is smooth. None where it is not, as where an input
+        jams, or where too few steps are known.
+        """
+        from scipy.interpolate import KroghInterpolator
+
+        chosen: list[tuple[float, Array]] = []
+        for time, y in reversed(good):
+            # about so far from one another as from what they tell
+            if not chosen or chosen[-1][0] - time >= 0.5 * (stalled - good[-1][0]):
+                chosen.append((time, y))
+        if len(chosen) < KEPT:
+            return None
+        chosen = chosen[KEPT - 1 :: -1]
+        at = [time for time, _ in chosen for _ in range(2)]
+        inner = KroghInterpolator(at, [each for time, y in chosen for each in (y, self._rate(time, y))])
+        beyond = stalled + 0.5 * (stalled - good[-1][0])
+        found = np.asarray(inner(beyond))
+        if beyond > self.time[-1] or not np.all(np.isfinite(found)):
+            return None
+        back = self._back(beyond, found)
+        scale = np.concatenate([self.law.scale, np.maximum(np.abs(found[self.many : -1]), self.law.scale), [1.0]])
+        smooth = float(np.abs((back - found)[:-1] / scale[:-1]).max()) < SMOOTH
+        return (beyond, inner) if smooth and self.law.of(beyond, *self._parts(back)).firm > 0.1 * WEAK else None
+
+    def _parts(self, y: Array) -> tuple[Array, Array]:
+        return y[: self.many], y[self.many : -1]
 
     def _rate(self, time: float, y: Array) -> Array:
-        q, q1 = y[: self.many], y[self.many : -1]
+        q, q1 = self._parts(y)
         found = self.law.of(time, q, q1)
+        if not np.all(np.isfinite(found.q2)):
+            raise FloatingPointError  # with no number the integrator would never end
         return np.concatenate([q1, found.q2, [found.power]])
 
     def _back(self, time: float, y: Array) -> Array:
         """The nearest position and rates that the constraints allow."""
-        return np.concatenate([*self.law.closed(time, y[: self.many], y[self.many : -1]), y[-1:]])
+        return np.concatenate([*self.law.closed(time, *self._parts(y)), y[-1:]])
 
     def _motion(self, time: Array, *orders: Array) -> Motion:
         """The rows as a motion like any other."""

@@ -16,13 +16,13 @@ from functools import cached_property, lru_cache
 import casadi as ca
 import numpy as np
 
-from planar.applied import Load, Spring
+from planar.applied import MET, Load, Spring
 from planar.dynamics.acting import carriers
 from planar.mechanism import Mechanism, motions
 from planar.motion import Moving
 from planar.pairs import Pair
 from planar.plane import GROUND, Frame, Vector, frame_at
-from planar.program import shapes
+from planar.program import shapes, size
 
 Array = np.ndarray
 
@@ -55,13 +55,15 @@ class Work:
     def wound(self, q: Array) -> Array:
         """The whole turns (rad) by which links stand apart whose torsional springs do not count them (springs,).
 
-        Nothing says in a file how often a spring is wound up: where its links stand at coordinates q it is the least.
+        Nothing says in a file how often links have turned: where they stand at coordinates q the spring is wound up the
+        least, but for a free angle beyond half a turn, which is off the angle between -pi and pi.
         """
         found = np.zeros(len(self.mechanism.springs))
         for number, spring in enumerate(self.mechanism.springs):
             if spring.turns:
                 first, second = (q[self.column[link] + 2] if link in self.column else 0.0 for link in spring.ends)
-                found[number] = 2.0 * np.pi * np.round((second - first - spring.free) / (2.0 * np.pi))
+                near = spring.free if abs(spring.free) <= np.pi else 0.0
+                found[number] = 2.0 * np.pi * np.round((second - first - near) / (2.0 * np.pi))
         return found
 
     def coordinates(self, moving: Moving) -> tuple[Array, Array, Array]:
@@ -142,9 +144,12 @@ class Work:
         apart = ca.vertcat(*(self.point(second) - self.point(first)))
         square = ca.dot(apart, apart)
         away = ca.sqrt(square)
-        # without a free length the ends may meet, where the root has no slope
-        stored = 0.5 * spring.stiffness * ((away - spring.free) ** 2 if spring.free else square)
-        taken = 0.5 * spring.damping * (ca.dot(apart, self._rate(apart)) / away) ** 2 if spring.damping else ca.SX(0.0)
+        met = square <= (MET * size(self.mechanism, self.shapes)) ** 2
+        known = ca.if_else(met, np.nan, 1.0)  # as a factor, so that slopes have it too
+        stored = 0.5 * spring.stiffness * ((away - spring.free) ** 2 * known if spring.free else square)
+        taken = ca.SX(0.0)
+        if spring.damping:
+            taken = 0.5 * spring.damping * (ca.dot(apart, self._rate(apart)) / away) ** 2 * known
         return stored, taken
 
     def _load(self, load: Load) -> tuple[ca.SX, ca.SX]:

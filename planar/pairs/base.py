@@ -103,10 +103,6 @@ class Pair(ABC):
         """How an effort of its drive acts."""
         return Effort(self.links[1], self.links[0])
 
-    def centres(self, beside: Sequence[Pair]) -> tuple[tuple[str, str], ...]:
-        """The (link, point) about which its two wheels turn; none where that is not known, or without wheels."""
-        return ()
-
     def contact(
         self, frames: Mapping[str, Frame], shapes: Mapping[str, Shape], beside: Sequence[Pair]
     ) -> Contact | None:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import tan
+from math import hypot, tan
 from typing import Any, ClassVar, Self
 
-from planar.algebra import Scalar, sqrt
+from planar.algebra import Scalar
 from planar.pairs.base import Contact, Entry, Pair, Quantity, Sample, Schema, Told
 from planar.pairs.teeth import PRESSURE_ANGLE, TEETH, read_pressure_angle, write_pressure_angle
 from planar.pairs.wheels import NEAR, Wheels
@@ -58,21 +58,23 @@ class Gear(Wheels):
     def contact(
         self, frames: Mapping[str, Frame], shapes: Mapping[str, Shape], beside: Sequence[Pair]
     ) -> Contact | None:
-        """The pitch point on the line of the centres, where both wheels are pinned to the carrier.
+        """The pitch point on the line of the centres, where both wheels are pinned to the carrier, apart.
 
         A ratio alone leaves open what stands between the wheels.
         """
-        centres = self.centres(beside)
-        if self.by == "ratio" or not centres:
+        pins = [self._centre(wheel, beside) for wheel in self.links]
+        if self.by == "ratio" or None in pins:
             return None
-        first, second = (frames[link].carry(shapes[link].at(point)) for link, point in centres)
-        whole = second - first
-        apart = sqrt(whole.dot(whole))
-        way = whole * (1.0 / apart)
+        first, second = (shapes[self.carrier].at(pin[self.carrier]) for pin in pins)
+        apart = hypot(*(second - first))
+        if apart == 0.0:
+            return None
+        way = (second - first) * (1.0 / apart)
         outside = 1.0 if self.ratio() < 0.0 else -1.0
-        at = first + way * (outside * self._pitch_radii(apart)[0])
+        carrier = frames[self.carrier]
+        at = carrier.carry(first + way * (outside * self._pitch_radii(apart)[0]))
         # teeth push a wheel that has them on its outside towards its own centre
-        return Contact(at, Vector(-way.y, way.x), way * outside, tan(self.pressure_angle))
+        return Contact(at, carrier.turn(Vector(-way.y, way.x)), carrier.turn(way * outside), tan(self.pressure_angle))
 
     @classmethod
     def samples(cls) -> tuple[Sample, ...]:

@@ -86,10 +86,6 @@ class Wheels(Pair):
     def report(self, position: Scalar, rate: Scalar, second: Scalar) -> dict[str, Scalar | None]:
         return dict(zip(self.reports, (position, rate, second), strict=True))
 
-    def centres(self, beside: Sequence[Pair]) -> tuple[tuple[str, str], ...]:
-        pins = [self._centre(wheel, beside) for wheel in self.links]
-        return () if None in pins else tuple((link, pin[link]) for link, pin in zip(self.links, pins, strict=True))
-
     def marks(self, shapes: Mapping[str, Shape], beside: Sequence[Pair]) -> tuple[Mark, ...]:
         """Both pitch circles, where both wheels are pinned to the carrier."""
         pins = [self._centre(wheel, beside) for wheel in self.links]
