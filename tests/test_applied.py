@@ -209,3 +209,24 @@ def test_a_load_over_a_turn_comes_again_with_every_turn_either_way():
 def test_a_step_is_two_factors_at_one_place():
     course = Course(None, (0.0, 1.0, 1.0, 2.0), (3.0, 3.0, 0.0, 0.0))
     assert list(factor(course, np.array([0.999, 1.001]), turns=False)) == [3.0, 0.0]
+
+
+def test_a_load_at_a_pin_acts_on_the_link_that_is_named_with_it():
+    """The same force on either side of a pin: the pin's own reaction differs by it, and nothing else does."""
+    mechanism = planar.load("four-bar")
+    name, links = next(
+        (each.name, [link for link, _ in each.members])
+        for each in planar.mechanism.named_points(mechanism)
+        if len(each.members) == 2 and mechanism.frame not in [link for link, _ in each.members]
+    )
+    found = []
+    for link in links:
+        value = planar.to_dict(mechanism) | {"loads": [{"point": f"{link}.{name}", "force": [30, -40]}]}
+        read = planar.from_dict(value)
+        assert planar.from_dict(planar.to_dict(read)) == read
+        found.append(planar.forces(planar.solve(read)))
+    first, second = found
+    apart = second.reactions[name].force - first.reactions[name].force
+    np.testing.assert_allclose(np.abs(apart), [30.0, 40.0], rtol=1e-9)
+    (given,) = mechanism.inputs
+    assert first.inputs[given.pair] == pytest.approx(second.inputs[given.pair], rel=1e-9)

@@ -634,6 +634,9 @@ def test_loads_name_points_and_links() -> None:
         Load(link="crank", torque=5.0),
     )
     given = [{"point": "rod.C", "force": ["1 kN", 0]}]
+    # at a pin the link that is named is the one that it acts on
+    assert read((["loads"], given), of="two dyads").loads == (Load(point="rod.C", force=(1000.0, 0.0)),)
+    given = [{"point": "C", "force": ["1 kN", 0]}]
     assert read((["loads"], given), of="two dyads").loads == (Load(point="C", force=(1000.0, 0.0)),)
 
 

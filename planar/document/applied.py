@@ -37,7 +37,7 @@ def _load(cursor: Cursor, mechanism: Mechanism, named: Mapping[str, Pair], point
     cursor.only(*kinds[given[0]])
     varies = _course(cursor["varies"], mechanism, named) if cursor.has("varies") else None
     if cursor.has("point"):
-        point = point_named(cursor["point"], cursor["point"].as_text(), points)
+        point = _end(cursor["point"], points)
         axes = cursor.link("axes") if cursor.has("axes") else None
         return Load(point=point, force=cursor["force"].as_vector("force"), axes=axes, varies=varies)
     if cursor.has("link"):
@@ -48,6 +48,14 @@ def _load(cursor: Cursor, mechanism: Mechanism, named: Mapping[str, Pair], point
     if cursor.has(other):
         raise cursor.refuse(other, f"what acts between the links of pair {pair.name!r} is a {wanted}")
     return Load(pair=pair.name, effort=cursor.quantity(wanted, wanted), varies=varies)
+
+
+def _end(cursor: Cursor, points: Mapping[str, str]) -> str:
+    """A point where something acts: on the link that is named with it, at a pin else on the first of its links."""
+    name = cursor.as_text()
+    found = point_named(cursor, name, points)
+    shared = sum(each == found for other, each in points.items() if other != found) > 1
+    return name if shared else found
 
 
 def _course(cursor: Cursor, mechanism: Mechanism, named: Mapping[str, Pair]) -> Course:
@@ -83,7 +91,7 @@ def _spring(cursor: Cursor, points: Mapping[str, str]) -> Spring:
     if turns:
         links = cursor.two_links("links")
         return Spring(None, links, found[0], cursor.quantity("free_angle", "angle", 0.0), found[1])
-    ends = tuple(point_named(item, item.as_text(), points) for item in cursor["points"].items())
+    ends = tuple(_end(item, points) for item in cursor["points"].items())
     if len(ends) != 2 or ends[0] == ends[1]:
         raise cursor.refuse("points", "a spring stands between two different points")
     return Spring((ends[0], ends[1]), None, found[0], _from_zero(cursor, "free_length", "length", 0.0), found[1])
