@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from planar.analysis.curvature import Curvature, curvature
     from planar.analysis.dwells import Dwell, dwells
     from planar.analysis.extremes import Extremes, Stroke, Swing, extremes, greatest, stroke, swing
-    from planar.analysis.forces import Forces, forces
     from planar.analysis.harmonics import harmonics
     from planar.analysis.inspection import Inspection, inspect
     from planar.analysis.mobility import Mobility, mobility
@@ -27,11 +26,28 @@ if TYPE_CHECKING:
     from planar.assemblies.modes import Mode, Modes, modes
     from planar.branches.circuits import Branch, Circuit, Circuits, circuits
     from planar.document.schema import schema
+    from planar.dynamics.flywheel import Flywheel, flywheel
+    from planar.dynamics.forces import Forces, forces
+    from planar.dynamics.simulated import Simulation, simulate
+    from planar.dynamics.told import Reaction
     from planar.errors import BadInput, NoAnswer, Outcome, PlanarError
     from planar.files import dumps, from_dict, load, loads, to_dict
     from planar.grouped.each import sweep_each
     from planar.grouped.result import Each, Swept
-    from planar.mechanism import Along, At, Distances, Drive, Input, Link, Load, Mechanism, Point
+    from planar.mechanism import (
+        Along,
+        At,
+        Course,
+        Distances,
+        Drive,
+        Input,
+        Link,
+        Load,
+        Mass,
+        Mechanism,
+        Point,
+        Spring,
+    )
     from planar.motion import Motion, State
     from planar.pins import pinned
     from planar.solving.cycle import cycle
@@ -41,7 +57,7 @@ if TYPE_CHECKING:
     from planar.sweeping.sweep import sweep
     from planar.views.dataset import dataset
 
-__version__ = "0.6.0"
+__version__ = "0.7.0"
 
 _ROOMS = {
     "Advantage": "analysis.advantage",
@@ -58,6 +74,7 @@ _ROOMS = {
     "Circuit": "branches.circuits",
     "Circuits": "branches.circuits",
     "Conflict": "assemblies.conflict",
+    "Course": "mechanism",
     "Curvature": "analysis.curvature",
     "Distances": "mechanism",
     "Drive": "mechanism",
@@ -65,11 +82,13 @@ _ROOMS = {
     "Each": "grouped.result",
     "Extreme": "analysis.output",
     "Extremes": "analysis.extremes",
-    "Forces": "analysis.forces",
+    "Flywheel": "dynamics.flywheel",
+    "Forces": "dynamics.forces",
     "Input": "mechanism",
     "Inspection": "analysis.inspection",
     "Link": "mechanism",
     "Load": "mechanism",
+    "Mass": "mechanism",
     "Mechanism": "mechanism",
     "Mobility": "analysis.mobility",
     "Mode": "assemblies.modes",
@@ -79,6 +98,9 @@ _ROOMS = {
     "Outcome": "errors",
     "PlanarError": "errors",
     "Point": "mechanism",
+    "Reaction": "dynamics.told",
+    "Simulation": "dynamics.simulated",
+    "Spring": "mechanism",
     "State": "motion",
     "Stroke": "analysis.extremes",
     "Sweep": "sweeping.result",
@@ -101,7 +123,8 @@ _ROOMS = {
     "dumps": "files",
     "dwells": "analysis.dwells",
     "extremes": "analysis.extremes",
-    "forces": "analysis.forces",
+    "flywheel": "dynamics.flywheel",
+    "forces": "dynamics.forces",
     "from_dict": "files",
     "greatest": "analysis.extremes",
     "harmonics": "analysis.harmonics",
@@ -114,6 +137,7 @@ _ROOMS = {
     "plot": "plot",
     "prepared": "sweeping.prepared",
     "schema": "document.schema",
+    "simulate": "dynamics.simulated",
     "solve": "solving.position",
     "stroke": "analysis.extremes",
     "sweep": "sweeping.sweep",
@@ -141,6 +165,7 @@ __all__ = [
     "Circuit",
     "Circuits",
     "Conflict",
+    "Course",
     "Curvature",
     "Distances",
     "Drive",
@@ -148,11 +173,13 @@ __all__ = [
     "Each",
     "Extreme",
     "Extremes",
+    "Flywheel",
     "Forces",
     "Input",
     "Inspection",
     "Link",
     "Load",
+    "Mass",
     "Mechanism",
     "Mobility",
     "Mode",
@@ -162,6 +189,9 @@ __all__ = [
     "Outcome",
     "PlanarError",
     "Point",
+    "Reaction",
+    "Simulation",
+    "Spring",
     "State",
     "Stroke",
     "Sweep",
@@ -184,6 +214,7 @@ __all__ = [
     "dumps",
     "dwells",
     "extremes",
+    "flywheel",
     "forces",
     "from_dict",
     "greatest",
@@ -197,6 +228,7 @@ __all__ = [
     "plot",
     "prepared",
     "schema",
+    "simulate",
     "solve",
     "stroke",
     "sweep",

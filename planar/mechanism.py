@@ -1,4 +1,4 @@
-"""A mechanism as immutable data, in SI units: links, pairs, inputs, loads, sketch, and what was published."""
+"""A mechanism as immutable data, in SI units: links, pairs, inputs, what acts on it, sketch, what was published."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from math import isfinite
 from numbers import Real
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from planar.applied import Course, Load, Mass, Spring
 from planar.errors import BadInput
 from planar.pairs.base import Pair
 from planar.shapes import Along, At, Distances, Link, Place, Point, Shape
@@ -21,16 +22,19 @@ __all__ = [
     "QUANTITIES",
     "Along",
     "At",
+    "Course",
     "Distances",
     "Drive",
     "Input",
     "Link",
     "Load",
+    "Mass",
     "Mechanism",
     "NamedPoint",
     "Place",
     "Point",
     "Published",
+    "Spring",
     "Units",
     "check",
     "counting",
@@ -78,15 +82,6 @@ class Input(NamedTuple):
     law: Law | None = None
 
 
-class Load(NamedTuple):
-    """A force (N, in the frame's axes) at a point, or a torque (N m, anticlockwise) on a link."""
-
-    point: str | None = None
-    force: tuple[float, float] | None = None
-    link: str | None = None
-    torque: float | None = None
-
-
 class Drive(NamedTuple):
     """What an input is changed to for one published quantity; None leaves it as it is."""
 
@@ -129,7 +124,8 @@ class Units(NamedTuple):
 class Mechanism:
     """Links joined by pairs, one of them the frame.
 
-    `pairs` are binary: a pin of n links is n - 1 of them. `remarks` are what the reader of the file has to say.
+    `pairs` are binary: a pin of n links is n - 1 of them. `gravity` is an acceleration (m/s^2). `remarks` are what the
+    reader of the file has to say.
     """
 
     name: str
@@ -138,6 +134,9 @@ class Mechanism:
     pairs: tuple[Pair, ...]
     inputs: tuple[Input, ...] = ()
     loads: tuple[Load, ...] = ()
+    springs: tuple[Spring, ...] = ()
+    masses: tuple[Mass, ...] = ()
+    gravity: tuple[float, float] = (0.0, 0.0)
     sketch: tuple[tuple[str, float, float], ...] = ()
     units: Units = field(default_factory=Units)
     ids: tuple[str, ...] = ()

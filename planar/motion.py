@@ -291,7 +291,7 @@ class Motion(Moving):
         )
 
     def __len__(self) -> int:
-        return len(next(iter(self.inputs.values())).position)
+        return len(next(iter(self.inputs.values())).position if self.time is None else self.time)
 
     @property
     def points(self) -> dict[str, PointMotion]:

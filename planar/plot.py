@@ -14,19 +14,25 @@ from planar.branches.circuits import circuits as all_circuits
 from planar.branches.located import located
 from planar.drawing import animation
 from planar.drawing.assemblies import sheets_of
+from planar.drawing.bearings import bearing_pictures
 from planar.drawing.centres import REACH, centres_picture, chosen
 from planar.drawing.centrodes import centrodes_picture
 from planar.drawing.circle import circle_picture
 from planar.drawing.circuits import circuits_figures
 from planar.drawing.diagrams import diagrams
 from planar.drawing.directions import directions_picture
-from planar.drawing.figure import figure, saved
+from planar.drawing.figure import figure, on_sheets, saved
+from planar.drawing.free_bodies import free_bodies
 from planar.drawing.page import sheets, solution_pages
 from planar.drawing.panels import Scales, panels
 from planar.drawing.paper import scales
 from planar.drawing.positions import loci as loci_picture
 from planar.drawing.positions import positions as positions_picture
 from planar.drawing.scheme import scheme as scheme_picture
+from planar.drawing.torque import torque_picture
+from planar.dynamics.flywheel import FLUCTUATION
+from planar.dynamics.forces import Forces
+from planar.dynamics.forces import forces as all_forces
 from planar.files import save as write
 from planar.mechanism import Mechanism
 from planar.motion import Motion, State
@@ -37,16 +43,19 @@ if TYPE_CHECKING:
 __all__ = [
     "acceleration",
     "animate",
+    "bearings",
     "centres",
     "centrodes",
     "circuits",
     "diagrams",
+    "forces",
     "loci",
     "modes",
     "positions",
     "save",
     "scheme",
     "solution",
+    "torque",
     "two_directions",
     "velocity",
 ]
@@ -127,6 +136,34 @@ def circuits(found: Circuits | Mechanism, of: str | None = None, assemblies: Mod
     of_all = found if isinstance(found, Circuits) else all_circuits(found)
     here = all_modes(of_all.mechanism, certify=False) if assemblies is None else assemblies
     return circuits_figures(of_all, located(of_all, here), of)
+
+
+def forces(found: Forces | State, scale: Scales = None) -> list[Figure]:
+    """Every moving link as a free body with all that acts on it, and its force polygon, on sheets of A4 on its side.
+
+    One scale of length and one of force, such as "1 cm = 500 N", hold for all. What equilibrium does not tell is named
+    and not drawn. Raises BadInput for forces over a motion and scales that are none, and what `planar.forces` raises.
+    """
+    return on_sheets(*free_bodies(found if isinstance(found, Forces) else all_forces(found), scale))
+
+
+def torque(found: Forces | Motion | Mechanism, of: str | None = None, fluctuation: float = FLUCTUATION) -> Figure:
+    """The torque or force of an input over a cycle at its steady speed: mean, parts, greatest and least, flywheel.
+
+    `of` left out: of the input that runs; `fluctuation` is the flywheel's coefficient of fluctuation of speed. Forces
+    over a motion are drawn as they are. Raises BadInput for an input that there is not, and a coefficient that is none.
+    """
+    return figure([torque_picture(found, of, fluctuation)])
+
+
+def bearings(found: Forces | Motion | Mechanism, pairs: Sequence[str] | None = None) -> list[Figure]:
+    """The loads of pairs (left out: of all in which points or lines meet) over a cycle, on sheets of A4 on its side.
+
+    Polar load diagrams in the frame's axes; of a sliding pair the force across its line and the couple over the input.
+    Raises BadInput for a pair that there is not.
+    """
+    mechanism = found if isinstance(found, Mechanism) else found.mechanism
+    return on_sheets(bearing_pictures(found, pairs), f"{mechanism.name}: loads of the pairs")
 
 
 def solution(state: State, scale: Scales = None) -> list[Figure]:

@@ -37,6 +37,8 @@ class Distances(NamedTuple):
 
 
 Place = At | Along | Distances
+Spot = str | tuple[Scalar, Scalar]
+"""A point of a link by name, or by coordinates in the axes in which the link was drawn."""
 
 
 class Point(NamedTuple):
@@ -83,7 +85,7 @@ class Shape:
     axis: Vector
     """cos and sin of the link's x-axis in the axes in which it was drawn."""
 
-    def at(self, point: str | tuple[Scalar, Scalar]) -> Vector:
+    def at(self, point: Spot) -> Vector:
         """A point by name, or by coordinates in the axes in which the link was drawn."""
         if isinstance(point, str):
             return self.points[point]

@@ -23,6 +23,12 @@ SI = {
     "force": "N",
     "torque": "N m",
     "time": "s",
+    "mass": "kg",
+    "moment of inertia": "kg m^2",
+    "stiffness": "N/m",
+    "torsional stiffness": "N m/rad",
+    "damping": "N s/m",
+    "torsional damping": "N m s/rad",
 }
 """Every kind of quantity that a file holds, and its SI unit."""
 
@@ -49,6 +55,14 @@ TABLE: dict[str, tuple[str, float, float]] = {
     "N m": ("torque", 1.0, 1.0),
     "s": ("time", 1.0, 1.0),
     "ms": ("time", 1.0, 1e3),
+    "kg": ("mass", 1.0, 1.0),
+    "g": ("mass", 1.0, 1e3),
+    "kg m^2": ("moment of inertia", 1.0, 1.0),
+    "N/m": ("stiffness", 1.0, 1.0),
+    "N/mm": ("stiffness", 1e3, 1.0),
+    "N m/rad": ("torsional stiffness", 1.0, 1.0),
+    "N s/m": ("damping", 1.0, 1.0),
+    "N m s/rad": ("torsional damping", 1.0, 1.0),
 }
 """unit: (kind, numerator, denominator) of its size in SI."""
 

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import planar
-from planar.analysis.forces import efforts
 from planar.analysis.published import compare
 from planar.mechanism import Drive, Published
 from planar.words import heading, hurrying, listed, turning
@@ -68,7 +67,7 @@ def test_efforts_need_no_speed_and_are_those_of_each_input():
         "inputs": [{"pair": "A", "position": 0.5}, {"pair": "B", "position": 0.7}],
         "loads": [{"point": "C", "force": [3, -4]}, {"link": "b", "torque": 1.5}],
     }
-    found = efforts(planar.solve(planar.from_dict(value)))
+    found = planar.forces(planar.solve(planar.from_dict(value))).inputs
     upper = 1 * np.exp(1.2j)
     whole = 2 * np.exp(0.5j) + upper
 

@@ -20,13 +20,16 @@ from planar.files import models
 from planar.mechanism import (
     Along,
     At,
+    Course,
     Distances,
     Input,
     Link,
     Load,
+    Mass,
     Mechanism,
     Point,
     Published,
+    Spring,
     Units,
     motions,
     named_points,
@@ -148,7 +151,54 @@ WHEELS = """
 }
 """
 
-EXAMPLES = {"four-bar": FOUR_BAR, "slider-crank": SLIDER_CRANK, "two dyads": TWO_DYADS, "wheels": WHEELS}
+LOADED = """
+{
+  "planar": 1,
+  "name": "A slider-crank with everything that can act on it",
+  "units": {"length": "mm", "angle": "deg"},
+  "frame": "frame",
+  "links": {
+    "frame": {"points": {"O": [0, 0], "S": [50, 200]}},
+    "crank": {"ends": ["O", "A"], "length": 80},
+    "rod": {"ends": ["A", "B"], "length": 300, "points": {"G": {"along": ["A", "B"], "distance": 110}}}
+  },
+  "pairs": [
+    {"turning": "O"}, {"turning": "A"},
+    {"sliding": "stroke", "on": "frame", "block": "B", "line": {"through": "O", "angle": 0}}
+  ],
+  "inputs": [{"pair": "O", "position": 40, "velocity": "60 rpm"}],
+  "loads": [
+    {"point": "B", "force": ["-2 kN", 0],
+     "varies": {"with": "O", "at": [0, 90, 90, 360], "factors": [0, 1, 0.25, 0]}},
+    {"point": "G", "force": [3, -4], "axes": "rod"},
+    {"link": "crank", "torque": "500 N mm", "varies": {"at": [0, "200 ms", 1], "factors": [1, 0, 0.5]}},
+    {"pair": "stroke", "force": 40},
+    {"pair": "A", "torque": -0.5}
+  ],
+  "springs": [
+    {"points": ["S", "A"], "stiffness": "2 N/mm", "free_length": 120, "damping": 3},
+    {"points": ["O", "B"], "damping": "0.5 N s/mm"},
+    {"links": ["crank", "rod"], "stiffness": "5 N m/rad", "free_angle": -30, "damping": 0.02},
+    {"links": ["frame", "rod"], "stiffness": 1}
+  ],
+  "masses": [
+    {"link": "crank", "mass": "900 g", "at": [20, -5], "inertia": 0.001},
+    {"link": "rod", "mass": 1.5, "at": "G"},
+    {"link": "rod", "mass": 0, "at": "A", "inertia": "2e4 g mm^2"},
+    {"link": "block B", "mass": 0.8, "at": "B"}
+  ],
+  "gravity": [0, "-9.81 m/s^2"],
+  "sketch": {"B": [360, 0]}
+}
+"""
+
+EXAMPLES = {
+    "four-bar": FOUR_BAR,
+    "slider-crank": SLIDER_CRANK,
+    "two dyads": TWO_DYADS,
+    "wheels": WHEELS,
+    "loaded": LOADED,
+}
 
 STEADY = settings(deadline=None)
 """No example is timed: the first one may load a library."""
@@ -257,6 +307,33 @@ def test_numbers_are_written_as_their_author_wrote_them() -> None:
     assert after["links"]["AD"] == before["links"]["AD"]
     assert after["links"]["BC"]["points"]["F"] == before["links"]["BC"]["points"]["F"]
     assert after["inputs"][0]["position"] == 60
+
+
+def test_what_acts_reads_as_it_is_written() -> None:
+    m = planar.loads(LOADED)
+    quarter = pi / 2
+    assert m.loads == (
+        Load(point="B", force=(-2000.0, 0.0), varies=Course("O", (0.0, quarter, quarter, 2 * pi), (0, 1, 0.25, 0))),
+        Load(point="G", force=(3.0, -4.0), axes="rod"),
+        Load(link="crank", torque=0.5, varies=Course(None, (0.0, 0.2, 1.0), (1, 0, 0.5))),
+        Load(pair="stroke", effort=40.0),
+        Load(pair="A", effort=-0.5),
+    )
+    assert m.springs == (
+        Spring(("S", "A"), None, 2000.0, 0.12, 3.0),
+        Spring(("O", "B"), None, 0.0, 0.0, 500.0),
+        Spring(None, ("crank", "rod"), 5.0, pytest.approx(-pi / 6.0, rel=EPS4), 0.02),
+        Spring(None, ("frame", "rod"), 1.0),
+    )
+    assert m.masses == (
+        Mass("crank", 0.9, (0.02, -0.005), 0.001),
+        Mass("rod", 1.5, "G"),
+        Mass("rod", 0.0, "A", pytest.approx(2e-5, rel=EPS4)),
+        Mass("block B", 0.8, "B"),
+    )
+    assert m.gravity == (0.0, -9.81)
+    assert planar.to_dict(m)["loads"][0] == base("loaded")["loads"][0] | {"force": [-2000, 0]}
+    assert {"springs", "masses", "gravity"} & set(planar.to_dict(planar.loads(FOUR_BAR))) == set()
 
 
 def test_reading_leaves_the_value_as_it_was() -> None:
@@ -557,6 +634,9 @@ def test_loads_name_points_and_links() -> None:
         Load(link="crank", torque=5.0),
     )
     given = [{"point": "rod.C", "force": ["1 kN", 0]}]
+    # at a pin the link that is named is the one that it acts on
+    assert read((["loads"], given), of="two dyads").loads == (Load(point="rod.C", force=(1000.0, 0.0)),)
+    given = [{"point": "C", "force": ["1 kN", 0]}]
     assert read((["loads"], given), of="two dyads").loads == (Load(point="C", force=(1000.0, 0.0)),)
 
 
@@ -822,6 +902,44 @@ MISTAKES = [
     mistake("loads", [{"link": "AB", "torque": 3, "force": [1, 2]}], "$.loads[0].force", "'force'"),
     mistake("loads", [{"link": "BA", "torque": 3}], "$.loads[0].link", "no link 'BA'"),
     mistake("loads", [{"link": "AB", "torque": "3 N"}], "$.loads[0].torque", "torque is wanted"),
+    mistake("loads/0", {"point": "B"}, "$.loads[0]", "'force'", "missing", of="loaded"),
+    mistake("loads/0", {"force": [1, 2]}, "$.loads[0]", "a 'force' at a 'point'", "at a 'pair'", of="loaded"),
+    mistake("loads/0", {"point": "B", "pair": "A", "force": [1, 2]}, "$.loads[0]", "a load is a", of="loaded"),
+    mistake("loads/1/axes", "road", "$.loads[1].axes", "no link 'road'", of="loaded"),
+    mistake("loads/2/axes", "rod", "$.loads[2].axes", "'axes'", of="loaded"),
+    mistake("loads/3", {"pair": "stroke", "torque": 4}, "$.loads[3].torque", "is a force", of="loaded"),
+    mistake("loads/4", {"pair": "A", "force": 4}, "$.loads[4].force", "is a torque", of="loaded"),
+    mistake("loads/4", {"pair": "A"}, "$.loads[4]", "'torque'", "missing", of="loaded"),
+    mistake("loads/4/pair", "Z", "$.loads[4].pair", "there is no pair 'Z'", of="loaded"),
+    mistake("loads/0/varies/with", "stroke", "$.loads[0].varies.with", "'stroke' has no input", of="loaded"),
+    mistake("loads/0/varies/with", "Z", "$.loads[0].varies.with", "there is no pair 'Z'", of="loaded"),
+    mistake("loads/0/varies/at", [0, 1], "$.loads[0].varies.factors", "4 for 2", of="loaded"),
+    mistake("loads/0/varies/at", [0, 90, 80, 360], "$.loads[0].varies.at[2]", "the places rise", of="loaded"),
+    mistake("loads/0/varies/at", [5, 5, 5, 5], "$.loads[0].varies.at", "do not differ", of="loaded"),
+    mistake("loads/0/varies/at/0", "1 s", "$.loads[0].varies.at[0]", "an angle is wanted", of="loaded"),
+    mistake("loads/2/varies/at/0", "1 deg", "$.loads[2].varies.at[0]", "a time is wanted", of="loaded"),
+    mistake("loads/0/varies/factors/1", "1", "$.loads[0].varies.factors[1]", "number", of="loaded"),
+    mistake("loads/0/varies/by", 1, "$.loads[0].varies.by", "'by'", of="loaded"),
+    mistake("springs/0", {"stiffness": 1}, "$.springs[0]", "between two 'points'", of="loaded"),
+    mistake("springs/0/links", ["frame", "rod"], "$.springs[0]", "between two 'points'", of="loaded"),
+    mistake("springs/0", {"points": ["S", "A"]}, "$.springs[0]", "a 'stiffness', a 'damping', or both", of="loaded"),
+    mistake("springs/0/points", ["S", "Z"], "$.springs[0].points[1]", "no point 'Z'", of="loaded"),
+    mistake("springs/0/points", ["S", "S"], "$.springs[0].points", "two different points", of="loaded"),
+    mistake("springs/0/points", ["S", "A", "O"], "$.springs[0].points", "two different points", of="loaded"),
+    mistake("springs/0/stiffness", -1, "$.springs[0].stiffness", "from zero on", "-1", of="loaded"),
+    mistake("springs/0/damping", "-1 N s/m", "$.springs[0].damping", "from zero on", of="loaded"),
+    mistake("springs/0/free_length", -1, "$.springs[0].free_length", "from zero on", of="loaded"),
+    mistake("springs/0/free_angle", 1, "$.springs[0].free_angle", "'free_angle'", of="loaded"),
+    mistake("springs/2/stiffness", "5 N/m", "$.springs[2].stiffness", "torsional stiffness is wanted", of="loaded"),
+    mistake("springs/2/links", ["rod", "rod"], "$.springs[2].links", "'rod' stands here twice", of="loaded"),
+    mistake("masses/0/mass", -1, "$.masses[0].mass", "mass from zero on", "-1", of="loaded"),
+    mistake("masses/0/inertia", -1, "$.masses[0].inertia", "from zero on", of="loaded"),
+    mistake("masses/0/link", "Z", "$.masses[0].link", "no link 'Z'", of="loaded"),
+    mistake("masses/0/at", "G", "$.masses[0].at", "'G'", "'crank'", of="loaded"),
+    mistake("masses/0/at", GONE, "$.masses[0]", "'at'", "missing", of="loaded"),
+    mistake("masses/0/weight", 1, "$.masses[0].weight", "'weight'", of="loaded"),
+    mistake("gravity", [0], "$.gravity", "two numbers", of="loaded"),
+    mistake("gravity", [0, "9.81 m/s"], "$.gravity[1]", "acceleration is wanted", of="loaded"),
     mistake("published", [{}], "$.published[0]", "'quantity'", "missing"),
     mistake("published", [PRINTED | {"quantity": "speed"}], "$.published[0].quantity", "'speed'"),
     mistake("published", [PRINTED | {"of": "Z"}], "$.published[0].of", "no point 'Z'"),
@@ -957,6 +1075,13 @@ SPELLED = {
     "acceleration": st.one_of(SIGNED, SIGNED.map(lambda x: f"{x!r} m s^-2")),
     "force": st.one_of(SIGNED, SIGNED.map(lambda x: f"{x!r} kN"), SIGNED.map(lambda x: f"{x!r} lbf")),
     "torque": st.one_of(SIGNED, SIGNED.map(lambda x: f"{x!r} N m")),
+    "time": st.one_of(SIGNED, SIGNED.map(lambda x: f"{x!r} ms")),
+    "mass": st.one_of(LENGTHS, LENGTHS.map(lambda x: f"{x!r} g"), LENGTHS.map(lambda x: f"{x!r} lb")),
+    "moment of inertia": st.one_of(LENGTHS, LENGTHS.map(lambda x: f"{x!r} g cm^2")),
+    "stiffness": st.one_of(LENGTHS, LENGTHS.map(lambda x: f"{x!r} N/mm")),
+    "damping": st.one_of(LENGTHS, LENGTHS.map(lambda x: f"{x!r} N s/mm")),
+    "torsional stiffness": st.one_of(LENGTHS, LENGTHS.map(lambda x: f"{x!r} N m/deg")),
+    "torsional damping": st.one_of(LENGTHS, LENGTHS.map(lambda x: f"{x!r} N m s/rad")),
 }
 UNITS = st.fixed_dictionaries(
     {},
@@ -1008,9 +1133,56 @@ def a_train(draw: Any, k: int) -> Any:
 
 
 @st.composite
+def a_course(draw: Any, driven: list[tuple[str, str]]) -> Any:
+    """How a load varies, with an input or with time."""
+    at = draw(st.lists(st.integers(-400, 400), min_size=2, max_size=5).map(sorted).filter(lambda at: at[0] < at[-1]))
+    factors = draw(st.lists(SIGNED, min_size=len(at), max_size=len(at)))
+    pair = draw(st.sampled_from([None, *(pair for pair, _ in driven)]))
+    return {"at": at, "factors": factors} | ({} if pair is None else {"with": pair})
+
+
+@st.composite
+def applied(draw: Any, points: list[str], links: list[str], pairs: list[tuple[str, str]], driven: Any) -> Any:
+    """Loads of every kind, springs and masses, beside points, links and relative motions with their kinds."""
+
+    def some(*kinds: Any) -> Any:
+        return draw(st.lists(st.one_of(*kinds), max_size=4))
+
+    def spelled(**keys: str) -> dict[str, Any]:
+        return {key: SPELLED[kind] for key, kind in keys.items()}
+
+    varies, one = {"varies": a_course(driven)}, st.sampled_from(links)
+    force = st.tuples(SPELLED["force"], SPELLED["force"]).map(list)
+    kinds = [
+        st.fixed_dictionaries({"point": st.sampled_from(points), "force": force}, optional=varies | {"axes": one}),
+        st.fixed_dictionaries({"link": one} | spelled(torque="torque"), optional=varies),
+    ]
+    for pair, kind in pairs:
+        effort = {"length": "force", "angle": "torque"}[kind]
+        kinds.append(st.fixed_dictionaries({"pair": st.just(pair), effort: SPELLED[effort]}, optional=varies))
+    two = st.lists(one, min_size=2, max_size=2, unique=True)
+    springs = [
+        st.fixed_dictionaries(
+            {"links": two} | spelled(stiffness="torsional stiffness"),
+            optional=spelled(damping="torsional damping", free_angle="angle"),
+        )
+    ]
+    if len(points) > 1:
+        ends = st.lists(st.sampled_from(points), min_size=2, max_size=2, unique=True)
+        optional = spelled(stiffness="stiffness") | {"free_length": LENGTHS}
+        springs.append(st.fixed_dictionaries({"points": ends} | spelled(damping="damping"), optional=optional))
+    place = st.tuples(SPELLED["length"], SPELLED["length"]).map(list)
+    mass = st.fixed_dictionaries(
+        {"link": one, "at": place} | spelled(mass="mass"), optional=spelled(inertia="moment of inertia")
+    )
+    found = {"loads": some(*kinds), "springs": some(*springs), "masses": some(mass)}
+    return found | ({"gravity": [0, draw(SPELLED["acceleration"])]} if draw(st.booleans()) else {})
+
+
+@st.composite
 def documents(draw: Any) -> Any:
     """The JSON value of some mechanism: a tree of links, with pins of several links, slides, blocks, slots, racks,
-    trains of wheels, inputs, loads.
+    trains of wheels, inputs, loads, springs, masses.
     """
     names = draw(st.lists(NAMES, min_size=2, max_size=6, unique=True))
     carried: dict[str, list[str]] = {name: [] for name in names}
@@ -1074,10 +1246,7 @@ def documents(draw: Any) -> Any:
             | {"velocity": draw(SPELLED[rates[kind][0]]), "acceleration": draw(SPELLED[rates[kind][1]])}
             for pair, kind in driven
         ],
-        "loads": [
-            {"point": f"{names[0]}.{next(iter(carried[names[0]]))}", "force": [draw(SPELLED["force"]), 1]},
-            {"link": names[-1], "torque": draw(SPELLED["torque"])},
-        ],
+        **draw(applied([f"{name}.{carried[name][0]}" for name in names[:1]], names, motions_of, driven)),
         "sketch": {f"{names[0]}.{carried[names[0]][0]}": [draw(SPELLED["length"]), draw(SPELLED["length"])]},
         "published": [
             {"symbol": "v", "quantity": "velocity", "of": f"{names[1]}.{carried[names[1]][0]}", "value": None}

@@ -5,6 +5,7 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from planar import files
+from planar.dynamics.forces import forces
 from planar.errors import NoAnswer, Outcome
 from planar.mechanism import Drive, Mechanism, counting
 from planar.motion import State
@@ -131,8 +132,6 @@ def test_micrometres_or_kilometres_give_the_same_numbers(seed, links, higher, fa
 @given(seeds, sizes, shares)
 def test_power_balances_for_any_load(seed, links, higher):
     """Inputs against loads: sum of T_i du_i + sum of F . v vanishes at the state's own rates, whatever they are."""
-    from planar.analysis.forces import efforts
-
     built = random_linkage(seed, links, 0.0, higher)
     rng = np.random.default_rng(seed)
     value = built.value | {
@@ -140,10 +139,11 @@ def test_power_balances_for_any_load(seed, links, higher):
         + [{"link": next(name for name in built.frames if name != "frame"), "torque": 3.0}]
     }
     _, state = assembled(Built(value, built.frames), 0.01)
-    drive = sum(effort * state.inputs[name].velocity for name, effort in efforts(state).items())
+    efforts = forces(state).inputs
+    drive = sum(effort * state.inputs[name].velocity for name, effort in efforts.items())
     load = sum(np.dot(each.force, state.point(each.point).velocity) for each in state.mechanism.loads if each.force)
     load += sum(each.torque * state.link(each.link).angular_velocity for each in state.mechanism.loads if each.torque)
-    parts = [abs(e * state.inputs[n].velocity) for n, e in efforts(state).items()]
+    parts = [abs(e * state.inputs[n].velocity) for n, e in efforts.items()]
     # velocities carry the rounding of one solve: 1e-16 times the condition, at most 1e2 here squared in the positions
     assert drive + load == 0 or abs(drive + load) < 1e-11 * max(1.0, *parts)
 

@@ -70,6 +70,21 @@ def test_entries_of_pairs_that_it_shows_are_such():
         check.validate(entry)
 
 
+def test_what_acts_is_written_as_it_shows(folder):
+    """Every entry of loads, springs and masses, and how a load varies, put into its own mechanism file."""
+    told = README[README.index("- **Loads**") : README.index("- **Units**")].replace("\n ", "")
+    value = json.loads((folder / "press.json").read_text(encoding="utf-8"))
+    kinds = dict(zip(("loads", "springs", "masses"), told.split("\n- **"), strict=True))
+    for kind, text in kinds.items():
+        value[kind] = [json.loads(entry) for entry in re.findall(r"`(\{.*?\})`", text)]
+    value["loads"][0] |= json.loads("{" + re.search(r'`("varies": .*?)`', told).group(1) + "}")
+    value["loads"][0] |= {"axes": "BD"}
+    value |= json.loads("{" + re.search(r'`("gravity": .*?)`', told).group(1) + "}")
+    mechanism = planar.from_dict(value)
+    assert [len(getattr(mechanism, kind)) for kind in kinds] == [3, 2, 1]
+    assert planar.forces(planar.solve(mechanism)).proof.equilibrium < 1e-10
+
+
 def test_the_readme_names_every_room():
     rooms = {path.relative_to(ROOT / "planar").with_suffix("").parts[0] for path in (ROOT / "planar").rglob("*.py")}
     rooms -= {"__init__", "__main__"}

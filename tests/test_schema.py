@@ -30,6 +30,7 @@ BAD = [
 UNSAID = {
     "a name that is not there": ["there is no ", " has no point ", "carries a point ", " is neither of the wheels "],
     "a name that is there already": [" already", "there is a pair "],
+    "a pair of another kind, or without an input": ["what acts between the links of pair ", " has no input"],
     "names that must differ, or agree": [
         *("the line needs two different points", "the way must be between ", "rests on itself"),
         *("is one of the wheels", "several points are called "),
@@ -38,6 +39,7 @@ UNSAID = {
     "a unit of the wrong kind": [" is wanted, such as ", "a bare rate "],
     "numbers that do not fit one another": [
         *("does not close", " coincide", " apart", "not pinned to ", "internal"),
+        *("as many factors as places", "the places rise", "the places do not differ"),
     ],
     "what no JSON file holds": ["this is not a number"],
     "a character that is not printable": [" holds a character that cannot be shown"],

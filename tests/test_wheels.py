@@ -9,7 +9,6 @@ import pytest
 from click.testing import CliRunner
 
 import planar
-from planar.analysis.forces import efforts
 from planar.cli import main
 from planar.errors import BadInput, NoAnswer, Outcome
 
@@ -308,6 +307,6 @@ def test_the_geared_example_balances_power_as_a_difference_of_positions_says():
     crank, step = mechanism.inputs[0].position, 1e-4
     ahead, behind = (planar.solve(mechanism, {"O": crank + way * step}).point("D").position[0] for way in (1, -1))
     # central difference: truncation of about step^2, so eight digits
-    assert efforts(state)["O"] == pytest.approx(3000 * (ahead - behind) / (2 * step), rel=1e-6)
+    assert planar.forces(state).inputs["O"] == pytest.approx(3000 * (ahead - behind) / (2 * step), rel=1e-6)
     assert state.link("QB").angle == pytest.approx(np.radians(208.1), rel=1e-12)
     assert state.link("QB").angular_velocity == pytest.approx(-2.122 * 100 * np.pi / 30, rel=1e-12)

@@ -11,8 +11,8 @@ import numpy as np
 
 from planar.analysis.by_centres import LinkByCentres, links_by_centres
 from planar.analysis.centres import Centres, centres, extent
-from planar.analysis.forces import alone, slides
 from planar.analysis.ties import Rate, Rates, rates
+from planar.dynamics.unit_rates import alone, slides
 from planar.errors import BadInput, NoAnswer
 from planar.mechanism import Input, motions
 from planar.motion import State, Unknown

@@ -102,9 +102,9 @@ def _value(item: Published, state: State, start: State) -> float | np.ndarray:
     if item.quantity in of_pair:
         return float(state.pair(item.of)[of_pair[item.quantity]] or 0.0)
     if item.quantity == "input torque":
-        from planar.analysis.forces import efforts  # few examples have loads
+        from planar.dynamics.forces import forces  # few examples have loads
 
-        return efforts(state)[item.of]
+        return float(forces(state).inputs[item.of])
     if item.relative_to is not None:
         relative = state.relative(item.of, item.relative_to)
         return {

@@ -61,34 +61,3 @@ def centres(model: str, as_json: bool, at: tuple[str, ...], mode: int | None, ou
         click.echo(json.dumps(record(found), ensure_ascii=False, indent=1, allow_nan=False))
         return
     show(table(found), output)
-
-
-@main.command()
-@click.argument("model")
-@as_json
-@at
-@moded
-@output("Write the tables to a .txt, .svg or .html file.")
-def forces(model: str, as_json: bool, at: tuple[str, ...], mode: int | None, output: Path | None) -> None:
-    """What the inputs supply against the loads, power, mechanical advantage."""
-    from planar.analysis.advantage import advantages
-    from planar.analysis.forces import forces as of_inputs
-    from planar.analysis.published import compare
-    from planar.solving.position import solve
-    from planar.views.loads import record, tables, where_to_write
-
-    if as_json and output is not None:
-        raise BadInput("-o", "tables go to a file or SI values are printed with --json; give one of the two")
-    mechanism = loaded(model, mode)
-    spare(model, output)
-    if not mechanism.loads:
-        raise BadInput("$.loads", where_to_write(mechanism))
-    moved = drives(mechanism, at)
-    with busy(mechanism.name):
-        state = solve(mechanism, moved)
-        found, ratios = of_inputs(state), advantages(state)
-        printed = [] if moved else [each for each in compare(state) if each.published.quantity == "input torque"]
-    if as_json:
-        click.echo(json.dumps(record(found, ratios, printed), ensure_ascii=False, indent=1, allow_nan=False))
-        return
-    show(tables(found, ratios, printed), output)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 from click.core import ParameterSource
@@ -15,10 +15,10 @@ if TYPE_CHECKING:
     from planar.mechanism import Mechanism
     from planar.motion import Motion
 
-POSITION = ("scheme", "velocity", "acceleration", "centres")
+POSITION = ("scheme", "velocity", "acceleration", "centres", "forces")
 ASSEMBLIES = ("modes",)
 BRANCHES = ("circuits",)
-MOTION = ("positions", "loci", "centrodes", "diagrams")
+MOTION = ("positions", "loci", "centrodes", "diagrams", "torque", "bearings")
 SMOOTH = 360
 """Steps of a run that is drawn."""
 
@@ -32,13 +32,22 @@ SMOOTH = 360
 @click.option(
     "--point", "points", multiple=True, metavar="NAME", help="A point to be lettered, or whose path is drawn."
 )
-@click.option("--of", "of", metavar="NAME", help="Diagrams, or circuits, of this slide, point or link.")
+@click.option(
+    "--of", "of", metavar="NAME", help="Diagrams, or circuits, of this slide, point or link; torque of this input."
+)
 @click.option(
     "--link",
     "links",
     multiple=True,
     metavar="NAME",
     help="Centres of this link, of several those between them; centrodes of the first in the axes of the second.",
+)
+@click.option("--pair", "pairs", multiple=True, metavar="NAME", help="A pair whose bearing load is drawn.")
+@click.option(
+    "--fluctuation",
+    type=float,
+    metavar="C",
+    help="The flywheel's coefficient of fluctuation of speed, (greatest - least) / mean; 0.02 where left out.",
 )
 @click.option("--steps", default=12, show_default=True, metavar="N", help="Positions, or chords of the diagrams.")
 @click.option("--chords", is_flag=True, help="Diagrams with graphical differentiation beside the curves.")
@@ -53,6 +62,8 @@ def plot(
     points: tuple[str, ...],
     of: str | None,
     links: tuple[str, ...],
+    pairs: tuple[str, ...],
+    fluctuation: float | None,
     steps: int,
     chords: bool,
     pair: str | None,
@@ -60,14 +71,17 @@ def plot(
     stop: str | None,
     mode: int | None,
 ) -> None:
-    """A drawing to scale: scheme, polygons and centres of a position; loci, diagrams and more of a run; circuits."""
+    """A drawing to scale: scheme, polygons, free bodies of a position; loci, diagrams, loads of a run; circuits."""
     from planar import plot as drawn
+    from planar.dynamics.flywheel import FLUCTUATION
     from planar.solving.position import solve
 
     steps_told = click.get_current_context().get_parameter_source("steps") is ParameterSource.COMMANDLINE
     for option, told, kinds in (
         ("--point", points, ("positions", "loci")),
-        ("--of", of, ("diagrams", *BRANCHES)),
+        ("--of", of, ("diagrams", "torque", *BRANCHES)),
+        ("--pair", pairs, ("bearings",)),
+        ("--fluctuation", fluctuation is not None, ("torque",)),
         ("--link", links, ("centres", "centrodes")),
         ("--chords", chords, ("diagrams",)),
         ("--steps", steps_told, ("positions", "diagrams") if chords else ("positions",)),
@@ -96,7 +110,18 @@ def plot(
             if at:
                 raise BadInput("--at", f"{what} are of a run; say where it starts with --from")
             moving = _run(mechanism, pair, start, stop)
-            figure = _of_run(moving, what, scales, points, of, links, (steps, chords))
+            if len(links) > 2:
+                raise BadInput(
+                    "--link", "centrodes are of two links; name one, or one and the link that it is seen from"
+                )
+            figure = {
+                "positions": lambda: drawn.positions(moving, steps, points or None, scales),
+                "loci": lambda: drawn.loci(moving, points or None, scales),
+                "centrodes": lambda: drawn.centrodes(moving, *links, scale=scales),
+                "diagrams": lambda: drawn.diagrams(moving, of, steps if chords else None),
+                "torque": lambda: drawn.torque(moving, of, FLUCTUATION if fluctuation is None else fluctuation),
+                "bearings": lambda: drawn.bearings(moving, pairs or None),
+            }[what]()
         drawn.save(figure, output)
 
 
@@ -107,30 +132,6 @@ def _refuse_range(what: str, pair: str | None, start: str | None, stop: str | No
     if (pair or start or stop) and what in (*POSITION, *ASSEMBLIES):
         told = f"{what} are" if what in ASSEMBLIES else f"a {what} is"
         raise BadInput("--input", f"{told} of one position; move an input there with --at")
-
-
-def _of_run(
-    moving: Mechanism | Motion,
-    what: str,
-    scales: tuple[str, ...],
-    points: tuple[str, ...],
-    of: str | None,
-    links: tuple[str, ...],
-    divided: tuple[int, bool],
-) -> Any:
-    """A drawing of a whole run; `divided` are its steps and whether chords are drawn."""
-    from planar import plot as drawn
-
-    steps, chords = divided
-    if what == "diagrams":
-        return drawn.diagrams(moving, of, steps if chords else None)
-    if what == "centrodes":
-        if len(links) > 2:
-            raise BadInput("--link", "centrodes are of two links; name one, or one and the link that it is seen from")
-        return drawn.centrodes(moving, *links, scale=scales)
-    if what == "positions":
-        return drawn.positions(moving, steps, points or None, scales)
-    return drawn.loci(moving, points or None, scales)
 
 
 @main.command()

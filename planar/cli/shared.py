@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,12 +12,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from planar import __version__
-from planar.cli.ending import Commands
-from planar.errors import BadInput
+from planar.cli.ending import NO_ANSWER, Commands
+from planar.errors import BadInput, Outcome
 
 if TYPE_CHECKING:
     from planar.mechanism import Drive, Mechanism
     from planar.motion import Motion
+    from planar.views.columns import Told
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
@@ -45,7 +47,7 @@ scaled = click.option(
     "scales",
     multiple=True,
     metavar="SCALE",
-    help='Of what is drawn: "1 cm = 100 mm", "1:5", "1 cm = 0.1 m/s", "1 cm = 2 m/s^2"; left out, round ones that fit.',
+    help='Of what is drawn: "1 cm = 100 mm", "1:5", "1 cm = 0.1 m/s", "1 cm = 500 N"; left out, round ones that fit.',
 )
 
 
@@ -84,6 +86,34 @@ def ranged(command: Any) -> Any:
     return command
 
 
+def cycled(command: Any) -> Any:
+    """The options of a whole motion, all of which `run` takes."""
+    for option in (
+        click.option(
+            "--duration",
+            metavar="TIME",
+            help="Run in time so long, every input by its law or at constant acceleration.",
+        ),
+        click.option(
+            "--branch",
+            "branches",
+            multiple=True,
+            type=click.IntRange(1),
+            metavar="N",
+            help="The way taken where branches of the motion cross: 1 smoothly, 2 the next; for each change point.",
+        ),
+        click.option("--circuit", is_flag=True, help="Go through dead points, all round the circuit of this assembly."),
+        click.option("--there-and-back", is_flag=True, help="Come back through the range by the same positions."),
+    ):
+        command = option(command)
+    return stepped(ranged(command))
+
+
+stepped = click.option(
+    "--steps", default=360, show_default=True, metavar="N", help="Parts that the motion is divided into."
+)
+
+
 def output(help: str, required: bool = False) -> Callable[[Any], Any]:  # noqa: A002
     """The option that names a file to write."""
     kind = click.Path(dir_okay=False, path_type=Path)
@@ -106,7 +136,7 @@ def busy(doing: str) -> AbstractContextManager[Any]:
 
 
 @contextmanager
-def advancing(doing: str) -> Iterator[Callable[[int, int], None] | None]:
+def advancing(doing: str) -> Iterator[Callable[[float, float], None] | None]:
     """A bar on a terminal that shows how much of a long work is done."""
     if not sys.stderr.isatty():
         yield None
@@ -153,14 +183,52 @@ def show(renderable: Any, output: Path | None) -> None:
     save(output, written(renderable, output.suffix))
 
 
-def run(mechanism: Mechanism, steps: int, pair: str | None, start: str | None, stop: str | None, **more: Any) -> Motion:
+def run(
+    mechanism: Mechanism,
+    steps: int,
+    pair: str | None,
+    start: str | None,
+    stop: str | None,
+    duration: str | None = None,
+    **more: Any,
+) -> Motion:
     """The run of an input over the range that the options give; `more` goes to `planar.cycle` as it is."""
+    from planar.document import read_time
     from planar.solving.cycle import cycle
 
     names = [given.pair for given in mechanism.inputs]
     of = pair if pair is not None or len(names) != 1 else names[0]
     ends = [_position(mechanism, of, text, option) for option, text in (("--from", start), ("--to", stop))]
-    return cycle(mechanism, steps, ends[0], ends[1], pair, **more)
+    time = None if duration is None else read_time(duration, "--duration")
+    return cycle(mechanism, steps, ends[0], ends[1], pair, duration=time, **more)
+
+
+def tell(
+    motion: Motion,
+    as_json: bool,
+    output: Path | None,
+    shown: Callable[[], Iterable[Any]],
+    more: Iterable[Told] = (),
+    said: Mapping[str, Any] | None = None,
+) -> None:
+    """A whole motion, with what `more` is told and `said` of it: as JSON, or as tables, and in a file that is named.
+
+    Ends with a sentence and a status where the motion did not come to its end.
+    """
+    from planar.views.run import record, written
+
+    if as_json:
+        click.echo(json.dumps(record(motion, more, said or {}), ensure_ascii=False, allow_nan=False))
+    else:
+        if output is not None:
+            from planar.files import save
+
+            save(output, written(motion, output.suffix, more, said or {}))
+        for each in shown():
+            show(each, None)
+    if motion.outcome is not Outcome.SOLVED:
+        click.echo(f"planar: {motion.outcome.value}: {motion.reason}", err=True)
+        sys.exit(NO_ANSWER)
 
 
 def _position(mechanism: Mechanism, pair: str | None, text: str | None, option: str) -> float | None:

@@ -3,31 +3,33 @@
 from __future__ import annotations
 
 import json
-import sys
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from planar.cli.ending import NO_ANSWER
 from planar.cli.shared import (
     as_json,
     at,
     busy,
+    cycled,
     drives,
     loaded,
     main,
     moded,
     output,
-    ranged,
     run,
     scaled,
     show,
     spare,
+    tell,
 )
-from planar.errors import BadInput, Outcome
+from planar.errors import BadInput
 
 if TYPE_CHECKING:
+    from rich.console import RenderableType
+
     from planar.analysis.answers import Answers
     from planar.analysis.published import Comparison
     from planar.motion import Motion, State
@@ -114,22 +116,8 @@ def _solved(
 @main.command()
 @click.argument("model")
 @as_json
-@click.option("--steps", default=360, show_default=True, metavar="N", help="Parts that the range is divided into.")
-@ranged
+@cycled
 @moded
-@click.option("--there-and-back", is_flag=True, help="Come back through the range by the same positions.")
-@click.option("--circuit", is_flag=True, help="Go through dead points, all round the circuit of this assembly.")
-@click.option(
-    "--branch",
-    "branches",
-    multiple=True,
-    type=click.IntRange(1),
-    metavar="N",
-    help="The way taken where branches of the motion cross: 1 smoothly, 2 the next; once for each change point.",
-)
-@click.option(
-    "--duration", metavar="TIME", help="Run in time so long, every input by its law or at constant acceleration."
-)
 @click.option("--jerk", is_flag=True, help="Third rates as well.")
 @click.option(
     "--of",
@@ -142,23 +130,14 @@ def _solved(
 def cycle(
     model: str,
     as_json: bool,
-    steps: int,
-    pair: str | None,
-    start: str | None,
-    stop: str | None,
     mode: int | None,
-    there_and_back: bool,
-    circuit: bool,
-    branches: tuple[int, ...],
-    duration: str | None,
     jerk: bool,
     asked: tuple[str, ...],
     output: Path | None,
+    steps: int,
+    **course: Any,
 ) -> None:
     """The whole motion: position to position through the range of an input, or in time by the inputs' laws."""
-    from planar.document import read_time
-    from planar.files import save
-
     if as_json and output is not None:
         raise BadInput("-o", "a run goes to a file or is printed with --json; give one of the two")
     mechanism = loaded(model, mode)
@@ -168,44 +147,26 @@ def cycle(
 
         writable(output.suffix)
     with busy(f"{mechanism.name}: {steps} steps"):
-        motion = run(
-            mechanism,
-            steps,
-            pair,
-            start,
-            stop,
-            there_and_back=there_and_back,
-            circuit=circuit,
-            branches=branches,
-            duration=None if duration is None else read_time(duration, "--duration"),
-            jerk=jerk,
-        )
+        motion = run(mechanism, steps, **course, jerk=jerk)
         if not as_json:
             motion.limits  # noqa: B018 - solved for while the sign is up
         told = {name: _answers(motion, name) for name in asked}
-    if as_json:
-        from planar.views.run import record
 
-        value = record(motion)
-        if told:
-            from planar.views.answers import record as answered
-
-            value["answers"] = answered(told)
-        click.echo(json.dumps(value, ensure_ascii=False, allow_nan=False))
-    else:
+    def shown() -> Iterator[RenderableType]:
         from planar.views.ran import ran
-        from planar.views.run import written
 
-        if output is not None:
-            save(output, written(motion, output.suffix))
-        show(ran(motion), None)
+        yield ran(motion)
         if told:
             from planar.views.answers import tables
 
-            show(tables(motion, told), None)
-    if motion.outcome is not Outcome.SOLVED:
-        click.echo(f"planar: {motion.outcome.value}: {motion.reason}", err=True)
-        sys.exit(NO_ANSWER)
+            yield tables(motion, told)
+
+    said = {}
+    if told:
+        from planar.views.answers import record
+
+        said = {"answers": record(told)}
+    tell(motion, as_json, output, shown, said=said)
 
 
 def _answers(motion: Motion, name: str) -> tuple[Answers, ...]:

@@ -280,7 +280,7 @@ class Cursor:
             raise self.refuse(key, "a pair joins at least two links")
         for name in found:
             if found.count(name) > 1:
-                raise self.refuse(key, f"link {name!r} stands here twice; a pair joins different links")
+                raise self.refuse(key, f"link {name!r} stands here twice; different ones are wanted here")
         return found
 
     def two_links(self, key: str) -> tuple[str, str]:

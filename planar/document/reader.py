@@ -6,12 +6,13 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+from planar.document.applied import read_applied
 from planar.document.cursor import Cursor, Whole, called, did_you_mean
+from planar.document.named import motion, point_named, point_names
 from planar.document.schema import (
     ALONG,
     DISTANCES,
     DRIVE,
-    FORCE,
     FORMAT,
     GEOMETRY,
     INPUT,
@@ -19,7 +20,6 @@ from planar.document.schema import (
     PUBLISHED,
     SENSES,
     TOP,
-    TORQUE,
     UNITS,
 )
 from planar.mechanism import (
@@ -30,7 +30,6 @@ from planar.mechanism import (
     Drive,
     Input,
     Link,
-    Load,
     Mechanism,
     Place,
     Point,
@@ -38,7 +37,6 @@ from planar.mechanism import (
     Units,
     misfits,
     motions,
-    named_points,
 )
 from planar.pairs import Kind, Pair, pair_types
 from planar.shapes import Unplaced, shape
@@ -72,7 +70,6 @@ def read(value: Any) -> Mechanism:
         source=full.text("source"),
         geometry=full.one_of("geometry", GEOMETRY),
         notes=tuple(item.as_text() for item in full.listed("notes")),
-        loads=(),
         remarks=_left_out(full, pairs),
     )
     inputs = _inputs(full, motions(bare))
@@ -81,10 +78,10 @@ def read(value: Any) -> Mechanism:
         from planar.document.laws import jumps
 
         driven = replace(driven, remarks=(*bare.remarks, *jumps(inputs, motions(bare))))
-    points = _point_names(driven)
+    points = point_names(driven)
     return replace(
         driven,
-        loads=tuple(_load(item, points) for item in full.listed("loads")),
+        **read_applied(full, driven, points),
         sketch=_sketch(full, points),
         published=tuple(_published(item, driven, points) for item in full.listed("published")),
     )
@@ -273,7 +270,7 @@ def _inputs(top: Cursor, known: Mapping[str, Pair]) -> tuple[Input, ...]:
     found: dict[str, Input] = {}
     for cursor in top.listed("inputs"):
         cursor.only(*INPUT)
-        pair = _motion(cursor["pair"], known)
+        pair = motion(cursor["pair"], known)
         if pair.name in found:
             raise cursor.refuse("pair", f"pair {pair.name!r} has an input already; a pair takes one")
         given = Input(
@@ -290,52 +287,12 @@ def _inputs(top: Cursor, known: Mapping[str, Pair]) -> tuple[Input, ...]:
     return tuple(found.values())
 
 
-def _motion(cursor: Cursor, known: Mapping[str, Pair]) -> Pair:
-    name = cursor.as_text()
-    if name in known:
-        return known[name]
-    parts = [other for other in known if other.startswith(f"{name}:")]
-    if parts:
-        raise cursor.refuse(None, f"{name!r} joins several links; say which two move: {' or '.join(map(repr, parts))}")
-    reverse = name.partition(":")[0] + ":" + ",".join(reversed(name.partition(":")[2].split(",")))
-    if reverse in known:
-        raise cursor.refuse(None, f"the links of {name!r} stand in the other order in the file; write {reverse!r}")
-    raise cursor.refuse(None, f"there is no pair {name!r}{did_you_mean(name, known)}")
-
-
-def _point_names(mechanism: Mechanism) -> dict[str, str]:
-    """Every way to write a point, and the name that results give it."""
-    named = named_points(mechanism)
-    return {f"{link}.{point}": each.name for each in named for link, point in each.members} | {
-        each.name: each.name for each in named
-    }
-
-
-def _result_point(cursor: Cursor, name: str, points: Mapping[str, str]) -> str:
-    if name in points:
-        return points[name]
-    several = [other for other in points if other.endswith(f".{name}")]
-    if several:
-        raise cursor.refuse(None, f"several points are called {name!r}; write {' or '.join(map(repr, several))}")
-    raise cursor.refuse(None, f"there is no point {name!r}{did_you_mean(name, points)}")
-
-
-def _load(cursor: Cursor, points: Mapping[str, str]) -> Load:
-    if cursor.has("point") == cursor.has("link"):
-        raise cursor.refuse(None, "a load is a 'force' at a 'point' or a 'torque' on a 'link'")
-    cursor.only(*(FORCE if cursor.has("point") else TORQUE))
-    if cursor.has("point"):
-        point = _result_point(cursor["point"], cursor["point"].as_text(), points)
-        return Load(point=point, force=cursor["force"].as_vector("force"))
-    return Load(link=cursor["link"].as_link(), torque=cursor.quantity("torque", "torque"))
-
-
 def _sketch(top: Cursor, points: Mapping[str, str]) -> tuple[tuple[str, float, float], ...]:
     if not top.has("sketch"):
         return ()
     found: dict[str, tuple[str, float, float]] = {}
     for name, place in top["sketch"].members():
-        point = _result_point(place, name, points)
+        point = point_named(place, name, points)
         if point in found:
             raise place.refuse(None, f"the point {point!r} is sketched already, under another of its names")
         found[point] = (point, *place.as_vector("length"))
@@ -373,11 +330,11 @@ def _published(cursor: Cursor, mechanism: Mechanism, points: Mapping[str, str]) 
     if quantity.startswith("angular"):
         of = cursor["of"].as_link()
     elif quantity in ("rubbing speed", "displacement", "sliding velocity", "sliding acceleration", "input torque"):
-        of = _motion(cursor["of"], motions(mechanism)).name
+        of = motion(cursor["of"], motions(mechanism)).name
     else:
-        of = _result_point(cursor["of"], of, points)
+        of = point_named(cursor["of"], of, points)
         if relative_to is not None:
-            relative_to = _result_point(cursor["relative_to"], relative_to, points)
+            relative_to = point_named(cursor["relative_to"], relative_to, points)
     return Published(
         symbol=cursor["symbol"].as_text(),
         quantity=quantity,

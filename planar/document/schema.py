@@ -23,6 +23,7 @@ SENSES = ("clockwise", "anticlockwise", "to the left", "to the right", "upwards"
 _TEXT: Schema = {"type": "string"}
 _TEXTS: Schema = {"type": "array", "items": _TEXT}
 _BOUNDED: Schema = {"type": "number", "exclusiveMinimum": -HUGE, "exclusiveMaximum": HUGE}
+_FROM_ZERO: Schema = {"type": "number", "minimum": 0, "exclusiveMaximum": HUGE}
 _SIZE: Schema = {"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": HUGE}
 _NUMBER = r"([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\s*(?![eE][+-]?[0-9])[A-Za-zµμΩ°]"
 """A number and the beginning of its unit."""
@@ -76,8 +77,33 @@ INPUT: Schema = {
     "law": {"anyOf": [described("piece"), several("piece", 1, MOST)]},
 }
 DRIVE: Schema = {key: INPUT[key] for key in ("position", "velocity", "acceleration")}
-FORCE: Schema = {"point": _TEXT, "force": _vector("quantity")}
-TORQUE: Schema = {"link": _TEXT, "torque": described("quantity")}
+VARIES: Schema = {"with": _TEXT, "at": several("quantity", 2, MOST), "factors": several("number", 2, MOST)}
+FORCE: Schema = {"point": _TEXT, "force": _vector("quantity"), "axes": _TEXT, "varies": described("varies")}
+TORQUE: Schema = {"link": _TEXT, "torque": described("quantity"), "varies": described("varies")}
+EFFORT: Schema = {
+    "pair": _TEXT,
+    "force": described("quantity"),
+    "torque": described("quantity"),
+    "varies": described("varies"),
+}
+SPRING: Schema = {
+    "points": several("text", 2, 2) | {"uniqueItems": True},
+    "stiffness": described("amount"),
+    "free_length": described("amount"),
+    "damping": described("amount"),
+}
+TORSION: Schema = {
+    "links": several("name", 2, 2) | {"uniqueItems": True},
+    "stiffness": described("amount"),
+    "free_angle": described("angle"),
+    "damping": described("amount"),
+}
+MASS: Schema = {
+    "link": _TEXT,
+    "mass": described("amount"),
+    "at": described("spot"),
+    "inertia": described("amount"),
+}
 PUBLISHED: Schema = {
     "symbol": _TEXT,
     "quantity": {"enum": list(QUANTITIES)},
@@ -108,8 +134,25 @@ TOP: Schema = {
     "inputs": {"type": "array", "items": _object(INPUT, "pair", "position")},
     "loads": {
         "type": "array",
-        "items": {"anyOf": [_object(FORCE, "point", "force"), _object(TORQUE, "link", "torque")]},
+        "items": {
+            "anyOf": [
+                _object(FORCE, "point", "force"),
+                _object(TORQUE, "link", "torque"),
+                _object(EFFORT, "pair", oneOf=[{"required": ["force"]}, {"required": ["torque"]}]),
+            ]
+        },
     },
+    "springs": {
+        "type": "array",
+        "items": {
+            "anyOf": [
+                _object(kind, ends, anyOf=[{"required": ["stiffness"]}, {"required": ["damping"]}])
+                for kind, ends in ((SPRING, "points"), (TORSION, "links"))
+            ]
+        },
+    },
+    "masses": {"type": "array", "items": _object(MASS, "link", "mass", "at")},
+    "gravity": _vector("quantity"),
     "sketch": {"type": "object", "additionalProperties": _vector("length")},
     "published": {"type": "array", "items": _object(PUBLISHED, "symbol", "quantity", "of")},
 }
@@ -128,9 +171,11 @@ def schema() -> dict[str, Any]:
                 "pattern": rf"^[^{FORBIDDEN}]*[^\s{FORBIDDEN}][^{FORBIDDEN}]*$",
                 "description": f"contains none of {' '.join(FORBIDDEN)}",
             },
+            "text": _TEXT,
             "number": _BOUNDED,
             "quantity": _quantity(_BOUNDED, "[+−-]?", "10.5 rad/s"),
             "length": _quantity(_BOUNDED, "[+−-]?", "50 mm"),
+            "amount": _quantity(_FROM_ZERO, "[+]?", "2 kg"),
             "size": _quantity(_SIZE, "[+]?", "50 mm"),
             "angle": _quantity(_BOUNDED, "[+−-]?", "60 deg"),
             "spot": {"anyOf": [_TEXT, _vector("length")], "description": "a point of the link, or [x, y]"},
@@ -150,6 +195,7 @@ def schema() -> dict[str, Any]:
                 ],
                 **{"not": {"required": ["ends", "axis"]}},
             ),
+            "varies": _object(VARIES, "at", "factors"),
             "time": _quantity(_SIZE, "[+]?", "0.5 s"),
             "piece": {"oneOf": [_piece(kind) for kind in MOTIONS.values()]},
             "drives": {"type": "object", "additionalProperties": _object(DRIVE)},

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
+from planar.document.applied import write_applied
 from planar.document.laws import write_law
 from planar.document.schema import DRIVE, FORMAT
 from planar.mechanism import QUANTITIES, Drive, Input, Link, Mechanism, Published, entries, motions
@@ -30,10 +31,7 @@ def write(mechanism: Mechanism) -> dict[str, Any]:
     value["pairs"] = [type(group[0]).write(group, quantity) for group in entries(mechanism)]
     value |= _told(
         inputs=[_drive_entry(mechanism, given, quantity) for given in mechanism.inputs],
-        loads=[
-            _told(point=load.point, force=_list(load.force), link=load.link, torque=load.torque)
-            for load in mechanism.loads
-        ],
+        **write_applied(mechanism, quantity),
         sketch={point: [quantity(x, "length"), quantity(y, "length")] for point, x, y in mechanism.sketch},
         published=[_published(item, mechanism, quantity) for item in mechanism.published],
     )

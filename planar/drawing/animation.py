@@ -94,9 +94,9 @@ def animate(
     """The motion as the bytes of a GIF that repeats for ever, or of an MP4.
 
     A whole turn is shown once, from the top dead centre where there is one, in `frames` equal divisions, and on until a
-    geared mechanism is back; a rocking input goes there and back. `paths` names the points whose paths grow (left out:
-    those of `loci`). Raises BadInput for names, numbers and suffixes that cannot be meant, or where a library is
-    missing; NoAnswer without a motion.
+    geared mechanism is back; a rocking input goes there and back; a motion in time is shown once. `paths` names the
+    points whose paths grow (left out: those of `loci`). Raises BadInput for names, numbers and suffixes that cannot be
+    meant, or where a library is missing; NoAnswer without a motion.
     """
     kind = f".{str(suffix).lower().lstrip('.')}"
     if kind not in SUFFIXES:
@@ -127,6 +127,8 @@ def scripted(motion: Motion | Mechanism, paths: Iterable[str] | None = None, fra
         stride = max(last // (whole_steps * run.turns), ceil(last / MOST_FRAMES))
         rows = list(range(0, last, stride))
         traced = rows
+    elif run.in_time:
+        rows = traced = [round(last * k / (whole_steps - 1)) for k in range(whole_steps)]
     else:
         half = max(whole_steps // 2, 1)
         there = [round(last * k / half) for k in range(half + 1)]

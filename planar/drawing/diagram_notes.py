@@ -102,14 +102,18 @@ def _start(sheet: Sheet) -> str:
     kind = "length" if run.slides else "angle"
     at = f"input {run.given.pair} at {amount(run.first, kind, units)}"
     start = f"top dead centre (TDC) of {run.stroke.pair}, {at}" if run.from_top and run.stroke else at
-    gone = _gone(run)
-    told = f"Position 0: {start}; {gone} is how far the input has {'moved' if run.slides else 'turned'} from there. "
+    told = f"Position 0: {start}"
+    if not run.in_time:
+        told += f"; {_gone(run)} is how far the input has {'moved' if run.slides else 'turned'} from there"
+    told += ". "
     if sheet.subject.angle:
         told += "φ is from the x-axis of the frame. "
     elif run.stroke is None or sheet.subject.slide != run.stroke.pair:
         told += "Displacements are from position 0. "
     elif not run.from_top:
         told += "S is from TDC. "
+    if run.in_time:
+        return f"{told}A motion in time."
     if not run.timed:
         return f"{told}The file gives no speed: rates are per {'metre' if run.slides else 'radian'} of the input."
     rates = ("velocity", "acceleration") if run.slides else ("angular velocity", "angular acceleration")
@@ -125,7 +129,8 @@ def _scales(sheet: Sheet, ordinates: list[Ordinate]) -> list[str]:
     parts = [f"Scales: OK = {sheet.width:g} mm"]
     if run.timed:
         parts.append(_mu("t", sheet.span / sheet.width, "s"))
-    parts.append(_mu(_gone(run), float(run.turned[-1]) / sheet.width, "m" if run.slides else "rad"))
+    if not run.in_time:
+        parts.append(_mu(_gone(run), float(run.turned[-1]) / sheet.width, "m" if run.slides else "rad"))
     symbols = _indices(sheet)
     parts += [_mu(name, each.scale.per_mm, each.si) for name, each in zip(symbols, ordinates, strict=True)]
     return [*(f"{part}," for part in parts[:-1]), f"{parts[-1]}."]
@@ -172,6 +177,8 @@ def _peaks(sheet: Sheet, ordinate: Ordinate, index: int) -> list[str]:
 
 def _when(sheet: Sheet, exact: Peak) -> str:
     run = sheet.run
+    if run.in_time:
+        return f"t = {exact.time:.4g} s"
     written = sheet.units.length if run.slides else sheet.units.angle
     return f"{_gone(run)} = {unit(written).from_si(exact.time * abs(run.rate)):.4g} {written}"
 

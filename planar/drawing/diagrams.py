@@ -45,7 +45,7 @@ SYMBOLS = {False: ("S", "V", "a"), True: ("φ", "ω", "ε")}
 def diagrams(
     motion: Motion | Mechanism, of: str | None = None, chords: int | None = None, width: float = 120.0
 ) -> Figure:
-    """S-t, V-t and a-t diagrams of a slide, a point or a link over one run at the input's steady speed.
+    """S-t, V-t and a-t diagrams of a slide, point or link over a motion in time, or a run at the input's steady speed.
 
     `of` left out: the first slide on the frame that is not driven, else the angle of the link on a pin of the frame
     that is farthest along. A slide on the frame is measured from its top dead centre, where the run starts. `width`
@@ -76,8 +76,8 @@ def _drawn(sheet: Sheet) -> Figure:
     ordinates = [_ordinate(sheet, index) for index in range(3)]
     lines = caption(sheet, ordinates, SMALL, LEFT + sheet.width + RIGHT - 8.0)
     line = SMALL * POINT * 1.45
-    rulers = 1 + sheet.run.timed
-    below = GAP / 2.0 + rulers * BETWEEN + 2.0 + line * len(lines) + 3.0
+    rulers = [_angle_axis] * (not sheet.run.in_time) + [_time_axis] * sheet.run.timed
+    below = GAP / 2.0 + len(rulers) * BETWEEN + 2.0 + line * len(lines) + 3.0
     heights = [each.high - each.low for each in ordinates]
     size = (LEFT + sheet.width + RIGHT, TOP + sum(heights) + 2.0 * GAP + below)
     made = Figure(figsize=(size[0] * MM, size[1] * MM), facecolor="white")
@@ -90,7 +90,7 @@ def _drawn(sheet: Sheet) -> Figure:
         _chart(charts[-1], sheet, each, index)
         bottom -= GAP
     bottom += GAP - GAP / 2.0
-    for ruler in (_angle_axis, _time_axis)[:rulers]:
+    for ruler in rulers:
         bottom -= BETWEEN / 2.0
         axis = made.add_axes((LEFT / size[0], bottom / size[1], sheet.width / size[0], 0.01 / size[1]))
         ruler(axis, sheet)

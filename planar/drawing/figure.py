@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 INCH = 25.4
-PAGE = 277.0
-"""mm that a row of pictures may be wide: A4 on its side, less margins."""
+PAGE, PAGE_HEIGHT = 277.0, 190.0
+"""mm that a row of pictures may be wide, and all rows high where there are several sheets: A4 on its side."""
 MARGIN, APART, EDGE = 3.0, 8.0, 5.0
 """mm about the marks of a picture, between pictures, and about them all."""
 CAPTION = 70.0
@@ -102,19 +102,36 @@ def figure(pictures: Sequence[Picture], title: str = "") -> Figure:
     its gid, the head of an arrow that and " head" (its first corner is the tip). Raises BadInput for a picture that
     is too large for any sheet or has a mark with no place, and where matplotlib is missing.
     """
+    return _sheet(_rows([cell(picture) for picture in pictures]), title)
+
+
+def on_sheets(pictures: Sequence[Picture], title: str = "") -> list[Figure]:
+    """The same on as many sheets as it takes for none to be higher than A4 on its side, where a row itself is not.
+
+    Several sheets are as wide as the page.
+    """
+    sheets: list[list[list[_Cell]]] = []
+    left = 0.0
+    for row in _rows([cell(picture) for picture in pictures]):
+        if not sheets or _tall(row) > left:
+            sheets.append([])
+            left = PAGE_HEIGHT - _heading(title, PAGE)[1]
+        sheets[-1].append(row)
+        left -= _tall(row) + APART
+    return [_sheet(rows, title, PAGE if len(sheets) > 1 else 0.0) for rows in sheets]
+
+
+def _sheet(rows: Sequence[Sequence[_Cell]], title: str, least: float = 0.0) -> Figure:
+    """Rows of pictures below each other, at least so wide (mm)."""
     ready()
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    cells = [cell(picture) for picture in pictures]
-    rows = _rows(cells)
-    widest = max((_across(row) for row in rows), default=20.0)
-    heading = wrapped(title, HEADING, max(widest, CAPTION), heavy=True)
+    widest = max(least, max(map(_across, rows), default=20.0))
+    heading, above = _heading(title, widest)
     widest = max([widest, *(measured(line, HEADING, heavy=True).width for line in heading)])
-    above = LEADING * POINT * HEADING * len(heading) + (3.0 if heading else 0.0)
-    heights = [max(each.inside[1] for each in row) + max(each.below for each in row) for row in rows]
     width = widest + 2.0 * EDGE
-    height = above + sum(heights) + APART * max(len(rows) - 1, 0) + 2.0 * EDGE
+    height = above + sum(map(_tall, rows)) + APART * max(len(rows) - 1, 0) + 2.0 * EDGE
     if max(width, height) > LARGEST:
         raise BadInput("scale", f"the drawing would be {max(width, height) / 1e3:.3g} m on paper: choose a smaller one")
     with rc_context(SETTINGS):
@@ -124,14 +141,25 @@ def figure(pictures: Sequence[Picture], title: str = "") -> Figure:
             top -= LEADING * POINT * HEADING
             _write(made, line, (width / 2.0, top), HEADING)
         top = height - EDGE - above
-        for row, tall in zip(rows, heights, strict=True):
+        for row in rows:
             left = (width - _across(row)) / 2.0
             floor = top - max(each.inside[1] for each in row)
             for each in row:
                 put(made, each, (left, floor))
                 left += each.width + APART
-            top -= tall + APART
+            top -= _tall(row) + APART
     return made
+
+
+def _heading(title: str, widest: float) -> tuple[list[str], float]:
+    """The lines of a title above pictures so wide, and what they take (mm)."""
+    lines = wrapped(title, HEADING, max(widest, CAPTION), heavy=True)
+    return lines, LEADING * POINT * HEADING * len(lines) + (3.0 if lines else 0.0)
+
+
+def _tall(row: Sequence[_Cell]) -> float:
+    """mm that a row takes, with the texts below."""
+    return max(each.inside[1] for each in row) + max(each.below for each in row)
 
 
 def saved(figure: Figure, suffix: str) -> bytes:

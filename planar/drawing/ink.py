@@ -46,8 +46,15 @@ INK = {
     Pen.CHORD: Ink(0.5, "#000000"),
     Pen.CHORD_FOUND: Ink(0.25, "#6a1b9a", (2.2, 1.1)),
     Pen.CHORD_SOLVED: Ink(0.35, "#a84a00", (3.5, 0.9, 0.4, 0.9)),
+    Pen.REACTION: Ink(0.35, "#0b46a8"),
+    Pen.LOAD: Ink(0.65, "#b00f1a"),
+    Pen.INERTIA: Ink(0.4, "#00796b", (1.6, 0.8)),
+    Pen.AXIS: Ink(0.25, "#000000"),
+    Pen.CURVE: Ink(0.45, "#000000"),
+    Pen.SHARE: Ink(0.2, "#0b46a8"),
+    Pen.MEAN: Ink(0.25, "#333333", (4.0, 0.9, 0.5, 0.9)),
 }
-FILLS = {Fill.PAPER: "#ffffff", Fill.LINK: "#ece7dd"}
+FILLS = {Fill.PAPER: "#ffffff", Fill.LINK: "#ece7dd", Fill.ABOVE: "#c9c9c9", Fill.BELOW: "#ececec"}
 """Colours of areas; those that are not here are empty."""
 
 

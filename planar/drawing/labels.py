@@ -50,16 +50,28 @@ def placed(letters: Iterable[Letter], marks: Iterable[Mark], obstacles: Sequence
     40 mm is taken.
     """
     marks = list(marks)
-    named = [joined(together) for together in _together([fit(each) for each in letters if each.text.strip()])]
+    fitted = [fit(each) for each in letters if each.text.strip()]
+    settled = tuple(Placed(each, _beside(each, each.side), None) for each in fitted if each.side is not None)
+    named = [joined(together) for together in _together([each for each in fitted if each.side is None])]
     if not named:
-        return ()
-    board = _Board(named, pieces(marks), np.array(obstacles, dtype=float).reshape(-1, 4))
+        return settled
+    taken = [*obstacles, *(each.box for each in settled)]
+    board = _Board(named, pieces(marks), np.array(taken, dtype=float).reshape(-1, 4))
     board.settle()
     rims = [mark for mark in marks if isinstance(mark, Circle)]
-    return tuple(
+    return settled + tuple(
         Placed(letter, Box(*map(float, box)), _leader(letter, box, rims))
         for letter, box in zip(named, board.boxes, strict=True)
     )
+
+
+def _beside(letter: Letter, side: Spot) -> Box:
+    """The box of a letter that has to stand on one side of its spot."""
+    width, height, _ = measured(letter.text, letter.size, letter.slanted, letter.math)
+    x, y = (
+        at + way * (letter.away + size / 2.0) for at, way, size in zip(letter.at, side, (width, height), strict=True)
+    )
+    return Box(x - width / 2.0, y - height / 2.0, x + width / 2.0, y + height / 2.0)
 
 
 def _alike(one: Letter, other: Letter) -> bool:

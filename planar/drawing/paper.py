@@ -17,6 +17,9 @@ ROUND = (1.0, 2.0, 5.0, 10.0)
 PLAIN = (1.0, 2.0, 5.0)
 DEGREES = (1.0, 2.0, 3.0, 4.5, 6.0, 9.0, 1.5)
 """First digits of the step between two numbers of an axis."""
+THOUSANDS = (("G", 1e9), ("M", 1e6), ("k", 1e3))
+LARGE, SMALL = 10.0, 0.01
+"""A force or a couple is said in the next larger unit from so many of these on, below so many in thousandths."""
 SYMBOLS = {"length": "μₗ", "velocity": "μᵥ", "acceleration": "μₐ"}
 """Of the calculating scales of a space diagram and its polygons."""
 
@@ -66,6 +69,18 @@ def round_step(least: float, firsts: Sequence[float] = PLAIN) -> float:
     power = 10.0 ** (floor(log10(least)) - 1)
     steps = sorted(first * power * more for first in firsts for more in (1.0, 10.0, 100.0))
     return next(step for step in steps if step >= least * (1.0 - 1e-9))
+
+
+def prefixed(value: float) -> tuple[str, float]:
+    """The prefix of the unit in which so much force (N) or couple (N m) is said, and how many SI units that has."""
+    small = ("m", 1e-3) if 0.0 < abs(value) < SMALL else ("", 1.0)
+    return next((each for each in THOUSANDS if abs(value) >= LARGE * each[1]), small)
+
+
+def said(value: float, measure: str) -> str:
+    """A force (N) or a couple (N m) with its unit: 46.65 kN."""
+    prefix, by = prefixed(value)
+    return f"{value / by:.4g} {prefix}{measure}".replace("-", "−")
 
 
 def raised(written: str) -> str:

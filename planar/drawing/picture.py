@@ -61,6 +61,20 @@ class Pen(Enum):
     """In a circle diagram: a centre found by Kennedy's theorem."""
     CHORD_SOLVED = "chord solved"
     """In a circle diagram: a centre found by equations."""
+    REACTION = "reaction"
+    """A force or couple that a pair puts on a link."""
+    LOAD = "load"
+    """A load, a weight, a spring, or what an input supplies."""
+    INERTIA = "inertia"
+    """A force of inertia, which nothing puts on a link."""
+    AXIS = "axis"
+    """An axis of a diagram, with its ticks."""
+    CURVE = "curve"
+    """A curve of a diagram."""
+    SHARE = "share"
+    """A part of what a curve is made of."""
+    MEAN = "mean"
+    """The mean of a curve."""
 
 
 class Fill(Enum):
@@ -71,6 +85,10 @@ class Fill(Enum):
     """Hides what lies below."""
     LINK = "link"
     """The light tone of a link that is a plate."""
+    ABOVE = "above"
+    """What of a curve is above its mean."""
+    BELOW = "below"
+    """What of a curve is below its mean."""
 
 
 class Line(NamedTuple):
@@ -121,6 +139,8 @@ class Letter(NamedTuple):
     away: float = 1.0
     slanted: bool = False
     math: bool = False
+    side: Spot | None = None
+    "the only side on which it may stand, such as (0, -1) for below, as the numbers of an axis do"
 
 
 Mark = Line | Arrow | Circle | Letter

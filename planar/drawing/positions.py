@@ -75,12 +75,9 @@ def positions(
     marks += body_marks(mechanism, made, run.frames(rows[0]), shapes, scale)
     marks += _letters(run, chosen, rows, scale)
     marks += (mark for mark in centres if isinstance(mark, Letter))
-    step = amount(
-        float(run.turned[rows[1]] - run.turned[rows[0]]), "length" if run.slides else "angle", mechanism.units
-    )
     notes = (
         _start(run),
-        f"The next positions follow every {step} of the input {run.given.pair}",
+        f"The next positions follow every {_gone(run, rows[0], rows[1])}",
         f"Space diagram, {scale}",
     )
     return Picture(tuple(marks), f"{mechanism.name}: {count} positions", notes)
@@ -94,7 +91,7 @@ def loci(motion: Motion | Mechanism, points: Iterable[str] | None = None, scale:
     there, NoAnswer where there is no motion.
     """
     run = closing(steady(motion, steps=SMOOTH))
-    mechanism, units = run.motion.mechanism, run.motion.mechanism.units
+    mechanism = run.motion.mechanism
     chosen = chosen_points(run, points) if points is not None else coupler_points(run)
     scale = scale or _fitting(run)
     here, low, high = run.given.position, float(run.position.min()), float(run.position.max())
@@ -113,8 +110,7 @@ def loci(motion: Motion | Mechanism, points: Iterable[str] | None = None, scale:
         paths += (Circle(spot(at[row] / scale.per_mm), MARK, Pen.PATH, f"mark of {name}", Fill.PAPER) for row in rows)
         names.append(Letter(f"path of {name}", _free(run, at / scale.per_mm, scale, letters), f"path {name}", 8.0))
     strokes = tuple(mark for mark in drawn.marks if not isinstance(mark, Letter))
-    gone = amount(float(run.turned[-1]), "length" if run.slides else "angle", units)
-    notes = (f"Paths over {gone} of the input {run.given.pair}, marked at 12 equal divisions", *drawn.notes)
+    notes = (f"Paths over {_gone(run, 0, -1)}, marked at 12 equal divisions", *drawn.notes)
     return Picture((*paths, *strokes, *letters, *names), f"{mechanism.name}: loci", notes)
 
 
@@ -177,8 +173,8 @@ def _rows(run: Run, count: int) -> Sequence[int]:
     """The rows at equal divisions; where a run stopped early, those nearest to them."""
     rows = run.places(count)
     if rows is None:
-        wanted = np.linspace(0.0, run.turned[-1], count + 1)
-        rows = np.abs(run.turned[None, :] - wanted[:, None]).argmin(axis=1)
+        wanted = np.linspace(0.0, run.time[-1], count + 1)
+        rows = np.abs(run.time[None, :] - wanted[:, None]).argmin(axis=1)
     return [int(row) for row in rows]
 
 
@@ -259,6 +255,18 @@ def _dead_centres(run: Run, scale: Scale) -> Iterator[Mark]:
         here = at[0] + slope * (end.value - went[0])
         yield Line((spot(here), spot(here + CENTRE * across)), Pen.CONSTRUCTION, f"{name} of {pair.name}")
         yield Letter(name, spot(here + CENTRE * across), f"{name} of {pair.name}", 8.0, 0.5)
+
+
+def _gone(run: Run, first: int, last: int) -> str:
+    """What lies between two rows: a time, or how far the input goes."""
+    if run.in_time:
+        return f"{run.time[last] - run.time[first]:.6g} s"
+    gone = amount(
+        float(run.turned[last] - run.turned[first]),
+        "length" if run.slides else "angle",
+        run.motion.mechanism.units,
+    )
+    return f"{gone} of the input {run.given.pair}"
 
 
 def _start(run: Run) -> str:

@@ -1,4 +1,4 @@
-"""The run that a drawing of a whole motion shows: at a steady speed, from the top dead centre on where there is one."""
+"""The run that a drawing of a whole motion shows: in time as it is, else at a steady speed, from top dead centre on."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from planar.analysis.extremes import Stroke, stroke
 from planar.drawing.scene import standing
+from planar.dynamics.flywheel import running
 from planar.errors import BadInput, Outcome, PlanarError
 from planar.mechanism import Drive, Input, Mechanism, with_inputs
 from planar.motion import Motion, Unknown
@@ -31,7 +32,7 @@ FINE = 720
 
 
 class Run(NamedTuple):
-    """A run of one input at a steady speed, its rows n in the order of time.
+    """A run of one input at a steady speed, or a motion in time, its rows n in the order of time.
 
     `rate` is the input's speed (rad/s or m/s), 1 where the file gives none: rates are then per radian, or per metre,
     and `timed` is false. `stroke` is that of the slide from whose top the run starts, if it lies within the run.
@@ -52,8 +53,15 @@ class Run(NamedTuple):
         return self.turns > 0
 
     @property
+    def in_time(self) -> bool:
+        """Whether it is a motion in time, in which inputs go as they do, to and fro for instance."""
+        return self.motion.time is not None
+
+    @property
     def order(self) -> slice:
         """The rows in the order of time."""
+        if self.in_time:
+            return slice(None)
         position = self.motion.inputs[self.given.pair].position
         return slice(None, None, -1) if (position[-1] - position[0]) * self.rate < 0.0 else slice(None)
 
@@ -70,7 +78,7 @@ class Run(NamedTuple):
     @property
     def time(self) -> Array:
         """Time from the start (n,), s; the same as `turned` where the file gives no speed."""
-        return self.turned / abs(self.rate)
+        return self.turned / abs(self.rate) if self.motion.time is None else self.motion.time
 
     @property
     def slides(self) -> bool:
@@ -158,14 +166,17 @@ def steady(
     """The run of a mechanism, or the same range as a motion's, in at least so many steps, a multiple of `count`.
 
     Over a whole turn it starts where `slide` (left out: the first on the frame that is not driven) is in its top dead
-    centre, else where the motion starts; acceleration of the input is left out. Raises BadInput and NoAnswer.
+    centre, else where the motion starts; acceleration of the input is left out. A motion in time stays as it is.
+    Raises BadInput and NoAnswer.
     """
     mechanism = what.mechanism if isinstance(what, Motion) else what
-    pair = _runs(what) if isinstance(what, Motion) else pair or _only(mechanism)
+    pair = running(what) if isinstance(what, Motion) else pair or _only(mechanism)
     given = next((each for each in mechanism.inputs if each.pair == pair), None)
     if given is None:
         raise BadInput(pair, f"there is no input at {pair!r}; inputs are at {_named(mechanism)}")
     rate = given.velocity or 1.0
+    if isinstance(what, Motion) and what.time is not None:
+        return Run(what, given, rate, timed=True, turns=0, stroke=None)
     timed = given.velocity != 0.0
     driven = with_inputs(mechanism, (Drive(pair, None, rate, 0.0),))
     steps = count * ceil(steps / count)
@@ -249,12 +260,6 @@ def _only(mechanism: Mechanism) -> str:
 
 def _named(mechanism: Mechanism) -> str:
     return ", ".join(given.pair for given in mechanism.inputs) or "none"
-
-
-def _runs(motion: Motion) -> str:
-    """The input that runs in a motion."""
-    spans = {name: float(np.ptp(given.position)) for name, given in motion.inputs.items()}
-    return max(spans, key=spans.__getitem__)
 
 
 def _same(motion: Motion, driven: Mechanism, pair: str, steps: int) -> Motion:

@@ -67,6 +67,8 @@ class Pair(ABC):
     """The names of its results, in order, and the kind of quantity that each is."""
     drive_kind: ClassVar[Kind]
     """Whether its input is an angle or a length."""
+    ties_angles: ClassVar[bool] = False
+    """Whether it ties angles alone: what holds it are couples, whatever forces they come from (see `contact`)."""
 
     @property
     def bodies(self) -> tuple[str, ...]:
@@ -95,6 +97,16 @@ class Pair(ABC):
 
     def rides(self) -> tuple[tuple[str, str], str] | None:
         """((link, point), link): a point of one link that moves along a line of another, if it does."""
+        return None
+
+    def effort(self, frames: Mapping[str, Frame], shapes: Mapping[str, Shape]) -> Effort:
+        """How an effort of its drive acts."""
+        return Effort(self.links[1], self.links[0])
+
+    def contact(
+        self, frames: Mapping[str, Frame], shapes: Mapping[str, Shape], beside: Sequence[Pair]
+    ) -> Contact | None:
+        """Where its teeth touch, beside all pairs of its mechanism; None without teeth, or where that is not known."""
         return None
 
     def marks(self, shapes: Mapping[str, Shape], beside: Sequence[Pair]) -> tuple[Mark, ...]:
@@ -157,6 +169,32 @@ class Pair(ABC):
     @abstractmethod
     def samples(cls) -> tuple[Sample, ...]:
         """Small closed configurations, in general position, on which every law is tried."""
+
+
+class Effort(NamedTuple):
+    """How what drives a pair acts: on one link, and the opposite on another, in the positive sense of the drive.
+
+    A couple, or a force at a place along a way (of length one), in the world's axes.
+    """
+
+    on: str
+    against: str
+    at: Vector | None = None
+    way: Vector | None = None
+
+
+class Contact(NamedTuple):
+    """Where teeth of two links press on one another, in the world's axes.
+
+    They touch at the pitch point `at`; of the force on the second link the part along `way` drives, and `slope` times
+    that part, whatever its sense, pushes it off along `apart` (both of length one): the slope is the tangent of the
+    pressure angle.
+    """
+
+    at: Vector
+    way: Vector
+    apart: Vector
+    slope: float
 
 
 class Rewritten(NamedTuple):

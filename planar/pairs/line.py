@@ -7,11 +7,9 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
 from planar.algebra import Scalar, atan2, sqrt
-from planar.pairs.base import Entry, Kind, Pair, Quantity, Schema, described
+from planar.pairs.base import Effort, Entry, Kind, Pair, Quantity, Schema, described
 from planar.plane import Frame, Vector, direction
-from planar.shapes import Shape
-
-Spot = str | tuple[float, float]
+from planar.shapes import Shape, Spot
 
 LINE: Schema = {
     "type": "object",
@@ -102,6 +100,11 @@ class Guided(Pair):
     def drive(self, frames: Sequence[Frame], numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Scalar:
         """The distance from `through` to the point along the line."""
         return own[0]
+
+    def effort(self, frames: Mapping[str, Frame], shapes: Mapping[str, Shape]) -> Effort:
+        first, second = self.links
+        at = frames[second].carry(shapes[second].at(self.point))
+        return Effort(second, first, at, frames[first].turn(self._guide(shapes)[1]))
 
     def report(self, position: Scalar, rate: Scalar, second: Scalar) -> dict[str, Scalar | None]:
         return dict(zip(self.reports, (position, rate, second), strict=True))

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import tan
 from typing import Any, ClassVar, Self
 
 from planar.algebra import Scalar
-from planar.pairs.base import Entry, Kind, Pair, Quantity, Sample, Schema, Told, described, plain, several
+from planar.pairs.base import Contact, Entry, Kind, Pair, Quantity, Sample, Schema, Told, described, plain, several
 from planar.pairs.line import LINE, MEASURES, Guided, Line, along
 from planar.pairs.marks import Mark, PitchLine, Wheel
+from planar.pairs.teeth import PRESSURE_ANGLE, TEETH, read_pressure_angle, write_pressure_angle
 from planar.plane import Frame, Vector, direction, frame_at
 from planar.shapes import Shape
 
@@ -25,6 +27,7 @@ class Rack(Guided):
 
     radius: float
     meet: tuple[float, float] = (0.0, 0.0)
+    pressure_angle: float = PRESSURE_ANGLE
 
     keyword: ClassVar[str] = "rack"
     members: ClassVar[Mapping[str, Schema]] = {
@@ -38,6 +41,7 @@ class Rack(Guided):
             "required": ["displacement", "angle"],
             "additionalProperties": False,
         },
+        **TEETH,
     }
     required: ClassVar[tuple[str, ...]] = ("links", "line", "point", "radius")
     touching: ClassVar[str] = "the centre lies left of the line for a radius above zero, right for one below"
@@ -65,6 +69,17 @@ class Rack(Guided):
     def apart(self, numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Scalar:
         return own[1] - numbers[6]
 
+    def contact(
+        self, frames: Mapping[str, Frame], shapes: Mapping[str, Shape], beside: Sequence[Pair]
+    ) -> Contact | None:
+        """Where the pitch circle touches the pitch line."""
+        rack, pinion = self.links
+        _, along_line = self._guide(shapes)
+        way = frames[rack].turn(along_line)
+        left = Vector(-way.y, way.x) * (1.0 if self.radius > 0.0 else -1.0)
+        centre = frames[pinion].carry(shapes[pinion].at(self.point))
+        return Contact(centre - left * abs(self.radius), way, left, tan(self.pressure_angle))
+
     def marks(self, shapes: Mapping[str, Shape], beside: Sequence[Pair]) -> tuple[Mark, ...]:
         rack, pinion = self.links
         wheel = Wheel(self.name, pinion, shapes[pinion].at(self.point), abs(self.radius))
@@ -83,7 +98,7 @@ class Rack(Guided):
             mesh = entry.inside("mesh")
             mesh.only("displacement", "angle")
             meet = (mesh.quantity("displacement", "length"), mesh.turned("angle"))
-        return (cls(name, links, line, point, radius, meet),)
+        return (cls(name, links, line, point, radius, meet, read_pressure_angle(entry)),)
 
     @classmethod
     def write(cls, group: Sequence[Self], quantity: Quantity) -> dict[str, Any]:
@@ -93,7 +108,7 @@ class Rack(Guided):
         if pair.meet != (0.0, 0.0):
             s0, a0 = pair.meet
             entry["mesh"] = {"displacement": quantity(s0, "length"), "angle": quantity(a0, "angle")}
-        return entry
+        return entry | write_pressure_angle(pair.pressure_angle, quantity)
 
     @classmethod
     def samples(cls) -> tuple[Sample, ...]:

@@ -8,7 +8,7 @@ from itertools import combinations
 from typing import Any, ClassVar, Self
 
 from planar.algebra import Scalar
-from planar.pairs.base import Entry, Kind, Pair, Quantity, Sample, Schema, described, plain, several
+from planar.pairs.base import Effort, Entry, Kind, Pair, Quantity, Sample, Schema, described, plain, several
 from planar.pairs.marks import Mark, Pin
 from planar.plane import Frame, Vector, frame_at
 from planar.shapes import Shape
@@ -53,6 +53,10 @@ class Turning(Pair):
         """The angle of the second link against the first; at a pin on the frame, of the other link."""
         first, second = frames
         return first.angle - second.angle if second.fixed else second.angle - first.angle
+
+    def effort(self, frames: Mapping[str, Frame], shapes: Mapping[str, Shape]) -> Effort:
+        first, second = self.links
+        return Effort(first, second) if frames[second].fixed else Effort(second, first)
 
     def report(self, position: Scalar, rate: Scalar, second: Scalar) -> dict[str, Scalar | None]:
         rubbing = None if self.radius is None else abs(rate) * self.radius

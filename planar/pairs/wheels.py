@@ -9,7 +9,7 @@ from math import hypot
 from typing import Any, ClassVar, Self
 
 from planar.algebra import Scalar
-from planar.pairs.base import Entry, Kind, Pair, Quantity, Sample, Schema, Told, described, plain, several
+from planar.pairs.base import Effort, Entry, Kind, Pair, Quantity, Sample, Schema, Told, described, plain, several
 from planar.pairs.marks import Mark, Wheel
 from planar.plane import Frame, Vector, frame_at
 from planar.shapes import Shape
@@ -50,6 +50,7 @@ class Wheels(Pair):
     rule: ClassVar[Schema] = {"oneOf": [{"required": [key]} for key in SIZES]}
     lower: ClassVar[bool] = False
     counts_turns: ClassVar[bool] = True
+    ties_angles: ClassVar[bool] = True
     constrains: ClassVar[tuple[Kind, ...]] = (Kind.TURNS,)
     measures: ClassVar[tuple[Kind, ...]] = (Kind.PURE, Kind.TURNS, Kind.TURNS)
     reports: ClassVar[Mapping[str, str]] = {
@@ -78,6 +79,9 @@ class Wheels(Pair):
     def drive(self, frames: Sequence[Frame], numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Scalar:
         """The angle of the second wheel against the carrier."""
         return frames[1].angle - frames[2].angle
+
+    def effort(self, frames: Mapping[str, Frame], shapes: Mapping[str, Shape]) -> Effort:
+        return Effort(self.links[1], self.carrier)
 
     def report(self, position: Scalar, rate: Scalar, second: Scalar) -> dict[str, Scalar | None]:
         return dict(zip(self.reports, (position, rate, second), strict=True))

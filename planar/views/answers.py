@@ -15,7 +15,7 @@ from planar.analysis.output import Axis, Extreme
 from planar.mechanism import Units
 from planar.motion import Motion
 from planar.units import unit
-from planar.views.loads import MEASURES
+from planar.views.advantages import MEASURES
 from planar.views.table import DIGITS, plain_table
 from planar.words import amount
 

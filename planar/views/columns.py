@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -15,14 +15,21 @@ Array = np.ndarray
 POINTS = {"position": "length", "velocity": "velocity", "acceleration": "acceleration", "jerk": "jerk"}
 """What is told of a point, and the kind of quantity that each is; a jerk where the run has one."""
 
-_LETTERS = {"position": "", "velocity": "v", "acceleration": "a", "jerk": "j"}
+MEASURES = SI | {"power": "W", "energy": "J"}
+"""The unit of every kind of quantity that results have."""
+
+_LETTERS = {"position": "", "velocity": "v", "acceleration": "a", "jerk": "j", "force": "F"}
+
+
+_KINDS = {"inputs": "input ", "pairs": "pair ", "reactions": "reaction "}
 
 
 class Told(NamedTuple):
     """What a run tells of one thing, in SI.
 
-    `group` is "inputs", "points", "links" or "pairs"; `values` are arrays (n,), of points (n, 2), under the names of
-    the quantities, None where the thing has no such quantity; `kinds` are the kinds of these quantities (see units.SI).
+    `group` is "inputs", "points", "links" or "pairs", or what else is told beside the run; a name that is empty means
+    the mechanism as a whole. `values` are arrays (n,), or (n, 2) of vectors, under the names of the quantities, None
+    where the thing has no such quantity; `kinds` are the kinds of these quantities (see MEASURES).
     """
 
     group: str
@@ -66,14 +73,14 @@ def told(motion: Motion) -> Iterator[Told]:
         yield Told("pairs", name, motion.reported(name), report)
 
 
-def columns(motion: Motion) -> Iterator[Column]:
-    """Time where there is one, then all that is told of the run but the frame's rest, under names that differ.
+def columns(motion: Motion, more: Iterable[Told] = ()) -> Iterator[Column]:
+    """Time where there is one, all that is told of the run but the frame's rest, then more; under names that differ.
 
     Positions and angles are in the units of the mechanism's file, everything else in SI.
     """
     own = {"angle": motion.mechanism.units.angle, "length": motion.mechanism.units.length}
     taken: set[str] = set()
-    for name, kind, values in _named(motion):
+    for name, kind, values in _named(motion, more):
         different, again = name, 1
         while different in taken:  # as a link "pair G" beside a pair "G"
             again += 1
@@ -83,21 +90,21 @@ def columns(motion: Motion) -> Iterator[Column]:
             _, numerator, denominator = unit(own[kind])
             yield Column(different, own[kind], kind, values * denominator / numerator)
         else:
-            yield Column(different, SI[kind], kind, values)
+            yield Column(different, MEASURES[kind], kind, values)
 
 
-def _named(motion: Motion) -> Iterator[tuple[str, str, Array]]:
+def _named(motion: Motion, more: Iterable[Told]) -> Iterator[tuple[str, str, Array]]:
     """Name, kind and values (n,) in SI of every column."""
     if motion.time is not None:
         yield "time", "time", motion.time
-    for thing in told(motion):
+    for thing in (*told(motion), *more):
         if thing.group == "links" and thing.name == motion.mechanism.frame:
             continue
-        of = {"inputs": "input ", "pairs": "pair "}.get(thing.group, "") + thing.name
+        of = _KINDS.get(thing.group, "") + thing.name or thing.group
         for what, values in thing.values.items():
             if values is None:
                 continue
-            if thing.group == "points":
+            if values.ndim == 2:
                 for axis, part in zip("xy", values.T, strict=True):
                     yield f"{of} {_LETTERS[what]}{axis}", thing.kinds[what], part
             else:

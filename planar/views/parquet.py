@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from planar.errors import BadInput
 from planar.motion import Motion
-from planar.views.columns import about, columns
+from planar.views.columns import Told, about, columns
 
 
 def ready() -> None:
@@ -15,7 +17,7 @@ def ready() -> None:
         raise BadInput("pyarrow", "Parquet files need pyarrow: pip install 'planar[parquet]'") from None
 
 
-def written(motion: Motion) -> bytes:
+def written(motion: Motion, more: Iterable[Told] = ()) -> bytes:
     """The columns of a CSV file, with the same heads, as doubles. Raises BadInput where pyarrow is not installed.
 
     Every field has "unit" and "quantity" in its metadata, the schema has "mechanism", "outcome" and "reason". What is
@@ -26,7 +28,7 @@ def written(motion: Motion) -> bytes:
     from pyarrow import parquet
 
     fields, arrays = [], []
-    for column in columns(motion):
+    for column in columns(motion, more):
         arrays.append(pa.array(column.values, pa.float64(), from_pandas=True))  # that is: NaN is null
         told = {"unit": column.unit, "quantity": column.kind}
         fields.append(pa.field(column.head, pa.float64(), metadata=told))

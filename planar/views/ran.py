@@ -22,15 +22,20 @@ WHOLE = 1e-9
 
 def ran(motion: Motion) -> RenderableType:
     """A run: its range, its limits, and for every point where it went and how fast it was, at most, among the rows."""
+    tables = [Text(), _limits(motion)] if motion.limits else []
+    notes = [paragraphs(("-", remark) for remark in motion.remarks)] if motion.remarks else []
+    return Group(*heading(motion), *tables, Text(), _points(motion), *notes)
+
+
+def heading(motion: Motion) -> list[Text]:
+    """What runs, from where to where, and how well it is solved."""
     lines = [Text(motion.mechanism.name, style="bold")]
     lines += [Text(_range(motion, name)) for name in motion.inputs]
     if motion.time is not None:
         lines.append(Text(f"in time, from 0 s to {motion.time[-1]:.6g} s"))
     worst = f"worst residual {motion.residual:.1e} of the mechanism's size"
     lines.append(Text(f"{many(len(motion), 'position')}; {worst}" + (f"; {motion.reason}" if motion.reason else "")))
-    tables = [Text(), _limits(motion)] if motion.limits else []
-    notes = [paragraphs(("-", remark) for remark in motion.remarks)] if motion.remarks else []
-    return Group(*lines, *tables, Text(), _points(motion), *notes)
+    return lines
 
 
 def _range(motion: Motion, name: str) -> str:
@@ -54,17 +59,31 @@ def _range(motion: Motion, name: str) -> str:
 def _limits(motion: Motion) -> Table:
     """Dead points, change points and ends of strokes, solved for."""
     units = motion.mechanism.units
-    running = _running(motion)
-    at = "time, s" if running is None else f"at {running}, {units.length if motion.slides(running) else units.angle}"
+    driver = running(motion)
+    at = place_heading(motion)
     table = plain_table("Limits, solved for", "limit", "of", at, "where")
     for limit in motion.limits:
         of = [name for name in (limit.of,) if name]
         kind = "length" if limit.of and motion.slides(limit.of) else "angle"
         where = amount(limit.value, kind, units) if limit.kind == "stroke end" else ""
-        at_input = limit.input if running is None else _in_units(motion, running, limit.input)
+        at_input = limit.input if driver is None else _in_units(motion, driver, limit.input)
         name = f"{limit.kind}, {limit.end}" if limit.end else limit.kind
         table.add_row(name, listed(of) if of else "", number(at_input), where)
     return table
+
+
+def place_heading(motion: Motion) -> str:
+    """The heading of a column that says where in a run something is: at the input that runs, or the time."""
+    driver, units = running(motion), motion.mechanism.units
+    return "time, s" if driver is None else f"at {driver}, {units.length if motion.slides(driver) else units.angle}"
+
+
+def place(motion: Motion, row: int) -> str:
+    """Where in a run a row is, under that heading."""
+    driver = running(motion)
+    if motion.time is not None:
+        return number(float(motion.time[row]))
+    return number(_in_units(motion, driver, float(motion.inputs[driver].position[row]))) if driver else ""
 
 
 def _in_units(motion: Motion, pair: str, value: float) -> float:
@@ -72,7 +91,7 @@ def _in_units(motion: Motion, pair: str, value: float) -> float:
     return unit(units.length if motion.slides(pair) else units.angle).from_si(value)
 
 
-def _running(motion: Motion) -> str | None:
+def running(motion: Motion) -> str | None:
     """The input that runs, unless they run in time."""
     if motion.time is not None:
         return None

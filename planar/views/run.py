@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -12,12 +13,12 @@ import numpy as np
 from planar.errors import BadInput
 from planar.motion import Motion
 from planar.results import Limit
-from planar.units import SI
 from planar.views import parquet
-from planar.views.columns import about, columns, told
+from planar.views.columns import MEASURES, Told, about, columns, told
 
 Array = np.ndarray
 
+_NOTHING: Mapping[str, Any] = MappingProxyType({})
 ROWS = 500
 """Of a CSV file that are made at a time: enough to be quick, few enough for the memory of many columns."""
 
@@ -30,25 +31,32 @@ def writable(suffix: str) -> None:
         parquet.ready()
 
 
-def written(motion: Motion, suffix: str) -> bytes:
-    """The run in the format that a file's suffix names. Raises BadInput."""
+def written(motion: Motion, suffix: str, more: Iterable[Told] = (), said: Mapping[str, Any] = _NOTHING) -> bytes:
+    """The run, and what more is told of it, in the format that a file's suffix names. Raises BadInput.
+
+    What is `said` of all of it together is for JSON.
+    """
     writable(suffix)
-    return _FORMATS[suffix.lower()](motion)
+    if suffix.lower() == ".json":
+        return _json(motion, more, said)
+    return _FORMATS[suffix.lower()](motion, more)
 
 
-def record(motion: Motion) -> dict[str, Any]:
+def record(motion: Motion, more: Iterable[Told] = (), said: Mapping[str, Any] = _NOTHING) -> dict[str, Any]:
     """The run as a JSON value in SI; null where no rate is determined.
 
     "time" is there where the run has one, so are "jerk" of points and "angular_jerk" of links; "limits" is a list of
     what `planar.results.Limit` holds.
     """
-    return _record(motion, _list)
+    return _record(motion, more, _list) | said
 
 
-def _record(motion: Motion, shown: Callable[[Array | None], Any]) -> dict[str, Any]:
+def _record(motion: Motion, more: Iterable[Told], shown: Callable[[Array | None], Any]) -> dict[str, Any]:
     groups: dict[str, dict[str, Any]] = {"inputs": {}, "links": {}, "points": {}, "pairs": {}}
-    for thing in told(motion):
-        groups[thing.group][thing.name] = {what: shown(values) for what, values in thing.values.items()}
+    for thing in (*told(motion), *more):
+        group = groups.setdefault(thing.group, {})
+        named = group.setdefault(thing.name, {}) if thing.name else group
+        named |= {what: shown(values) for what, values in thing.values.items()}
     return {
         **about(motion),
         "residual": motion.residual,
@@ -74,15 +82,15 @@ def _list(values: Array | None) -> Any:
     return (values if there.all() else np.where(there, values, None)).tolist()
 
 
-def _json(motion: Motion) -> bytes:
-    whole = _record(motion, lambda values: values)
+def _json(motion: Motion, more: Iterable[Told], said: Mapping[str, Any]) -> bytes:
+    whole = _record(motion, more, lambda values: values) | said
     # arrays become lists one by one as they are written: lists of a long run take four times the memory of its arrays
     return (json.dumps(whole, default=_list, ensure_ascii=False, allow_nan=False) + "\n").encode()
 
 
-def _csv(motion: Motion) -> bytes:
+def _csv(motion: Motion, more: Iterable[Told]) -> bytes:
     """A row a position; positions and angles in the units of the mechanism's file, rates in SI, as the heads say."""
-    all_columns = tuple(columns(motion))
+    all_columns = tuple(columns(motion, more))
     text = io.BytesIO()
     text.write((",".join(_cell(column.head) for column in all_columns) + "\n").encode())
     for first in range(0, len(motion), ROWS):
@@ -97,7 +105,7 @@ def _cell(text: str) -> str:
     return '"' + text.replace('"', '""') + '"' if any(mark in text for mark in ',"\n\r') else text
 
 
-def _npz(motion: Motion) -> bytes:
+def _npz(motion: Motion, more: Iterable[Told]) -> bytes:
     """SI arrays under names such as "points/C/velocity", and texts; "units" are rows of an array's name and its unit.
 
     `dict(arrays["units"])["points/C/velocity"]` is "m/s".
@@ -105,19 +113,19 @@ def _npz(motion: Motion) -> bytes:
     arrays: dict[str, Any] = {}
     units: dict[str, str] = {}
     if motion.time is not None:
-        arrays["time"], units["time"] = motion.time, SI["time"]
-    for thing in told(motion):
+        arrays["time"], units["time"] = motion.time, MEASURES["time"]
+    for thing in (*told(motion), *more):
         for what, values in thing.values.items():
             if values is not None:
-                name = f"{thing.group}/{thing.name}/{what}"
-                arrays[name], units[name] = values, SI[thing.kinds[what]]
+                name = "/".join(filter(None, (thing.group, thing.name, what)))
+                arrays[name], units[name] = values, MEASURES[thing.kinds[what]]
     texts = {what: np.array(text) for what, text in about(motion).items()}
     content = io.BytesIO()
     np.savez(content, **arrays, **texts, units=np.array(list(units.items())))
     return content.getvalue()
 
 
-_FORMATS: dict[str, Callable[[Motion], bytes]] = {
+_FORMATS: dict[str, Callable[..., bytes]] = {
     ".csv": _csv,
     ".json": _json,
     ".npz": _npz,

@@ -22,6 +22,8 @@ HEADING = 13
 """Characters: longer headings stand in several lines, so that the tables of a textbook mechanism fit 80 columns."""
 DIGITS = 6
 """Significant digits printed; `--json` has all of them."""
+ROUNDING = 1e-12
+"""What is less than this part of what it is told beside is printed as 0."""
 _UNITS = {"rad/s^2": "rad/s²", "m/s^2": "m/s²", "N m": "N·m"}
 
 
@@ -209,6 +211,13 @@ def _reported(value: float | None, kind: str, state: State) -> str:
 
 def number(value: float) -> str:
     return "0" if abs(value) < 1e-14 else f"{value:#.{DIGITS}g}".rstrip(".")
+
+
+def counted(value: float | None, beside: float = 0.0) -> str:
+    """A number, nothing where it is only what rounding leaves of another beside it; a dash where there is none."""
+    if value is None or not np.isfinite(value):
+        return "-"
+    return f"{value:#.{DIGITS}g}".rstrip(".") if abs(value) > ROUNDING * abs(beside) else "0"
 
 
 def plain_table(title: str | None, *headings: str, left: tuple[int, ...] = (0,)) -> Table:

@@ -1,0 +1,1 @@
+"""How forces and motion go together: reactions, inertia, motion under loads."""

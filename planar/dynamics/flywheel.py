@@ -1,0 +1,130 @@
+"""How uneven an input's torque is over a cycle, and the flywheel that keeps its speed within bounds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isclose, pi
+
+import numpy as np
+
+from planar.dynamics.forces import Forces
+from planar.errors import BadInput
+from planar.motion import Motion
+
+Array = np.ndarray
+
+FLUCTUATION = 0.02
+"""The coefficient of fluctuation of speed where none is given."""
+AGAIN = 1e-6
+"""Of the greatest: what may differ between the start and the end of a whole cycle."""
+STEADY = 1e-6
+"""Of the speed: what it may differ by and be steady."""
+
+ROUNDED = 1e-13
+"""Of the greatest torque: a smaller mean is none."""
+
+
+@dataclass(frozen=True)
+class Flywheel:
+    """What a whole cycle asks of a flywheel on the link that an input turns.
+
+    Driven by the steady torque `mean` (N m), the input has `energy` (J) too much and too little by turns: the greatest
+    difference between two places of the integral of mean less torque, at `fastest` and at `slowest` (rad). A moment of
+    inertia `inertia` (kg m^2) keeps (greatest - least) / mean speed to `fluctuation` at the mean `speed` (rad/s):
+    I = energy / (fluctuation speed^2). Without a steady speed both are None.
+    """
+
+    input: str
+    mean: float
+    energy: float
+    fastest: float
+    slowest: float
+    fluctuation: float
+    speed: float | None
+    inertia: float | None
+
+
+def flywheel(forces: Forces, of: str | None = None, fluctuation: float = FLUCTUATION) -> Flywheel:
+    """The flywheel of an input (left out: the one that runs) after forces over a whole cycle of it.
+
+    The torque goes through all positions by a periodic cubic spline, whose integral and places are exact; the links'
+    own inertia is in the torque already, at the speed without fluctuation (J. E. Shigley, Mechanical Engineering
+    Design, chapter on flywheels; R. L. Norton, Design of Machinery, section on flywheels). Raises BadInput for an input
+    that is not there or is no angle, forces that are not over a whole cycle, and a fluctuation that is none.
+    """
+    motion = forces.moving
+    if not 0.0 < fluctuation < 2.0:
+        raise BadInput("fluctuation", f"a coefficient between 0 and 2 is wanted, not {fluctuation!r:.40}")
+    if not isinstance(motion, Motion):
+        raise BadInput("forces", "a flywheel is of a whole cycle; give the forces over a motion")
+    name = running(motion) if of is None else of
+    if name not in forces.inputs:
+        raise BadInput(name, f"there is no input of this name; inputs are at {', '.join(forces.inputs)}")
+    angle, torque = motion.inputs[name].position, np.asarray(forces.inputs[name])
+    refused = no_cycle(forces, name)
+    if refused:
+        raise BadInput(name, refused)
+    if angle[-1] < angle[0]:
+        angle, torque = angle[::-1], torque[::-1]
+    return _evened(name, angle, torque, fluctuation, _speed(motion.inputs[name].velocity))
+
+
+def running(motion: Motion) -> str:
+    """The input that runs farthest in a motion."""
+    return max(motion.inputs, key=lambda name: float(np.ptp(motion.inputs[name].position)))
+
+
+def turns(motion: Motion, name: str) -> int:
+    """The whole turns of an input after which a motion ends as it began; 0 where it does not, or turns back."""
+    angle = motion.inputs[name].position
+    gone = abs(angle[-1] - angle[0]) / (2.0 * pi)
+    ahead = np.sign(angle[-1] - angle[0]) * np.diff(angle) > 0.0
+    if motion.slides(name) or not isclose(gone, round(gone), rel_tol=1e-9) or not ahead.all():
+        return 0
+    places = [motion.point(point).position for point in motion.point_names]
+    size = max((float(np.ptp(each, axis=0).max()) for each in places), default=0.0)
+    return round(gone) if all(np.abs(each[-1] - each[0]).max() <= AGAIN * size for each in places) else 0
+
+
+def no_cycle(forces: Forces, name: str) -> str:
+    """Why forces over a motion are not those of a whole cycle of an input; nothing where they are."""
+    motion, torque = forces.moving, np.asarray(forces.inputs[name])
+    if motion.slides(name):
+        return "a flywheel turns; this input is a length"
+    if not turns(motion, name):
+        return "the motion is no whole cycle: it does not end as it began after whole turns of this input"
+    if not np.isfinite(torque).all():
+        return "the torque is not told all over the cycle"
+    if abs(torque[-1] - torque[0]) > AGAIN * float(np.abs(torque).max()):
+        return "the motion is no whole cycle: the torque does not end as it began"
+    return ""
+
+
+def _speed(velocity: Array) -> float | None:
+    """The steady speed, if it is that."""
+    mean = abs(float(np.mean(velocity)))
+    return mean if mean and float(np.ptp(velocity)) <= STEADY * mean else None
+
+
+def _evened(name: str, angle: Array, torque: Array, fluctuation: float, speed: float | None) -> Flywheel:
+    from scipy.interpolate import CubicSpline  # slow to load, and only needed here
+
+    closed = np.append(torque[:-1], torque[0])
+    mean = float(CubicSpline(angle, closed, bc_type="periodic").integrate(angle[0], angle[-1]) / (angle[-1] - angle[0]))
+    if abs(mean) <= ROUNDED * float(np.abs(torque).max()):
+        mean = 0.0
+    over = CubicSpline(angle, closed - mean, bc_type="periodic")
+    turning = over.roots(extrapolate=False)
+    places = np.concatenate([angle[:1], turning[np.isfinite(turning)]])
+    stored = -over.antiderivative()(places)
+    energy = float(np.ptp(stored))
+    return Flywheel(
+        name,
+        mean,
+        energy,
+        float(places[np.argmax(stored)]),
+        float(places[np.argmin(stored)]),
+        fluctuation,
+        speed,
+        energy / (fluctuation * speed**2) if speed else None,
+    )

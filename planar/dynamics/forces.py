@@ -1,0 +1,218 @@
+"""The forces of a mechanism: what its inputs supply, what its pairs carry, and how well that is proved."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from planar.dynamics.acting import Acting, Field, acting, power
+from planar.dynamics.balance import Balancing, balancing
+from planar.dynamics.checked import check
+from planar.dynamics.courses import factors
+from planar.dynamics.free_bodies import left_open
+from planar.dynamics.reactions import Reactions
+from planar.dynamics.told import ROUNDED, Reaction, efforts, reaction
+from planar.dynamics.unit_rates import alone, refuse_surplus, slides
+from planar.errors import BadInput, NoAnswer, Outcome
+from planar.mechanism import Mechanism
+from planar.motion import Motion, State
+from planar.words import listed
+
+Array = np.ndarray
+
+
+class Proof(NamedTuple):
+    """How far laws are from being kept, each beside what it balances; None where a law says nothing.
+
+    `power`: what everything supplies together, inertia included, beside the greatest part of it; None where nothing
+    that is loaded moves. `routes`: between the efforts and those by virtual power with each input alone at unit rate,
+    which takes the velocities of the solved position instead of multipliers; None for a motion, and where no input
+    moves anything. `equilibrium`: the worst force or moment that a link is left with as a free body, under all
+    that is told to act on it, beside the greatest force.
+    """
+
+    power: float | None
+    routes: float | None
+    equilibrium: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Forces:
+    """The forces at a position, or over a motion (then every array has a first axis for its n positions).
+
+    `inputs["O"]` is what that input supplies: a torque (N m) at a pair whose motion is an angle, a force (N) at one
+    whose motion is a length, positive in the positive sense of the motion, and `powers["O"]` its power (W).
+    `reactions["B"]` see `Reaction`. `acting` are loads, weights, springs, efforts and inertia. `undetermined` names
+    what equilibrium does not tell, and why; `bodies` are the links whose balance was proved.
+    """
+
+    moving: State | Motion
+    inputs: Mapping[str, Array | float]
+    powers: Mapping[str, Array | float]
+    reactions: Mapping[str, Reaction]
+    acting: tuple[Acting, ...]
+    undetermined: Mapping[str, str]
+    proof: Proof
+    bodies: tuple[str, ...]
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """The mechanism."""
+        return self.moving.mechanism
+
+    @property
+    def loads(self) -> tuple[Acting, ...]:
+        """What acts on the links, the inputs and the links' inertia apart."""
+        return tuple(each for each in self.acting if each.kind not in ("input", "inertia"))
+
+    @property
+    def power_in(self) -> Array | float:
+        """What the inputs supply, W."""
+        return sum(self.powers.values(), 0.0)
+
+    @property
+    def power_out(self) -> Array | float:
+        """What the mechanism does against its loads, W."""
+        return 0.0 - sum((each.power for each in self.loads), 0.0)
+
+    @cached_property
+    def shaking(self) -> tuple[Array, Array | float]:
+        """What the links' inertia puts on the frame: a force, N, and a moment about the frame's origin, N m."""
+        of = [each for each in self.acting if each.kind == "inertia"]
+        at = [each.at[..., 0] * each.force[..., 1] - each.at[..., 1] * each.force[..., 0] + each.couple for each in of]
+        none = np.zeros(np.shape(next(iter(self.inputs.values()), 0.0)))
+        return sum((each.force for each in of), np.stack([none, none], axis=-1)), sum(at, none)
+
+    def slides(self, name: str) -> bool:
+        """Whether an input's effort is a force (N), not a torque (N m)."""
+        return slides(self.mechanism, name)
+
+
+def forces(moving: State | Motion, inertia: bool = True) -> Forces:
+    """What inputs and pairs must supply against loads, weights, springs and the links' inertia.
+
+    A position has its own rates, and of loads that vary with time those at t = 0. `inertia=False` leaves it out:
+    equilibrium at rest, or in slow motion. For any number of inputs; where the links are held more than once, what
+    rigid bodies do not tell is NaN and named. Raises BadInput where a load, spring or mass is none of this
+    mechanism's; NoAnswer where there are more inputs than freedoms, and where no forces in the pairs balance the
+    links, as at a dead point (of a motion such rows are NaN).
+    """
+    mechanism = moving.mechanism
+    check(mechanism)
+    one = isinstance(moving, State)
+    if one:
+        refuse_surplus(moving)
+    time = np.zeros(1) if one else moving.time
+    if time is None and any(load.varies is not None and load.varies.input is None for load in mechanism.loads):
+        raise BadInput("loads", "a load varies with time, which this motion has not; give it a duration")
+    equations = balancing(mechanism)
+    field = Field(moving, equations.work.shapes)
+    reactions = _balanced(equations, field, time, inertia)
+    solved = reactions.solved()
+    if one and not np.isfinite(reactions.balance.loads).all():
+        raise NoAnswer(
+            Outcome.DEAD_POINT,
+            "the ends of a spring or damper meet here, so that its force has no direction; move the input",
+        )
+    if one and not solved.balanced.all():
+        told = listed([repr(given.pair) for given in mechanism.inputs])
+        raise NoAnswer(
+            Outcome.DEAD_POINT,
+            f"no forces in the pairs balance the links here, which the inputs at {told} cannot hold; move the input",
+        )
+    supplied, whys = efforts(solved)
+    all_of = acting(field, time, supplied, inertia)
+    powers = power(field, all_of)
+    all_of = [each._replace(power=row) for each, row in zip(all_of, powers, strict=True)]
+    told = {pair.name: reaction(pair, field, reactions, solved) for pair in mechanism.pairs}
+    equilibrium, bodies = left_open(field, all_of, told, reactions.arm)
+    names = [given.pair for given in mechanism.inputs]
+    undetermined = {name: why for name, why in zip(names, whys, strict=True) if why}
+    undetermined |= {name: each.why for name, each in told.items() if each.why}
+    routes = _routes(moving, field, all_of, supplied[0]) if one else None
+    found = Forces(
+        moving,
+        dict(zip(names, supplied.T, strict=True)),
+        {name: sum(each.power for each in all_of if each[:2] == ("input", name)) for name in names},
+        told,
+        tuple(all_of),
+        undetermined,
+        Proof(_open(powers, field, all_of), routes, equilibrium),
+        bodies,
+    )
+    return _at_one(found) if one else found
+
+
+def _balanced(equations: Balancing, field: Field, time: Array | None, inertia: bool) -> Reactions:
+    """The balance of every position."""
+    body, moving = equations.work, field.moving
+    inputs = {name: np.broadcast_to(each.position, (field.many,)) for name, each in moving.inputs.items()}
+    q, q1, q2 = body.coordinates(moving)
+    balance = equations.over(q, q1, q2, factors(body.mechanism, inputs, time, field.many), body.wound(q[0]))
+    if not inertia:
+        balance = balance._replace(inertia=np.zeros_like(balance.inertia))
+    return Reactions(equations, balance, field)
+
+
+def _open(powers: Array, field: Field, all_of: Sequence[Acting]) -> float | None:
+    """What all powers (acting, n) add up to, beside the greatest of them; None where that is rounding alone."""
+    told = np.isfinite(powers).all(axis=0)
+    greatest = float(np.abs(powers[:, told]).max(initial=0.0))
+    if greatest <= ROUNDED * _could(field, all_of):
+        return None
+    return float(np.abs(powers[:, told].sum(axis=0)).max(initial=0.0)) / greatest
+
+
+def _could(field: Field, all_of: Sequence[Acting]) -> float:
+    """The power that the greatest force would have at the greatest speed: powers are rounding beside it."""
+    pushed, fastest = _most(each.force for each in all_of), _most(field.velocity(each.link, each.at) for each in all_of)
+    turned, spun = _most(each.couple for each in all_of), _most(field.turning(each.link) for each in all_of)
+    return pushed * fastest + turned * spun
+
+
+def _most(values: Iterable[Array | float]) -> float:
+    return max((float(np.abs(np.nan_to_num(each)).max(initial=0.0)) for each in values), default=0.0)
+
+
+def _routes(state: State, field: Field, all_of: Sequence[Acting], supplied: Array) -> float | None:
+    """How far the efforts are from those by virtual power, beside what each input would supply against every part."""
+    worst = None
+    for given, effort in zip(state.mechanism.inputs, supplied, strict=True):
+        others = [each for each in all_of if each.kind != "input"]
+        unit = Field(alone(state, given.pair), field.shapes)
+        parts = power(unit, others)
+        whole = float(np.abs(parts).sum())
+        could = _could(unit, others)
+        beside = whole if whole > ROUNDED * could else could
+        if beside and np.isfinite(effort):
+            worst = max(worst or 0.0, abs(float(parts.sum() + effort)) / beside)
+    return worst
+
+
+def _at_one(found: Forces) -> Forces:
+    """The same for the one position that there is, without an axis for it."""
+
+    def one(each: Reaction) -> Reaction:
+        at = None if each.at is None else each.at[0]
+        couples = {link: float(couple[0]) for link, couple in each.couples.items()}
+        return each._replace(at=at, force=each.force[0], couple=float(each.couple[0]), couples=couples)
+
+    def act(each: Acting) -> Acting:
+        return each._replace(
+            at=each.at[0], force=each.force[0], couple=float(each.couple[0]), power=float(each.power[0])
+        )
+
+    return Forces(
+        found.moving,
+        {name: float(each[0]) for name, each in found.inputs.items()},
+        {name: float(each[0]) for name, each in found.powers.items()},
+        {name: one(each) for name, each in found.reactions.items()},
+        tuple(act(each) for each in found.acting),
+        found.undetermined,
+        found.proof,
+        found.bodies,
+    )

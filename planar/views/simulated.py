@@ -1,0 +1,65 @@
+"""The motion of a mechanism that is let go: tables for a terminal, and what a file of it has of energies."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from rich.console import Group, RenderableType
+from rich.table import Table
+
+from planar.dynamics.simulated import Simulation
+from planar.units import SI, unit
+from planar.views.columns import Told
+from planar.views.ran import ran
+from planar.views.table import counted, number, paragraphs, plain_table
+
+ENERGIES = ("kinetic", "potential", "work")
+
+
+def tables(simulation: Simulation) -> RenderableType:
+    """The run, which inputs were let go, how they moved, and what became of the energy."""
+    motion = simulation.motion
+    kept = f"kinetic + potential − work stays what it was, but for {simulation.balance:.1e} of the energy that changes"
+    return Group(ran(motion), _inputs(simulation), _energies(simulation), paragraphs([("energy", kept)]))
+
+
+def _inputs(simulation: Simulation) -> Table:
+    motion = simulation.motion
+    units = motion.mechanism.units
+    headings = ("input", "", "unit", "start", "end", "least", "greatest", "greatest speed", "unit")
+    table = plain_table("Inputs, among these positions", *headings, left=(0, 1, 2, 8))
+    for name, each in motion.inputs.items():
+        own = units.length if motion.slides(name) else units.angle
+        of = unit(own).from_si
+        places = (each.position[0], each.position[-1], each.position.min(), each.position.max())
+        table.add_row(
+            name,
+            "driven" if name in simulation.driven else "let go",
+            own,
+            *(number(of(float(place))) for place in places),
+            number(float(np.abs(each.velocity).max())),
+            SI[motion.driven(name)[1]],
+        )
+    return table
+
+
+def _energies(simulation: Simulation) -> Table:
+    headings = ("of", "at the start, J", "at the end, J", "least, J", "greatest, J")
+    table = plain_table("Energy", *headings)
+    names = ("kinetic energy", "potential energy", "work put in")
+    for name, what in zip(names, ENERGIES, strict=True):
+        values = getattr(simulation, what)
+        table.add_row(name, *(counted(float(each)) for each in (values[0], values[-1], values.min(), values.max())))
+    return table
+
+
+def told(simulation: Simulation) -> Iterable[Told]:
+    """The energies at every position, beside what a file of the motion has."""
+    yield Told("energy", "", dict.fromkeys(ENERGIES, "energy"), {what: getattr(simulation, what) for what in ENERGIES})
+
+
+def said(simulation: Simulation) -> dict[str, Any]:
+    """What is said of the whole motion, as JSON values."""
+    return {"driven": list(simulation.driven), "energy_balance": simulation.balance}
