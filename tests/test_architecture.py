@@ -28,7 +28,7 @@ FLOORS = [
     {"analysis", "assemblies", "sweeping"},
     {"branches", "grouped", "speed"},
     {"views", "drawing"},
-    {"plot"},
+    {"pages", "plot"},
     {"cli", "__init__"},
     {"__main__"},
 ]
@@ -56,7 +56,7 @@ LIBRARIES = {
         "drawing",
         "words",
     },
-    "casadi": {"closed", "elimination", "groups", "equations", "judged", "assemblies", "program", "native", "grouped"},
+    "casadi": {"closed", "pages", "elimination", "groups", "equations", "judged", "assemblies", "program", "native", "grouped"},
     "networkx": {"graph"},
     "flint": {"assemblies"},
     "llvmlite": {"native"},
