@@ -10,8 +10,11 @@ from planar.files import asset
 from planar.mechanism import Mechanism
 from planar.pages.carried import carried
 
-STYLES = ("uplot/uPlot.min.css", "page.css")
-SCRIPTS = ("uplot/uPlot.iife.min.js", "solver.js", "page.js")
+STYLES = ("uplot/uPlot.min.css", "page.css", "stage.css")
+SCRIPTS = (
+    *("uplot/uPlot.iife.min.js", "solver.js", "page.js", "course.js"),
+    *("bodies.js", "symbols.js", "ground.js", "letters.js", "poses.js", "drawing.js", "dragging.js", "controls.js"),
+)
 
 
 def page(mechanism: Mechanism) -> str:
@@ -27,7 +30,12 @@ def page(mechanism: Mechanism) -> str:
     return filled(asset("page.html"), parts)
 
 
-START = 'const page = new Page(JSON.parse(document.getElementById("data").textContent), program);'
+START = """
+const page = new Page(JSON.parse(document.getElementById("data").textContent), program);
+const svg = document.getElementById("drawing"), drawing = new Drawing(page, svg), dragging = new Dragging(page, svg);
+const controls = new Controls(page, document.getElementById("controls"), svg, drawing, dragging);
+new Courses(page);
+"""
 
 
 def filled(template: str, parts: dict[str, str]) -> str:

@@ -7,20 +7,33 @@ const CLOSED = 1e-13;      // sizes, rad: Newton's method stops here
 const STEPS = 25;          // of Newton's method
 const FARTHEST = 0.06;     // rad, sizes: the longest step of an input from one position to the next
 const SHORTEST = 1e-6;     // a step that has to be shorter ends at a dead point
-const JUMP = 0.5;          // how far unknowns may move in a step, in parts of what the tangent foretells, beyond it
+const FAR = 0.3;           // rad, sizes: unknowns that would move farther are followed by shorter steps
+const JUMP = 0.5;          // how far from what was foretold unknowns may be, in parts of that
+const NEAR = 0.02;         // rad, sizes: as far from it they may always be
+const SMOOTH = 0.1;       // in the same parts, where a determinant changes its sign: at a change point, not at a dead point
+const RUNUP = 8;          // the farthest a step is foretold from the last one, in lengths of that
 const WEAK = 1e-9;         // a pivot below this part of the greatest: no rates are determined
 
 function solve(matrix, right, n) {
-  // Gauss with the greatest pivot of the column; matrix column by column (n by n), both are used up
-  let greatest = 0;
-  for (const each of matrix.subarray ? matrix.subarray(0, n * n) : matrix) greatest = Math.max(greatest, Math.abs(each));
+  // Gauss with the greatest pivot of the column; matrix column by column (n by n), both are used up: the sign of the
+  // determinant, 0 where there is no solution
+  let greatest = 0, sign = 1;
+  for (let i = 0; i < n * n; i++) greatest = Math.max(greatest, Math.abs(matrix[i]));
   for (let k = 0; k < n; k++) {
     let best = k;
     for (let i = k + 1; i < n; i++) if (Math.abs(matrix[k * n + i]) > Math.abs(matrix[k * n + best])) best = i;
-    if (!(Math.abs(matrix[k * n + best]) > WEAK * greatest)) return false;
+    if (!(Math.abs(matrix[k * n + best]) > WEAK * greatest)) return 0;
+    if (matrix[k * n + best] < 0) sign = -sign;
     if (best !== k) {
-      for (let j = 0; j < n; j++) [matrix[j * n + k], matrix[j * n + best]] = [matrix[j * n + best], matrix[j * n + k]];
-      [right[k], right[best]] = [right[best], right[k]];
+      sign = -sign;
+      for (let j = 0; j < n; j++) {
+        const kept = matrix[j * n + k];
+        matrix[j * n + k] = matrix[j * n + best];
+        matrix[j * n + best] = kept;
+      }
+      const kept = right[k];
+      right[k] = right[best];
+      right[best] = kept;
     }
     for (let i = k + 1; i < n; i++) {
       const by = matrix[k * n + i] / matrix[k * n + k];
@@ -33,7 +46,7 @@ function solve(matrix, right, n) {
     for (let j = k + 1; j < n; j++) right[k] -= matrix[j * n + k] * right[j];
     right[k] /= matrix[k * n + k];
   }
-  return true;
+  return sign;
 }
 
 function leastSquares(matrix, left, rows, n, damping) {
@@ -75,9 +88,10 @@ class Linkage {
     this.p = this.sizes.subarray(0, this.data.counts.p);
   }
 
-  /** Newton's method from z for inputs u: {z, open, closed}. */
+  /** Newton's method from z for inputs u: {z, open, closed, signs}; of the determinants of the groups, 0: not known. */
   newton(u, z) {
     z = Float64Array.from(z);
+    const signs = new Int8Array(this.data.stages.length);
     let worst = 0;
     for (let k = 0; k < this.data.stages.length; k++) {
       const [from, to] = this.data.stages[k].z, [first, last] = this.data.stages[k].F;
@@ -85,20 +99,24 @@ class Linkage {
       let left = Infinity, polished = 0;
       for (let step = 0; step < STEPS; step++) {
         const out = this.program.stages[k](z, u, this.p, this.room[k]);
-        const gap = out.slice(0, rows);
-        const before = left;
-        left = gap.reduce((most, each) => Math.max(most, Math.abs(each)), 0);
-        if (!Number.isFinite(left)) return { z, open: Infinity, closed: false };
+        const gap = out.subarray(0, rows), before = left; // solved in place: the next step fills them anew
+        left = 0;
+        for (let i = 0; i < rows; i++) left = Math.max(left, Math.abs(gap[i]));
+        if (!Number.isFinite(left)) return { z, open: Infinity, closed: false, signs };
         if (n === 0 || (left <= CLOSED && (polished++ || left === 0)) || (left <= CLOSED && left >= before)) break;
-        const slope = out.slice(rows);
-        const move = rows === n ? (solve(slope, gap, n) ? gap : null) : leastSquares(slope, gap, rows, n, 1e-15);
+        const slope = out.subarray(rows);
+        let move = gap;
+        if (rows === n) {
+          signs[k] = solve(slope, gap, n);
+          if (signs[k] === 0) break;
+        } else move = leastSquares(slope, gap, rows, n, 1e-15);
         if (move === null) break;
         for (let i = 0; i < n; i++) z[from + i] -= move[i];
       }
       worst = Math.max(worst, left);
-      if (!(left <= 1e3 * this.data.tolerance)) return { z, open: worst, closed: false };
+      if (!(left <= 1e3 * this.data.tolerance)) return { z, open: worst, closed: false, signs };
     }
-    return { z, open: worst, closed: true };
+    return { z, open: worst, closed: true, signs };
   }
 
   /** How the unknowns move with inputs moving at u1: (unknowns,), or null where that is not determined. */
@@ -119,7 +137,7 @@ class Linkage {
     return leastSquares(slope, right, rows, n, 0);
   }
 
-  /** Go with the inputs to u, step by step on the branch: {reached: 0..1, why}. The state moves as far as it can. */
+  /** Go with the inputs to u, step by step on the branch: {reached: 0..1, open}. The state moves as far as it can. */
   moveTo(u) {
     const from = this.u.slice(), far = Math.max(...u.map((each, k) => Math.abs(each - from[k])), 0);
     return this.follow(far / FARTHEST, (part) => {
@@ -128,9 +146,10 @@ class Linkage {
     });
   }
 
-  /** Change the dimensions, the inputs where they are: {reached, why, open}. */
+  /** Change the dimensions, the inputs where they are: {reached, open}. */
   changeTo(d) {
     const from = this.d.slice();
+    this.last = null; // the way is another than that of the step before
     const far = Math.max(...d.map((each, k) => Math.abs(each - from[k]) / this.data.size), 0);
     const done = this.follow(far / FARTHEST, (part) => {
       const to = from.map((each, k) => each + part * (d[k] - each));
@@ -144,23 +163,15 @@ class Linkage {
   /** Follow a branch along a way: `at` says for a part from 0 to 1 which inputs and numbers there are. */
   follow(count, at) {
     let reached = 0, step = 1 / Math.max(1, Math.ceil(count)), open = 0;
-    let last = null;
     const whole = step;
     while (reached < 1) {
       const next = Math.min(1, reached + step), there = at(next);
       there.ready();
-      const guess = Float64Array.from(this.z);
-      if (last !== null) for (let i = 0; i < guess.length; i++) guess[i] += ((this.z[i] - last.z[i]) * (next - reached)) / last.step;
-      const found = this.newton(there.u, guess);
-      let moved = 0, foretold = 0;
-      for (let i = 0; i < guess.length; i++) {
-        moved = Math.max(moved, Math.abs(found.z[i] - guess[i]));
-        foretold = Math.max(foretold, Math.abs(guess[i] - this.z[i]));
-      }
-      if (found.closed && (moved <= 0.02 + JUMP * foretold || count === 0) && moved < 0.3) {
-        last = { z: this.z, step: next - reached };
+      const guess = this.foretold(there.u, next - reached), found = this.newton(there.u, guess);
+      if (found.closed && (count === 0 || this.continues(found, guess))) {
+        this.last = { u: this.u, z: this.z, to: found.z, signs: this.agreed(found.signs), step: next - reached };
         this.z = found.z;
-        this.u = there.u.slice ? there.u.slice() : there.u;
+        this.u = Array.from(there.u);
         reached = next;
         step = Math.min(whole, step * 1.5);
       } else {
@@ -171,6 +182,50 @@ class Linkage {
     }
     at(reached).ready();
     return { reached, open };
+  }
+
+  /** What is known of the step that led here; nothing where somebody else has put z. */
+  get before() { return this.last && this.last.to === this.z ? this.last : null; }
+
+  /** Where the unknowns would be for inputs u if they went on as in the last step, or along the tangent. */
+  foretold(u, step) {
+    const guess = Float64Array.from(this.z), { before } = this;
+    const way = Array.from(u, (each, k) => each - this.u[k]);
+    if (before !== null) {
+      const past = Array.from(this.u, (each, k) => each - before.u[k]);
+      const square = past.reduce((sum, each) => sum + each * each, 0);
+      // where the inputs rest the dimensions change, step by step of the same way
+      const by = square > 0 ? way.reduce((sum, each, k) => sum + each * past[k], 0) / square : step / before.step;
+      const aside = Math.hypot(...way.map((each, k) => each - by * past[k])), far = Math.hypot(...way);
+      if (Math.abs(by) <= RUNUP && aside <= 1e-6 * far && (square > 0) === (far > 0)) {
+        for (let i = 0; i < guess.length; i++) guess[i] += by * (this.z[i] - before.z[i]);
+        return guess;
+      }
+    }
+    const tangent = way.some((each) => each !== 0) ? this.tangent(this.u, this.z, way) : null;
+    // beside a dead point a tangent leads anywhere
+    if (tangent !== null && tangent.every((each) => Math.abs(each) < FAR)) for (let i = 0; i < guess.length; i++) guess[i] += tangent[i];
+    return guess;
+  }
+
+  /** Whether a position is on the same branch as this one: near to what was foretold, and on the same side of every
+      dead point, unless the way leads smoothly across a change point. */
+  continues(found, guess) {
+    let moved = 0, ahead = 0, gone = 0;
+    for (let i = 0; i < guess.length; i++) {
+      gone = Math.max(gone, Math.abs(found.z[i] - this.z[i]));
+      moved = Math.max(moved, Math.abs(found.z[i] - guess[i]));
+      ahead = Math.max(ahead, Math.abs(guess[i] - this.z[i]));
+    }
+    if (!(gone < FAR) || moved > NEAR + JUMP * ahead) return false;
+    const signs = this.before ? this.before.signs : this.newton(this.u, this.z).signs;
+    return moved <= SMOOTH * ahead || found.signs.every((each, k) => each * signs[k] >= 0);
+  }
+
+  /** The signs of determinants at a new position; where one is not known there, that before. */
+  agreed(signs) {
+    const { before } = this;
+    return before ? signs.map((each, k) => each || before.signs[k]) : signs;
   }
 
   /** Where everything is, in SI: w, and with rates of the inputs u1, u2 also w1, w2 (null where not determined). */
