@@ -6,9 +6,15 @@ from typing import Any
 
 import casadi as ca
 
+from planar.analysis.centres import extent
+from planar.analysis.centrodes import usual
+from planar.analysis.primary import primary
+from planar.analysis.standing import standing
+from planar.analysis.ties import rates
 from planar.dimensions import Dimension, changed, dimensions
 from planar.drawing.bodies import all_marks
-from planar.mechanism import Mechanism, named_points
+from planar.graph import numbered
+from planar.mechanism import Mechanism, counting, named_points
 from planar.pages.script import printed
 from planar.pairs import Kind
 from planar.pairs.marks import Mark
@@ -69,6 +75,7 @@ def carried(mechanism: Mechanism) -> tuple[dict[str, Any], str]:
         }
         for name, members in named_points(mechanism)
     }
+    named = {member: name for name, members in named_points(mechanism) for member in members}
     marks = [_mark(mark, numbers) for mark in all_marks(numbers.mechanism, numbers.shapes)]
     data = {
         "name": mechanism.name,
@@ -98,6 +105,11 @@ def carried(mechanism: Mechanism) -> tuple[dict[str, Any], str]:
         "inputs": [_input(given, solver.slides(given.pair)) for given in mechanism.inputs],
         "dimensions": [_dimension(each, solver.unit) for each in numbers.dimensions],
         "points": points,
+        "numbers": numbered(mechanism),
+        "counting": sorted(counting(mechanism)),
+        "centred": _centred(mechanism),
+        "rides": [[named[rider], guide] for rider, guide in filter(None, (pair.rides() for pair in mechanism.pairs))],
+        "rolling": list(usual(mechanism)) if len(mechanism.links) > 1 else None,
         "marks": marks,
         "z": z.tolist(),
         "tolerance": solver.tolerance,
@@ -118,6 +130,12 @@ def _input(given: Any, slides: bool) -> dict[str, Any]:
         "velocity": given.velocity,
         "acceleration": given.acceleration,
     }
+
+
+def _centred(mechanism: Mechanism) -> list[list[str]]:
+    """Every two links whose instantaneous centre a pair of theirs shows."""
+    state = standing(mechanism)
+    return [sorted(two) for two in primary(rates(state), *extent(state)).centres]
 
 
 def _units(mechanism: Mechanism) -> dict[str, Any]:

@@ -10,10 +10,20 @@ from planar.files import asset
 from planar.mechanism import Mechanism
 from planar.pages.carried import carried
 
-STYLES = ("uplot/uPlot.min.css", "page.css", "stage.css")
+STYLES = ("uplot/uPlot.min.css", "page.css", "stage.css", "layers.css")
 SCRIPTS = (
     *("uplot/uPlot.iife.min.js", "solver.js", "page.js", "course.js"),
     *("bodies.js", "symbols.js", "ground.js", "letters.js", "poses.js", "drawing.js", "dragging.js", "controls.js"),
+    *(
+        "layers_ink.js",
+        "layers_points.js",
+        "polygons.js",
+        "centres.js",
+        "layers_centrodes.js",
+        "numbers.js",
+        "charts.js",
+    ),
+    "layers.js",
 )
 
 
@@ -35,6 +45,7 @@ const page = new Page(JSON.parse(document.getElementById("data").textContent), p
 const svg = document.getElementById("drawing"), drawing = new Drawing(page, svg), dragging = new Dragging(page, svg);
 const controls = new Controls(page, document.getElementById("controls"), svg, drawing, dragging);
 new Courses(page);
+startLayers(page);
 """
 
 
