@@ -41,7 +41,7 @@ def sqrt(x: Scalar) -> Scalar:
 
 def atan2(y: Scalar, x: Scalar) -> Scalar:
     """The angle of the direction (x, y), between -pi and pi."""
-    method = getattr(y, "arctan2", None)
+    method = getattr(y, "arctan2", None) or getattr(y, "__arctan2__", None)
     return np.arctan2(y, x) if method is None else method(x)
 
 

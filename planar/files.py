@@ -54,6 +54,11 @@ def save(path: Path, content: str | bytes) -> None:
         raise BadInput(str(path), f"the file cannot be written: {problem.strerror}") from None
 
 
+def asset(name: str) -> str:
+    """A text that comes along for pages."""
+    return (Path(__file__).parent / "pages" / "assets" / name).read_text(encoding="utf-8")
+
+
 def own_bytes(path: Path) -> bytes | None:
     """A file's content if it and its folder are this user's and nobody else may write there; else None."""
     try:

@@ -141,10 +141,11 @@ class Program:
 
     @cached_property
     def _called(self) -> tuple[Called, Called]:
-        return Called(self._kinematics), Called(self._slopes)
+        return Called(self.rates), Called(self._slopes)
 
     @cached_property
-    def _kinematics(self) -> ca.Function:
+    def rates(self) -> ca.Function:
+        """(y, y1, y2, p) -> F and w, one after the other, with their first and second rates, and dF/dy."""
         e = self.equations
         both = ca.vertcat(e.F, e.w)
         y, y1, y2, first, second = _derivatives(e, both)

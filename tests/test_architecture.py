@@ -29,7 +29,7 @@ FLOORS = [
     {"analysis", "assemblies", "sweeping"},
     {"branches", "grouped", "speed"},
     {"views", "drawing"},
-    {"plot"},
+    {"pages", "plot"},
     {"cli", "__init__"},
     {"__main__"},
 ]
@@ -68,6 +68,7 @@ LIBRARIES = {
         "assemblies",
         "program",
         "native",
+        "pages",
         "grouped",
     },
     "networkx": {"graph"},

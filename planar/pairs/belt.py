@@ -51,7 +51,7 @@ class Belt(Wheels):
             return tuple(wheels)
         return (*wheels, Band(self.name, *wheels, self.ratio() < 0.0))
 
-    def _pitch_radii(self, apart: float) -> tuple[float, ...]:
+    def _pitch_radii(self, apart: Scalar) -> tuple[Scalar, ...]:
         ratio = abs(self.ratio())
         larger = LARGER * apart
         return (larger, larger / ratio) if ratio > 1.0 else (larger * ratio, larger)

@@ -33,7 +33,7 @@ class Gear(Wheels):
             return None
         return f"wheels of these radii mesh with centres {length(wanted)} apart, but theirs are {length(apart)} apart"
 
-    def _pitch_radii(self, apart: float) -> tuple[float, ...]:
+    def _pitch_radii(self, apart: Scalar) -> tuple[Scalar, ...]:
         """From ratio = -r / s and the distance |r + s|, where of an internal pair the larger wheel is negative."""
         ratio = self.ratio()
         if ratio == 1.0:  # equal wheels that turn alike do not meet

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from math import hypot
 from typing import Any, ClassVar, Self
 
-from planar.algebra import Scalar
+from planar.algebra import Scalar, sqrt
 from planar.pairs.base import Effort, Entry, Kind, Pair, Quantity, Sample, Schema, Told, described, plain, several
 from planar.pairs.marks import Mark, Wheel
 from planar.plane import Frame, Vector, frame_at
@@ -93,15 +93,15 @@ class Wheels(Pair):
             return ()
         carrier = shapes[self.carrier]
         apart = carrier.at(pins[1][self.carrier]) - carrier.at(pins[0][self.carrier])
-        radii = self.sizes if self.by == "radii" else self._pitch_radii(hypot(apart.x, apart.y))
+        radii = self.sizes if self.by == "radii" else self._pitch_radii(sqrt(apart.dot(apart)))
         return tuple(
             Wheel(self.name, link, shapes[link].at(pin[link]), radius)
             for link, pin, radius in zip(self.links, pins, radii, strict=True)
-            if radius != 0.0
+            if not (isinstance(radius, float) and radius == 0.0)
         )
 
     @abstractmethod
-    def _pitch_radii(self, apart: float) -> tuple[float, ...]:
+    def _pitch_radii(self, apart: Scalar) -> tuple[Scalar, ...]:
         """Radii (m) in the ratio that go with centres so far apart; zeros where there are none."""
 
     def _centre(self, wheel: str, beside: Sequence[Pair]) -> Mapping[str, str] | None:

@@ -1,0 +1,237 @@
+"use strict";
+/* Instantaneous centres of every two links, from the links' rates: where both have one velocity. The letters are those
+   of `planar centres`; a centre picked shows the lines of Kennedy's theorem on which it lies, and its chord in the
+   circle diagram beside. */
+
+const AT_INFINITY = 1e-9;     // of the size: a turning this small beside the sliding has its centre at infinity
+const TOGETHER = 1e-9;        // of the greatest motion: links that move as one have no centre
+const ALL_SHOWN = 36;         // of more centres than that only those of one link are shown, unless all are asked for
+const CIRCLE = [260, 260, 96]; // px: the circle diagram and its radius
+
+/** The motion of every link as [ux, uy, w], velocity (ux − w y, uy + w x) at (x, y); null where not determined. */
+function motionsOf(frames, data) {
+  const found = {};
+  for (const link of data.links) {
+    const f = frames[link];
+    if (!f.v) return null;
+    const [vx, vy, w] = f.v;
+    found[link] = [vx + w * f.y, vy - w * f.x, w];
+  }
+  return found;
+}
+
+/** Where two motions are one: homogeneous [x, y, w], w = 0 at infinity; null where both are one altogether. */
+function poleOf(a, b, size, greatest) {
+  const [x, y, w] = b.map((each, k) => each - a[k]), slide = Math.hypot(x, y);
+  if (Math.max(slide / size, Math.abs(w)) <= TOGETHER * greatest) return null;
+  return Math.abs(w) * size <= AT_INFINITY * slide ? [-y, x, 0] : [-y, x, w];
+}
+
+/** The greatest motion of a link: how fast it turns, or would turn at the size's distance. */
+function greatestOf(motions, size) {
+  return Math.max(...Object.values(motions).map(([x, y, w]) => Math.max(Math.hypot(x, y) / size, Math.abs(w))));
+}
+
+/** All centres: {links, numbers, name, at}, in the order of the numbers. */
+function centresOf(page, frames) {
+  const { data } = page, motions = motionsOf(frames, data);
+  if (motions === null) return null;
+  const order = [...data.links].sort((a, b) => data.numbers[a] - data.numbers[b]);
+  const greatest = greatestOf(motions, data.size);
+  const found = [], centred = new Set(data.centred.map((links) => JSON.stringify([...links].sort())));
+  order.forEach((a, i) => order.slice(i + 1).forEach((b) => {
+    const numbers = [data.numbers[a], data.numbers[b]];
+    // from ten links on a comma parts the numbers
+    const name = numbers.join(order.length > 9 ? "," : "");
+    const shown = centred.has(JSON.stringify([a, b].sort()));
+    const at = poleOf(motions[a], motions[b], data.size, greatest) ?? (shown ? pinOf(page, a, b) : null);
+    found.push({ links: [a, b], name, at, shown });
+  }));
+  return found;
+}
+
+/** The point that both links have, be it that they move as one just now; null where there is none. */
+function pinOf(page, a, b) {
+  const name = Object.keys(page.data.points).find((each) => [a, b].every((link) => page.data.points[each].links.includes(link)));
+  return name === undefined ? null : [...page.point(name).position, 1];
+}
+
+/** Two lines of centres on which a centre lies: [[centre, centre], ...], those first that pairs show. */
+function kennedyLines(all, centre, data) {
+  const [a, b] = centre.links, of = (one, other) => all.find(({ links }) => links.includes(one) && links.includes(other));
+  const found = [];
+  for (const c of data.links) {
+    if (c === a || c === b) continue;
+    const two = [of(a, c), of(b, c)];
+    if (two.some((each) => each.at === null)) continue;
+    // unit vectors of the projective plane in the mechanism's size: centres that coincide give no line
+    const [p, q] = two.map(({ at: [x, y, w] }) => {
+      const length = Math.hypot(x, y, w * data.size);
+      return [x / length, y / length, (w * data.size) / length];
+    });
+    const line = [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]], sine = Math.hypot(...line);
+    if (sine > 1e-6) found.push({ two, through: c, line: line.map((each) => each / sine), rank: two.filter((each) => each.shown).length });
+  }
+  found.sort((one, other) => other.rank - one.rank);
+  const second = found.slice(1).find(({ line: [x, y, z] }) => {
+    const [u, v, w] = found[0].line;
+    return Math.hypot(y * w - z * v, z * u - x * w, x * v - y * u) > 1e-3;
+  });
+  return found.length ? [found[0], ...(second ? [second] : [])] : [];
+}
+
+const centres = {
+  key: "centres",
+  label: "Instantaneous centres",
+  beside(layers, part) {
+    const { page } = layers, { data } = page;
+    htmlPart("h3", {}, part, "Circle diagram");
+    const svg = svgPart("svg", { viewBox: `0 0 ${CIRCLE[0]} ${CIRCLE[1]}`, role: "img", "aria-label": "circle diagram" }, part);
+    const which = chooser(part, "Centres", [["all", "all"], ...byNumber(data).map((link) => [link, `of ${data.numbers[link]} ${link}`])]);
+    const many = (data.links.length * (data.links.length - 1)) / 2 > ALL_SHOWN;
+    which.value = many ? data.frame : "all";
+    const pick = chooser(part, "Lines of Kennedy's theorem for", []);
+    for (const each of [which, pick]) each.addEventListener("change", () => layers.draw());
+    this.state = { which, pick, svg, all: null, picked: null, lines: [], places: [], drawn: "", told: "" };
+    return { draw: () => drawCircle(page, this.state) };
+  },
+  places() { return this.state.places; },
+  pick(name, layers) {
+    const { pick } = this.state;
+    pick.value = pick.value === name ? "" : name;
+    layers.draw();
+    layers.page.say(pick.value ? `lines of centre I${name} shown` : "no lines of centres shown");
+  },
+  draw(ink, layers) {
+    const { page } = layers, state = this.state, all = centresOf(page, standardFrames(page));
+    Object.assign(state, { all, places: [] });
+    if (all === null) return "centres are not determined at a dead or change point";
+    const shown = all.filter(({ links }) => state.which.value === "all" || links.includes(state.which.value));
+    offer(state.pick, [["", "none"], ...shown.filter(({ at }) => at !== null).map(({ name }) => [name, `I${name}`])]);
+    const picked = all.find(({ name, at }) => name === state.pick.value && at !== null) ?? null;
+    state.picked = picked;
+    state.lines = picked ? kennedyLines(all, picked, page.data) : [];
+    const room = layers.bounds(), drawn = new Map();
+    for (const { two } of state.lines) drawLine(ink, layers, room, [...two, picked]);
+    const one = new Set([...shown, ...state.lines.flatMap(({ two }) => two), ...(picked ? [picked] : [])]);
+    for (const each of one) if (each.at !== null) {
+      const place = drawCentre(ink, layers, room, each, drawn, each === picked);
+      state.places.push([each.name, place]);
+    }
+    for (const { place, names, outside, away } of drawn.values()) {
+      ink.letter(place, names.map((name, k) => [k ? ", I" : "I", name]), "letter centre", { told: outside, away });
+    }
+    if (picked === null) return "";
+    const lines = state.lines.map(({ two }) => two.map(({ name }) => `I${name}`).join(" "));
+    return `I${picked.name}${picked.shown ? ", shown by a pair," : ""} lies on ${lines.join(" and on ") || "no line of other centres"}`;
+  },
+};
+
+/** The links' motions with the file's rates, or if nothing moves at those with the running input at unit speed. */
+function standardFrames(page) {
+  const { inputs } = page.data;
+  if (!inputs.length || inputs.some((each) => each.velocity !== 0)) return page.frames;
+  const still = inputs.map(() => 0);
+  return page.framesOf(page.linkage.state(still.map((_, k) => (k === page.running ? 1 : 0)), still));
+}
+
+/** A centre as a dot where a pair shows it, else a ring; one beyond the picture as an arrow at its edge. Where that is. */
+function drawCentre(ink, layers, room, { name, at, shown }, drawn, picked) {
+  const [x, y, w] = at, middle = [(room[0] + room[2]) / 2, (room[1] + room[3]) / 2], edge = 30 * ink.unit;
+  const there = w === 0 ? null : layers.at([x / w, y / w]);
+  const inside = there !== null && there[0] > room[0] && there[0] < room[2] && there[1] > room[1] && there[1] < room[3];
+  const add = (key, place, outside, away) => {
+    if (drawn.has(key)) { drawn.get(key).names.push(name); return false; }
+    drawn.set(key, { place, names: [name], outside, away });
+    return true;
+  };
+  if (inside) {
+    const key = there.map((each) => Math.round(each / ink.unit / 2)).join();
+    if (add(key, there, "", null)) {
+      ink.dot(there, shown ? 3.5 : 4.5, `centre ${shown ? "shown" : "found"}${picked ? " picked" : ""}`);
+      ink.keepClear(there, 5);
+    }
+    return there;
+  }
+  const start = w === 0 ? layers.at([0, 0]) : middle, along = (there ?? layers.at([x, y])).map((each, k) => each - start[k]);
+  const length = Math.hypot(...along), [dx, dy] = along.map((each) => each / length);
+  const reach = Math.min(...[[dx, 0], [dy, 1]].map(([d, k]) => (d ? (room[k + 2] - room[k] - 2 * edge) / 2 / Math.abs(d) : Infinity)));
+  const tip = [middle[0] + dx * reach, middle[1] + dy * reach], tail = [tip[0] - 22 * ink.unit * dx, tip[1] - 22 * ink.unit * dy];
+  const { page } = layers, beyond = there === null ? 0 : Math.hypot(there[0] - tip[0], there[1] - tip[1]) / page.view.scale;
+  const far = w === 0 ? " at ∞" : ` at ${lengthTold(page, beyond)}`;
+  const key = `${tip.map((each) => Math.round(each / ink.unit / 6)).join()}${far}`;
+  if (add(key, tail, far, [-dx, -dy])) ink.arrow(tail, tip, `arrow centre${picked ? " picked" : ""}`);
+  return tip;
+}
+
+/** A line through three centres, as far as it can be seen. */
+function drawLine(ink, layers, room, three) {
+  const finite = three.filter(({ at }) => at[2] !== 0).map(({ at: [x, y, w] }) => layers.at([x / w, y / w]));
+  const far = three.find(({ at }) => at[2] === 0), start = layers.at([0, 0]);
+  if (!finite.length) return;
+  const size = 4 * Math.max(room[2] - room[0], room[3] - room[1]);
+  if (far !== undefined) {
+    const [x, y] = layers.at([far.at[0], far.at[1]]).map((each, k) => each - start[k]), length = Math.hypot(x, y);
+    finite.push(...[-1, 1].map((sign) => [finite[0][0] + (sign * size * x) / length, finite[0][1] + (sign * size * y) / length]));
+  }
+  const along = [0, 1].map((axis) => finite[finite.length - 1][axis] - finite[0][axis]);
+  const order = finite.sort((a, b) => (a[0] - b[0]) * along[0] + (a[1] - b[1]) * along[1]);
+  ink.line([order[0], order[order.length - 1]].map((each) => within(each, order, size * 50)), "kennedy");
+}
+
+/** A place that is not absurdly far for a screen's numbers. */
+function within(place, order, most) {
+  const near = order.reduce((best, each) => (Math.hypot(...each) < Math.hypot(...best) ? each : best));
+  const far = Math.hypot(place[0] - near[0], place[1] - near[1]);
+  return far <= most ? place : [0, 1].map((k) => near[k] + ((place[k] - near[k]) * most) / far);
+}
+
+/** The circle diagram: a place for each link, a chord for each centre. */
+function drawCircle(page, state) {
+  const { svg, all, picked, lines } = state;
+  if (!all) { svg.replaceChildren(); state.drawn = ""; return ""; }
+  const used = new Set(lines.flatMap(({ two }) => two)), kind = (each) => (each === picked ? " picked" : used.has(each) ? " used" : "");
+  // it changes only where another centre is picked, or links begin to move as one
+  const known = all.filter(({ at: place }) => place !== null), drawn = known.map((each) => each.name + kind(each)).join();
+  if (state.drawn === drawn) return state.told;
+  state.drawn = drawn;
+  svg.replaceChildren();
+  const { data } = page, order = byNumber(data), [width, height, radius] = CIRCLE;
+  const at = new Map(order.map((link, k) => {
+    const angle = ((k + 0.5) / order.length) * 2 * Math.PI - Math.PI / 2 - (2 * Math.PI) / order.length;
+    return [link, [width / 2 + radius * Math.cos(angle), height / 2 + radius * Math.sin(angle)]];
+  }));
+  const ink = new Ink(svg, 1);
+  ink.dot([width / 2, height / 2], radius, "circle");
+  for (const each of known) ink.line(each.links.map((link) => at.get(link)), `chord ${each.shown ? "shown" : "found"}${kind(each)}`);
+  for (const [link, [x, y]] of at) {
+    ink.dot([x, y], 3, "place");
+    const by = 1 + 14 / radius;
+    const [X, Y] = [width / 2 + (x - width / 2) * by, height / 2 + (y - height / 2) * by + 0.35 * LETTER];
+    svgPart("text", { x: X, y: Y, "text-anchor": "middle", "font-size": LETTER, class: "letter" }, svg, data.numbers[link]);
+  }
+  const links = order.map((link) => `${data.numbers[link]} ${link}`).join(", ");
+  state.told = `${known.length} centres; full chords: shown by pairs. Links: ${links}`;
+  return state.told;
+}
+
+function byNumber(data) {
+  return [...data.links].sort((a, b) => data.numbers[a] - data.numbers[b]);
+}
+
+/** A labelled choice. */
+function chooser(parent, label, choices) {
+  const box = htmlPart("label", { class: "choice" }, parent, `${label} `), select = htmlPart("select", {}, box);
+  offer(select, choices);
+  return select;
+}
+
+/** What can be chosen; what was stays if it can still be. */
+function offer(select, choices) {
+  const told = JSON.stringify(choices);
+  if (select.dataset.choices === told) return;
+  select.dataset.choices = told;
+  const was = select.value;
+  select.replaceChildren(...choices.map(([value, text]) => htmlPart("option", { value }, null, text)));
+  if (choices.some(([value]) => value === was)) select.value = was;
+}

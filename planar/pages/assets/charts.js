@@ -1,0 +1,179 @@
+"use strict";
+/* Diagrams under the drawing, over the range of the input: one for each quantity, with a line for each point or link
+   chosen, and a marker that runs along. A press in a diagram takes the mechanism there. */
+
+const SERIES = 6;        // colours of lines
+const DEGREES = [1, 2, 5, 10, 15, 30, 45, 60, 90, 180, 360, 720]; // between numbers of an axis
+const HEIGHT = 240;      // px
+
+/** Quantities over the course: {key, label, unit, kind, of(columns)}. */
+const DIAGRAMS = [
+  { key: "x", label: "x", unit: "length", kind: "point", of: (c, i) => c.x[i] },
+  { key: "y", label: "y", unit: "length", kind: "point", of: (c, i) => c.y[i] },
+  { key: "v", label: "velocity", unit: "m/s", kind: "point", of: (c, i) => Math.hypot(c.vx[i], c.vy[i]) },
+  { key: "vx", label: "velocity along x", unit: "m/s", kind: "point", of: (c, i) => c.vx[i] },
+  { key: "vy", label: "velocity along y", unit: "m/s", kind: "point", of: (c, i) => c.vy[i] },
+  { key: "a", label: "acceleration", unit: "m/s²", kind: "point", of: (c, i) => Math.hypot(c.ax[i], c.ay[i]) },
+  { key: "ax", label: "acceleration along x", unit: "m/s²", kind: "point", of: (c, i) => c.ax[i] },
+  { key: "ay", label: "acceleration along y", unit: "m/s²", kind: "point", of: (c, i) => c.ay[i] },
+  { key: "angle", label: "angle", unit: "angle", kind: "link", of: (c, i) => c.angle[i] - c.turns },
+  { key: "w", label: "angular velocity", unit: "rad/s", kind: "link", of: (c, i) => c.w[i] },
+  { key: "e", label: "angular acceleration", unit: "rad/s²", kind: "link", of: (c, i) => c.e[i] },
+];
+
+/** By which rate of the points the rows are told that a diagram is to fit; positions fit all of them. */
+const CALM_BY = {
+  length: null, angle: null, "m/s": RATES.velocity.parts, "rad/s": RATES.velocity.parts,
+  "m/s²": RATES.acceleration.parts, "rad/s²": RATES.acceleration.parts,
+};
+
+class Charts {
+  constructor(page) {
+    this.page = page;
+    const section = document.getElementById("numbers"), told = memory.read("diagrams");
+    this.on = new Set(told === null ? ["v", "w"] : told.split(","));
+    this.charts = [];
+    if (!page.data.inputs.length) return;
+    const box = htmlPart("fieldset", { class: "choices" }, section);
+    htmlPart("legend", {}, box, "Diagrams");
+    for (const { key, label, kind } of DIAGRAMS) {
+      const holder = htmlPart("label", {}, box), tick = htmlPart("input", { type: "checkbox", name: `diagram-${key}` }, holder);
+      holder.append(`${label} of ${kind}s`);
+      tick.checked = this.on.has(key);
+      tick.addEventListener("change", () => {
+        if (tick.checked) this.on.add(key); else this.on.delete(key);
+        memory.write("diagrams", DIAGRAMS.filter((each) => this.on.has(each.key)).map((each) => each.key).join(",") || "none");
+        this.build();
+      });
+    }
+    this.place = htmlPart("div", { class: "charts" }, section);
+    this.hint = htmlPart("p", { class: "hint", hidden: "" }, section);
+    page.on("chosen", () => this.build());
+    page.on("course", () => this.build());
+    page.on("move", () => this.mark());
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.build());
+    new ResizeObserver(() => this.fit()).observe(this.place);
+    this.build();
+  }
+
+  /** All diagrams anew; while the motion is being solved again the old ones stay, faint. */
+  build() {
+    const { page, place } = this, { course } = page;
+    place.setAttribute("aria-busy", String(course === null));
+    if (course === null) return;
+    for (const { plot } of this.charts) plot.destroy();
+    this.charts = [];
+    place.replaceChildren();
+    for (const each of DIAGRAMS) {
+      const names = each.kind === "point" ? page.chosen.points() : page.chosen.links();
+      if (this.on.has(each.key) && names.length) this.charts.push(this.chart(each, names, course));
+    }
+    this.hint.hidden = this.charts.length > 0;
+    this.hint.textContent = this.on.size && !this.on.has("none") ? "Choose a point or a link to see its diagrams." : "";
+    this.fit();
+    this.mark();
+  }
+
+  chart({ label, unit, kind, of }, names, course) {
+    const { page, place } = this, [by, unitName] = unitOf(page, unit), k = course.input, { pair, slides } = page.data.inputs[k];
+    const [byInput, inputUnit] = unitOf(page, slides ? "length" : "angle");
+    const xs = Array.from(course.inputs, (each) => each * byInput);
+    const lines = names.map((name) => {
+      const columns = kind === "point" ? course.point(name) : { ...course.link(name), turns: turnsOf(page, course, name) };
+      return Array.from(course.inputs, (_, i) => { const value = of(columns, i) * by; return Number.isFinite(value) ? value : null; });
+    });
+    const limits = rangeOf(lines, course, CALM_BY[unit], unit === "length" ? page.data.size * by : 0);
+    const style = getComputedStyle(document.documentElement), colour = (name) => style.getPropertyValue(name).trim();
+    const [from, to] = [course.inputs[0], course.inputs[course.count - 1]].map((each) => inputTold(page, each, k));
+    const figure = htmlPart("figure", { "aria-label": `${label} of ${names.join(", ")} over ${pair}, from ${from} to ${to}` }, place);
+    const em = parseFloat(getComputedStyle(document.body).fontSize) / 16, font = `${12 * em}px system-ui, sans-serif`;
+    const line = { stroke: colour("--line"), width: 1 };
+    const values = (_, splits) => splits.map((each) => (each === null ? "" : short(each)));
+    const axis = { font, labelFont: `600 ${font}`, labelSize: 24 * em, stroke: colour("--ink"), grid: line, ticks: line, values };
+    const made = { tell: () => undefined }, plot = new uPlot({
+      width: Math.max(280, place.clientWidth), height: HEIGHT,
+      scales: { x: { time: false, range: [xs[0], xs[xs.length - 1]] }, y: { range: limits } },
+      axes: [
+        { ...axis, size: 34 * em, label: `${pair}, ${inputUnit}`, incrs: inputUnit === "deg" ? DEGREES : undefined },
+        { ...axis, size: 64 * em, label: `${label}, ${unitName}` },
+      ],
+      series: [{}, ...names.map((_, i) => ({
+        stroke: colour(`--series${i % SERIES}`), width: 2, dash: i < SERIES ? undefined : [6, 4], points: { show: false },
+      }))],
+      legend: { show: false },
+      cursor: { drag: { x: false, y: false }, sync: { key: "motion" } },
+      hooks: { setCursor: [() => this.tell(made)] },
+    }, [xs, ...lines], figure);
+    const caption = htmlPart("figcaption", {}, figure), where = htmlPart("span", {}, caption);
+    const told = names.map((name, i) => {
+      const each = htmlPart("span", { class: "value" }, caption);
+      htmlPart("span", { class: `swatch series${i % SERIES}${i < SERIES ? "" : " dashed"}`, "aria-hidden": "true" }, each);
+      each.append(`${name} `);
+      return htmlPart("span", {}, each);
+    });
+    const now = (name) => {
+      const one = kind === "point" ? pointNumbers(page, name, page.frames) : linkNumbers(page.frames[name]);
+      const columns = Object.fromEntries(Object.entries(one).map(([key, each]) => [key, [each]]));
+      return by * of(kind === "point" ? columns : { ...columns, turns: turnsOf(page, course, name) }, 0);
+    };
+    Object.assign(made, { tell: (idx) => {
+      where.textContent = `${pair} = ${idx === null ? inputTold(page, page.input(), k) : `${short(xs[idx])} ${inputUnit}`}:`;
+      told.forEach((each, i) => { each.textContent = `${short(idx === null ? now(names[i]) : lines[i][idx] ?? NaN)} ${unitName}`; });
+    } });
+    plot.root.setAttribute("aria-hidden", "true"); // the table above says its numbers
+    const marker = htmlPart("div", { class: "marker" }, plot.over);
+    plot.over.addEventListener("click", () => { if (plot.cursor.left >= 0) this.goTo(plot.posToVal(plot.cursor.left, "x") / byInput); });
+    return Object.assign(made, { plot, marker, by: byInput });
+  }
+
+  /** Take the mechanism to a place of the range, the short way round where it turns. */
+  goTo(position) {
+    const { page } = this, { course } = page, here = page.input();
+    const shift = course?.periodic ? here - course.within(here) : 0;
+    page.moveTo(position + shift);
+  }
+
+  fit() {
+    const width = Math.floor(this.place.clientWidth);
+    for (const { plot } of this.charts) if (width > 0 && plot.width !== width) plot.setSize({ width, height: HEIGHT });
+    this.mark();
+  }
+
+  /** The markers where the mechanism is. */
+  mark() {
+    const { page } = this, { course } = page;
+    if (course === null) return;
+    const at = course.within(page.input());
+    for (const each of this.charts) {
+      each.marker.style.transform = `translateX(${each.plot.valToPos(at * each.by, "x")}px)`;
+      this.tell(each);
+    }
+  }
+
+  /** A legend's numbers: of where the pointer is in the diagrams, else of where the mechanism is. */
+  tell({ plot, tell }) {
+    const over = plot !== undefined && plot.cursor.left >= 0 && plot.cursor.idx !== null && plot.cursor.idx !== undefined;
+    tell(over ? plot.cursor.idx : null);
+  }
+}
+
+/** The whole turns by which a link's angle is lessened, so that it starts between −π and π; none where turns count. */
+function turnsOf(page, course, name) {
+  const { angle } = course.link(name);
+  return angle[0] - wrapped(angle[0], page.data.counting.includes(name));
+}
+
+/** The range of an axis: what the lines need away from dead points, where rates outgrow every scale. */
+function rangeOf(lines, course, parts, least) {
+  let low = Infinity, high = -Infinity;
+  const calm = parts === null ? [] : course.calm(parts), rows = calm.length ? calm : course.inputs.keys();
+  for (const i of rows) for (const line of lines) if (line[i] !== null) [low, high] = [Math.min(low, line[i]), Math.max(high, line[i])];
+  if (!(high >= low)) return [0, 1];
+  // what stands still but for rounding is a straight line in the middle
+  const room = Math.max(0.06 * (high - low), 1e-9 * least, 1e-9 * Math.max(Math.abs(low), Math.abs(high)), 1e-12);
+  if (high - low < 1e-9 * Math.max(Math.abs(low), Math.abs(high), least)) {
+    const wide = 0.1 * (Math.abs(low) || 1);
+    return [low - wide, high + wide];
+  }
+  return [low >= 0 && low < 0.3 * high ? 0 : low - room, high <= 0 && high > 0.3 * low ? 0 : high + room];
+}

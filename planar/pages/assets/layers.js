@@ -1,0 +1,208 @@
+"use strict";
+/* The layers that can be laid over the mechanism or shown beside it: a checkbox for each, remembered in the address.
+   A layer is {key, label, still: whether it stays as it is while the mechanism moves, draw(ink, layers): what is drawn
+   over the mechanism, and a sentence on it; places(), pick(name, layers): what can be picked in the drawing by a click, in
+   user units; beside(layers, part): fills a part of the page, {draw(): a sentence}}. */
+
+const CLOSE = 14;   // px: a click as near as that picks a point
+const LARGE = 60;   // px
+const STILL = 4;    // px: a pointer that went farther has dragged
+
+/** Part of the address after #, shared by all who remember something there. */
+const memory = {
+  read(key) { return new URLSearchParams(location.hash.slice(1)).get(key); },
+  write(key, value) {
+    const all = new URLSearchParams(location.hash.slice(1));
+    if (value === "") all.delete(key); else all.set(key, value);
+    // a page inside another one may have no address to write to
+    try { history.replaceState(null, "", `#${all}`); } catch { /* what is chosen is forgotten then */ }
+  },
+};
+
+/** The points and links that are looked at, in the order in which they were chosen. */
+class Chosen {
+  constructor(page) {
+    this.page = page;
+    const told = memory.read("of");
+    this.list = told === null ? this.usual() : this.parse(told);
+  }
+
+  has(kind, name) { return this.list.some((each) => each.kind === kind && each.name === name); }
+  points() { return this.list.filter((each) => each.kind === "point").map((each) => each.name); }
+  links() { return this.list.filter((each) => each.kind === "link").map((each) => each.name); }
+
+  toggle(kind, name) {
+    const had = this.has(kind, name);
+    this.list = had ? this.list.filter((each) => each.kind !== kind || each.name !== name) : [...this.list, { kind, name }];
+    memory.write("of", JSON.stringify(this.list.map((each) => [each.kind, each.name])));
+    this.page.emit("chosen");
+    this.page.say(`${kind} ${name} ${had ? "no longer shown" : "shown"}`);
+  }
+
+  parse(told) {
+    const { points, links } = this.page.data;
+    let list = [];
+    try { list = JSON.parse(told); } catch { return this.usual(); }
+    return (Array.isArray(list) ? list : [])
+      .map(([kind, name]) => ({ kind, name }))
+      .filter(({ kind, name }) => (kind === "point" ? Object.keys(points).includes(name) : kind === "link" && links.includes(name)));
+  }
+
+  /** Points that trace a curve of their own first, then joints that move; a few. */
+  usual() {
+    const { page } = this, { points, frame } = page.data;
+    const moving = Object.keys(points).filter((name) => !points[name].links.includes(frame));
+    const alone = moving.filter((name) => points[name].links.length === 1);
+    return [...alone, ...moving.filter((name) => !alone.includes(name))].slice(0, 3).map((name) => ({ kind: "point", name }));
+  }
+}
+
+class Layers {
+  constructor(page, layers) {
+    this.page = page;
+    this.svg = document.getElementById("drawing");
+    this.section = document.getElementById("layers");
+    this.all = layers;
+    const told = memory.read("layers");
+    this.on = new Set(told === null ? ["paths"] : told.split(",").filter((key) => layers.some((each) => each.key === key)));
+    this.kept = new Map();  // what was drawn by layers that stay as they are
+    this.stood = new Map(); // where letters stood, by layer
+    this.group = svgPart("g", { class: "layers" });
+    this.panel();
+    for (const event of ["move", "size", "course", "chosen", "view"]) page.on(event, () => this.draw());
+    new ResizeObserver(() => this.draw()).observe(this.svg);
+    this.picking();
+    this.draw();
+  }
+
+  /** The checkboxes, with what each layer has beside it or to choose. */
+  panel() {
+    const box = htmlPart("fieldset", { class: "choices" }, this.section);
+    htmlPart("legend", {}, box, "Layers");
+    this.notes = htmlPart("div", { class: "hint notes" }, this.section);
+    this.places = htmlPart("div", { class: "beside" }, this.section);
+    this.parts = new Map();
+    for (const layer of this.all) {
+      const label = htmlPart("label", {}, box), tick = htmlPart("input", { type: "checkbox", name: layer.key }, label);
+      label.append(layer.label);
+      tick.checked = this.on.has(layer.key);
+      tick.addEventListener("change", () => {
+        if (tick.checked) this.on.add(layer.key); else this.on.delete(layer.key);
+        memory.write("layers", this.all.map((each) => each.key).filter((key) => this.on.has(key)).join(",") || "none");
+        this.draw();
+      });
+      const part = htmlPart(layer.beside ? "figure" : "p", { hidden: "" }, layer.beside ? this.places : this.notes);
+      const beside = layer.beside?.(this, part) ?? null, told = layer.beside ? htmlPart("figcaption", {}, part) : part;
+      this.parts.set(layer.key, { part, beside, told });
+    }
+  }
+
+  draw() {
+    const { view } = this.page;
+    this.ready = view !== undefined && view !== null;
+    if (this.ready && this.svg.lastElementChild !== this.group) this.svg.append(this.group);
+    const shapes = [], matrix = this.ready ? this.svg.getScreenCTM() : null;
+    this.unit = matrix ? 1 / matrix.a : 1;
+    if (this.ready) this.group.replaceChildren();
+    const { course, chosen, view: now } = this.page;
+    for (const layer of this.all) {
+      const { part, beside, told } = this.parts.get(layer.key), shown = this.on.has(layer.key);
+      if (!shown) { part.hidden = true; continue; }
+      let text = "";
+      if (layer.draw && this.ready) {
+        const kept = layer.still ? this.kept.get(layer.key) : undefined;
+        if (kept !== undefined && kept.of.every((each, k) => each === [course, chosen.list, now, this.unit][k])) {
+          this.group.append(kept.ink.group);
+          ({ text } = kept);
+        } else {
+          const ink = new Ink(svgPart("g", { class: layer.key }, this.group), this.unit);
+          text = layer.draw(ink, this) ?? "";
+          shapes.push([layer.key, ink]);
+          if (layer.still) this.kept.set(layer.key, { of: [course, chosen.list, now, this.unit], ink, text });
+        }
+      }
+      part.hidden = beside === null && text === "";
+      if (beside !== null) text = [beside.draw(), text].filter(Boolean).join("; ");
+      if (told.textContent !== text) told.textContent = text;
+    }
+    const lettered = shapes.filter(([, ink]) => ink.letters.length);
+    if (!lettered.length) return;
+    const zoom = parseFloat(getComputedStyle(document.body).fontSize) / 16;
+    // letters of all layers keep clear of one another, of all arrows, and of what is lettered already
+    const taken = [...this.lettered(matrix), ...shapes.flatMap(([, ink]) => ink.taken)], bounds = this.bounds();
+    for (const [key, ink] of lettered) {
+      Object.assign(ink, { taken, zoom });
+      if (!this.stood.has(key)) this.stood.set(key, new Map());
+      ink.set(this.stood.get(key), bounds);
+    }
+  }
+
+  /** The boxes of letters that the drawing has already, and of its points, in user units. */
+  lettered(matrix) {
+    const inverse = matrix.inverse(), found = [];
+    for (const each of this.svg.querySelectorAll("text, .ground :not(g), .drives :not(g)")) {
+      const box = each.getBoundingClientRect();
+      // of what is large the outline alone is drawn, and there is room inside
+      if (!box.width || (box.width > LARGE && box.height > LARGE)) continue;
+      const [a, b] = [new DOMPoint(box.left, box.top), new DOMPoint(box.right, box.bottom)].map((each) => each.matrixTransform(inverse));
+      found.push([a.x, a.y, b.x, b.y]);
+    }
+    const { data } = this.page, ink = new Ink(this.group, this.unit);
+    ink.taken = found;
+    const places = new Map(Object.keys(data.points).map((name) => [name, this.at(this.page.point(name).position)]));
+    for (const place of places.values()) ink.keepClear(place, 8);
+    // along the sides of links, which are strong strokes
+    for (const link of data.links) {
+      if (link === data.frame) continue;
+      const own = [...places].filter(([name]) => data.points[name].links.includes(link)).map(([, place]) => place), at = outline(own);
+      for (let k = 0; k < (at.length > 2 ? at.length : at.length - 1); k++) ink.keepOff(own[at[k]], own[at[(k + 1) % at.length]]);
+    }
+    return found;
+  }
+
+  /** What can be seen, in user units: [x, y, x, y]. */
+  bounds() {
+    const inverse = this.svg.getScreenCTM().inverse(), box = this.svg.getBoundingClientRect();
+    const [a, b] = [[box.left, box.top], [box.right, box.bottom]].map(([x, y]) => new DOMPoint(x, y).matrixTransform(inverse));
+    return [a.x, a.y, b.x, b.y];
+  }
+
+  at(position) { return this.page.view.toScreen(position); }
+
+  /** A click near a point, what a layer has to pick, or on a link chooses it or no longer; whoever drags does not pick. */
+  picking() {
+    let from = null;
+    this.svg.addEventListener("pointerdown", (event) => { from = [event.clientX, event.clientY]; });
+    this.svg.addEventListener("click", (event) => {
+      if (!this.ready || from === null || Math.hypot(event.clientX - from[0], event.clientY - from[1]) > STILL) return;
+      const matrix = this.svg.getScreenCTM();
+      const near = (places) => {
+        let nearest = null, least = CLOSE;
+        for (const [name, [x, y]] of places) {
+          const there = new DOMPoint(x, y).matrixTransform(matrix);
+          const far = Math.hypot(there.x - event.clientX, there.y - event.clientY);
+          if (far < least) [nearest, least] = [name, far];
+        }
+        return nearest;
+      };
+      const point = near(Object.keys(this.page.data.points).map((name) => [name, this.at(this.page.point(name).position)]));
+      if (point !== null) return this.page.chosen.toggle("point", point);
+      for (const layer of this.all.filter((each) => each.pick && this.on.has(each.key))) {
+        const name = near(layer.places());
+        if (name !== null) return layer.pick(name, this);
+      }
+      const under = document.elementsFromPoint(event.clientX, event.clientY).map((each) => each.closest("[data-link]"));
+      const link = under.find((each) => each !== null)?.getAttribute("data-link");
+      if (link !== undefined && link !== this.page.data.frame) this.page.chosen.toggle("link", link);
+    });
+  }
+}
+
+/** Begin, beside `page.course`: what is chosen, the layers, the numbers and diagrams. */
+function startLayers(page) {
+  page.chosen = new Chosen(page);
+  const rates = Object.keys(RATES);
+  page.layers = new Layers(page, [paths, ...rates.map(arrows), ...rates.map(polygon), centres, centrodes]);
+  new Numbers(page);
+  new Charts(page);
+}

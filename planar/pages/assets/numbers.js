@@ -1,0 +1,173 @@
+"use strict";
+/* The numbers of the points and links chosen, as tables: positions in the file's units, rates in SI, as `planar solve`
+   prints them. Each cell carries its exact SI value as `data-si`. */
+
+const NOTHING = 1e-13;  // of the size, or of the greatest of its kind: printed as 0
+
+/** What a table says of a point or a link: [head, unit or its kind, value in SI from the page and the name]. */
+const QUANTITIES_OF = {
+  point: [
+    ["x", "length", (p) => p.position[0]],
+    ["y", "length", (p) => p.position[1]],
+    ["velocity", "m/s", (p) => size2(p.velocity)],
+    ["at", "angle", (p) => direction(p.velocity)],
+    ["along x", "m/s", (p) => p.velocity?.[0]],
+    ["along y", "m/s", (p) => p.velocity?.[1]],
+    ["acceleration", "m/s²", (p) => size2(p.acceleration)],
+    ["at", "angle", (p) => direction(p.acceleration)],
+    ["along x", "m/s²", (p) => p.acceleration?.[0]],
+    ["along y", "m/s²", (p) => p.acceleration?.[1]],
+  ],
+  link: [
+    ["angle", "angle", (f) => f.told],
+    ["angular velocity", "rad/s", (f) => f.v?.[2]],
+    ["angular acceleration", "rad/s²", (f) => f.a?.[2]],
+  ],
+};
+
+function size2(vector) { return vector ? Math.hypot(...vector) : undefined; }
+
+/** Of a vector; none of one that is nothing but rounding. */
+function direction(vector) { return vector && Math.hypot(...vector) > 1e-14 ? Math.atan2(vector[1], vector[0]) : undefined; }
+
+/** Between −π and π, unless the link's angle counts turns. */
+function wrapped(angle, counts) {
+  return counts || Math.abs(angle) <= Math.PI ? angle : Math.atan2(Math.sin(angle), Math.cos(angle));
+}
+
+/** [factor of SI, name] of a unit that is a kind of the file's or a name of SI. */
+function unitOf(page, kind) {
+  const own = page.data.units[kind];
+  return own === undefined ? [1, kind] : [1 / own.si, own.name];
+}
+
+function inputTold(page, value, k) {
+  const [by, name] = unitOf(page, page.data.inputs[k].slides ? "length" : "angle");
+  return `${short(value * by)} ${name}`;
+}
+
+function lengthTold(page, value) {
+  const [by, name] = unitOf(page, "length");
+  return `${Number((value * by).toPrecision(3))} ${name}`;
+}
+
+/** Six figures, as tables have them. */
+function figures(value) {
+  if (value === 0) return "0";
+  const text = value.toPrecision(6);
+  return text.replace("-", "−").replace("e+", "e");
+}
+
+class Numbers {
+  constructor(page) {
+    this.page = page;
+    const section = document.getElementById("numbers");
+    const box = htmlPart("div", { class: "choosing" }, section);
+    this.choosing(box);
+    this.place = htmlPart("div", { class: "tables" }, section);
+    this.tables();
+    page.on("chosen", () => { this.tables(); this.listed(); });
+    for (const event of ["move", "size"]) page.on(event, () => this.fill());
+  }
+
+  /** A list from which a point or a link is taken or given back, and one press that drops all. */
+  choosing(box) {
+    const { page } = this, { points, links, frame } = page.data;
+    const label = htmlPart("label", { class: "choice" }, box, "Point or link ");
+    this.select = htmlPart("select", {}, label);
+    this.add = htmlPart("button", { type: "button" }, box, "Show");
+    const moving = links.filter((link) => link !== frame);
+    for (const [kind, title, names] of [["point", "Points", Object.keys(points)], ["link", "Links", moving]]) {
+      const group = htmlPart("optgroup", { label: title }, this.select);
+      for (const name of names) htmlPart("option", { value: JSON.stringify([kind, name]) }, group, `${kind} ${name}`);
+    }
+    this.select.addEventListener("change", () => this.listed());
+    this.add.addEventListener("click", () => page.chosen.toggle(...JSON.parse(this.select.value)));
+    htmlPart("span", { class: "hint" }, box, "or click it in the drawing");
+    this.listed();
+  }
+
+  listed() {
+    if (!this.select.value) return;
+    this.add.textContent = this.page.chosen.has(...JSON.parse(this.select.value)) ? "Hide" : "Show";
+  }
+
+  /** The tables anew, for other points and links. */
+  tables() {
+    const { page } = this;
+    this.place.replaceChildren();
+    this.cells = [];
+    this.captions = [];
+    for (const [kind, title, names] of [["point", "Points", page.chosen.points()], ["link", "Links", page.chosen.links()]]) {
+      if (!names.length) continue;
+      const quantities = QUANTITIES_OF[kind], label = `${title}: numbers`;
+      const scroll = htmlPart("div", { class: "scroll", tabindex: "0", role: "group", "aria-label": label }, this.place);
+      const table = htmlPart("table", {}, scroll), caption = htmlPart("caption", {}, table);
+      const head = htmlPart("tr", {}, htmlPart("thead", {}, table));
+      this.captions.push([caption, title]);
+      htmlPart("th", { scope: "col" }, head, kind);
+      htmlPart("td", { class: "press" }, head);
+      for (const [name, unit] of quantities) {
+        const cell = htmlPart("th", { scope: "col" }, head, name);
+        htmlPart("span", { class: "unit" }, cell, ` ${unitOf(page, unit)[1]}`);
+      }
+      const body = htmlPart("tbody", {}, table);
+      names.forEach((name, k) => {
+        const row = htmlPart("tr", {}, body), first = htmlPart("th", { scope: "row" }, row);
+        htmlPart("span", { class: `swatch series${k % SERIES}`, "aria-hidden": "true" }, first);
+        first.append(name);
+        const hide = { type: "button", class: "drop", "aria-label": `Hide ${kind} ${name}` };
+        const drop = htmlPart("button", hide, htmlPart("td", { class: "press" }, row), "×");
+        const cells = quantities.map(() => htmlPart("td", {}, row));
+        drop.addEventListener("click", () => { page.chosen.toggle(kind, name); this.select.focus(); });
+        this.cells.push({ kind, name, cells });
+      });
+    }
+    if (!this.cells.length) htmlPart("p", { class: "hint" }, this.place, "No point or link is chosen.");
+    this.fill();
+  }
+
+  /** The numbers of now. */
+  fill() {
+    const { page } = this, { data } = page, rows = this.cells.map(({ kind, name }) => valuesOf(page, kind, name));
+    const greatest = greatestNumbers(page);
+    const at = data.inputs.map((each, k) => `${each.pair} = ${inputTold(page, page.input(k), k)}`).join(", ");
+    for (const [caption, title] of this.captions) caption.textContent = at ? `${title} at ${at}` : title;
+    this.cells.forEach(({ kind, cells }, r) => cells.forEach((cell, c) => {
+      const value = rows[r][c], [, unit] = QUANTITIES_OF[kind][c], [by] = unitOf(page, unit);
+      if (value === undefined || Number.isNaN(value)) {
+        cell.textContent = unit === "angle" ? "" : "–";
+        delete cell.dataset.si;
+        return;
+      }
+      cell.textContent = figures(Math.abs(value) <= NOTHING * greatest[unit] ? 0 : value * by);
+      cell.dataset.si = String(value);
+    }));
+  }
+}
+
+/** The greatest size of each kind of number: what is rounding beside it is none. */
+function greatestNumbers(page) {
+  const { data } = page, found = { length: data.size, angle: Math.PI };
+  for (const [kind, names] of [["point", Object.keys(data.points)], ["link", data.links]]) {
+    for (const name of names) {
+      valuesOf(page, kind, name).forEach((value, k) => {
+        const [, unit] = QUANTITIES_OF[kind][k];
+        found[unit] = Math.max(found[unit] ?? 0, Math.abs(value ?? 0));
+      });
+    }
+  }
+  // what would balance out, or be as fast, at the mechanism's size
+  const turning = found["rad/s"] ?? 0;
+  found["rad/s²"] = Math.max(found["rad/s²"] ?? 0, turning ** 2);
+  found["m/s"] = Math.max(found["m/s"] ?? 0, turning * data.size);
+  found["m/s²"] = Math.max(found["m/s²"] ?? 0, turning ** 2 * data.size);
+  return found;
+}
+
+/** The numbers of a point or link in SI, in the order of its table; undefined where there is none. */
+function valuesOf(page, kind, name, frames = page.frames) {
+  const f = frames[name], counts = page.data.counting.includes(name);
+  const of = kind === "point" ? page.point(name, frames) : { ...f, told: wrapped(f.angle, counts) };
+  return QUANTITIES_OF[kind].map(([, , value]) => value(of));
+}

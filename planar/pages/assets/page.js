@@ -1,0 +1,101 @@
+"use strict";
+/* The page's one state: where the mechanism is. What shows it listens; what changes it calls `moveTo`, `changeTo`,
+   `take`. Events: "move" (another position), "size" (other dimensions, or another assembly: all that was remembered of
+   the motion is void), "said" (a sentence for the reader), "course" (the whole motion is known, or void), "chosen" (other
+   points and links are looked at), "view" (the drawing lies elsewhere on the screen, or is of another size). */
+
+class Page {
+  constructor(data, program) {
+    this.data = data;
+    this.linkage = new Linkage(data, program);
+    this.listeners = { move: [], size: [], said: [], course: [], chosen: [], view: [] };
+    this.running = 0; // which input is moved
+    this.update();
+  }
+
+  on(event, act) { this.listeners[event].push(act); }
+  emit(event, ...more) { for (const act of this.listeners[event]) act(...more); }
+  say(sentence) { this.emit("said", sentence); }
+
+  /** Solve where everything is, with the rates of the inputs as the file has them. */
+  update() {
+    const rates = this.inputRates();
+    this.state = this.linkage.state(rates.map((each) => each[0]), rates.map((each) => each[1]));
+    this.frames = this.framesOf(this.state);
+  }
+
+  /** Velocity and acceleration of every input, SI. */
+  inputRates() { return this.data.inputs.map((each) => [each.velocity, each.acceleration]); }
+
+  /** The links' own axes in a state: {x, y, angle, cos, sin, v: [vx, vy, w], a} by name. */
+  framesOf({ w, w1, w2 }) {
+    const { column, frame, links } = this.data;
+    const found = { [frame]: { x: 0, y: 0, angle: 0, cos: 1, sin: 0, v: w1 && [0, 0, 0], a: w2 && [0, 0, 0] } };
+    for (const link of links) {
+      if (link === frame) continue;
+      const at = column[link], [x, y, angle] = at.map((k) => w[k]);
+      found[link] = {
+        x, y, angle, cos: Math.cos(angle), sin: Math.sin(angle),
+        v: w1 && at.map((k) => w1[k]), a: w2 && at.map((k) => w2[k]),
+      };
+    }
+    return found;
+  }
+
+  /** The position of an input (rad or m). */
+  input(k = this.running) { return this.linkage.u[k] * this.linkage.scale[k]; }
+
+  /** Move an input to a position (rad or m), as far as it goes; whether it came there. */
+  moveTo(position, k = this.running) {
+    const u = Array.from(this.linkage.u);
+    u[k] = position / this.linkage.scale[k];
+    const { reached } = this.linkage.moveTo(u);
+    this.update();
+    this.emit("move");
+    return reached === 1;
+  }
+
+  /** Change the dimensions (m), as far as the linkage goes together: {reached, open}. */
+  changeTo(d) {
+    const done = this.linkage.changeTo(d);
+    this.update();
+    this.emit("size", done);
+    this.emit("move");
+    return done;
+  }
+
+  /** Take another assembly, the inputs where they are: its unknowns. */
+  take(z) {
+    this.linkage.z = Float64Array.from(z);
+    this.update();
+    this.emit("size", { reached: 1, open: 0 });
+    this.emit("move");
+  }
+
+  /** A number that depends on the dimensions. */
+  size(at) { return this.linkage.sizes[at]; }
+
+  /** Where a place of a link lies in the world (m), given by the places of its x and y. */
+  place(link, [x, y], frames = this.frames) {
+    const f = frames[link], a = this.size(x), b = this.size(y);
+    return [f.x + f.cos * a - f.sin * b, f.y + f.sin * a + f.cos * b];
+  }
+
+  /** Position, velocity and acceleration of a named point, each [x, y] (SI); rates null where not determined. */
+  point(name, frames = this.frames) {
+    const { links, at } = this.data.points[name];
+    return this.rates(links[0], this.place(links[0], at[0], frames), frames);
+  }
+
+  /** The same of the place of a link that lies at p in the world. */
+  rates(link, p, frames = this.frames) {
+    const f = frames[link], dx = p[0] - f.x, dy = p[1] - f.y;
+    if (!f.v || !f.a) return { position: p, velocity: null, acceleration: null };
+    const [vx, vy, w] = f.v, [ax, ay, e] = f.a;
+    return {
+      position: p,
+      velocity: [vx - w * dy, vy + w * dx],
+      acceleration: [ax - e * dy - w * w * dx, ay + e * dx - w * w * dy],
+    };
+  }
+}

@@ -1,0 +1,253 @@
+"use strict";
+/* A linkage solved as Python solves it: group after group by Newton's method on the functions printed beside this file.
+   `data` is what Python's planar.pages.carried says of the mechanism, `program` its functions. Lengths in z, u, w are
+   divided by data.size; everything that the class gives back is in SI. */
+
+const CLOSED = 1e-13;      // sizes, rad: Newton's method stops here
+const STEPS = 25;          // of Newton's method
+const FARTHEST = 0.06;     // rad, sizes: the longest step of an input from one position to the next
+const SHORTEST = 1e-6;     // a step that has to be shorter ends at a dead point
+const FAR = 0.3;           // rad, sizes: unknowns that would move farther are followed by shorter steps
+const JUMP = 0.5;          // how far from what was foretold unknowns may be, in parts of that
+const NEAR = 0.02;         // rad, sizes: as far from it they may always be
+const SMOOTH = 0.1;       // in the same parts, where a determinant changes its sign: at a change point, not at a dead point
+const RUNUP = 8;          // the farthest a step is foretold from the last one, in lengths of that
+const WEAK = 1e-9;         // a pivot below this part of the greatest: no rates are determined
+
+function solve(matrix, right, n) {
+  // Gauss with the greatest pivot of the column; matrix column by column (n by n), both are used up: the sign of the
+  // determinant, 0 where there is no solution
+  let greatest = 0, sign = 1;
+  for (let i = 0; i < n * n; i++) greatest = Math.max(greatest, Math.abs(matrix[i]));
+  for (let k = 0; k < n; k++) {
+    let best = k;
+    for (let i = k + 1; i < n; i++) if (Math.abs(matrix[k * n + i]) > Math.abs(matrix[k * n + best])) best = i;
+    if (!(Math.abs(matrix[k * n + best]) > WEAK * greatest)) return 0;
+    if (matrix[k * n + best] < 0) sign = -sign;
+    if (best !== k) {
+      sign = -sign;
+      for (let j = 0; j < n; j++) {
+        const kept = matrix[j * n + k];
+        matrix[j * n + k] = matrix[j * n + best];
+        matrix[j * n + best] = kept;
+      }
+      const kept = right[k];
+      right[k] = right[best];
+      right[best] = kept;
+    }
+    for (let i = k + 1; i < n; i++) {
+      const by = matrix[k * n + i] / matrix[k * n + k];
+      if (by === 0) continue;
+      for (let j = k; j < n; j++) matrix[j * n + i] -= by * matrix[j * n + k];
+      right[i] -= by * right[k];
+    }
+  }
+  for (let k = n - 1; k >= 0; k--) {
+    for (let j = k + 1; j < n; j++) right[k] -= matrix[j * n + k] * right[j];
+    right[k] /= matrix[k * n + k];
+  }
+  return sign;
+}
+
+function leastSquares(matrix, left, rows, n, damping) {
+  // a step that lessens what is open where rows and unknowns differ, or the slope is weak: Levenberg's
+  const square = new Float64Array(n * n), right = new Float64Array(n);
+  for (let i = 0; i < n; i++) {
+    for (let j = 0; j < n; j++) {
+      let sum = 0;
+      for (let k = 0; k < rows; k++) sum += matrix[i * rows + k] * matrix[j * rows + k];
+      square[j * n + i] = sum + (i === j ? damping : 0);
+    }
+    for (let k = 0; k < rows; k++) right[i] += matrix[i * rows + k] * left[k];
+  }
+  return solve(square, right, n) ? right : null;
+}
+
+class Linkage {
+  constructor(data, program) {
+    this.data = data;
+    this.program = program;
+    const { z, u, w, F } = data.counts;
+    this.room = program.stages.map((_, k) => {
+      const [a, b] = data.stages[k].z, [c, d] = data.stages[k].F;
+      return new Float64Array((d - c) * (1 + b - a));
+    });
+    this.found = new Float64Array(w);
+    this.rates = new Float64Array((F + w) * 3 + F * (z + u));
+    this.d = data.dimensions.map((each) => each.value);
+    this.sizes = new Float64Array(data.sizes);
+    this.measure();
+    this.scale = data.inputs.map((each) => (each.slides ? data.size : 1));
+    this.u = data.inputs.map((each, k) => each.position / this.scale[k]);
+    this.z = Float64Array.from(data.z);
+  }
+
+  /** Fill in the numbers of the pairs from the dimensions. */
+  measure(d = this.d) {
+    this.program.sizes(d, this.sizes);
+    this.p = this.sizes.subarray(0, this.data.counts.p);
+  }
+
+  /** Newton's method from z for inputs u: {z, open, closed, signs}; of the determinants of the groups, 0: not known. */
+  newton(u, z) {
+    z = Float64Array.from(z);
+    const signs = new Int8Array(this.data.stages.length);
+    let worst = 0;
+    for (let k = 0; k < this.data.stages.length; k++) {
+      const [from, to] = this.data.stages[k].z, [first, last] = this.data.stages[k].F;
+      const n = to - from, rows = last - first;
+      let left = Infinity, polished = 0;
+      for (let step = 0; step < STEPS; step++) {
+        const out = this.program.stages[k](z, u, this.p, this.room[k]);
+        const gap = out.subarray(0, rows), before = left; // solved in place: the next step fills them anew
+        left = 0;
+        for (let i = 0; i < rows; i++) left = Math.max(left, Math.abs(gap[i]));
+        if (!Number.isFinite(left)) return { z, open: Infinity, closed: false, signs };
+        if (n === 0 || (left <= CLOSED && (polished++ || left === 0)) || (left <= CLOSED && left >= before)) break;
+        const slope = out.subarray(rows);
+        let move = gap;
+        if (rows === n) {
+          signs[k] = solve(slope, gap, n);
+          if (signs[k] === 0) break;
+        } else move = leastSquares(slope, gap, rows, n, 1e-15);
+        if (move === null) break;
+        for (let i = 0; i < n; i++) z[from + i] -= move[i];
+      }
+      worst = Math.max(worst, left);
+      if (!(left <= 1e3 * this.data.tolerance)) return { z, open: worst, closed: false, signs };
+    }
+    return { z, open: worst, closed: true, signs };
+  }
+
+  /** How the unknowns move with inputs moving at u1: (unknowns,), or null where that is not determined. */
+  tangent(u, z, u1) {
+    const { z: n, F: rows, w, u: m } = this.data.counts;
+    const y = [...z, ...u];
+    this.program.kinematics(y, new Float64Array(n + m), new Float64Array(n + m), this.p, this.rates);
+    const slope = this.rates.slice(3 * (rows + w));
+    const right = new Float64Array(rows);
+    for (let j = 0; j < m; j++) for (let i = 0; i < rows; i++) right[i] -= slope[(n + j) * rows + i] * u1[j];
+    return this.inverse(slope, right);
+  }
+
+  /** Solve the slope in the unknowns for a right side. */
+  inverse(slope, right) {
+    const { z: n, F: rows } = this.data.counts;
+    if (rows === n) return solve(slope.slice(0, n * n), right, n) ? right : null;
+    return leastSquares(slope, right, rows, n, 0);
+  }
+
+  /** Go with the inputs to u, step by step on the branch: {reached: 0..1, open}. The state moves as far as it can. */
+  moveTo(u) {
+    const from = this.u.slice(), far = Math.max(...u.map((each, k) => Math.abs(each - from[k])), 0);
+    return this.follow(far / FARTHEST, (part) => {
+      const to = from.map((each, k) => each + part * (u[k] - each));
+      return { u: to, ready: () => undefined };
+    });
+  }
+
+  /** Change the dimensions, the inputs where they are: {reached, open}. */
+  changeTo(d) {
+    const from = this.d.slice();
+    this.last = null; // the way is another than that of the step before
+    const far = Math.max(...d.map((each, k) => Math.abs(each - from[k]) / this.data.size), 0);
+    const done = this.follow(far / FARTHEST, (part) => {
+      const to = from.map((each, k) => each + part * (d[k] - each));
+      return { u: this.u, ready: () => this.measure(to) };
+    });
+    this.d = from.map((each, k) => each + done.reached * (d[k] - each));
+    this.measure();
+    return done;
+  }
+
+  /** Follow a branch along a way: `at` says for a part from 0 to 1 which inputs and numbers there are. */
+  follow(count, at) {
+    let reached = 0, step = 1 / Math.max(1, Math.ceil(count)), open = 0;
+    const whole = step;
+    while (reached < 1) {
+      const next = Math.min(1, reached + step), there = at(next);
+      there.ready();
+      const guess = this.foretold(there.u, next - reached), found = this.newton(there.u, guess);
+      if (found.closed && (count === 0 || this.continues(found, guess))) {
+        this.last = { u: this.u, z: this.z, to: found.z, signs: this.agreed(found.signs), step: next - reached };
+        this.z = found.z;
+        this.u = Array.from(there.u);
+        reached = next;
+        step = Math.min(whole, step * 1.5);
+      } else {
+        open = found.open;
+        step *= 0.4;
+        if (step * Math.max(count, 1) * FARTHEST < SHORTEST) break;
+      }
+    }
+    at(reached).ready();
+    return { reached, open };
+  }
+
+  /** What is known of the step that led here; nothing where somebody else has put z. */
+  get before() { return this.last && this.last.to === this.z ? this.last : null; }
+
+  /** Where the unknowns would be for inputs u if they went on as in the last step, or along the tangent. */
+  foretold(u, step) {
+    const guess = Float64Array.from(this.z), { before } = this;
+    const way = Array.from(u, (each, k) => each - this.u[k]);
+    if (before !== null) {
+      const past = Array.from(this.u, (each, k) => each - before.u[k]);
+      const square = past.reduce((sum, each) => sum + each * each, 0);
+      // where the inputs rest the dimensions change, step by step of the same way
+      const by = square > 0 ? way.reduce((sum, each, k) => sum + each * past[k], 0) / square : step / before.step;
+      const aside = Math.hypot(...way.map((each, k) => each - by * past[k])), far = Math.hypot(...way);
+      if (Math.abs(by) <= RUNUP && aside <= 1e-6 * far && (square > 0) === (far > 0)) {
+        for (let i = 0; i < guess.length; i++) guess[i] += by * (this.z[i] - before.z[i]);
+        return guess;
+      }
+    }
+    const tangent = way.some((each) => each !== 0) ? this.tangent(this.u, this.z, way) : null;
+    // beside a dead point a tangent leads anywhere
+    if (tangent !== null && tangent.every((each) => Math.abs(each) < FAR)) for (let i = 0; i < guess.length; i++) guess[i] += tangent[i];
+    return guess;
+  }
+
+  /** Whether a position is on the same branch as this one: near to what was foretold, and on the same side of every
+      dead point, unless the way leads smoothly across a change point. */
+  continues(found, guess) {
+    let moved = 0, ahead = 0, gone = 0;
+    for (let i = 0; i < guess.length; i++) {
+      gone = Math.max(gone, Math.abs(found.z[i] - this.z[i]));
+      moved = Math.max(moved, Math.abs(found.z[i] - guess[i]));
+      ahead = Math.max(ahead, Math.abs(guess[i] - this.z[i]));
+    }
+    if (!(gone < FAR) || moved > NEAR + JUMP * ahead) return false;
+    const signs = this.before ? this.before.signs : this.newton(this.u, this.z).signs;
+    return moved <= SMOOTH * ahead || found.signs.every((each, k) => each * signs[k] >= 0);
+  }
+
+  /** The signs of determinants at a new position; where one is not known there, that before. */
+  agreed(signs) {
+    const { before } = this;
+    return before ? signs.map((each, k) => each || before.signs[k]) : signs;
+  }
+
+  /** Where everything is, in SI: w, and with rates of the inputs u1, u2 also w1, w2 (null where not determined). */
+  state(u1 = null, u2 = null) {
+    const { z: n, F: rows, w: many, u: m } = this.data.counts;
+    const by = this.data.lengths.map((each) => (each ? this.data.size : 1));
+    const scaled = (part) => Float64Array.from(part, (each, k) => each * by[k]);
+    if (u1 === null) return { w: scaled(this.program.positions(this.z, this.u, this.p, this.found).slice(0, many)), w1: null, w2: null };
+    const y = [...this.z, ...this.u], none = new Float64Array(n);
+    const rates = (y1, y2) => this.program.kinematics(y, y1, y2, this.p, this.rates);
+    const size = rows + many, column = (k) => this.rates.slice(k * size, (k + 1) * size);
+    const v = u1.map((each, k) => each / this.scale[k]), a = u2.map((each, k) => each / this.scale[k]);
+    rates([...none, ...v], [...none, ...a]);
+    const slope = this.rates.slice(3 * size);
+    const still = column(0).slice(rows);
+    const z1 = this.inverse(slope, column(1).slice(0, rows).map((each) => -each));
+    if (z1 === null) return { w: scaled(still), w1: null, w2: null };
+    rates([...z1, ...v], [...none, ...a]);
+    const z2 = this.inverse(slope, column(2).slice(0, rows).map((each) => -each));
+    rates([...z1, ...v], [...z2, ...a]);
+    return { w: scaled(still), w1: scaled(column(1).slice(rows)), w2: scaled(column(2).slice(rows)) };
+  }
+}
+
+if (typeof module !== "undefined") module.exports = { Linkage, solve };
