@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from planar.grouped.result import Each, Swept
     from planar.mechanism import Along, At, Distances, Drive, Input, Link, Load, Mechanism, Point
     from planar.motion import Motion, State
+    from planar.pages.shown import view
     from planar.pins import pinned
     from planar.solving.cycle import cycle
     from planar.solving.position import solve
@@ -123,6 +124,7 @@ _ROOMS = {
     "to_dict": "files",
     "transmission": "analysis.transmission",
     "velocity_by_centres": "analysis.by_centres",
+    "view": "pages.shown",
 }
 """Where each public name lives: it is loaded when it is first used."""
 
@@ -206,6 +208,7 @@ __all__ = [
     "to_dict",
     "transmission",
     "velocity_by_centres",
+    "view",
 ]
 
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from planar.errors import BadInput
 from planar.pairs.base import Pair
 from planar.shapes import Along, At, Distances, Link, Place, Point, Shape
+from planar.shown import Shown
 from planar.units import unit
 
 if TYPE_CHECKING:
@@ -126,7 +127,7 @@ class Units(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Mechanism:
+class Mechanism(Shown):
     """Links joined by pairs, one of them the frame.
 
     `pairs` are binary: a pin of n links is n - 1 of them. `remarks` are what the reader of the file has to say.

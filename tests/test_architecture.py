@@ -13,7 +13,7 @@ from planar.pairs import pair_types
 
 ROOT = Path(planar.__file__).parent
 FLOORS = [
-    {"errors", "algebra", "roots"},
+    {"errors", "algebra", "roots", "shown"},
     {"plane", "units"},
     {"laws"},
     {"shapes"},
@@ -55,8 +55,20 @@ LIBRARIES = {
         "views",
         "drawing",
         "words",
+        "pages",
     },
-    "casadi": {"closed", "pages", "elimination", "groups", "equations", "judged", "assemblies", "program", "native", "grouped"},
+    "casadi": {
+        "closed",
+        "pages",
+        "elimination",
+        "groups",
+        "equations",
+        "judged",
+        "assemblies",
+        "program",
+        "native",
+        "grouped",
+    },
     "networkx": {"graph"},
     "flint": {"assemblies"},
     "llvmlite": {"native"},
