@@ -49,6 +49,7 @@ if TYPE_CHECKING:
         Spring,
     )
     from planar.motion import Motion, State
+    from planar.pages.shown import view
     from planar.pins import pinned
     from planar.solving.cycle import cycle
     from planar.solving.position import solve
@@ -57,7 +58,7 @@ if TYPE_CHECKING:
     from planar.sweeping.sweep import sweep
     from planar.views.dataset import dataset
 
-__version__ = "0.7.0"
+__version__ = "0.8.0"
 
 _ROOMS = {
     "Advantage": "analysis.advantage",
@@ -147,6 +148,7 @@ _ROOMS = {
     "to_dict": "files",
     "transmission": "analysis.transmission",
     "velocity_by_centres": "analysis.by_centres",
+    "view": "pages.shown",
 }
 """Where each public name lives: it is loaded when it is first used."""
 
@@ -238,6 +240,7 @@ __all__ = [
     "to_dict",
     "transmission",
     "velocity_by_centres",
+    "view",
 ]
 
 

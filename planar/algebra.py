@@ -42,7 +42,10 @@ def sqrt(x: Scalar) -> Scalar:
 def atan2(y: Scalar, x: Scalar) -> Scalar:
     """The angle of the direction (x, y), between -pi and pi."""
     method = getattr(y, "arctan2", None) or getattr(y, "__arctan2__", None)
-    return np.arctan2(y, x) if method is None else method(x)
+    if method is not None:
+        return method(x)
+    turned = getattr(x, "__rarctan2__", None)  # of a symbol beside a number
+    return np.arctan2(y, x) if turned is None else turned(y)
 
 
 class Jet:

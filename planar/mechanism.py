@@ -13,6 +13,7 @@ from planar.applied import Course, Load, Mass, Spring
 from planar.errors import BadInput
 from planar.pairs.base import Pair
 from planar.shapes import Along, At, Distances, Link, Place, Point, Shape
+from planar.shown import Shown
 from planar.units import unit
 
 if TYPE_CHECKING:
@@ -121,7 +122,7 @@ class Units(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Mechanism:
+class Mechanism(Shown):
     """Links joined by pairs, one of them the frame.
 
     `pairs` are binary: a pin of n links is n - 1 of them. `gravity` is an acceleration (m/s^2). `remarks` are what the

@@ -26,6 +26,7 @@ from planar.results import (
     RelativeState,
 )
 from planar.shapes import Shape
+from planar.shown import Shown
 from planar.words import heading, hurrying, turning
 
 Array = np.ndarray
@@ -38,7 +39,7 @@ class Unknown(KeyError):
         return str(self.args[0])
 
 
-class Moving:
+class Moving(Shown):
     """What a position and a motion have in common: links, points and pairs by name, from frames that are jets."""
 
     mechanism: Mechanism

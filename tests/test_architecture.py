@@ -13,7 +13,7 @@ from planar.pairs import pair_types
 
 ROOT = Path(planar.__file__).parent
 FLOORS = [
-    {"errors", "algebra", "roots"},
+    {"errors", "algebra", "roots", "shown"},
     {"plane", "units"},
     {"laws"},
     {"shapes"},
@@ -57,10 +57,12 @@ LIBRARIES = {
         "views",
         "drawing",
         "words",
+        "pages",
     },
     "casadi": {
         "closed",
         "dynamics",
+        "pages",
         "elimination",
         "groups",
         "equations",
@@ -68,7 +70,6 @@ LIBRARIES = {
         "assemblies",
         "program",
         "native",
-        "pages",
         "grouped",
     },
     "networkx": {"graph"},

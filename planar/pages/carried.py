@@ -2,45 +2,58 @@
 
 from __future__ import annotations
 
+from itertools import islice
 from typing import Any
 
 import casadi as ca
+import numpy as np
 
 from planar.analysis.centres import extent
 from planar.analysis.centrodes import usual
 from planar.analysis.primary import primary
 from planar.analysis.standing import standing
 from planar.analysis.ties import rates
+from planar.assemblies.modes import modes
+from planar.branches.circuits import circuits
 from planar.dimensions import Dimension, changed, dimensions
 from planar.drawing.bodies import all_marks
 from planar.graph import numbered
-from planar.mechanism import Mechanism, counting, named_points
+from planar.mechanism import Mechanism, counting, misfits, named_points
+from planar.pages.columns import heads, reported
+from planar.pages.document import above_zero, called, document
 from planar.pages.script import printed
-from planar.pairs import Kind
+from planar.pairs import Kind, Pair
 from planar.pairs.marks import Mark
 from planar.plane import Vector
-from planar.program import scaled, shapes
-from planar.solving.position import known_of
+from planar.program import length, scaled, shapes
+from planar.shapes import Unplaced
+from planar.solving.position import Solver, known_of
 from planar.units import unit
+from planar.words import amount
 
 LONGEST, SHORTEST = 2.0, 0.25
 """By what a dimension can be changed on a page: from a quarter of it to twice as much."""
+PROBE = 0.02
+"""Of the way to its end, where a dimension is tried that may be held by a pair."""
+HALVINGS = 40
+MOST = 64
+"""Assemblies that a page offers."""
 
 
 class Numbers:
     """Numbers that depend on the dimensions, each with its place in what the page's function `sizes` gives."""
 
-    def __init__(self, mechanism: Mechanism):
-        self.dimensions = list(dimensions(mechanism, frozenset(link.name for link in mechanism.links)))
+    def __init__(self, mechanism: Mechanism, live: bool = True):
+        self.dimensions = list(dimensions(mechanism, frozenset(link.name for link in mechanism.links))) if live else []
         self.d = ca.SX.sym("d", len(self.dimensions))
         for k, each in enumerate(self.dimensions):
             mechanism = changed(mechanism, each, self.d[k])
         self.mechanism, self.shapes = mechanism, shapes(mechanism)
-        self.values: list[ca.SX] = []
+        self.values: list[Any] = []
 
     def place(self, value: Any) -> int:
         """The place of a number."""
-        self.values.append(ca.SX(value))
+        self.values.append(value)
         return len(self.values) - 1
 
     def spot(self, at: Vector) -> list[int]:
@@ -49,17 +62,19 @@ class Numbers:
 
     def function(self) -> str:
         """sizes(d): all numbers."""
-        return printed("sizes", ca.Function("sizes", [self.d], [ca.vertcat(*self.values)]))
+        return printed("sizes", ca.Function("sizes", [self.d], [ca.vertcat(*map(ca.SX, self.values))]))
 
 
-def carried(mechanism: Mechanism) -> tuple[dict[str, Any], str]:
+def carried(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[str, Any], str]:
     """The data of a page, and its functions.
 
-    Raises NoAnswer where the mechanism has no position to start from.
+    `z` are the unknowns of an assembly; left out, that nearest to the sketch. Raises NoAnswer where the mechanism has
+    no position to start from.
     """
     known = known_of(mechanism)
-    solver, z = known.solver, known.assembly.z
+    solver, z = known.solver, known.assembly.z if z is None else z
     e, program = solver.equations, solver.program
+    named = {member: name for name, members in named_points(mechanism) for member in members}
     numbers = Numbers(mechanism)
     measured = [
         value
@@ -68,21 +83,10 @@ def carried(mechanism: Mechanism) -> tuple[dict[str, Any], str]:
     ]
     for value in measured:
         numbers.place(value)
-    points = {
-        name: {
-            "links": [member[0] for member in members],
-            "at": [numbers.spot(numbers.shapes[link].at(point)) for link, point in members],
-        }
-        for name, members in named_points(mechanism)
-    }
-    named = {member: name for name, members in named_points(mechanism) for member in members}
-    marks = [_mark(mark, numbers) for mark in all_marks(numbers.mechanism, numbers.shapes)]
-    data = {
+    data = looks(mechanism, numbers) | {
         "name": mechanism.name,
         "about": mechanism.about,
         "units": _units(mechanism),
-        "frame": mechanism.frame,
-        "links": [link.name for link in mechanism.links],
         "column": {
             link.name: [solver.column[link.name, part] for part in ("x", "y", "angle")]
             for link in mechanism.links
@@ -103,23 +107,55 @@ def carried(mechanism: Mechanism) -> tuple[dict[str, Any], str]:
             for s in e.stages
         ],
         "inputs": [_input(given, solver.slides(given.pair)) for given in mechanism.inputs],
-        "dimensions": [_dimension(each, solver.unit) for each in numbers.dimensions],
-        "points": points,
+        "dimensions": [_dimension(mechanism, each, solver.unit) for each in numbers.dimensions],
         "numbers": numbered(mechanism),
         "counting": sorted(counting(mechanism)),
         "centred": _centred(mechanism),
         "rides": [[named[rider], guide] for rider, guide in filter(None, (pair.rides() for pair in mechanism.pairs))],
         "rolling": list(usual(mechanism)) if len(mechanism.links) > 1 else None,
-        "marks": marks,
+        "document": document(mechanism, numbers.dimensions),
+        "columns": heads(mechanism, solver),
+        "assemblies": _assemblies(mechanism, solver),
         "z": z.tolist(),
         "tolerance": solver.tolerance,
         "sizes": len(numbers.values),
     }
     functions = [numbers.function(), printed("positions", program.positions), printed("kinematics", program.rates)]
     functions += [printed(f"closing{k}", program.closing(stage)) for k, stage in enumerate(e.stages)]
+    functions.append(reported(mechanism, solver, numbers.d, numbers.shapes))
     stages = ",".join(f"closing{k}" for k in range(len(e.stages)))
-    functions.append(f"const program={{sizes,positions,kinematics,stages:[{stages}]}};")
+    functions.append(f"const program={{sizes,positions,kinematics,reported,stages:[{stages}]}};")
     return data, "\n".join(functions)
+
+
+def looks(mechanism: Mechanism, numbers: Numbers) -> dict[str, Any]:
+    """What a drawing of the mechanism needs: its links, points and marks, their numbers as places."""
+    points = {
+        name: {
+            "links": [member[0] for member in members],
+            "at": [numbers.spot(numbers.shapes[link].at(point)) for link, point in members],
+        }
+        for name, members in named_points(mechanism)
+    }
+    return {
+        "frame": mechanism.frame,
+        "links": [link.name for link in mechanism.links],
+        "points": points,
+        "names": list(points),
+        "marks": [_mark(mark, numbers) for mark in all_marks(numbers.mechanism, numbers.shapes)],
+    }
+
+
+def drawn(mechanism: Mechanism) -> tuple[dict[str, Any], list[float]]:
+    """What a drawing needs whose dimensions stay as they are, and the numbers themselves."""
+    numbers = Numbers(mechanism, live=False)
+    return looks(mechanism, numbers), [float(each) for each in numbers.values]
+
+
+def _centred(mechanism: Mechanism) -> list[list[str]]:
+    """Every two links whose instantaneous centre a pair of theirs shows."""
+    state = standing(mechanism)
+    return [sorted(two) for two in primary(rates(state), *extent(state)).centres]
 
 
 def _input(given: Any, slides: bool) -> dict[str, Any]:
@@ -132,25 +168,78 @@ def _input(given: Any, slides: bool) -> dict[str, Any]:
     }
 
 
-def _centred(mechanism: Mechanism) -> list[list[str]]:
-    """Every two links whose instantaneous centre a pair of theirs shows."""
-    state = standing(mechanism)
-    return [sorted(two) for two in primary(rates(state), *extent(state)).centres]
-
-
 def _units(mechanism: Mechanism) -> dict[str, Any]:
-    return {kind: {"name": name, "si": unit(name).to_si(1.0)} for kind, name in mechanism.units._asdict().items()}
+    """Of lengths and angles; a unit is `ratio[0] / ratio[1]` of the SI unit, `si` in one number."""
+    found = {kind: (name, unit(name)) for kind, name in mechanism.units._asdict().items()}
+    return {
+        kind: {"name": name, "si": of.to_si(1.0), "ratio": [of.numerator, of.denominator]}
+        for kind, (name, of) in found.items()
+    }
 
 
-def _dimension(each: Dimension, size: float) -> dict[str, Any]:
+def _assemblies(mechanism: Mechanism, solver: Solver) -> dict[str, Any]:
+    """The first assemblies in the order of their numbers, whether these are all, and where each lies."""
+    found = modes(mechanism, certify=False)
+    listed = list(islice(found, MOST + 1))
+    stages = solver.equations.stages
+    # of one group of two the circuits are known in some milliseconds; of others it may take a minute
+    small = len(stages) <= 1 and all(length(stage.unknowns) <= 2 for stage in stages) and len(mechanism.inputs) == 1
+    every = circuits(mechanism) if small else None
+    lying = [every.of(mode) if every else None for mode in listed[:MOST]]
+    return {
+        "more": len(listed) > MOST,
+        "list": [
+            {
+                "z": mode.z.tolist(),
+                "circuit": on and [on[0].number, len(every)],
+                "branch": on and [on[1].number, len(on[0].branches)],
+            }
+            for mode, on in zip(listed, lying, strict=False)
+        ],
+    }
+
+
+def _dimension(mechanism: Mechanism, each: Dimension, size: float) -> dict[str, Any]:
     """A dimension with the range in which a page lets it be changed: a length stays one, a coordinate may pass zero."""
-    value = float(each.value)
-    part = each.name.rsplit(".", 1)[1]
-    free = part in ("x", "y")
-    low, high = (
-        (value - 0.5 * size, value + 0.5 * size) if free or not value else sorted((SHORTEST * value, LONGEST * value))
-    )
-    return {"name": each.name, "value": value, "low": low, "high": high}
+    value, part = float(each.value), each.name.rsplit(".", 1)[1]
+    free = part in ("x", "y") or not value
+    low, high = (value - 0.5 * size, value + 0.5 * size) if free else sorted((SHORTEST * value, LONGEST * value))
+    tried = [value + PROBE * (to - value) for to in (low, high)]
+    wrong = [(to, why) for to in tried if (why := _misfit(mechanism, each, to))]
+    held = f"at {amount(wrong[0][0], 'length', mechanism.units)} {wrong[0][1]}" if wrong else ""
+    far = (low, high) if held else tuple(_as_far(mechanism, each, value, to) for to in (low, high))
+    return {
+        "name": each.name,
+        "link": each.link,
+        "what": called(mechanism, each),
+        "value": value,
+        "low": far[0],
+        "high": far[1],
+        "bounds": [None if to == end else end for to, end in zip((low, high), far, strict=True)],
+        "positive": above_zero(mechanism, each),
+        "held": held,
+    }
+
+
+def _misfit(mechanism: Mechanism, each: Dimension, value: float) -> str:
+    """What a pair has against another value of a dimension, as wheels whose radii say how far apart they are."""
+    if all(type(pair).misfit is Pair.misfit for pair in mechanism.pairs):
+        return ""  # none of them looks at sizes
+    other = changed(mechanism, each, value)
+    try:
+        return next((wrong for _, wrong in misfits(other.pairs, shapes(other), other.units)), "")
+    except Unplaced:
+        return ""  # the page says itself how far a triangle closes
+
+
+def _as_far(mechanism: Mechanism, each: Dimension, value: float, to: float) -> float:
+    """How far from its value towards another one no pair has anything against a dimension."""
+    if not _misfit(mechanism, each, to):
+        return to
+    for _ in range(HALVINGS):
+        middle = 0.5 * (value + to)
+        value, to = (value, middle) if _misfit(mechanism, each, middle) else (middle, to)
+    return value
 
 
 def _mark(mark: Mark, numbers: Numbers) -> dict[str, Any]:

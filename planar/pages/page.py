@@ -4,32 +4,65 @@ from __future__ import annotations
 
 import json
 from html import escape
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from planar.files import asset
 from planar.mechanism import Mechanism
 from planar.pages.carried import carried
 
-STYLES = ("uplot/uPlot.min.css", "page.css", "stage.css", "layers.css")
+
+class Window(NamedTuple):
+    """The part of an input's range that a page runs through: the number of the input, and both ends (rad or m)."""
+
+    running: int
+    low: float
+    high: float
+
+
+STYLES = (
+    "uplot/uPlot.min.css",
+    "page.css",
+    "stage.css",
+    "layers.css",
+    "dimensions.css",
+)
 SCRIPTS = (
-    *("uplot/uPlot.iife.min.js", "solver.js", "page.js", "course.js"),
-    *("bodies.js", "symbols.js", "ground.js", "letters.js", "poses.js", "drawing.js", "dragging.js", "controls.js"),
-    *(
-        "layers_ink.js",
-        "layers_points.js",
-        "polygons.js",
-        "centres.js",
-        "layers_centrodes.js",
-        "numbers.js",
-        "charts.js",
-    ),
+    "uplot/uPlot.iife.min.js",
+    "solver.js",
+    "page.js",
+    "course.js",
+    "bodies.js",
+    "symbols.js",
+    "ground.js",
+    "letters.js",
+    "poses.js",
+    "drawing.js",
+    "dragging.js",
+    "controls.js",
+    "layers_ink.js",
+    "layers_points.js",
+    "polygons.js",
+    "centres.js",
+    "layers_centrodes.js",
+    "numbers.js",
+    "charts.js",
     "layers.js",
+    "dimensions.js",
+    "assemblies.js",
+    "saving.js",
 )
 
 
-def page(mechanism: Mechanism) -> str:
-    """The page of a mechanism. Raises NoAnswer where it has no position to start from."""
-    data, functions = carried(mechanism)
+def page(mechanism: Mechanism, z: np.ndarray | None = None, window: Window | None = None) -> str:
+    """The page of a mechanism at its inputs.
+
+    `z` are the unknowns of the assembly, left out that nearest to the sketch; `window` is the range that is run
+    through, left out a turn or from limit to limit. Raises NoAnswer where it has no position to start from.
+    """
+    data, functions = carried(mechanism, z)
+    data["window"] = window and window._asdict()
     scripts = "\n".join([*(asset(name) for name in SCRIPTS), functions, START])
     parts = {
         "title": escape(mechanism.name),
@@ -40,11 +73,14 @@ def page(mechanism: Mechanism) -> str:
     return filled(asset("page.html"), parts)
 
 
-START = """
+START = r"""
 const page = new Page(JSON.parse(document.getElementById("data").textContent), program);
 const svg = document.getElementById("drawing"), drawing = new Drawing(page, svg), dragging = new Dragging(page, svg);
 const controls = new Controls(page, document.getElementById("controls"), svg, drawing, dragging);
 new Courses(page);
+new Dimensions(page, document.getElementById("dimensions"));
+new Assemblies(page, document.getElementById("assemblies"));
+new Saving(page, document.getElementById("saving"), document.getElementById("drawing"));
 startLayers(page);
 """
 

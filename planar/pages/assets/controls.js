@@ -25,26 +25,26 @@ class Controls {
   make(section) {
     const { inputs } = this.page.data;
     if (!inputs.length) return;
-    const bar = made("div", { class: "buttons" });
-    this.button = made("button", { type: "button", class: "main" }, "Play");
+    const bar = control("div", { class: "buttons" });
+    this.button = control("button", { type: "button", class: "main" }, "Play");
     this.button.addEventListener("click", () => (this.playing ? this.pause() : this.play()));
-    this.turn = made("button", { type: "button" });
+    this.turn = control("button", { type: "button" });
     this.turn.addEventListener("click", () => this.reverse());
-    const home = made("button", { type: "button", title: "Home" }, "Start");
+    const home = control("button", { type: "button", title: "Home" }, "Start");
     home.setAttribute("aria-label", "To the position in the file");
     home.addEventListener("click", () => this.home());
     bar.append(this.button, this.turn, home, this.speeds());
     section.append(bar);
     this.rows = inputs.map((given, k) => this.row(given, k, inputs.length > 1));
     section.append(...this.rows.map((row) => row.row));
-    section.append(made("p", { class: "hint", id: "keys" }, "Take hold of any link and move it. Arrow keys step, space plays, Home goes back to the start."));
+    section.append(control("p", { class: "hint", id: "keys" }, "Take hold of any link and move it. Arrow keys step, space plays, Home goes back to the start."));
     this.svg.setAttribute("aria-describedby", "keys");
     this.svg.setAttribute("aria-keyshortcuts", "ArrowRight ArrowLeft Shift+ArrowRight Shift+ArrowLeft Space Home");
   }
 
   speeds() {
-    const label = made("label", { class: "speed" }, "Speed "), told = made("output");
-    const slider = made("input", { type: "range", min: SPEEDS[0], max: SPEEDS[1], step: 0.5, value: 0 });
+    const label = control("label", { class: "speed" }, "Speed "), told = control("output");
+    const slider = control("input", { type: "range", min: SPEEDS[0], max: SPEEDS[1], step: 0.5, value: 0 });
     slider.setAttribute("aria-label", "Speed");
     slider.addEventListener("input", () => { this.speed = 2 ** slider.valueAsNumber; this.told(); });
     label.append(slider, told);
@@ -54,16 +54,16 @@ class Controls {
 
   /** One input: which runs, its slider with marks at its ends, its number. */
   row(given, k, many) {
-    const row = made("div", { class: "input" }), unit = inputUnit(this.page, k);
-    const name = made(many ? "label" : "span", { class: "name" });
-    const slider = made("input", { type: "range", step: "any" });
+    const row = control("div", { class: "input" }), unit = inputUnit(this.page, k);
+    const name = control(many ? "label" : "span", { class: "name" });
+    const slider = control("input", { type: "range", step: "any" });
     slider.setAttribute("aria-label", given.pair);
-    const number = made("input", { type: "text", inputmode: "decimal", size: 8, autocomplete: "off" });
+    const number = control("input", { type: "text", inputmode: "decimal", size: 8, autocomplete: "off" });
     number.setAttribute("aria-label", `${given.pair} (${unit.name})`);
-    const ends = made("div", { class: "ends" }), low = made("span"), high = made("span");
+    const ends = control("div", { class: "ends" }), low = control("span"), high = control("span");
     let chosen = null;
     if (many) {
-      chosen = made("input", { type: "radio", name: "running" });
+      chosen = control("input", { type: "radio", name: "running" });
       chosen.setAttribute("aria-label", `Play ${given.pair}`);
       chosen.addEventListener("change", () => this.run(k));
       name.append(chosen);
@@ -78,9 +78,9 @@ class Controls {
       this.show(true);
     });
     ends.append(low, high);
-    const line = made("div", { class: "line" });
+    const line = control("div", { class: "line" });
     line.append(slider, ends);
-    const field = made("span", { class: "field" });
+    const field = control("span", { class: "field" });
     field.append(number, document.createTextNode(` ${unit.name}`));
     row.append(name, line, field);
     return { row, slider, number, low, high, chosen };
@@ -249,7 +249,7 @@ class Controls {
 }
 
 /** An element; attributes and texts are set as such, never parsed. */
-function made(name, attributes = {}, text = null) {
+function control(name, attributes = {}, text = null) {
   const element = document.createElement(name);
   for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
   if (text !== null) element.textContent = text;

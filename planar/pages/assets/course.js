@@ -155,13 +155,14 @@ class Courses {
     const slides = data.inputs[k].slides, here = u[k];
     const turn = 2 * Math.PI, base = turn * Math.floor(here / turn + 1e-9);
     // a turn is gone from 0 to 360 deg; half of it up from here, half of it down
-    const far = slides ? [here - FREE_SLIDE, here + FREE_SLIDE] : [base, base + turn];
+    const own = data.window?.running === k ? data.window : null; // the range of a motion that is shown
+    const far = own ? [own.low / scale, own.high / scale] : slides ? [here - FREE_SLIDE, here + FREE_SLIDE] : [base, base + turn];
     const ends = [null, null];
     for (const [side, sign] of [[1, 1], [0, -1]]) {
       ends[side] = yield* this.march(z, u, k, far[side], sign);
     }
-    const turns = !slides && !ends[0].stopped && !ends[1].stopped;
-    if (!slides && !turns) {
+    const turns = !slides && !own && !ends[0].stopped && !ends[1].stopped;
+    if (!slides && !own && !turns) {
       // an end beyond the turn's seam: a rocking crank's range is not cut there
       for (const [side, sign] of [[1, 1], [0, -1]]) {
         if (!ends[side].stopped) ends[side] = yield* this.march(ends[side].z, ends[side].u, k, ends[side].at + sign * turn, sign);

@@ -30,7 +30,8 @@ class Page {
   /** The links' own axes in a state: {x, y, angle, cos, sin, v: [vx, vy, w], a} by name. */
   framesOf({ w, w1, w2 }) {
     const { column, frame, links } = this.data;
-    const found = { [frame]: { x: 0, y: 0, angle: 0, cos: 1, sin: 0, v: w1 && [0, 0, 0], a: w2 && [0, 0, 0] } };
+    const found = Object.create(null); // a link may be named like something that every object has
+    found[frame] = { x: 0, y: 0, angle: 0, cos: 1, sin: 0, v: w1 && [0, 0, 0], a: w2 && [0, 0, 0] };
     for (const link of links) {
       if (link === frame) continue;
       const at = column[link], [x, y, angle] = at.map((k) => w[k]);

@@ -141,7 +141,7 @@ class Linkage {
   moveTo(u) {
     const from = this.u.slice(), far = Math.max(...u.map((each, k) => Math.abs(each - from[k])), 0);
     return this.follow(far / FARTHEST, (part) => {
-      const to = from.map((each, k) => each + part * (u[k] - each));
+      const to = part === 1 ? u : from.map((each, k) => each + part * (u[k] - each));
       return { u: to, ready: () => undefined };
     });
   }
@@ -152,10 +152,10 @@ class Linkage {
     this.last = null; // the way is another than that of the step before
     const far = Math.max(...d.map((each, k) => Math.abs(each - from[k]) / this.data.size), 0);
     const done = this.follow(far / FARTHEST, (part) => {
-      const to = from.map((each, k) => each + part * (d[k] - each));
+      const to = part === 1 ? d : from.map((each, k) => each + part * (d[k] - each));
       return { u: this.u, ready: () => this.measure(to) };
     });
-    this.d = from.map((each, k) => each + done.reached * (d[k] - each));
+    this.d = done.reached === 1 ? Array.from(d) : from.map((each, k) => each + done.reached * (d[k] - each));
     this.measure();
     return done;
   }

@@ -1,0 +1,120 @@
+"use strict";
+/* The index of a folder of pages: small pictures that move while they are seen. Where the links are at every step was
+   found beforehand; between two steps they go on evenly. */
+
+const ROUND = 6; // s, one way through a motion
+
+/** What a drawing looks at, in the place of a page: a mechanism that is only played. */
+class Recording {
+  constructor(data) {
+    this.data = data;
+    const [first = []] = data.frames;
+    this.steps = first.length / 3 - 1;
+    this.poses = Array.from({ length: this.steps + 1 }, (_, k) => this.at(k));
+    [this.frames] = this.poses;
+  }
+
+  on() {}
+  emit() {}
+  size(at) { return this.data.sizes[at]; }
+
+  /** Where all links are at a step, or between two. */
+  at(step) {
+    const { frame, links, frames } = this.data, k = Math.min(Math.floor(step), Math.max(0, this.steps - 1)), part = step - k;
+    const found = Object.create(null); // a link may be named like something that every object has
+    found[frame] = { x: 0, y: 0, angle: 0, cos: 1, sin: 0 };
+    links.filter((link) => link !== frame).forEach((link, i) => {
+      const next = this.steps ? 3 * (k + 1) : 0;
+      const [x, y, angle] = [0, 1, 2].map((j) => frames[i][3 * k + j] + part * (frames[i][next + j] - frames[i][3 * k + j]));
+      found[link] = { x, y, angle, cos: Math.cos(angle), sin: Math.sin(angle) };
+    });
+    return found;
+  }
+
+  /** Go to a time (s): round and round, else to and fro. */
+  play(time) {
+    const rounds = time / ROUND, whole = Math.floor(rounds), part = rounds - whole;
+    const there = this.data.closed ? part : (1 - Math.cos(Math.PI * rounds)) / 2;
+    this.frames = this.at(there * this.steps);
+  }
+}
+
+/** The drawing of a page, without letters, arrows and scale. */
+class Small extends Drawing {
+  measure() {
+    this.poses = this.page.poses;
+    this.spans = [];
+    this.slack = 0;
+    this.build();
+  }
+
+  named() {
+    this.spots = [];
+    this.letters = { place: () => true };
+    this.strokes = new Float64Array(4 * this.edges.length);
+  }
+
+  drive() {}
+  scaleBar() {}
+  inside() { return true; }
+}
+
+const shownModels = JSON.parse(document.getElementById("data").textContent).map((data) => {
+  const item = document.createElement("li"), link = document.createElement("a");
+  const title = document.createElement("strong"), about = document.createElement("span");
+  const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+  title.textContent = data.name;
+  about.textContent = data.about;
+  svg.setAttribute("class", "small");
+  svg.setAttribute("aria-hidden", "true"); // its name stands below it
+  link.href = data.href;
+  link.append(svg, title, about);
+  item.append(link);
+  document.getElementById("gallery").append(item);
+  return { data, item, svg, seen: false, recording: null, drawing: null };
+});
+
+const watcher = new IntersectionObserver((entries) => {
+  for (const { target, isIntersecting } of entries) {
+    const model = shownModels.find((each) => each.svg === target);
+    model.seen = isIntersecting;
+    if (isIntersecting && !model.drawing) {
+      model.recording = new Recording(model.data);
+      model.drawing = new Small(model.recording, model.svg);
+    }
+  }
+}, { rootMargin: "100px" });
+for (const { svg } of shownModels) watcher.observe(svg);
+
+const run = document.getElementById("run"), find = document.getElementById("find"), none = document.getElementById("none");
+let running = !matchMedia("(prefers-reduced-motion: reduce)").matches, time = 0, last = null;
+
+function frame(now) {
+  if (last !== null) time += Math.min(now - last, 100) / 1000;
+  last = now;
+  for (const { seen, recording, drawing } of shownModels) {
+    if (!seen || !drawing || !recording.steps) continue;
+    recording.play(time);
+    drawing.place();
+  }
+  if (running) requestAnimationFrame(frame);
+}
+
+function told() { run.textContent = running ? "Pause" : "Play"; }
+run.addEventListener("click", () => {
+  running = !running;
+  last = null;
+  told();
+  if (running) requestAnimationFrame(frame);
+});
+find.addEventListener("input", () => {
+  const words = find.value.toLowerCase().split(/\s+/);
+  let left = 0;
+  for (const { data, item } of shownModels) {
+    item.hidden = !words.every((word) => `${data.name} ${data.about}`.toLowerCase().includes(word));
+    left += !item.hidden;
+  }
+  none.textContent = left ? "" : "No mechanism of that name.";
+});
+told();
+if (running) requestAnimationFrame(frame);

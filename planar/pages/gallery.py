@@ -1,0 +1,119 @@
+"""A folder of pages, a mechanism each, and an index of small moving pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import numpy as np
+
+from planar.errors import BadInput, NoAnswer
+from planar.files import asset, save
+from planar.mechanism import Mechanism
+from planar.motion import Motion
+from planar.pages.carried import drawn
+from planar.pages.page import filled, page, told
+from planar.solving.cycle import cycle
+from planar.solving.position import known_of
+
+SCRIPTS = ("bodies.js", "symbols.js", "ground.js", "letters.js", "drawing.js", "gallery.js")
+STYLES = ("page.css", "stage.css", "gallery.css")
+"""The drawing as pages have it, and what moves many of them."""
+
+STEPS = 36
+"""Of the motion in a small picture, between which it goes on evenly."""
+DIGITS = 5
+"""Of places and angles there: less than a hundredth of a pixel."""
+
+
+def gallery(
+    models: Sequence[tuple[str, Mechanism]], folder: Path, progress: Callable[[int, int], None] | None = None
+) -> tuple[Path, list[tuple[str, NoAnswer]]]:
+    """Write a page for each mechanism under its name, and the index; gives the index's path.
+
+    Mechanisms that have no position to start from are left out and given back with the reason. `progress` is told
+    after each how many are done, of how many. Raises BadInput where the folder or a file cannot be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as problem:
+        raise BadInput(str(folder), f"the folder cannot be made: {problem.strerror}") from None
+    taken, shown, refused = {"index"}, [], []
+    for done, (name, mechanism) in enumerate(models, start=1):
+        try:
+            text, moving = page(mechanism), small(mechanism)
+        except NoAnswer as problem:
+            refused.append((name, problem))
+            continue
+        finally:
+            if progress is not None:
+                progress(done, len(models))
+        file = _new(name, taken)
+        save(folder / f"{file}.html", text)
+        shown.append(moving | {"name": mechanism.name, "about": mechanism.about or "", "href": quote(f"{file}.html")})
+    save(folder / "index.html", index(shown))
+    return folder / "index.html", refused
+
+
+def index(shown: list[dict[str, Any]]) -> str:
+    """The page of small pictures."""
+    title = escape(f"{len(shown)} mechanisms" if len(shown) != 1 else "1 mechanism")
+    scripts = "\n".join(asset(name) for name in SCRIPTS)
+    styles = "\n".join(asset(name) for name in STYLES).replace("#drawing", ".small")  # a page has one drawing
+    return filled(asset("gallery.html"), {"title": title, "styles": styles, "data": told(shown), "scripts": scripts})
+
+
+def small(mechanism: Mechanism) -> dict[str, Any]:
+    """What a small picture is drawn from: how the links look, and where they are at every step.
+
+    `closed` says whether the motion comes back to its start, so that it goes round, not to and fro.
+    """
+    looks, sizes = drawn(mechanism)
+    motion = _motion(mechanism)
+    paths = [
+        np.stack([np.broadcast_to(part.parts[0], (len(motion),)) for part in (frame.x, frame.y, frame.angle)], axis=1)
+        for frame in (motion.frames[link] for link in looks["links"] if link != mechanism.frame)
+    ]
+    whole = 2.0 * np.pi
+    closed = all(
+        np.abs(p[-1] - p[0] - [0.0, 0.0, whole * round((p[-1, 2] - p[0, 2]) / whole)]).max() < 1e-6 for p in paths
+    )
+    return looks | {
+        "size": known_of(mechanism).solver.unit,
+        "inputs": [{"pair": given.pair} for given in mechanism.inputs],
+        "sizes": [_short(value) for value in sizes],
+        "frames": [[_short(value) for value in path.ravel()] for path in paths],
+        "closed": closed and len(motion) > 1,
+    }
+
+
+def _motion(mechanism: Mechanism) -> Motion:
+    """The motion of the first input over its own range; of a slide without limits, its own size either way."""
+    given = mechanism.inputs[0]
+    try:
+        return cycle(mechanism, STEPS, pair=given.pair) if _timeless(mechanism) else cycle(mechanism, STEPS)
+    except BadInput:
+        far = known_of(mechanism).solver.unit
+        return cycle(mechanism, STEPS, given.position - far, given.position + far, given.pair)
+
+
+def _timeless(mechanism: Mechanism) -> bool:
+    return not any(given.law is not None for given in mechanism.inputs)
+
+
+def _short(value: float) -> float:
+    return float(f"{float(value):.{DIGITS}g}")
+
+
+def _new(name: str, taken: set[str]) -> str:
+    """A name for a file that no other of the folder has, on any system."""
+    kept = "".join(each if each.isalnum() or each in "-_." else "-" for each in name)[:80].strip(".-") or "mechanism"
+    found, again = kept, 1
+    while found.lower() in taken:
+        again += 1
+        found = f"{kept}-{again}"
+    taken.add(found.lower())
+    return found

@@ -1,0 +1,92 @@
+"""A mechanism, a position or a motion as a page: written to a file, opened in the browser, or shown in a notebook."""
+
+from __future__ import annotations
+
+from html import escape
+from pathlib import Path
+from tempfile import mkdtemp
+
+import numpy as np
+
+from planar.algebra import Jet, Scalar
+from planar.errors import BadInput, NoAnswer
+from planar.files import save
+from planar.mechanism import Drive, Mechanism, with_inputs
+from planar.motion import Motion, State
+from planar.pages.page import Window, page
+from planar.plane import frame_at
+from planar.solving.position import known_of
+
+HEIGHT = 720
+"""Pixels of a page in a notebook."""
+
+
+def view(shown: Mechanism | State | Motion, path: str | Path | None = None) -> Path:
+    """Write the page of a mechanism, of a position, or of a motion, which keeps its range.
+
+    Without a path it is written to a folder of its own and opened in the browser. Gives the file's path. Raises
+    NoAnswer where the mechanism has no position to start from, BadInput where the file cannot be written.
+    """
+    if not isinstance(shown, Mechanism | State | Motion):
+        raise BadInput("view", f"a Mechanism, a State or a Motion is wanted, not {type(shown).__name__}")
+    text = page_of(shown)
+    if path is not None:
+        save(Path(path), text)
+        return Path(path)
+    from webbrowser import open_new_tab  # only where one is opened
+
+    made = Path(mkdtemp(prefix="planar-")) / "page.html"
+    save(made, text)
+    open_new_tab(made.as_uri())
+    return made
+
+
+def page_of(shown: Mechanism | State | Motion) -> str:
+    """The text of the page of a mechanism, a position or a motion."""
+    if isinstance(shown, Mechanism):
+        return page(shown)
+    if isinstance(shown, State):
+        return page(shown.mechanism, _unknowns(shown, shown.mechanism))
+    ends = {name: given.position for name, given in shown.inputs.items()}
+    # of inputs that run in time together the one that goes farthest runs on the page
+    pair = max(ends, key=lambda name: float(np.ptp(ends[name])))
+    window = Window(list(ends).index(pair), float(ends[pair].min()), float(ends[pair].max()))
+    row = _start(shown, pair)
+    there = with_inputs(shown.mechanism, tuple(Drive(name, float(at[row])) for name, at in ends.items()))
+    return page(there, _unknowns(shown, there, row), window if window.low < window.high else None)
+
+
+def _start(motion: Motion, pair: str) -> int:
+    """The row nearest to the file's position, among those that are no dead points."""
+    rates = [
+        np.broadcast_to(frame.angle.parts[1], (len(motion),)) for frame in motion.frames.values() if not frame.fixed
+    ]
+    lost = ~np.isfinite(rates).all(axis=0)
+    filed = next(given.position for given in motion.mechanism.inputs if given.pair == pair)
+    return int(np.argmin(np.abs(motion.inputs[pair].position - filed) + np.where(lost & ~lost.all(), np.inf, 0.0)))
+
+
+def framed(shown: Mechanism | State | Motion) -> str | None:
+    """The page inside an element that notebooks show; None where there is no position, so that they show the text."""
+    try:
+        text = page_of(shown)
+    except (BadInput, NoAnswer):
+        return None
+    name = shown.name if isinstance(shown, Mechanism) else shown.mechanism.name
+    return (
+        f'<iframe title="{escape(name)}" srcdoc="{escape(text)}" '
+        f'style="width:100%;height:{HEIGHT}px;border:0"></iframe>'
+    )
+
+
+def _unknowns(shown: State | Motion, mechanism: Mechanism, row: int = 0) -> np.ndarray:
+    """The unknowns of a position, or of a row of a motion, in the equations of its mechanism."""
+
+    def number(value: Scalar) -> float:
+        rows = np.ravel(value.parts[0] if isinstance(value, Jet) else value)
+        return float(rows[row if rows.size > 1 else 0])  # what stands still has one for all
+
+    solver = known_of(mechanism).solver
+    frames = {name: frame_at(*map(number, (frame.x, frame.y, frame.angle))) for name, frame in shown.frames.items()}
+    own = {name: tuple(map(number, values)) for name, values in shown.own.items()}
+    return solver.coordinates(frames, own)[list(solver.equations.unknowns)]

@@ -1,0 +1,461 @@
+"""Pages without a browser: what the file holds, texts that would do harm, and its scripts' numbers beside Python's."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import planar
+from planar.dimensions import changed, dimensions
+from planar.errors import BadInput, NoAnswer
+from planar.files import asset
+from planar.mechanism import Mechanism
+from planar.pages import gallery
+from planar.pages.carried import carried
+from planar.pages.page import SCRIPTS, filled, page, told
+from planar.pages.shown import framed, page_of, view
+from planar.solving.position import known_of
+from planar.views.columns import columns
+from tests import command
+from tests.known import MODELS
+from tests.pages import in_node, needs_node
+
+LARGEST = 1_500_000
+HARMFUL = (
+    "</script><script>window.hacked=1</script><img src=x onerror='window.hacked=1'>"
+    "\"'`${window.hacked=1}&lt;\u2028\u2029🦾{data}{scripts}"
+)
+HARMFUL_NAME = "</script><img src=x onerror='hacked=1'>\"`${hacked=1}&lt;🦾"
+SOME = dict(list(MODELS.items())[::4])
+"""Models for what takes long for each."""
+CLOSE = 1e-12
+"""Of the size, or of the greatest rate of a kind."""
+
+
+def hostile() -> Mechanism:
+    """A four-bar linkage all of whose texts would do harm if they were taken for anything but texts."""
+    value = planar.to_dict(planar.load("four-bar"))
+    text = json.dumps(value)
+    pins = sorted({pair["turning"] for pair in value["pairs"]})
+    new = ["constructor", "__proto__", "toString", *(f"{k}{HARMFUL_NAME}" for k in range(20))]
+    for k, name in enumerate([*value["links"], *pins]):
+        text = text.replace(json.dumps(name), f'"\\u0001{k}"')  # first aside: a new name may be an old one
+    for k in range(len(value["links"]) + len(pins)):
+        text = text.replace(f'"\\u0001{k}"', json.dumps(new[k]))
+    value = json.loads(text)
+    return planar.from_dict(value | {"name": HARMFUL, "about": HARMFUL, "notes": [HARMFUL]})
+
+
+def triangle(base: float) -> Mechanism:
+    """Links of 70 and 80 mm on a base (mm), which does not move."""
+    return planar.from_dict(
+        {
+            "planar": 1,
+            "name": "Triangle",
+            "units": {"length": "mm", "angle": "deg"},
+            "frame": "base",
+            "links": {
+                "base": {"ends": ["A", "B"], "length": base},
+                "left": {"ends": ["A", "C"], "length": 70},
+                "right": {"ends": ["B", "C"], "length": 80},
+            },
+            "pairs": [{"turning": "A"}, {"turning": "B"}, {"turning": "C"}],
+            "sketch": {"C": [50, 50]},
+        }
+    )
+
+
+class Elements(HTMLParser):
+    """The elements of a page, and the text of those that hold scripts and data."""
+
+    def __init__(self, text: str):
+        super().__init__(convert_charrefs=True)
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.texts: dict[int, str] = {}
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+
+    def handle_data(self, data):
+        if self.tags:
+            self.texts[len(self.tags) - 1] = self.texts.get(len(self.tags) - 1, "") + data
+
+    def data(self):
+        at = next(k for k, (tag, attributes) in enumerate(self.tags) if attributes.get("id") == "data")
+        return json.loads(self.texts[at])
+
+
+def addresses(text: str) -> set[str]:
+    """Addresses in a network that a text names, but for namespaces and the bundled library's licence."""
+    text = re.sub(r"/\*! https://github\.com/leeoniya/uPlot.*?\*/", "", text)
+    return {each for each in re.findall(r"(?:https?:)?//[\w.-]+\.\w+/[^\s\"'`)]*", text) if "www.w3.org/" not in each}
+
+
+# what a page holds
+
+
+@pytest.mark.parametrize("stem", MODELS)
+def test_the_page_of_every_model_is_one_small_file_that_needs_no_network(stem):
+    text = page(MODELS[stem])
+    assert len(text.encode()) < LARGEST
+    assert addresses(text) == set()
+    elements = Elements(text)
+    assert not {tag for tag, _ in elements.tags} & {"link", "iframe", "object", "embed", "base", "form"}
+    assert not any("src" in attributes or "href" in attributes for _, attributes in elements.tags)
+    assert elements.data()["name"] == MODELS[stem].name
+
+
+def test_a_page_may_load_nothing():
+    (policy,) = (
+        attributes["content"]
+        for _, attributes in Elements(page(MODELS["four-bar"])).tags
+        if attributes.get("http-equiv") == "Content-Security-Policy"
+    )
+    assert policy.startswith("default-src 'none';")
+    assert "unsafe-eval" not in policy
+
+
+def test_texts_of_a_file_stay_texts():
+    plain, harmful = Elements(page(planar.load("four-bar"))), Elements(page(hostile()))
+    assert [tag for tag, _ in harmful.tags] == [tag for tag, _ in plain.tags]
+    assert harmful.data()["name"] == harmful.data()["about"] == HARMFUL
+    assert harmful.data()["document"]["value"]["notes"] == [HARMFUL]
+    title = next(k for k, (tag, _) in enumerate(harmful.tags) if tag == "title")
+    assert harmful.texts[title].rstrip("\n") == HARMFUL
+
+
+def test_texts_in_a_template_are_not_filled_again():
+    assert filled("{a}{b}", {"a": "{b}", "b": "2"}) == "{b}2"
+    assert json.loads(told({"x": HARMFUL})) == {"x": HARMFUL}
+    assert not set(told(HARMFUL)) & set("<\u2028\u2029")
+
+
+def test_no_script_of_ours_makes_elements_or_programs_of_texts():
+    for name in {*SCRIPTS, *gallery.SCRIPTS}:
+        if name.startswith("uplot/"):
+            continue
+        text = asset(name)
+        assert not re.findall(
+            r"innerHTML|outerHTML|insertAdjacentHTML|document\.write|\beval\(|new Function|fetch\(", text
+        )
+        assert text.startswith('"use strict";\n/*')
+        assert len(text.splitlines()) < 420
+
+
+@pytest.mark.parametrize("scripts", [SCRIPTS, gallery.SCRIPTS], ids=["page", "gallery"])
+def test_no_two_scripts_of_a_page_give_one_name_to_two_things(scripts):
+    named = [
+        name
+        for script in scripts
+        for name in re.findall(r"^(?:async )?(?:const|let|var|class|function\*?) (\w+)", asset(script), re.MULTILINE)
+    ]
+    assert sorted(named) == sorted(set(named))
+
+
+# what Python shows as a page
+
+
+def test_a_mechanism_a_position_and_a_motion_show_themselves_in_a_notebook(tmp_path):
+    mechanism = planar.load("four-bar")
+    state, motion = planar.solve(mechanism, {mechanism.inputs[0].pair: 1.0}), planar.cycle(mechanism, 12)
+    for each in (mechanism, state, motion):
+        (frame,) = (attributes for tag, attributes in Elements(each._repr_html_()).tags if tag == "iframe")
+        assert Elements(frame["srcdoc"]).data()["name"] == mechanism.name
+        assert frame["title"] == mechanism.name
+    assert Elements(page_of(state)).data()["inputs"][0]["position"] == 1.0
+
+
+def test_the_page_of_a_position_stands_at_that_assembly_also_where_the_sketch_means_another():
+    mechanism = planar.load("four-bar")
+    other = next(
+        mode for mode in planar.modes(mechanism, certify=False) if mode.number != planar.modes(mechanism).nearest.number
+    )
+    state = replace(planar.solve(other.mechanism), mechanism=mechanism)
+    assert np.abs(np.array(Elements(page_of(state)).data()["z"]) - other.z).max() < CLOSE
+
+
+def test_the_page_of_a_motion_keeps_its_range_and_stands_on_one_of_its_rows():
+    mechanism = planar.load("crank-rocker")
+    (given,) = mechanism.inputs
+    motion = planar.cycle(mechanism, 10, given.position + 1.0, given.position + 2.0)
+    data = Elements(page_of(motion)).data()
+    assert data["window"] == {"running": 0, "low": given.position + 1.0, "high": given.position + 2.0}
+    assert data["inputs"][0]["position"] == pytest.approx(given.position + 1.0, abs=CLOSE)
+    there = known_of(planar.solve(mechanism, {given.pair: given.position + 1.0}).mechanism).solver
+    z = np.array(data["z"])
+    assert there.open_along(z[None], there.station.u[None])[0] < there.tolerance
+
+
+def test_a_mechanism_without_a_position_shows_its_text():
+    mechanism = triangle(200)
+    assert framed(mechanism) is None
+    with pytest.raises(NoAnswer):
+        view(mechanism, "never.html")
+
+
+def test_view_writes_where_it_is_told_or_opens_a_browser(tmp_path, monkeypatch):
+    mechanism, shown = planar.load("four-bar"), []
+    assert planar.view(mechanism, tmp_path / "a.html").read_text(encoding="utf-8") == page(mechanism)
+    monkeypatch.setattr("webbrowser.open_new_tab", shown.append)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    path = planar.view(mechanism)
+    assert shown == [path.as_uri()]
+    assert path.read_text(encoding="utf-8") == page(mechanism)
+    with pytest.raises(BadInput, match="a Mechanism, a State or a Motion"):
+        planar.view("four-bar")
+
+
+def test_the_view_command_writes_a_page_at_a_position_and_of_an_assembly(tmp_path):
+    (tmp_path / "m.json").write_text(planar.dumps(planar.load("crank-rocker")), encoding="utf-8")
+    (given,) = planar.load("crank-rocker").inputs
+    assert command.run(tmp_path, "view", "m.json", "-o", "a.html").done() == "a.html\n"
+    command.run(tmp_path, "view", "m.json", "-o", "b.html", "--mode", "2", "--at", f"{given.pair}=80deg").done()
+    first, second = (Elements((tmp_path / name).read_text(encoding="utf-8")).data() for name in ("a.html", "b.html"))
+    assert second["inputs"][0]["position"] == pytest.approx(np.radians(80.0))
+    other = planar.solve(list(planar.modes(planar.load("crank-rocker")))[1].mechanism, {given.pair: np.radians(80.0)})
+    solver = known_of(other.mechanism).solver
+    wanted = solver.coordinates(other.frames, other.own)[list(solver.equations.unknowns)]
+    assert np.abs(np.sin(np.subtract(second["z"], wanted))).max() < CLOSE
+    assert first["z"] != second["z"]
+
+
+def test_the_view_command_refuses_other_files_and_its_own(tmp_path):
+    (tmp_path / "m.html").write_text(planar.dumps(planar.load("crank-rocker")), encoding="utf-8")
+    assert "own file" in command.run(tmp_path, "view", "m.html", "-o", "m.html").refused(2)
+    assert ".html" in command.run(tmp_path, "view", "crank-rocker", "-o", "a.pdf").refused(2)
+
+
+# the gallery
+
+
+def test_a_gallery_has_a_page_for_each_and_an_index_that_moves(tmp_path):
+    told_of = []
+    models = [
+        ("../<b>.x", hostile()),
+        ("index", planar.load("slider-crank")),
+        ("INDEX", planar.load("rack-steering")),
+        ("apart", triangle(200)),
+    ]
+    index, refused = gallery.gallery(models, tmp_path / "new" / "folder", lambda *done: told_of.append(done))
+    assert told_of == [(1, 4), (2, 4), (3, 4), (4, 4)]
+    assert [name for name, _ in refused] == ["apart"]
+    names = {path.name for path in index.parent.iterdir()}
+    assert names == {"index.html", "b-.x.html", "index-2.html", "INDEX-3.html"}
+    elements = Elements(index.read_text(encoding="utf-8"))
+    first, second, third = elements.data()
+    assert {each["href"] for each in (first, second, third)} <= names
+    assert (first["name"], first["about"]) == (HARMFUL, HARMFUL)
+    assert [tag for tag, _ in elements.tags].count("script") == 2
+    assert (second["closed"], third["closed"]) == (True, False)
+
+
+def test_the_gallery_command_writes_a_folder_and_tells_what_it_leaves_out(tmp_path):
+    (tmp_path / "apart.json").write_text(planar.dumps(triangle(200)), encoding="utf-8")
+    done = command.run(tmp_path, "gallery", "four-bar", "apart.json", "-o", "pages")
+    assert done.status == 0
+    assert done.out == str(Path("pages") / "index.html") + "\n"
+    assert done.err.startswith("planar: apart: ")
+    assert {path.name for path in (tmp_path / "pages").iterdir()} == {"index.html", "four-bar.html"}
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    assert "file" in command.run(tmp_path, "gallery", "four-bar", "-o", "file/folder").refused(2)
+
+
+def test_the_index_is_small_and_its_links_are_where_the_motion_has_them():
+    shown = [gallery.small(mechanism) for mechanism in SOME.values()]
+    drawing = len(gallery.index([]).encode())
+    each = len(gallery.index([one | {"name": "", "about": "", "href": ""} for one in shown]).encode()) - drawing
+    assert drawing + each / len(SOME) * len(MODELS) < 2 * LARGEST
+    mechanism = MODELS["crank-rocker"]
+    small = gallery.small(mechanism)
+    motion = planar.cycle(mechanism, gallery.STEPS)
+    moving = [link for link in small["links"] if link != mechanism.frame]
+    for link, path in zip(moving, small["frames"], strict=True):
+        frame = motion.frames[link]
+        wanted = np.stack([part.parts[0] for part in (frame.x, frame.y, frame.angle)], axis=1)
+        assert np.abs(np.reshape(path, (-1, 3)) - wanted).max() < 1e-4 * max(1.0, np.abs(wanted).max())
+
+
+# numbers
+
+
+def near(found, wanted, scale):
+    assert np.abs(np.subtract(found, wanted)).max() <= CLOSE * scale
+
+
+@needs_node
+def test_the_pages_of_all_models_solve_as_python_does():
+    """At the file's position and one beside it: places, velocities and accelerations of all points."""
+    act = """
+    const told = () => page.data.names.map((name) => Object.values(page.point(name)));
+    const found = [[page.input(0), told()]], start = page.input(0);
+    const far = page.data.inputs[0].slides ? 0.05 * page.data.size : 0.2;
+    for (const to of [start + far, start - far]) {
+      if (found.length < 2 && page.moveTo(to, 0)) found.push([to, told()]);
+    }
+    return found;
+    """
+    compared = 0
+    for stem, positions in in_node(MODELS, act).items():
+        mechanism = MODELS[stem]
+        given = mechanism.inputs[0]
+        for to, points in positions:
+            try:
+                state = planar.solve(mechanism, {given.pair: to} if to != given.position else {})
+            except NoAnswer:
+                continue  # a dead point, or a change point, where the page does not stop
+            if any(part is None for point in points for part in point):
+                continue
+            wanted = np.array([[p.position, p.velocity, p.acceleration] for p in state.points.values()])
+            found = np.array(points)
+            size = max(1e-3, np.abs(wanted[:, 0]).max())
+            for order in range(3):
+                scale = max(np.abs(wanted[:, order]).max(), size)
+                assert np.abs(found[:, order] - wanted[:, order]).max() <= CLOSE * scale, (stem, to, order)
+            compared += 1
+    assert compared > 1.7 * len(MODELS)
+
+
+@needs_node
+def test_a_changed_mechanism_is_saved_as_a_file_that_planar_solves_to_the_same():
+    """One dimension after the other by some per cent, and the input moved: the saved file, solved from nothing."""
+    act = """
+    const d = page.linkage.d.map((each, k) => (page.data.dimensions[k].held ? each : each * (1 + 0.01 * (1 + k % 3))));
+    const { reached } = page.changeTo(d);
+    page.moveTo(page.input(0) + (page.data.inputs[0].slides ? 0.01 * page.data.size : 0.05), 0);
+    return { reached, d: Array.from(page.linkage.d), u: page.input(0), file: Files.mechanism(page),
+      points: page.data.names.map((name) => page.point(name).position) };
+    """
+    whole = 0
+    for stem, found in in_node(SOME, act).items():
+        saved = planar.from_dict(found["file"])
+        links = frozenset(link.name for link in saved.links)
+        assert [each.value for each in dimensions(saved, links)] == found["d"], stem
+        assert saved.inputs[0].position == found["u"]
+        try:
+            state = planar.solve(saved)
+        except NoAnswer:
+            continue
+        wanted = np.array([state.point(name).position for name in state.point_names])
+        apart = np.abs(np.array(found["points"]) - wanted).max()
+        assert apart < 1e-9 * max(1e-3, np.abs(wanted).max()), stem
+        whole += found["reached"] == 1
+    assert whole > 0.8 * len(SOME)
+
+
+@needs_node
+def test_a_mechanism_that_is_not_changed_is_saved_as_it_came():
+    for stem, found in in_node(SOME, "return Files.mechanism(page);").items():
+        assert planar.from_dict(found) == MODELS[stem]
+
+
+@pytest.mark.parametrize("stem", ["planetary-gear-set", "cartwright", "sun-and-planet", "belt-arm", "crank-rocker"])
+def test_a_dimension_is_held_where_a_pair_would_refuse_the_file_with_another(stem):
+    mechanism = MODELS[stem]
+    links = frozenset(link.name for link in mechanism.links)
+    for each, told_of in zip(dimensions(mechanism, links), carried(mechanism)[0]["dimensions"], strict=True):
+        refused = 0
+        for end in ("low", "high"):
+            other = changed(mechanism, each, each.value + 0.02 * (told_of[end] - each.value))
+            try:
+                planar.loads(planar.dumps(other))
+            except BadInput as problem:
+                refused += 1
+                assert "wheels" in problem.sentence
+        assert bool(refused) == bool(told_of["held"])
+
+
+@needs_node
+def test_the_page_of_a_motion_runs_over_its_range():
+    mechanism = MODELS["crank-rocker"]
+    window = {"running": 0, "low": mechanism.inputs[0].position + 0.5, "high": mechanism.inputs[0].position + 1.25}
+    act = f"""
+    page.data.window = {json.dumps(window)};
+    page.moveTo(page.data.window.low + 0.1);
+    new Courses(page);
+    while (!page.course) await new Promise((go) => setTimeout(go, 5));
+    return [page.course.inputs[0], page.course.inputs[page.course.count - 1], page.course.whole];
+    """
+    low, high, whole = in_node({"motion": mechanism}, act, "course.js")["motion"]
+    assert (low, high) == pytest.approx((window["low"], window["high"]))
+    assert not whole
+
+
+@needs_node
+def test_a_dimension_stops_where_the_linkage_comes_apart():
+    """A triangle of two links on a line of centres: they part where the base is as long as both together."""
+    act = """
+    const k = page.data.dimensions.findIndex((each) => each.name === "base.length"), d = Array.from(page.linkage.d);
+    d[k] = 0.2;
+    const up = page.changeTo(d).reached, high = page.linkage.d[k];
+    d[k] = 0.001;
+    const down = page.changeTo(d).reached, low = page.linkage.d[k];
+    d[k] = 0.1;
+    const back = page.changeTo(d).reached;
+    return { up, high, down, low, back, C: page.point("C").position };
+    """
+    found = in_node({"triangle": triangle(100)}, act)["triangle"]
+    assert found["up"] < 1.0
+    assert found["down"] < 1.0
+    assert found["back"] == 1.0
+    assert found["high"] == pytest.approx(0.15, rel=1e-5)
+    assert found["low"] == pytest.approx(0.01, rel=1e-3)
+    near(found["C"], planar.solve(triangle(100)).point("C").position, 0.1)
+
+
+@needs_node
+@pytest.mark.parametrize(
+    "stem", ["crank-rocker", "000-P2", "double-rocker", "planetary-gear-set", "walschaerts-valve-gear"]
+)
+def test_the_motion_is_saved_with_the_columns_and_numbers_of_the_cycle_command(stem):
+    act = """
+    new Courses(page);
+    while (!page.course) await new Promise((go) => setTimeout(go, 5));
+    return [page.course.inputs[0], page.course.inputs[page.course.count - 1], page.course.count, Files.motion(page)];
+    """
+    low, high, count, text = in_node({stem: MODELS[stem]}, act, "course.js")[stem]
+    mechanism = MODELS[stem]
+    motion = planar.cycle(mechanism, count - 1, low, high, mechanism.inputs[0].pair)
+    heads, *rows = csv.reader(io.StringIO(text))
+    wanted = {column.head: column.values for column in columns(motion)}
+    assert heads == list(wanted)
+    table = np.array([[float(cell) if cell else np.nan for cell in row] for row in rows])
+    calm = slice(count // 10, -(count // 10))
+    for found, (head, values) in zip(table.T, wanted.items(), strict=True):
+        scale = np.abs(values[calm]).max() or 1.0
+        assert np.abs(found[: len(values)][calm] - values[calm]).max() < 1e-8 * max(scale, 1e-3), head
+
+
+@needs_node
+def test_other_dimensions_give_pythons_numbers():
+    """Each dimension of a linkage alone, by a tenth: every point, beside Python's solution of the changed mechanism."""
+    stem = "watt-six-bar"
+    mechanism = MODELS[stem]
+    act = """
+    const found = [], own = Array.from(page.linkage.d);
+    for (let k = 0; k < own.length; k++) {
+      const d = own.map((each, i) => (i === k ? 1.1 * each : each));
+      found.push([page.changeTo(d).reached, page.data.names.map((name) => page.point(name).position)]);
+      page.changeTo(own);
+    }
+    return found;
+    """
+    links = frozenset(link.name for link in mechanism.links)
+    for each, (reached, points) in zip(
+        dimensions(mechanism, links), in_node({stem: mechanism}, act)[stem], strict=True
+    ):
+        other = changed(mechanism, each, 1.1 * each.value)
+        assert reached == 1
+        sketch = tuple((name, *at) for name, at in zip(planar.solve(mechanism).point_names, points, strict=True))
+        state = planar.solve(replace(other, sketch=sketch))
+        wanted = np.array([state.point(name).position for name in state.point_names])
+        near(points, wanted, np.abs(wanted).max())

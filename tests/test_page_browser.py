@@ -1,0 +1,348 @@
+"""Pages in a real browser, taken hold of by mouse, keys and fields: every number beside Python's."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from dataclasses import replace
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+import planar
+from planar.dimensions import changed, dimensions
+from planar.pages import gallery
+from planar.pages.shown import view
+from tests.known import MODELS
+from tests.pages import browser, opened
+from tests.test_page import hostile, triangle
+
+CLOSE = 1e-12
+SCREENS = {"phone": (390, 844), "desk": (1280, 900), "projector": (1920, 1080)}
+PLACES = "page.data.names.map((name) => Object.values(page.point(name)))"
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    with browser() as running:
+        yield running
+
+
+@pytest.fixture
+def shown(chromium, tmp_path):
+    """Opens the page of a mechanism: its window, and what goes wrong there, of which there must be nothing."""
+    contexts, wrong = [], []
+
+    def show(mechanism, screen="desk", scheme="light"):
+        width, height = SCREENS[screen]
+        context = chromium.new_context(
+            viewport={"width": width, "height": height}, color_scheme=scheme, has_touch=screen == "phone"
+        )
+        contexts.append(context)
+        context.set_default_timeout(10_000)
+        window, problems = opened(context, view(mechanism, tmp_path / "page.html"))
+        wrong.append(problems)
+        return window
+
+    yield show
+    for context in contexts:
+        context.close()
+    assert not any(wrong), wrong
+
+
+def same(window, state):
+    """The page's places, velocities and accelerations are those of a state."""
+    found = np.array(window.evaluate(PLACES))
+    wanted = np.array([[p.position, p.velocity, p.acceleration] for p in state.points.values()])
+    for order in range(3):
+        scale = np.abs(wanted[:, order]).max()
+        assert np.abs(found[:, order] - wanted[:, order]).max() <= CLOSE * scale
+
+
+def settled(window):
+    """Wait for two frames, after which what was asked for is drawn."""
+    window.evaluate("new Promise((go) => requestAnimationFrame(() => requestAnimationFrame(go)))")
+
+
+def downloaded(window, button, path):
+    with window.expect_download() as coming:
+        window.get_by_role("button", name=button).click()
+    coming.value.save_as(path)
+    return path.read_text(encoding="utf-8")
+
+
+# motion
+
+
+def test_the_crank_is_dragged_to_ten_angles(shown):
+    mechanism = MODELS["crank-rocker"]
+    (given,) = mechanism.inputs
+    window = shown(mechanism)
+    start = window.evaluate("page.input(0)")
+    # the end of the crank: the point that moves as the input does, and is not its pin
+    tip = window.evaluate(
+        """(pin) => {
+          const [link] = page.data.points[pin].links.filter((each) => each !== page.data.frame);
+          return page.data.names.find((name) => name !== pin && page.data.points[name].links.includes(link));
+        }""",
+        given.pair,
+    )
+    box = window.locator("#drawing").bounding_box()
+
+    def screen(name):
+        x, y = window.evaluate("(name) => page.view.toScreen(page.point(name).position)", name)
+        return np.array([box["x"] + x, box["y"] + y])
+
+    centre, at = screen(given.pair), screen(tip)
+    window.mouse.move(*at)
+    window.mouse.down()
+    radius, first = np.hypot(*(at - centre)), np.arctan2(-(at - centre)[1], (at - centre)[0])
+    for k in range(1, 11):
+        turned = k * 0.5
+        for part in np.linspace(turned - 0.5, turned, 5)[1:]:
+            angle = first + part
+            window.mouse.move(*(centre + radius * np.array([np.cos(angle), -np.sin(angle)])))
+        settled(window)
+        found = window.evaluate("page.input(0)")
+        assert found == pytest.approx(start + turned, abs=0.02)
+        same(window, planar.solve(mechanism, {given.pair: found}))
+    window.mouse.up()
+
+
+def test_the_input_is_moved_by_keys_and_by_its_number(shown):
+    mechanism = MODELS["crank-rocker"]
+    (given,) = mechanism.inputs
+    window = shown(mechanism)
+    start = window.evaluate("page.input(0)")
+    slider = window.get_by_role("slider", name=given.pair, exact=True)
+    slider.focus()
+    window.keyboard.press("ArrowRight")
+    settled(window)
+    assert window.evaluate("page.input(0)") == pytest.approx(start + np.radians(1.0))
+    window.keyboard.press("Home")
+    settled(window)
+    assert window.evaluate("page.input(0)") == pytest.approx(start, abs=CLOSE)
+    field = window.get_by_label(f"{given.pair} ({mechanism.units.angle})")
+    field.fill("100")
+    field.press("Enter")
+    settled(window)
+    assert window.evaluate("page.input(0)") == pytest.approx(np.radians(100.0), abs=CLOSE)
+    same(window, planar.solve(mechanism, {given.pair: np.radians(100.0)}))
+
+
+def test_it_plays_and_stops(shown):
+    window = shown(MODELS["slider-crank"])
+    start = window.evaluate("page.input(0)")
+    window.get_by_role("button", name="Play").click()
+    window.wait_for_function("([start]) => Math.abs(page.input(0) - start) > 0.05", arg=[start])
+    window.get_by_role("button", name="Pause").click()
+    settled(window)
+    stood = window.evaluate("page.input(0)")
+    settled(window)
+    assert window.evaluate("page.input(0)") == stood
+
+
+def test_a_dead_point_stops_it_and_is_told(shown):
+    mechanism = MODELS["000-P1"]
+    (given,) = mechanism.inputs
+    window = shown(mechanism)
+    *_, dead = planar.cycle(mechanism, 12).inputs[given.pair].position
+    field = window.get_by_label(f"{given.pair} ({mechanism.units.angle})")
+    field.fill(str(np.degrees(dead) + 30.0))
+    field.press("Enter")
+    settled(window)
+    assert window.evaluate("page.input(0)") == pytest.approx(dead, abs=1e-5)
+    assert "dead point" in window.locator("#said").inner_text().lower()
+
+
+# layers
+
+
+@pytest.mark.parametrize("stem", ["watt-six-bar", "000-P2", "planetary-gear-set", "walschaerts-valve-gear"])
+def test_every_layer_is_shown_without_a_problem(stem, shown):
+    window = shown(MODELS[stem])
+    boxes = window.locator("#layers").get_by_role("checkbox")
+    assert boxes.count() >= 4
+    for k in range(boxes.count()):
+        assert boxes.nth(k).evaluate("(each) => each.labels.length > 0 || each.hasAttribute('aria-label')")
+        boxes.nth(k).check()
+        settled(window)
+    window.evaluate("page.moveTo(page.input(0) + 0.1)")
+    settled(window)
+    assert "NaN" not in window.locator("#drawing").evaluate("(each) => each.outerHTML")
+
+
+# dimensions
+
+
+def test_a_length_is_changed_by_its_number_and_reset(shown):
+    mechanism = MODELS["watt-six-bar"]
+    window = shown(mechanism)
+    each = next(
+        d for d in dimensions(mechanism, frozenset(link.name for link in mechanism.links)) if d.name.endswith(".length")
+    )
+    length = planar.units.unit(mechanism.units.length)
+    wanted = float(f"{length.from_si(1.05 * each.value):.4g}")
+    field = window.get_by_label(f"{each.link}: length, number, {mechanism.units.length}")
+    field.fill(str(wanted))
+    field.press("Enter")
+    settled(window)
+    assert window.evaluate(
+        "page.data.dimensions.findIndex((one, k) => page.linkage.d[k] !== one.value)"
+    ) == window.evaluate("(name) => page.data.dimensions.findIndex((one) => one.name === name)", each.name)
+    places = dict(zip(window.evaluate("page.data.names"), window.evaluate(PLACES), strict=True))
+    other = changed(mechanism, each, length.to_si(wanted))
+    same(window, planar.solve(replace(other, sketch=tuple((name, *at[0]) for name, at in places.items()))))
+    slider = window.get_by_role("slider", name=f"{each.link}: length, {mechanism.units.length}")
+    assert slider.get_attribute("aria-valuetext") == f"{wanted:.6g} {mechanism.units.length}"
+    window.get_by_role("button", name="Reset all dimensions").click()
+    settled(window)
+    same(window, planar.solve(mechanism))
+    assert window.get_by_role("button", name="Reset all dimensions").is_disabled()
+
+
+def test_a_slider_gives_round_numbers_and_is_moved_by_keys(shown):
+    mechanism = MODELS["four-bar"]
+    window = shown(mechanism)
+    slider = window.locator("#dimensions input[type=range]:enabled").locator("visible=true").first
+    slider.focus()
+    before = window.evaluate("Array.from(page.linkage.d)")
+    window.keyboard.press("ArrowRight")
+    settled(window)
+    (k,) = np.flatnonzero(np.subtract(window.evaluate("Array.from(page.linkage.d)"), before))
+    now = planar.units.unit(mechanism.units.length).from_si(window.evaluate("(k) => page.linkage.d[k]", int(k)))
+    assert float(f"{now:.4g}") == pytest.approx(now, rel=1e-12)
+
+
+def test_what_does_not_go_together_is_told_with_how_far_it_goes(shown):
+    window = shown(triangle(100))
+    field = window.get_by_label("base: length, number, mm")
+    field.fill("190")
+    field.press("Enter")
+    settled(window)
+    note = window.locator("#dimensions .note", has_text="goes together")
+    assert note.inner_text() == "It goes together up to base: length = 150 mm; asked for 190 mm."
+    assert float(field.input_value()) == pytest.approx(150.0, rel=1e-5)
+    field.fill("-3")
+    field.press("Enter")
+    settled(window)
+    assert window.locator("#dimensions .note", has_text="cannot be").inner_text() == "base: length cannot be -3 mm."
+
+
+# assemblies
+
+
+def test_every_assembly_can_be_chosen(shown):
+    mechanism = MODELS["000-P2"]
+    window = shown(mechanism)
+    modes = list(planar.modes(mechanism, certify=False))
+    choice = window.get_by_label("Assembly, of 4")
+    assert choice.input_value() == str(planar.modes(mechanism, certify=False).nearest.number - 1)
+    window.evaluate("page.moveTo(page.input(0) + 0.2)")
+    for mode in reversed(modes):
+        choice.select_option(index=mode.number - 1)
+        settled(window)
+        found = np.array([places[0] for places in window.evaluate(PLACES)])
+        wanted = np.array([mode.points[name] for name in window.evaluate("page.data.names")])
+        assert np.abs(found - wanted).max() <= CLOSE * np.abs(wanted).max()
+        assert choice.input_value() == str(mode.number - 1)
+        assert window.locator("#said").inner_text().startswith(f"Assembly {mode.number} of 4")
+
+
+def test_circuit_and_branch_of_an_assembly_are_told_where_they_are_known_soon(shown):
+    mechanism = MODELS["crank-rocker"]
+    circuits = planar.circuits(mechanism)
+    options = shown(mechanism).get_by_label("Assembly, of 2").locator("option").all_inner_texts()
+    for mode, option in zip(planar.modes(mechanism, certify=False), options, strict=True):
+        circuit, branch = circuits.of(mode)
+        told = f"circuit {circuit.number} of {len(circuits)}, branch {branch.number} of {len(circuit.branches)}"
+        assert option == f"{mode.number}: {told}"
+
+
+# texts
+
+
+def test_texts_of_a_file_are_shown_and_never_run(shown, chromium, tmp_path):
+    mechanism = hostile()
+    window = shown(mechanism)
+    for box in window.locator("#layers").get_by_role("checkbox").all():
+        box.check()
+    for button in ("Play", "Pause", "Save: Mechanism (JSON)", "Save: Motion (CSV)"):
+        window.get_by_role("button", name=button).click()
+    settled(window)
+    assert window.evaluate("typeof window.hacked") == "undefined"
+    assert window.locator("h1").inner_text().split() == mechanism.name.split()
+    assert window.locator("img").count() == 0
+    index, _ = gallery.gallery([("a", mechanism)], tmp_path / "folder")
+    context = chromium.new_context()
+    window, wrong = opened(context, index)
+    window.locator("#gallery svg polyline").first.wait_for(state="attached")
+    assert window.evaluate("typeof window.hacked") == "undefined"
+    assert window.locator("#gallery strong").inner_text().split() == mechanism.name.split()
+    window.locator("#gallery a").click()
+    assert window.locator("#drawing").count() == 1
+    assert wrong == []
+    context.close()
+
+
+# what is saved
+
+
+def test_the_changed_mechanism_is_saved_and_read_back(shown, tmp_path):
+    mechanism = MODELS["watt-six-bar"]
+    window = shown(mechanism)
+    window.evaluate("page.changeTo(page.linkage.d.map((each) => each * 1.01)); page.moveTo(page.input(0) + 0.1)")
+    path = tmp_path / "saved.json"
+    downloaded(window, "Save: Mechanism (JSON)", path)
+    same(window, planar.solve(planar.load(path)))
+
+
+def test_the_picture_is_saved_by_itself(shown, tmp_path):
+    window = shown(MODELS["slider-crank"], scheme="dark")
+    text = downloaded(window, "Save: Picture (SVG)", tmp_path / "picture.svg")
+    root = ElementTree.fromstring(text)
+    assert root.tag == "{http://www.w3.org/2000/svg}svg"
+    assert "var(" not in text
+    assert "href" not in text
+    strokes = [each.get("stroke") for each in root.iter() if each.tag.endswith(("polyline", "circle", "line"))]
+    assert any(stroke not in (None, "none") for stroke in strokes)
+
+
+def test_the_motion_is_saved_as_a_table(shown, tmp_path):
+    mechanism = MODELS["slider-crank"]
+    window = shown(mechanism)
+    heads, *rows = csv.reader(io.StringIO(downloaded(window, "Save: Motion (CSV)", tmp_path / "motion.csv")))
+    motion = planar.cycle(mechanism, len(rows) - 1, *(np.radians(float(rows[k][0])) for k in (0, -1)))
+    column = heads.index(f"B x [{mechanism.units.length}]")
+    found = np.array([float(row[column]) for row in rows])
+    assert found == pytest.approx(
+        planar.units.unit(mechanism.units.length).from_si(motion.point("B").position[:, 0]), rel=1e-9
+    )
+
+
+# how it looks
+
+
+@pytest.mark.parametrize("screen", SCREENS)
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_nothing_is_wider_than_the_screen(screen, scheme, shown):
+    for stem in ("000-P2", "excavator-arm"):
+        window = shown(MODELS[stem], screen, scheme)
+        for box in window.locator("#layers").get_by_role("checkbox").all():
+            box.check()
+        settled(window)
+        assert window.evaluate("document.documentElement.scrollWidth") <= SCREENS[screen][0]
+        dark = window.evaluate("getComputedStyle(document.body).backgroundColor")
+        assert (sum(json.loads(f"[{dark[4:-1]}]")) < 380) == (scheme == "dark")
+
+
+def test_every_control_has_a_name(shown):
+    window = shown(MODELS["000-P2"])
+    nameless = window.evaluate(
+        """Array.from(document.querySelectorAll("button, input, select, summary, [role=slider]"))
+          .filter((each) => !each.textContent.trim() && !each.getAttribute("aria-label") && !each.labels?.length)
+          .map((each) => each.outerHTML)"""
+    )
+    assert nameless == []
