@@ -353,6 +353,11 @@ class Motion(Moving):
         """Whether the relative motion at a pair is a length."""
         return self._motions[name].drive_kind is Kind.LENGTH
 
+    @property
+    def running(self) -> str:
+        """The input that runs farthest."""
+        return max(self.inputs, key=lambda name: float(np.ptp(self.inputs[name].position)))
+
     def _rows(self, parts: tuple[Any, ...]) -> tuple[Array, ...]:
         return tuple(np.broadcast_to(part, (len(self),)).copy() for part in parts)
 

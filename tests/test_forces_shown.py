@@ -227,9 +227,37 @@ def test_on_a_dead_point_nothing_is_told_and_how_often_is_said(tmp_path):
     effort, place = (column(tmp_path / "f.csv", f"input stroke {what}") for what in ("force [N]", "position [mm]"))
     dead = np.isclose(np.abs(place - 1600), 480, atol=1e-6)
     assert np.array_equal(np.isnan(effort), dead)
-    assert f"at {dead.sum()} of {len(dead)} positions" in text
+    assert f"at {dead.sum()} of {len(dead)} positions: no forces in the pairs balance the links there" in text
+    assert "held more than once" not in text
     found = json.loads(run(tmp_path, "forces", model, "--cycle", "--circuit", "--json").done())
     assert found["inputs"]["stroke"]["force"].count(None) == dead.sum()
+
+
+def truss(*bars: str) -> planar.Mechanism:
+    """Bars from the frame to a loaded pin C, which stands a metre above the middle of A and B."""
+    feet = {"A": [0, 0], "B": [2, 0], "E": [1, 0]}
+    return planar.from_dict(
+        {
+            "planar": 1,
+            "frame": "f",
+            "links": {"f": {"points": {bar: feet[bar] for bar in bars}}}
+            | {f"{bar}C": {"ends": [bar, "C"], "length": 1.0 if bar == "E" else sqrt(2.0)} for bar in bars},
+            "pairs": [{"turning": name} for name in (*bars, "C")],
+            "loads": [{"point": "C", "force": [0, -100]}],
+            "sketch": {"C": [1, 1]},
+        }
+    )
+
+
+def test_a_truss_has_no_inputs_and_its_bars_carry_the_load_along_themselves(tmp_path):
+    text = run(tmp_path, "forces", kept(tmp_path, truss("A", "B"))).done()
+    assert "Inputs" not in text
+    assert row(text, "Reactions", "A")[3:] == ["70.7107", "0.785398", "50.0000", "50.0000", "0"]
+    assert row(text, "Reactions", "B")[3:] == ["70.7107", "2.35619", "-50.0000", "50.0000", "0"]
+    assert "every link balances as a free body" in text
+    text = run(tmp_path, "forces", kept(tmp_path, truss("A", "B", "E"))).done()
+    assert row(text, "Reactions", "E")[3:7] == ["-"] * 4
+    assert "none: of no link all is told" in text
 
 
 @pytest.mark.parametrize(
@@ -301,6 +329,14 @@ def test_an_input_that_is_driven_keeps_its_speed_and_the_others_are_let_go(tmp_p
     text = run(tmp_path, *words).done()
     assert row(text, "Inputs", first)[1] == "driven"
     assert all(row(text, "Inputs", other)[1:3] == ["let", "go"] for other in others)
+
+
+def test_what_rounding_leaves_of_a_place_or_an_energy_is_told_as_nothing(tmp_path):
+    """A piston on the x-axis: its y is 0, not 1e-14 mm; without weights and springs there is no potential energy."""
+    mechanism = replace(heavy("slider-crank"), gravity=(0.0, 0.0))
+    text = run(tmp_path, "simulate", kept(tmp_path, mechanism), "--duration", "0.2s", "--moving").done()
+    assert row(text, "Points", "B")[3:5] == ["0", "0"]
+    assert row(text, "Energy", "potential")[2:] == ["0"] * 4
 
 
 def test_it_starts_from_rest_unless_it_moves_already(tmp_path):

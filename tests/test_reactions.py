@@ -249,6 +249,39 @@ def test_two_pins_in_line_hold_a_rigid_body_twice_only_along_their_line():
         assert np.isnan(found.reactions[name].force).all()
 
 
+@pytest.mark.parametrize("second", [20, 28])
+def test_teeth_that_mesh_twice_leave_open_how_hard_they_push_their_bearings_apart(second):
+    """Two meshes of one pair of wheels may press against each other; the torques are told all the same."""
+    value = {
+        "planar": 1,
+        "units": {"angle": "deg"},
+        "frame": "f",
+        "links": {
+            "f": {"points": {"P": [0, 0], "Q": [3, 0]}},
+            "a": {"points": {"P": [0, 0]}},
+            "b": {"points": {"Q": [0, 0]}},
+        },
+        "pairs": [
+            {"turning": "P"},
+            {"turning": "Q"},
+            {"gear": "one", "links": ["a", "b"], "radii": [1, 2]},
+            {"gear": "two", "links": ["a", "b"], "radii": [1, 2], "pressure_angle": second},
+        ],
+        "inputs": [{"pair": "P", "position": 0}],
+        "loads": [{"link": "b", "torque": -10}],
+    }
+    found = of(value)
+    assert found.inputs["P"] == pytest.approx(-5.0, rel=1e-12)
+    assert set(found.undetermined) == {"P", "Q", "one", "two"}
+    for each in found.reactions.values():
+        assert np.isnan(each.force).all()
+    value["pairs"].pop()
+    once = of(value)
+    assert not once.undetermined
+    # T / s across the centres at each, and its tangent along them, off each other
+    assert once.reactions["Q"].force == pytest.approx([-5.0 * tan(radians(20)), 5.0], rel=1e-12)
+
+
 @pytest.mark.parametrize("angle", [0.3, pi])
 def test_a_motion_that_passes_where_links_are_held_twice_names_it_there_only(angle):
     """A parallelogram of two cranks: flat in its line of shafts it is held twice, elsewhere once."""
@@ -270,6 +303,8 @@ def test_a_motion_that_passes_where_links_are_held_twice_names_it_there_only(ang
     found = planar.forces(motion)
     lost = np.isnan(found.inputs["O"])
     assert list(lost) == [False, False, angle == pi, False, False]
+    assert all("as at a dead point" in why for why in found.undetermined.values())  # the second crank is loaded
+    assert bool(found.undetermined) == lost.any()
     np.testing.assert_allclose(found.inputs["O"][~lost], -2.0, rtol=1e-10)
     force = found.reactions["A"].force
     # the rod is a two-force link: T / (r sin) along itself

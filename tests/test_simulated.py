@@ -303,6 +303,28 @@ def test_a_parallelogram_that_falls_passes_every_change_point_on_its_way():
     np.testing.assert_allclose(speed, 2 * G / 0.3 * (sin(0.6) - np.sin(angle(found))), atol=1e-6 * speed.max())
 
 
+def test_a_step_that_ends_beyond_a_change_point_takes_no_speed_away():
+    """Where Watt's parallelogram lies flat, rates that are brought back by its constraints lost half its energy."""
+    value = planar.to_dict(planar.load("watt-parallel-motion"))
+    told = {
+        "beam": (0.98, 8, 84, 0.024),
+        "AB": (0.737, 26, -34, 0.0146),
+        "radius bar": (1.22, -122, -87, 0.0266),
+        "EQ": (0.762, -122, 12, 0.0492),
+        "BQ": (2.585, -43, 105, 0.0119),
+    }
+    value["masses"] = [
+        {"link": link, "mass": mass, "at": [f"{x} mm", f"{y} mm"], "inertia": f"{inertia} kg m^2"}
+        for link, (mass, x, y, inertia) in told.items()
+    ]
+    value["gravity"] = ["0 m/s^2", f"{-G} m/s^2"]
+    found = run(value, 0.615, 40)
+    across = found.motion.link("AB").angle - found.motion.link("beam").angle
+    assert np.any(np.diff(np.sign(np.sin(across))))
+    assert found.balance < 1e-6
+    np.testing.assert_allclose(found.motion.link("EQ").angle, found.motion.link("AB").angle, atol=1e-7)
+
+
 # what is refused, and what is said
 
 
@@ -319,11 +341,46 @@ def test_a_link_that_nothing_makes_heavy_is_named():
     assert angle(driven)[-1] == pytest.approx(3.0 + 1.0, rel=1e-12)
 
 
-@pytest.mark.parametrize("duration", [0.0, -1.0, float("nan"), float("inf"), True])
+def test_where_what_can_move_loses_its_mass_on_the_way_the_rows_before_are_kept():
+    """A yoke thrown up to where its crank, which has no mass, stands upright: till then it is a body in free flight."""
+    radius, speed = 0.1, sqrt(2.0 * G * 0.1)
+    value = {
+        "planar": 1,
+        "frame": "f",
+        "links": {
+            "f": {"points": {"O": [0, 0]}},
+            "crank": {"ends": ["O", "A"], "length": radius},
+            "yoke": {"points": {"Y": [0, 0]}},
+        },
+        "pairs": [
+            {"turning": "O"},
+            {"sliding": "up", "links": ["f", "yoke"], "line": {"through": "O", "angle": pi / 2}, "point": "Y"},
+            {"slot": "slot", "links": ["yoke", "crank"], "line": {"through": "Y", "angle": -pi / 2}, "point": "A"},
+        ],
+        "inputs": [{"pair": "O", "position": 0, "velocity": speed / radius}],
+        "masses": [{"link": "yoke", "mass": 1, "at": "Y"}],
+        "gravity": [0, -G],
+    }
+    found = planar.simulate(planar.from_dict(value), 0.2, 100, moving=True)
+    assert found.motion.outcome is Outcome.TOO_FEW_INPUTS
+    assert "only to 0.142 s: beyond, link 'crank' can move without anything that has a mass" in found.motion.reason
+    time = found.motion.time
+    assert time[-1] == pytest.approx(0.142)  # of the 0.1428 s to the top
+    np.testing.assert_allclose(found.motion.point("Y").position[:, 1], speed * time - G / 2 * time**2, atol=1e-11)
+
+
+@pytest.mark.parametrize("duration", [0.0, -1.0, float("nan"), float("inf"), True, "2s"])
 def test_durations_that_are_none_are_refused(duration):
     with pytest.raises(BadInput) as refused:
         planar.simulate(planar.from_dict(lever({"A": [1, 0]})), duration)
     assert refused.value.place == "duration"
+
+
+@pytest.mark.parametrize("steps", [0, 2.5, True, 10**6])
+def test_steps_that_are_none_are_refused(steps):
+    with pytest.raises(BadInput) as refused:
+        planar.simulate(planar.from_dict(lever({"A": [1, 0]})), 1.0, steps)
+    assert refused.value.place == "steps"
 
 
 def test_inputs_to_be_driven_are_known_by_name():

@@ -9,7 +9,7 @@ import numpy as np
 
 from planar.drawing.chart import number
 from planar.drawing.runs import closing, steady
-from planar.dynamics.flywheel import running, turns
+from planar.dynamics.flywheel import turns
 from planar.dynamics.forces import Forces, forces
 from planar.errors import BadInput
 from planar.mechanism import Mechanism
@@ -87,7 +87,7 @@ def loaded(what: Forces | Motion | Mechanism) -> Loaded:
     motion = found.moving
     if not isinstance(motion, Motion):
         raise BadInput("forces", "this is drawn over a motion; give the forces over one")
-    name = running(motion)
+    name = motion.running
     position, way = motion.inputs[name].position, np.diff(motion.inputs[name].position)
     units = motion.mechanism.units
     if (way > 0.0).all() or (way < 0.0).all() or motion.time is None:

@@ -10,7 +10,6 @@ import numpy as np
 
 from planar.analysis.extremes import Stroke, stroke
 from planar.drawing.scene import standing
-from planar.dynamics.flywheel import running
 from planar.errors import BadInput, Outcome, PlanarError
 from planar.mechanism import Drive, Input, Mechanism, with_inputs
 from planar.motion import Motion, Unknown
@@ -170,7 +169,7 @@ def steady(
     Raises BadInput and NoAnswer.
     """
     mechanism = what.mechanism if isinstance(what, Motion) else what
-    pair = running(what) if isinstance(what, Motion) else pair or _only(mechanism)
+    pair = what.running if isinstance(what, Motion) else pair or _only(mechanism)
     given = next((each for each in mechanism.inputs if each.pair == pair), None)
     if given is None:
         raise BadInput(pair, f"there is no input at {pair!r}; inputs are at {_named(mechanism)}")

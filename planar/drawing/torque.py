@@ -10,7 +10,7 @@ from planar.drawing import chart
 from planar.drawing.loaded import Loaded, loaded
 from planar.drawing.paper import said
 from planar.drawing.picture import Circle, Fill, Letter, Line, Mark, Pen, Picture
-from planar.dynamics.flywheel import FLUCTUATION, Flywheel, flywheel, no_cycle, running
+from planar.dynamics.flywheel import FLUCTUATION, Flywheel, flywheel, no_cycle
 from planar.dynamics.forces import Forces
 from planar.errors import BadInput
 from planar.mechanism import Mechanism
@@ -38,7 +38,7 @@ def torque_picture(
     """
     drawn = loaded(what)
     found = drawn.forces
-    name = running(found.moving) if of is None else of
+    name = found.moving.running if of is None else of
     if name not in found.inputs:
         raise BadInput(name, f"there is no input of this name; inputs are at {', '.join(found.inputs)}")
     effort = drawn.along(found.inputs[name])

@@ -57,7 +57,7 @@ def flywheel(forces: Forces, of: str | None = None, fluctuation: float = FLUCTUA
         raise BadInput("fluctuation", f"a coefficient between 0 and 2 is wanted, not {fluctuation!r:.40}")
     if not isinstance(motion, Motion):
         raise BadInput("forces", "a flywheel is of a whole cycle; give the forces over a motion")
-    name = running(motion) if of is None else of
+    name = motion.running if of is None else of
     if name not in forces.inputs:
         raise BadInput(name, f"there is no input of this name; inputs are at {', '.join(forces.inputs)}")
     angle, torque = motion.inputs[name].position, np.asarray(forces.inputs[name])
@@ -67,11 +67,6 @@ def flywheel(forces: Forces, of: str | None = None, fluctuation: float = FLUCTUA
     if angle[-1] < angle[0]:
         angle, torque = angle[::-1], torque[::-1]
     return _evened(name, angle, torque, fluctuation, _speed(motion.inputs[name].velocity))
-
-
-def running(motion: Motion) -> str:
-    """The input that runs farthest in a motion."""
-    return max(motion.inputs, key=lambda name: float(np.ptp(motion.inputs[name].position)))
 
 
 def turns(motion: Motion, name: str) -> int:

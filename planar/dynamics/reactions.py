@@ -98,8 +98,10 @@ class Reactions:
         if pushed:
             off = sum(each[:, 0] for each in pushed.values()) * self.scale
             found, ways, balanced = self._carried((asked - off)[:, :, None])
-        because = ("",) * ways.shape[2] + tuple(name for name in self.unshared for _ in range(4))
-        ways = np.concatenate([ways, *(self._share(self.pairs[name]) for name in self.unshared)], axis=2)
+        by_cause = {"": ways} | {name: self._share(self.pairs[name]) for name in self.unshared}
+        by_cause = {name: np.concatenate([each, *self._pushed_off(each)], axis=2) for name, each in by_cause.items()}
+        because = tuple(name for name, each in by_cause.items() for _ in range(each.shape[2]))
+        ways = np.concatenate([*by_cause.values()], axis=2)
         wrenches = {name: self._wrenches(pair, found[:, self.rows[name]]) for name, pair in self.pairs.items()}
         for name, push in pushed.items():
             also = self._on_bodies(self.pairs[name], push[:, 0, :, None])
@@ -184,6 +186,21 @@ class Reactions:
         barred = np.concatenate([change[:, own], change[:, inputs], share + self.held @ change], axis=1)
         s, v = np.linalg.svd(barred)[1:]
         return change @ (v.transpose(0, 2, 1) * (s <= BARRED)[:, None]) @ v
+
+    def _pushed_off(self, ways: Array) -> list[Array]:
+        """How forces (n, forces, 1) change with what pushes teeth off each other, for every contact.
+
+        Where ways (n, forces, ways) leave open how hard teeth press, they leave that open too, and whatever the sense.
+        """
+        if not ways.shape[2]:
+            return []
+        found = []
+        for name, contact in self.contacts.items():
+            rows = self.rows[name]
+            press = np.linalg.norm(ways[:, rows] / self.size[:, rows, None], axis=(1, 2))
+            push = self._along(self.pairs[name], contact, contact.apart)[:, 0] * (contact.slope * press)[:, None]
+            found.append(-self._inverse[0] @ (push * self.scale)[:, :, None])
+        return found
 
     def _wrenches(self, pair: Pair, forces: Array) -> dict[str, Wrench]:
         """What a pair does to each of its bodies (n, ways) by forces of its own (n, rows, ways)."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from planar.dynamics.accelerations import Accelerations
 from planar.dynamics.acting import Field
 from planar.dynamics.checked import check
 from planar.dynamics.work import work
-from planar.errors import BadInput, Outcome
+from planar.errors import BadInput, NoAnswer, Outcome
 from planar.mechanism import Input, Mechanism
 from planar.motion import Motion, State
 from planar.plane import Frame, frame_at
@@ -34,6 +35,8 @@ LEAST, MOST_TINY = 1e-10, 20
 WEAK, KEPT, MEMORY, SMOOTH = 5e-3, 6, 200, 1e-5
 """A weakest constraint beside the strongest as near a change point; from how many of the steps before, and of how many,
 the motion goes on beyond, and by how much these may miss."""
+BENT = 1e-8
+"""What is brought back onto the constraints by more than this is bent: near a change point these are weak."""
 FIRM = 1e-5
 """Nearer to a change point accelerations are no more told by the constraints."""
 Tick = Callable[[float], None]
@@ -87,9 +90,9 @@ def simulate(
     A motion that cannot go on says so in its `outcome` and `reason`. Raises BadInput for a duration or names that are
     none, NoAnswer where there is no position to start from, or something can move that has no mass.
     """
-    if isinstance(duration, bool) or not 0.0 < duration <= LONGEST:
+    if isinstance(duration, bool) or not isinstance(duration, Real) or not 0.0 < duration <= LONGEST:
         raise BadInput("duration", f"a time above zero up to {LONGEST:g} s is wanted, not {duration!r:.40}")
-    if isinstance(steps, bool) or not 1 <= steps <= MOST_STEPS:
+    if isinstance(steps, bool) or not isinstance(steps, Integral) or not 1 <= steps <= MOST_STEPS:
         raise BadInput("steps", f"a whole number of steps from 1 to {MOST_STEPS} is wanted, not {steps!r:.40}")
     names = [given.pair for given in mechanism.inputs]
     for pair in driven:
@@ -115,6 +118,10 @@ def _resting(given: Input, kept: Sequence[str]) -> Input:
     return given._replace(velocity=float(velocity), acceleration=float(acceleration))
 
 
+def _only_to(time: float, why: str) -> str:
+    return f"the motion can be told only to {time:.6g} s{why}"
+
+
 class _Run:
     """One motion from a solved position."""
 
@@ -130,23 +137,38 @@ class _Run:
         self.time = np.linspace(0.0, duration, steps + 1)
 
     def done(self, tick: Tick | None) -> Simulation:
-        rows, stopped = self._integrated(tick)
+        rows, outcome, reason = self._integrated(tick)
         time = self.time[: len(rows)]
         q, q1 = rows[:, : self.many], rows[:, self.many : 2 * self.many]
-        pushed = [self.law.of(*each) for each in zip(time, q, q1, strict=True)]
-        q2 = np.array([each.q2 if each.firm > FIRM else np.full(self.many, np.nan) for each in pushed])
+        q2 = np.array([self._accelerations(*each) for each in zip(time, q, q1, strict=True)])
         energies = np.array([self.law.energy(*each) for each in zip(time, q, q1, strict=True)])
-        motion = self._motion(time, q, q1, q2)
-        if stopped:
-            motion = replace(motion, outcome=Outcome.BRANCH_LOST, reason=stopped)
+        motion = replace(self._motion(time, q, q1, q2), outcome=outcome, reason=reason)
         return Simulation(motion, energies[:, 0], energies[:, 1], rows[:, -1], self.kept)
 
-    def _integrated(self, tick: Tick | None) -> tuple[Array, str]:
+    def _accelerations(self, time: float, q: Array, q1: Array) -> Array:
+        """Those of a row; not a number where nothing tells them."""
+        try:
+            pushed = self.law.of(time, q, q1)
+        except NoAnswer:
+            return np.full(self.many, np.nan)
+        return pushed.q2 if pushed.firm > FIRM else np.full(self.many, np.nan)
+
+    def _integrated(self, tick: Tick | None) -> tuple[Array, Outcome, str]:
         """The rows at all times that were reached, and why not all of them were."""
-        last = float(self.time[-1])
+        rows = [self.first]
         if not np.all(np.isfinite(self.law.of(0.0, *self._parts(self.first)).q2)):
-            return self.first[None], f"the motion can be told only to 0 s{self._why(0.0, self.first)}"
-        solver, rows, good, tiny = self._integrator(0.0, self.first), [self.first], [], 0
+            return np.array(rows), Outcome.BRANCH_LOST, _only_to(0.0, self._why(0.0, self.first))
+        try:
+            stopped = self._fill(rows, tick)
+        except NoAnswer as massless:
+            told = _only_to(float(self.time[len(rows) - 1]), f": beyond, {massless.reason}")
+            return np.array(rows), massless.outcome, told
+        return np.array(rows), Outcome.BRANCH_LOST if stopped else Outcome.SOLVED, stopped
+
+    def _fill(self, rows: list[Array], tick: Tick | None) -> str:
+        """Add the rows after the first, as far as they can be told; why not all of them."""
+        last = float(self.time[-1])
+        solver, good, tiny = self._integrator(0.0, self.first), [], 0
         while solver.status == "running":
             failed = False
             try:
@@ -154,27 +176,39 @@ class _Run:
             except FloatingPointError:
                 failed = True
             firm = self.law.of(solver.t, *self._parts(solver.y)).firm
+            y = self._back(solver.t, solver.y)
+            failed = failed or self._moved(solver.y, y) > BENT
             tiny = tiny + 1 if (solver.step_size or 0.0) < LEAST * last else 0
             if failed or solver.status == "failed" or tiny > MOST_TINY:
                 over = self._over(good, solver.t) if firm < WEAK else None
                 if over is None:
-                    why = self._why(solver.t, solver.y)
-                    return np.array(rows), f"the motion can be told only to {solver.t:.6g} s{why}"
+                    return _only_to(solver.t, self._why(solver.t, solver.y))
                 at, inner = over
-                while len(rows) < len(self.time) and self.time[len(rows)] <= at:
-                    rows.append(self._back(float(self.time[len(rows)]), inner(self.time[len(rows)])))
+                self._reach(rows, at, inner)
                 solver, good, tiny = self._integrator(at, self._back(at, inner(at))), [], 0
                 continue
-            inner = solver.dense_output()
-            while len(rows) < len(self.time) and self.time[len(rows)] <= solver.t:
-                rows.append(self._back(float(self.time[len(rows)]), inner(self.time[len(rows)])))
-            y = self._back(solver.t, solver.y)
+            self._reach(rows, solver.t, solver.dense_output())
             solver.y, solver.f = y, self._rate(solver.t, y)
             if firm > WEAK:
                 good = [*good[-MEMORY:], (solver.t, y)]
             if tick is not None:
                 tick(solver.t / last)
-        return np.array(rows), ""
+        return ""
+
+    def _reach(self, rows: list[Array], end: float, inner: Callable[..., Array]) -> None:
+        """Add the rows up to a time, on the constraints; with rates as they come where constraints would bend them."""
+        while len(rows) < len(self.time) and self.time[len(rows)] <= end:
+            time = float(self.time[len(rows)])
+            y = np.asarray(inner(time))
+            back = self._back(time, y)
+            if self._moved(y, back) > BENT:
+                back[self.many :] = y[self.many :]
+            rows.append(back)
+
+    def _moved(self, y: Array, back: Array) -> float:
+        """How far coordinates and rates are moved, of sizes and turns and of the rates."""
+        scale = np.concatenate([self.law.scale, np.maximum(np.abs(y[self.many : -1]), self.law.scale)])
+        return float(np.abs((back - y)[:-1] / scale).max(initial=0.0))
 
     def _integrator(self, time: float, y: Array) -> Any:
         from scipy.integrate import DOP853  # slow to load, and only needed here
@@ -218,9 +252,11 @@ class _Run:
         if beyond > self.time[-1] or not np.all(np.isfinite(found)):
             return None
         back = self._back(beyond, found)
-        scale = np.concatenate([self.law.scale, np.maximum(np.abs(found[self.many : -1]), self.law.scale), [1.0]])
-        smooth = float(np.abs((back - found)[:-1] / scale[:-1]).max()) < SMOOTH
-        return (beyond, inner) if smooth and self.law.of(beyond, *self._parts(back)).firm > 0.1 * WEAK else None
+        return (
+            (beyond, inner)
+            if self._moved(found, back) < SMOOTH and self.law.of(beyond, *self._parts(back)).firm > 0.1 * WEAK
+            else None
+        )
 
     def _parts(self, y: Array) -> tuple[Array, Array]:
         return y[: self.many], y[self.many : -1]

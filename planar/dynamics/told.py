@@ -87,7 +87,7 @@ def _still(changes: Array) -> Array:
 
 def _why(solved: Solved, changes: Sequence[Array]) -> str:
     """Why something is not told, from its changes (n, ways) each; empty where it is."""
-    moved = np.max([np.abs(each).max(axis=0, initial=0.0) for each in changes], axis=0)
+    moved = np.max([np.abs(each[solved.balanced]).max(axis=0, initial=0.0) for each in changes], axis=0)
     because = dict.fromkeys(name for name, most in zip(solved.because, moved, strict=True) if most > SHARED)
     told = []
     if "" in because:
@@ -95,4 +95,6 @@ def _why(solved: Solved, changes: Sequence[Array]) -> str:
     names = [repr(name) for name in because if name]
     if names:
         told.append(f"what {listed(names)} put{'s' * (len(names) == 1)} on it is not known: only the couples are")
+    if not solved.balanced.all():
+        told.append("no forces in the pairs balance the links there, as at a dead point")
     return "; ".join(told)

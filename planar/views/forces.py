@@ -30,7 +30,9 @@ def tables(forces: Forces, advantages: ratios.Advantages, comparisons: Sequence[
     head = [Text(forces.mechanism.name, style="bold")]
     if forces.mechanism.source:
         head.append(Text(forces.mechanism.source, style="italic"))
-    parts: list[RenderableType] = [Text(balanced(forces)), Text(), _inputs(forces)]
+    parts: list[RenderableType] = [Text(balanced(forces)), Text()]
+    if forces.inputs:
+        parts.append(_inputs(forces))
     acting, inertia = loads.moved(forces, inertia=False), loads.moved(forces, inertia=True)
     if acting:
         parts.append(loads.acting_table("Loads", acting, degree, greatest(forces)[0]))
@@ -156,7 +158,9 @@ def proved(forces: Forces) -> list[tuple[str, str]]:
         )
     if proof.equilibrium is not None:
         told.append(f"{_which(forces)}, but for {proof.equilibrium:.1e} of the greatest force")
-    return [("" if index else "proof", each) for index, each in enumerate(told or ["none: nothing acts on what moves"])]
+    if not told:
+        told.append("none: of no link all is told" if forces.undetermined else "none: nothing acts on what moves")
+    return [("" if index else "proof", each) for index, each in enumerate(told)]
 
 
 def _which(forces: Forces) -> str:

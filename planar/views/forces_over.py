@@ -47,7 +47,7 @@ def _efforts(forces: Forces) -> Table:
 
 
 def _mean(forces: Forces, values: Array) -> float:
-    """Over the time, or over the way of the input that runs: what it supplies is the work by that way."""
+    """Over the time, or over the way of the input that runs, there and back: work by way where it does not turn."""
     motion = forces.moving
     driver = running(motion)
     ways = motion.time if driver is None else motion.inputs[driver].position
@@ -107,9 +107,8 @@ def _undetermined(forces: Forces) -> Iterator[str]:
     efforts = {name: np.isnan(values) for name, values in forces.inputs.items()}
     by: dict[tuple[str, int], list[str]] = {}
     for name, lost in (efforts | {name: _unknown(each) for name, each in forces.reactions.items()}).items():
-        why = forces.undetermined.get(name, "no forces in the pairs balance the links there, as at a dead point")
         if lost.any():
-            by.setdefault((why, int(np.sum(lost))), []).append(name)
+            by.setdefault((forces.undetermined[name], int(np.sum(lost))), []).append(name)
     for (why, count), names in by.items():
         yield f"not determined at {listed(names)}, at {count} of {many(len(forces.moving), 'position')}: {why}"
 

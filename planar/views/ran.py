@@ -11,7 +11,7 @@ from rich.text import Text
 
 from planar.motion import Motion
 from planar.units import unit
-from planar.views.table import number, paragraphs, plain_table
+from planar.views.table import counted, number, paragraphs, plain_table
 from planar.words import amount, listed, many
 
 MOST_ENDS = 6
@@ -93,9 +93,7 @@ def _in_units(motion: Motion, pair: str, value: float) -> float:
 
 def running(motion: Motion) -> str | None:
     """The input that runs, unless they run in time."""
-    if motion.time is not None:
-        return None
-    return max(motion.inputs, key=lambda name: float(np.ptp(motion.inputs[name].position)))
+    return motion.running if motion.time is None else None
 
 
 def _points(motion: Motion) -> Table:
@@ -104,10 +102,12 @@ def _points(motion: Motion) -> Table:
     table = plain_table(
         "Points, among these positions", "point", *heads, "velocity up to, m/s", "acceleration up to, m/s²"
     )
-    length = unit(units.length)
+    length = unit(units.length).from_si
+    farthest = max((float(np.abs(each.position).max()) for each in motion.points.values()), default=0.0)
     for name, point in motion.points.items():
-        ends = [length.from_si(float(end)) for values in point.position.T for end in (values.min(), values.max())]
-        greatest = [np.hypot(*rate.T) for rate in (point.velocity, point.acceleration)]
-        most = ["-" if np.isnan(rate).all() else number(float(np.nanmax(rate))) for rate in greatest]
-        table.add_row(name, *map(number, ends), *most)
+        ends = [float(end) for values in point.position.T for end in (values.min(), values.max())]
+        fastest = [np.hypot(*rate.T) for rate in (point.velocity, point.acceleration)]
+        rates = ["-" if np.isnan(rate).all() else number(float(np.nanmax(rate))) for rate in fastest]
+        places = (counted(length(end), length(farthest)) for end in ends)
+        table.add_row(name, *places, *rates)
     return table

@@ -49,9 +49,11 @@ def _energies(simulation: Simulation) -> Table:
     headings = ("of", "at the start, J", "at the end, J", "least, J", "greatest, J")
     table = plain_table("Energy", *headings)
     names = ("kinetic energy", "potential energy", "work put in")
+    most = max(float(np.abs(getattr(simulation, what)).max()) for what in ENERGIES)
     for name, what in zip(names, ENERGIES, strict=True):
         values = getattr(simulation, what)
-        table.add_row(name, *(counted(float(each)) for each in (values[0], values[-1], values.min(), values.max())))
+        ends = (values[0], values[-1], values.min(), values.max())
+        table.add_row(name, *(counted(float(each), most) for each in ends))
     return table
 
 
