@@ -41,6 +41,8 @@ def sqrt(x: Scalar) -> Scalar:
 
 def atan2(y: Scalar, x: Scalar) -> Scalar:
     """The angle of the direction (x, y), between -pi and pi."""
+    if type(y) is float and hasattr(x, "__arctan2__"):  # a number over a symbol
+        y = type(x)(y)
     method = getattr(y, "arctan2", None) or getattr(y, "__arctan2__", None)
     if method is not None:
         return method(x)

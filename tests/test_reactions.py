@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import cos, pi, radians, sin, tan
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 import planar
+from planar.applied import Load
 from planar.dynamics.forces import Forces
 from tests.test_dynamics import of, slider_crank
 
@@ -83,6 +85,14 @@ def test_the_planet_of_a_gear_set_is_pressed_alike_from_both_sides():
     assert pin.force == pytest.approx(-2 * press * across, rel=1e-12)
     assert found.inputs["O:frame,sun"] == pytest.approx(press * 0.040, rel=1e-12)
     assert found.undetermined == {}
+
+
+@pytest.mark.parametrize("name, pair", [("rolling-wheel", "rail"), ("rack-differential", "upper mesh")])
+def test_an_effort_along_a_rack_is_carried_where_it_acts(name, pair):
+    """It pushes the pinion at its centre, and what pairs carry balances every link against that very push."""
+    mechanism = planar.load(name)
+    solved = planar.solve(replace(mechanism, loads=(Load(pair=pair, effort=4.0),), springs=(), masses=()))
+    assert planar.forces(solved).proof.equilibrium < 1e-12
 
 
 def test_a_pinion_and_its_rack_push_each_other_off():

@@ -40,9 +40,9 @@ class Balancing:
             self.rows[pair.name] = slice(at, at + len(pair.constrains) - len(pair.coordinates))
             at = self.rows[pair.name].stop
         self.count = at
-        loads, efforts = work.pushed
-        slopes, drives = ca.jacobian(work.gaps, work.q), ca.jacobian(work.drives, work.q)
-        outputs = [slopes, drives, loads + work.kept, efforts, work.inertia]
+        # what efforts do is told by their places: how a pair's own coordinates follow those of its links is not unique
+        drives = ca.vertcat(ca.SX(0, work.q.numel()), *(work.effort(given.pair).T for given in work.mechanism.inputs))
+        outputs = [ca.jacobian(work.gaps, work.q), drives, ca.sum2(work.acting), work.inertia]
         given = [work.q, work.q1, work.q2, work.factors, work.turns]
         self._called = Called(ca.Function("balance", given, [ca.densify(each) for each in outputs]))
 
@@ -51,9 +51,8 @@ class Balancing:
         `wound` as `Work.wound` has it."""
         parts = self._called.over(len(q), q, q1, q2, factors, wound)
         slopes, drives = (each.transpose(0, 2, 1) for each in parts[:2])
-        loads, efforts, inertia = (each[:, 0] for each in parts[2:])
+        loads, inertia = (each[:, 0] for each in parts[2:])
         constraints = np.zeros((len(q), self.count, self.many))
-        carried, pushed = drives[:, :, : self.many].copy(), loads[:, : self.many] + efforts[:, : self.many]
         first = 0
         for pair in self.work.mechanism.pairs:
             rows, own = slice(first, first + len(pair.constrains)), self.work.own[pair.name]
@@ -61,15 +60,11 @@ class Balancing:
             of_links, of_own = slopes[:, rows, : self.many], slopes[:, rows, own]
             count = of_own.shape[2]
             if count:
-                # what follows of its own coordinates from those of the links, and what is left to hold these
-                basis, upper = np.linalg.qr(of_own, mode="complete")
-                turned = basis.transpose(0, 2, 1) @ of_links
-                follows = -np.linalg.solve(upper[:, :count], turned[:, :count])
-                of_links = turned[:, count:]
-                carried += drives[:, :, own] @ follows
-                pushed += (efforts[:, None, own] @ follows)[:, 0]
+                # what is left to hold the links, square to what its own coordinates do
+                basis = np.linalg.qr(of_own, mode="complete")[0]
+                of_links = (basis.transpose(0, 2, 1) @ of_links)[:, count:]
             constraints[:, self.rows[pair.name]] = of_links
-        return Balance(constraints, carried, pushed, inertia[:, : self.many])
+        return Balance(constraints, *(each[..., : self.many] for each in (drives, loads, inertia)))
 
 
 @lru_cache(maxsize=32)

@@ -72,12 +72,14 @@ def _place(pair: Pair, field: Field, reactions: Reactions) -> Array | None:
     contact = reactions.contacts.get(pair.name)
     if contact is not None:
         return np.stack(np.broadcast_arrays(*contact.at, np.zeros(field.many))[:2], axis=-1)
+    end = borne(pair)
+    return field.at(end[0], field.shapes[end[0]].at(end[1])) if end is not None else None
+
+
+def borne(pair: Pair) -> tuple[str, str] | None:
+    """The (link, point) at which a pair without teeth bears; None where it joins its links at no place."""
     rides = pair.rides()
-    ends = pair.coincident()[1:] or ((rides[0],) if rides else ())
-    if not ends:
-        return None
-    link, point = ends[0]
-    return field.at(link, field.shapes[link].at(point))
+    return next(iter(pair.coincident()[1:] or ((rides[0],) if rides else ())), None)
 
 
 def _still(changes: Array) -> Array:

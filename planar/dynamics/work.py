@@ -10,13 +10,13 @@ inputs, whose drives are D q',
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property, lru_cache
 
 import casadi as ca
 import numpy as np
 
-from planar.applied import MET, Load, Spring
+from planar.applied import MET, Load, Mass, Spring
 from planar.dynamics.acting import carriers
 from planar.mechanism import Mechanism, motions
 from planar.motion import Moving
@@ -30,9 +30,11 @@ Array = np.ndarray
 class Work:
     """The functions of one mechanism."""
 
-    def __init__(self, mechanism: Mechanism):
+    def __init__(self, mechanism: Mechanism, unit: float | None = None):
+        """Dimensions may be symbols; then `unit` is the mechanism's size (m)."""
         self.mechanism = mechanism
         self.shapes = shapes(mechanism)
+        self.unit = size(mechanism, self.shapes) if unit is None else unit
         self.links = tuple(link.name for link in mechanism.links if link.name != mechanism.frame)
         self.column = {link: 3 * k for k, link in enumerate(self.links)}
         self.named = motions(mechanism)
@@ -122,10 +124,9 @@ class Work:
     def energies(self) -> tuple[ca.SX, ca.SX, ca.SX]:
         """Kinetic energy, potential of weights and springs (J), and what dampers take up, halved (W)."""
         kinetic = potential = lost = ca.SX(0.0)
-        gravity = self.mechanism.gravity
         for mass in self.mechanism.masses:
-            at = self.frames[mass.link].carry(self.shapes[mass.link].at(mass.at))
-            potential -= mass.mass * (gravity[0] * at.x + gravity[1] * at.y)
+            at = self.centre(mass)
+            potential += self._lifted(mass)
             if mass.link in self.column:
                 v = self._rate(ca.vertcat(at.x, at.y))
                 turning = self.q1[self.column[mass.link] + 2]
@@ -134,6 +135,46 @@ class Work:
             stored, taken = self._spring(spring, number)
             potential, lost = potential + stored, lost + taken
         return kinetic, potential, lost
+
+    @cached_property
+    def acting(self) -> ca.SX:
+        """What each load, weight and spring puts on the links (coordinates, loads + masses + springs)."""
+        q, q1 = self.q, self.q1
+        loads = []
+        for k, load in enumerate(self.mechanism.loads):
+            effort = self.effort(load.pair) * (load.effort or 0.0) if load.pair is not None else 0.0
+            loads.append((self._load(load)[0] + effort) * self.factors[k])
+        weights = [-ca.gradient(self._lifted(mass), q) for mass in self.mechanism.masses]
+        energies = [self._spring(spring, number) for number, spring in enumerate(self.mechanism.springs)]
+        springs = [-ca.gradient(stored, q) - ca.gradient(taken, q1) for stored, taken in energies]
+        return ca.horzcat(ca.SX(q.numel(), 0), *loads, *weights, *springs)
+
+    def effort(self, name: str) -> ca.SX:
+        """What an effort of one at a pair puts on the links (coordinates,), the pairs' own coordinates left alone."""
+        way = self.named[name].effort(self.frames, self.shapes)
+        return self.push({way.on: 1.0, way.against: -1.0}, way.at, way.way)
+
+    def push(self, senses: Mapping[str, float], at: Vector | None, way: Vector | None) -> ca.SX:
+        """A force of one along a way at a place of the world, or a couple of one, on links (coordinates,)."""
+        found = ca.SX.zeros(self.q.numel())
+        for link, sense in senses.items():
+            if link in self.column:
+                parts = (0.0, 0.0, 1.0)
+                if at is not None and way is not None:
+                    frame = self.frames[link]
+                    parts = (way.x, way.y, (at - Vector(frame.x, frame.y)).cross(way))
+                for k, part in enumerate(parts):
+                    found[self.column[link] + k] += sense * part
+        return found
+
+    def centre(self, mass: Mass) -> Vector:
+        """Where a mass is centred."""
+        return self.frames[mass.link].carry(self.shapes[mass.link].at(mass.at))
+
+    def _lifted(self, mass: Mass) -> ca.SX:
+        """The potential energy of a weight (J)."""
+        at, gravity = self.centre(mass), self.mechanism.gravity
+        return ca.SX(-mass.mass * (gravity[0] * at.x + gravity[1] * at.y))
 
     def _spring(self, spring: Spring, number: int) -> tuple[ca.SX, ca.SX]:
         """What a spring stores (J), and half of what its damper takes up (W)."""
@@ -144,7 +185,7 @@ class Work:
         apart = ca.vertcat(*(self.point(second) - self.point(first)))
         square = ca.dot(apart, apart)
         away = ca.sqrt(square)
-        met = square <= (MET * size(self.mechanism, self.shapes)) ** 2
+        met = square <= (MET * self.unit) ** 2
         known = ca.if_else(met, np.nan, 1.0)  # as a factor, so that slopes have it too
         stored = 0.5 * spring.stiffness * ((away - spring.free) ** 2 * known if spring.free else square)
         taken = ca.SX(0.0)

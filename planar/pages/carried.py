@@ -21,6 +21,7 @@ from planar.graph import numbered
 from planar.mechanism import Mechanism, counting, misfits, named_points
 from planar.pages.columns import heads, reported
 from planar.pages.document import above_zero, called, document
+from planar.pages.loaded import loaded
 from planar.pages.script import printed
 from planar.pairs import Kind, Pair
 from planar.pairs.marks import Mark
@@ -120,11 +121,14 @@ def carried(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[str
         "tolerance": solver.tolerance,
         "sizes": len(numbers.values),
     }
+    acting = loaded(numbers.mechanism, numbers.d, standing(mechanism), solver.unit)
+    data["forces"] = acting and acting[0]
     functions = [numbers.function(), printed("positions", program.positions), printed("kinematics", program.rates)]
     functions += [printed(f"closing{k}", program.closing(stage)) for k, stage in enumerate(e.stages)]
     functions.append(reported(mechanism, solver, numbers.d, numbers.shapes))
     stages = ",".join(f"closing{k}" for k in range(len(e.stages)))
-    functions.append(f"const program={{sizes,positions,kinematics,reported,stages:[{stages}]}};")
+    functions.append(acting[1] if acting else "const balance=null;")
+    functions.append(f"const program={{sizes,positions,kinematics,reported,balance,stages:[{stages}]}};")
     return data, "\n".join(functions)
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import hypot, tan
+from math import tan
 from typing import Any, ClassVar, Self
 
-from planar.algebra import Scalar
+from planar.algebra import Scalar, sqrt
 from planar.pairs.base import Contact, Entry, Pair, Quantity, Sample, Schema, Told
 from planar.pairs.teeth import PRESSURE_ANGLE, TEETH, read_pressure_angle, write_pressure_angle
 from planar.pairs.wheels import NEAR, Wheels
@@ -66,8 +66,8 @@ class Gear(Wheels):
         if self.by == "ratio" or None in pins:
             return None
         first, second = (shapes[self.carrier].at(pin[self.carrier]) for pin in pins)
-        apart = hypot(*(second - first))
-        if apart == 0.0:
+        apart = sqrt((second - first).dot(second - first))
+        if isinstance(apart, float) and apart == 0.0:
             return None
         way = (second - first) * (1.0 / apart)
         outside = 1.0 if self.ratio() < 0.0 else -1.0

@@ -6,7 +6,7 @@ const SERIES = 6;        // colours of lines
 const DEGREES = [1, 2, 5, 10, 15, 30, 45, 60, 90, 180, 360, 720]; // between numbers of an axis
 const HEIGHT = 240;      // px
 
-/** Quantities over the course: {key, label, unit, kind, of(columns)}. */
+/** Quantities over the course of points, links and inputs: {key, label, unit, kind, of(columns)}. */
 const DIAGRAMS = [
   { key: "x", label: "x", unit: "length", kind: "point", of: (c, i) => c.x[i] },
   { key: "y", label: "y", unit: "length", kind: "point", of: (c, i) => c.y[i] },
@@ -19,30 +19,35 @@ const DIAGRAMS = [
   { key: "angle", label: "angle", unit: "angle", kind: "link", of: (c, i) => c.angle[i] - c.turns },
   { key: "w", label: "angular velocity", unit: "rad/s", kind: "link", of: (c, i) => c.w[i] },
   { key: "e", label: "angular acceleration", unit: "rad/s²", kind: "link", of: (c, i) => c.e[i] },
+  { key: "torque", label: "input torque", unit: "N·m", kind: "input", of: (c, i) => c.effort[i] },
+  { key: "push", label: "input force", unit: "N", kind: "input", of: (c, i) => c.effort[i] },
 ];
 
 /** By which rate of the points the rows are told that a diagram is to fit; positions fit all of them. */
 const CALM_BY = {
   length: null, angle: null, "m/s": RATES.velocity.parts, "rad/s": RATES.velocity.parts,
   "m/s²": RATES.acceleration.parts, "rad/s²": RATES.acceleration.parts,
+  "N·m": RATES.acceleration.parts, N: RATES.acceleration.parts,
 };
 
 class Charts {
   constructor(page) {
     this.page = page;
     const section = document.getElementById("numbers"), told = memory.read("diagrams");
-    this.on = new Set(told === null ? ["v", "w"] : told.split(","));
+    this.on = new Set(told === null ? ["v", "w", "torque", "push"] : told.split(","));
+    // of inputs there are those whose efforts are such, where anything acts
+    this.diagrams = DIAGRAMS.filter((each) => each.kind !== "input" || this.names(each).length);
     this.charts = [];
     if (!page.data.inputs.length) return;
     const box = htmlPart("fieldset", { class: "choices" }, section);
     htmlPart("legend", {}, box, "Diagrams");
-    for (const { key, label, kind } of DIAGRAMS) {
+    for (const { key, label, kind } of this.diagrams) {
       const holder = htmlPart("label", {}, box), tick = htmlPart("input", { type: "checkbox", name: `diagram-${key}` }, holder);
-      holder.append(`${label} of ${kind}s`);
+      holder.append(kind === "input" ? label : `${label} of ${kind}s`);
       tick.checked = this.on.has(key);
       tick.addEventListener("change", () => {
         if (tick.checked) this.on.add(key); else this.on.delete(key);
-        memory.write("diagrams", DIAGRAMS.filter((each) => this.on.has(each.key)).map((each) => each.key).join(",") || "none");
+        memory.write("diagrams", this.diagrams.filter((each) => this.on.has(each.key)).map((each) => each.key).join(",") || "none");
         this.build();
       });
     }
@@ -64,8 +69,8 @@ class Charts {
     for (const { plot } of this.charts) plot.destroy();
     this.charts = [];
     place.replaceChildren();
-    for (const each of DIAGRAMS) {
-      const names = each.kind === "point" ? page.chosen.points() : page.chosen.links();
+    for (const each of this.diagrams) {
+      const names = this.names(each);
       if (this.on.has(each.key) && names.length) this.charts.push(this.chart(each, names, course));
     }
     this.hint.hidden = this.charts.length > 0;
@@ -74,12 +79,29 @@ class Charts {
     this.mark();
   }
 
+  /** Of what a diagram has lines. */
+  names({ kind, unit }) {
+    const { page } = this;
+    if (kind === "input") return (page.forces?.inputs ?? []).filter((each) => each.slides === (unit === "N")).map((each) => each.pair);
+    return kind === "point" ? page.chosen.points() : page.chosen.links();
+  }
+
+  /** All values of it over the course, or the one of now in a list. */
+  columns(kind, name, course) {
+    const { page } = this;
+    if (kind === "input") return { effort: course ? page.forces.over(course)?.efforts[name] ?? new Float64Array(course.count).fill(NaN) : [page.forces.effort(name)] };
+    const list = (one) => Object.fromEntries(Object.entries(one).map(([key, each]) => [key, [each]]));
+    if (kind === "point") return course ? course.point(name) : list(pointNumbers(page, name, page.frames));
+    const columns = course ? course.link(name) : list(linkNumbers(page.frames[name]));
+    return { ...columns, turns: turnsOf(page, page.course, name) };
+  }
+
   chart({ label, unit, kind, of }, names, course) {
     const { page, place } = this, [by, unitName] = unitOf(page, unit), k = course.input, { pair, slides } = page.data.inputs[k];
     const [byInput, inputUnit] = unitOf(page, slides ? "length" : "angle");
     const xs = Array.from(course.inputs, (each) => each * byInput);
     const lines = names.map((name) => {
-      const columns = kind === "point" ? course.point(name) : { ...course.link(name), turns: turnsOf(page, course, name) };
+      const columns = this.columns(kind, name, course);
       return Array.from(course.inputs, (_, i) => { const value = of(columns, i) * by; return Number.isFinite(value) ? value : null; });
     });
     const limits = rangeOf(lines, course, CALM_BY[unit], unit === "length" ? page.data.size * by : 0);
@@ -102,7 +124,7 @@ class Charts {
       }))],
       legend: { show: false },
       cursor: { drag: { x: false, y: false }, sync: { key: "motion" } },
-      hooks: { setCursor: [() => this.tell(made)] },
+      hooks: { setCursor: [() => this.tell(made)], ready: [() => this.mark()] }, // a plot has its scales a little later
     }, [xs, ...lines], figure);
     const caption = htmlPart("figcaption", {}, figure), where = htmlPart("span", {}, caption);
     const told = names.map((name, i) => {
@@ -111,11 +133,7 @@ class Charts {
       each.append(`${name} `);
       return htmlPart("span", {}, each);
     });
-    const now = (name) => {
-      const one = kind === "point" ? pointNumbers(page, name, page.frames) : linkNumbers(page.frames[name]);
-      const columns = Object.fromEntries(Object.entries(one).map(([key, each]) => [key, [each]]));
-      return by * of(kind === "point" ? columns : { ...columns, turns: turnsOf(page, course, name) }, 0);
-    };
+    const now = (name) => by * of(this.columns(kind, name, null), 0);
     Object.assign(made, { tell: (idx) => {
       where.textContent = `${pair} = ${idx === null ? inputTold(page, page.input(), k) : `${short(xs[idx])} ${inputUnit}`}:`;
       told.forEach((each, i) => { each.textContent = `${short(idx === null ? now(names[i]) : lines[i][idx] ?? NaN)} ${unitName}`; });

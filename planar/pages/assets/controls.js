@@ -146,6 +146,7 @@ class Controls {
   show(always = false) {
     if (this.ran !== this.page.running) { // whoever has chosen it
       this.ran = this.page.running;
+      this.sense = this.page.data.inputs[this.ran]?.velocity < 0 ? -1 : 1; // as the file has it
       this.arrow();
     }
     this.rows?.forEach(({ slider, number, chosen }, k) => {

@@ -199,10 +199,10 @@ class Courses {
   row(made, at) {
     const { page, running } = this, { inputs } = page.data;
     const rates = page.inputRates(), still = inputs.map(() => 0);
-    const frames = page.framesOf(made.state(rates.map((each) => each[0]), rates.map((each) => each[1])));
+    const state = made.state(rates.map((each) => each[0]), rates.map((each) => each[1])), frames = page.framesOf(state);
     const same = inputs.length === 1 && inputs[0].velocity !== 0;
     const alone = same ? frames : page.framesOf(made.state(still.map((_, k) => (k === running ? 1 : 0)), still));
-    return { at, z: Float64Array.from(made.z), frames, alone };
+    return { at, z: Float64Array.from(made.z), state, frames, alone };
   }
 }
 

@@ -90,6 +90,7 @@ class Layers {
         if (tick.checked) this.on.add(layer.key); else this.on.delete(layer.key);
         memory.write("layers", this.all.map((each) => each.key).filter((key) => this.on.has(key)).join(",") || "none");
         this.draw();
+        page.emit("shown");
       });
       const part = htmlPart(layer.beside ? "figure" : "p", { hidden: "" }, layer.beside ? this.places : this.notes);
       const beside = layer.beside?.(this, part) ?? null, told = layer.beside ? htmlPart("figcaption", {}, part) : part;
@@ -202,7 +203,10 @@ class Layers {
 function startLayers(page) {
   page.chosen = new Chosen(page);
   const rates = Object.keys(RATES);
-  page.layers = new Layers(page, [paths, ...rates.map(arrows), ...rates.map(polygon), centres, centrodes]);
+  page.forces = page.data.forces === null ? null : new PageForces(page);
+  const acting = page.forces === null ? [] : [forceArrows];
+  page.layers = new Layers(page, [paths, ...rates.map(arrows), ...acting, ...rates.map(polygon), centres, centrodes]);
   new Numbers(page);
+  if (page.forces !== null) new ForceTables(page);
   new Charts(page);
 }

@@ -80,6 +80,17 @@ class Ink {
     this.line([tip, [neck[0] - half * ey, neck[1] + half * ex], [neck[0] + half * ey, neck[1] - half * ex]], `${kind} head`, true);
   }
 
+  /** A curved arrow about a place, anticlockwise as seen for `sense` 1: where its letter stands, and which way off. */
+  turn([x, y], radius, sense, kind) {
+    const parts = 24, gap = 1.1, spot = (angle) => [x + radius * Math.cos(angle), y - radius * Math.sin(angle)];
+    const from = -Math.PI / 2 + sense * gap, sweep = sense * (2 * Math.PI - 2 * gap), back = 1 - (HEAD * this.unit) / (radius * Math.abs(sweep));
+    const places = Array.from({ length: parts + 1 }, (_, k) => spot(from + (back * sweep * k) / parts));
+    this.line(places, kind);
+    this.arrow(places[parts], spot(from + sweep), kind);
+    for (const place of places) this.keepClear(place, 3);
+    return { at: spot(Math.PI / 2), away: [0, -1] };
+  }
+
   dot([x, y], radius, kind) {
     return svgPart("circle", { cx: x, cy: y, r: radius * this.unit, class: kind }, this.group);
   }

@@ -2,13 +2,13 @@
 /* The page's one state: where the mechanism is. What shows it listens; what changes it calls `moveTo`, `changeTo`,
    `take`. Events: "move" (another position), "size" (other dimensions, or another assembly: all that was remembered of
    the motion is void), "said" (a sentence for the reader), "course" (the whole motion is known, or void), "chosen" (other
-   points and links are looked at), "view" (the drawing lies elsewhere on the screen, or is of another size). */
+   points and links are looked at), "shown" (other layers are), "view" (the drawing lies elsewhere on the screen, or is of another size). */
 
 class Page {
   constructor(data, program) {
     this.data = data;
     this.linkage = new Linkage(data, program);
-    this.listeners = { move: [], size: [], said: [], course: [], chosen: [], view: [] };
+    this.listeners = { move: [], size: [], said: [], course: [], chosen: [], shown: [], view: [] };
     this.running = 0; // which input is moved
     this.update();
   }

@@ -1,0 +1,66 @@
+"use strict";
+/* The forces as tables, while their layer is shown: what inputs supply, and what pairs do to the links chosen, or else to
+   their second links. Each cell carries its exact SI value as `data-si`. */
+
+class ForceTables {
+  constructor(page) {
+    this.page = page;
+    this.place = htmlPart("div", { class: "tables forces" }, document.getElementById("numbers"));
+    for (const event of ["move", "size", "chosen", "shown"]) page.on(event, () => this.fill());
+    this.fill();
+  }
+
+  fill() {
+    const { page, place } = this, shown = page.layers.on.has(forceArrows.key);
+    place.hidden = !shown;
+    if (!shown) return;
+    const found = page.forces.now(), at = page.data.inputs.map((each, k) => `${each.pair} = ${inputTold(page, page.input(k), k)}`).join(", ");
+    this.told ??= htmlPart("p", { class: "hint" }, place);
+    this.told.textContent = found.efforts ? forceNotes(page, found).join("; ") : `Forces: ${found.why}`;
+    this.told.hidden = this.told.textContent === "";
+    if (!found.efforts) { this.rows("inputs", "", [], []); this.rows("pairs", "", [], []); return; }
+    const [force, couple] = page.forces.least(found);
+    const number = (value, least) => [value, Math.abs(value) <= least ? "0" : Number.isFinite(value) ? figures(value) : ""];
+    const [degree, angle] = unitOf(page, "angle"), rates = page.inputRates();
+    this.rows("inputs", `What inputs supply at ${at}`, [["input"], ["torque or force"], ["unit"], ["power", "W"]], found.inputs.map((each, k) => {
+      const least = each.slides ? force : couple, rate = rates[k][0];
+      return [each.pair, number(each.effort, least), each.slides ? "N" : "N·m", number(each.effort * rate, least * Math.abs(rate))];
+    }));
+    const head = [["pair"], ["on"], ["by"], ["force", "N"], ["at", angle], ["along x", "N"], ["along y", "N"], ["couple", "N·m"]];
+    this.rows("pairs", `Reactions in the pairs at ${at}`, head, pairForces(found, page.chosen.links()).filter((each) => Number.isFinite(each.couple)).map(({ pair, link, by, force: [x, y], couple: turned }) => {
+      const size = Math.hypot(x, y), way = Math.atan2(y, x);
+      const at = size > force ? [way, figures(way * degree)] : [NaN, ""];
+      return [pair, link, by ?? "", number(size, force), at, number(x, force), number(y, force), number(turned, couple)];
+    }));
+  }
+
+  /** One table; its cells are made anew only where there are others. */
+  rows(key, title, head, rows) {
+    const shape = JSON.stringify(rows.map((row) => row.filter((each) => typeof each === "string")));
+    this.tables ??= new Map();
+    let table = this.tables.get(key);
+    if (table?.shape !== shape) {
+      const scroll = htmlPart("div", { class: "scroll", tabindex: "0", role: "group" });
+      if (table) table.scroll.replaceWith(scroll); else this.place.append(scroll);
+      const body = htmlPart("table", {}, scroll), caption = htmlPart("caption", {}, body);
+      const top = htmlPart("tr", {}, htmlPart("thead", {}, body)), rest = htmlPart("tbody", {}, body);
+      for (const [name, unit] of head) {
+        const cell = htmlPart("th", { scope: "col" }, top, name);
+        if (unit) htmlPart("span", { class: "unit" }, cell, ` ${unit}`);
+      }
+      const cells = rows.map((row) => {
+        const line = htmlPart("tr", {}, rest);
+        return row.map((_, k) => htmlPart(k ? "td" : "th", k ? {} : { scope: "row" }, line));
+      });
+      this.tables.set(key, table = { shape, scroll, caption, cells });
+    }
+    table.scroll.hidden = !rows.length;
+    table.scroll.setAttribute("aria-label", title || key);
+    table.caption.textContent = title;
+    rows.forEach((row, r) => row.forEach((each, c) => {
+      const cell = table.cells[r][c], [value, text] = typeof each === "string" ? [undefined, each] : each;
+      if (cell.textContent !== text) cell.textContent = text;
+      if (Number.isFinite(value)) cell.dataset.si = String(value); else delete cell.dataset.si;
+    }));
+  }
+}
