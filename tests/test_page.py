@@ -436,6 +436,57 @@ def test_the_motion_is_saved_with_the_columns_and_numbers_of_the_cycle_command(s
 
 
 @needs_node
+def test_the_range_of_the_input_is_that_of_the_cycle_command():
+    """Hart's A-frame passes a change point at the very angle where a turn begins."""
+    act = """
+    new Courses(page);
+    while (!page.course) await new Promise((go) => setTimeout(go, 1));
+    return page.course.limits;
+    """
+    free = {"davis-steering", "rack-differential", "rapsons-slide", "rolling-wheel"}  # slides without limits
+    some = {stem: each for stem, each in list(MODELS.items())[1::4] if each.inputs and stem not in free}
+    for stem, limits in in_node(some | {"hart-a-frame": MODELS["hart-a-frame"]}, act, "course.js").items():
+        mechanism = MODELS[stem]
+        positions = planar.cycle(mechanism, 4, pair=mechanism.inputs[0].pair)
+        wanted = positions.inputs[mechanism.inputs[0].pair].position
+        if limits is None:
+            assert np.ptp(wanted) == pytest.approx(2.0 * np.pi), stem
+        else:
+            assert limits == pytest.approx([wanted.min(), wanted.max()], abs=1e-5), stem
+
+
+@needs_node
+def test_a_file_that_stands_at_a_dead_point_can_be_moved_off_it():
+    """On a base of 4 a crank of 3, coupler and rocker of 1.5: these in line where the crank is at arccos(2/3)."""
+    value = planar.to_dict(triangle(100))
+    value["links"] = {
+        name: {"ends": list(ends), "length": length}
+        for name, ends, length in [
+            ("base", "AB", 400),
+            ("crank", "AC", 300),
+            ("coupler", "CD", 150),
+            ("rocker", "BD", 150),
+        ]
+    }
+    dead = np.arccos(2.0 / 3.0)
+    value |= {"pairs": [{"turning": pin} for pin in "ABCD"], "sketch": {"C": [200, 220], "D": [300, 110]}}
+    value["inputs"] = [{"pair": "A", "position": f"{float(dead)!r} rad"}]
+    act = """
+    const beyond = page.moveTo(page.input(0) + 0.2), stood = page.input(0), back = page.moveTo(page.input(0) - 0.2);
+    const points = page.data.names.map((name) => [name, page.point(name).position]);
+    return { beyond, stood, back, at: page.input(0), points };
+    """
+    mechanism = planar.from_dict(value)
+    found = in_node({"dead": mechanism}, act)["dead"]
+    assert (found["beyond"], found["back"]) == (False, True)
+    assert found["stood"] == pytest.approx(dead, abs=1e-5)
+    assert found["at"] == pytest.approx(dead - 0.2, abs=1e-5)
+    value["inputs"][0]["position"] = f"{found['at']!r} rad"
+    state = planar.solve(planar.from_dict(value | {"sketch": dict(found["points"])}))
+    near([at for _, at in found["points"]], [state.point(name).position for name, _ in found["points"]], 0.4)
+
+
+@needs_node
 def test_other_dimensions_give_pythons_numbers():
     """Each dimension of a linkage alone, by a tenth: every point, beside Python's solution of the changed mechanism."""
     stem = "watt-six-bar"

@@ -231,6 +231,56 @@ def test_what_does_not_go_together_is_told_with_how_far_it_goes(shown):
     assert window.locator("#dimensions .note", has_text="cannot be").inner_text() == "base: length cannot be -3 mm."
 
 
+def test_a_length_moved_to_and_fro_while_it_plays_leaves_it_on_its_branch_with_pythons_numbers(shown, tmp_path):
+    window = shown(MODELS["crank-rocker"])
+    window.evaluate(
+        """async () => {
+          const next = () => new Promise((go) => requestAnimationFrame(go));
+          const k = page.data.dimensions.findIndex((each) => each.name.endsWith(".length"));
+          const slider = document.getElementById(`dimension-${k}`);
+          controls.speed = 4;
+          controls.play();
+          for (let i = 0; i < 40; i++) {
+            slider.value = Number(slider.min) + ((7 * i) % 11) / 10 * (Number(slider.max) - Number(slider.min));
+            slider.dispatchEvent(new Event("input"));
+            await next();
+          }
+          controls.pause();
+        }"""
+    )
+    settled(window)
+    path = tmp_path / "saved.json"
+    downloaded(window, "Save: Mechanism (JSON)", path)
+    saved = planar.load(path)
+    assert saved.links != MODELS["crank-rocker"].links
+    same(window, planar.solve(saved))
+    window.get_by_role("button", name="Reset all dimensions").click()
+    window.get_by_role("button", name="To the position in the file").click()
+    settled(window)
+    same(window, planar.solve(MODELS["crank-rocker"]))
+
+
+def test_all_dimensions_are_reset_also_where_the_input_is_beyond_the_files_range(shown):
+    mechanism = MODELS["000-P1"]
+    window = shown(mechanism)
+    far = window.evaluate(
+        """async () => {
+          while (!page.course) await new Promise((go) => setTimeout(go, 10));
+          const own = Array.from(page.linkage.d), [low, high] = page.course.limits;
+          for (let k = 0; k < own.length; k++) {
+            page.changeTo(own.map((each, i) => (i === k ? 1.1 * each : each)));
+            for (const to of [low - 0.05, high + 0.05]) if (page.moveTo(to)) return to;
+            page.take(page.data.z);
+          }
+        }"""
+    )
+    assert window.evaluate("page.input(0)") == far
+    window.get_by_role("button", name="Reset all dimensions").click()
+    settled(window)
+    assert "do not go together" in window.locator("#said").inner_text()
+    same(window, planar.solve(mechanism))
+
+
 # assemblies
 
 
@@ -306,6 +356,9 @@ def test_the_picture_is_saved_by_itself(shown, tmp_path):
     assert root.tag == "{http://www.w3.org/2000/svg}svg"
     assert "var(" not in text
     assert "href" not in text
+    assert "paint-order" not in text
+    plain = {each.text for each in root.iter() if each.tag.endswith("text") and each.get("stroke", "none") == "none"}
+    assert plain >= set(planar.solve(MODELS["slider-crank"]).point_names)  # no letter is hidden by its own outline
     strokes = [each.get("stroke") for each in root.iter() if each.tag.endswith(("polyline", "circle", "line"))]
     assert any(stroke not in (None, "none") for stroke in strokes)
 
@@ -336,6 +389,61 @@ def test_nothing_is_wider_than_the_screen(screen, scheme, shown):
         assert window.evaluate("document.documentElement.scrollWidth") <= SCREENS[screen][0]
         dark = window.evaluate("getComputedStyle(document.body).backgroundColor")
         assert (sum(json.loads(f"[{dark[4:-1]}]")) < 380) == (scheme == "dark")
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_texts_stand_out_from_their_paper(scheme, shown):
+    """WCAG 2, 1.4.3: a contrast of 4.5 to 1, but for what cannot be used now."""
+    window = shown(MODELS["excavator-arm"], scheme=scheme)
+    window.evaluate("document.querySelectorAll('details').forEach((each) => { each.open = true; })")
+    for box in window.locator("#layers").get_by_role("checkbox").all():
+        box.check()
+    settled(window)
+    faint = window.evaluate(
+        r"""() => {
+          const parts = (colour) => colour.match(/[\d.]+/g).map(Number);
+          const light = (colour) => {
+            const linear = (each) => (each <= 0.04045 ? each / 12.92 : ((each + 0.055) / 1.055) ** 2.4);
+            const [r, g, b] = parts(colour).map((each) => linear(each / 255));
+            return 0.2126 * r + 0.7152 * g + 0.0722 * b + 0.05;
+          };
+          const paper = (each) => {
+            const colour = getComputedStyle(each).backgroundColor;
+            return each.parentElement && parts(colour)[3] === 0 ? paper(each.parentElement) : colour;
+          };
+          const fields = "[type=text], [type=number], select";
+          const text = (node) => node.nodeType === 3 && node.data.trim() !== "";
+          const lettered = (each) => Array.from(each.childNodes).some(text);
+          const texts = Array.from(document.querySelectorAll("body *")).filter(
+            (each) => each.getClientRects().length && !each.disabled && (each.matches(fields) || lettered(each)),
+          );
+          const found = texts.map((each) => {
+            const style = getComputedStyle(each), ink = each.ownerSVGElement ? style.fill : style.color;
+            const ratio = light(ink) / light(paper(each));
+            return [each.textContent.trim().slice(0, 20), Math.max(ratio, 1 / ratio)];
+          });
+          return { count: found.length, least: found.filter(([, ratio]) => ratio < 4.5) };
+        }"""
+    )
+    assert faint["count"] > 100
+    assert faint["least"] == []
+
+
+def test_long_names_stay_in_the_picture_and_letters_stand_above_the_layers(shown):
+    value = planar.to_dict(MODELS["crank-rocker"])
+    text = json.dumps(value)
+    for name in {pair["turning"] for pair in value["pairs"]}:
+        text = text.replace(json.dumps(name), json.dumps(name + 9 * " of a very long name"))
+    window = shown(planar.from_dict(json.loads(text)))
+    box = window.locator("#drawing").bounding_box()
+    for letter in window.locator("#drawing .letters text").all():
+        each = letter.bounding_box()
+        assert box["x"] <= each["x"]
+        assert each["x"] + each["width"] <= box["x"] + box["width"]
+    assert window.evaluate(
+        "document.querySelector('.layers').compareDocumentPosition(document.querySelector('.letters'))"
+        "& Node.DOCUMENT_POSITION_FOLLOWING"
+    )
 
 
 def test_every_control_has_a_name(shown):

@@ -36,10 +36,7 @@ class Assemblies {
   }
 
   take(k) {
-    const { page } = this, { data, linkage } = page, moved = !this.asFiled();
-    linkage.d = data.dimensions.map((each) => each.value);
-    linkage.measure();
-    linkage.u = data.inputs.map((each, i) => each.position / linkage.scale[i]);
+    const { page } = this, { data } = page, moved = !this.asFiled();
     this.current = k;
     page.take(data.assemblies.list[k].z);
     const where = data.inputs.length ? Forms.inputs(page) : "the file's dimensions";

@@ -85,7 +85,7 @@ const centres = {
   label: "Instantaneous centres",
   beside(layers, part) {
     const { page } = layers, { data } = page;
-    htmlPart("h3", {}, part, "Circle diagram");
+    htmlPart("h2", {}, part, "Circle diagram");
     const svg = svgPart("svg", { viewBox: `0 0 ${CIRCLE[0]} ${CIRCLE[1]}`, role: "img", "aria-label": "circle diagram" }, part);
     const which = chooser(part, "Centres", [["all", "all"], ...byNumber(data).map((link) => [link, `of ${data.numbers[link]} ${link}`])]);
     const many = (data.links.length * (data.links.length - 1)) / 2 > ALL_SHOWN;

@@ -138,43 +138,34 @@ class Courses {
     this.later();
   }
 
-  /** A linkage as the page's is now, to go its own way. */
-  copy(z, u) {
-    const { data, linkage } = this.page, made = new Linkage(data, linkage.program);
-    made.d = Array.from(linkage.d);
-    made.measure();
-    made.z = Float64Array.from(z);
-    made.u = Array.from(u);
-    return made;
-  }
-
   /** The work, a little at a time. */
   *find() {
     const { page } = this, k = this.running, { linkage, data } = page;
-    const z = Float64Array.from(linkage.z), u = Array.from(linkage.u), scale = linkage.scale[k];
-    const slides = data.inputs[k].slides, here = u[k];
+    const start = linkage.copy(), scale = linkage.scale[k];
+    const slides = data.inputs[k].slides, here = start.u[k];
     const turn = 2 * Math.PI, base = turn * Math.floor(here / turn + 1e-9);
     // a turn is gone from 0 to 360 deg; half of it up from here, half of it down
     const own = data.window?.running === k ? data.window : null; // the range of a motion that is shown
     const far = own ? [own.low / scale, own.high / scale] : slides ? [here - FREE_SLIDE, here + FREE_SLIDE] : [base, base + turn];
     const ends = [null, null];
     for (const [side, sign] of [[1, 1], [0, -1]]) {
-      ends[side] = yield* this.march(z, u, k, far[side], sign);
+      ends[side] = yield* this.march(start.copy(), k, far[side], sign);
     }
     const turns = !slides && !own && !ends[0].stopped && !ends[1].stopped;
     if (!slides && !own && !turns) {
       // an end beyond the turn's seam: a rocking crank's range is not cut there
       for (const [side, sign] of [[1, 1], [0, -1]]) {
-        if (!ends[side].stopped) ends[side] = yield* this.march(ends[side].z, ends[side].u, k, ends[side].at + sign * turn, sign);
+        if (!ends[side].stopped) ends[side] = yield* this.march(ends[side].made, k, ends[side].at + sign * turn, sign);
       }
     }
     const low = ends[0].at, high = ends[1].at, rows = new Array(PARTS + 1);
     const grid = Array.from({ length: PARTS + 1 }, (_, i) => low + ((high - low) * i) / PARTS);
     for (const [side, sign] of [[1, 1], [0, -1]]) {
-      const made = this.copy(z, u), last = side ? PARTS : 0;
+      const last = side ? PARTS : 0;
+      let made = start.copy();
       const above = grid.findIndex((each) => each >= here), first = sign > 0 ? above : (above < 0 ? PARTS : above - 1);
       for (let i = first; i >= 0 && i <= PARTS; i += sign) {
-        if (i === last) { made.z = Float64Array.from(ends[side].z); made.u = Array.from(ends[side].u); }
+        if (i === last) ({ made } = ends[side]);
         else made.moveTo(made.u.map((each, j) => (j === k ? grid[i] : each)));
         rows[i] = this.row(made, made.u[k] * scale);
         yield;
@@ -183,16 +174,15 @@ class Courses {
     return new Course(page, k, rows, turns, [ends[0].stopped, ends[1].stopped]);
   }
 
-  /** Go one way as far as it goes, to a place of the input at the most: {at, z, u, stopped}. */
-  *march(z, u, k, to, sign) {
-    const made = this.copy(z, u);
+  /** Go with a linkage one way as far as it goes, to a place of the input at the most: {at, made, stopped}. */
+  *march(made, k, to, sign) {
     let stopped = false;
     while (!stopped && sign * (to - made.u[k]) > 0) {
       const next = sign > 0 ? Math.min(to, made.u[k] + CHUNK) : Math.max(to, made.u[k] - CHUNK);
       stopped = made.moveTo(made.u.map((each, j) => (j === k ? next : each))).reached < 1;
       yield;
     }
-    return { at: made.u[k], z: made.z, u: made.u, stopped };
+    return { at: made.u[k], made, stopped };
   }
 
   /** A position with the rates of the file, and with those of the running input alone, at unit speed. */
@@ -205,5 +195,3 @@ class Courses {
     return { at, z: Float64Array.from(made.z), state, frames, alone };
   }
 }
-
-if (typeof module !== "undefined") module.exports = { Course, Courses };

@@ -5,10 +5,14 @@
 /** What the forms of a page have in common. */
 const Forms = {
   DIGITS: 6,           // of a number that is shown
+  SMALL: 1e-4,         // what is less is shown by a power of ten, as its zeros would take all the room
   STEPS: 200,          // at least, that a slider's range is divided into
 
   /** A number as it is shown: six digits, no zeros behind. */
-  shown(value) { return String(Number(value.toPrecision(Forms.DIGITS))); },
+  shown(value) {
+    const round = Number(value.toPrecision(Forms.DIGITS));
+    return round !== 0 && Math.abs(round) < Forms.SMALL ? round.toExponential() : String(round);
+  },
 
   /** The round step (1, 2 or 5 of a power of ten) that divides a range finely enough. */
   roundStep(range) {
@@ -43,7 +47,7 @@ class Dimensions {
     this.rows = page.data.dimensions.map((each, k) => this.row(each, k));
     if (!this.rows.length) { section.remove(); return; }
     this.all = Forms.element("button", { type: "button" }, "Reset all dimensions");
-    this.all.addEventListener("click", () => this.ask(page.data.dimensions.map((each) => each.value), -1));
+    this.all.addEventListener("click", () => this.reset());
     section.append(Forms.element("h2", {}, "Dimensions"), ...this.groups(), this.all);
     page.on("size", () => this.show());
     this.show();
@@ -102,19 +106,34 @@ class Dimensions {
     this.ask(d, k);
   }
 
+  /** All dimensions as in the file; where the inputs are now they may not go together, then also the inputs. */
+  reset() {
+    const { page } = this, { data } = page, own = data.dimensions.map((each) => each.value), at = Forms.inputs(page);
+    this.asked = null;
+    this.quiet();
+    if (page.changeTo(own).reached === 1) return;
+    page.take(data.z);
+    page.say(`With ${at} the file's dimensions do not go together: back at ${Forms.inputs(page)}.`);
+  }
+
+  /** Take back what was said beside the dimensions. */
+  quiet() {
+    this.rows.forEach((row, i) => { if (!this.page.data.dimensions[i].held) row.note.textContent = ""; });
+  }
+
   /** Change the dimensions with the next frame: a slider tells of more values than are drawn. */
   ask(d, k) {
     const waits = this.asked !== null;
     this.asked = { d, k };
-    if (!waits) requestAnimationFrame(() => this.change());
+    if (!waits) requestAnimationFrame(() => { if (this.asked !== null) this.change(); });
   }
 
   change() {
     const { page, asked: { d, k }, unit } = this, { data, linkage } = this.page;
     this.asked = null;
     const before = Array.from(linkage.d);
-    this.rows.forEach((row, i) => { if (!data.dimensions[i].held) row.note.textContent = ""; });
-    const possible = k < 0 || this.possible(d[k], k);
+    this.quiet();
+    const possible = this.possible(d[k], k);
     const { reached } = possible ? page.changeTo(d) : { reached: 0 };
     if (reached === 1) return;
     const said = data.dimensions.map((each, i) => {

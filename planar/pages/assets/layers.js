@@ -2,10 +2,11 @@
 /* The layers that can be laid over the mechanism or shown beside it: a checkbox for each, remembered in the address.
    A layer is {key, label, still: whether it stays as it is while the mechanism moves, draw(ink, layers): what is drawn
    over the mechanism, and a sentence on it; places(), pick(name, layers): what can be picked in the drawing by a click, in
-   user units; beside(layers, part): fills a part of the page, {draw(): a sentence}}. */
+   px; beside(layers, part): fills a part of the page, {draw(): a sentence}}. */
 
 const CLOSE = 14;   // px: a click as near as that picks a point
 const LARGE = 60;   // px
+const UNIT = 1;     // px: the drawing's user unit
 const STILL = 4;    // px: a pointer that went farther has dragged
 
 /** Part of the address after #, shared by all who remember something there. */
@@ -101,9 +102,10 @@ class Layers {
   draw() {
     const { view } = this.page;
     this.ready = view !== undefined && view !== null;
-    if (this.ready && this.svg.lastElementChild !== this.group) this.svg.append(this.group);
-    const shapes = [], matrix = this.ready ? this.svg.getScreenCTM() : null;
-    this.unit = matrix ? 1 / matrix.a : 1;
+    // letters stand above all layers; a drawing made anew has new ones
+    const letters = this.ready ? this.svg.querySelector(".mechanism > .letters") : null;
+    if (letters !== null && letters.previousElementSibling !== this.group) letters.before(this.group);
+    const shapes = [];
     if (this.ready) this.group.replaceChildren();
     const { course, chosen, view: now } = this.page;
     for (const layer of this.all) {
@@ -112,14 +114,14 @@ class Layers {
       let text = "";
       if (layer.draw && this.ready) {
         const kept = layer.still ? this.kept.get(layer.key) : undefined;
-        if (kept !== undefined && kept.of.every((each, k) => each === [course, chosen.list, now, this.unit][k])) {
+        if (kept !== undefined && kept.of.every((each, k) => each === [course, chosen.list, now][k])) {
           this.group.append(kept.ink.group);
           ({ text } = kept);
         } else {
-          const ink = new Ink(svgPart("g", { class: layer.key }, this.group), this.unit);
+          const ink = new Ink(svgPart("g", { class: layer.key }, this.group), UNIT);
           text = layer.draw(ink, this) ?? "";
           shapes.push([layer.key, ink]);
-          if (layer.still) this.kept.set(layer.key, { of: [course, chosen.list, now, this.unit], ink, text });
+          if (layer.still) this.kept.set(layer.key, { of: [course, chosen.list, now], ink, text });
         }
       }
       part.hidden = beside === null && text === "";
@@ -130,7 +132,7 @@ class Layers {
     if (!lettered.length) return;
     const zoom = parseFloat(getComputedStyle(document.body).fontSize) / 16;
     // letters of all layers keep clear of one another, of all arrows, and of what is lettered already
-    const taken = [...this.lettered(matrix), ...shapes.flatMap(([, ink]) => ink.taken)], bounds = this.bounds();
+    const taken = [...this.lettered(), ...shapes.flatMap(([, ink]) => ink.taken)], bounds = this.bounds();
     for (const [key, ink] of lettered) {
       Object.assign(ink, { taken, zoom });
       if (!this.stood.has(key)) this.stood.set(key, new Map());
@@ -138,17 +140,16 @@ class Layers {
     }
   }
 
-  /** The boxes of letters that the drawing has already, and of its points, in user units. */
-  lettered(matrix) {
-    const inverse = matrix.inverse(), found = [];
+  /** The boxes of letters that the drawing has already, and of its points, in px. */
+  lettered() {
+    const { left, top } = this.svg.getBoundingClientRect(), found = [];
     for (const each of this.svg.querySelectorAll("text, .ground :not(g), .drives :not(g)")) {
       const box = each.getBoundingClientRect();
       // of what is large the outline alone is drawn, and there is room inside
       if (!box.width || (box.width > LARGE && box.height > LARGE)) continue;
-      const [a, b] = [new DOMPoint(box.left, box.top), new DOMPoint(box.right, box.bottom)].map((each) => each.matrixTransform(inverse));
-      found.push([a.x, a.y, b.x, b.y]);
+      found.push([box.left - left, box.top - top, box.right - left, box.bottom - top]);
     }
-    const { data } = this.page, ink = new Ink(this.group, this.unit);
+    const { data } = this.page, ink = new Ink(this.group, UNIT);
     ink.taken = found;
     const places = new Map(Object.keys(data.points).map((name) => [name, this.at(this.page.point(name).position)]));
     for (const place of places.values()) ink.keepClear(place, 8);
@@ -161,12 +162,8 @@ class Layers {
     return found;
   }
 
-  /** What can be seen, in user units: [x, y, x, y]. */
-  bounds() {
-    const inverse = this.svg.getScreenCTM().inverse(), box = this.svg.getBoundingClientRect();
-    const [a, b] = [[box.left, box.top], [box.right, box.bottom]].map(([x, y]) => new DOMPoint(x, y).matrixTransform(inverse));
-    return [a.x, a.y, b.x, b.y];
-  }
+  /** What can be seen, in px: [x, y, x, y]. */
+  bounds() { return [0, 0, this.page.view.width, this.page.view.height]; }
 
   at(position) { return this.page.view.toScreen(position); }
 
@@ -176,12 +173,11 @@ class Layers {
     this.svg.addEventListener("pointerdown", (event) => { from = [event.clientX, event.clientY]; });
     this.svg.addEventListener("click", (event) => {
       if (!this.ready || from === null || Math.hypot(event.clientX - from[0], event.clientY - from[1]) > STILL) return;
-      const matrix = this.svg.getScreenCTM();
+      const { left, top } = this.svg.getBoundingClientRect();
       const near = (places) => {
         let nearest = null, least = CLOSE;
         for (const [name, [x, y]] of places) {
-          const there = new DOMPoint(x, y).matrixTransform(matrix);
-          const far = Math.hypot(there.x - event.clientX, there.y - event.clientY);
+          const far = Math.hypot(left + x - event.clientX, top + y - event.clientY);
           if (far < least) [nearest, least] = [name, far];
         }
         return nearest;

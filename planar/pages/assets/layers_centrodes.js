@@ -10,7 +10,7 @@ const centrodes = {
   label: "Centrodes",
   beside(layers, part) {
     const { page } = layers, { data } = page, links = byNumber(data).map((link) => [link, `${data.numbers[link]} ${link}`]);
-    htmlPart("h3", {}, part, "Centrodes");
+    htmlPart("h2", {}, part, "Centrodes");
     const [link, other] = ["Of link", "against"].map((label) => chooser(part, label, links));
     if (data.rolling !== null) [link.value, other.value] = data.rolling;
     for (const each of [link, other]) each.addEventListener("change", () => layers.draw());

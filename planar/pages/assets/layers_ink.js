@@ -182,5 +182,3 @@ function outline(points) {
   };
   return order.length < 2 ? order : [...half(order), ...half([...order].reverse())];
 }
-
-if (typeof module !== "undefined") module.exports = { roundUp, roundScale, short, outline };

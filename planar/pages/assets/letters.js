@@ -2,11 +2,14 @@
 /* Letters of points: upright, beside what they name, clear of strokes and of each other while everything moves. A letter
    stays on its side as long as nothing is in its way there, and then slides round to a freer one. */
 
+const CLEAR = 2; // px: as far letters keep off the middle of a stroke at least
+const LONGEST_NAME = 24; // letters: of a longer name its beginning is shown
+
 class Letters {
   /** `items`: {name, away}, `away` px kept from the spot; `size` px of the letters. */
   constructor(group, items, size) {
     this.items = items.map(({ name, away }) => {
-      const text = Symbols.element("text", { class: "letter", "font-size": Math.round(size * 10) / 10 }, name);
+      const text = Symbols.element("text", { class: "letter", "font-size": Math.round(size * 10) / 10 }, Letters.told(name));
       group.append(text);
       return { name, away, text, at: [0, 0], side: null, x: 0, y: 0 };
     });
@@ -17,6 +20,12 @@ class Letters {
       each.sides = Letters.sides(each.half, each.away, size);
     }
     this.still = matchMedia("(prefers-reduced-motion: reduce)").matches;
+  }
+
+  /** A name, or its beginning. */
+  static told(name) {
+    const all = Array.from(name);
+    return all.length > LONGEST_NAME ? `${all.slice(0, LONGEST_NAME - 1).join("")}…` : name;
   }
 
   /** Where the middle of a box can stand beside a spot: [x, y, what it costs by itself]. */
@@ -75,7 +84,7 @@ class Letters {
     let cost = side[2];
     if (x - w < 0 || y - h < 0 || x + w > room[0] || y + h > room[1]) cost += 30;
     for (let k = 0; k < strokes.length; k += 4) {
-      if (Letters.cuts(strokes[k], strokes[k + 1], strokes[k + 2], strokes[k + 3], x, y, w, h)) cost += 8;
+      if (Letters.cuts(strokes[k], strokes[k + 1], strokes[k + 2], strokes[k + 3], x, y, w + CLEAR, h + CLEAR)) cost += 8;
     }
     for (const other of this.items) {
       if (other === each) continue;

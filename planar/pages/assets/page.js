@@ -65,9 +65,13 @@ class Page {
     return done;
   }
 
-  /** Take another assembly, the inputs where they are: its unknowns. */
+  /** Take an assembly of the file's dimensions and inputs: its unknowns. */
   take(z) {
-    this.linkage.z = Float64Array.from(z);
+    const { linkage, data } = this;
+    linkage.d = data.dimensions.map((each) => each.value);
+    linkage.measure();
+    linkage.u = data.inputs.map((each, k) => each.position / linkage.scale[k]);
+    linkage.z = Float64Array.from(z);
     this.update();
     this.emit("size", { reached: 1, open: 0 });
     this.emit("move");

@@ -16,7 +16,7 @@ function polygon(rate) {
     label: `${word[0].toUpperCase()}${word.slice(1)} polygon`,
     beside(layers, part) {
       const { page } = layers;
-      htmlPart("h3", {}, part, `${word[0].toUpperCase()}${word.slice(1)} polygon`);
+      htmlPart("h2", {}, part, `${word[0].toUpperCase()}${word.slice(1)} polygon`);
       const svg = svgPart("svg", { viewBox: `0 0 ${SHEET[0]} ${SHEET[1]}`, role: "img", "aria-label": `${word} polygon` }, part);
       const which = chooser(part, "Scale for", [["now", "this position"], ["all", "the whole motion"]]);
       which.addEventListener("change", () => layers.draw());

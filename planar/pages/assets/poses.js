@@ -7,15 +7,13 @@ const FREE = 0.3; // of the mechanism's size: how far a slide without limits is 
 /** Go through the motion of every input, the others where they are: {poses: the links' axes, spans: of every input from
     where to where it went, {low, high, whole, dead}}. */
 function motions(page) {
-  const { data, linkage } = page, poses = [page.frames], made = new Linkage(data, linkage.program);
+  const { data, linkage } = page, poses = [page.frames];
   const spans = data.inputs.map((given, k) => {
     const far = given.slides ? 1 : 2 * Math.PI, scale = linkage.scale[k];
     const span = { low: 0, high: 2 * Math.PI, whole: true, dead: [false, false] };
+    let made;
     for (const sign of [1, -1]) {
-      made.d = Array.from(linkage.d);
-      made.measure();
-      made.z = Float64Array.from(linkage.z);
-      made.u = Array.from(linkage.u);
+      made = linkage.copy();
       for (let i = 1; i <= POSES; i++) {
         const u = Array.from(linkage.u);
         u[k] += (sign * far * i) / POSES;

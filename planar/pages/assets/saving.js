@@ -50,20 +50,28 @@ const Files = (() => {
 
   /** The drawing by itself: what styles it is written into it, and it brings its paper. */
   function picture(page, drawing) {
-    const kept = ["fill", "fill-opacity", "stroke", "stroke-width", "stroke-dasharray", "stroke-linecap", "stroke-linejoin",
-      "stroke-opacity", "opacity", "font-family", "font-size", "font-style", "font-weight", "text-anchor", "dominant-baseline",
-      "vector-effect", "paint-order", "visibility"];
+    const inherited = ["fill", "fill-opacity", "stroke", "stroke-width", "stroke-dasharray", "stroke-linecap", "stroke-linejoin",
+      "stroke-opacity", "font-family", "font-size", "font-style", "font-weight", "text-anchor", "dominant-baseline"];
+    const kept = [...inherited, "opacity", "vector-effect"];
     const copy = drawing.cloneNode(true), pairs = [[drawing, copy]];
     while (pairs.length) {
       const [shownOne, made] = pairs.pop(), style = getComputedStyle(shownOne);
-      if (style.display === "none" && shownOne.getBBox) { made.remove(); continue; }
+      const unseen = style.display === "none" || (style.visibility === "hidden" && !shownOne.children.length); // grips
+      if (unseen && shownOne.getBBox) { made.remove(); continue; }
       Array.from(shownOne.children).forEach((child, k) => pairs.push([child, made.children[k]]));
+      const above = shownOne === drawing ? null : getComputedStyle(shownOne.parentNode);
       for (const name of kept) {
-        const value = style.getPropertyValue(name);
-        if (value) made.setAttribute(name, value);
+        const value = style.getPropertyValue(name), same = above !== null && above.getPropertyValue(name) === value;
+        if (same && inherited.includes(name)) made.removeAttribute(name); // as the part that it is in
+        else if (value) made.setAttribute(name, value);
       }
       if (shownOne.style.transform) made.setAttribute("transform", style.transform);
       for (const name of ["class", "style", "tabindex"]) made.removeAttribute(name);
+    }
+    // few programs know paint-order: what keeps letters off strokes is a text of its own below them
+    for (const text of copy.querySelectorAll("text[stroke]:not([stroke=none])")) {
+      text.before(text.cloneNode(true));
+      for (const each of [text, ...text.children]) each.setAttribute("stroke", "none");
     }
     const box = drawing.viewBox.baseVal, { width, height } = drawing.getBoundingClientRect();
     const [x, y, w, h] = box && box.width ? [box.x, box.y, box.width, box.height] : [0, 0, width, height];

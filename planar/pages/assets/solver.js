@@ -12,6 +12,9 @@ const JUMP = 0.5;          // how far from what was foretold unknowns may be, in
 const NEAR = 0.02;         // rad, sizes: as far from it they may always be
 const SMOOTH = 0.1;       // in the same parts, where a determinant changes its sign: at a change point, not at a dead point
 const RUNUP = 8;          // the farthest a step is foretold from the last one, in lengths of that
+const LEAVING = 1e-4;      // rad, sizes: the first step off an exact dead point; shorter ones say nothing of the way
+const NUDGES = [0.003, 0.01, 0.03, 0.1]; // rad, sizes: how far the unknowns may move in that step
+const SINGULAR = 1e-5;     // of the greatest slope: a stop by steps that shorten lies a hundred times as far off a dead point
 const WEAK = 1e-9;         // a pivot below this part of the greatest: no rates are determined
 
 function solve(matrix, right, n) {
@@ -80,6 +83,18 @@ class Linkage {
     this.scale = data.inputs.map((each) => (each.slides ? data.size : 1));
     this.u = data.inputs.map((each, k) => each.position / this.scale[k]);
     this.z = Float64Array.from(data.z);
+    this.last = null; // the step that led here
+  }
+
+  /** A linkage as this one, to go its own way. */
+  copy() {
+    const made = new Linkage(this.data, this.program), { before } = this;
+    made.d = Array.from(this.d);
+    made.measure();
+    made.z = Float64Array.from(this.z);
+    made.u = Array.from(this.u);
+    made.last = before && { ...before, to: made.z };
+    return made;
   }
 
   /** Fill in the numbers of the pairs from the dimensions. */
@@ -121,14 +136,17 @@ class Linkage {
 
   /** How the unknowns move with inputs moving at u1: (unknowns,), or null where that is not determined. */
   tangent(u, z, u1) {
-    const { z: n, F: rows, w, u: m } = this.data.counts;
+    const { z: n, F: rows, u: m } = this.data.counts;
     const y = [...z, ...u];
     this.program.kinematics(y, new Float64Array(n + m), new Float64Array(n + m), this.p, this.rates);
-    const slope = this.rates.slice(3 * (rows + w));
+    const slope = this.slope();
     const right = new Float64Array(rows);
     for (let j = 0; j < m; j++) for (let i = 0; i < rows; i++) right[i] -= slope[(n + j) * rows + i] * u1[j];
     return this.inverse(slope, right);
   }
+
+  /** The slope that `kinematics` has just found: rows by unknowns and inputs, column by column. */
+  slope() { return this.rates.slice(3 * (this.data.counts.F + this.data.counts.w)); }
 
   /** Solve the slope in the unknowns for a right side. */
   inverse(slope, right) {
@@ -169,7 +187,7 @@ class Linkage {
       there.ready();
       const guess = this.foretold(there.u, next - reached), found = this.newton(there.u, guess);
       if (found.closed && (count === 0 || this.continues(found, guess))) {
-        this.last = { u: this.u, z: this.z, to: found.z, signs: this.agreed(found.signs), step: next - reached };
+        this.last = { ...this.since(there.u), to: found.z, signs: this.agreed(found.signs), step: next - reached };
         this.z = found.z;
         this.u = Array.from(there.u);
         reached = next;
@@ -177,15 +195,71 @@ class Linkage {
       } else {
         open = found.open;
         step *= 0.4;
-        if (step * Math.max(count, 1) * FARTHEST < SHORTEST) break;
+        if (step * Math.max(count, 1) * FARTHEST >= SHORTEST) continue;
+        const part = reached + Math.min(1 - reached, LEAVING / (Math.max(count, 1) * FARTHEST));
+        at(reached).ready();
+        if (!this.leave(at(part))) break;
+        reached = part;
+        step = Math.min(whole, part);
       }
     }
     at(reached).ready();
     return { reached, open };
   }
 
+  /** Off an exact dead point, where no step leads: the unknowns go along what the slope leaves free, to the side from
+      which they came if that is known. Whether it came to another position. */
+  leave(there) {
+    const free = this.free();
+    if (free === null) return false;
+    const { before } = this, back = before ? free.reduce((sum, each, i) => sum + each * (before.z[i] - this.z[i]), 0) : 1;
+    there.ready();
+    for (const side of back < 0 ? [-1, 1] : [1, -1]) {
+      for (const nudge of NUDGES) {
+        const found = this.newton(there.u, this.z.map((each, i) => each + side * nudge * free[i]));
+        const gone = found.z.reduce((most, each, i) => Math.max(most, Math.abs(each - this.z[i])), 0);
+        if (!found.closed || gone > 3 * nudge || found.signs.includes(0)) continue;
+        [this.z, this.u] = [found.z, Array.from(there.u)];
+        return true;
+      }
+    }
+    return false;
+  }
+
+  /** How the unknowns can move by themselves where their slope is singular, the greatest by 1; null where it is not. */
+  free() {
+    const { z: n, F: rows, u: m } = this.data.counts;
+    if (rows !== n || n === 0) return null;
+    this.program.kinematics([...this.z, ...this.u], new Float64Array(n + m), new Float64Array(n + m), this.p, this.rates);
+    const slope = this.slope(), square = new Float64Array(n * n);
+    let most = 0;
+    for (let i = 0; i < n; i++) {
+      for (let j = 0; j < n; j++) for (let k = 0; k < n; k++) square[j * n + i] += slope[i * n + k] * slope[j * n + k];
+      most = Math.max(most, square[i * n + i]);
+    }
+    for (let i = 0; i < n; i++) square[i * n + i] += 10 * WEAK * most;
+    let way = new Float64Array(n).fill(1);
+    for (let round = 0; round < 4; round++) { // inverse iteration
+      const next = way.slice();
+      if (!solve(square.slice(), next, n)) return null;
+      const far = next.reduce((greatest, each) => Math.max(greatest, Math.abs(each)), 0);
+      way = next.map((each) => each / far);
+    }
+    let left = 0;
+    for (let k = 0; k < n; k++) left = Math.max(left, Math.abs(way.reduce((sum, each, i) => sum + slope[i * n + k] * each, 0)));
+    return left <= SINGULAR * Math.sqrt(most) ? way : null;
+  }
+
   /** What is known of the step that led here; nothing where somebody else has put z. */
   get before() { return this.last && this.last.to === this.z ? this.last : null; }
+
+  /** From where a step to inputs u is remembered: from here, but from one before where it is so short that it says
+      nothing of the way. */
+  since(u) {
+    const { before } = this, far = Math.max(0, ...Array.from(u, (each, k) => Math.abs(each - this.u[k])));
+    const here = before === null || far === 0 || far >= LEAVING || before.u.every((each, k) => each === this.u[k]);
+    return here ? { u: this.u, z: this.z } : { u: before.u, z: before.z };
+  }
 
   /** Where the unknowns would be for inputs u if they went on as in the last step, or along the tangent. */
   foretold(u, step) {
@@ -239,7 +313,7 @@ class Linkage {
     const size = rows + many, column = (k) => this.rates.slice(k * size, (k + 1) * size);
     const v = u1.map((each, k) => each / this.scale[k]), a = u2.map((each, k) => each / this.scale[k]);
     rates([...none, ...v], [...none, ...a]);
-    const slope = this.rates.slice(3 * size);
+    const slope = this.slope();
     const still = column(0).slice(rows);
     const z1 = this.inverse(slope, column(1).slice(0, rows).map((each) => -each));
     if (z1 === null) return { w: scaled(still), w1: null, w2: null };
@@ -249,5 +323,3 @@ class Linkage {
     return { w: scaled(still), w1: scaled(column(1).slice(rows)), w2: scaled(column(2).slice(rows)) };
   }
 }
-
-if (typeof module !== "undefined") module.exports = { Linkage, solve };
