@@ -285,7 +285,10 @@ def test_what_is_not_known_is_not_claimed(name, why):
     assert found.complete is Completeness.NOT
     assert "not claimed" in found.said[0]
     assert why in found.said[0]
-    assert found.of(planar.modes(mechanism, certify=False).nearest) is not None
+    circuit, branch = found.of(planar.modes(mechanism, certify=False).nearest)
+    assert branch in circuit.branches
+    at = next(each.position for each in mechanism.inputs if each.pair == found.pair)
+    assert any(branch.low - 1e-6 <= at + 2.0 * np.pi * turn <= branch.high + 1e-6 for turn in (-1, 0, 1))
 
 
 @pytest.mark.parametrize("seed", range(12))
