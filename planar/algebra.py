@@ -109,3 +109,8 @@ class Jet:
 
     def sin(self) -> Jet:
         return Jet(*self._turned()[1])
+
+
+def orders(value: Scalar) -> tuple[Scalar, ...]:
+    """Value, rate, second rate (and more, if a jet has them); a plain number is at rest."""
+    return value.parts if isinstance(value, Jet) else (value, 0.0, 0.0)

@@ -43,6 +43,7 @@ __all__ = [
     "misfits",
     "motions",
     "named_points",
+    "running_input",
     "unlawful",
     "with_inputs",
 ]
@@ -193,6 +194,21 @@ def with_inputs(mechanism: Mechanism, drives: tuple[Drive, ...]) -> Mechanism:
         return found._replace(law=given.law and given.law.started(found.position, found.velocity))
 
     return replace(mechanism, inputs=tuple(changed(given) for given in mechanism.inputs))
+
+
+def running_input(mechanism: Mechanism, pair: str | None) -> int:
+    """Which of the inputs runs while the others stand still; `pair` names it where there are several.
+
+    Raises BadInput where there is no such input, or several of which none is named.
+    """
+    names = [given.pair for given in mechanism.inputs]
+    if not names:
+        raise BadInput("inputs", "the mechanism has no input that could run")
+    if pair is None and len(names) > 1:
+        raise BadInput("inputs", f"there are several inputs, {', '.join(names)}; name the one that runs")
+    if pair is not None and pair not in names:
+        raise BadInput(pair, f"there is no input at {pair!r}; inputs are at {', '.join(names)}")
+    return 0 if pair is None else names.index(pair)
 
 
 def check(mechanism: Mechanism) -> None:

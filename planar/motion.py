@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from planar.algebra import Jet
+from planar.algebra import Jet, orders
 from planar.errors import BadInput, Outcome
 from planar.mechanism import Mechanism, NamedPoint, counting, motions, named_points
 from planar.pairs import Kind, Pair
@@ -82,7 +82,7 @@ class Moving(Shown):
         pair = self._motions[name]
         numbers = pair.measure([self.shapes[link] for link in pair.bodies])
         frames = [self.frames[link] for link in pair.bodies]
-        return pair, _parts(pair.drive(frames, numbers, self.own.get(pair.name, ())))
+        return pair, orders(pair.drive(frames, numbers, self.own.get(pair.name, ())))
 
     def relative(self, point: str, other: str, axes: str | None = None) -> RelativeState:
         """How `point` moves against `other`, in the axes of a link.
@@ -94,9 +94,9 @@ class Moving(Shown):
         axes = axes or self._between(p, q)
         frame = self._frame(axes)
         r = [_both(*parts) for parts in _parts_of(self._carried(p) - self._carried(q))]
-        _, omega, alpha = (np.asarray(part)[..., None] for part in _parts(frame.angle))
+        _, omega, alpha = (np.asarray(part)[..., None] for part in orders(frame.angle))
         local = [_both(*parts) for parts in _parts_of(self._local(p, axes) - self._local(q, axes))]
-        cos, sin = (np.asarray(_parts(each)[0])[..., None] for each in (frame.cos, frame.sin))
+        cos, sin = (np.asarray(orders(each)[0])[..., None] for each in (frame.cos, frame.sin))
         sliding, sliding_acceleration = (cos * each + sin * _quarter(each) for each in local[1:])
         return RelativeState(
             axes=axes,
@@ -189,7 +189,7 @@ class State(Moving):
 
     def link(self, name: str) -> LinkState:
         """A link by name; its angle between -pi and pi, or with its turns where a pair counts them. Raises Unknown."""
-        angle, velocity, acceleration = map(float, _parts(self._frame(name).angle))
+        angle, velocity, acceleration = map(float, orders(self._frame(name).angle))
         fastest, hardest = self._greatest_of_links
         sense = _sense(turning(velocity, fastest), velocity * acceleration, abs(velocity) * hardest)
         return LinkState(angle if name in self._counting else _wrapped(angle), velocity, acceleration, sense)
@@ -219,7 +219,7 @@ class State(Moving):
     @cached_property
     def _greatest_of_links(self) -> tuple[float, float]:
         """The greatest angular velocity and acceleration of any link; what turns at omega is good for omega^2 too."""
-        parts = np.array([_parts(frame.angle) for frame in self.frames.values()])
+        parts = np.array([orders(frame.angle) for frame in self.frames.values()])
         fastest, hardest = np.abs(parts[:, 1:]).max(axis=0, initial=0.0)
         return float(fastest), float(max(hardest, fastest**2))
 
@@ -315,7 +315,7 @@ class Motion(Moving):
 
     def link(self, name: str) -> LinkMotion:
         """A link by name. Its angle starts between -pi and pi unless a pair counts its turns. Raises Unknown."""
-        angle, velocity, acceleration = self._rows(_parts(self._frame(name).angle))
+        angle, velocity, acceleration = self._rows(orders(self._frame(name).angle))
         if name not in self._counting:
             angle = angle - (angle[0] - _wrapped(float(angle[0])))
         return LinkMotion(angle, velocity, acceleration)
@@ -362,7 +362,7 @@ class Motion(Moving):
         return tuple(np.broadcast_to(part, (len(self),)).copy() for part in parts)
 
     def _point(self, named: NamedPoint) -> PointMotion:
-        x, y = (self._rows(_parts(each)) for each in self._carried(named))
+        x, y = (self._rows(orders(each)) for each in self._carried(named))
         return PointMotion(*(np.stack(both, axis=1) for both in zip(x, y, strict=True)))
 
 
@@ -379,18 +379,13 @@ Parts = tuple[Any, Any, Any]
 """A number with its first and second rate: floats, or arrays over a motion."""
 
 
-def _parts(value: Any) -> Parts:
-    """Value, rate and second rate of a jet; a plain number is at rest."""
-    return value.parts if isinstance(value, Jet) else (value, 0.0, 0.0)
-
-
 def _third(value: Any) -> Any:
     """The third rate of a jet that has one; a plain number is at rest."""
     return value.parts[3] if isinstance(value, Jet) else 0.0
 
 
 def _parts_of(vector: Vector) -> list[tuple[Any, Any]]:
-    return list(zip(_parts(vector.x), _parts(vector.y), strict=True))
+    return list(zip(orders(vector.x), orders(vector.y), strict=True))
 
 
 def _both(x: Any, y: Any) -> Array:

@@ -13,7 +13,7 @@ from scipy.special import ellipk
 import planar
 from planar.dynamics.simulated import Simulation
 from planar.errors import BadInput, NoAnswer, Outcome
-from tests.test_dynamics import four_bar, lever, masses, slider_crank
+from tests.test_dynamics import bracket, four_bar, lever, masses, slider_crank
 
 Value = dict[str, Any]
 G = 9.81
@@ -417,25 +417,12 @@ def test_what_rests_stays_and_keeps_its_energy():
     hanging = run(lever({"G": [LENGTH, 0]}, -pi / 2, **PENDULUM), 2.0)
     np.testing.assert_allclose(angle(hanging), -pi / 2, atol=1e-12)
     assert hanging.balance < 1e-14
-    bracket = {
-        "planar": 1,
-        "frame": "f",
-        "links": {
-            "f": {"points": {"P": [0, 0], "Q": [0, 3]}},
-            "strut": {"ends": ["P", "C"], "length": 4},
-            "tie": {"ends": ["Q", "C"], "length": 5},
-        },
-        "pairs": [{"turning": each} for each in "PQC"],
-        "inputs": [],
-        "masses": [{"link": "strut", "mass": 2.0, "at": "C"}],
-        "gravity": [0, -G],
-        "sketch": {"C": [4, 0]},
-    }
-    still = planar.simulate(planar.from_dict(bracket), 1.0, 4)
+    value = bracket(masses=[{"link": "strut", "mass": 2.0, "at": "C"}], gravity=[0, -G])
+    still = planar.simulate(planar.from_dict(value), 1.0, 4)
     assert still.motion.outcome is Outcome.SOLVED
     assert still.balance < 1e-14
     np.testing.assert_allclose(still.motion.point("C").position, [[4.0, 0.0]] * 5, atol=1e-12)
-    assert planar.forces(planar.solve(planar.from_dict(bracket))).reactions["Q"].force[1] == pytest.approx(2.0 * G)
+    assert planar.forces(planar.solve(planar.from_dict(value))).reactions["Q"].force[1] == pytest.approx(2.0 * G)
 
 
 def test_a_motion_does_not_depend_on_units_or_size():

@@ -9,11 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.algebra import orders
 from planar.analysis.steady import SAME, Steady
 from planar.analysis.zeros import changes, dips
 from planar.errors import BadInput, NoAnswer
 from planar.mechanism import motions
-from planar.motion import Moving, Parts, Unknown, _parts, _wrapped
+from planar.motion import Moving, Parts, Unknown, _wrapped
 from planar.pairs import Kind
 from planar.roots import root
 
@@ -67,7 +68,7 @@ class Output:
             pair, parts = moving._motion(self.name)
             position, velocity, acceleration = list(pair.report(*parts).values())[:3]
         else:
-            position, velocity, acceleration = _parts(moving.frames[self.name].angle)
+            position, velocity, acceleration = orders(moving.frames[self.name].angle)
         return position + self._off, velocity, acceleration
 
     def at(self, position: float) -> tuple[float, float, float]:

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planar.algebra import Jet
+from planar.algebra import orders
 from planar.motion import Unknown
 from planar.plane import Frame, Vector
 
@@ -85,5 +85,5 @@ def _turned(vectors: Array, angle: Array) -> Array:
 
 
 def _parts(value: Any) -> list[Array]:
-    parts = value.parts if isinstance(value, Jet) else (value, 0.0, 0.0)
+    parts = orders(value)
     return [np.asarray(part, dtype=float) for part in parts]

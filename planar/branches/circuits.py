@@ -13,8 +13,7 @@ import numpy as np
 from planar.assemblies.modes import Mode
 from planar.branches.search import Interval, Search, same
 from planar.branches.traced import Branch, Traced
-from planar.errors import BadInput
-from planar.mechanism import Drive, Mechanism, with_inputs
+from planar.mechanism import Drive, Mechanism, running_input, with_inputs
 from planar.motion import Motion
 from planar.solving.cycle import cycle
 from planar.solving.position import known_of
@@ -36,14 +35,7 @@ def circuits(mechanism: Mechanism, pair: str | None = None) -> Circuits:
 
     Raises BadInput where there is no such input, NoAnswer where the inputs leave links free whatever the dimensions.
     """
-    names = [given.pair for given in mechanism.inputs]
-    if not names:
-        raise BadInput("inputs", "the mechanism has no input that could run")
-    if pair is None and len(names) > 1:
-        raise BadInput("inputs", f"there are several inputs, {', '.join(names)}; name the one that runs")
-    if pair is not None and pair not in names:
-        raise BadInput(pair, f"there is no input at {pair!r}; inputs are at {', '.join(names)}")
-    return Circuits(mechanism, pair or names[0])
+    return Circuits(mechanism, mechanism.inputs[running_input(mechanism, pair)].pair)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ import numpy as np
 from planar.analysis.extremes import Stroke, stroke
 from planar.drawing.scene import standing
 from planar.errors import BadInput, Outcome, PlanarError
-from planar.mechanism import Drive, Input, Mechanism, with_inputs
+from planar.mechanism import Drive, Input, Mechanism, running_input, with_inputs
 from planar.motion import Motion, Unknown
 from planar.pairs import Pair
 from planar.plane import Frame
@@ -250,11 +250,7 @@ def _rounded(rows: Array) -> Array:
 
 def _only(mechanism: Mechanism) -> str:
     """The one input; where there are several, one has to be named."""
-    if len(mechanism.inputs) == 1:
-        return mechanism.inputs[0].pair
-    if not mechanism.inputs:
-        raise BadInput("inputs", "the mechanism has no input that could run")
-    raise BadInput("inputs", f"there are several inputs, {_named(mechanism)}; name the one that runs")
+    return mechanism.inputs[running_input(mechanism, None)].pair
 
 
 def _named(mechanism: Mechanism) -> str:

@@ -19,7 +19,7 @@ from planar.called import Called
 from planar.dynamics.courses import factors
 from planar.dynamics.work import Work
 from planar.errors import NoAnswer, Outcome
-from planar.mechanism import Input
+from planar.solving.timed import by_law
 from planar.words import listed
 
 Array = np.ndarray
@@ -53,7 +53,7 @@ class Driven:
 
     def at(self, time: float) -> Array:
         """Position, velocity and acceleration (3, driven)."""
-        return np.array([_by_law(each, time) for each in self.given]).reshape(-1, 3).T
+        return np.array([by_law(each, np.array([time]))[:3, 0] for each in self.given]).reshape(-1, 3).T
 
 
 class Accelerations:
@@ -167,12 +167,3 @@ class Accelerations:
             f"has a mass, so nothing tells how fast; give {'one of them' if len(moved) > 1 else 'it'} a mass with an "
             f"inertia, or let an input drive it",
         )
-
-
-def _by_law(given: Input, time: float) -> tuple[float, float, float]:
-    """Position, velocity and acceleration of an input that is driven."""
-    if given.law is not None:
-        at = given.law.at(np.array([time]), given.position, given.velocity)[:3, 0]
-        return float(at[0]), float(at[1]), float(at[2])
-    velocity = given.velocity + given.acceleration * time
-    return given.position + 0.5 * (given.velocity + velocity) * time, velocity, given.acceleration

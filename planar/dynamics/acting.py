@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.algebra import Jet, Scalar
+from planar.algebra import Scalar, orders
 from planar.applied import MET, Load, Spring
 from planar.dynamics.courses import factors
 from planar.mechanism import Mechanism, motions, named_points
@@ -45,13 +45,13 @@ class Field:
         self.moving, self.shapes = moving, shapes
         self.mechanism = moving.mechanism
         self.points = carriers(self.mechanism)
-        parts = [np.size(part) for frame in moving.frames.values() for part in _jet(frame.angle)]
+        parts = [np.size(part) for frame in moving.frames.values() for part in orders(frame.angle)]
         self.many = max(parts, default=1)
 
     def frame(self, link: str) -> Frame:
         """A link's axes at every position, rates left out."""
         frame = self.moving.frames[link]
-        return Frame(*(self._row(_jet(part)[0]) for part in frame[:5]), frame.fixed)
+        return Frame(*(self._row(orders(part)[0]) for part in frame[:5]), frame.fixed)
 
     @property
     def frames(self) -> dict[str, Frame]:
@@ -61,11 +61,11 @@ class Field:
     def at(self, link: str, place: Vector, rate: int = 0) -> Array:
         """Where a place of a link is, or one of its rates (n, 2)."""
         carried = self.moving.frames[link].carry(place)
-        return np.stack([self._row(_jet(each)[rate]) for each in carried], axis=-1)
+        return np.stack([self._row(orders(each)[rate]) for each in carried], axis=-1)
 
     def turning(self, link: str, rate: int = 1) -> Array:
         """A link's angle or one of its rates (n,)."""
-        return self._row(_jet(self.moving.frames[link].angle)[rate])
+        return self._row(orders(self.moving.frames[link].angle)[rate])
 
     def named(self, name: str) -> tuple[str, Vector]:
         """The link that carries a named point, and where in its axes."""
@@ -190,10 +190,6 @@ def _spring(field: Field, spring: Spring, name: str) -> list[Acting]:
         Acting("spring", name, link, place, sense * pull, 0.0 * length)
         for (link, _), place, sense in zip(ends, at, (1.0, -1.0), strict=True)
     ]
-
-
-def _jet(value: Scalar) -> tuple[Scalar, ...]:
-    return value.parts if isinstance(value, Jet) else (value, 0.0, 0.0)
 
 
 def carriers(mechanism: Mechanism) -> dict[str, tuple[str, str]]:

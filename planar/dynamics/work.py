@@ -16,6 +16,7 @@ from functools import cached_property, lru_cache
 import casadi as ca
 import numpy as np
 
+from planar.algebra import orders
 from planar.applied import MET, Load, Mass, Spring
 from planar.dynamics.acting import carriers
 from planar.mechanism import Mechanism, motions
@@ -72,7 +73,7 @@ class Work:
         """The coordinates of a state or a motion with their two rates (n, coordinates)."""
         values = [getattr(moving.frames[link], part) for link in self.links for part in ("x", "y", "angle")]
         values += [each for pair in self.mechanism.pairs for each in moving.own.get(pair.name, ())]
-        parts = [value.parts[:3] if hasattr(value, "parts") else (value, 0.0, 0.0) for value in values]
+        parts = [orders(value)[:3] for value in values]
         many = max((np.size(part) for each in parts for part in each), default=1)
         found = np.array([[np.broadcast_to(part, (many,)) for part in each] for each in parts], dtype=float)
         return tuple(found.reshape(-1, 3, many).transpose(1, 2, 0))  # type: ignore[return-value]

@@ -19,6 +19,7 @@ from planar.dimensions import Dimension, changed, dimensions
 from planar.drawing.bodies import all_marks
 from planar.graph import numbered
 from planar.mechanism import Mechanism, counting, misfits, named_points
+from planar.motion import State
 from planar.pages.columns import heads, reported
 from planar.pages.document import above_zero, called, document
 from planar.pages.loaded import loaded
@@ -74,7 +75,7 @@ def carried(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[str
     """
     known = known_of(mechanism)
     solver, z = known.solver, known.assembly.z if z is None else z
-    e, program = solver.equations, solver.program
+    e, program, state = solver.equations, solver.program, standing(mechanism)
     named = {member: name for name, members in named_points(mechanism) for member in members}
     numbers = Numbers(mechanism)
     measured = [
@@ -111,7 +112,7 @@ def carried(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[str
         "dimensions": [_dimension(mechanism, each, solver.unit) for each in numbers.dimensions],
         "numbers": numbered(mechanism),
         "counting": sorted(counting(mechanism)),
-        "centred": _centred(mechanism),
+        "centred": _centred(state),
         "rides": [[named[rider], guide] for rider, guide in filter(None, (pair.rides() for pair in mechanism.pairs))],
         "rolling": list(usual(mechanism)) if len(mechanism.links) > 1 else None,
         "document": document(mechanism, numbers.dimensions),
@@ -121,7 +122,7 @@ def carried(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[str
         "tolerance": solver.tolerance,
         "sizes": len(numbers.values),
     }
-    acting = loaded(numbers.mechanism, numbers.d, standing(mechanism), solver.unit)
+    acting = loaded(numbers.mechanism, numbers.d, state, solver.unit)
     data["forces"] = acting and acting[0]
     functions = [numbers.function(), printed("positions", program.positions), printed("kinematics", program.rates)]
     functions += [printed(f"closing{k}", program.closing(stage)) for k, stage in enumerate(e.stages)]
@@ -156,9 +157,8 @@ def drawn(mechanism: Mechanism) -> tuple[dict[str, Any], list[float]]:
     return looks(mechanism, numbers), [float(each) for each in numbers.values]
 
 
-def _centred(mechanism: Mechanism) -> list[list[str]]:
+def _centred(state: State) -> list[list[str]]:
     """Every two links whose instantaneous centre a pair of theirs shows."""
-    state = standing(mechanism)
     return [sorted(two) for two in primary(rates(state), *extent(state)).centres]
 
 

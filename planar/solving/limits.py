@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.algebra import Jet
+from planar.algebra import Jet, orders
 from planar.pairs import Kind, Pair
 from planar.program import placed
 from planar.results import Limit
@@ -55,7 +55,7 @@ class Outputs(NamedTuple):
         for pair in self.pairs:
             numbers = pair.measure([setup.shapes[link] for link in pair.bodies])
             drive = pair.drive([frames[link] for link in pair.bodies], numbers, own.get(pair.name, ()))
-            found.append(drive.parts if isinstance(drive, Jet) else (drive, 0.0, 0.0))
+            found.append(orders(drive))
         return np.array(found, dtype=float)
 
     def end(self, curve: Curve, point: Point) -> _End:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.errors import BadInput, NoAnswer, Outcome
-from planar.mechanism import Drive, Mechanism, with_inputs
+from planar.mechanism import Drive, Mechanism, running_input, with_inputs
 from planar.motion import Motion
 from planar.results import Limit
 from planar.solving import limits
@@ -47,11 +47,7 @@ class Ranged:
 
     def __init__(self, mechanism: Mechanism, pair: str | None, branches: Sequence[int], third: bool):
         names = [given.pair for given in mechanism.inputs]
-        if pair is None and len(names) > 1:
-            raise BadInput("inputs", f"there are several inputs, {', '.join(names)}; name the one that runs")
-        if pair is not None and pair not in names:
-            raise BadInput(pair, f"there is no input at {pair!r}; inputs are at {', '.join(names)}")
-        self.index = names.index(pair) if pair is not None else 0
+        self.index = running_input(mechanism, pair)
         still = tuple(Drive(name, None, 0.0, 0.0) for k, name in enumerate(names) if k != self.index)
         self.known = known_of(with_inputs(mechanism, still))
         self.solver = self.known.solver

@@ -74,11 +74,11 @@ class Timed:
 
     def given(self, time: Array) -> Given:
         """The inputs at times (s)."""
-        parts = np.array([_by_law(each, time) for each in self.solver.mechanism.inputs])
+        parts = np.array([by_law(each, time) for each in self.solver.mechanism.inputs])
         return Given(*(part.T / self.scale for part in parts.transpose(1, 0, 2)))
 
 
-def _by_law(given: Input, time: Array) -> Array:
+def by_law(given: Input, time: Array) -> Array:
     """Position and first, second and third rate of an input (4, times)."""
     if given.law is not None:
         return np.asarray(given.law.at(time, given.position, given.velocity))

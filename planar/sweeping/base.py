@@ -11,7 +11,7 @@ from planar.algebra import Scalar
 from planar.dimensions import Dimension
 from planar.document.cursor import did_you_mean
 from planar.errors import BadInput
-from planar.mechanism import Drive, Mechanism, NamedPoint, named_points, with_inputs
+from planar.mechanism import Drive, Mechanism, NamedPoint, named_points, running_input, with_inputs
 from planar.pairs import Kind
 from planar.pairs.base import Pair
 from planar.program import scaled
@@ -32,13 +32,7 @@ class Base:
 
     def __init__(self, mechanism: Mechanism, pair: str | None):
         names = [given.pair for given in mechanism.inputs]
-        if not names:
-            raise BadInput("inputs", "the mechanism has no input that could run")
-        if pair is None and len(names) > 1:
-            raise BadInput("inputs", f"there are several inputs, {', '.join(names)}; name the one that runs")
-        if pair is not None and pair not in names:
-            raise BadInput(pair, f"there is no input at {pair!r}; inputs are at {', '.join(names)}")
-        self.index = names.index(pair) if pair is not None else 0
+        self.index = running_input(mechanism, pair)
         self.pair = names[self.index]
         still = tuple(Drive(name, None, 0.0, 0.0) for name in names if name != self.pair)
         self.mechanism = with_inputs(mechanism, still)
