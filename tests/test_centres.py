@@ -26,13 +26,14 @@ from planar.motion import State, Unknown
 from planar.solving.position import solve
 from planar.views.centres import remarks
 from tests.command import run
+from tests.draws import draws
 from tests.known import MODELS, state_of
 from tests.known import found_centres as found
 from tests.linkages import random_linkage
 
 EXACT = 1e-10
 many = settings(
-    max_examples=50, deadline=None, suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow]
+    max_examples=draws(15), deadline=None, suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow]
 )
 
 
@@ -801,7 +802,7 @@ def test_an_input_at_rest_leaves_all_at_rest():
 
 
 @given(st.integers(0, 10**6))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=draws(40), deadline=None)
 def test_two_velocities_of_a_turning_link_give_back_its_centre(seed):
     rng = np.random.default_rng(seed)
     centre, a, b = rng.uniform(-1.0, 1.0, (3, 2))

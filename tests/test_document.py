@@ -38,6 +38,7 @@ from planar.pairs import pair_types
 from planar.pairs.line import Line
 from planar.plane import GROUND, frame_at
 from planar.shapes import shape
+from tests.draws import draws
 
 FOUR_BAR = """
 {
@@ -1261,7 +1262,7 @@ def documents(draw: Any) -> Any:
     return value
 
 
-@settings(STEADY, max_examples=150, suppress_health_check=[HealthCheck.too_slow])
+@settings(STEADY, max_examples=draws(50), suppress_health_check=[HealthCheck.too_slow])
 @given(documents())
 def test_any_mechanism_written_and_read_again_is_the_same_to_the_last_bit(value: Any) -> None:
     m = planar.from_dict(value)
@@ -1332,7 +1333,7 @@ def mutilated(value: Any, draw: Callable[..., Any]) -> Any:
     return place
 
 
-@settings(STEADY, max_examples=600, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
+@settings(STEADY, max_examples=draws(200), suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
 @given(st.sampled_from(sorted(EXAMPLES)), st.integers(1, 3), st.data())
 def test_a_mutilated_file_is_read_or_refused_and_nothing_else(name: str, times: int, data: st.DataObject) -> None:
     value = base(name)
@@ -1350,7 +1351,7 @@ def test_a_mutilated_file_is_read_or_refused_and_nothing_else(name: str, times: 
     assert planar.loads(planar.dumps(m)) == m
 
 
-@settings(STEADY, max_examples=200)
+@settings(STEADY, max_examples=draws(80))
 @given(PIECES)
 def test_any_value_at_all_is_refused_and_nothing_else(value: Any) -> None:
     with pytest.raises(BadInput):

@@ -17,6 +17,7 @@ from planar.mechanism import Drive, motions, with_inputs
 from planar.motion import Unknown
 from planar.pairs import Kind
 from planar.roots import root
+from tests.draws import draws
 
 NEAR = 1e-12
 """rad, and part of a value: rounding of a position solved."""
@@ -75,7 +76,7 @@ def test_an_end_at_the_seam_of_a_turn_is_found_however_the_turn_is_cut(steps, st
     assert all(each.input < motion.inputs["O"].position[-1] for each in (found.top, found.bottom))
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=draws(6), deadline=None)
 @given(
     r=st.floats(0.05, 0.5),
     more=st.floats(1.15, 6.0),

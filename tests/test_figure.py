@@ -19,6 +19,7 @@ from planar.drawing.labels import placed
 from planar.drawing.lettering import UNKNOWN
 from planar.drawing.picture import Arrow, Circle, Fill, Letter, Line, Pen, Picture
 from planar.errors import BadInput
+from tests.draws import draws
 from tests.test_labels import HOSTILE
 
 INCH = 25.4
@@ -154,7 +155,7 @@ def test_pens_that_meet_in_a_drawing_differ_in_width_or_dashes_or_much_in_grey()
 arrows = st.tuples(*[st.floats(-60.0, 60.0)] * 4)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=draws(10), deadline=None)
 @given(arrows)
 def test_an_arrow_has_its_tip_at_its_head_and_its_line_ends_inside(ends):
     tail, tip = ends[:2], ends[2:]
@@ -303,7 +304,7 @@ strokes = st.tuples(spots, spots, st.sampled_from([Pen.LINK, Pen.VELOCITY]))
 marks = st.one_of(letters, strokes.map(lambda each: Arrow(*each)), spots.map(lambda at: Circle(at, 7.0, Pen.PIN)))
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=draws(5), deadline=None)
 @given(st.lists(marks, min_size=1, max_size=12))
 def test_nothing_is_clipped(some):
     made = figure([Picture(tuple(some), "Title", ("a note",))])

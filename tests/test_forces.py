@@ -20,12 +20,13 @@ from planar.mechanism import Drive, Input, Load, Mechanism
 from planar.motion import State, Unknown
 from planar.solving.position import solve
 from tests.command import run
+from tests.draws import draws
 from tests.known import MODELS, state_of
 from tests.linkages import random_linkage
 
 ONE_INPUT = [stem for stem, mechanism in MODELS.items() if len(mechanism.inputs) == 1]
 EXACT = 1e-10
-near = settings(max_examples=15, deadline=None)
+near = settings(max_examples=draws(8), deadline=None)
 
 
 def crank(angle: float, loads: list[Any], r: float = 0.3, rod: float = 1.0, turned: float = 0.0) -> dict[str, Any]:

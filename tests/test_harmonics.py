@@ -18,6 +18,7 @@ from planar.errors import BadInput, NoAnswer
 from planar.mechanism import Drive, motions, with_inputs
 from planar.views.analytical import record
 from tests.command import run
+from tests.draws import draws
 
 NEAR = 1e-12
 """Part of a value: rounding of a position solved."""
@@ -279,7 +280,7 @@ def test_a_piston_is_asked_of_a_pair_that_there_is():
         piston(planar.load("000-P5"), "nothing")
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=draws(5), deadline=None)
 @given(
     r=st.floats(0.05, 0.5),
     more=st.floats(1.2, 6.0),

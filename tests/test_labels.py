@@ -12,6 +12,7 @@ from planar.drawing.ink import POINT
 from planar.drawing.labels import LEADER, Box, Placed, placed
 from planar.drawing.lettering import UNKNOWN, font, measured, shown, wrapped
 from planar.drawing.picture import Arrow, Circle, Letter, Line, Pen
+from tests.draws import draws
 
 HOSTILE = [
     "$x",
@@ -150,7 +151,7 @@ lines = st.builds(lambda one, other: Line((one, other), Pen.LINK), spots, spots)
 circles = st.builds(lambda centre, radius: Circle(centre, radius, Pen.PITCH), spots, st.floats(1.0, 15.0))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=draws(20), deadline=None)
 @given(
     st.lists(st.tuples(texts, spots).map(lambda pair: Letter(*pair)), min_size=1, max_size=10),
     st.lists(st.one_of(lines, circles), max_size=6),
@@ -162,7 +163,7 @@ def test_letters_are_clear_of_strokes_and_of_each_other_whenever_there_is_room(l
         assert not any(covers(each.box, dotted(mark)) for mark in marks)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=draws(8), deadline=None)
 @given(
     st.lists(st.tuples(texts, near).map(lambda pair: Letter(*pair)), max_size=30),
     st.lists(lines, max_size=40),

@@ -36,6 +36,7 @@ from planar.laws import (
 from planar.mechanism import Drive, Input, with_inputs
 from planar.program import structure
 from tests import test_document as document
+from tests.draws import draws
 
 H, T = -0.7, 0.3
 """The way and the time of the pieces here."""
@@ -231,7 +232,7 @@ PIECES = st.one_of(
 LAWS = st.lists(PIECES, min_size=1, max_size=6).map(tuple).map(Law)
 
 
-@settings(STEADY, max_examples=150)
+@settings(STEADY, max_examples=draws(50))
 @given(LAWS, WAYS, WAYS)
 def test_positions_of_any_law_go_on_at_every_joint(law, position, velocity):
     joints = law.joints(position, velocity)
@@ -249,7 +250,7 @@ def test_positions_of_any_law_go_on_at_every_joint(law, position, velocity):
     assert (np.abs(before[1] - [joint.ending for joint in joints]) <= bend).all()
 
 
-@settings(STEADY, max_examples=50)
+@settings(STEADY, max_examples=draws(25))
 @given(LAWS, WAYS, WAYS, st.permutations(range(40)))
 def test_each_time_has_its_own_answer_in_whatever_order(law, position, velocity, order):
     t = np.linspace(-0.2, 1.2, 40) * law.duration
@@ -263,7 +264,7 @@ def test_each_time_has_its_own_answer_in_whatever_order(law, position, velocity,
 # tables
 
 
-@settings(STEADY, max_examples=60)
+@settings(STEADY, max_examples=draws(30))
 @given(st.lists(st.tuples(st.floats(0.2, 1.0), WAYS), min_size=2, max_size=30))
 def test_a_table_goes_through_its_points(rows):
     times = np.concatenate([[0.0], np.cumsum([r[0] for r in rows[1:]])])
@@ -389,7 +390,7 @@ def test_a_law_written_and_read_again_is_the_same_to_the_last_bit(law, velocity)
         assert Draft202012Validator(schema()).is_valid(value)
 
 
-@settings(STEADY, max_examples=100)
+@settings(STEADY, max_examples=draws(40))
 @given(LAWS, st.floats(-3.0, 3.0), st.floats(-3.0, 3.0))
 def test_any_law_made_in_python_is_read_as_it_was_written(law, position, velocity):
     mechanism = planar.from_dict(document.base())
@@ -549,7 +550,7 @@ def test_a_law_made_in_python_is_held_to_the_same_rules(pieces, place):
     assert caught.value.place == place
 
 
-@settings(STEADY, max_examples=400)
+@settings(STEADY, max_examples=draws(150))
 @given(st.sampled_from([FULL, [TABULATED], [FULL[0], TABULATED, *FULL[3:6]]]), st.integers(1, 3), st.data())
 def test_a_mutilated_law_is_read_or_refused_and_nothing_else(law, times, data):
     law = {"law": deepcopy(law)}

@@ -17,6 +17,7 @@ from planar.analysis.polygons import Meeting, Part, Polygon, Simultaneous, Trian
 from planar.plane import direction
 from planar.solving.position import solve
 from planar.words import heading
+from tests.draws import draws
 from tests.known import MODELS
 from tests.known import state_of as solved
 from tests.linkages import random_linkage
@@ -348,7 +349,7 @@ def test_law_holds_for_every_model(law, stem):
 
 
 some = settings(
-    max_examples=20, deadline=None, suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow]
+    max_examples=draws(8), deadline=None, suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow]
 )
 
 

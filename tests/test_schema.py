@@ -18,6 +18,7 @@ from planar.files import model_files
 from planar.pairs import pair_types
 from tests import test_document as document
 from tests import test_wheels as wheels
+from tests.draws import draws
 
 VALIDATOR = Draft202012Validator(schema())
 MODELS = {file.stem: json.loads(file.read_text(encoding="utf-8")) for file in model_files()}
@@ -124,14 +125,14 @@ def test_of_all_that_a_schema_cannot_say_there_are_examples():
 # whatever is written
 
 
-@settings(searching, max_examples=150)
+@settings(searching, max_examples=draws(40))
 @given(document.documents())
 def test_any_mechanism_is_valid_as_it_is_written_and_as_it_is_written_back(value):
     assert wrong(value) is None
     assert wrong(planar.to_dict(planar.from_dict(value))) is None
 
 
-@settings(searching, max_examples=700)
+@settings(searching, max_examples=draws(200))
 @given(st.sampled_from([*MODELS.values(), *map(document.base, document.EXAMPLES)]), st.integers(1, 2), st.data())
 def test_what_the_schema_refuses_the_reader_refuses(value, times, data):
     value = deepcopy(value)
@@ -157,7 +158,7 @@ SPELT = st.builds(
 )
 
 
-@settings(searching, max_examples=250)
+@settings(searching, max_examples=draws(100))
 @given(SPELT, st.sampled_from([("links", "AB", "length"), ("inputs", 0, "position"), ("inputs", 0, "velocity")]))
 def test_a_quantity_that_the_reader_reads_is_one_of_the_schema(text, path):
     value = document.put(document.base(), list(path), text)

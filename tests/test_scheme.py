@@ -24,6 +24,7 @@ from planar.pairs import Kind, pair_types
 from planar.pairs.marks import Band, Block, Guide, Opening, Pin, PitchLine, Wheel
 from planar.plane import Vector, frame_at
 from planar.shapes import shape
+from tests.draws import draws
 from tests.known import MODELS
 from tests.known import state_of as solved
 from tests.linkages import random_linkage
@@ -408,7 +409,7 @@ clouds = st.lists(st.builds(Vector, coordinates, coordinates), min_size=1, max_s
 
 
 @given(clouds)
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=draws(30), deadline=None)
 def test_a_hull_is_convex_anticlockwise_and_holds_all_points(points):
     corners = hull(points, 1e-9)
     if not corners:
@@ -421,7 +422,7 @@ def test_a_hull_is_convex_anticlockwise_and_holds_all_points(points):
 
 
 @given(st.lists(st.builds(Vector, coordinates, coordinates), min_size=0, max_size=6), st.floats(0.0, 6.28))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=draws(20), deadline=None)
 def test_a_link_with_any_points_can_be_drawn(points, angle):
     links = {"f": {"points": {"O": [0, 0]}}, "m": {"points": {"O": [0, 0]}}}
     links["m"]["points"] |= {f"p{k}": [1e3 * x, 1e3 * y] for k, (x, y) in enumerate(points)}

@@ -20,6 +20,7 @@ from planar.sweeping.base import base
 from planar.sweeping.columns import Columns
 from planar.sweeping.designs import lifted, one
 from planar.sweeping.judging import Branches, Closed
+from tests.draws import draws
 from tests.known import MODELS
 from tests.linkages import random_linkage
 from tests.test_cycle import PARALLELOGRAM, ROCKER, TRIPLE, TURN, four_bar, rates, rocker, slider_crank
@@ -112,7 +113,7 @@ def test_one_of_several_inputs_runs_and_the_others_stand_where_each_design_has_t
         planar.sweep(mechanism, designs, 24)
 
 
-@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=draws(6), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.integers(0, 10**6), st.integers(1, 6), st.sampled_from([0.0, 0.3]))
 def test_random_linkages_of_dimensions_changed_by_a_hundredth(seed, links, higher):
     mechanism = files.from_dict(random_linkage(seed, links, higher=higher).value)

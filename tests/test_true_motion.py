@@ -10,12 +10,13 @@ from planar import files
 from planar.errors import BadInput, NoAnswer, Outcome
 from planar.pairs import Kind
 from planar.solving.position import Solver
+from tests.draws import draws
 from tests.linkages import conditioning, random_linkage
 from tests.test_cycle import TURN, passes_gate, rocker
 from tests.test_random import seeds, shares
 
 few = settings(
-    max_examples=10, deadline=None, suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow]
+    max_examples=draws(6), deadline=None, suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow]
 )
 sizes = st.integers(3, 8)
 
