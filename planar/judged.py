@@ -16,7 +16,7 @@ from planar.elimination import stack
 from planar.equations import Equations
 from planar.mechanism import Mechanism, motions
 from planar.pairs import Kind
-from planar.program import NEWTON_STEPS, Program, compact, length, placed, program, solved, structure
+from planar.program import CACHED, NEWTON_STEPS, Program, compact, length, placed, program, solved, structure
 
 Array = np.ndarray
 
@@ -308,6 +308,6 @@ def judged(mechanism: Mechanism) -> Judged:
     return _judged(structure(mechanism))
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=CACHED)
 def _judged(structure: Mechanism) -> Judged:
     return Judged(structure, program(structure))

@@ -21,6 +21,8 @@ from planar.plane import GROUND, Frame, frame_at
 from planar.shapes import Shape, shape
 
 Array = np.ndarray
+CACHED = 256
+"""Mechanisms of which what was derived is kept: more than come along, so that none is derived twice in a round."""
 
 POLISHED = 2
 """Newton's steps that carry a closed form to round-off."""
@@ -335,7 +337,7 @@ def program(mechanism: Mechanism) -> Program:
     return _program(structure(mechanism))
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=CACHED)
 def _program(structure: Mechanism) -> Program:
     return Program(build(structure))
 

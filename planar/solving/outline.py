@@ -11,7 +11,7 @@ from planar.errors import BadInput
 from planar.judged import Judged, judged
 from planar.mechanism import Input, Link, Mechanism, Point, check, counting, motions, named_points, unlawful
 from planar.pairs import Kind, Pair
-from planar.program import Program, program
+from planar.program import CACHED, Program, program
 from planar.shapes import At
 
 Array = np.ndarray
@@ -77,7 +77,7 @@ def outline(mechanism: Mechanism) -> Outline:
         return Outline(mechanism)
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=CACHED)
 def _outline(
     frame: str, links: tuple[tuple[str, tuple[str, ...]], ...], pairs: tuple[Pair, ...], inputs: tuple[str, ...]
 ) -> Outline:

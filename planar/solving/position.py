@@ -14,7 +14,7 @@ from planar.errors import Ending, NoAnswer
 from planar.mechanism import Drive, Mechanism, with_inputs
 from planar.motion import State
 from planar.plane import Frame
-from planar.program import Rates, length, placed, program
+from planar.program import CACHED, Rates, length, placed, program
 from planar.solving import refusals
 from planar.solving.assemble import Assembly, Failure, search
 from planar.solving.candidates import Candidates
@@ -227,7 +227,7 @@ class Known:
         return Ways(self.solver, self.assembly.z)
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=CACHED)
 def _known(mechanism: Mechanism) -> Known:
     return Known(mechanism)
 
