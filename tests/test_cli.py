@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +14,7 @@ import pytest
 
 import planar
 from planar.files import LARGEST, models
-from tests.command import process, run
+from tests.command import ROOT, process, run
 
 FAR = 1e-12
 """A result printed in full and read again is the same number; one solved again is so to round-off."""
@@ -535,3 +537,19 @@ def test_a_screen_without_the_characters_is_no_traceback(tmp_path: Path) -> None
     value = changed(FOUR_BAR, AB="曲柄") | {"name": "连杆"}
     ended = process(tmp_path, "solve", written(tmp_path, value, "连杆.json"), PYTHONIOENCODING="ascii")
     assert "60.0000" in ended.done()
+
+
+@pytest.mark.parametrize("said", [None, "3"])
+def test_the_command_shares_no_small_matrix_among_threads_unless_the_user_wants_it(said):
+    code = """
+import os, sys
+from planar.cli import main
+assert "numpy" not in sys.modules
+main(["solve", "four-bar"], standalone_mode=False)
+assert "numpy" in sys.modules
+print(os.environ["OPENBLAS_NUM_THREADS"], file=sys.stderr)
+"""
+    environment = {key: value for key, value in os.environ.items() if key != "OPENBLAS_NUM_THREADS"}
+    environment |= {"PYTHONPATH": str(ROOT)} | ({} if said is None else {"OPENBLAS_NUM_THREADS": said})
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=False)
+    assert done.stderr.strip() == (said or "1")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -21,6 +22,11 @@ if TYPE_CHECKING:
     from planar.views.columns import Told
 
 
+ONE_THREAD = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+"""Set before numpy is loaded, unless the user did: matrices are small, and on a busy machine threads that share one
+wait for each other longer than they work."""
+
+
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, message="planar %(version)s")
 def main() -> None:
@@ -28,6 +34,8 @@ def main() -> None:
 
     MODEL is a mechanism file (JSON), or the name of a model that comes along.
     """
+    for limit in ONE_THREAD:
+        os.environ.setdefault(limit, "1")
 
 
 as_json = click.option("--json", "as_json", is_flag=True, help="Print machine-readable SI values.")
