@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from functools import cache
-from math import isfinite, pi
+from math import isfinite, log10, pi
 from typing import NamedTuple
 
 SI = {
@@ -66,6 +66,9 @@ TABLE: dict[str, tuple[str, float, float]] = {
 }
 """unit: (kind, numerator, denominator) of its size in SI."""
 
+_OF_LENGTH = {"velocity": "/s", "acceleration": "/s^2", "jerk": "/s^3"}
+"""Kinds of quantities that are lengths by time, and what stands behind the unit of length."""
+
 LONGEST = 64
 """Characters of a quantity; the longest that `shortest` writes takes 33."""
 
@@ -104,6 +107,35 @@ def unit(text: str) -> Unit:
     if not _UNIT.fullmatch(spelled):
         raise UnitError(f"{text!r} is not a unit")
     return _looked_up(spelled)
+
+
+def shown(kind: str, declared: tuple[str, str]) -> tuple[str, Unit]:
+    """The unit in which a kind of quantity is shown, as it is printed, where a file declares a length and an angle.
+
+    Lengths and angles are shown in the file's own. Velocities, accelerations and jerks are in metres by seconds where
+    the length is metric, as textbooks have them beside millimetres, and else in the file's own length by seconds:
+    in/s beside in. Everything else is in SI.
+    """
+    length, angle = declared
+    own = {"length": length, "angle": angle}
+    if kind in own:
+        return own[kind], unit(own[kind])
+    if kind in _OF_LENGTH and not _metric(length):
+        _, numerator, denominator = unit(length)
+        return printed(length + _OF_LENGTH[kind]), Unit(kind, numerator, denominator)
+    return printed(SI[kind]), unit(SI[kind])
+
+
+def printed(name: str) -> str:
+    """A unit as it is printed: m/s², N·m."""
+    return name.replace("^2", "²").replace("^3", "³").replace(" ", "·")
+
+
+def _metric(length: str) -> bool:
+    """Whether a unit of length is the metre or a tenth, a hundredth, ... of it."""
+    _, numerator, denominator = unit(length)
+    power = log10(numerator / denominator)
+    return abs(power - round(power)) < 1e-9
 
 
 def quantity(text: str, kind: str) -> float:

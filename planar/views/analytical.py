@@ -124,7 +124,7 @@ def _formula(formula: Formula, units: Units, per: tuple[str, str]) -> Renderable
     """The two-term formulas beside what is exact."""
     title = f"Piston from TDC, crank at {_angle(formula.theta, units)} from it"
     table = plain_table(
-        title, "", "exact", "two terms", "unit", "off here", "greatest error in a turn", "at", left=(0, 3)
+        title, "", ("exact", "two terms", "unit"), "off here", ("greatest error in a turn", "at"), left=(0, 3)
     )
     length = unit(units.length)
     names = (("displacement", units.length), ("velocity", per[0]), ("acceleration", per[1]))
@@ -150,7 +150,7 @@ def _formula(formula: Formula, units: Units, per: tuple[str, str]) -> Renderable
 def _rod(rod: OnRod, units: Units, per: tuple[str, str]) -> RenderableType:
     """A point of a rod by the two-term formulas beside what is exact."""
     title = f"On the rod of {rod.piston.pair}, {_length(rod.b, units)} from the piston"
-    table = plain_table(title, "", "exact", "two terms", "unit", "off", left=(0, 3))
+    table = plain_table(title, "", ("exact", "two terms", "unit"), "off", left=(0, 3))
     length = unit(units.length)
     names = (("", units.length, length.from_si(1.0)), ("velocity", per[0], 1.0), ("acceleration", per[1], 1.0))
     for (name, measure, by), exact, two in zip(names, rod.exact, rod.here, strict=True):

@@ -28,8 +28,9 @@ def tables(motion: Motion, asked: Mapping[str, Sequence[Answers]]) -> Renderable
     for each in (one for group in asked.values() for one in group):
         units = motion.mechanism.units
         position = _Position(motion.slides(each.input), units)
-        table = plain_table(f"Answers of {each.what} {each.of}", "what", "value", "at", "", left=(0, 1, 2, 3))
-        table.columns[2].header = f"at {each.input}"
+        table = plain_table(
+            f"Answers of {each.what} {each.of}", "what", "value", f"at {each.input}", "", left=(0, 1, 2, 3)
+        )
         for row in (*_ranges(each, units, position), *_rates(each, position), *_uses(each, units, position)):
             table.add_row(*row)
         parts += [Text(), table, *(Text(f"- {note}") for note in each.notes)]

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 from rich.console import Group, RenderableType
-from rich.table import Table
 from rich.text import Text
 
 from planar.analysis.centres import Centres
 from planar.mechanism import motions
 from planar.motion import State
 from planar.units import unit
+from planar.views.fitted import FittedTable
 from planar.views.table import DIGITS, paragraphs, plain_table
 from planar.words import amount, listed, many
 
@@ -39,7 +39,7 @@ def table(centres: Centres) -> RenderableType:
     return Group(*head, _rows(centres), paragraphs(_proof(centres)), Text(), notes)
 
 
-def _rows(centres: Centres) -> Table:
+def _rows(centres: Centres) -> FittedTable:
     state = centres.state
     length = state.mechanism.units.length
     rows = plain_table(
@@ -48,10 +48,10 @@ def _rows(centres: Centres) -> Table:
         "centre",
         "links",
         "how",
-        f"x, {length}",
-        f"y, {length}",
+        (f"x, {length}", f"y, {length}"),
         "derivation",
         left=(1, 2, 3, 6),
+        keys=2,
     )
     for centre in centres:
         order = "" if centre.how in ("as one", "open") else str(centre.order)

@@ -33,7 +33,7 @@ def explained(solution: Solution, scales: Scales | None = None) -> RenderableTyp
             parts += [Text(), *_section(section, half, scales)]
     parts += [Text(), *_results(solution)]
     if solution.comparisons:
-        parts.append(published(solution.comparisons))
+        parts.append(published(solution.comparisons, mechanism.units))
     notes = [*solution.state.remarks, *mechanism.notes]
     if notes:
         parts += [Text("Notes", style="bold"), paragraphs(("-", note) for note in notes)]
@@ -71,7 +71,7 @@ def _section(section: Section, half: Worked, scales: Scales) -> Iterator[Rendera
 
 def _table(rows: Iterable[Row], kind: str) -> RenderableType:
     shown = SHOWN.get(SI[kind], SI[kind])
-    table = plain_table(None, "S.N.", "vector", f"magnitude, {shown}", "direction", "sense", left=(1, 2, 3, 4))
+    table = plain_table(None, "S.N.", "vector", f"magnitude, {shown}", "direction", "sense", left=(1, 2, 3, 4), keys=2)
     for count, row in enumerate(rows, 1):
         vector = f"{plain((row.symbol,))} or {plain((row.chord,))}"
         table.add_row(f"{count}.", vector, plain(row.magnitude), plain(row.direction), plain(row.sense))
@@ -80,11 +80,11 @@ def _table(rows: Iterable[Row], kind: str) -> RenderableType:
 
 def _results(solution: Solution) -> Iterator[RenderableType]:
     links = plain_table(
-        "Links", "link", "ang. velocity, rad/s", "sense", "ang. acceleration, rad/s²", "sense", left=(0, 2, 4)
+        "Links", "link", ("ang. velocity, rad/s", "sense"), ("ang. acceleration, rad/s²", "sense"), left=(0, 2, 4)
     )
     for link in solution.links:
         links.add_row(*_turn(link))
-    points = plain_table("Points", "point", "velocity, m/s", "sense", "acceleration, m/s²", "sense", left=(0, 2, 4))
+    points = plain_table("Points", "point", ("velocity, m/s", "sense"), ("acceleration, m/s²", "sense"), left=(0, 2, 4))
     for point in solution.points:
         points.add_row(*_move(point))
     yield Text("3. Results", style="bold underline")
