@@ -65,6 +65,20 @@ class Moving(Shown):
     def _motions(self) -> Mapping[str, Pair]:
         return motions(self.mechanism)
 
+    def _turns_off_of_link(self, name: str, angle: float) -> float:
+        """The whole turns (rad) between the angle that a link's unknown has at first and the one that is told."""
+        return 0.0 if name in self._counting else _wrapped(angle) - angle
+
+    def _turns_off(self, name: str, position: float) -> float:
+        """The same of the relative angle at a pair, whose input's own position is told; of a length 0."""
+        pair = self._motions[name]
+        if pair.drive_kind is not Kind.ANGLE or self._counting.issuperset(pair.links):
+            return 0.0
+        if name in self.inputs:
+            started = float(np.ravel(self.inputs[name].position)[0])
+            return 2.0 * np.pi * round((started - position) / (2.0 * np.pi))
+        return _wrapped(position) - position
+
     @property
     def point_names(self) -> tuple[str, ...]:
         """The names that results give the points."""
@@ -192,15 +206,13 @@ class State(Moving):
         angle, velocity, acceleration = map(float, orders(self._frame(name).angle))
         fastest, hardest = self._greatest_of_links
         sense = _sense(turning(velocity, fastest), velocity * acceleration, abs(velocity) * hardest)
-        return LinkState(angle if name in self._counting else _wrapped(angle), velocity, acceleration, sense)
+        return LinkState(angle + self._turns_off_of_link(name, angle), velocity, acceleration, sense)
 
     def pair(self, name: str) -> dict[str, float | None]:
         """What a pair reports of its relative motion (SI). Raises Unknown."""
         pair, parts = self._motion(name)
         position, rate, second = map(float, parts)
-        if pair.drive_kind is Kind.ANGLE and not self._counting.issuperset(pair.links):
-            position = _wrapped(position)
-        return pair.report(position, rate, second)
+        return pair.report(position + self._turns_off(name, position), rate, second)
 
     def _point(self, named: NamedPoint) -> PointState:
         position, velocity, acceleration = (_both(*part) for part in _parts_of(self._carried(named)))
@@ -316,9 +328,7 @@ class Motion(Moving):
     def link(self, name: str) -> LinkMotion:
         """A link by name. Its angle starts between -pi and pi unless a pair counts its turns. Raises Unknown."""
         angle, velocity, acceleration = self._rows(orders(self._frame(name).angle))
-        if name not in self._counting:
-            angle = angle - (angle[0] - _wrapped(float(angle[0])))
-        return LinkMotion(angle, velocity, acceleration)
+        return LinkMotion(angle + self._turns_off_of_link(name, float(angle[0])), velocity, acceleration)
 
     def jerk(self, point: str) -> Array:
         """A point's third rate (n, 2) (m/s^3). Raises Unknown, and BadInput where the motion was made without."""
@@ -337,9 +347,14 @@ class Motion(Moving):
         return self.jerked
 
     def pair(self, name: str) -> dict[str, Array | None]:
-        """What a pair reports of its relative motion at every position, each (n,) (SI). Raises Unknown."""
+        """What a pair reports of its relative motion at every position, each (n,) (SI). Raises Unknown.
+
+        An angle starts between -pi and pi, as a link's; that of an input is the input's position, and where the turns
+        of both links are counted it has these.
+        """
         pair, parts = self._motion(name)
-        return pair.report(*self._rows(parts))
+        position, velocity, acceleration = self._rows(parts)
+        return pair.report(position + self._turns_off(name, float(position[0])), velocity, acceleration)
 
     def reported(self, name: str) -> Mapping[str, str]:
         """What a pair reports, and the kind of quantity that each is."""

@@ -14,7 +14,7 @@ from planar.analysis.steady import SAME, Steady
 from planar.analysis.zeros import changes, dips
 from planar.errors import BadInput, NoAnswer
 from planar.mechanism import motions
-from planar.motion import Moving, Parts, Unknown, _wrapped
+from planar.motion import Moving, Parts, Unknown
 from planar.pairs import Kind
 from planar.roots import root
 
@@ -56,8 +56,9 @@ class Output:
         self.near = SAME * steady.solver.unit if length else SAME
         self._off = 0.0
         self._values = np.broadcast_to(self.of(moving)[0], steady.positions.shape)
-        if not self._pair and not length and name not in moving._counting:
-            self._off = _wrapped(float(self._values[0])) - float(self._values[0])  # as `Motion.link` tells it
+        if not length:  # as the motion tells it
+            off = moving._turns_off if self._pair else moving._turns_off_of_link
+            self._off = off(name, float(self._values[0]))
             self._values = self._values + self._off
 
     def of(self, moving: Moving) -> Parts:
