@@ -10,6 +10,7 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planar.analysis.centres import Centres
+from planar.graph import number_and_name
 from planar.mechanism import motions
 from planar.motion import State
 from planar.units import unit
@@ -33,7 +34,7 @@ HOW = {
 def table(centres: Centres) -> RenderableType:
     """All centres in the order of finding, and what proves them."""
     state = centres.state
-    numbers = listed([f"{number} {link}" for link, number in centres.numbers.items()])
+    numbers = listed([number_and_name(number, link) for link, number in centres.numbers.items()])
     notes = paragraphs((" -", sentence) for sentence in (*remarks(centres), *state.remarks))
     head = [Text(state.mechanism.name, style="bold"), Text(_at(state)), Text(f"links: {numbers}"), Text()]
     return Group(*head, _rows(centres), paragraphs(_proof(centres)), Text(), notes)

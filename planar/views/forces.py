@@ -13,7 +13,7 @@ from planar.analysis.published import Comparison
 from planar.dynamics.forces import Forces
 from planar.dynamics.told import Reaction
 from planar.errors import Outcome
-from planar.graph import numbered
+from planar.graph import number_and_name, numbered
 from planar.mechanism import motions
 from planar.program import size
 from planar.units import shown
@@ -44,7 +44,7 @@ def tables(forces: Forces, advantages: ratios.Advantages, comparisons: Sequence[
     if told:
         parts.append(ratios.advantages_table(told))
     if any(each.through for each in told):
-        links = listed([f"{number} {link}" for link, number in numbered(forces.mechanism).items()])
+        links = listed([number_and_name(number, link) for link, number in numbered(forces.mechanism).items()])
         parts += [paragraphs([("links", links)]), Text()]
     if comparisons:
         parts += [published(comparisons, units), Text()]
