@@ -20,7 +20,7 @@ from planar.drawing.bodies import all_marks
 from planar.graph import numbered
 from planar.mechanism import Mechanism, counting, misfits, named_points
 from planar.motion import State
-from planar.pages.columns import heads, reported
+from planar.pages.columns import heads, reported, starting
 from planar.pages.document import above_zero, called, document
 from planar.pages.loaded import loaded
 from planar.pages.script import printed
@@ -117,6 +117,7 @@ def carried(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[str
         "rolling": list(usual(mechanism)) if len(mechanism.links) > 1 else None,
         "document": document(mechanism, numbers.dimensions),
         "columns": heads(mechanism, solver),
+        "starting": starting(mechanism),
         "assemblies": _assemblies(mechanism, solver),
         "z": z.tolist(),
         "tolerance": solver.tolerance,
