@@ -110,20 +110,26 @@ def unit(text: str) -> Unit:
 
 
 def shown(kind: str, declared: tuple[str, str]) -> tuple[str, Unit]:
-    """The unit in which a kind of quantity is shown, as it is printed, where a file declares a length and an angle.
+    """The unit in which a kind of quantity is shown, and its name as it is printed (see `own`)."""
+    name, of = own(kind, declared)
+    return printed(name), of
 
-    Lengths and angles are shown in the file's own. Velocities, accelerations and jerks are in metres by seconds where
+
+def own(kind: str, declared: tuple[str, str]) -> tuple[str, Unit]:
+    """The unit of a kind of quantity that goes with the length and the angle that a file declares, and its name.
+
+    Lengths and angles are in the file's own. Velocities, accelerations and jerks are in metres by seconds where
     the length is metric, as textbooks have them beside millimetres, and else in the file's own length by seconds:
     in/s beside in. Everything else is in SI.
     """
     length, angle = declared
-    own = {"length": length, "angle": angle}
-    if kind in own:
-        return own[kind], unit(own[kind])
+    theirs = {"length": length, "angle": angle}
+    if kind in theirs:
+        return theirs[kind], unit(theirs[kind])
     if kind in _OF_LENGTH and not _metric(length):
         _, numerator, denominator = unit(length)
-        return printed(length + _OF_LENGTH[kind]), Unit(kind, numerator, denominator)
-    return printed(SI[kind]), unit(SI[kind])
+        return length + _OF_LENGTH[kind], Unit(kind, numerator, denominator)
+    return SI[kind], unit(SI[kind])
 
 
 def printed(name: str) -> str:
