@@ -39,6 +39,7 @@ TABLE: dict[str, tuple[str, float, float]] = {
     "km": ("length", 1e3, 1.0),
     "um": ("length", 1.0, 1e6),
     "in": ("length", 0.0254, 1.0),
+    "ft": ("length", 0.3048, 1.0),
     "rad": ("angle", 1.0, 1.0),
     "deg": ("angle", pi, 180.0),
     "rad/s": ("angular velocity", 1.0, 1.0),
@@ -48,8 +49,12 @@ TABLE: dict[str, tuple[str, float, float]] = {
     "deg/s^2": ("angular acceleration", pi, 180.0),
     "m/s": ("velocity", 1.0, 1.0),
     "mm/s": ("velocity", 1.0, 1e3),
+    "in/s": ("velocity", 0.0254, 1.0),
+    "ft/s": ("velocity", 0.3048, 1.0),
     "m/s^2": ("acceleration", 1.0, 1.0),
     "mm/s^2": ("acceleration", 1.0, 1e3),
+    "in/s^2": ("acceleration", 0.0254, 1.0),
+    "ft/s^2": ("acceleration", 0.3048, 1.0),
     "N": ("force", 1.0, 1.0),
     "kN": ("force", 1e3, 1.0),
     "N m": ("torque", 1.0, 1.0),
@@ -126,22 +131,28 @@ def own(kind: str, declared: tuple[str, str]) -> tuple[str, Unit]:
     theirs = {"length": length, "angle": angle}
     if kind in theirs:
         return theirs[kind], unit(theirs[kind])
-    if kind in _OF_LENGTH and not _metric(length):
-        _, numerator, denominator = unit(length)
-        return length + _OF_LENGTH[kind], Unit(kind, numerator, denominator)
-    return SI[kind], unit(SI[kind])
+    if kind in _OF_LENGTH:
+        name, (_, numerator, denominator) = length_of_rates(length)
+        return name + _OF_LENGTH[kind], Unit(kind, numerator, denominator)
+    return SI[kind], Unit(kind, 1.0, 1.0)
+
+
+def length_of_rates(length: str) -> tuple[str, Unit]:
+    """The unit of length in which rates are shown: the metre where the declared one is metric, else that one."""
+    return coherent(length)
+
+
+def coherent(text: str) -> tuple[str, Unit]:
+    """The SI unit of what a unit measures where it is a tenth, a thousand, ... of that, else the unit itself."""
+    own = unit(text)
+    power = log10(own.numerator / own.denominator)
+    metric = abs(power - round(power)) < 1e-9
+    return (SI[own.kind], Unit(own.kind, 1.0, 1.0)) if metric else (text, own)
 
 
 def printed(name: str) -> str:
     """A unit as it is printed: m/s², N·m."""
     return name.replace("^2", "²").replace("^3", "³").replace(" ", "·")
-
-
-def _metric(length: str) -> bool:
-    """Whether a unit of length is the metre or a tenth, a hundredth, ... of it."""
-    _, numerator, denominator = unit(length)
-    power = log10(numerator / denominator)
-    return abs(power - round(power)) < 1e-9
 
 
 def quantity(text: str, kind: str) -> float:
