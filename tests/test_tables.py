@@ -10,15 +10,22 @@ import subprocess
 import sys
 from collections import Counter
 from functools import cache
+from math import pi
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
+import numpy as np
 import pytest
 from rich.console import Console
 
+import planar
+from planar.drawing.panels import panels
+from planar.drawing.picture import Letter
+from planar.drawing.scheme import scheme
+from planar.pages.carried import carried
 from planar.views.fitted import plain_table
-from planar.views.table import paragraphs
+from planar.views.table import kept, paragraphs
 from tests.command import FROM_OUTSIDE, ROOT, run
 
 WIDTHS = (40, 60, 80, 100, 200)
@@ -184,3 +191,145 @@ def test_characters_that_take_two_places_are_counted_so() -> None:
 def test_paragraphs_break_between_words() -> None:
     said = [("mobility", "in this position 1.23456e-17 of the greatest"), ("-", "end")]
     assert words(printed([paragraphs(said)], 24)) == words(printed([paragraphs(said)], 200))
+
+
+# units: inches
+
+CRANK = {
+    "planar": 1,
+    "name": "Slider-crank",
+    "units": {"length": "in", "angle": "deg"},
+    "frame": "frame",
+    "links": {
+        "frame": {"points": {"O": [0, 0]}},
+        "crank": {"ends": ["O", "A"], "length": 2},
+        "rod": {"ends": ["A", "B"], "length": 8, "points": {"E": {"along": ["A", "B"], "distance": 3}}},
+    },
+    "pairs": [
+        {"turning": "O", "pin_radius": 0.5},
+        {"turning": "A", "pin_radius": 0.25},
+        {"sliding": "stroke", "on": "frame", "block": "B", "line": {"through": "O"}},
+    ],
+    "inputs": [{"pair": "O", "position": 60, "velocity": "600 rpm", "acceleration": "100 rad/s^2"}],
+    "loads": [{"point": "B", "force": ["-100 lbf", 0]}],
+    "sketch": {"B": [8, 0]},
+}
+METRIC = re.compile(r"(?<![a-zA-Z·])m{1,2}(/s|/rad|²|$|\s)", re.MULTILINE)
+"""A metre or a millimetre, or what is by one; not the N·m of a torque."""
+
+
+@pytest.fixture
+def inches(tmp_path: Path) -> Path:
+    (tmp_path / "in.json").write_text(json.dumps(CRANK), encoding="utf-8")
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("solve", "in.json", "--relative", "B,A"),
+        ("cycle", "in.json", "--steps", "36", "--of", "stroke", "--of", "E", "--of", "rod"),
+        ("explain", "in.json"),
+        ("explain", "dyads.json"),
+        ("forces", "in.json"),
+        ("forces", "in.json", "--cycle", "--steps", "12"),
+        ("simulate", "in.json", "--duration", "0.01s", "--steps", "2"),
+        ("harmonics", "in.json", "--point", "E"),
+    ],
+    ids=" ".join,
+)
+def test_nothing_of_a_mechanism_in_inches_is_told_in_metres(command: tuple[str, ...], inches: Path) -> None:
+    driven = CRANK | {
+        "inputs": [{"pair": "stroke", "position": 8.8, "velocity": "20 in/s", "acceleration": "5 in/s^2"}],
+    }
+    driven["masses"] = [{"link": "rod", "mass": "1 lb", "at": "E"}]
+    (inches / "dyads.json").write_text(json.dumps(driven), encoding="utf-8")
+    if command[0] == "simulate":
+        command = (command[0], "dyads.json", *command[2:])
+    text = run(inches, *command).done()
+    assert not METRIC.findall(text)
+    assert " in" in text
+
+
+def test_a_worked_solution_in_inches_computes_in_inches(inches: Path) -> None:
+    """omega r = 62.8 x 2 = 126 in/s, and its square by the radius: closed forms at each step."""
+    text = run(inches, "explain", "in.json").done()
+    speed = 20.0 * pi * 2.0
+    assert f"ω_crank × OA = 62.8 × 2 = {speed:.0f}" in text
+    assert f"(oa)²/OA = ({speed:.0f})²/2 = {speed**2 / 2.0:.0f}" in text
+    velocity = planar.solve(planar.from_dict(CRANK)).point("B").velocity[0] / 0.0254
+    assert f"v_B = gb = {abs(velocity):.0f} in/s" in text
+
+
+def test_numbers_in_inches_are_those_in_millimetres_of_the_same_mechanism(inches: Path) -> None:
+    shown = json.dumps(CRANK)
+    in_mm = json.loads(shown)
+    in_mm["units"]["length"] = "mm"
+    for link, length in (("crank", 50.8), ("rod", 203.2)):
+        in_mm["links"][link]["length"] = length
+    in_mm["links"]["rod"]["points"]["E"]["distance"] = 76.2
+    in_mm["pairs"][0]["pin_radius"], in_mm["pairs"][1]["pin_radius"] = 12.7, 6.35
+    in_mm["sketch"] = {"B": [203.2, 0]}
+    (inches / "mm.json").write_text(json.dumps(in_mm), encoding="utf-8")
+    heads, ours = saved(inches, "in.json")
+    theirs_heads, theirs = saved(inches, "mm.json")
+    sizes = {"in": 25.4, "in/s": 0.0254, "in/s^2": 0.0254}
+    assert len(heads) == len(theirs_heads)
+    for head, theirs_head, column, other in zip(heads, theirs_heads, ours.T, theirs.T, strict=True):
+        (name, measure), (their_name, theirs_measure) = (each[:-1].split(" [") for each in (head, theirs_head))
+        assert name == their_name
+        assert theirs_measure == {"in": "mm", "in/s": "m/s", "in/s^2": "m/s^2"}.get(measure, measure)
+        scale = max(1e-9, float(np.abs(other).max()))
+        np.testing.assert_allclose(column * sizes.get(measure, 1.0), other, atol=1e-9 * scale)
+
+
+def saved(folder: Path, model: str) -> tuple[list[str], np.ndarray]:
+    """The columns of a run in a file."""
+    run(folder, "cycle", model, "--steps", "12", "-o", "run.csv").done()
+    heads, *rows = (folder / "run.csv").read_text(encoding="utf-8").splitlines()
+    return heads.split(","), np.array([[float(cell or "nan") for cell in row.split(",")] for row in rows])
+
+
+def test_drawings_and_pages_in_inches_have_inches() -> None:
+    mechanism = planar.from_dict(CRANK)
+    state = planar.solve(mechanism)
+    told = [note for each in panels(state, None, 3) for note in each.notes]
+    assert len([note for note in told if " in/s" in note]) == 2
+    assert not [note for note in told if METRIC.search(note.replace("/mm", ""))]
+    data, _ = carried(mechanism)
+    assert {kind: data["units"][kind]["name"] for kind in ("length", "velocity", "acceleration")} == {
+        "length": "in",
+        "velocity": "in/s",
+        "acceleration": "in/s²",
+    }
+    assert data["units"]["acceleration"]["si"] == pytest.approx(0.0254, rel=1e-15)
+    pushed = CRANK | {"inputs": [{"pair": "stroke", "position": 8.8, "velocity": "20 in/s"}]}
+    texts = [mark.text for mark in scheme(planar.solve(planar.from_dict(pushed))).marks if isinstance(mark, Letter)]
+    assert "v = 20 in/s" in texts
+
+
+@pytest.mark.parametrize(
+    "command",
+    [("solve", "four-bar"), ("cycle", "four-bar", "--steps", "8"), ("centres", "four-bar"), ("forces", "000-P2")],
+    ids=" ".join,
+)
+def test_what_is_left_to_rounding_is_said_in_words(command: tuple[str, ...], tmp_path: Path) -> None:
+    text = " ".join(run(tmp_path, *command).done().split())
+    figures = re.findall(r"\S+ \S+ \(?\d\.\de-\d\d", text)
+    assert all(re.match(r"to round-off \(\d\.\de-1[0-9]", each) for each in figures)
+    assert figures or "exactly" in text
+    assert "0.0e+00" not in text
+
+
+def test_how_well_something_holds_in_words() -> None:
+    said = [kept(value, "of the greatest") for value in (0.0, 2.2e-16, 3e-7)]
+    assert said == ["exactly", "to round-off (2.2e-16 of the greatest)", "but for 3.0e-07 of the greatest"]
+
+
+def test_a_ratio_of_like_for_like_has_no_unit(tmp_path: Path) -> None:
+    (line,) = [
+        each
+        for each in run(tmp_path, "forces", "gear-reducer").done().splitlines()
+        if re.search(r"\bI\d\d I\d\d", each)
+    ]
+    assert line.split() == ["output", "shaft", "O1", "9.00000", "9.00000", "I14", "I13", "I34"]

@@ -11,8 +11,8 @@ from planar.views.table import counted, plain_table
 
 Advantages = Mapping[str, Mapping[str, Advantage]]
 """By output and input."""
-MEASURES = {"1/m": "N per N·m", "m": "N·m per N", "1": "1"}
-"""How an advantage's unit is printed."""
+MEASURES = {"1/m": "N per N·m", "m": "N·m per N", "1": ""}
+"""How an advantage's unit is printed; one of like for like has none."""
 
 
 def each_of(advantages: Advantages) -> list[Advantage]:

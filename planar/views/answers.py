@@ -104,7 +104,7 @@ def _uses(each: Answers, units: Units, position: _Position) -> Iterator[Row]:
     if each.advantage is not None:
         found = each.advantage
         measure = MEASURES[found.measure]
-        told = f"{found.least.value:.{DIGITS}g}" + (f" {measure}" if measure != "1" else "")
+        told = f"{found.least.value:.{DIGITS}g}" + (f" {measure}" if measure else "")
         yield "least mechanical advantage", told, position(found.least.input), ""
         for place in found.infinite:
             yield "  beyond all bounds", "", position(place), ""

@@ -15,7 +15,7 @@ from planar.mechanism import motions
 from planar.motion import State
 from planar.units import unit
 from planar.views.fitted import FittedTable
-from planar.views.table import DIGITS, paragraphs, plain_table
+from planar.views.table import DIGITS, SIZE, kept, paragraphs, plain_table
 from planar.words import amount, listed, many
 
 ZERO = 1e-12
@@ -45,7 +45,7 @@ def _rows(centres: Centres) -> FittedTable:
     length = state.mechanism.units.length
     rows = plain_table(
         "Instantaneous centres",
-        "",
+        "no.",
         "centre",
         "links",
         "how",
@@ -88,21 +88,17 @@ def _number(value: float) -> str:
 
 def _proof(centres: Centres) -> list[tuple[str, str]]:
     proof = centres.proof
-    by_jacobian = "each is that of the null vector of the whole Jacobian, but for"
+    by_jacobian = "each is that of the null vector of the whole Jacobian, "
     return [
-        ("proof", f"{by_jacobian} {_figure(proof.routes)}" if proof.routes is not None else "nothing can move here"),
-        ("", f"the centres of any three links are in one line, but for {_figure(proof.collinear)}"),
+        ("proof", by_jacobian + kept(proof.routes) if proof.routes is not None else "nothing can move here"),
+        ("", f"the centres of any three links are in one line, {kept(proof.collinear)}"),
         *(
-            [("", f"both links have one velocity in it, but for {_figure(proof.velocities)} of the greatest")]
+            [("", f"both links have one velocity in it, {kept(proof.velocities, 'of the greatest')}")]
             if proof.velocities is not None
             else []
         ),
-        ("", "worst of all, with lengths in those of the mechanism"),
+        ("", f"the figures are the worst of all, lengths in parts {SIZE}"),
     ]
-
-
-def _figure(value: float | None) -> str:
-    return "-" if value is None else f"{value:.1e}"
 
 
 def remarks(centres: Centres) -> tuple[str, ...]:

@@ -108,7 +108,8 @@ class FittedTable:
 
     def _record(self, row: Sequence[Cell], room: int) -> tuple[Table, int]:
         """A row by itself: every cell behind its heading."""
-        told = [(Text(column.label), cell) for column, cell in zip(self.columns, row, strict=True) if str(cell)]
+        both = zip(self.columns, row, strict=True)
+        told = [(Text(column.label), cell) for column, cell in both if column.label or str(cell)]
         widths = [_of_cells([each[k] for each in told]) for k in (0, 1)]
         wide = _spread(widths, [each.hard for each in widths], room) or [each.hard for each in widths]
         table = Table(box=None, show_header=False, padding=(0, 1, 0, 1), pad_edge=True)

@@ -20,7 +20,7 @@ from planar.units import shown
 from planar.views import advantages as ratios
 from planar.views import loads
 from planar.views.fitted import FittedTable
-from planar.views.table import ROUNDING, counted, paragraphs, plain_table, published
+from planar.views.table import ROUNDING, counted, kept, paragraphs, plain_table, published
 from planar.words import amount, listed
 
 
@@ -151,14 +151,14 @@ def proved(forces: Forces) -> list[tuple[str, str]]:
     """How well laws are kept."""
     proof, told = forces.proof, []
     if proof.power is not None:
-        told.append(f"all powers add up to nothing, but for {proof.power:.1e} of the greatest")
+        told.append(f"all powers add up to nothing, {kept(proof.power, 'of the greatest')}")
     if proof.routes is not None:
         told.append(
             "the efforts are those by virtual power with each input alone at unit rate, "
-            f"but for {proof.routes:.1e} of what all that acts could ask for"
+            f"{kept(proof.routes, 'of what all that acts could ask for')}"
         )
     if proof.equilibrium is not None:
-        told.append(f"{_which(forces)}, but for {proof.equilibrium:.1e} of the greatest force")
+        told.append(f"{_which(forces)}, {kept(proof.equilibrium, 'of the greatest force')}")
     if not told:
         told.append("none: of no link all is told" if forces.undetermined else "none: nothing acts on what moves")
     return [("" if index else "proof", each) for index, each in enumerate(told)]

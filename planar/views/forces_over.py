@@ -94,12 +94,12 @@ def _shaking(forces: Forces) -> Iterator[tuple[str, str]]:
     if not at_one.accelerated(forces):
         return
     force, moment = forces.shaking
-    at, told = place_heading(forces.moving), []
+    (name, measure), told = place_heading(forces.moving).split(", "), []
     for values, unit, beside in zip(
         (np.hypot(*force.T), np.abs(moment)), ("N", "N·m"), at_one.greatest(forces)[::-1], strict=True
     ):
         most, where = _extreme(forces, values)
-        told.append(f"up to {counted(most, beside)} {unit} ({at}: {where})")
+        told.append(f"up to {counted(most, beside)} {unit} ({name} = {where} {measure})")
     yield "shaking", f"{told[0]}, and {told[1]} about the frame's origin"
 
 

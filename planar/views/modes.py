@@ -49,7 +49,8 @@ def table(modes: Modes, limit: int, points: Sequence[str] = (), circuits: Circui
     for reason, which in why.items():
         told.append(f"{listed([*which[:LISTED], 'more'] if len(which) > LISTED else which)}: {reason}")
     notes = paragraphs((" -", sentence) for sentence in told)
-    return Stack(*head, Text(), _groups(modes), _rows(modes, shown, names, circuits), Text(), notes)
+    groups = [_groups(modes)] if modes.groups else []
+    return Stack(*head, Text(), *groups, _rows(modes, shown, names, circuits), Text(), notes)
 
 
 def counted(modes: Modes, listed: int) -> str:
@@ -66,7 +67,7 @@ def counted(modes: Modes, listed: int) -> str:
 def _groups(modes: Modes) -> FittedTable:
     rows = plain_table(
         "Groups of links, one after the other",
-        "",
+        "group",
         "links",
         "complex expected",
         "complex found",
@@ -99,7 +100,7 @@ def _rows(modes: Modes, shown: Sequence[Mode], names: Sequence[str], circuits: C
     near = modes.nearest
     rows = plain_table(
         "Assemblies",
-        "",
+        "no.",
         *(["groups"] if several else []),
         *([] if circuits is None else ["circuit", "branch"]),
         *(f"{name}: x y, {length}" for name in names),

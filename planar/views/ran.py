@@ -11,7 +11,7 @@ from rich.text import Text
 from planar.motion import Motion
 from planar.units import shown, unit
 from planar.views.fitted import FittedTable
-from planar.views.table import counted, heading, number, paragraphs, plain_table
+from planar.views.table import SIZE, counted, heading, kept, number, paragraphs, plain_table
 from planar.words import amount, listed, many
 
 MOST_ENDS = 6
@@ -33,7 +33,7 @@ def head(motion: Motion) -> list[Text]:
     lines += [Text(_range(motion, name)) for name in motion.inputs]
     if motion.time is not None:
         lines.append(Text(f"in time, from 0 s to {motion.time[-1]:.6g} s"))
-    worst = f"worst residual {motion.residual:.1e} of the mechanism's size"
+    worst = f"every pair closes {kept(motion.residual, SIZE)}"
     lines.append(Text(f"{many(len(motion), 'position')}; {worst}" + (f"; {motion.reason}" if motion.reason else "")))
     return lines
 

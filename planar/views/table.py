@@ -19,6 +19,9 @@ from planar.words import amount, listed
 
 DIGITS = 6
 """Significant digits printed; `--json` has all of them."""
+SIZE = "of the mechanism's size"
+ROUND_OFF = 1e-10
+"""Of what it is told beside: a proof that leaves less is as good as numbers are."""
 ROUNDING = 1e-12
 """What is less than this part of what it is told beside is printed as 0."""
 
@@ -86,7 +89,7 @@ def _heading(state: State) -> RenderableType:
         for name, given in state.inputs.items()
     ]
     at = f"at {listed(inputs)}" if inputs else "without inputs"
-    lines.append(Text(f"{at}; mobility {state.mobility}; residual {state.residual:.1e} of the mechanism's size"))
+    lines.append(Text(f"{at}; mobility {state.mobility}; every pair closes {kept(state.residual, SIZE)}"))
     return Group(*lines)
 
 
@@ -194,6 +197,12 @@ def _relative(text: str, relative: RelativeState, state: State) -> RenderableTyp
 
 def _reported(value: float | None, kind: str, units: Units) -> str:
     return "-" if value is None else number(shown(kind, units)[1].from_si(value))
+
+
+def kept(value: float, of: str = "") -> str:
+    """How well something holds that leaves `value` of another thing open: exactly, to round-off, or but for that."""
+    beside = f"{value:.1e} {of}".rstrip()
+    return "exactly" if value == 0.0 else f"to round-off ({beside})" if value < ROUND_OFF else f"but for {beside}"
 
 
 def number(value: float) -> str:
