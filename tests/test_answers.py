@@ -357,7 +357,10 @@ def test_an_angle_of_one_thing_is_told_one_way(model):
                     assert one.value == pytest.approx(other.value, abs=1e-7)
             wide = [planar.dwells(motion, each, within=0.2, least=0.0) for each in (name, pair.links[1])]
             assert [each.at.value for each in wide[0]] == pytest.approx([each.at.value for each in wide[1]], abs=1e-7)
-            low, high = float(told.min()) - 0.1, float(told.max()) + 0.1
-            assert all(low <= each.at.value <= high for each in wide[0])
+            if by_pair is not None:
+                assert abs(by_pair.least.value) <= pi + 1e-6
+                low, high = by_pair.least.value - 1e-7, by_pair.greatest.value + 1e-7
+                ends = [each.value for each in motion.limits if each.kind == "stroke end" and each.of == name]
+                assert all(low <= each <= high for each in (*ends, *(each.at.value for each in wide[0])))
             compared += 1
     assert compared

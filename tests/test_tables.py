@@ -44,7 +44,7 @@ COMMANDS: list[tuple[str, ...]] = [
     ("modes", "press.json", "--circuits"),
     ("modes", "stuck.json"),
     ("circuits", "press.json"),
-    ("cycle", "press.json", "--steps", "12", "--of", "stroke", "--of", "OA", "--of", "E"),
+    ("cycle", "press.json", "--steps", "12", "--of", "stroke", "--of", "E"),
     ("cycle", "gear-reducer", "--steps", "12"),
     ("centres", "press.json"),
     ("forces", "two-stroke-engine"),
@@ -68,8 +68,8 @@ def press() -> str:
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     (tmp_path / "press.json").write_text(press(), encoding="utf-8")
-    stuck = json.loads(press())
-    stuck["links"]["AB"]["length"] = 1200
+    stuck = json.loads((ROOT / "models" / "four-bar.json").read_text(encoding="utf-8"))
+    stuck["links"]["BC"] = {"ends": ["B", "C"], "length": 20}
     (tmp_path / "stuck.json").write_text(json.dumps(stuck), encoding="utf-8")
     return tmp_path
 
