@@ -294,7 +294,7 @@ class Motion(Moving):
 
     def _counted_limit(self, limit: Limit) -> Limit:
         """A limit whose angle is one as positions have it (see `turns_to_least`)."""
-        if limit.kind != "stroke end":
+        if limit.kind != "stroke end" or limit.of not in self._motions:
             return limit
         position = np.atleast_1d(self._motion(limit.of)[1][0])
         return limit._replace(value=limit.value + self._turns_of_swing(limit.of, position))
