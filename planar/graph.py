@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import combinations
+from itertools import combinations, count
 from typing import NamedTuple
 
 import networkx as nx
 
 from planar.mechanism import Mechanism, entries, motions
 from planar.pairs import Kind, Pair
+
+_NUMBER = re.compile(r"0|[1-9][0-9]{0,3}")
+"""A link's name that is its number."""
 
 
 def linkage(mechanism: Mechanism) -> nx.Graph:
@@ -97,10 +101,12 @@ def trees(links: Sequence[str]) -> tuple[tuple[tuple[str, str], ...], ...]:
 
 
 def numbered(mechanism: Mechanism) -> dict[str, str]:
-    """The number of each link in the manner of textbooks: 1 drives, 2 is joined to it and so on; the frame is last.
+    """The number of each link, in the order of the numbers.
 
-    Breadth first over the moving links, links alike in that in the order of the file. What drives is the link that
-    the first input moves: on the frame the other one, else the second; without inputs it is the file's first.
+    A link whose name is a number has that number. The others have the numbers that are left, in the manner of
+    textbooks: 1 drives, 2 is joined to it and so on; the frame is last. Breadth first over the moving links, links
+    alike in that in the order of the file. What drives is the link that the first input moves: on the frame the other
+    one, else the second; without inputs it is the file's first.
     """
     place = {link.name: index for index, link in enumerate(mechanism.links) if link.name != mechanism.frame}
     graph = nx.Graph()
@@ -114,7 +120,20 @@ def numbered(mechanism: Mechanism) -> dict[str, str]:
         if start not in order:
             ways = nx.bfs_edges(graph, start, sort_neighbors=lambda links: sorted(links, key=place.__getitem__))
             order |= dict.fromkeys((start, *(link for _, link in ways)))
-    return {link: str(number) for number, link in enumerate((*order, mechanism.frame), start=1)}
+    own = {link for link in (*order, mechanism.frame) if _NUMBER.fullmatch(link)}
+    free = (str(number) for number in count(1) if str(number) not in own)
+    numbers = {link: link if link in own else next(free) for link in (*order, mechanism.frame)}
+    return dict(sorted(numbers.items(), key=lambda item: int(item[1])))
+
+
+def number_and_name(number: str, link: str) -> str:
+    """A link by its number and its name, once where they are the same."""
+    return number if number == link else f"{number} {link}"
+
+
+def parting(numbers: Mapping[str, str]) -> str:
+    """What stands between the numbers of two links: nothing, or a comma where one of all has two digits."""
+    return "," if any(len(number) > 1 for number in numbers.values()) else ""
 
 
 def pair_words(mechanism: Mechanism) -> tuple[tuple[str, tuple[str, ...]], ...]:
@@ -124,18 +143,18 @@ def pair_words(mechanism: Mechanism) -> tuple[tuple[str, tuple[str, ...]], ...]:
     stands for n - 1 pairs: of the frame, else of its link of the lowest number, with each of the others.
     """
     number = {link: int(text) for link, text in numbered(mechanism).items()}
-    last = number[mechanism.frame]
+    frame = number[mechanism.frame]
     found: dict[tuple[bool, str, str], list[tuple[tuple[int, int], str]]] = {}
     for group in entries(mechanism):
         pair = group[0]
         hub, *others = sorted(number[link] for link in _meeting(group, number))
-        if others[-1] == last:
-            hub, others = last, [hub, *others[:-1]]
+        if frame in others:
+            hub, others = frame, [hub, *(each for each in others if each != frame)]
         for other in others:
             low, high = sorted((hub, other))
-            pinned = high == last and pair.lower and pair.drive_kind is Kind.ANGLE
-            key = (low, high) if high == last else (high, low)
-            text = f"{pair.entry_name()}-{low}" if pinned else f"{low}-{high}"
+            pinned = hub == frame and pair.lower and pair.drive_kind is Kind.ANGLE
+            key = (other, frame) if hub == frame else (high, low)
+            text = f"{pair.entry_name()}-{other}" if pinned else f"{low}-{high}"
             found.setdefault((not pair.lower, pair.drive_kind.value, pair.keyword), []).append((key, text))
     return tuple((kind[-1], tuple(text for _, text in sorted(found[kind]))) for kind in sorted(found))
 

@@ -65,6 +65,31 @@ class Moving(Shown):
     def _motions(self) -> Mapping[str, Pair]:
         return motions(self.mechanism)
 
+    def _turns_of_link(self, name: str, angle: float) -> float:
+        """The whole turns (rad) between the angle that a link's unknown has at first and the one that is told."""
+        return 0.0 if name in self._counting else _wrapped(angle) - angle
+
+    def _turns_of_pair(self, name: str, position: float) -> float:
+        """The same of the relative angle at a pair, whose input's own position is told; of a length 0."""
+        pair = self._motions[name]
+        if pair.drive_kind is not Kind.ANGLE or self._counting.issuperset(pair.links):
+            return 0.0
+        if name in self.inputs:
+            started = float(np.ravel(self.inputs[name].position)[0])
+            return 2.0 * np.pi * round((started - position) / (2.0 * np.pi))
+        return _wrapped(position) - position
+
+    def _turns_of_swing(self, name: str, positions: Array) -> float:
+        """The whole turns (rad) by which the angle at a pair is told off these of its unknown; of a length 0."""
+        pair = self._motions[name]
+        if pair.drive_kind is not Kind.ANGLE or name in self.inputs or self._counting.issuperset(pair.links):
+            return self._turns_of_pair(name, float(positions[0]))
+        return turns_to_least(positions)
+
+    def _turns_of_link_swing(self, name: str, angles: Array) -> float:
+        """The same of a link's angle."""
+        return 0.0 if name in self._counting else turns_to_least(angles)
+
     @property
     def point_names(self) -> tuple[str, ...]:
         """The names that results give the points."""
@@ -192,15 +217,13 @@ class State(Moving):
         angle, velocity, acceleration = map(float, orders(self._frame(name).angle))
         fastest, hardest = self._greatest_of_links
         sense = _sense(turning(velocity, fastest), velocity * acceleration, abs(velocity) * hardest)
-        return LinkState(angle if name in self._counting else _wrapped(angle), velocity, acceleration, sense)
+        return LinkState(angle + self._turns_of_link(name, angle), velocity, acceleration, sense)
 
     def pair(self, name: str) -> dict[str, float | None]:
         """What a pair reports of its relative motion (SI). Raises Unknown."""
         pair, parts = self._motion(name)
         position, rate, second = map(float, parts)
-        if pair.drive_kind is Kind.ANGLE and not self._counting.issuperset(pair.links):
-            position = _wrapped(position)
-        return pair.report(position, rate, second)
+        return pair.report(position + self._turns_of_pair(name, position), rate, second)
 
     def _point(self, named: NamedPoint) -> PointState:
         position, velocity, acceleration = (_both(*part) for part in _parts_of(self._carried(named)))
@@ -267,7 +290,14 @@ class Motion(Moving):
         Solved for when first asked for. Outputs are all slides, and all links pinned to the frame. Of a motion there
         and back they are those of the way there.
         """
-        return self.course.limits(self) if self.course else ()
+        return tuple(map(self._counted_limit, self.course.limits(self))) if self.course else ()
+
+    def _counted_limit(self, limit: Limit) -> Limit:
+        """A limit whose angle is one as positions have it (see `turns_to_least`)."""
+        if limit.kind != "stroke end" or limit.of not in self._motions:
+            return limit
+        position = np.atleast_1d(self._motion(limit.of)[1][0])
+        return limit._replace(value=limit.value + self._turns_of_swing(limit.of, position))
 
     def until(self, row: int) -> Motion:
         """The rows up to one, and that."""
@@ -316,9 +346,7 @@ class Motion(Moving):
     def link(self, name: str) -> LinkMotion:
         """A link by name. Its angle starts between -pi and pi unless a pair counts its turns. Raises Unknown."""
         angle, velocity, acceleration = self._rows(orders(self._frame(name).angle))
-        if name not in self._counting:
-            angle = angle - (angle[0] - _wrapped(float(angle[0])))
-        return LinkMotion(angle, velocity, acceleration)
+        return LinkMotion(angle + self._turns_of_link(name, float(angle[0])), velocity, acceleration)
 
     def jerk(self, point: str) -> Array:
         """A point's third rate (n, 2) (m/s^3). Raises Unknown, and BadInput where the motion was made without."""
@@ -337,9 +365,14 @@ class Motion(Moving):
         return self.jerked
 
     def pair(self, name: str) -> dict[str, Array | None]:
-        """What a pair reports of its relative motion at every position, each (n,) (SI). Raises Unknown."""
+        """What a pair reports of its relative motion at every position, each (n,) (SI). Raises Unknown.
+
+        An angle starts between -pi and pi, as a link's; that of an input is the input's position, and where the turns
+        of both links are counted it has these.
+        """
         pair, parts = self._motion(name)
-        return pair.report(*self._rows(parts))
+        position, velocity, acceleration = self._rows(parts)
+        return pair.report(position + self._turns_of_pair(name, float(position[0])), velocity, acceleration)
 
     def reported(self, name: str) -> Mapping[str, str]:
         """What a pair reports, and the kind of quantity that each is."""
@@ -375,6 +408,17 @@ def _wrapped(angle: float) -> float:
     return float(np.arctan2(np.sin(angle), np.cos(angle))) if abs(angle) > np.pi else angle
 
 
+def turns_to_least(angles: Array) -> float:
+    """The whole turns (rad) to add to angles so that their least lies between -pi and pi, as positions have it.
+
+    Of such as turn right round it is the first that lies there.
+    """
+    first = float(angles[0] if np.ptp(angles) >= 2.0 * np.pi else np.min(angles))
+    return 0.0 if abs(first) <= np.pi + SEAM else _wrapped(first) - first
+
+
+SEAM = 1e-9
+"""rad: an angle so little beyond half a turn is told as half a turn."""
 Parts = tuple[Any, Any, Any]
 """A number with its first and second rate: floats, or arrays over a motion."""
 

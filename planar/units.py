@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from functools import cache
-from math import isfinite, pi
+from math import isfinite, log10, pi
 from typing import NamedTuple
 
 SI = {
@@ -39,6 +39,7 @@ TABLE: dict[str, tuple[str, float, float]] = {
     "km": ("length", 1e3, 1.0),
     "um": ("length", 1.0, 1e6),
     "in": ("length", 0.0254, 1.0),
+    "ft": ("length", 0.3048, 1.0),
     "rad": ("angle", 1.0, 1.0),
     "deg": ("angle", pi, 180.0),
     "rad/s": ("angular velocity", 1.0, 1.0),
@@ -48,8 +49,12 @@ TABLE: dict[str, tuple[str, float, float]] = {
     "deg/s^2": ("angular acceleration", pi, 180.0),
     "m/s": ("velocity", 1.0, 1.0),
     "mm/s": ("velocity", 1.0, 1e3),
+    "in/s": ("velocity", 0.0254, 1.0),
+    "ft/s": ("velocity", 0.3048, 1.0),
     "m/s^2": ("acceleration", 1.0, 1.0),
     "mm/s^2": ("acceleration", 1.0, 1e3),
+    "in/s^2": ("acceleration", 0.0254, 1.0),
+    "ft/s^2": ("acceleration", 0.3048, 1.0),
     "N": ("force", 1.0, 1.0),
     "kN": ("force", 1e3, 1.0),
     "N m": ("torque", 1.0, 1.0),
@@ -65,6 +70,9 @@ TABLE: dict[str, tuple[str, float, float]] = {
     "N m s/rad": ("torsional damping", 1.0, 1.0),
 }
 """unit: (kind, numerator, denominator) of its size in SI."""
+
+_OF_LENGTH = {"velocity": "/s", "acceleration": "/s^2", "jerk": "/s^3"}
+"""Kinds of quantities that are lengths by time, and what stands behind the unit of length."""
 
 LONGEST = 64
 """Characters of a quantity; the longest that `shortest` writes takes 33."""
@@ -104,6 +112,47 @@ def unit(text: str) -> Unit:
     if not _UNIT.fullmatch(spelled):
         raise UnitError(f"{text!r} is not a unit")
     return _looked_up(spelled)
+
+
+def shown(kind: str, declared: tuple[str, str]) -> tuple[str, Unit]:
+    """The unit in which a kind of quantity is shown, and its name as it is printed (see `own`)."""
+    name, of = own(kind, declared)
+    return printed(name), of
+
+
+def own(kind: str, declared: tuple[str, str]) -> tuple[str, Unit]:
+    """The unit of a kind of quantity that goes with the length and the angle that a file declares, and its name.
+
+    Lengths and angles are in the file's own. Velocities, accelerations and jerks are in metres by seconds where
+    the length is metric, as textbooks have them beside millimetres, and else in the file's own length by seconds:
+    in/s beside in. Everything else is in SI.
+    """
+    length, angle = declared
+    theirs = {"length": length, "angle": angle}
+    if kind in theirs:
+        return theirs[kind], unit(theirs[kind])
+    if kind in _OF_LENGTH:
+        name, (_, numerator, denominator) = length_of_rates(length)
+        return name + _OF_LENGTH[kind], Unit(kind, numerator, denominator)
+    return SI[kind], Unit(kind, 1.0, 1.0)
+
+
+def length_of_rates(length: str) -> tuple[str, Unit]:
+    """The unit of length in which rates are shown: the metre where the declared one is metric, else that one."""
+    return coherent(length)
+
+
+def coherent(text: str) -> tuple[str, Unit]:
+    """The SI unit of what a unit measures where it is a tenth, a thousand, ... of that, else the unit itself."""
+    own = unit(text)
+    power = log10(own.numerator / own.denominator)
+    metric = abs(power - round(power)) < 1e-9
+    return (SI[own.kind], Unit(own.kind, 1.0, 1.0)) if metric else (text, own)
+
+
+def printed(name: str) -> str:
+    """A unit as it is printed: m/s², N·m."""
+    return name.replace("^2", "²").replace("^3", "³").replace(" ", "·")
 
 
 def quantity(text: str, kind: str) -> float:

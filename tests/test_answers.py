@@ -11,7 +11,7 @@ from click.testing import CliRunner
 import planar
 from planar.cli import main
 from planar.errors import BadInput
-from planar.mechanism import Drive, with_inputs
+from planar.mechanism import Drive, motions, with_inputs
 from planar.motion import Unknown
 from planar.views.answers import record, tables
 from tests.test_extremes import slider_crank, turn_apart
@@ -330,3 +330,37 @@ def test_the_command_prints_answers_beside_the_run():
     refused = CliRunner().invoke(main, ["cycle", "004-QR", "--steps", "24", "--of", "nothing"])
     assert refused.exit_code == 2
     assert "--of" in refused.output
+
+
+@pytest.mark.parametrize(
+    "model", ["four-bar", "hart-inversor", "triple-rocker", "watt-parallel-motion", "jansen-leg", "crank-rocker"]
+)
+def test_an_angle_of_one_thing_is_told_one_way(model):
+    """A pair on the frame turns as its link does; both start between -180 and 180 degrees, as a position has them."""
+    motion = planar.cycle(planar.load(model), 24)
+    state = planar.solve(motion.mechanism)
+    compared = 0
+    for name, pair in motions(motion.mechanism).items():
+        told = next(iter(motion.pair(name).values()))
+        here = next(iter(state.pair(name).values()))
+        if name in motion.inputs:
+            assert told == pytest.approx(motion.inputs[name].position, abs=1e-9)
+            assert here == pytest.approx(state.inputs[name].position, abs=1e-9)
+        elif pair.links[0] == motion.mechanism.frame and pair.keyword == "turning":
+            assert abs(told[0]) <= pi
+            assert here == pytest.approx(state.link(pair.links[1]).angle, abs=1e-9)
+            assert told == pytest.approx(motion.link(pair.links[1]).angle, abs=1e-9)
+            by_pair, by_link = planar.swing(motion, name), planar.swing(motion, pair.links[1])
+            assert (by_pair is None) == (by_link is None)
+            if by_pair is not None:
+                for one, other in zip(by_pair[1:3], by_link[1:3], strict=True):
+                    assert one.value == pytest.approx(other.value, abs=1e-7)
+            wide = [planar.dwells(motion, each, within=0.2, least=0.0) for each in (name, pair.links[1])]
+            assert [each.at.value for each in wide[0]] == pytest.approx([each.at.value for each in wide[1]], abs=1e-7)
+            if by_pair is not None:
+                assert abs(by_pair.least.value) <= pi + 1e-6
+                low, high = by_pair.least.value - 1e-7, by_pair.greatest.value + 1e-7
+                ends = [each.value for each in motion.limits if each.kind == "stroke end" and each.of == name]
+                assert all(low <= each <= high for each in (*ends, *(each.at.value for each in wide[0])))
+            compared += 1
+    assert compared

@@ -919,7 +919,7 @@ def test_the_command_prints_all_centres_in_the_order_of_finding(tmp_path):
         assert (row[2], row[3], row[6]) == (" - ".join(each.links), each.how, each.derivation)
     assert "6 centres of 4 links: 4 by the pairs and 2 by Kennedy's theorem" in ended.out
     assert "none needed the simultaneous equations" in ended.out
-    assert len(re.findall(r"but for \d\.\de-1\d", ended.out)) == 3
+    assert len(re.findall(r"to round-off \(\d\.\de-1\d|exactly", ended.out)) == 3
 
 
 def test_the_command_says_what_lies_at_infinity_and_where(tmp_path):

@@ -10,9 +10,15 @@ from rich.console import Console
 
 import planar
 from planar import files
+from planar.drawing.free_bodies import free_bodies
+from planar.drawing.picture import Letter
+from planar.drawing.scheme import scheme
+from planar.files import to_dict
+from planar.graph import numbered
 from planar.mechanism import entries
+from planar.pages.carried import carried
 from planar.views.inspected import inspection, orders
-from tests.command import run
+from tests.command import ROOT, run
 from tests.known import MODELS
 from tests.test_cli import written
 
@@ -295,6 +301,53 @@ def test_two_inspections_from_other_names_and_orders_agree():
     }
     one, two = (planar.inspect(files.from_dict(each)) for each in (value, turned))
     assert one == two
+
+
+NUMBERED = {"OA": "1", "AB": "2", "QB": "4", "BD": "15"}
+"""What the links of the README's press are called, instead."""
+
+
+@pytest.fixture(scope="module")
+def renamed():
+    """The press whose links its author numbered, with the load that presses."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8").split("<!-- file: press.json -->\n```json\n")[1]
+    text = text.split("```")[0]
+    for old, new in NUMBERED.items():
+        text = text.replace(f'"{old}"', f'"{new}"')
+    return files.from_dict(json.loads(text) | {"loads": [{"point": "D", "force": [-1000, 0]}]})
+
+
+def test_links_that_are_numbers_keep_them_in_text_tables_drawings_and_pages(renamed, tmp_path):
+    """The others have the numbers that are left, the frame the last of these."""
+    expected = {"1": "1", "2": "2", "4": "4", "15": "15", "block D": "3", "frame": "5"}
+    inspected = planar.inspect(renamed)
+    assert {link: each.number for link, each in inspected.links.items()} == expected
+    words = dict(inspected.pairs)
+    assert set(words["turning"]) == {"O-1", "1-2", "2-4", "2-15", "Q-4", "3-15"}
+    assert set(words["sliding"]) == {"3-5"}
+    state = planar.solve(renamed)
+    centres = planar.centres(state)
+    assert dict(centres.numbers) == expected
+    assert centres["2", "frame"].name == "I2,5"
+    assert centres["2", "15"].name == "I2,15"
+    texts = {mark.about: mark.text for mark in scheme(state).marks if isinstance(mark, Letter)}
+    assert {link: texts[f"number of {link}"] for link in expected} == expected
+    pictures, _ = free_bodies(planar.forces(state))
+    titles = [each.title for each in pictures]
+    assert {"1", "2", "4", "15", "3 block D"} <= set(titles)
+    abouts = {mark.about for each in pictures for mark in each.marks}
+    assert {"force F_12", "force F_21", "force F_3,15"} <= abouts
+    data, _ = carried(renamed)
+    assert data["numbers"] == expected
+    shown = run(tmp_path, "centres", written(tmp_path, to_dict(renamed))).done()
+    assert "links: 1, 2, 3 block D, 4, 5 frame and 15" in shown
+
+
+@pytest.mark.parametrize("name", ["01", "1a", "-1", "½", "２", "99999"])
+def test_only_a_plain_number_is_a_links_number(name):
+    value = json.loads(json.dumps(four_bar()).replace('"c"', json.dumps(name)))
+    number = numbered(files.from_dict(value))
+    assert sorted(number.values()) == ["1", "2", "3", "4"]
 
 
 # the command

@@ -50,6 +50,29 @@ def test_commands_of_the_tour_run(words, folder):
         assert len(done.out) > 100
 
 
+def test_the_tour_runs_as_it_stands_once_the_environment_is_activated(folder):
+    """In a shell that has no `planar`, in an environment where the set-up's own command put it."""
+    (line,) = re.search(r"<!-- activate -->\n```sh\n(.*?)```", README, re.DOTALL).groups()
+    assert README.index(line) < README.index("\nplanar ")
+    made = folder / re.search(r"-m venv (\S+)", README).group(1)
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", made], check=True)
+    script = made / "bin" / "planar"
+    entry = "import sys; from planar.cli import main; sys.exit(main())"
+    script.write_text(f"#!/bin/sh\nexec '{sys.executable}' -c '{entry}' \"$@\"\n", encoding="utf-8")
+    script.chmod(0o755)
+    elsewhere = [each for each in os.get_exec_path() if not (Path(each) / "planar").exists()]
+    done = subprocess.run(
+        [shutil.which("sh"), "-ec", f"{line}\n{shlex.join(COMMANDS[0])}"],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        env=os.environ | {"PATH": os.pathsep.join(elsewhere), "PYTHONPATH": str(ROOT)},
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "Press" in done.stdout
+
+
 def test_the_python_snippet_runs(folder):
     (snippet,) = blocks("python")
     environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONWARNINGS": "error"}

@@ -14,6 +14,7 @@ from planar import files
 from planar.drawing import symbols
 from planar.drawing.bodies import bodies, hull
 from planar.drawing.ground import ground_marks
+from planar.drawing.labels import placed
 from planar.drawing.paper import Scale
 from planar.drawing.paper import given as reading
 from planar.drawing.picture import Arrow, Circle, Fill, Letter, Line, Pen, Picture, extent
@@ -328,12 +329,17 @@ def test_input_arrows_point_the_way_that_the_input_drives(name):
     state, picture = solved(name), drawn(name)
     for given_input in state.mechanism.inputs:
         marks = about(picture, f"input {given_input.pair}")
-        if given_input.velocity == 0.0:
+        if given_input.velocity == given_input.acceleration == 0.0:
             assert marks == []
             continue
-        arrow, letter = marks
-        assert isinstance(letter, Letter)
-        assert f"{abs(given_input.velocity):.4g}" in letter.text
+        arrow, *letters = marks
+        assert all(isinstance(letter, Letter) for letter in letters)
+        along = 1.0 if (given_input.velocity or given_input.acceleration) > 0.0 else -1.0
+        told = [rate * along for rate in (given_input.velocity, given_input.acceleration) if rate]
+        read = [float(letter.text.split()[2].replace("−", "-")) for letter in letters]
+        assert read == pytest.approx(told, rel=5e-4)
+        if not given_input.velocity:
+            continue
         if isinstance(arrow, Arrow):
             rides = next(pair for pair in state.mechanism.pairs if pair.name == given_input.pair).rides()
             (link, point), guide = rides
@@ -360,6 +366,35 @@ def test_the_arrow_of_a_crank_turns_as_the_crank_does():
         assert arrow.centre == pytest.approx((0.0, 0.0), abs=1e-9)
     still = planar.solve(with_inputs(mechanism, (Drive("A", None, 0.0, 0.0),)))
     assert about(scheme(still), "input A") == []
+
+
+def test_alpha_stands_beside_omega_with_its_sense_along_the_arrow():
+    mechanism = planar.load("four-bar")
+    for velocity, acceleration, pointed, told in (
+        (3.0, -26.0, 1, ["ω = 3 rad/s", "α = −26 rad/s²"]),
+        (-3.0, -26.0, -1, ["ω = 3 rad/s", "α = 26 rad/s²"]),
+        (0.0, -26.0, -1, ["α = 26 rad/s²"]),
+    ):
+        state = planar.solve(with_inputs(mechanism, (Drive("A", None, velocity, acceleration),)))
+        picture = scheme(state)
+        arrow, *letters = about(picture, "input A")
+        assert (arrow.pointed, [each.text for each in letters]) == (pointed, told)
+        shown = placed([mark for mark in picture.marks if isinstance(mark, Letter)], picture.marks)
+        assert set(told) <= {each.letter.text for each in shown}  # two texts, not one line
+
+
+@pytest.mark.parametrize("name", ["slider-crank", "four-bar", "crank-rocker", "002-E3.1", "two-stroke-engine"])
+def test_the_number_of_a_link_is_not_read_as_a_part_of_a_rate(name):
+    """No figure stands close behind words in their line."""
+    picture = scheme(planar.solve(planar.load(name)))
+    shown = placed([mark for mark in picture.marks if isinstance(mark, Letter)], picture.marks)
+    rates = [each.box for each in shown if " = " in each.letter.text]
+    assert rates
+    for each in shown:
+        if each.letter.text.isdigit():
+            for box in rates:
+                behind = 0.0 < each.box.left - box.right < 8.0
+                assert not (behind and min(each.box.top, box.top) - max(each.box.bottom, box.bottom) > 0.5)
 
 
 def test_a_coupler_has_its_points_on_its_line_and_beside_it():

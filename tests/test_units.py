@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planar.units import SI, TABLE, Unit, UnitError, example, quantity, shortest, unit
+from planar.units import SI, TABLE, Unit, UnitError, example, own, quantity, shortest, shown, unit
 from tests.watchdog import watched
 
 STEADY = settings(deadline=None)
@@ -354,3 +354,25 @@ def test_shortest_writes_numbers_of_numpy_as_numbers() -> None:
 def test_from_si_undoes_to_si(spelled: str, value: float) -> None:
     of = unit(spelled)
     assert of.from_si(of.to_si(value)) == pytest.approx(value, rel=ULPS)
+
+
+# the units in which results are shown
+
+
+@pytest.mark.parametrize(
+    ("length", "rates"),
+    [("m", "m"), ("mm", "m"), ("cm", "m"), ("km", "m"), ("dm", "m"), ("in", "in"), ("ft", "ft"), ("yd", "yd")],
+)
+def test_rates_are_in_metres_beside_metric_lengths_and_else_in_the_files_own(length: str, rates: str) -> None:
+    declared = (length, "deg")
+    size = 1.0 if rates == "m" else quantity(f"1 {length}", "length")
+    for kind, behind in (("velocity", "/s"), ("acceleration", "/s^2"), ("jerk", "/s^3")):
+        name, of = own(kind, declared)
+        assert (name, of.kind) == (rates + behind, kind)
+        assert of.to_si(3.0) == pytest.approx(3.0 * size, rel=ULPS)
+        if kind != "jerk":
+            assert unit(name).to_si(3.0) == pytest.approx(of.to_si(3.0), rel=ULPS)
+    assert shown("acceleration", declared)[0] == f"{rates}/s²"
+    assert own("length", declared) == (length, unit(length))
+    assert own("angle", declared) == ("deg", unit("deg"))
+    assert [own(kind, declared)[0] for kind in ("angular velocity", "force", "torque")] == ["rad/s", "N", "N m"]

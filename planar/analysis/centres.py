@@ -19,7 +19,7 @@ from planar.analysis.standing import standing
 from planar.analysis.ties import Rates
 from planar.analysis.ties import rates as rates_of
 from planar.analysis.walks import Walks
-from planar.graph import numbered
+from planar.graph import numbered, parting
 from planar.mechanism import Mechanism, named_points
 from planar.motion import State, Unknown
 
@@ -220,7 +220,7 @@ class _Search:
     def _named(self, two: Two) -> tuple[tuple[str, str], str]:
         links = tuple(sorted(two, key=lambda link: int(self.numbers[link])))
         first, second = (self.numbers[link] for link in links)
-        return links, f"I{first}{second}" if len(self.links) < 10 else f"I{first},{second}"
+        return links, f"I{first}{parting(self.numbers)}{second}"
 
     def _name(self, a: str, b: str) -> str:
         return self._named(frozenset((a, b)))[1]

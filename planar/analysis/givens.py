@@ -13,7 +13,7 @@ from planar.mechanism import Along, At, Distances, Link, Mechanism, Units, entri
 from planar.motion import State
 from planar.pairs import Kind, Pair
 from planar.results import InputState
-from planar.units import unit
+from planar.units import own, unit
 from planar.words import amount, turning
 
 
@@ -120,7 +120,7 @@ def _input(mechanism: Mechanism, pair: Pair, driven: InputState) -> Phrase:
     at = _amount(position, "length" if pair.drive_kind is Kind.LENGTH else "angle", mechanism.units)
     first, second = pair.links
     if pair.drive_kind is Kind.LENGTH:
-        return (f"Input at {pair.name}: {at}; ", *_shifts(second, first, velocity, acceleration), ".")
+        return (f"Input at {pair.name}: {at}; ", *_shifts(second, first, velocity, acceleration, mechanism.units), ".")
     moves = second if first == mechanism.frame else first if second == mechanism.frame else f"{second} against {first}"
     if not velocity and not acceleration:
         return (f"Input at {pair.name}: {at}; {moves} is held.",)
@@ -137,13 +137,18 @@ def _input(mechanism: Mechanism, pair: Pair, driven: InputState) -> Phrase:
     return (*found, ".")
 
 
-def _shifts(second: str, first: str, velocity: float, acceleration: float) -> Phrase:
+def _shifts(second: str, first: str, velocity: float, acceleration: float, units: Units) -> Phrase:
     if not velocity and not acceleration:
         return (f"{second} is held on {first}",)
-    found: Phrase = (f"{second} slides on {first} at ", Quantity(velocity, "m/s"), " along the line")
+    found: Phrase = (f"{second} slides on {first} at ", _told(velocity, "velocity", units), " along the line")
     if not acceleration:
         return (*found, ", uniformly")
-    return (*found, ", with an acceleration of ", Quantity(acceleration, "m/s^2"))
+    return (*found, ", with an acceleration of ", _told(acceleration, "acceleration", units))
+
+
+def _told(value: float, kind: str, units: Units) -> Quantity:
+    name, of = own(kind, units)
+    return Quantity(value, name, by=of.from_si(1.0))
 
 
 def _turns(velocity: float) -> Phrase:

@@ -25,6 +25,7 @@ from planar.analysis.phrases import (
 )
 from planar.analysis.polygons import Factor, Meeting, Part, Polygon, Simultaneous, Triangle, Vector
 from planar.mechanism import named_points
+from planar.units import length_of_rates, own
 
 NONE = 1e-9
 """A vector below this part of the polygon's greatest is zero."""
@@ -55,9 +56,23 @@ class Notation:
         """1 for velocities, 2 for accelerations."""
         return 1 if self.polygon.kind == "velocity" else 2
 
-    @property
+    @cached_property
     def unit(self) -> str:
-        return "m/s" if self.order == 1 else "m/s^2"
+        """The unit in which its vectors are told: m/s."""
+        return own(self.polygon.kind, self.polygon.state.mechanism.units)[0]
+
+    @cached_property
+    def lengths(self) -> float:
+        """How many of the lengths in which rates are told are one metre."""
+        return length_of_rates(self.polygon.state.mechanism.units.length)[1].from_si(1.0)
+
+    def number(self, value: float, kind: str) -> str:
+        """A number (SI) of a kind of quantity, as it is told."""
+        return number(value * self.lengths if kind in ("length", "velocity", "acceleration") else value)
+
+    def quantity(self, value: float) -> Quantity:
+        """A magnitude of this polygon's kind (SI) with its unit."""
+        return Quantity(value, self.unit, by=self.lengths)
 
     @cached_property
     def letters(self) -> Mapping[str, str]:
@@ -118,7 +133,7 @@ class Notation:
 
     def drawn(self, vector: Vector) -> Quantity:
         """A vector's magnitude, to be drawn."""
-        return Quantity(self.size(vector.value), self.unit, self.polygon.kind)
+        return self.quantity(self.size(vector.value))._replace(kind=self.polygon.kind)
 
     def row(self, vector: Vector, alone: bool) -> Row:
         """A row of the vector table; `alone`: it is the whole of the relative acceleration along a line."""
@@ -133,19 +148,30 @@ class Notation:
         if vector.part is Part.SLIDING or not vector.factors:
             pair = vector.factors[0].symbol.partition(" at ")[2] if vector.factors else ""
             given = pair in self.polygon.state.inputs
-            return (f"{'given' if given else 'by the pair'} at {pair}: " if pair else "", number(size))
-        whole = (" = ", number(size))
+            return (
+                f"{'given' if given else 'by the pair'} at {pair}: " if pair else "",
+                self.number(size, self.polygon.kind),
+            )
+        whole = (" = ", self.number(size, self.polygon.kind))
         if vector.part is Part.CENTRIPETAL:
             speed, length = vector.factors
             over: Phrase = (Raised(self._speed(vector), speed.power),)
-            numbers: Phrase = (Raised((f"({number(speed.value)})",), speed.power),)
-            return (Fraction(over, self._factor(length)), " = ", Fraction(numbers, (number(length.value),)), *whole)
+            numbers: Phrase = (Raised((f"({self.number(speed.value, speed.kind)})",), speed.power),)
+            return (
+                Fraction(over, self._factor(length)),
+                " = ",
+                Fraction(numbers, (self.number(length.value, length.kind),)),
+                *whole,
+            )
         symbols: list[Piece] = []
         for factor in vector.factors:
             told = self._speed(vector) if factor.kind == "velocity" else self._factor(factor)
             symbols += [*([" × "] if symbols else []), *told]
-        values = [factor.value if abs(factor.value) > NONE * self._rate(factor) else 0.0 for factor in vector.factors]
-        return (*symbols, " = ", " × ".join(map(number, values)), *whole)
+        values = [
+            self.number(factor.value if abs(factor.value) > NONE * self._rate(factor) else 0.0, factor.kind)
+            for factor in vector.factors
+        ]
+        return (*symbols, " = ", " × ".join(values), *whole)
 
     def _rate(self, factor: Factor) -> float:
         """The greatest rate of a factor's kind, beside which it is none."""

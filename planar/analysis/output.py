@@ -14,7 +14,7 @@ from planar.analysis.steady import SAME, Steady
 from planar.analysis.zeros import changes, dips
 from planar.errors import BadInput, NoAnswer
 from planar.mechanism import motions
-from planar.motion import Moving, Parts, Unknown, _wrapped
+from planar.motion import Moving, Parts, Unknown
 from planar.pairs import Kind
 from planar.roots import root
 
@@ -35,7 +35,8 @@ class Extreme(NamedTuple):
 class Output:
     """What a pair tells first, the angle of a link (pairs before links of the same name), or a point's coordinate.
 
-    `kind` is "length" (m) or "angle" (rad); angles count on from turn to turn. `near` is what is round-off of it.
+    `kind` is "length" (m) or "angle" (rad). The least angle of what swings lies between -pi and pi, as a position has
+    it, and the others count on from there; what turns right round starts there. `near` is what is round-off of it.
     """
 
     def __init__(self, steady: Steady, name: str, axis: Axis | None = None):
@@ -56,8 +57,9 @@ class Output:
         self.near = SAME * steady.solver.unit if length else SAME
         self._off = 0.0
         self._values = np.broadcast_to(self.of(moving)[0], steady.positions.shape)
-        if not self._pair and not length and name not in moving._counting:
-            self._off = _wrapped(float(self._values[0])) - float(self._values[0])  # as `Motion.link` tells it
+        if not length:
+            off = moving._turns_of_swing if self._pair else moving._turns_of_link_swing
+            self._off = off(name, self._values)
             self._values = self._values + self._off
 
     def of(self, moving: Moving) -> Parts:

@@ -6,13 +6,14 @@ from collections.abc import Iterable, Mapping
 from math import floor, isfinite, log10
 from typing import NamedTuple, Protocol
 
+from planar.units import printed
+
 DIGITS = 3
 """Significant digits of what is read from a drawing; what is exact with one more has that."""
 LARGE, SMALL = 1e6, 1e-4
 """From where, and below which, a number is written with a power of ten."""
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
-SHOWN = {"rad/s^2": "rad/s²", "m/s^2": "m/s²"}
 
 
 class Symbol(NamedTuple):
@@ -44,11 +45,15 @@ class Name(NamedTuple):
 
 
 class Quantity(NamedTuple):
-    """A number (SI) with its unit; one of a `kind` that is drawn to scale has its length on paper beside it."""
+    """A number (SI) with its unit, `by` of which are one in SI.
+
+    One of a `kind` that is drawn to scale has its length on paper beside it.
+    """
 
     value: float
     unit: str = ""
     kind: str = ""
+    by: float = 1.0
 
 
 class Fraction(NamedTuple):
@@ -115,8 +120,7 @@ def listed(phrases: Iterable[Phrase]) -> Phrase:
 
 def measured(value: Quantity, paper: Mapping[str, Paper] | None = None) -> str:
     """A number with its unit, and in brackets its length on paper where its kind has a scale."""
-    unit = SHOWN.get(value.unit, value.unit)
-    told = f"{number(value.value)} {unit}".rstrip()
+    told = f"{number(value.value * value.by)} {printed(value.unit)}".rstrip()
     scale = (paper or {}).get(value.kind)
     return told if scale is None else f"{told} ({scale.on_paper(abs(value.value)):.1f} mm)"
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planar.analysis.notation import NONE, Notation
-from planar.analysis.phrases import Fraction, Name, Phrase, Quantity, Symbol, number
+from planar.analysis.phrases import Fraction, Name, Phrase, Quantity, Symbol
 from planar.analysis.polygons import Meeting, Part, Simultaneous, Turn, Vector
 from planar.mechanism import motions
 from planar.words import heading
@@ -39,7 +39,8 @@ class Readings:
         if still:
             how = "neither gains nor loses speed here" if order == 2 and self._turns(turn.link) else "does not turn"
             return (symbol, " = ", Fraction(chord, (Name(turn.line),)), f" = 0: {turn.link} {how}")
-        numbers = Fraction((number(turn.magnitude),), (number(turn.length),))
+        told = self.notation.number
+        numbers = Fraction((told(turn.magnitude, self.notation.polygon.kind),), (told(turn.length, "length"),))
         return (symbol, " = ", Fraction(chord, (Name(turn.line),)), " = ", numbers, " = ", value, sense)
 
     def _source(self, pair: str) -> str:
@@ -77,7 +78,7 @@ class Readings:
         size = notation.size(value)
         symbol = Symbol("v" if notation.order == 1 else "a", point)
         chord = notation.chord(root, letter)
-        told = (symbol, " = ", chord, " = ", Quantity(size, notation.unit))
+        told = (symbol, " = ", chord, " = ", notation.quantity(size))
         if not size:
             yield (*told, ": it is at rest" if notation.order == 1 else ": its velocity does not change")
             return
@@ -110,7 +111,7 @@ class Readings:
         words = (what, *self.notation.line(vector))
         symbol = self.notation.symbol(vector.of, vector.against, vector.part)
         sense = f", {heading(vector.value)}" if size else ""
-        return (symbol, " = ", chord, " = ", Quantity(size, self.notation.unit), f"{sense}: ", *words)
+        return (symbol, " = ", chord, " = ", self.notation.quantity(size), f"{sense}: ", *words)
 
     def together(self, stage: Simultaneous) -> Iterator[Phrase]:
         """The rates and the points that simultaneous equations give."""

@@ -9,7 +9,7 @@ from itertools import groupby
 from typing import NamedTuple
 
 from planar.analysis.notation import NONE, Notation, Row
-from planar.analysis.phrases import Name, Phrase, Piece, Symbol, joined, listed, number, primed
+from planar.analysis.phrases import Name, Phrase, Piece, Quantity, Symbol, joined, listed, number, primed
 from planar.analysis.polygons import (
     Equation,
     Meeting,
@@ -310,15 +310,13 @@ def _simultaneous(notation: Notation, stage: Simultaneous) -> Iterator[Phrase]:
     )
     yield (f"{why} {many(equations, 'simultaneous equation')} in {many(unknowns, 'unknown')} {give} them at once.",)
     for equation in stage.equations:
-        yield _written(equation)
+        yield _written(notation, stage, equation)
+    angular = ("rad/s", "rad/s^2")[notation.order - 1]
     solved = [
-        (*_unknown(each.name), " = ", number(each.value), f" {_unit(notation, each.turns)}") for each in stage.unknowns
+        (*_unknown(each.name), " = ", Quantity(each.value, angular) if each.turns else notation.quantity(each.value))
+        for each in stage.unknowns
     ]
     yield ("From these ", *listed(solved), ".")
-
-
-def _unit(notation: Notation, turns: bool) -> str:
-    return ("rad/s", "rad/s²")[notation.order - 1] if turns else ("m/s", "m/s²")[notation.order - 1]
 
 
 def _unknown(name: str) -> Phrase:
@@ -326,7 +324,11 @@ def _unknown(name: str) -> Phrase:
     return (Symbol(letter, below),) if mark and letter in ("ω", "α") else (name,)
 
 
-def _written(equation: Equation) -> Phrase:
+def _written(notation: Notation, stage: Simultaneous, equation: Equation) -> Phrase:
+    """An equation with its numbers; one of lengths is in the length in which rates are told."""
+    turning = {each.name for each in stage.unknowns if each.turns}
+    of_lengths = equation.axis in ("x", "y") or any(name not in turning for name, _ in equation.terms)
+    by = notation.lengths if of_lengths else 1.0
     greatest = max((abs(slope) for _, slope in equation.terms), default=1.0)
     where = "".join(equation.loop) if max(map(len, equation.loop), default=0) <= 2 else "–".join(equation.loop)
     if equation.axis in ("x", "y"):
@@ -338,10 +340,11 @@ def _written(equation: Equation) -> Phrase:
         if abs(slope) <= NONE * greatest:
             continue
         sign = ("−" if slope < 0.0 else "") if len(found) == start else (" − " if slope < 0.0 else " + ")
-        factor = "" if abs(abs(slope) - 1.0) < NONE else f"{number(abs(slope))} "
+        told = abs(slope) * (by if name in turning else 1.0)
+        factor = "" if abs(told - 1.0) < NONE else f"{number(told)} "
         found += [sign + factor, *_unknown(name)]
     known = equation.known if abs(equation.known) > NONE * greatest else 0.0
-    return (*found, " = ", number(known))
+    return (*found, " = ", number(known * by))
 
 
 def _results(readings: Readings, batch: Batch) -> Iterator[Phrase]:

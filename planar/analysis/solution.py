@@ -17,6 +17,7 @@ from planar.analysis.sections import Section, sections
 from planar.mechanism import QUANTITIES, Published, motions
 from planar.motion import State
 from planar.pairs import Kind
+from planar.units import own
 from planar.words import STILL, heading, turning
 from planar.words import listed as words_listed
 
@@ -151,6 +152,8 @@ def _slides(state: State) -> Iterator[SlideResult]:
 
 def _rubbing(state: State) -> Iterator[Phrase]:
     """How fast pins rub: the difference of two angular velocities times the radius."""
+    measure, of = own("velocity", state.mechanism.units)
+    by = of.from_si(1.0)
     for name, pair in motions(state.mechanism).items():
         speed = state.pair(name).get("rubbing_speed")
         if speed is None:
@@ -160,6 +163,11 @@ def _rubbing(state: State) -> Iterator[Phrase]:
         frame = state.mechanism.frame
         between = [(Symbol("ω", link),) for link in pair.links[::-1] if link != frame]
         radius = speed / apart if apart > 1e-12 * (abs(first) + abs(second)) else 0.0
-        told = f" × r = {number(apart)} × {number(radius)} = " if radius else " × r = "
+        told = f" × r = {number(apart)} × {number(radius * by)} = " if radius else " × r = "
         brackets = ("(", ")") if len(between) > 1 else ("", "")
-        yield (f"At {name}: {brackets[0]}", *joined(between, " − "), f"{brackets[1]}{told}", Quantity(speed, "m/s"))
+        yield (
+            f"At {name}: {brackets[0]}",
+            *joined(between, " − "),
+            f"{brackets[1]}{told}",
+            Quantity(speed, measure, by=by),
+        )

@@ -180,10 +180,10 @@ def show(renderable: Any, output: Path | None) -> None:
 
     if output is None:
         console = Console(markup=False, emoji=False, highlight=False)  # a name is text, whatever it looks like
-        if not console.is_terminal:
+        if not console.is_terminal and not os.environ.get("COLUMNS", "").isdecimal():
             # a file or another program has no width: lines are not to be broken for it
             console.width = 140
-        console.print(renderable)
+        console.print(renderable, crop=False)
         return
     from planar.files import save
     from planar.views.saved import written

@@ -16,7 +16,7 @@ from planar.drawing.picture import Circle, Fill, Letter, Line, Pen, Picture, ext
 from planar.drawing.runs import Run, closing, steady
 from planar.drawing.scheme import scheme, space_scale, standing
 from planar.errors import BadInput, NoAnswer
-from planar.graph import numbered
+from planar.graph import numbered, parting
 from planar.mechanism import Drive, Mechanism, with_inputs
 from planar.motion import Motion, State, Unknown
 from planar.plane import Vector
@@ -220,7 +220,7 @@ def _name(found: Centrodes, mechanism: Mechanism) -> str:
     """The pole by the numbers of its links: I24."""
     numbers = numbered(mechanism)
     both = sorted((numbers[found.link], numbers[found.other]), key=int)
-    return "I" + ("," if len(numbers) > 9 else "").join(both)
+    return "I" + parting(numbers).join(both)
 
 
 def _notes(run: Run, found: Centrodes, name: str, inside: bool, pole: Array | None) -> Iterator[str]:

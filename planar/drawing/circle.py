@@ -10,6 +10,7 @@ import numpy as np
 from planar.analysis.centres import Centre, Centres
 from planar.drawing.lettering import measured
 from planar.drawing.picture import Circle, Letter, Line, Mark, Pen, Picture, Spot, spot
+from planar.graph import number_and_name
 from planar.plane import direction
 
 CHORDS = {
@@ -107,7 +108,7 @@ def _distances(spots: Array, start: Array, stop: Array) -> Array:
 
 def _notes(found: Centres, drawn: Sequence[Centre]) -> Iterator[str]:
     links = sorted(found.numbers.items(), key=lambda item: int(item[1]))
-    yield f"Links: {', '.join(f'{number} {link}' for link, number in links)}"
+    yield f"Links: {', '.join(number_and_name(number, link) for link, number in links)}"
     kinds = dict.fromkeys(told for how, (_, told) in CHORDS.items() if any(each.how == how for each in drawn))
     if kinds:
         yield "; ".join(kinds).capitalize()

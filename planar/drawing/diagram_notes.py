@@ -12,7 +12,7 @@ from planar.drawing.lettering import measured, wrapped
 from planar.drawing.paper import Scale
 from planar.drawing.runs import Run
 from planar.mechanism import Units
-from planar.units import SI, unit
+from planar.units import coherent, length_of_rates, shown, unit
 from planar.words import amount
 
 Array = np.ndarray
@@ -31,6 +31,8 @@ class Ordinate(NamedTuple):
     si: str
     low: float
     high: float
+    by: float
+    "how many of the unit `si` are one in SI, which it is but for inches and the like"
 
 
 class Sheet(NamedTuple):
@@ -117,9 +119,10 @@ def _start(sheet: Sheet) -> str:
     if not run.timed:
         return f"{told}The file gives no speed: rates are per {'metre' if run.slides else 'radian'} of the input."
     rates = ("velocity", "acceleration") if run.slides else ("angular velocity", "angular acceleration")
-    told += f"Steady speed {abs(run.rate):.6g} {SI[rates[0]]}"
+    (speed, of), (second, of_second) = (shown(kind, units) for kind in rates)
+    told += f"Steady speed {of.from_si(abs(run.rate)):.6g} {speed}"
     if run.given.acceleration:
-        told += f"; the acceleration in the file, {run.given.acceleration:.6g} {raised(SI[rates[1]])}, is left out"
+        told += f"; the acceleration in the file, {of_second.from_si(run.given.acceleration):.6g} {second}, is left out"
     return f"{told}."
 
 
@@ -130,9 +133,10 @@ def _scales(sheet: Sheet, ordinates: list[Ordinate]) -> list[str]:
     if run.timed:
         parts.append(_mu("t", sheet.span / sheet.width, "s"))
     if not run.in_time:
-        parts.append(_mu(_gone(run), float(run.turned[-1]) / sheet.width, "m" if run.slides else "rad"))
+        name, of = length_of_rates(sheet.units.length) if run.slides else coherent("rad")
+        parts.append(_mu(_gone(run), of.from_si(float(run.turned[-1])) / sheet.width, name))
     symbols = _indices(sheet)
-    parts += [_mu(name, each.scale.per_mm, each.si) for name, each in zip(symbols, ordinates, strict=True)]
+    parts += [_mu(name, each.scale.per_mm * each.by, each.si) for name, each in zip(symbols, ordinates, strict=True)]
     return [*(f"{part}," for part in parts[:-1]), f"{parts[-1]}."]
 
 
@@ -157,10 +161,10 @@ def _peaks(sheet: Sheet, ordinate: Ordinate, index: int) -> list[str]:
             continue
         told = None
         if exact is not None and np.ptp(curve.all[index]) <= 1e-9 * exact.value:
-            lines.append(f"{name} is {exact.value:.4g} {written} throughout.")
+            lines.append(f"{name} is {exact.value * ordinate.by:.4g} {written} throughout.")
             continue
         if exact is not None:
-            told = f"Greatest {name} {exact.value:.4g} {written} at {_when(sheet, exact)}"
+            told = f"Greatest {name} {exact.value * ordinate.by:.4g} {written} at {_when(sheet, exact)}"
         if sheet.chords is not None:
             found = chords(sheet.run, curve.all[index - 1], sheet.chords)
             by_chords = _by_chords(ordinate, curve, found, written, sheet.chords)
@@ -199,7 +203,7 @@ def _by_chords(ordinate: Ordinate, curve: Curve, found: Chords, written: str, co
         return None
     at = _greatest(found.rates)
     letter = f"{ordinate.symbol}_{{{at + 1}{',' + curve.name if curve.name else ''}}}"
-    return f"by {count} chords {abs(found.rates[at]):.4g} {written} ($\\mathit{{{letter}}}$)"
+    return f"by {count} chords {abs(found.rates[at]) * ordinate.by:.4g} {written} ($\\mathit{{{letter}}}$)"
 
 
 def _less(found: Chords, exact: Peak) -> str:
@@ -213,5 +217,5 @@ def _chord_scale(sheet: Sheet, ordinates: list[Ordinate]) -> str:
     symbols = _indices(sheet)
     per_mm = ordinates[0].scale.per_mm / step
     base = f"$\\mu_{symbols[0]}/(\\mu_t\\cdot$OK$/{sheet.count})$"
-    said = _mu(symbols[1], per_mm, ordinates[1].si).replace(" = ", f" = {base} = ", 1)
+    said = _mu(symbols[1], per_mm * ordinates[1].by, ordinates[1].si).replace(" = ", f" = {base} = ", 1)
     return f"Rises of {ordinates[0].symbol} drawn as they are would be velocities to the scale {said}."

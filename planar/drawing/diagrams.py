@@ -17,7 +17,7 @@ from planar.drawing.runs import steady
 from planar.errors import BadInput
 from planar.mechanism import Mechanism, motions
 from planar.motion import Motion
-from planar.units import SI, unit
+from planar.units import SI, coherent, length_of_rates, own, unit
 from planar.words import amount
 
 if TYPE_CHECKING:
@@ -110,19 +110,21 @@ def _ordinate(sheet: Sheet, index: int) -> Ordinate:
     values = np.concatenate([inner(sheet.run.time, each.all[index], each) for each in sheet.subject.curves])
     values = values[np.isfinite(values)]
     low, high = float(values.min(initial=0.0)), float(values.max(initial=0.0))
-    own = (sheet.units.angle if angle else sheet.units.length) if index == 0 else SI[kind]
-    scale = fitting(kind, own, high - low, high - low, (ROOM, ROOM))
+    of_time = timed or not sheet.run.slides or angle
+    name = own(kind, sheet.units)[0] if index == 0 or of_time else SI[kind]
+    scale = fitting(kind, name, high - low, high - low, (ROOM, ROOM))
     top = 5.0 * max(ceil((scale.on_paper(high) + 2.0) / 5.0), 0) if high > 0.0 else 0.0
     foot = 5.0 * min(floor((scale.on_paper(low) - 2.0) / 5.0), 0) if low < 0.0 else 0.0
     if top - foot < 10.0:
         top, foot = max(top, 5.0), min(foot, -5.0)
-    si = SI[kind]
+    told, of = coherent(SI[kind] if angle else name)
     if not timed and index:
         per = SI["length"] if sheet.run.slides else SI["angle"]
-        si = f"{SI[kinds[0]]}/{per}" + ("^2" if index == 2 else "")
-    written = own if index == 0 else si
-    name = ("displacement", "velocity", "acceleration")[index]
-    return Ordinate(name, SYMBOLS[angle][index], scale, written, si, foot, top)
+        base = SI["angle"] if angle else length_of_rates(sheet.units.length)[0] if of_time else SI["length"]
+        told = f"{base}/{per}" + ("^2" if index == 2 else "")
+    written = name if index == 0 else told
+    title = ("displacement", "velocity", "acceleration")[index]
+    return Ordinate(title, SYMBOLS[angle][index], scale, written, told, foot, top, of.from_si(1.0))
 
 
 def _chart(axes: Axes, sheet: Sheet, ordinate: Ordinate, index: int) -> None:

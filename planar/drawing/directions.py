@@ -17,6 +17,7 @@ from planar.errors import BadInput
 from planar.mechanism import named_points
 from planar.motion import State
 from planar.results import PointState
+from planar.units import length_of_rates, own
 
 Array = np.ndarray
 REACH = 2.5
@@ -128,7 +129,7 @@ class _Sheet:
         scale: Scale | None,
         speeds: Scale | None,
     ):
-        self.names, self.points, self.found = names, points, found
+        self.names, self.points, self.found, self.units = names, points, found, state.mechanism.units
         self.letter = "C" if "C" not in state.point_names else "I"
         fastest = max(float(np.hypot(*point.velocity)) for point in points)
         if fastest == 0.0:
@@ -139,7 +140,9 @@ class _Sheet:
         near = found.at is not None and np.abs(found.at - middle).max() <= REACH * size / 2.0
         both = np.array([low, high, *([found.at] if near else [])])
         self.scale = scale or paper.fitting("length", whole.unit, *map(float, np.ptp(both, axis=0)), ROOM)
-        self.speeds = speeds or paper.fitting("velocity", "m/s", fastest, fastest, (ARROW, ARROW))
+        self.speeds = speeds or paper.fitting(
+            "velocity", own("velocity", state.mechanism.units)[0], fastest, fastest, (ARROW, ARROW)
+        )
         self.plain = scheme(state, self.scale, numbers=False)
         self.spots = [point.position / self.scale.per_mm for point in points]
         self.heads = [at + v.velocity / self.speeds.per_mm for at, v in zip(self.spots, points, strict=True)]
@@ -207,10 +210,12 @@ class _Sheet:
         yield self.found.how.format(C=self.letter)
         if self.found.at is None:
             return
+        length, of = length_of_rates(self.units.length)
         for name, point in zip(self.names, self.points, strict=True):
             radius, speed = (float(np.hypot(*each)) for each in (point.position - self.found.at, point.velocity))
             if radius > 0.0 and speed > 0.0:
-                yield f"ω = v / r at {name}: {speed:.4g} m/s / {radius:.4g} m = {speed / radius:.4g} rad/s"
+                v, r = speed * of.from_si(1.0), radius * of.from_si(1.0)
+                yield f"ω = v / r at {name}: {v:.4g} {length}/s / {r:.4g} {length} = {speed / radius:.4g} rad/s"
         if self.at is None:
             yield f"{self.letter} lies outside, where the lines lead"
 

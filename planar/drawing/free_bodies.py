@@ -18,7 +18,7 @@ from planar.drawing.scheme import point_letters, scheme, space_scale
 from planar.drawing.strokes import moving
 from planar.dynamics.forces import Forces
 from planar.errors import BadInput
-from planar.graph import numbered
+from planar.graph import number_and_name, numbered
 from planar.mechanism import named_points
 from planar.motion import Motion
 from planar.pairs.marks import Band, Block, Opening, Pin, Wheel
@@ -100,7 +100,7 @@ class _FreeBody:
             strokes.append(arc)
             letters.append(self._letter(each, at, arc.about))
         polygon = list(self._polygon(extent(strokes)))
-        title = f"{numbered(self.scene.mechanism)[self.link]}  {self.link}"
+        title = number_and_name(numbered(self.scene.mechanism)[self.link], self.link)
         return Picture((*strokes, *polygon, *letters), title, tuple(self._notes()))
 
     @property

@@ -28,6 +28,8 @@ CLEAR, WIDE, GAP = 0.15, 0.7, 0.45
 """mm to strokes at the least; mm to strokes that look well; mm between letters at the least."""
 HIT, MEET, BLIND = 40.0, 120.0, 40.0
 """Costs of a stroke across a letter, of letters that meet, of a leader across a letter."""
+ALONG, READS_ON = 10.0, 4.0
+"""mm within which a figure that follows words in their line is read as theirs, and what that costs."""
 GOOD = 12.0
 """What the place of a letter costs at the most where nothing is wrong with it."""
 SWEEPS = 5
@@ -137,6 +139,8 @@ class _Board:
         sizes = [measured(each.text, each.size, each.slanted, each.math) for each in letters]
         self.sizes = np.array([(each.width, each.height) for each in sizes])
         self.spots = np.array([each.at for each in letters])
+        self.figures = np.array([each.text[:1].isdigit() for each in letters])
+        self.words = np.array([" " in each.text for each in letters])
         self.stages = [1] * len(letters)
         self.choices = [self._candidates(index, STAGES[0]) for index in range(len(letters))]
         self.boxes = np.full((len(letters), 4), np.nan)
@@ -223,13 +227,24 @@ class _Board:
         nearest = distances(boxes, spots).min(axis=1)
         return np.where(nearest < 0.4, HIT, 0.0) + np.where(~led & (nearest < far + 0.3), 4.0, 0.0)
 
-    def _beside(self, choice: _Choice, others: np.ndarray) -> np.ndarray:
+    def _read_on(self, index: int, boxes: np.ndarray, others: np.ndarray) -> np.ndarray:
+        """What it costs that a figure stands behind words in their line, as if it were a part of what they say (n,)."""
+        costs = np.zeros(len(boxes))
+        for own, theirs, behind in ((self.figures, self.words, 1.0), (self.words, self.figures, -1.0)):
+            found = self.boxes[others[theirs[others]]] if own[index] else np.empty((0, 4))
+            left, right = (found[None], boxes[:, None]) if behind > 0.0 else (boxes[:, None], found[None])
+            gap = right[..., 0] - left[..., 2]
+            level = np.minimum(left[..., 3], right[..., 3]) - np.maximum(left[..., 1], right[..., 1])
+            costs += READS_ON * ((gap > 0.0) & (gap < ALONG) & (level > 0.0)).sum(axis=1)
+        return costs
+
+    def _beside(self, index: int, choice: _Choice, others: np.ndarray) -> np.ndarray:
         """What the candidates cost besides others (indices) that stand somewhere (n,)."""
         boxes, leaders = self.boxes[others], self.leaders[others]
         leaders = leaders[~np.isnan(leaders[:, 0])]
         count, bounds = len(choice.boxes), around(leaders)
         deep = meet(choice.boxes, boxes, GAP)
-        costs = np.where(deep > 0.0, MEET + 20.0 * deep, 0.0).sum(axis=1)
+        costs = np.where(deep > 0.0, MEET + 20.0 * deep, 0.0).sum(axis=1) + self._read_on(index, choice.boxes, others)
         if len(leaders):
             box, piece = close(choice.boxes, bounds, 0.2)
             blind = inside(choice.boxes[box], leaders[piece], 0.2) >= 0.0
@@ -254,12 +269,12 @@ class _Board:
         self.boxes[index], self.leaders[index] = choice.boxes[which], choice.leaders[which]
         self.paid[index] = choice.costs[which]
 
-    def _best(self, choice: _Choice, others: np.ndarray) -> tuple[int, float]:
+    def _best(self, index: int, choice: _Choice, others: np.ndarray) -> tuple[int, float]:
         """The cheapest candidate beside others, and its cost; the rest is not looked at once that is sure."""
         best, least, start, count = 0, np.inf, 0, 24
         while start < len(choice.costs) and choice.costs[start] < least:
             part = slice(start, start + count)
-            costs = choice.costs[part] + self._beside(choice.chosen(part), others)
+            costs = choice.costs[part] + self._beside(index, choice.chosen(part), others)
             if costs.min() < least:
                 best, least = start + int(costs.argmin()), float(costs.min())
             start, count = start + count, 2 * count
@@ -268,12 +283,12 @@ class _Board:
     def _choose(self, index: int) -> float:
         """Put one letter where it costs least now, looking farther off while nothing good is found; that cost."""
         others = self._standing(index)
-        best, least = self._best(self.choices[index], others)
+        best, least = self._best(index, self.choices[index], others)
         while least > GOOD and self.stages[index] < len(STAGES):
             both = zip(self.choices[index], self._candidates(index, STAGES[self.stages[index]]), strict=True)
             self.choices[index] = _Choice(*(np.concatenate(each) for each in both)).ordered()
             self.stages[index] += 1
-            best, least = self._best(self.choices[index], others)
+            best, least = self._best(index, self.choices[index], others)
         self._stand(index, self.choices[index], best)
         return least
 
@@ -317,7 +332,7 @@ class _Board:
         total = 0.0
         for place, index in enumerate(touched):
             now = _Choice(self.boxes[index][None], self.leaders[index][None], self.paid[[index]])
-            total += self.paid[index] + float(self._beside(now, self._standing(*touched[: place + 1]))[0])
+            total += self.paid[index] + float(self._beside(index, now, self._standing(*touched[: place + 1]))[0])
         return total
 
     def _part(self) -> None:
@@ -327,7 +342,7 @@ class _Board:
             step = STAGES[-1][-1] / 4.0
             while meet(self.boxes[[index]], self.boxes[others], 0.0).max(initial=0.0) > 0.0:
                 choice = self._candidates(index, (step, step * 1.15, step * 1.3))
-                costs = choice.costs + self._beside(choice, others)
+                costs = choice.costs + self._beside(index, choice, others)
                 costs[meet(choice.boxes, self.boxes[others], 0.0).max(axis=1) > 0.0] += 1e9
                 self._stand(index, choice, int(costs.argmin()))
                 step *= 1.5

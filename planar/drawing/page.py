@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planar.analysis.phrases import SHOWN, Name, Phrase, number
+from planar.analysis.phrases import Name, Phrase, number
 from planar.analysis.published import Comparison
 from planar.analysis.sections import Section
 from planar.analysis.solution import Solution, Worked, worked_solution
@@ -25,7 +25,7 @@ from planar.drawing.typeset import Sheet, Style, lift
 from planar.errors import BadInput
 from planar.mechanism import QUANTITIES
 from planar.motion import State
-from planar.units import SI, unit
+from planar.units import own, shown, unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -121,7 +121,7 @@ def _fitting(solution: Solution) -> dict[str, Scale]:
         values = np.array([(0.0, 0.0), *half.polygon.letters.values()])
         width, height = (float(each) for each in np.ptp(values, axis=0))
         most = ROOMS[half.kind]
-        found[half.kind] = fitting(half.kind, SI[half.kind], width, height, most)
+        found[half.kind] = fitting(half.kind, own(half.kind, solution.state.mechanism.units)[0], width, height, most)
     return found | {"length": _space(solution.state)}
 
 
@@ -215,7 +215,13 @@ def _section(section: Section, half: Worked, used: Mapping[str, Scale]) -> Itera
     for phrase in section.equation:
         yield from lines(phrase, indent=INDENT, before=0.6, keep=True)
     if section.rows:
-        heads = ("S.N.", "Vector", f"Magnitude ({SHOWN.get(SI[half.kind], SI[half.kind])})", "Direction", "Sense")
+        heads = (
+            "S.N.",
+            "Vector",
+            f"Magnitude ({shown(half.kind, half.polygon.state.mechanism.units)[0]})",
+            "Direction",
+            "Sense",
+        )
         cells = [
             ((f"{count}.",), (row.symbol, " or ", row.chord), row.magnitude, row.direction, row.sense)
             for count, row in enumerate(section.rows, 1)
@@ -245,13 +251,16 @@ def _results(solution: Solution) -> Iterator[Strip]:
             for link in solution.links
         ]
         yield from table(heads, cells, title="Links")
-    heads = [Column("Point"), Column("v (m/s)", True), Column(""), Column("a (m/s²)", True), Column("")]
+    (v, velocity), (a, acceleration) = (
+        shown(kind, solution.state.mechanism.units) for kind in ("velocity", "acceleration")
+    )
+    heads = [Column("Point"), Column(f"v ({v})", True), Column(""), Column(f"a ({a})", True), Column("")]
     cells = [
         (
             (Name(point.point),),
-            (number(point.velocity),),
+            (number(velocity.from_si(point.velocity)),),
             (point.velocity_sense,),
-            (number(point.acceleration),),
+            (number(acceleration.from_si(point.acceleration)),),
             (point.acceleration_sense,),
         )
         for point in solution.points
@@ -259,13 +268,13 @@ def _results(solution: Solution) -> Iterator[Strip]:
     yield from table(heads, cells, title="Points", before=4.0)
     if solution.slides:
         length = solution.state.mechanism.units.length
-        names = ("Pair", f"s ({length})", "v (m/s)", "a (m/s²)")
+        names = ("Pair", f"s ({length})", f"v ({v})", f"a ({a})")
         cells = [
             (
                 (slide.pair,),
                 (f"{unit(length).from_si(slide.displacement):.6g}".replace("-", "−"),),
-                (number(slide.velocity),),
-                (number(slide.acceleration),),
+                (number(velocity.from_si(slide.velocity)),),
+                (number(acceleration.from_si(slide.acceleration)),),
             )
             for slide in solution.slides
         ]
@@ -284,11 +293,11 @@ def _compared(solution: Solution) -> Iterator[Strip]:
     reasons: list[Phrase] = []
     for each in solution.comparisons:
         item = each.published
-        measure = SI[QUANTITIES[item.quantity]]
+        measure, of = shown(QUANTITIES[item.quantity], solution.state.mechanism.units)
         off = "" if each.apart is None else f"{round(100.0 * each.apart, 1) + 0.0:+.1f} %".replace("-", "−")
-        printed = "—" if item.value is None else f"{item.value:.6g}".replace("-", "−")
-        solved = (number(each.solved),)
-        cells.append(((each.about,), solved, (printed,), (SHOWN.get(measure, measure),), (off,), (each.verdict,)))
+        printed = "—" if item.value is None else f"{of.from_si(item.value):.6g}".replace("-", "−")
+        solved = (number(of.from_si(each.solved)),)
+        cells.append(((each.about,), solved, (printed,), (measure,), (off,), (each.verdict,)))
         why = item.slip or item.note
         if why:
             reasons.append((f"{each.about}: {why}",))

@@ -13,6 +13,7 @@ from planar.drawing.polygons import polygon_picture
 from planar.drawing.scheme import scheme as scheme_picture
 from planar.drawing.scheme import space_scale, standing
 from planar.motion import State
+from planar.units import own
 
 Scales = str | Sequence[str] | None
 """Scales as a reader writes them, each for what its unit measures: "1 cm = 100 mm", "1:5", "1 cm = 0.1 m/s"."""
@@ -31,7 +32,7 @@ def panels(state: State, scales: Scales, many: int) -> list[Picture]:
     pictures = [scheme_picture(state, space)._replace(title="Space diagram", notes=_scales(space))]
     for polygon in (velocity_polygon(state), acceleration_polygon(state))[: many - 1]:
         spread = np.ptp([(0.0, 0.0), *polygon.letters.values()], axis=0)
-        unit = paper.SI[polygon.kind]
+        unit = own(polygon.kind, state.mechanism.units)[0]
         fits = given.get(polygon.kind) or paper.fitting(polygon.kind, unit, *map(float, spread), PANEL)
         drawn = polygon_picture(polygon, fits)
         rest = tuple(note for note in drawn.notes[1:] if note not in _scales(fits))

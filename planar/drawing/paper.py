@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from math import floor, isfinite, log10
 
 from planar.errors import BadInput
-from planar.units import SI, UnitError, quantity, unit
+from planar.units import UnitError, coherent, quantity, unit
 
 WIDTH, HEIGHT = 150.0, 110.0
 """mm on paper that one drawing takes at the most, unless its scale is given."""
@@ -46,9 +46,10 @@ class Scale:
 
     @property
     def mu(self) -> str:
-        """The calculating scale, in SI units to a millimetre: μₗ = 0.01 m/mm."""
-        si = raised(SI[self.kind])
-        return f"{SYMBOLS[self.kind]} = {self.per_mm:.4g} {f'({si})' if '/' in si else si}/mm"
+        """The calculating scale, in SI units to a millimetre, of inches in these: μₗ = 0.01 m/mm."""
+        name, of = coherent(self.unit)
+        name = raised(name)
+        return f"{SYMBOLS[self.kind]} = {of.from_si(self.per_mm):.4g} {f'({name})' if '/' in name else name}/mm"
 
 
 def fitting(kind: str, written: str, width: float, height: float, room: tuple[float, float] = (WIDTH, HEIGHT)) -> Scale:

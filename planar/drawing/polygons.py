@@ -16,6 +16,7 @@ from planar.analysis.ties import Rates, Slide, rates
 from planar.drawing.paper import Scale, fitting
 from planar.drawing.picture import Arrow, Circle, Letter, Line, Mark, Pen, Picture, spot
 from planar.mechanism import named_points
+from planar.units import own
 
 SHORTEST = 0.05
 """mm within which two letters are at one spot, and what joins them is none."""
@@ -25,7 +26,6 @@ NOTHING = 1e-10
 """Of what the motion of the links could bring with it: a polygon smaller than that is a point."""
 MANY, FEW = 8, 3
 """Of more letters than that at the pole only the first few are shown, and the last."""
-UNITS = {"velocity": "m/s", "acceleration": "m/s^2"}
 PENS = {"velocity": Pen.VELOCITY, "acceleration": Pen.ACCELERATION}
 STILL = {"velocity": "everything is at rest", "acceleration": "nothing is accelerated"}
 TURNING = {"velocity": "no lettered point moves", "acceleration": "no lettered point is accelerated"}
@@ -53,7 +53,7 @@ def polygon_picture(polygon: Polygon, scale: Scale | None = None) -> Picture:
         values = 0.0 * values
     if scale is None:
         width, height = np.ptp(values, axis=0)
-        scale = fitting(polygon.kind, UNITS[polygon.kind], float(width), float(height))
+        scale = fitting(polygon.kind, own(polygon.kind, polygon.state.mechanism.units)[0], float(width), float(height))
     said = (
         TURNING
         if any(link.angular_velocity or link.angular_acceleration for link in polygon.state.links.values())

@@ -9,6 +9,7 @@ from math import atan2, hypot, pi, remainder
 from planar.drawing import symbols
 from planar.drawing.bodies import Body, all_marks, bodies
 from planar.drawing.ground import Clearance, fixed, ground_marks
+from planar.drawing.labels import SAME
 from planar.drawing.paper import WIDTH, Scale, fitting
 from planar.drawing.picture import Arrow, Letter, Line, Mark, Pen, Picture, spot
 from planar.drawing.scene import Scene, Travel, standing
@@ -21,6 +22,7 @@ from planar.pairs import Kind, Pair
 from planar.pairs.marks import Block, Guide, Opening, Pin, PitchLine, Wheel
 from planar.plane import Frame, Vector, direction
 from planar.shapes import Shape
+from planar.units import shown
 
 __all__ = ["body_marks", "ground_marks", "point_letters", "scheme", "space_scale", "standing"]
 
@@ -159,15 +161,27 @@ def _middle(scene: Scene, body: Body, clear: Clearance) -> tuple[Vector, float]:
 
 
 def _input(scene: Scene, given: Input, clear: Clearance) -> Iterator[Mark]:
-    """The arrow of an input with its rate, in the sense in which the driven link moves; nothing at rest."""
+    """The arrow of an input with its rates, in the sense in which the driven link moves, or begins to; none at rest."""
     pair = motions(scene.mechanism)[given.pair]
-    rate = given.velocity
-    if rate == 0.0:
+    if not given.velocity and not given.acceleration:
         return
     if pair.drive_kind is Kind.LENGTH:
-        yield from _pushed(scene, pair, rate, clear)
+        yield from _pushed(scene, pair, given, clear)
     else:
-        yield from _turned(scene, pair, rate, clear)
+        yield from _turned(scene, pair, given, clear)
+
+
+def _rates(
+    scene: Scene, given: Input, letters: tuple[str, ...], kinds: tuple[str, str], at: Vector
+) -> Iterator[Letter]:
+    """What is written at an input's arrow: its velocity, and its acceleration along the arrow; nothing of what is 0."""
+    along = 1.0 if (given.velocity or given.acceleration) > 0.0 else -1.0
+    for index, rate in enumerate((given.velocity, given.acceleration)):
+        if rate:
+            name, of = shown(kinds[index], scene.mechanism.units)
+            text = f"{letters[index]} = {of.from_si(rate * along):.4g} {name}".replace("-", "−")
+            # a text of its own by the velocity's, not one line with it
+            yield Letter(text, spot(at - Vector(0.0, 2.0 * SAME * index)), f"input {given.pair}", 9.0, 1.2)
 
 
 def _symbol(scene: Scene, letter: str, link: str, against: str | None) -> str:
@@ -179,7 +193,7 @@ def _symbol(scene: Scene, letter: str, link: str, against: str | None) -> str:
     return letter if len(scene.mechanism.inputs) == 1 else letter + number[link].translate(LOWERED)
 
 
-def _turned(scene: Scene, pair: Pair, rate: float, clear: Clearance) -> Iterator[Mark]:
+def _turned(scene: Scene, pair: Pair, given: Input, clear: Clearance) -> Iterator[Mark]:
     numbers = pair.measure([scene.shapes[link] for link in pair.bodies])
 
     def drive(turned: str | None) -> float:
@@ -196,12 +210,13 @@ def _turned(scene: Scene, pair: Pair, rate: float, clear: Clearance) -> Iterator
     at = _turning_place(scene, pair, driven)
     if at is None:
         return
-    sense = 1 if rate * turns[driven] > 0.0 else -1
+    sense = 1 if (given.velocity or given.acceleration) * turns[driven] > 0.0 else -1
     radius, middle = _free_arc(scene, at, driven, sense, clear)
     about = f"input {pair.name}"
     yield symbols.arc(at, radius, middle, SWEEP, sense, about)
-    text = f"{_symbol(scene, 'ω', driven, against)} = {abs(rate):.4g} rad/s"
-    yield Letter(text, spot(at + direction(middle) * radius), about, 9.0, 1.2)
+    rates = tuple(_symbol(scene, letter, driven, against) for letter in "ωα")
+    kinds = ("angular velocity", "angular acceleration")
+    yield from _rates(scene, given, rates, kinds, at + direction(middle) * radius)
 
 
 def _turning_place(scene: Scene, pair: Pair, driven: str) -> Vector | None:
@@ -229,13 +244,13 @@ def _free_arc(scene: Scene, at: Vector, driven: str, sense: int, clear: Clearanc
     return min(((radius, ahead + k * pi / 18.0) for radius in RADII for k in range(36)), key=price)
 
 
-def _pushed(scene: Scene, pair: Pair, rate: float, clear: Clearance) -> Iterator[Mark]:
+def _pushed(scene: Scene, pair: Pair, given: Input, clear: Clearance) -> Iterator[Mark]:
     found = pair.marks(scene.shapes, scene.mechanism.pairs)
     line = next((mark for mark in found if isinstance(mark, Guide | Opening | PitchLine)), None)
     rider = scene.rider(pair.name)
     if line is None or rider is None:
         return
-    moved, against, sign = rider[0], line.link, 1.0 if rate > 0.0 else -1.0
+    moved, against, sign = rider[0], line.link, 1.0 if (given.velocity or given.acceleration) > 0.0 else -1.0
     if moved == scene.mechanism.frame:  # the line is pushed through the block
         moved, against, sign = against, moved, -sign
     at, way = scene.place(*rider), scene.way(line.link, line.way) * sign
@@ -251,5 +266,5 @@ def _pushed(scene: Scene, pair: Pair, rate: float, clear: Clearance) -> Iterator
     tail = at + side * ASIDE + way * (ahead - ARROW / 2.0)
     about = f"input {pair.name}"
     yield Arrow(spot(tail), spot(tail + way * ARROW), Pen.INPUT, about)
-    text = f"{_symbol(scene, 'v', moved, against)} = {abs(rate):.4g} m/s"
-    yield Letter(text, spot(tail + way * (ARROW / 2.0)), about, 9.0, 1.2)
+    rates = tuple(_symbol(scene, letter, moved, against) for letter in "va")
+    yield from _rates(scene, given, rates, ("velocity", "acceleration"), tail + way * (ARROW / 2.0))

@@ -20,7 +20,7 @@ from planar.drawing.bodies import all_marks
 from planar.graph import numbered
 from planar.mechanism import Mechanism, counting, misfits, named_points
 from planar.motion import State
-from planar.pages.columns import heads, reported
+from planar.pages.columns import heads, reported, starting
 from planar.pages.document import above_zero, called, document
 from planar.pages.loaded import loaded
 from planar.pages.script import printed
@@ -30,7 +30,7 @@ from planar.plane import Vector
 from planar.program import length, scaled, shapes
 from planar.shapes import Unplaced
 from planar.solving.position import Solver, known_of
-from planar.units import unit
+from planar.units import shown
 from planar.words import amount
 
 LONGEST, SHORTEST = 2.0, 0.25
@@ -65,6 +65,10 @@ class Numbers:
     def function(self) -> str:
         """sizes(d): all numbers."""
         return printed("sizes", ca.Function("sizes", [self.d], [ca.vertcat(*map(ca.SX, self.values))]))
+
+
+KINDS = ("length", "angle", "velocity", "acceleration", "angular velocity", "angular acceleration")
+"""Of quantities that a page shows."""
 
 
 def carried(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[str, Any], str]:
@@ -117,6 +121,7 @@ def carried(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[str
         "rolling": list(usual(mechanism)) if len(mechanism.links) > 1 else None,
         "document": document(mechanism, numbers.dimensions),
         "columns": heads(mechanism, solver),
+        "starting": starting(mechanism),
         "assemblies": _assemblies(mechanism, solver),
         "z": z.tolist(),
         "tolerance": solver.tolerance,
@@ -173,8 +178,8 @@ def _input(given: Any, slides: bool) -> dict[str, Any]:
 
 
 def _units(mechanism: Mechanism) -> dict[str, Any]:
-    """Of lengths and angles; a unit is `ratio[0] / ratio[1]` of the SI unit, `si` in one number."""
-    found = {kind: (name, unit(name)) for kind, name in mechanism.units._asdict().items()}
+    """Of kinds of quantities as they are shown; a unit is `ratio[0] / ratio[1]` of the SI unit, `si` in one number."""
+    found = {kind: shown(kind, mechanism.units) for kind in KINDS}
     return {
         kind: {"name": name, "si": of.to_si(1.0), "ratio": [of.numerator, of.denominator]}
         for kind, (name, of) in found.items()

@@ -7,9 +7,10 @@ import numpy as np
 
 from planar.algebra import Jet
 from planar.errors import Outcome
-from planar.mechanism import Mechanism, motions
+from planar.mechanism import Mechanism, counting, motions
 from planar.motion import Motion
 from planar.pages.script import printed
+from planar.pairs import Kind
 from planar.program import placed
 from planar.results import InputMotion
 from planar.shapes import Shape
@@ -27,6 +28,20 @@ def heads(mechanism: Mechanism, solver: Solver) -> list[list[str]]:
     frames, own = placed(still, solver.column, solver.shapes, solver.pairs)
     one = Motion(mechanism, inputs, Outcome.SOLVED, "", 0.0, (), frames, own, solver.shapes)
     return [[column.name, column.unit, column.kind] for column in columns(one)]
+
+
+def starting(mechanism: Mechanism) -> list[list[int]]:
+    """Of what pairs report the angles whose turns are not counted: which number it is, and its input's number or -1.
+
+    They start within half a turn either way, or where the input is (see `planar.motion.Motion.pair`).
+    """
+    inputs, counts = [given.pair for given in mechanism.inputs], counting(mechanism)
+    found, at = [], 0
+    for name, pair in motions(mechanism).items():
+        if pair.drive_kind is Kind.ANGLE and not counts.issuperset(pair.links):
+            found.append([at, inputs.index(name) if name in inputs else -1])
+        at += sum(each is not None for each in pair.report(0.0, 0.0, 0.0).values())
+    return found
 
 
 def reported(mechanism: Mechanism, solver: Solver, d: ca.SX, changed: dict[str, Shape]) -> str:

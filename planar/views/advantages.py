@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from rich.table import Table
-
 from planar.analysis.advantage import Advantage
+from planar.views.fitted import FittedTable
 from planar.views.table import counted, plain_table
 
 Advantages = Mapping[str, Mapping[str, Advantage]]
 """By output and input."""
-MEASURES = {"1/m": "N per N·m", "m": "N·m per N", "1": "1"}
-"""How an advantage's unit is printed."""
+MEASURES = {"1/m": "N per N·m", "m": "N·m per N", "1": ""}
+"""How an advantage's unit is printed; one of like for like has none."""
 
 
 def each_of(advantages: Advantages) -> list[Advantage]:
@@ -21,10 +20,10 @@ def each_of(advantages: Advantages) -> list[Advantage]:
     return [each for row in advantages.values() for each in row.values()]
 
 
-def advantages_table(ratios: Iterable[Advantage]) -> Table:
+def advantages_table(ratios: Iterable[Advantage]) -> FittedTable:
     """What an ideal mechanism exerts at each output for what an input supplies, by both routes."""
-    headings = ("output", "for the input", "by power", "by centres", "unit", "through")
-    table = plain_table("Mechanical advantage", *headings, left=(0, 1, 4, 5))
+    headings = ("output", "for the input", ("by power", "by centres", "unit"), "through")
+    table = plain_table("Mechanical advantage", *headings, left=(0, 1, 4, 5), keys=2)
     for each in ratios:
         values = counted(each.by_power), counted(each.by_centres)
         table.add_row(each.output, each.input, *values, MEASURES[each.measure], " ".join(each.through))

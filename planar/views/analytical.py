@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from math import floor, log10, pi
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from rich.console import Group, RenderableType
@@ -14,7 +14,7 @@ from planar.analysis.analytical import Formula, OnRod, Route
 from planar.analysis.harmonics import Harmonics
 from planar.mechanism import Mechanism, Units
 from planar.motion import Array
-from planar.units import unit
+from planar.units import length_of_rates, unit
 from planar.views.table import paragraphs, plain_table
 from planar.words import amount, many
 
@@ -46,10 +46,19 @@ def analytical(mechanism: Mechanism, routes: Sequence[Route]) -> RenderableType:
     return Group(*parts)
 
 
+class _Per(NamedTuple):
+    """The units of velocity and acceleration, by time or by the input's angle, and how many of the length are 1 m."""
+
+    velocity: str
+    acceleration: str
+    by: float
+
+
 def _route(route: Route, units: Units) -> Iterator[RenderableType]:
     point = route.series[0].axis is not None
     yield Text(f"{'Point' if point else 'Slide'} {route.of}", style="bold")
-    per = ("m/rad", "m/rad²") if route.per_unit else ("m/s", "m/s²")
+    name, length = length_of_rates(units.length)
+    per = _Per(*((f"{name}/rad", f"{name}/rad²") if route.per_unit else (f"{name}/s", f"{name}/s²")), length.from_si(1))
     yield paragraphs(_said(route, units, per))
     yield _harmonics(route.series, units)
     if route.formula is not None:
@@ -58,7 +67,7 @@ def _route(route: Route, units: Units) -> Iterator[RenderableType]:
         yield _rod(rod, units, per)
 
 
-def _said(route: Route, units: Units, per: tuple[str, str]) -> Iterator[tuple[str, str]]:
+def _said(route: Route, units: Units, per: _Per) -> Iterator[tuple[str, str]]:
     """Stroke, greatest speed, mean, and what the slide is, in words."""
     stroke = route.series[0].stroke
     if stroke is not None:
@@ -67,10 +76,10 @@ def _said(route: Route, units: Units, per: tuple[str, str]) -> Iterator[tuple[st
             for word, end in (("TDC", stroke.top), ("BDC", stroke.bottom))
         )
         yield "stroke", f"{_length(stroke.length, units)}: {'; '.join(told)}"
-    fastest = f"{_number(route.fastest.value)} {per[0]} at {_angle(route.fastest.input, units)}"
+    fastest = f"{_number(route.fastest.value * per.by)} {per.velocity} at {_angle(route.fastest.input, units)}"
     if route.formula is not None:
         by_two = route.formula.fastest
-        fastest += f"; by two terms {_number(by_two.value)} {per[0]} at {_angle(by_two.input, units)}"
+        fastest += f"; by two terms {_number(by_two.value * per.by)} {per.velocity} at {_angle(by_two.input, units)}"
     yield "greatest speed", fastest
     if route.piston is not None:
         one = route.piston
@@ -120,15 +129,15 @@ def _count(amplitudes: Array, scale: float) -> int:
     return int(large[-1]) + 1 if len(large) else 1
 
 
-def _formula(formula: Formula, units: Units, per: tuple[str, str]) -> RenderableType:
+def _formula(formula: Formula, units: Units, per: _Per) -> RenderableType:
     """The two-term formulas beside what is exact."""
     title = f"Piston from TDC, crank at {_angle(formula.theta, units)} from it"
     table = plain_table(
-        title, "", "exact", "two terms", "unit", "off here", "greatest error in a turn", "at", left=(0, 3)
+        title, "", ("exact", "two terms", "unit"), "off here", ("greatest error in a turn", "at"), left=(0, 3)
     )
     length = unit(units.length)
-    names = (("displacement", units.length), ("velocity", per[0]), ("acceleration", per[1]))
-    scales = (length.from_si(1.0), 1.0, 1.0)
+    names = (("displacement", units.length), ("velocity", per.velocity), ("acceleration", per.acceleration))
+    scales = (length.from_si(1.0), per.by, per.by)
     for (name, measure), by, exact, two, off in zip(
         names, scales, formula.exact, formula.here, formula.deviations, strict=True
     ):
@@ -147,12 +156,16 @@ def _formula(formula: Formula, units: Units, per: tuple[str, str]) -> Renderable
     return Group(table, Text(note, style="italic"))
 
 
-def _rod(rod: OnRod, units: Units, per: tuple[str, str]) -> RenderableType:
+def _rod(rod: OnRod, units: Units, per: _Per) -> RenderableType:
     """A point of a rod by the two-term formulas beside what is exact."""
     title = f"On the rod of {rod.piston.pair}, {_length(rod.b, units)} from the piston"
-    table = plain_table(title, "", "exact", "two terms", "unit", "off", left=(0, 3))
+    table = plain_table(title, "", ("exact", "two terms", "unit"), "off", left=(0, 3))
     length = unit(units.length)
-    names = (("", units.length, length.from_si(1.0)), ("velocity", per[0], 1.0), ("acceleration", per[1], 1.0))
+    names = (
+        ("", units.length, length.from_si(1.0)),
+        ("velocity", per.velocity, per.by),
+        ("acceleration", per.acceleration, per.by),
+    )
     for (name, measure, by), exact, two in zip(names, rod.exact, rod.here, strict=True):
         rows = [(f"{name} {axis}".strip(), float(exact[k]), float(two[k])) for k, axis in enumerate("xy")]
         if name:

@@ -14,7 +14,7 @@ from planar.analysis.answers import Answers
 from planar.analysis.output import Axis, Extreme
 from planar.mechanism import Units
 from planar.motion import Motion
-from planar.units import unit
+from planar.units import length_of_rates, unit
 from planar.views.advantages import MEASURES
 from planar.views.table import DIGITS, plain_table
 from planar.words import amount
@@ -28,9 +28,10 @@ def tables(motion: Motion, asked: Mapping[str, Sequence[Answers]]) -> Renderable
     for each in (one for group in asked.values() for one in group):
         units = motion.mechanism.units
         position = _Position(motion.slides(each.input), units)
-        table = plain_table(f"Answers of {each.what} {each.of}", "what", "value", "at", "", left=(0, 1, 2, 3))
-        table.columns[2].header = f"at {each.input}"
-        for row in (*_ranges(each, units, position), *_rates(each, position), *_uses(each, units, position)):
+        table = plain_table(
+            f"Answers of {each.what} {each.of}", "what", "value", f"at {each.input}", "", left=(0, 1, 2, 3)
+        )
+        for row in (*_ranges(each, units, position), *_rates(each, units, position), *_uses(each, units, position)):
             table.add_row(*row)
         parts += [Text(), table, *(Text(f"- {note}") for note in each.notes)]
     return Group(*parts)
@@ -74,14 +75,17 @@ def _ranges(each: Answers, units: Units, position: _Position) -> Iterator[Row]:
         yield f"dwell{_of(axis)}", position(dwell.travel), position(dwell.start, dwell.stop), near
 
 
-def _rates(each: Answers, position: _Position) -> Iterator[Row]:
-    what, per = ("m" if each.length else "rad"), ("m" if position.kind == "length" else "rad")
+def _rates(each: Answers, units: Units, position: _Position) -> Iterator[Row]:
+    name, length = length_of_rates(units.length)
+    what, per = (name if each.length else "rad"), (name if position.kind == "length" else "rad")
+    by = length.from_si(1.0) if each.length else 1.0
     measures = (f"{what}/{per}", f"{what}/{per}²") if each.per_unit else (f"{what}/s", f"{what}/s²")
-    for word, found, measure in zip(
-        ("velocity", "acceleration"), (each.velocity, each.acceleration), measures, strict=True
+    scales = (by / length.from_si(1.0) ** order if each.per_unit and per == name else by for order in (1, 2))
+    for word, found, measure, scale in zip(
+        ("velocity", "acceleration"), (each.velocity, each.acceleration), measures, scales, strict=True
     ):
         if found is not None and np.isfinite(found.value):
-            yield f"greatest {word}", f"{found.value:.{DIGITS}g} {measure}", position(found.input), ""
+            yield f"greatest {word}", f"{found.value * scale:.{DIGITS}g} {measure}", position(found.input), ""
         elif found is not None:
             told = "beyond all bounds" if found.value > 0.0 else "not determined"
             yield f"greatest {word}", told, position(found.input), ""
@@ -100,7 +104,7 @@ def _uses(each: Answers, units: Units, position: _Position) -> Iterator[Row]:
     if each.advantage is not None:
         found = each.advantage
         measure = MEASURES[found.measure]
-        told = f"{found.least.value:.{DIGITS}g}" + (f" {measure}" if measure != "1" else "")
+        told = f"{found.least.value:.{DIGITS}g}" + (f" {measure}" if measure else "")
         yield "least mechanical advantage", told, position(found.least.input), ""
         for place in found.infinite:
             yield "  beyond all bounds", "", position(place), ""

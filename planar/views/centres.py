@@ -7,14 +7,15 @@ from typing import Any
 
 import numpy as np
 from rich.console import Group, RenderableType
-from rich.table import Table
 from rich.text import Text
 
 from planar.analysis.centres import Centres
+from planar.graph import number_and_name
 from planar.mechanism import motions
 from planar.motion import State
 from planar.units import unit
-from planar.views.table import DIGITS, paragraphs, plain_table
+from planar.views.fitted import FittedTable
+from planar.views.table import DIGITS, SIZE, kept, paragraphs, plain_table
 from planar.words import amount, listed, many
 
 ZERO = 1e-12
@@ -33,25 +34,25 @@ HOW = {
 def table(centres: Centres) -> RenderableType:
     """All centres in the order of finding, and what proves them."""
     state = centres.state
-    numbers = listed([f"{number} {link}" for link, number in centres.numbers.items()])
+    numbers = listed([number_and_name(number, link) for link, number in centres.numbers.items()])
     notes = paragraphs((" -", sentence) for sentence in (*remarks(centres), *state.remarks))
     head = [Text(state.mechanism.name, style="bold"), Text(_at(state)), Text(f"links: {numbers}"), Text()]
     return Group(*head, _rows(centres), paragraphs(_proof(centres)), Text(), notes)
 
 
-def _rows(centres: Centres) -> Table:
+def _rows(centres: Centres) -> FittedTable:
     state = centres.state
     length = state.mechanism.units.length
     rows = plain_table(
         "Instantaneous centres",
-        "",
+        "no.",
         "centre",
         "links",
         "how",
-        f"x, {length}",
-        f"y, {length}",
+        (f"x, {length}", f"y, {length}"),
         "derivation",
         left=(1, 2, 3, 6),
+        keys=2,
     )
     for centre in centres:
         order = "" if centre.how in ("as one", "open") else str(centre.order)
@@ -87,21 +88,17 @@ def _number(value: float) -> str:
 
 def _proof(centres: Centres) -> list[tuple[str, str]]:
     proof = centres.proof
-    by_jacobian = "each is that of the null vector of the whole Jacobian, but for"
+    by_jacobian = "each is that of the null vector of the whole Jacobian, "
     return [
-        ("proof", f"{by_jacobian} {_figure(proof.routes)}" if proof.routes is not None else "nothing can move here"),
-        ("", f"the centres of any three links are in one line, but for {_figure(proof.collinear)}"),
+        ("proof", by_jacobian + kept(proof.routes) if proof.routes is not None else "nothing can move here"),
+        ("", f"the centres of any three links are in one line, {kept(proof.collinear)}"),
         *(
-            [("", f"both links have one velocity in it, but for {_figure(proof.velocities)} of the greatest")]
+            [("", f"both links have one velocity in it, {kept(proof.velocities, 'of the greatest')}")]
             if proof.velocities is not None
             else []
         ),
-        ("", "worst of all, with lengths in those of the mechanism"),
+        ("", f"the figures are the worst of all, lengths in parts {SIZE}"),
     ]
-
-
-def _figure(value: float | None) -> str:
-    return "-" if value is None else f"{value:.1e}"
 
 
 def remarks(centres: Centres) -> tuple[str, ...]:

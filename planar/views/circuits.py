@@ -7,7 +7,6 @@ from typing import Any
 
 from rich.console import Group as Stack
 from rich.console import RenderableType
-from rich.table import Table
 from rich.text import Text
 
 from planar.assemblies.modes import Modes
@@ -16,6 +15,7 @@ from planar.branches.located import MOST, Located, located
 from planar.errors import Outcome
 from planar.mechanism import motions
 from planar.units import unit
+from planar.views.fitted import FittedTable
 from planar.views.table import number, paragraphs, plain_table
 from planar.words import amount, listed, many
 
@@ -66,17 +66,16 @@ def _running(circuits: Circuits) -> str:
     return f"input {circuits.pair} running" + (f", {listed(rest)} held" if rest else "")
 
 
-def _branches(circuits: Circuits, lying: tuple[Located, ...]) -> Table:
+def _branches(circuits: Circuits, lying: tuple[Located, ...]) -> FittedTable:
     at = _amount(circuits, _position(circuits))
     rows = plain_table(
         "Circuits and branches",
         "circuit",
         "branch",
-        f"from, {_unit(circuits)}",
-        f"to, {_unit(circuits)}",
-        "ends",
+        (f"from, {_unit(circuits)}", f"to, {_unit(circuits)}", "ends"),
         f"assemblies at, {at}",
         left=(4, 5),
+        keys=2,
     )
     for circuit in circuits:
         for branch in circuit.branches:
@@ -96,13 +95,13 @@ def _ends(branch: Branch) -> str:
     return f"{low}s" if low == high == "dead point" else low if low == high else f"{low} and {high}"
 
 
-def _intervals(circuits: Circuits) -> Table:
+def _intervals(circuits: Circuits) -> FittedTable:
     rows = plain_table(
         "Intervals of the input",
-        f"from, {_unit(circuits)}",
-        f"to, {_unit(circuits)}",
+        (f"from, {_unit(circuits)}", f"to, {_unit(circuits)}"),
         "assemblies",
         left=(),
+        keys=0,
     )
     for each in circuits.intervals:
         many_ = "?" if each.assemblies is None else str(each.assemblies)

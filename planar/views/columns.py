@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.motion import Motion
-from planar.units import SI, unit
+from planar.units import SI, own
 
 Array = np.ndarray
 
@@ -76,9 +76,8 @@ def told(motion: Motion) -> Iterator[Told]:
 def columns(motion: Motion, more: Iterable[Told] = ()) -> Iterator[Column]:
     """Time where there is one, all that is told of the run but the frame's rest, then more; under names that differ.
 
-    Positions and angles are in the units of the mechanism's file, everything else in SI.
+    Units are those that go with the mechanism's file (see `planar.units.own`).
     """
-    own = {"angle": motion.mechanism.units.angle, "length": motion.mechanism.units.length}
     taken: set[str] = set()
     for name, kind, values in _named(motion, more):
         different, again = name, 1
@@ -86,9 +85,9 @@ def columns(motion: Motion, more: Iterable[Told] = ()) -> Iterator[Column]:
             again += 1
             different = f"{name} ({again})"
         taken.add(different)
-        if kind in own:
-            _, numerator, denominator = unit(own[kind])
-            yield Column(different, own[kind], kind, values * denominator / numerator)
+        if kind in SI:
+            measure, (_, numerator, denominator) = own(kind, motion.mechanism.units)
+            yield Column(different, measure, kind, values * denominator / numerator)
         else:
             yield Column(different, MEASURES[kind], kind, values)
 

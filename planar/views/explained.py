@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planar.analysis.notation import Row
-from planar.analysis.phrases import SHOWN, Paper, Phrase, number, plain
+from planar.analysis.phrases import Paper, Phrase, number, plain
 from planar.analysis.sections import Section
 from planar.analysis.solution import LinkResult, PointResult, SlideResult, Solution, Worked
-from planar.units import SI, unit
-from planar.views.table import paragraphs, plain_table, published
+from planar.units import Unit, shown, unit
+from planar.views.table import heading, paragraphs, plain_table, published
 
 Scales = Mapping[str, Paper]
 
@@ -33,7 +33,7 @@ def explained(solution: Solution, scales: Scales | None = None) -> RenderableTyp
             parts += [Text(), *_section(section, half, scales)]
     parts += [Text(), *_results(solution)]
     if solution.comparisons:
-        parts.append(published(solution.comparisons))
+        parts.append(published(solution.comparisons, mechanism.units))
     notes = [*solution.state.remarks, *mechanism.notes]
     if notes:
         parts += [Text("Notes", style="bold"), paragraphs(("-", note) for note in notes)]
@@ -56,7 +56,7 @@ def _section(section: Section, half: Worked, scales: Scales) -> Iterator[Rendera
     if section.equation:
         yield paragraphs((" ", plain(line)) for line in section.equation)
     if section.rows:
-        yield _table(section.rows, half.kind)
+        yield _table(section.rows, shown(half.kind, half.polygon.state.mechanism.units)[0])
     steps = [(f"{count})", plain(step, scales)) for count, step in enumerate((*section.steps, *section.images), 1)]
     if section.simultaneous:
         yield paragraphs(steps[: len(section.steps)])
@@ -69,9 +69,10 @@ def _section(section: Section, half: Worked, scales: Scales) -> Iterator[Rendera
         yield _paragraphs(section.results, {})
 
 
-def _table(rows: Iterable[Row], kind: str) -> RenderableType:
-    shown = SHOWN.get(SI[kind], SI[kind])
-    table = plain_table(None, "S.N.", "vector", f"magnitude, {shown}", "direction", "sense", left=(1, 2, 3, 4))
+def _table(rows: Iterable[Row], measure: str) -> RenderableType:
+    table = plain_table(
+        None, "S.N.", "vector", f"magnitude, {measure}", "direction", "sense", left=(1, 2, 3, 4), keys=2
+    )
     for count, row in enumerate(rows, 1):
         vector = f"{plain((row.symbol,))} or {plain((row.chord,))}"
         table.add_row(f"{count}.", vector, plain(row.magnitude), plain(row.direction), plain(row.sense))
@@ -79,25 +80,37 @@ def _table(rows: Iterable[Row], kind: str) -> RenderableType:
 
 
 def _results(solution: Solution) -> Iterator[RenderableType]:
+    units = solution.state.mechanism.units
+    rates = [shown(kind, units)[1] for kind in ("velocity", "acceleration")]
     links = plain_table(
-        "Links", "link", "ang. velocity, rad/s", "sense", "ang. acceleration, rad/s²", "sense", left=(0, 2, 4)
+        "Links", "link", ("ang. velocity, rad/s", "sense"), ("ang. acceleration, rad/s²", "sense"), left=(0, 2, 4)
     )
     for link in solution.links:
         links.add_row(*_turn(link))
-    points = plain_table("Points", "point", "velocity, m/s", "sense", "acceleration, m/s²", "sense", left=(0, 2, 4))
+    points = plain_table(
+        "Points",
+        "point",
+        (heading("velocity", "velocity", units), "sense"),
+        (heading("acceleration", "acceleration", units), "sense"),
+        left=(0, 2, 4),
+    )
     for point in solution.points:
-        points.add_row(*_move(point))
+        points.add_row(*_move(point, rates))
     yield Text("3. Results", style="bold underline")
     yield Text()
     yield links
     yield points
     if solution.slides:
-        length = solution.state.mechanism.units.length
+        length = units.length
         slides = plain_table(
-            "Slides, along their lines", "pair", f"displacement, {length}", "velocity, m/s", "acceleration, m/s²"
+            "Slides, along their lines",
+            "pair",
+            f"displacement, {length}",
+            heading("velocity", "velocity", units),
+            heading("acceleration", "acceleration", units),
         )
         for slide in solution.slides:
-            slides.add_row(*_slide(slide, length))
+            slides.add_row(*_slide(slide, length, rates))
         yield slides
     if solution.rubbing:
         yield Text("Rubbing speeds at the pins", style="bold")
@@ -109,14 +122,18 @@ def _turn(link: LinkResult) -> tuple[str, ...]:
     return name, number(abs(velocity)), sense, number(abs(acceleration)), second
 
 
-def _move(point: PointResult) -> tuple[str, ...]:
+def _move(point: PointResult, rates: Sequence[Unit]) -> tuple[str, ...]:
     name, velocity, sense, acceleration, second = point
-    return name, number(velocity), sense, number(acceleration), second
+    return name, number(rates[0].from_si(velocity)), sense, number(rates[1].from_si(acceleration)), second
 
 
-def _slide(slide: SlideResult, length: str) -> tuple[str, ...]:
+def _slide(slide: SlideResult, length: str, rates: Sequence[Unit]) -> tuple[str, ...]:
     name, displacement, velocity, acceleration = slide
-    return name, f"{unit(length).from_si(displacement):.6g}", number(velocity), number(acceleration)
+    return (
+        name,
+        f"{unit(length).from_si(displacement):.6g}",
+        *(number(of.from_si(rate)) for of, rate in zip(rates, (velocity, acceleration), strict=True)),
+    )
 
 
 def record(solution: Solution, scales: Scales | None = None) -> dict[str, Any]:

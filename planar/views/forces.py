@@ -7,26 +7,26 @@ from typing import Any
 
 import numpy as np
 from rich.console import Group, RenderableType
-from rich.table import Table
 from rich.text import Text
 
 from planar.analysis.published import Comparison
 from planar.dynamics.forces import Forces
 from planar.dynamics.told import Reaction
 from planar.errors import Outcome
-from planar.graph import numbered
+from planar.graph import number_and_name, numbered
 from planar.mechanism import motions
 from planar.program import size
-from planar.units import SI
+from planar.units import shown
 from planar.views import advantages as ratios
 from planar.views import loads
-from planar.views.table import ROUNDING, counted, paragraphs, plain_table, published
+from planar.views.fitted import FittedTable
+from planar.views.table import ROUNDING, counted, kept, paragraphs, plain_table, published
 from planar.words import amount, listed
 
 
 def tables(forces: Forces, advantages: ratios.Advantages, comparisons: Sequence[Comparison] = ()) -> RenderableType:
     """Inputs, what acts, reactions, power, mechanical advantages, and the published torques beside the solved ones."""
-    state, degree = forces.moving, forces.mechanism.units.angle
+    state, units = forces.moving, forces.mechanism.units
     head = [Text(forces.mechanism.name, style="bold")]
     if forces.mechanism.source:
         head.append(Text(forces.mechanism.source, style="italic"))
@@ -35,19 +35,19 @@ def tables(forces: Forces, advantages: ratios.Advantages, comparisons: Sequence[
         parts.append(_inputs(forces))
     acting, inertia = loads.moved(forces, inertia=False), loads.moved(forces, inertia=True)
     if acting:
-        parts.append(loads.acting_table("Loads", acting, degree, greatest(forces)[0]))
+        parts.append(loads.acting_table("Loads", acting, units, greatest(forces)[0]))
     if inertia:
-        parts.append(loads.acting_table("Inertia", inertia, degree, greatest(forces)[0]))
+        parts.append(loads.acting_table("Inertia", inertia, units, greatest(forces)[0]))
     most = sum(each.most for each in (*acting, *inertia))
     parts += [_reactions(forces), paragraphs(_sums(forces, most)), Text()]
     told = ratios.each_of(advantages)
     if told:
         parts.append(ratios.advantages_table(told))
     if any(each.through for each in told):
-        links = listed([f"{number} {link}" for link, number in numbered(forces.mechanism).items()])
+        links = listed([number_and_name(number, link) for link, number in numbered(forces.mechanism).items()])
         parts += [paragraphs([("links", links)]), Text()]
     if comparisons:
-        parts += [published(comparisons), Text()]
+        parts += [published(comparisons, units), Text()]
     parts.append(paragraphs(proved(forces)))
     notes = (*undetermined(forces), *_time(forces), *dict.fromkeys(each.why for each in told if each.why))
     notes += state.remarks
@@ -86,27 +86,28 @@ def _most(values: np.ndarray | float) -> float:
     return float(np.max(np.abs(np.nan_to_num(values)), initial=0.0))
 
 
-def _inputs(forces: Forces) -> Table:
+def _inputs(forces: Forces) -> FittedTable:
     mechanism, given = forces.mechanism, forces.moving.inputs
     named, most = motions(mechanism), greatest(forces)
-    table = plain_table("Inputs", "input", "effort", "unit", "position", "rate", "power, W", left=(0, 2))
+    table = plain_table("Inputs", "input", ("effort", "unit"), "position", "rate", "power, W", left=(0, 2))
     for name, effort in forces.inputs.items():
         kind, rate_kind, _ = named[name].driven()
+        rate, of = shown(rate_kind, mechanism.units)
         table.add_row(
             name,
             counted(effort, most[forces.slides(name)]),
             measure(forces, name)[1],
             amount(given[name].position, kind, mechanism.units),
-            f"{counted(given[name].velocity)} {SI[rate_kind]}",
+            f"{counted(of.from_si(given[name].velocity))} {rate}",
             counted(forces.powers[name], most[forces.slides(name)] * given[name].velocity),
         )
     return table
 
 
-def _reactions(forces: Forces) -> Table:
+def _reactions(forces: Forces) -> FittedTable:
     degree, (moment, most) = forces.mechanism.units.angle, greatest(forces)
-    headings = ("pair", "on", "by", "force, N", f"at, {degree}", "x, N", "y, N", "couple, N·m")
-    table = plain_table("Reactions in the pairs", *headings, left=(0, 1, 2))
+    headings = ("pair", "on", "by", ("force, N", f"at, {degree}"), ("x, N", "y, N"), "couple, N·m")
+    table = plain_table("Reactions in the pairs", *headings, left=(0, 1, 2), keys=3)
     for name, reaction in forces.reactions.items():
         first, second = reaction.links
         if reaction.at is not None:
@@ -150,14 +151,14 @@ def proved(forces: Forces) -> list[tuple[str, str]]:
     """How well laws are kept."""
     proof, told = forces.proof, []
     if proof.power is not None:
-        told.append(f"all powers add up to nothing, but for {proof.power:.1e} of the greatest")
+        told.append(f"all powers add up to nothing, {kept(proof.power, 'of the greatest')}")
     if proof.routes is not None:
         told.append(
             "the efforts are those by virtual power with each input alone at unit rate, "
-            f"but for {proof.routes:.1e} of what all that acts could ask for"
+            f"{kept(proof.routes, 'of what all that acts could ask for')}"
         )
     if proof.equilibrium is not None:
-        told.append(f"{_which(forces)}, but for {proof.equilibrium:.1e} of the greatest force")
+        told.append(f"{_which(forces)}, {kept(proof.equilibrium, 'of the greatest force')}")
     if not told:
         told.append("none: of no link all is told" if forces.undetermined else "none: nothing acts on what moves")
     return [("" if index else "proof", each) for index, each in enumerate(told)]

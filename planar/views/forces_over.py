@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from rich.console import Group, RenderableType
-from rich.table import Table
 from rich.text import Text
 
 from planar.dynamics.forces import Forces
@@ -15,7 +14,8 @@ from planar.dynamics.told import Reaction
 from planar.views import forces as at_one
 from planar.views import loads
 from planar.views.columns import Told
-from planar.views.ran import heading, place, place_heading, running
+from planar.views.fitted import FittedTable
+from planar.views.ran import head, place, place_heading, running
 from planar.views.table import counted, paragraphs, plain_table
 from planar.words import listed, many
 
@@ -25,7 +25,7 @@ Array = np.ndarray
 def tables(forces: Forces) -> RenderableType:
     """Mean, least and greatest effort of every input, the greatest force and couple in every pair, each with where."""
     motion = forces.moving
-    parts: list[RenderableType] = [*heading(motion), Text(at_one.balanced(forces)), Text(), _efforts(forces)]
+    parts: list[RenderableType] = [*head(motion), Text(at_one.balanced(forces)), Text(), _efforts(forces)]
     parts += [_reactions(forces), paragraphs([*_shaking(forces), *at_one.proved(forces)])]
     notes = (*_undetermined(forces), *motion.remarks)
     if notes:
@@ -33,10 +33,10 @@ def tables(forces: Forces) -> RenderableType:
     return Group(*parts)
 
 
-def _efforts(forces: Forces) -> Table:
+def _efforts(forces: Forces) -> FittedTable:
     at, most = place_heading(forces.moving), at_one.greatest(forces)
     table = plain_table(
-        "Inputs, among these positions", "input", "mean effort", "unit", "least", at, "greatest", at, left=(0, 2)
+        "Inputs, among these positions", "input", ("mean effort", "unit"), ("least", at), ("greatest", at), left=(0, 2)
     )
     for name, effort in forces.inputs.items():
         _, unit = at_one.measure(forces, name)
@@ -65,10 +65,11 @@ def _extreme(forces: Forces, values: Array) -> tuple[float, str]:
     return float(values[row]), place(forces.moving, row)
 
 
-def _reactions(forces: Forces) -> Table:
+def _reactions(forces: Forces) -> FittedTable:
     degree, at, (moment, greatest) = forces.mechanism.units.angle, place_heading(forces.moving), at_one.greatest(forces)
-    headings = ("pair", "on", "by", "greatest force, N", f"its direction, {degree}", at, "greatest couple, N·m", at)
-    table = plain_table("Reactions in the pairs, among these positions", *headings, left=(0, 1, 2))
+    force = ("greatest force, N", f"its direction, {degree}", at)
+    headings = ("pair", "on", "by", force, ("greatest couple, N·m", at))
+    table = plain_table("Reactions in the pairs, among these positions", *headings, left=(0, 1, 2), keys=3)
     for name, each in forces.reactions.items():
         first, second = each.links
         if each.at is not None:
@@ -93,12 +94,12 @@ def _shaking(forces: Forces) -> Iterator[tuple[str, str]]:
     if not at_one.accelerated(forces):
         return
     force, moment = forces.shaking
-    at, told = place_heading(forces.moving), []
+    (name, measure), told = place_heading(forces.moving).split(", "), []
     for values, unit, beside in zip(
         (np.hypot(*force.T), np.abs(moment)), ("N", "N·m"), at_one.greatest(forces)[::-1], strict=True
     ):
         most, where = _extreme(forces, values)
-        told.append(f"up to {counted(most, beside)} {unit} ({at}: {where})")
+        told.append(f"up to {counted(most, beside)} {unit} ({name} = {where} {measure})")
     yield "shaking", f"{told[0]}, and {told[1]} about the frame's origin"
 
 

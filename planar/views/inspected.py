@@ -12,7 +12,7 @@ from planar.words import listed, many
 
 def inspection(found: Inspection) -> RenderableType:
     """Names, links, pairs, chain and mobility, in the order in which a textbook takes them up."""
-    links = plain_table("Links", "no.", "link", "order", "motion", left=(1, 2, 3))
+    links = plain_table("Links", "no.", "link", "order", "motion", left=(1, 2, 3), keys=2)
     for name, link in found.links.items():
         links.add_row(link.number, name, link.order, link.motion)
     said = [

@@ -7,13 +7,13 @@ from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
-from rich.table import Table
 
 from planar.dynamics.acting import Acting, Field
 from planar.dynamics.forces import Forces
-from planar.mechanism import Mechanism, named_points
-from planar.units import unit
-from planar.views.table import ROUNDING, counted, plain_table
+from planar.mechanism import Mechanism, Units, named_points
+from planar.units import shown, unit
+from planar.views.fitted import FittedTable
+from planar.views.table import ROUNDING, counted, heading, plain_table
 
 Array = np.ndarray
 
@@ -41,10 +41,22 @@ def moved(forces: Forces, inertia: bool) -> list[Moved]:
     ]
 
 
-def acting_table(title: str, rows: Iterable[Moved], degree: str, moment: float) -> Table:
+def acting_table(title: str, rows: Iterable[Moved], units: Units, moment: float) -> FittedTable:
     """Forces and couples with the motion of what they act on, and their power; beside the greatest moment (N m)."""
-    headings = ("what", "on", "force, N", f"at, {degree}", "torque, N·m", "velocity, m/s", f"at, {degree}")
-    table = plain_table(title, *headings, "ang. velocity, rad/s", "power, W", left=(0, 1))
+    at = heading("at", "angle", units)
+    table = plain_table(
+        title,
+        "what",
+        "on",
+        ("force, N", at),
+        "torque, N·m",
+        (heading("velocity", "velocity", units), at),
+        heading("ang. velocity", "angular velocity", units),
+        "power, W",
+        left=(0, 1),
+        keys=2,
+    )
+    measure = shown("velocity", units)[1]
     for each in rows:
         acting = each.acting
         turns = abs(acting.couple) > ROUNDING * moment
@@ -52,9 +64,9 @@ def acting_table(title: str, rows: Iterable[Moved], degree: str, moment: float) 
         table.add_row(
             acting.name,
             acting.link,
-            *arrow(acting.force if pushes else None, degree),
+            *arrow(acting.force if pushes else None, units.angle),
             counted(float(acting.couple) if turns else None),
-            *arrow(each.velocity if pushes else None, degree),
+            *arrow(measure.from_si(each.velocity) if pushes else None, units.angle),
             counted(each.angular_velocity if turns else None),
             counted(float(acting.power), each.most + moment * abs(each.angular_velocity)),
         )

@@ -8,7 +8,6 @@ from typing import Any
 
 from rich.console import Group as Stack
 from rich.console import RenderableType
-from rich.table import Table
 from rich.text import Text
 
 from planar.assemblies.modes import Group, Mode, Modes
@@ -16,6 +15,7 @@ from planar.branches.circuits import Circuits
 from planar.errors import BadInput, Outcome
 from planar.mechanism import motions
 from planar.units import unit
+from planar.views.fitted import FittedTable
 from planar.views.table import DIGITS, paragraphs, plain_table
 from planar.words import amount, listed, many
 
@@ -25,8 +25,6 @@ LISTED = 6
 """Names or numbers of one sentence."""
 CHOICES = 12
 """Groups: of more the choices are not printed."""
-WIDE = 8
-"""Characters that a coordinate takes."""
 ZERO = 1e-12
 """A coordinate below this part of the greatest is printed as 0."""
 
@@ -51,7 +49,8 @@ def table(modes: Modes, limit: int, points: Sequence[str] = (), circuits: Circui
     for reason, which in why.items():
         told.append(f"{listed([*which[:LISTED], 'more'] if len(which) > LISTED else which)}: {reason}")
     notes = paragraphs((" -", sentence) for sentence in told)
-    return Stack(*head, Text(), _groups(modes), _rows(modes, shown, names, circuits), Text(), notes)
+    groups = [_groups(modes)] if modes.groups else []
+    return Stack(*head, Text(), *groups, _rows(modes, shown, names, circuits), Text(), notes)
 
 
 def counted(modes: Modes, listed: int) -> str:
@@ -65,10 +64,10 @@ def counted(modes: Modes, listed: int) -> str:
     return f"{many(modes.total, 'assembly', 'assemblies')}{beside}, {modes.complete.value}{left}"
 
 
-def _groups(modes: Modes) -> Table:
+def _groups(modes: Modes) -> FittedTable:
     rows = plain_table(
         "Groups of links, one after the other",
-        "",
+        "group",
         "links",
         "complex expected",
         "complex found",
@@ -94,14 +93,14 @@ def _range(ends: tuple[int, int]) -> str:
     return str(ends[0]) if ends[0] == ends[1] else f"{ends[0]} to {ends[1]}"
 
 
-def _rows(modes: Modes, shown: Sequence[Mode], names: Sequence[str], circuits: Circuits | None) -> Table:
+def _rows(modes: Modes, shown: Sequence[Mode], names: Sequence[str], circuits: Circuits | None) -> FittedTable:
     length = modes.mechanism.units.length
     several = 1 < len(modes.groups) <= CHOICES
     leading = several + (0 if circuits is None else 2)
     near = modes.nearest
     rows = plain_table(
         "Assemblies",
-        "",
+        "no.",
         *(["groups"] if several else []),
         *([] if circuits is None else ["circuit", "branch"]),
         *(f"{name}: x y, {length}" for name in names),
@@ -109,9 +108,8 @@ def _rows(modes: Modes, shown: Sequence[Mode], names: Sequence[str], circuits: C
         "proved",
         "",
         left=(len(names) + leading + 2, len(names) + leading + 3),
+        keys=1 + leading,
     )
-    for column in rows.columns[1 + leading : 1 + leading + len(names)]:
-        column.no_wrap, column.min_width = False, WIDE  # on a narrow screen y goes below x
     by = unit(length)
     for mode in shown:
         distance = mode.distance

@@ -6,12 +6,12 @@ from itertools import pairwise
 
 import numpy as np
 from rich.console import Group, RenderableType
-from rich.table import Table
 from rich.text import Text
 
 from planar.motion import Motion
-from planar.units import unit
-from planar.views.table import counted, number, paragraphs, plain_table
+from planar.units import shown, unit
+from planar.views.fitted import FittedTable
+from planar.views.table import SIZE, counted, heading, kept, number, paragraphs, plain_table
 from planar.words import amount, listed, many
 
 MOST_ENDS = 6
@@ -24,16 +24,16 @@ def ran(motion: Motion) -> RenderableType:
     """A run: its range, its limits, and for every point where it went and how fast it was, at most, among the rows."""
     tables = [Text(), _limits(motion)] if motion.limits else []
     notes = [paragraphs(("-", remark) for remark in motion.remarks)] if motion.remarks else []
-    return Group(*heading(motion), *tables, Text(), _points(motion), *notes)
+    return Group(*head(motion), *tables, Text(), _points(motion), *notes)
 
 
-def heading(motion: Motion) -> list[Text]:
+def head(motion: Motion) -> list[Text]:
     """What runs, from where to where, and how well it is solved."""
     lines = [Text(motion.mechanism.name, style="bold")]
     lines += [Text(_range(motion, name)) for name in motion.inputs]
     if motion.time is not None:
         lines.append(Text(f"in time, from 0 s to {motion.time[-1]:.6g} s"))
-    worst = f"worst residual {motion.residual:.1e} of the mechanism's size"
+    worst = f"every pair closes {kept(motion.residual, SIZE)}"
     lines.append(Text(f"{many(len(motion), 'position')}; {worst}" + (f"; {motion.reason}" if motion.reason else "")))
     return lines
 
@@ -56,7 +56,7 @@ def _range(motion: Motion, name: str) -> str:
     return f"{name} from {ends[0]} to {', to '.join(told)}"
 
 
-def _limits(motion: Motion) -> Table:
+def _limits(motion: Motion) -> FittedTable:
     """Dead points, change points and ends of strokes, solved for."""
     units = motion.mechanism.units
     driver = running(motion)
@@ -96,18 +96,22 @@ def running(motion: Motion) -> str | None:
     return motion.running if motion.time is None else None
 
 
-def _points(motion: Motion) -> Table:
+def _points(motion: Motion) -> FittedTable:
     units = motion.mechanism.units
-    heads = (f"x from, {units.length}", f"x to, {units.length}", f"y from, {units.length}", f"y to, {units.length}")
-    table = plain_table(
-        "Points, among these positions", "point", *heads, "velocity up to, m/s", "acceleration up to, m/s²"
-    )
+    heads = [tuple(f"{axis} {end}, {units.length}" for end in ("from", "to")) for axis in "xy"]
+    kinds = ("velocity", "acceleration")
+    most = [heading(f"{kind} up to", kind, units) for kind in kinds]
+    table = plain_table("Points, among these positions", "point", *heads, *most)
+    measures = [shown(kind, units)[1] for kind in kinds]
     length = unit(units.length).from_si
     farthest = max((float(np.abs(each.position).max()) for each in motion.points.values()), default=0.0)
     for name, point in motion.points.items():
         ends = [float(end) for values in point.position.T for end in (values.min(), values.max())]
         fastest = [np.hypot(*rate.T) for rate in (point.velocity, point.acceleration)]
-        rates = ["-" if np.isnan(rate).all() else number(float(np.nanmax(rate))) for rate in fastest]
+        rates = [
+            "-" if np.isnan(rate).all() else number(of.from_si(float(np.nanmax(rate))))
+            for rate, of in zip(fastest, measures, strict=True)
+        ]
         places = (counted(length(end), length(farthest)) for end in ends)
         table.add_row(name, *places, *rates)
     return table

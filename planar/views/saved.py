@@ -19,7 +19,7 @@ def written(renderable: RenderableType, suffix: str) -> str:
     console = Console(
         record=True, width=WIDTH, file=io.StringIO(), force_terminal=True, markup=False, emoji=False, highlight=False
     )
-    console.print(renderable)
+    console.print(renderable, crop=False)
     formats = {
         ".txt": console.export_text,
         ".html": lambda: console.export_html(theme=DEFAULT_TERMINAL_THEME),

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 from rich.console import Group, RenderableType
-from rich.table import Table
 
 from planar.dynamics.simulated import Simulation
-from planar.units import SI, unit
+from planar.units import shown, unit
 from planar.views.columns import Told
+from planar.views.fitted import FittedTable
 from planar.views.ran import ran
 from planar.views.table import counted, number, paragraphs, plain_table
 
@@ -25,27 +25,28 @@ def tables(simulation: Simulation) -> RenderableType:
     return Group(ran(motion), _inputs(simulation), _energies(simulation), paragraphs([("energy", kept)]))
 
 
-def _inputs(simulation: Simulation) -> Table:
+def _inputs(simulation: Simulation) -> FittedTable:
     motion = simulation.motion
     units = motion.mechanism.units
-    headings = ("input", "", "unit", "start", "end", "least", "greatest", "greatest speed", "unit")
-    table = plain_table("Inputs, among these positions", *headings, left=(0, 1, 2, 8))
+    headings = ("input", "", ("unit", "start", "end", "least", "greatest"), ("greatest speed", "unit"))
+    table = plain_table("Inputs, among these positions", *headings, left=(0, 1, 2, 8), keys=2)
     for name, each in motion.inputs.items():
         own = units.length if motion.slides(name) else units.angle
         of = unit(own).from_si
+        per, rate = shown(motion.driven(name)[1], units)
         places = (each.position[0], each.position[-1], each.position.min(), each.position.max())
         table.add_row(
             name,
             "driven" if name in simulation.driven else "let go",
             own,
             *(number(of(float(place))) for place in places),
-            number(float(np.abs(each.velocity).max())),
-            SI[motion.driven(name)[1]],
+            number(rate.from_si(float(np.abs(each.velocity).max()))),
+            per,
         )
     return table
 
 
-def _energies(simulation: Simulation) -> Table:
+def _energies(simulation: Simulation) -> FittedTable:
     headings = ("of", "at the start, J", "at the end, J", "least, J", "greatest, J")
     table = plain_table("Energy", *headings)
     names = ("kinetic energy", "potential energy", "work put in")

@@ -41,8 +41,8 @@ function centresOf(page, frames) {
   const found = [], centred = new Set(data.centred.map((links) => JSON.stringify([...links].sort())));
   order.forEach((a, i) => order.slice(i + 1).forEach((b) => {
     const numbers = [data.numbers[a], data.numbers[b]];
-    // from ten links on a comma parts the numbers
-    const name = numbers.join(order.length > 9 ? "," : "");
+    // a comma parts the numbers where one of all has two digits
+    const name = numbers.join(order.some((link) => data.numbers[link].length > 1) ? "," : "");
     const shown = centred.has(JSON.stringify([a, b].sort()));
     const at = poleOf(motions[a], motions[b], data.size, greatest) ?? (shown ? pinOf(page, a, b) : null);
     found.push({ links: [a, b], name, at, shown });
@@ -87,7 +87,7 @@ const centres = {
     const { page } = layers, { data } = page;
     htmlPart("h2", {}, part, "Circle diagram");
     const svg = svgPart("svg", { viewBox: `0 0 ${CIRCLE[0]} ${CIRCLE[1]}`, role: "img", "aria-label": "circle diagram" }, part);
-    const which = chooser(part, "Centres", [["all", "all"], ...byNumber(data).map((link) => [link, `of ${data.numbers[link]} ${link}`])]);
+    const which = chooser(part, "Centres", [["all", "all"], ...byNumber(data).map((link) => [link, `of ${numberAndName(data, link)}`])]);
     const many = (data.links.length * (data.links.length - 1)) / 2 > ALL_SHOWN;
     which.value = many ? data.frame : "all";
     const pick = chooser(part, "Lines of Kennedy's theorem for", []);
@@ -210,10 +210,13 @@ function drawCircle(page, state) {
     const [X, Y] = [width / 2 + (x - width / 2) * by, height / 2 + (y - height / 2) * by + 0.35 * LETTER];
     svgPart("text", { x: X, y: Y, "text-anchor": "middle", "font-size": LETTER, class: "letter" }, svg, data.numbers[link]);
   }
-  const links = order.map((link) => `${data.numbers[link]} ${link}`).join(", ");
+  const links = order.map((link) => numberAndName(data, link)).join(", ");
   state.told = `${known.length} centres; full chords: shown by pairs. Links: ${links}`;
   return state.told;
 }
+
+/** A link by its number and its name, once where they are the same. */
+function numberAndName(data, link) { return data.numbers[link] === link ? link : `${data.numbers[link]} ${link}`; }
 
 function byNumber(data) {
   return [...data.links].sort((a, b) => data.numbers[a] - data.numbers[b]);

@@ -10,23 +10,23 @@ const HEIGHT = 240;      // px
 const DIAGRAMS = [
   { key: "x", label: "x", unit: "length", kind: "point", of: (c, i) => c.x[i] },
   { key: "y", label: "y", unit: "length", kind: "point", of: (c, i) => c.y[i] },
-  { key: "v", label: "velocity", unit: "m/s", kind: "point", of: (c, i) => Math.hypot(c.vx[i], c.vy[i]) },
-  { key: "vx", label: "velocity along x", unit: "m/s", kind: "point", of: (c, i) => c.vx[i] },
-  { key: "vy", label: "velocity along y", unit: "m/s", kind: "point", of: (c, i) => c.vy[i] },
-  { key: "a", label: "acceleration", unit: "m/s²", kind: "point", of: (c, i) => Math.hypot(c.ax[i], c.ay[i]) },
-  { key: "ax", label: "acceleration along x", unit: "m/s²", kind: "point", of: (c, i) => c.ax[i] },
-  { key: "ay", label: "acceleration along y", unit: "m/s²", kind: "point", of: (c, i) => c.ay[i] },
+  { key: "v", label: "velocity", unit: "velocity", kind: "point", of: (c, i) => Math.hypot(c.vx[i], c.vy[i]) },
+  { key: "vx", label: "velocity along x", unit: "velocity", kind: "point", of: (c, i) => c.vx[i] },
+  { key: "vy", label: "velocity along y", unit: "velocity", kind: "point", of: (c, i) => c.vy[i] },
+  { key: "a", label: "acceleration", unit: "acceleration", kind: "point", of: (c, i) => Math.hypot(c.ax[i], c.ay[i]) },
+  { key: "ax", label: "acceleration along x", unit: "acceleration", kind: "point", of: (c, i) => c.ax[i] },
+  { key: "ay", label: "acceleration along y", unit: "acceleration", kind: "point", of: (c, i) => c.ay[i] },
   { key: "angle", label: "angle", unit: "angle", kind: "link", of: (c, i) => c.angle[i] - c.turns },
-  { key: "w", label: "angular velocity", unit: "rad/s", kind: "link", of: (c, i) => c.w[i] },
-  { key: "e", label: "angular acceleration", unit: "rad/s²", kind: "link", of: (c, i) => c.e[i] },
+  { key: "w", label: "angular velocity", unit: "angular velocity", kind: "link", of: (c, i) => c.w[i] },
+  { key: "e", label: "angular acceleration", unit: "angular acceleration", kind: "link", of: (c, i) => c.e[i] },
   { key: "torque", label: "input torque", unit: "N·m", kind: "input", of: (c, i) => c.effort[i] },
   { key: "push", label: "input force", unit: "N", kind: "input", of: (c, i) => c.effort[i] },
 ];
 
 /** By which rate of the points the rows are told that a diagram is to fit; positions fit all of them. */
 const CALM_BY = {
-  length: null, angle: null, "m/s": RATES.velocity.parts, "rad/s": RATES.velocity.parts,
-  "m/s²": RATES.acceleration.parts, "rad/s²": RATES.acceleration.parts,
+  length: null, angle: null, "velocity": RATES.velocity.parts, "angular velocity": RATES.velocity.parts,
+  "acceleration": RATES.acceleration.parts, "angular acceleration": RATES.acceleration.parts,
   "N·m": RATES.acceleration.parts, N: RATES.acceleration.parts,
 };
 

@@ -9,7 +9,7 @@ const centrodes = {
   key: "centrodes",
   label: "Centrodes",
   beside(layers, part) {
-    const { page } = layers, { data } = page, links = byNumber(data).map((link) => [link, `${data.numbers[link]} ${link}`]);
+    const { page } = layers, { data } = page, links = byNumber(data).map((link) => [link, numberAndName(data, link)]);
     htmlPart("h2", {}, part, "Centrodes");
     const [link, other] = ["Of link", "against"].map((label) => chooser(part, label, links));
     if (data.rolling !== null) [link.value, other.value] = data.rolling;

@@ -119,7 +119,7 @@ const forceArrows = {
         .map((each) => ({ ...each, of: "reaction", letters: ["F", "M"], index: indexOf(data, each.link, each.by) })),
       ...actions,
     ];
-    const { px, told } = roundScale(most > BEYOND * usual ? most : usual, LONGEST_ARROW, "N"), turned = [];
+    const { px, told } = roundScale(most > BEYOND * usual ? most : usual, LONGEST_ARROW, [1, "N"]), turned = [];
     for (const { at, force, couple, of, letters: [letter, turning], index, link } of pushes) {
       const tail = layers.at(at), length = Math.hypot(...force), key = `${of} ${letter} ${index} ${link}`;
       if (length > nothing) {

@@ -35,10 +35,11 @@ function roundUp(least, firsts = DIGITS) {
   return firsts.find((first) => first * power >= least * (1 - 1e-9)) * power;
 }
 
-/** A scale at which `most` (SI) takes no more than `room` px: {px per unit, told: "1 cm = 0.2 m/s"}. */
-function roundScale(most, room, unit) {
-  const perCm = roundUp((most * CM) / room, FINE);
-  return { px: CM / perCm, told: `1 cm = ${short(perCm)} ${unit}` };
+/** A scale at which `most` (SI) takes no more than `room` px, of a unit [by, name] (see `unitOf`): {px per SI unit,
+    told: "1 cm = 0.2 m/s"}. */
+function roundScale(most, room, [by, name]) {
+  const perCm = roundUp((most * by * CM) / room, FINE);
+  return { px: (CM / perCm) * by, told: `1 cm = ${short(perCm)} ${name}` };
 }
 
 /** A number as people write it, six figures at the most. */

@@ -7,8 +7,8 @@ const LONGEST_ARROW = 80; // px
 const BEYOND = 2;        // times the usual: beside a dead point the scale is that of now
 
 const RATES = {
-  velocity: { word: "velocity", unit: "m/s", parts: ["vx", "vy"] },
-  acceleration: { word: "acceleration", unit: "m/s²", parts: ["ax", "ay"] },
+  velocity: { word: "velocity", unit: "velocity", parts: ["vx", "vy"] },
+  acceleration: { word: "acceleration", unit: "acceleration", parts: ["ax", "ay"] },
 };
 
 const paths = {
@@ -48,7 +48,7 @@ function arrows(rate) {
       if (now[0][rate] === null) return `${Word}: not determined at a dead or change point`;
       const usual = greatest(page, names, parts), most = Math.max(...now.map((point) => Math.hypot(...point[rate])));
       if (!(usual > 0)) return `${Word}: none of these points has one at the inputs' rates`;
-      const { px, told } = roundScale(most > BEYOND * usual ? most : usual, LONGEST_ARROW, unit);
+      const { px, told } = roundScale(most > BEYOND * usual ? most : usual, LONGEST_ARROW, unitOf(page, unit));
       now.forEach((point) => {
         const tail = layers.at(point.position), [x, y] = point[rate], by = px * ink.unit;
         ink.arrow(tail, [tail[0] + x * by, tail[1] - y * by], `arrow ${rate}`);

@@ -1,27 +1,27 @@
 "use strict";
-/* The numbers of the points and links chosen, as tables: positions in the file's units, rates in SI, as `planar solve`
+/* The numbers of the points and links chosen, as tables: in the units in which `planar solve`
    prints them. Each cell carries its exact SI value as `data-si`. */
 
 const NOTHING = 1e-13;  // of the size, or of the greatest of its kind: printed as 0
 
-/** What a table says of a point or a link: [head, unit or its kind, value in SI from the page and the name]. */
+/** What a table says of a point or a link: [head, kind of quantity, value in SI from the page and the name]. */
 const QUANTITIES_OF = {
   point: [
     ["x", "length", (p) => p.position[0]],
     ["y", "length", (p) => p.position[1]],
-    ["velocity", "m/s", (p) => size2(p.velocity)],
+    ["velocity", "velocity", (p) => size2(p.velocity)],
     ["at", "angle", (p) => direction(p.velocity)],
-    ["along x", "m/s", (p) => p.velocity?.[0]],
-    ["along y", "m/s", (p) => p.velocity?.[1]],
-    ["acceleration", "m/s²", (p) => size2(p.acceleration)],
+    ["along x", "velocity", (p) => p.velocity?.[0]],
+    ["along y", "velocity", (p) => p.velocity?.[1]],
+    ["acceleration", "acceleration", (p) => size2(p.acceleration)],
     ["at", "angle", (p) => direction(p.acceleration)],
-    ["along x", "m/s²", (p) => p.acceleration?.[0]],
-    ["along y", "m/s²", (p) => p.acceleration?.[1]],
+    ["along x", "acceleration", (p) => p.acceleration?.[0]],
+    ["along y", "acceleration", (p) => p.acceleration?.[1]],
   ],
   link: [
     ["angle", "angle", (f) => f.told],
-    ["angular velocity", "rad/s", (f) => f.v?.[2]],
-    ["angular acceleration", "rad/s²", (f) => f.a?.[2]],
+    ["angular velocity", "angular velocity", (f) => f.v?.[2]],
+    ["angular acceleration", "angular acceleration", (f) => f.a?.[2]],
   ],
 };
 
@@ -35,7 +35,7 @@ function wrapped(angle, counts) {
   return counts || Math.abs(angle) <= Math.PI ? angle : Math.atan2(Math.sin(angle), Math.cos(angle));
 }
 
-/** [factor of SI, name] of a unit that is a kind of the file's or a name of SI. */
+/** [factor of SI, name] of the unit of a kind of quantity, or of a name of SI. */
 function unitOf(page, kind) {
   const own = page.data.units[kind];
   return own === undefined ? [1, kind] : [1 / own.si, own.name];
@@ -158,10 +158,10 @@ function greatestNumbers(page) {
     }
   }
   // what would balance out, or be as fast, at the mechanism's size
-  const turning = found["rad/s"] ?? 0;
-  found["rad/s²"] = Math.max(found["rad/s²"] ?? 0, turning ** 2);
-  found["m/s"] = Math.max(found["m/s"] ?? 0, turning * data.size);
-  found["m/s²"] = Math.max(found["m/s²"] ?? 0, turning ** 2 * data.size);
+  const turning = found["angular velocity"] ?? 0;
+  found["angular acceleration"] = Math.max(found["angular acceleration"] ?? 0, turning ** 2);
+  found["velocity"] = Math.max(found["velocity"] ?? 0, turning * data.size);
+  found["acceleration"] = Math.max(found["acceleration"] ?? 0, turning ** 2 * data.size);
   return found;
 }
 

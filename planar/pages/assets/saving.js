@@ -116,7 +116,13 @@ const Files = (() => {
         if (!first.has(link)) first.set(link, counting.includes(link) ? 0 : 2 * Math.PI * Math.round(w[k] / (2 * Math.PI)));
         values.push(w[k] - first.get(link), (w1 ?? none)[k], (w2 ?? none)[k]);
       }
-      values.push(...linkage.program.reported(w, w1 ?? none, w2 ?? none, linkage.d, told).slice(0, columns.length - values.length));
+      const reported = linkage.program.reported(w, w1 ?? none, w2 ?? none, linkage.d, told).slice(0, columns.length - values.length);
+      for (const [k, input] of data.starting) {
+        // and so does one between links; an input's starts where the input is
+        if (!first.has(k)) first.set(k, 2 * Math.PI * Math.round((reported[k] - (input < 0 ? 0 : own.input(input))) / (2 * Math.PI)));
+        reported[k] -= first.get(k);
+      }
+      values.push(...reported);
       return columns.map(([, , kind], k) => {
         const value = kind in units ? (values[k] * units[kind].ratio[1]) / units[kind].ratio[0] : values[k];
         return Number.isFinite(value) ? String(value) : "";
