@@ -22,6 +22,11 @@ class Text:
         self._ahead: list[str | list[str]] = []
         self.vector = f"<{lanes} x double>"
 
+    @property
+    def count(self) -> int:
+        """How many values are made."""
+        return self._count
+
     def line(self, text: str) -> None:
         """Add a line as it is."""
         self.lines.append(text)
