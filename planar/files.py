@@ -70,6 +70,14 @@ def save(path: Path, content: str | bytes) -> None:
         raise kind(str(path), f"the file cannot be written: {said}") from None
 
 
+def abandon(stream: Any) -> None:
+    """Let what is left of a stream go nowhere, or the interpreter would try to write it once more at its end."""
+    with suppress(OSError, ValueError):  # a stream within this process has no number
+        number, nowhere = stream.fileno(), os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, number)
+        os.close(nowhere)
+
+
 def asset(name: str) -> str:
     """A text that comes along for pages."""
     return (Path(__file__).parent / "pages" / "assets" / name).read_text(encoding="utf-8")

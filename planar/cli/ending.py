@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import json
-import os
 import sys
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import contextmanager, nullcontext
 from types import MappingProxyType
 from typing import Any, NoReturn
 
@@ -80,11 +79,11 @@ def _refuse(
 
 def _lost(problem: OSError) -> NoReturn:
     """End where what is printed cannot be written, quietly where nobody reads it any more."""
-    from planar.files import OUT_OF_ROOM
+    from planar.files import OUT_OF_ROOM, abandon
 
     if problem.errno not in OUT_OF_ROOM:
         raise problem
-    _abandon(sys.stdout)
+    abandon(sys.stdout)
     if isinstance(problem, BrokenPipeError):
         sys.exit(CLOSED_PIPE)
     _say(f"the output cannot be written: {problem.strerror}")
@@ -97,10 +96,6 @@ def _say(sentence: str) -> None:
     try:
         click.echo(f"planar: {shown}", err=True)
     except OSError:
-        _abandon(sys.stderr)
+        from planar.files import abandon
 
-
-def _abandon(stream: Any) -> None:
-    """Let what is left of a stream go nowhere, or the interpreter would try to write it once more at its end."""
-    with suppress(OSError, ValueError):  # a stream within this process has no number
-        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+        abandon(sys.stderr)
