@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import re
 import stat
 import sys
 from collections import Counter
@@ -23,8 +24,8 @@ OUT_OF_ROOM = {getattr(errno, name) for name in ("ENOSPC", "EDQUOT", "EFBIG", "E
 """What comes of writing, and not of where."""
 NOT_REPLACED = {errno.EACCES, errno.EPERM, errno.EROFS, errno.EBUSY, errno.EXDEV}
 """What comes of a folder that takes no other file, as where one file alone is mounted or may be written."""
-PART = ".part"
-"""Ending of what is not whole yet."""
+PART = re.compile(r"\.[0-9a-f]{24}\.part")
+"""Names of files that are not whole yet."""
 MOST_LINKS = 40
 """From link to link, as Linux has it."""
 
@@ -54,7 +55,7 @@ def dumps(mechanism: Mechanism) -> str:
 def load(model: str | Path) -> Mechanism:
     """The mechanism in a file, or the model of that name or id that comes along. Raises BadInput."""
     path = found(model)
-    return loads(_content(path), str(path))
+    return loads(bytes_of(path), str(path))
 
 
 def save(path: Path, content: str | bytes) -> None:
@@ -65,9 +66,13 @@ def save(path: Path, content: str | bytes) -> None:
     try:
         write_whole(path, content.encode() if isinstance(content, str) else content)
     except (OSError, ValueError) as problem:
-        kind = NotWritten if getattr(problem, "errno", None) in OUT_OF_ROOM else BadInput
-        said = getattr(problem, "strerror", None) or problem
-        raise kind(str(path), f"the file cannot be written: {said}") from None
+        raise unwritten(str(path), "the file", problem) from None
+
+
+def unwritten(place: str, what: str, problem: Exception) -> BadInput:
+    """That something cannot be written, as an error: NotWritten where its content found no room, else BadInput."""
+    kind = NotWritten if getattr(problem, "errno", None) in OUT_OF_ROOM else BadInput
+    return kind(place, f"{what} cannot be written: {getattr(problem, 'strerror', None) or problem}")
 
 
 def abandon(stream: Any) -> None:
@@ -165,7 +170,7 @@ def _replace(path: Path, content: bytes, mode: int | None = None, like: os.stat_
 
     Raises OSError, of `NOT_REPLACED` where the file has an owner, or other names, that the new one would not have.
     """
-    part = path.with_name(f".{os.urandom(12).hex()}{PART}")
+    part = path.with_name(f".{os.urandom(12).hex()}.part")
     try:
         # nobody may look into it who may not look into the file itself
         least = 0o666 if mode is None else mode & 0o666
@@ -221,7 +226,7 @@ def found(model: str | Path) -> Path:
     if str(model) in known:
         return known[str(model)]
     for file in known.values():
-        if str(model) in _parsed(_content(file), str(file)).get("ids", ()):
+        if str(model) in _parsed(bytes_of(file), str(file)).get("ids", ()):
             return file
     from difflib import get_close_matches
 
@@ -243,7 +248,16 @@ def models() -> Iterator[tuple[Path, Mechanism]]:
         yield file, load(file)
 
 
-def _content(path: Path) -> bytes:
+def digest(path: Path) -> str:
+    """The SHA-256 of a file's content, in hexadecimal digits. Raises OSError."""
+    from hashlib import file_digest
+
+    with path.open("rb") as file:
+        return file_digest(file, "sha256").hexdigest()
+
+
+def bytes_of(path: Path) -> bytes:
+    """The content of a file that is no larger than a mechanism may be. Raises BadInput."""
     try:
         with path.open("rb") as file:
             content = file.read(LARGEST + 1)

@@ -179,7 +179,7 @@ def test_a_device_stays_one():
     with pytest.raises(NotWritten, match="No space left on device"):
         save(FULL, NEW)
     assert stat.S_ISCHR(FULL.stat().st_mode)
-    assert not [path for path in FULL.parent.iterdir() if path.name.endswith(files.PART)]
+    assert not [path for path in FULL.parent.iterdir() if files.PART.fullmatch(path.name)]
 
 
 @pytest.mark.skipif(not Path("/dev/fd").exists(), reason="there is no such folder")

@@ -30,7 +30,6 @@ OWN = "code"
 MARK = b"planar machine code\n"
 """How every file of code begins."""
 NAME = re.compile(rf"[0-9a-f]{{64}}{re.escape(ENDING)}")
-UNFINISHED = re.compile(rf"\.[0-9a-f]{{24}}{re.escape(PART)}")
 TAG = "CACHEDIR.TAG"
 TAGGED = b"Signature: 8a477f597d28d172789f06886806bc55\n# Machine code kept by planar; may be removed at any time.\n"
 """By the Cache Directory Tagging Specification, so that backups leave the folder out."""
@@ -113,13 +112,13 @@ def _bound(place: Path) -> None:
     with suppress(OSError):
         found = []
         for path in place.iterdir():
-            if NAME.fullmatch(path.name) or UNFINISHED.fullmatch(path.name):
+            if NAME.fullmatch(path.name) or PART.fullmatch(path.name):
                 known = path.stat()
                 found.append((known.st_mtime_ns, known.st_size, path))
         whole = sum(size for _, size, _ in found)
         for _, size, path in sorted(found):
             if whole <= MOST:
                 return
-            if UNFINISHED.fullmatch(path.name) or (own_bytes(path) or b"").startswith(MARK):
+            if PART.fullmatch(path.name) or (own_bytes(path) or b"").startswith(MARK):
                 path.unlink(missing_ok=True)
             whole -= size
