@@ -92,7 +92,8 @@ def test_whatever_file_of_a_store_is_damaged_its_block_is_solved_again_or_the_st
     little(store)
     sound = {path: path.read_bytes() for path in files_of(store)}
     of_all = {"zarr.json", "_planar.json"}
-    for k, path in enumerate(sound):
+    # of three blocks that are alike, one
+    for k, path in enumerate(path for path in sound if "c" not in path.parts or {"1", "designs"} & {*path.parts}):
         damage, told = [*DAMAGES.values()][k % len(DAMAGES)], []
         damage(path)
         if path.parent == store and path.name in of_all:
