@@ -8,7 +8,7 @@ import pytest
 import planar
 from planar.errors import BadInput, Outcome
 from planar.mechanism import named_points
-from planar.native import backend, compiled, kernel, march
+from planar.native import backend, compiled, listing, march
 from planar.native.backend import Designs, layout, run
 from planar.native.kernel import Outside
 from planar.native.listing import MOST_INSTRUCTIONS, Listing, NotPrinted, Turned, without_turning
@@ -85,12 +85,12 @@ def test_a_run_of_a_model_is_the_one_that_casadi_gives(stem):
 
 
 def test_cos_and_sin_of_sums_are_put_together_from_the_angles_own():
-    listing = Listing()
-    a, b, c = (listing.add("input", data=("z", k)) for k in range(3))
-    turned = [Turned(*(listing.add("input", data=(part, k)) for part in ("zc", "zs"))) for k in range(2)]
-    inside = listing.add("sub", listing.add("add", a, listing.add("mul", listing.const(2.0), b)), c)
-    wanted = [listing.add("cos", inside), listing.add("sin", inside)]
-    made, numbers = without_turning(listing, wanted, {a: turned[0], b: turned[1]})
+    made_of = Listing()
+    a, b, c = (made_of.add("input", data=("z", k)) for k in range(3))
+    turned = [Turned(*(made_of.add("input", data=(part, k)) for part in ("zc", "zs"))) for k in range(2)]
+    inside = made_of.add("sub", made_of.add("add", a, made_of.add("mul", made_of.const(2.0), b)), c)
+    wanted = [made_of.add("cos", inside), made_of.add("sin", inside)]
+    made, numbers = without_turning(made_of, wanted, {a: turned[0], b: turned[1]})
     values = {
         ("zc", 0): np.cos(0.3),
         ("zs", 0): np.sin(0.3),
@@ -170,10 +170,10 @@ def test_what_is_wanted_before_it_is_known_is_not_printed(monkeypatch):
 
 
 def test_what_cancels_is_nothing():
-    listing = Listing()
-    value = listing.add("mul", *(listing.add("input", data=("p", k)) for k in range(2)))
-    less = listing.add("neg", value)
-    assert [listing.number(listing.add("add", *both)) for both in ((value, less), (less, value))] == [0.0, 0.0]
+    made = Listing()
+    value = made.add("mul", *(made.add("input", data=("p", k)) for k in range(2)))
+    less = made.add("neg", value)
+    assert [made.number(made.add("add", *both)) for both in ((value, less), (less, value))] == [0.0, 0.0]
 
 
 def test_a_longer_function_is_left_to_casadi_and_printed_once_in_vain(monkeypatch):
@@ -186,7 +186,7 @@ def test_a_longer_function_is_left_to_casadi_and_printed_once_in_vain(monkeypatc
     at, pair = mechanism.inputs[0].position, mechanism.inputs[0].pair
     designs, run_ = {f"{pair}.velocity": np.linspace(1, 2, 6)}, {"start": at, "stop": at + 0.1, "pair": pair}
     wanted = planar.sweep(mechanism, designs, 5, backend="casadi", **run_)
-    monkeypatch.setattr(kernel, "MOST_INSTRUCTIONS", 100)
+    monkeypatch.setattr(listing, "MOST_INSTRUCTIONS", 100)
     monkeypatch.setattr(backend, "march", printing)
     backend._layout.cache_clear()
     found = planar.sweep(mechanism, designs, 5, backend="native", block=2, **run_)

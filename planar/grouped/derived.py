@@ -12,7 +12,7 @@ from planar.equations import Equations, Stage
 from planar.grouped.formulas import Formula, Leaf
 from planar.grouped.structure import COS, SIN, X1, X2, Structure
 from planar.native.kernel import solved
-from planar.native.listing import MOST_INSTRUCTIONS, Listing, NotPrinted, Turned, needed, without_turning
+from planar.native.listing import Listing, NotPrinted, Turned, check_length, needed, without_turning
 from planar.pairs import Kind as Measure
 from planar.plane import GROUND, Frame, frame_at
 from planar.program import length, placed
@@ -233,8 +233,7 @@ class Derivation:
         made, numbers = without_turning(self.listing, wanted, self.turned)
         leaves: dict[int, Leaf] = {}
         order = needed(made, numbers)
-        if len(order) > MOST_INSTRUCTIONS:
-            raise NotPrinted(f"more than {MOST_INSTRUCTIONS} instructions take too long to compile")
+        check_length(len(order))
         for number in order:
             value = made.values[number]
             if value.what == "input":

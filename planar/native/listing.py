@@ -49,6 +49,12 @@ class NotPrinted(Exception):
     """What other machines are not told; the text says why."""
 
 
+def check_length(instructions: int) -> None:
+    """Raises NotPrinted for more instructions than one function may have."""
+    if instructions > MOST_INSTRUCTIONS:
+        raise NotPrinted(f"more than {MOST_INSTRUCTIONS} instructions take too long to compile")
+
+
 class Value(NamedTuple):
     """One value: what makes it ("const", "input", "add", ...), of which values, and a constant or the input's place."""
 

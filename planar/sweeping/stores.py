@@ -152,9 +152,9 @@ def writing(path: Path) -> Iterator[None]:
 
 def begun(path: Path) -> bool:
     """Whether anything whole stands in the folder of a store, which is made if it is not there. Raises BadInput."""
-    if path.exists() and not path.is_dir():
-        raise BadInput("store", f"{path} is a file, and a store is a folder; name another, or take it away first")
     with writing(path):
+        if path.exists() and not path.is_dir():
+            raise BadInput("store", f"{path} is a file, and a store is a folder; name another, or take it away first")
         path.mkdir(parents=True, exist_ok=True)
         return any(not PART.fullmatch(each.name) and each.suffix != ZARRS_PART for each in path.iterdir())
 
