@@ -125,9 +125,13 @@ def _staged(mechanism: Mechanism, whole: Equations) -> Equations:
     Only now does it show where constraints hold each other twice: angles that a ring of slides closes by itself
     have dropped out, and what was matched with them is free.
     """
-    groups = [group for group in decompose(_moved(whole), len(whole.unknowns)) if group.rows or group.columns]
+    both, moved = _without_idle(whole)
+    whole = replace(whole, F=both[: len(whole.rows)], w=both[len(whole.rows) :])
+    groups = [
+        group for group in decompose(moved[: len(whole.rows)], len(whole.unknowns)) if group.rows or group.columns
+    ]
     level_of = {column: level for level, group in enumerate(groups) for column in group.columns}
-    known_from = tuple(max((level_of[column] for column in held), default=-1) for held in _touched(whole.w, whole.z))
+    known_from = tuple(max((level_of[column] for column in held), default=-1) for held in moved[len(whole.rows) :])
     stages, first_unknown, first_row = [], 0, 0
     level_of_link: dict[str, int] = {}
     for coordinate, level in zip(whole.coordinates, known_from, strict=True):
@@ -166,22 +170,28 @@ def _staged(mechanism: Mechanism, whole: Equations) -> Equations:
     )
 
 
-def _moved(whole: Equations) -> list[set[int]]:
-    """The unknowns that really move each remaining constraint.
+def _without_idle(whole: Equations) -> tuple[ca.SX, list[set[int]]]:
+    """F and w, one below the other, with no unknown in an entry that does not move it; and those that move each.
 
-    What cancels in a sum shows in numbers only: an entry of the slope that vanishes at random places is none.
+    What cancels in a sum shows in numbers only: an entry of the slope that vanishes at random places is none. Left
+    standing it would have a group, or a link, wait for unknowns that are solved after it.
     """
-    touched = _touched(whole.F, whole.z)
+    both = ca.vertcat(whole.F, whole.w)
+    touched = _touched(both, whole.z)
     if not any(touched):
-        return touched
-    slope = ca.Function("slope", [whole.z, whole.u, whole.p], [ca.jacobian(whole.F, whole.z)])
+        return both, touched
+    slope = ca.Function("slope", [whole.z, whole.u, whole.p], [ca.jacobian(both, whole.z)])
     rng = np.random.default_rng(0)
     sizes = [symbol.numel() for symbol in (whole.z, whole.u, whole.p)]
     found = [slope(*(rng.uniform(0.5, 2.0, size) for size in sizes)) for _ in range(2)]
     seen = sum(np.abs(np.array(each.nonzeros())) for each in found)
     rows, columns = found[0].sparsity().get_triplet()
     alive = {(row, column) for row, column, value in zip(rows, columns, seen, strict=True) if value > 1e-12}
-    return [{column for column in held if (row, column) in alive} for row, held in enumerate(touched)]
+    moved = [{column for column in held if (row, column) in alive} for row, held in enumerate(touched)]
+    idle = {row: sorted(held - moved[row]) for row, held in enumerate(touched) if held != moved[row]}
+    for row, columns in idle.items():
+        both[row] = ca.substitute(both[row], whole.z[columns], ca.SX.zeros(len(columns)))
+    return both, moved
 
 
 def _touched(expressions: ca.SX, z: ca.SX) -> list[set[int]]:

@@ -48,6 +48,10 @@ class BadInput(PlanarError):
         super().__init__(f"{self.place}: {self.sentence}")
 
 
+class NotWritten(BadInput):
+    """A result that was found could not be written whole, as on a full disk; `place` is where it was to go."""
+
+
 class NoAnswer(PlanarError):
     """The mechanism is well described but has no answer here; `outcome` says which kind, `more` what a program asks."""
 

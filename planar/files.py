@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
+import re
+import stat
+import sys
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import suppress
@@ -11,11 +15,19 @@ from pathlib import Path
 from typing import Any
 
 from planar.document import read
-from planar.errors import BadInput
+from planar.errors import BadInput, NotWritten
 from planar.mechanism import Mechanism
 
 LARGEST = 8 * 1024 * 1024
 """Bytes; a mechanism of ten thousand links takes about two million."""
+OUT_OF_ROOM = {getattr(errno, name) for name in ("ENOSPC", "EDQUOT", "EFBIG", "EIO", "EPIPE") if hasattr(errno, name)}
+"""What comes of writing, and not of where."""
+NOT_REPLACED = {errno.EACCES, errno.EPERM, errno.EROFS, errno.EBUSY, errno.EXDEV}
+"""What comes of a folder that takes no other file, as where one file alone is mounted or may be written."""
+PART = re.compile(r"\.[0-9a-f]{24}\.part")
+"""Names of files that are not whole yet."""
+MOST_LINKS = 40
+"""From link to link, as Linux has it."""
 
 
 def loads(text: str | bytes, place: str = "$") -> Mechanism:
@@ -43,15 +55,32 @@ def dumps(mechanism: Mechanism) -> str:
 def load(model: str | Path) -> Mechanism:
     """The mechanism in a file, or the model of that name or id that comes along. Raises BadInput."""
     path = found(model)
-    return loads(_content(path), str(path))
+    return loads(bytes_of(path), str(path))
 
 
 def save(path: Path, content: str | bytes) -> None:
-    """Write a text, or bytes, to a file. Raises BadInput."""
+    """Write a text, or bytes, to a file: all of it, or nothing, so that a file that is there stays whole till then.
+
+    Raises BadInput where there can be no such file, NotWritten where its content finds no room.
+    """
     try:
-        path.write_bytes(content.encode() if isinstance(content, str) else content)
-    except OSError as problem:
-        raise BadInput(str(path), f"the file cannot be written: {problem.strerror}") from None
+        write_whole(path, content.encode() if isinstance(content, str) else content)
+    except (OSError, ValueError) as problem:
+        raise unwritten(str(path), "the file", problem) from None
+
+
+def unwritten(place: str, what: str, problem: Exception) -> BadInput:
+    """That something cannot be written, as an error: NotWritten where its content found no room, else BadInput."""
+    kind = NotWritten if getattr(problem, "errno", None) in OUT_OF_ROOM else BadInput
+    return kind(place, f"{what} cannot be written: {getattr(problem, 'strerror', None) or problem}")
+
+
+def abandon(stream: Any) -> None:
+    """Let what is left of a stream go nowhere, or the interpreter would try to write it once more at its end."""
+    with suppress(OSError, ValueError):  # a stream within this process has no number
+        number, nowhere = stream.fileno(), os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, number)
+        os.close(nowhere)
 
 
 def asset(name: str) -> str:
@@ -70,24 +99,109 @@ def own_bytes(path: Path) -> bytes | None:
         return None
 
 
-def put_whole(path: Path, content: bytes) -> bool:
+def put_private(path: Path, content: bytes) -> bool:
     """Write a file that only this user can read, all at once, into a folder of his own; whether that was possible.
 
-    A folder that is not there is made. A process that is killed leaves the old file or the new one, never a part.
+    A folder that is not there is made.
     """
-    part = path.with_name(f"{os.getpid()}-{os.urandom(6).hex()}.part")
     try:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         if not _own(path.parent.stat()):
             return False
-        part.touch(mode=0o600, exist_ok=False)
-        part.write_bytes(content)
-        part.replace(path)
+        _replace(path, content, 0o600)
     except OSError:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)
         return False
     return True
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file all at once: a process that is killed leaves the old file or the new one, never a part.
+
+    A link stays one, and the file that it leads to is written, which keeps its owner and permissions. A pipe or a
+    device takes the bytes as they come. Raises OSError.
+    """
+    target, number = _meant(path)
+    if number is not None:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+        _pass(number, content)
+        return
+    try:
+        known = target.stat()
+    except FileNotFoundError:
+        _replace(target, content)
+        return
+    if not stat.S_ISREG(known.st_mode):
+        with target.open("wb", buffering=0) as device:
+            _pass(device.fileno(), content)
+        return
+    if not os.access(target, os.W_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+    try:
+        _replace(target, content, stat.S_IMODE(known.st_mode), known)
+    except OSError as problem:
+        if problem.errno not in NOT_REPLACED:
+            raise
+        _overwrite(target, content)
+
+
+def _meant(path: Path) -> tuple[Path, int | None]:
+    """The file to which links lead; of one that stands for what this process has open, as /dev/stdout, its number."""
+    for _ in range(MOST_LINKS):
+        folder = os.path.realpath(path.parent)
+        path = Path(folder, path.name)
+        if folder in ("/dev/fd", f"/proc/{os.getpid()}/fd") and path.name.isdecimal():
+            return path, int(path.name)
+        if not path.is_symlink():
+            return path, None
+        path = Path(folder, path.readlink())
+    raise OSError(errno.ELOOP, os.strerror(errno.ELOOP))
+
+
+def _pass(number: int, content: bytes) -> None:
+    """Write bytes to what is open."""
+    rest = memoryview(content)
+    while rest:
+        rest = rest[os.write(number, rest) :]
+
+
+def _replace(path: Path, content: bytes, mode: int | None = None, like: os.stat_result | None = None) -> None:
+    """Write beside a file, then take its place; without a mode it is what new files have.
+
+    Raises OSError, of `NOT_REPLACED` where the file has an owner, or other names, that the new one would not have.
+    """
+    part = path.with_name(f".{os.urandom(12).hex()}.part")
+    try:
+        # nobody may look into it who may not look into the file itself
+        least = 0o666 if mode is None else mode & 0o666
+        number = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), least)
+        with os.fdopen(number, "wb") as file:
+            own = os.fstat(number)
+            if like is not None and (like.st_nlink, like.st_uid, like.st_gid) != (1, own.st_uid, own.st_gid):
+                raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
+            file.write(content)
+        if mode is not None:
+            part.chmod(mode)
+        part.replace(path)
+    except BaseException:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+        raise
+
+
+def _overwrite(path: Path, content: bytes) -> None:
+    """Write over a file that cannot be replaced: room is made for it first, so that without any it stays whole."""
+    with path.open("r+b", buffering=0) as file:
+        before = os.fstat(file.fileno()).st_size
+        try:
+            if content and hasattr(os, "posix_fallocate"):
+                os.posix_fallocate(file.fileno(), 0, len(content))
+        except OSError as problem:
+            file.truncate(before)
+            if problem.errno in OUT_OF_ROOM:
+                raise
+        _pass(file.fileno(), content)
+        file.truncate(len(content))
 
 
 def _own(known: os.stat_result) -> bool:
@@ -112,7 +226,7 @@ def found(model: str | Path) -> Path:
     if str(model) in known:
         return known[str(model)]
     for file in known.values():
-        if str(model) in _parsed(_content(file), str(file)).get("ids", ()):
+        if str(model) in _parsed(bytes_of(file), str(file)).get("ids", ()):
             return file
     from difflib import get_close_matches
 
@@ -134,7 +248,16 @@ def models() -> Iterator[tuple[Path, Mechanism]]:
         yield file, load(file)
 
 
-def _content(path: Path) -> bytes:
+def digest(path: Path) -> str:
+    """The SHA-256 of a file's content, in hexadecimal digits. Raises OSError."""
+    from hashlib import file_digest
+
+    with path.open("rb") as file:
+        return file_digest(file, "sha256").hexdigest()
+
+
+def bytes_of(path: Path) -> bytes:
+    """The content of a file that is no larger than a mechanism may be. Raises BadInput."""
     try:
         with path.open("rb") as file:
             content = file.read(LARGEST + 1)

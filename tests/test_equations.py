@@ -1,5 +1,7 @@
 """The equations against the pairs' own residuals, and the graph's groups against known structures."""
 
+from pathlib import Path
+
 import casadi as ca
 import networkx as nx
 import numpy as np
@@ -117,6 +119,22 @@ def test_groups_are_as_small_as_the_structure_allows(model, unknowns_of_groups):
     stages = program(files.load(model)).equations.stages
     assert [length(stage.unknowns) for stage in stages if length(stage.unknowns)] == unknowns_of_groups
     assert all(length(stage.unknowns) == length(stage.rows) for stage in stages)
+
+
+IDLE = Path(__file__).parent / "data" / "idle-slide.json"
+
+
+@pytest.mark.parametrize("seed", [None, *range(1000, 1040, 3)])
+def test_a_group_and_a_place_stand_in_no_unknown_that_does_not_move_them(seed):
+    mechanism = files.load(IDLE) if seed is None else files.from_dict(random_linkage(seed, 7, 0.0, 0.3).value)
+    e = build(structure(mechanism))
+    for stage in e.stages if not any(stage.free for stage in e.stages) else ():
+        _, columns = ca.jacobian_sparsity(e.F[stage.rows], e.z).get_triplet()
+        assert max(columns, default=-1) < stage.unknowns.stop
+    both, rng = ca.vertcat(e.F, e.w), np.random.default_rng(1)
+    slope = ca.Function("slope", [e.z, e.u, e.p], [ca.jacobian(both, e.z)])
+    places = [[rng.uniform(0.5, 2.0, each.numel()) for each in (e.z, e.u, e.p)] for _ in range(2)]
+    assert np.all(sum(np.abs(np.array(slope(*place).nonzeros())) for place in places) > 1e-12)
 
 
 def test_mechanisms_that_differ_in_dimensions_share_one_program():

@@ -10,10 +10,11 @@ import planar
 from benchmarks import chain
 from planar import files
 from planar.errors import BadInput, NoAnswer, Outcome
-from planar.grouped import formulas
+from planar.grouped import formulas, parting
 from planar.grouped.kinds import kind
 from planar.grouped.parting import Unparted, parted
 from planar.grouped.structure import GROUNDED, Joint, Signature
+from planar.native import listing
 from planar.pairs import pair_types
 from planar.solving.position import Solver
 from tests.known import MODELS
@@ -228,6 +229,19 @@ def test_what_the_general_path_does_is_counted_and_said():
     assert [each.general for each in result] == [False, True, True, True, True]
     assert (result.general, result.sent) == (4 * 13, 4)
     assert "4 of 5 mechanisms" in result.said[0]
+    for mechanism, found in zip(mechanisms, result, strict=True):
+        as_cycle(mechanism, found, 12, result.outcomes)
+
+
+def test_formulas_too_long_to_be_compiled_are_left_to_the_general_path(monkeypatch):
+    mechanisms = [MODELS["watt-six-bar"], MODELS["double-butterfly"]]  # dyads, and four unknowns at once
+    longest = 500
+    monkeypatch.setattr(listing, "MOST_INSTRUCTIONS", longest)
+    monkeypatch.setattr(parting, "_KINDS", {})
+    kind.cache_clear()
+    result = planar.sweep_each(mechanisms, 12)
+    kind.cache_clear()
+    assert [each.general for each in result] == [False, True]
     for mechanism, found in zip(mechanisms, result, strict=True):
         as_cycle(mechanism, found, 12, result.outcomes)
 

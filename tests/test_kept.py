@@ -37,8 +37,8 @@ def times(factor):
 @pytest.fixture
 def place(tmp_path, monkeypatch):
     """An empty folder of code."""
-    monkeypatch.setenv("PLANAR_CACHE", str(tmp_path / "code"))
-    return tmp_path / "code"
+    monkeypatch.setenv("PLANAR_CACHE", str(tmp_path))
+    return tmp_path / kept.OWN
 
 
 @pytest.fixture
@@ -55,14 +55,28 @@ def made(monkeypatch):
 
 
 def only(place):
-    (path,) = place.iterdir()
+    (path,) = codes(place)
     return path
+
+
+def codes(place):
+    """The files of code that are kept."""
+    assert (place / kept.TAG).read_bytes() == kept.TAGGED
+    return [path for path in place.iterdir() if path.name != kept.TAG]
+
+
+def key(letter):
+    """A fingerprint."""
+    return sha256(letter.encode()).hexdigest()
+
+
+HEAD = len(kept.MARK) + kept.DIGEST
 
 
 def test_code_is_compiled_once_and_read_from_then_on(place, made):
     assert (times(3), times(3), times(5), times(3)) == (6.0, 6.0, 10.0, 6.0)
     assert made == [text(3), text(5)]
-    assert len(list(place.iterdir())) == 2
+    assert len(codes(place)) == 2
 
 
 def test_another_process_does_not_compile_again(place):
@@ -76,7 +90,7 @@ def test_another_process_does_not_compile_again(place):
     assert (ended.stdout, ended.stderr) == ("6.0\n", "")
 
 
-@pytest.mark.parametrize("where", [0, kept.DIGEST - 1, kept.DIGEST, 200, -1])
+@pytest.mark.parametrize("where", [0, len(kept.MARK), HEAD - 1, HEAD, 200, -1])
 def test_a_damaged_file_is_compiled_again_and_replaced(place, made, where):
     times(3)
     path = only(place)
@@ -89,7 +103,7 @@ def test_a_damaged_file_is_compiled_again_and_replaced(place, made, where):
     assert path.read_bytes() == right
 
 
-@pytest.mark.parametrize("length", [0, 10, kept.DIGEST, 300])
+@pytest.mark.parametrize("length", [0, 10, len(kept.MARK), HEAD, 300])
 def test_a_part_of_a_file_is_compiled_again(place, made, length):
     times(3)
     path = only(place)
@@ -135,22 +149,39 @@ def test_code_runs_where_nothing_can_be_kept(tmp_path, made, monkeypatch):
 
 
 def test_a_write_that_fails_leaves_nothing_behind(place, monkeypatch):
-    kept.write("a", b"one")
+    kept.write(key("a"), b"one")
     monkeypatch.setattr(Path, "replace", lambda self, target: (_ for _ in ()).throw(OSError("no room")))
-    assert not kept.write("b", b"two")
-    assert [path.name for path in place.iterdir()] == [f"a{kept.ENDING}"]
-    assert kept.read("a") == b"one"
+    assert not kept.write(key("b"), b"two")
+    assert [path.name for path in codes(place)] == [f"{key('a')}{kept.ENDING}"]
+    assert kept.read(key("a")) == b"one"
 
 
 def test_what_was_not_read_for_longest_goes_first(place, monkeypatch):
-    size = len(b"code") + kept.DIGEST
+    size = len(b"code") + HEAD
     monkeypatch.setattr(kept, "MOST", 3 * size)
-    for age, key in enumerate("abc"):
-        assert kept.write(key, b"code")
-        os.utime(place / f"{key}{kept.ENDING}", (1000 + age, 1000 + age))
-    assert kept.read("a") == b"code"
-    kept.write("d", b"code")
-    assert {path.stem for path in place.iterdir()} == {"a", "c", "d"}
+    for age, letter in enumerate("abc"):
+        assert kept.write(key(letter), b"code")
+        os.utime(place / f"{key(letter)}{kept.ENDING}", (1000 + age, 1000 + age))
+    assert kept.read(key("a")) == b"code"
+    kept.write(key("d"), b"code")
+    assert {path.stem for path in codes(place)} == {key(letter) for letter in "acd"}
+
+
+def test_only_what_was_written_here_is_ever_removed(place, tmp_path, monkeypatch):
+    kept.write(key("a"), b"code")
+    names = ("notes.code", "my.part", f"{key('b')}{kept.ENDING}", "thesis.code", ".hidden.part", f"{key('c')}.txt")
+    for folder in (tmp_path, place):
+        for name in names:
+            (folder / name).write_bytes(b"another's, and long" * 100)
+            os.utime(folder / name, (1000, 1000))
+    unfinished = place / f".{'0f' * 12}.part"
+    unfinished.write_bytes(b"of a process that was killed")
+    os.utime(unfinished, (2000, 2000))
+    monkeypatch.setattr(kept, "MOST", 0)
+    kept.write(key("d"), b"code")
+    assert {path.name for path in codes(place)} == set(names)
+    assert {path.name for path in tmp_path.iterdir()} == {*names, kept.OWN}
+    assert all(path.stat().st_size == 1900 for folder in (tmp_path, place) for path in map(folder.joinpath, names))
 
 
 def test_the_folder_is_where_each_system_has_such_things(monkeypatch, tmp_path):
@@ -158,19 +189,19 @@ def test_the_folder_is_where_each_system_has_such_things(monkeypatch, tmp_path):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(Path, "home", lambda: tmp_path)
     monkeypatch.setattr(sys, "platform", "linux")
-    assert kept.folder() == tmp_path / ".cache" / "planar"
+    assert kept.folder() == tmp_path / ".cache" / "planar" / kept.OWN
     monkeypatch.setenv("XDG_CACHE_HOME", "not/absolute")
-    assert kept.folder() == tmp_path / ".cache" / "planar"
+    assert kept.folder() == tmp_path / ".cache" / "planar" / kept.OWN
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "other"))
-    assert kept.folder() == tmp_path / "other" / "planar"
+    assert kept.folder() == tmp_path / "other" / "planar" / kept.OWN
     monkeypatch.setattr(sys, "platform", "darwin")
-    assert kept.folder() == tmp_path / "Library" / "Caches" / "planar"
+    assert kept.folder() == tmp_path / "Library" / "Caches" / "planar" / kept.OWN
     monkeypatch.setattr(sys, "platform", "win32")
-    assert kept.folder() == tmp_path / "AppData" / "Local" / "planar" / "Cache"
+    assert kept.folder() == tmp_path / "AppData" / "Local" / "planar" / "Cache" / kept.OWN
     monkeypatch.setenv("LOCALAPPDATA", str(tmp_path / "local"))
-    assert kept.folder() == tmp_path / "local" / "planar" / "Cache"
+    assert kept.folder() == tmp_path / "local" / "planar" / "Cache" / kept.OWN
     monkeypatch.setenv("PLANAR_CACHE", str(tmp_path / "told"))
-    assert kept.folder() == tmp_path / "told"
+    assert kept.folder() == tmp_path / "told" / kept.OWN
 
 
 def test_code_for_another_processor_or_compiler_has_another_fingerprint(monkeypatch):

@@ -1,14 +1,22 @@
 """What LLVM is told equals what casadi computes: runs of many designs against runs of one."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import planar
 from planar.errors import BadInput, Outcome
 from planar.mechanism import named_points
-from planar.native.backend import Designs, run
-from planar.native.listing import Listing, NotPrinted, Turned, without_turning
+from planar.native import backend, compiled, listing, march
+from planar.native.backend import Designs, layout, run
+from planar.native.kernel import Outside
+from planar.native.listing import MOST_INSTRUCTIONS, Listing, NotPrinted, Turned, without_turning
+from planar.program import structure
+from planar.sweeping.base import base
 from tests.known import MODELS
+from tests.linkages import random_linkage
+from tests.watchdog import watched
 
 PART = slice(30, 331)
 """Rows of a cycle of 360 steps that are away from its limits."""
@@ -77,12 +85,12 @@ def test_a_run_of_a_model_is_the_one_that_casadi_gives(stem):
 
 
 def test_cos_and_sin_of_sums_are_put_together_from_the_angles_own():
-    listing = Listing()
-    a, b, c = (listing.add("input", data=("z", k)) for k in range(3))
-    turned = [Turned(*(listing.add("input", data=(part, k)) for part in ("zc", "zs"))) for k in range(2)]
-    inside = listing.add("sub", listing.add("add", a, listing.add("mul", listing.const(2.0), b)), c)
-    wanted = [listing.add("cos", inside), listing.add("sin", inside)]
-    made, numbers = without_turning(listing, wanted, {a: turned[0], b: turned[1]})
+    made_of = Listing()
+    a, b, c = (made_of.add("input", data=("z", k)) for k in range(3))
+    turned = [Turned(*(made_of.add("input", data=(part, k)) for part in ("zc", "zs"))) for k in range(2)]
+    inside = made_of.add("sub", made_of.add("add", a, made_of.add("mul", made_of.const(2.0), b)), c)
+    wanted = [made_of.add("cos", inside), made_of.add("sin", inside)]
+    made, numbers = without_turning(made_of, wanted, {a: turned[0], b: turned[1]})
     values = {
         ("zc", 0): np.cos(0.3),
         ("zs", 0): np.sin(0.3),
@@ -116,3 +124,90 @@ def test_what_is_not_a_number_is_not_good():
     given["designs"].p[0, 1] = np.nan
     _, good = run(**given)
     assert good.tolist() == [len(given["gone"]), 0]
+
+
+# how much is printed
+
+
+IDLE = planar.load(Path(__file__).parent / "data" / "idle-slide.json")
+"""Six links: the slide of S4 places links L2 and L3 and does not turn them, but stands in the equations that do."""
+
+
+def all_points(mechanism, rates):
+    """The function that a sweep of the first input runs for all points that move."""
+    common = base(mechanism, mechanism.inputs[0].pair)
+    links = tuple(common.member(name)[0] for name in common.wanted(None))
+    return layout(common.program, structure(common.mechanism), links, rates)
+
+
+@pytest.mark.parametrize("rates", [False, True])
+@pytest.mark.parametrize("seed", [None, 406027, 406063, 406117, 406230, 406299, 407086])
+def test_what_is_printed_ends(seed, rates):
+    mechanism = IDLE if seed is None else planar.from_dict(random_linkage(seed, 6).value)
+    with watched(10):
+        assert all_points(mechanism, rates).text.count("\n") < MOST_INSTRUCTIONS / 3
+
+
+def test_a_slide_that_turns_nothing_leaves_a_sweep_as_the_cycle():
+    with watched(10):
+        motion = planar.cycle(IDLE, 10, -0.07, 0.03)
+        found = planar.sweep(IDLE, {"S7.velocity": [1.9]}, 10, start=-0.07, stop=0.03, backend="native")
+    assert found.whole.all()
+    assert found.general == 0
+    for point in found.points:
+        for order in ("position", "velocity", "acceleration"):
+            wanted = getattr(motion.point(point), order)
+            np.testing.assert_allclose(getattr(found, order)[point][0], wanted, atol=1e-11 * (1 + np.abs(wanted).max()))
+
+
+def test_what_is_wanted_before_it_is_known_is_not_printed(monkeypatch):
+    def written(self):
+        raise Outside(("z", 0))
+
+    monkeypatch.setattr(march._March, "written", written)
+    with watched(10), pytest.raises(NotPrinted, match="a later one"):
+        march.march(backend.printed(base(IDLE, None).program, structure(IDLE)), ("L2",), False, 16)
+
+
+def test_what_cancels_is_nothing():
+    made = Listing()
+    value = made.add("mul", *(made.add("input", data=("p", k)) for k in range(2)))
+    less = made.add("neg", value)
+    assert [made.number(made.add("add", *both)) for both in ((value, less), (less, value))] == [0.0, 0.0]
+
+
+def test_a_longer_function_is_left_to_casadi_and_printed_once_in_vain(monkeypatch):
+    mechanism, tried, really = MODELS["stephenson-1-six-bar"], [], march.march
+
+    def printing(*given):
+        tried.append(given)
+        return really(*given)
+
+    at, pair = mechanism.inputs[0].position, mechanism.inputs[0].pair
+    designs, run_ = {f"{pair}.velocity": np.linspace(1, 2, 6)}, {"start": at, "stop": at + 0.1, "pair": pair}
+    wanted = planar.sweep(mechanism, designs, 5, backend="casadi", **run_)
+    monkeypatch.setattr(listing, "MOST_INSTRUCTIONS", 100)
+    monkeypatch.setattr(backend, "march", printing)
+    backend._layout.cache_clear()
+    found = planar.sweep(mechanism, designs, 5, backend="native", block=2, **run_)
+    backend._layout.cache_clear()
+    assert len({given[1:] for given in tried}) == len(tried) > 0
+    assert (found.general, found.whole.all()) == (0, True)
+    for point in found.points:
+        np.testing.assert_array_equal(found.acceleration[point], wanted.acceleration[point])
+
+
+def test_a_long_text_is_compiled_briefly(monkeypatch):
+    plan = all_points(MODELS["crank-rocker"], True)
+    usual, asked, really = compiled.fingerprint(plan.text), [], compiled._machine
+
+    def machine(code):
+        asked.append(code)
+        return really(code)
+
+    monkeypatch.setattr(compiled, "_machine", machine)
+    compiled._made(plan.text)
+    monkeypatch.setattr(compiled, "LONG", plan.text.count("\n") - 1)
+    compiled._made(plan.text)
+    assert asked == [compiled.CODE, compiled.BRIEF]
+    assert compiled.fingerprint(plan.text) != usual

@@ -1,6 +1,5 @@
 """Sweeps: every design as its own cycle and the closed forms have it, refused where it must be, kept in stores."""
 
-import json
 import sys
 from importlib.machinery import ModuleSpec
 from types import ModuleType
@@ -336,80 +335,3 @@ def test_wheels_that_do_not_mesh_are_refused_design_by_design():
 def test_what_a_base_has_in_common_is_made_once():
     mechanism = four_bar(*ROCKER, 0.8)
     assert base(mechanism, None) is base(four_bar(*ROCKER, 0.8), None)
-
-
-# stores
-
-
-def swept(store, **more):
-    mechanism = four_bar(*TRIPLE, 1.2)
-    return planar.sweep(mechanism, around(mechanism, 0.05, 9), 20, ["E", "C"], block=4, store=store, **more)
-
-
-@pytest.fixture(params=["zarr", "parquet"])
-def store(request, tmp_path):
-    pytest.importorskip({"zarr": "zarr", "parquet": "pyarrow"}[request.param])
-    return tmp_path / f"sweep.{request.param}"
-
-
-def same(found, wanted):
-    for order in ORDERS:
-        np.testing.assert_array_equal(getattr(found, order)["E"][:], getattr(wanted, order)["E"])
-    np.testing.assert_array_equal(found.status[:], wanted.status)
-    np.testing.assert_array_equal(found.input, wanted.input)
-    assert (found.general, found.said) == (wanted.general, wanted.said)
-
-
-def test_a_store_has_what_memory_has(store):
-    same(swept(store), swept(None))
-
-
-def test_a_sweep_goes_on_with_the_blocks_that_are_missing(store):
-    def stop(done, many):
-        if done == 8:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        swept(store, progress=stop)
-    told = []
-    found = swept(store, progress=lambda done, many: told.append(done))
-    assert told == [8, 9]
-    same(found, swept(None))
-    told.clear()
-    same(swept(store, progress=lambda done, many: told.append(done)), swept(None))
-    assert told == [9]
-
-
-def test_a_store_of_another_sweep_is_left_alone(store):
-    swept(store)
-    with pytest.raises(BadInput, match="something else than this sweep"):
-        planar.sweep(four_bar(*TRIPLE, 1.2), {"BC.length": [0.7]}, 20, store=store)
-
-
-def test_a_store_of_inputs_that_differ_has_them_by_design(store):
-    mechanism = four_bar(*ROCKER, 0.8)
-    found = planar.sweep(mechanism, {"A.position": [0.7, 0.8, 0.9]}, 4, "C", block=2, store=store, rates=False)
-    np.testing.assert_allclose(found.input[:], np.array([[0.7], [0.8], [0.9]]) + np.linspace(0, TURN, 5))
-    assert found.velocity is None
-
-
-def test_a_parquet_folder_is_one_table_for_other_readers(tmp_path):
-    pq = pytest.importorskip("pyarrow.parquet")
-    swept(tmp_path / "a.parquet")
-    table = pq.read_table(tmp_path / "a.parquet")
-    assert table.num_rows == 9 * 21
-    assert {"design", "step", "input", "status", "BC.length", "E x [m]", "C vy [m/s]", "E ax [m/s^2]"} <= {
-        *table.column_names
-    }
-    about = json.loads(pq.read_schema(tmp_path / "a.parquet" / "part-000000.parquet").metadata[b"planar"])
-    assert about["outcomes"][0] == "solved"
-
-
-def test_a_zarr_group_says_what_it_is(tmp_path):
-    zarr = pytest.importorskip("zarr")
-    swept(tmp_path / "a.zarr")
-    group = zarr.open_group(str(tmp_path / "a.zarr"), mode="r")
-    assert files.from_dict(group.attrs["mechanism"]) == four_bar(*TRIPLE, 1.2)
-    assert group["position/E"].shape == (9, 21, 2)
-    assert group["position/E"].chunks == (4, 21, 2)
-    assert group["designs/BC.length"].shape == (9,)

@@ -7,18 +7,31 @@ import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NoReturn
 
 import click
 
-from planar.errors import BadInput, NoAnswer
+from planar.errors import BadInput, NoAnswer, NotWritten
 
-NO_ANSWER, BAD_INPUT = 1, 2
+NO_ANSWER, BAD_INPUT, NOT_WRITTEN = 1, 2, 3
 """Exit statuses; 0 is done."""
+CLOSED_PIPE = 128 + 13
+"""What a shell tells of programs that the closing of their pipe ends (SIGPIPE is signal 13), as by `| head`."""
 
 
 class Commands(click.Group):
     """Every command ends with the same sentences and exit statuses."""
+
+    def main(self, *args: Any, **more: Any) -> Any:
+        """As click's, but that output which cannot be written ends in a status of its own, the last of it too."""
+        try:
+            try:
+                return super().main(*args, **more)
+            finally:
+                if sys.stdout is not None:
+                    sys.stdout.flush()
+        except OSError as problem:
+            _lost(problem)
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         for stream in (sys.stdout, sys.stderr):
@@ -36,6 +49,10 @@ class Commands(click.Group):
 def _ending() -> Iterator[None]:
     try:
         yield
+    except OSError as problem:
+        _lost(problem)
+    except NotWritten as problem:
+        _refuse(str(problem), "not written", str(problem), NOT_WRITTEN)
     except BadInput as problem:
         _refuse(str(problem), "bad input", str(problem), BAD_INPUT)
     except NoAnswer as problem:
@@ -52,7 +69,33 @@ def _refuse(
     sentence: str, outcome: str, reason: str, status: int, more: Mapping[str, Any] = MappingProxyType({})
 ) -> None:
     if "--json" in sys.argv:
-        click.echo(json.dumps({"outcome": outcome, "reason": reason, **more}, ensure_ascii=False))
-    shown = "".join(each if each.isprintable() else repr(each)[1:-1] for each in sentence)
-    click.echo(f"planar: {shown}", err=True)
+        try:
+            click.echo(json.dumps({"outcome": outcome, "reason": reason, **more}, ensure_ascii=False))
+        except OSError as problem:
+            _lost(problem)
+    _say(sentence)
     sys.exit(status)
+
+
+def _lost(problem: OSError) -> NoReturn:
+    """End where what is printed cannot be written, quietly where nobody reads it any more."""
+    from planar.files import OUT_OF_ROOM, abandon
+
+    if problem.errno not in OUT_OF_ROOM:
+        raise problem
+    abandon(sys.stdout)
+    if isinstance(problem, BrokenPipeError):
+        sys.exit(CLOSED_PIPE)
+    _say(f"the output cannot be written: {problem.strerror}")
+    sys.exit(NOT_WRITTEN)
+
+
+def _say(sentence: str) -> None:
+    """One line on stderr, if that takes it."""
+    shown = "".join(each if each.isprintable() else repr(each)[1:-1] for each in sentence)
+    try:
+        click.echo(f"planar: {shown}", err=True)
+    except OSError:
+        from planar.files import abandon
+
+        abandon(sys.stderr)

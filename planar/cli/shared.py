@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import sys
@@ -33,6 +34,9 @@ def main() -> None:
     """How any planar linkage moves.
 
     MODEL is a mechanism file (JSON), or the name of a model that comes along.
+
+    Ends with status 0 when all is done, 1 where the mechanism has no answer, 2 on bad input, 3 where the result cannot
+    be written, as on a full disk.
     """
     for limit in ONE_THREAD:
         os.environ.setdefault(limit, "1")
@@ -178,8 +182,12 @@ def show(renderable: Any, output: Path | None) -> None:
     """Print a table, or write it to a file in the format that its name says."""
     from rich.console import Console
 
+    class Screen(Console):
+        def on_broken_pipe(self) -> None:
+            raise BrokenPipeError(errno.EPIPE, os.strerror(errno.EPIPE))  # which every command ends alike
+
     if output is None:
-        console = Console(markup=False, emoji=False, highlight=False)  # a name is text, whatever it looks like
+        console = Screen(markup=False, emoji=False, highlight=False)  # a name is text, whatever it looks like
         if not console.is_terminal and not os.environ.get("COLUMNS", "").isdecimal():
             # a file or another program has no width: lines are not to be broken for it
             console.width = 140

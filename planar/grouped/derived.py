@@ -12,7 +12,7 @@ from planar.equations import Equations, Stage
 from planar.grouped.formulas import Formula, Leaf
 from planar.grouped.structure import COS, SIN, X1, X2, Structure
 from planar.native.kernel import solved
-from planar.native.listing import Listing, NotPrinted, Turned, needed, without_turning
+from planar.native.listing import Listing, NotPrinted, Turned, check_length, needed, without_turning
 from planar.pairs import Kind as Measure
 from planar.plane import GROUND, Frame, frame_at
 from planar.program import length, placed
@@ -229,10 +229,12 @@ class Derivation:
         return whole
 
     def formula(self, wanted: list[int]) -> Formula:
-        """The formula of wanted values. Raises NotPrinted where an angle stands outside cos and sin."""
+        """The formula of wanted values. Raises NotPrinted where an angle stands outside cos and sin, or it is long."""
         made, numbers = without_turning(self.listing, wanted, self.turned)
         leaves: dict[int, Leaf] = {}
-        for number in needed(made, numbers):
+        order = needed(made, numbers)
+        check_length(len(order))
+        for number in order:
             value = made.values[number]
             if value.what == "input":
                 what, data = value.data  # type: ignore[misc]

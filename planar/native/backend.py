@@ -39,12 +39,25 @@ def printed(program: Program, of: Mechanism) -> Structure:
     return Structure(program.equations, of)
 
 
-@lru_cache(maxsize=256)
 def layout(
     program: Program, of: Mechanism, links: tuple[str, ...], rates: bool, levels: tuple[int, ...] | None = None
 ) -> Layout:
     """The function for points on links of a structure, see `march`. Raises NotPrinted."""
-    return march(printed(program, of), links, rates, LANES, levels)
+    found = _layout(program, of, links, rates, levels)
+    if isinstance(found, str):
+        raise NotPrinted(found)
+    return found
+
+
+@lru_cache(maxsize=256)
+def _layout(
+    program: Program, of: Mechanism, links: tuple[str, ...], rates: bool, levels: tuple[int, ...] | None
+) -> Layout | str:
+    """The same, or why there is none: every block of a sweep would find that out again."""
+    try:
+        return march(printed(program, of), links, rates, LANES, levels)
+    except NotPrinted as why:
+        return str(why)
 
 
 class Designs(NamedTuple):

@@ -19,7 +19,7 @@ from planar.closed import Closed, closed
 from planar.equations import Equations, Stage
 from planar.mechanism import Mechanism, motions
 from planar.native.collected import Collecting
-from planar.native.listing import Listing, NotPrinted, Turned, needed, without_turning
+from planar.native.listing import Listing, NotPrinted, Turned, check_length, needed, without_turning
 from planar.native.text import Text
 from planar.pairs import Kind
 from planar.plane import GROUND, Frame, frame_at
@@ -230,6 +230,7 @@ class Kernel:
     def values(self, outputs: Sequence[ca.SX], have: Mapping[Leaf, str]) -> list[str]:
         """The values of expressions where numbers stand under these names. Raises Outside, NotPrinted."""
         function = ca.Function("part", list(self.symbols.values()), [ca.densify(ca.vertcat(*outputs))], {"cse": True})
+        check_length(self.text.count + function.n_instructions())
         listing = Listing()
         angles: dict[int, Turned] = {}
         arguments = []
@@ -243,7 +244,9 @@ class Kernel:
         wanted = [each for output in listing.inlined(function, arguments) for each in output]
         turned_out, wanted = without_turning(listing, wanted, angles)
         numbers = self.collecting.again(turned_out, wanted)
-        return self._written(numbers, have)
+        names = self._written(numbers, have)
+        check_length(self.text.count)
+        return names
 
     def parted(self, outputs: Sequence[ca.SX], have: Mapping[Leaf, str]) -> list[list[str]]:
         """The same, of each expression by itself."""

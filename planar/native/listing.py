@@ -41,8 +41,18 @@ WHOLE = (-3.0, -2.0, -1.0, 1.0, 2.0, 3.0)
 """Multiples of an angle that are put together from its own cos and sin."""
 
 
+MOST_INSTRUCTIONS = 16_000
+"""Of one function: longer ones would take more than about a second to compile."""
+
+
 class NotPrinted(Exception):
-    """An operation that other machines are not told."""
+    """What other machines are not told; the text says why."""
+
+
+def check_length(instructions: int) -> None:
+    """Raises NotPrinted for more instructions than one function may have."""
+    if instructions > MOST_INSTRUCTIONS:
+        raise NotPrinted(f"more than {MOST_INSTRUCTIONS} instructions take too long to compile")
 
 
 class Value(NamedTuple):
@@ -91,12 +101,18 @@ class Listing:
             return of[0]
         if what in ("add", "mul") and known[0] == idle:
             return of[1]
-        if (what == "mul" and 0.0 in known) or (what == "div" and known[0] == 0.0):
+        if (what == "mul" and 0.0 in known) or (what == "div" and known[0] == 0.0) or self._cancels(what, of):
             return self.const(0.0)
-        if what == "sub" and (of[0] == of[1] or known[0] == 0.0):
-            return self.const(0.0) if of[0] == of[1] else self.add("neg", of[1])
+        if what == "sub" and known[0] == 0.0:
+            return self.add("neg", of[1])
         inside = self.values[of[0]] if what == "neg" else None
         return inside.of[0] if inside is not None and inside.what == "neg" else None
+
+    def _cancels(self, what: str, of: tuple[int, ...]) -> bool:
+        """Whether a sum or difference is of a value and the same taken away."""
+        if what == "add":
+            return any(self.values[a] == Value("neg", (b,)) for a, b in (of, of[::-1]))
+        return what == "sub" and of[0] == of[1]
 
     def inlined(self, function: ca.Function, inputs: list[list[int]]) -> list[list[int]]:
         """A function of values: the numbers of its results, dense, column by column. Raises NotPrinted."""

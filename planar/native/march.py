@@ -10,6 +10,7 @@ from math import inf
 from typing import NamedTuple
 
 from planar.native.kernel import FASTEST, WEAK, Have, Leaf, Outside, Part, Structure
+from planar.native.listing import NotPrinted
 from planar.native.points import Points
 
 ORDER, RING = 6, 8
@@ -50,6 +51,8 @@ def march(
         try:
             return _March(structure, tuple(links), rates, lanes, levels, carried).written()
         except Outside as angle:
+            if angle.leaf in carried:  # its value is wanted before its own group is solved
+                raise NotPrinted(f"a group stands in an angle of a later one: {angle.leaf}") from None
             carried |= {angle.leaf}
 
 

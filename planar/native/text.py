@@ -17,7 +17,7 @@ class Text:
     """Instructions one after the other, with fresh names."""
 
     def __init__(self, lanes: int):
-        self.lanes, self._count = lanes, 0
+        self.lanes, self.count = lanes, 0
         self.lines: list[str | list[str]] = []
         self._ahead: list[str | list[str]] = []
         self.vector = f"<{lanes} x double>"
@@ -40,8 +40,8 @@ class Text:
 
     def new(self, text: str) -> str:
         """Add an instruction that gives a value; the value's name."""
-        self._count += 1
-        name = f"%v{self._count}"
+        self.count += 1
+        name = f"%v{self.count}"
         self.lines.append(f"{name} = {text}")
         return name
 

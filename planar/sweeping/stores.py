@@ -1,4 +1,4 @@
-"""Where the blocks of a sweep go: arrays in memory, a Zarr group, or a folder of Parquet files."""
+"""Where the blocks of a sweep go: what every place for them does, and arrays in memory, which are one."""
 
 from __future__ import annotations
 
@@ -6,16 +6,15 @@ import hashlib
 import json
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
-from functools import cached_property
+from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
-from urllib.parse import quote
 
 import numpy as np
 
 from planar.errors import BadInput, Outcome
-from planar.files import to_dict
+from planar.files import PART, to_dict, unwritten
 from planar.native.room import room
 from planar.sweeping.block import Block, Done
 from planar.sweeping.result import Sweep
@@ -25,7 +24,10 @@ Array = np.ndarray
 MOST = 16 * 2**30
 """Bytes of results that are kept in memory."""
 ORDERS = ("position", "velocity", "acceleration")
-LETTERS = {"position": ("", "m"), "velocity": ("v", "m/s"), "acceleration": ("a", "m/s^2")}
+ZARRS_PART = ".partial"
+"""Ending of the files that Zarr has not written whole."""
+FORM = 2
+"""Of what stands in a store; raised where it is no longer that of stores of before."""
 
 
 class Plan(NamedTuple):
@@ -40,6 +42,11 @@ class Plan(NamedTuple):
         return len(next(iter(self.whole.designs.values())))
 
     @property
+    def blocks(self) -> int:
+        """How many blocks there are."""
+        return -(-self.many // self.size)
+
+    @property
     def orders(self) -> tuple[str, ...]:
         """What is told of every point."""
         return ORDERS if self.whole.rates else ORDERS[:1]
@@ -48,7 +55,7 @@ class Plan(NamedTuple):
         """The same for two sweeps that have the same results."""
         whole, made = self.whole, hashlib.sha256()
         grid = [whole.steps, whole.points, whole.rates, whole.start, whole.stop, whole.pair]
-        made.update(json.dumps([to_dict(whole.mechanism), grid], sort_keys=True, default=float).encode())
+        made.update(json.dumps([FORM, to_dict(whole.mechanism), grid], sort_keys=True, default=float).encode())
         for name, values in sorted(whole.designs.items()):
             made.update(name.encode() + b"\0" + np.ascontiguousarray(values).tobytes())
         return made.hexdigest()
@@ -123,15 +130,44 @@ def sink(store: str | Path | None, plan: Plan) -> Sink:
     if store is None:
         return _Memory(plan)
     path = Path(store)
-    kinds = {".zarr": (_Zarr, "zarr", "sweep"), ".parquet": (_Parquet, "pyarrow", "parquet")}
-    if path.suffix not in kinds:
-        raise BadInput("store", f"a store ends in {' or '.join(kinds)}, unlike {str(store)[:80]!r}")
-    kind, library, extra = kinds[path.suffix]
+    modules = {".zarr": ("zarr_store", "zarr", "sweep"), ".parquet": ("parquet_store", "pyarrow", "parquet")}
+    if path.suffix not in modules:
+        raise BadInput("store", f"a store ends in {' or '.join(modules)}, unlike {str(store)[:80]!r}")
+    module, library, extra = modules[path.suffix]
     try:
         import_module(library)
     except ImportError:
         raise BadInput("store", f"a {path.suffix} store needs {library}: pip install 'planar[{extra}]'") from None
-    return kind(plan, path)
+    return import_module(f"planar.sweeping.{module}").Store(plan, path)
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """What the system refuses of a store is one sentence: BadInput, or NotWritten where there is no room."""
+    try:
+        yield
+    except OSError as problem:
+        raise unwritten("store", str(path), problem) from None
+
+
+def begun(path: Path) -> bool:
+    """Whether anything whole stands in the folder of a store, which is made if it is not there. Raises BadInput."""
+    with writing(path):
+        if path.exists() and not path.is_dir():
+            raise BadInput("store", f"{path} is a file, and a store is a folder; name another, or take it away first")
+        path.mkdir(parents=True, exist_ok=True)
+        return any(not PART.fullmatch(each.name) and each.suffix != ZARRS_PART for each in path.iterdir())
+
+
+def another(path: Path) -> BadInput:
+    """That a folder is not this sweep's to write in."""
+    return BadInput("store", f"{path} holds something else than this sweep; name another store, or take it away first")
+
+
+def damaged(path: Path, number: int, part: slice) -> BadInput:
+    """That a block of a store cannot be read."""
+    told = f"block {number} of {path} (designs {part.start} to {part.stop - 1}) is missing or damaged"
+    return BadInput("store", f"{told}; the same sweep into this store solves it again")
 
 
 class _Memory(Sink):
@@ -159,10 +195,10 @@ class _Memory(Sink):
 
     def result(self) -> Sweep:
         assert self.inputs is not None
-        return self.sweep(_views(self.out, self.plan), self.status, self.inputs)
+        return self.sweep(views(self.out, self.plan), self.status, self.inputs)
 
 
-def _views(out: Array, plan: Plan) -> dict[str, dict[str, Array]]:
+def views(out: Array, plan: Plan) -> dict[str, dict[str, Array]]:
     """out (steps + 1, rows, designs) as arrays (designs, steps + 1, 2) by order and point, without a copy."""
     turned = out.transpose(2, 0, 1)
     many = len(plan.whole.points)
@@ -184,187 +220,3 @@ def _joined(whole: Array | None, own: Array, part: slice, plan: Plan) -> Array:
         whole = np.tile(row, (plan.many, 1))
     whole[part] = own
     return whole
-
-
-class _Zarr(Sink):
-    def __init__(self, plan: Plan, path: Path):
-        super().__init__(plan)
-        import zarr
-
-        self.path, mark = path, plan.fingerprint()
-        if path.exists():
-            try:
-                self.group = zarr.open_group(str(path), mode="r+")
-                same = self.group.attrs.get("fingerprint") == mark
-            except (FileNotFoundError, ValueError):
-                same = False
-            if not same:
-                raise _another(path)
-            self.size = int(self.group.attrs["block"])  # type: ignore[arg-type]
-            general = self.group["blocks"][:]
-            self.finished = {int(k) for k in np.flatnonzero(general[:, 0] >= 0)}
-            for k in self.finished:
-                self.told[k] = (*map(int, general[k]), self.group.attrs.get(f"said {k}", ()))  # type: ignore[assignment]
-            return
-        self.group = group = zarr.open_group(str(path), mode="w")
-        rows, steps = plan.size, plan.whole.steps + 1
-        for order in plan.orders:
-            for name in plan.whole.points:
-                self._add(f"{order}/{_plain(name)}", (plan.many, steps, 2), (rows, steps, 2), float, "axis")
-        self._add("status", (plan.many, steps), (rows, steps), np.int8)
-        self._add("input", (plan.many, steps), (rows, steps), float)
-        blocks = -(-plan.many // rows)
-        group.create_array("blocks", shape=(blocks, 2), chunks=(1, 2), dtype="int64", fill_value=-1)
-        for name, values in plan.whole.designs.items():
-            group.create_array(
-                f"designs/{_plain(name)}", data=np.ascontiguousarray(values), dimension_names=("design",)
-            )
-        group.attrs.update(
-            {"mechanism": to_dict(plan.whole.mechanism), "points": list(plan.whole.points), "block": rows}
-        )
-        group.attrs["outcomes"] = [each.value for each in Outcome]
-        group.attrs["fingerprint"] = mark  # last: a store without it was not begun
-
-    def _add(self, name: str, shape: tuple, chunks: tuple, kind: Any, *axes: str) -> None:
-        fill = np.nan if kind is float else 0
-        names = ("design", "step", *axes)
-        self.group.create_array(name, shape=shape, chunks=chunks, dtype=kind, fill_value=fill, dimension_names=names)
-
-    def take(self, number: int, part: slice, done: Done) -> None:
-        for order, points in _views(done.out, self.plan).items():
-            for name, values in points.items():
-                self.group[f"{order}/{_plain(name)}"][part] = np.ascontiguousarray(values)
-        self.group["status"][part] = done.status
-        self.group["input"][part] = np.broadcast_to(done.input, done.status.shape)
-        if done.said:
-            self.group.attrs[f"said {number}"] = [list(each) for each in done.said]
-        self.group["blocks"][number] = [done.general, done.sent]
-        self.told[number] = done.general, done.sent, done.said
-
-    def result(self) -> Sweep:
-        group = self.group
-        found = {
-            order: {name: group[f"{order}/{_plain(name)}"] for name in self.plan.whole.points}
-            for order in self.plan.orders
-        }
-        return self.sweep(found, group["status"], _one_row(group["input"], self.size))
-
-
-def _one_row(stored: Any, size: int) -> Array:
-    """Positions of the input, as one row where all designs have the same; looked at block by block."""
-    first = stored[0]
-    blocks = range(0, stored.shape[0], size)
-    if all(np.array_equal(np.broadcast_to(first, (p := stored[k : k + size]).shape), p) for k in blocks):
-        return first
-    return stored
-
-
-class _Parquet(Sink):
-    """One file for each block, a row for each design and step."""
-
-    def __init__(self, plan: Plan, path: Path):
-        super().__init__(plan)
-        self.path, self.mark = path, plan.fingerprint()
-        path.mkdir(parents=True, exist_ok=True)
-        if not path.is_dir():
-            raise BadInput("store", f"{path} is no folder")
-        for file in sorted(path.glob("part-*.parquet")):
-            about = self._about(file)
-            if about.get("fingerprint") != self.mark:
-                raise _another(path)
-            self.size = about["block"]
-            self.finished.add(about["number"])
-            self.told[about["number"]] = about["general"], about["sent"], about["said"]
-
-    @staticmethod
-    def _about(file: Path) -> dict[str, Any]:
-        from pyarrow import parquet
-
-        return json.loads((parquet.read_schema(file).metadata or {}).get(b"planar", b"{}"))
-
-    def _file(self, number: int) -> Path:
-        return self.path / f"part-{number:06d}.parquet"
-
-    def take(self, number: int, part: slice, done: Done) -> None:
-        import pyarrow as pa
-        from pyarrow import parquet
-
-        designs, steps = done.status.shape
-        columns: dict[str, Array] = {
-            "design": np.repeat(np.arange(part.start, part.stop), steps),
-            "step": np.tile(np.arange(steps, dtype=np.int32), designs),
-            **{name: np.repeat(values[part], steps) for name, values in self.plan.whole.designs.items()},
-            "input": np.broadcast_to(done.input, done.status.shape).ravel(),
-            "status": done.status.ravel(),
-        }
-        for order, points in _views(done.out, self.plan).items():
-            for name, values in points.items():
-                for axis, own in zip(_columns(order, name), np.moveaxis(values, 2, 0), strict=True):
-                    columns[axis] = np.ascontiguousarray(own).ravel()
-        about = {
-            "fingerprint": self.mark,
-            "block": self.size,
-            "number": number,
-            "general": done.general,
-            "sent": done.sent,
-            "said": done.said,
-            "outcomes": [each.value for each in Outcome],
-        }
-        table = pa.table(columns).replace_schema_metadata({"planar": json.dumps(about)})
-        # a name that readers of the folder pass over, until the file is whole
-        rough = self.path / f".part-{number:06d}"
-        parquet.write_table(table, rough)
-        rough.replace(self._file(number))
-        self.told[number] = done.general, done.sent, done.said
-
-    def _read(self, columns: tuple[str, ...]) -> list[Array]:
-        """Columns of all blocks, each (designs, steps + 1)."""
-        from pyarrow import parquet
-
-        blocks = range(-(-self.plan.many // self.size))
-        tables = [parquet.read_table(self._file(k), columns=list(columns)) for k in blocks]
-        return [
-            np.concatenate([table[name].to_numpy() for table in tables]).reshape(-1, self.plan.whole.steps + 1)
-            for name in columns
-        ]
-
-    def result(self) -> Sweep:
-        found = {order: _Read(self, order) for order in self.plan.orders}
-        status, inputs = self._read(("status", "input"))
-        return self.sweep(found, status, inputs[0] if np.all(inputs == inputs[0]) else inputs)
-
-
-class _Read(Mapping[str, Any]):
-    """One quantity of all points, read from Parquet files when it is asked for."""
-
-    def __init__(self, of: _Parquet, order: str):
-        self.of, self.order = of, order
-
-    def __getitem__(self, name: str) -> Array:
-        if name not in self.of.plan.whole.points:
-            raise KeyError(name)
-        return np.stack(self.of._read(_columns(self.order, name)), axis=2)
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.of.plan.whole.points)
-
-    @cached_property
-    def _many(self) -> int:
-        return len(self.of.plan.whole.points)
-
-    def __len__(self) -> int:
-        return self._many
-
-
-def _columns(order: str, point: str) -> tuple[str, str]:
-    letter, unit = LETTERS[order]
-    return f"{point} {letter}x [{unit}]", f"{point} {letter}y [{unit}]"
-
-
-def _plain(name: str) -> str:
-    """A name that a path can have."""
-    return quote(name, safe=" ")
-
-
-def _another(path: Path) -> BadInput:
-    return BadInput("store", f"{path} holds something else than this sweep; name another store, or take it away first")
