@@ -22,6 +22,7 @@ from planar.pages import gallery
 from planar.pages.carried import carried
 from planar.pages.page import SCRIPTS, filled, page, told
 from planar.pages.shown import framed, page_of, view
+from planar.solving.freedom import strengths
 from planar.solving.position import known_of
 from planar.views.columns import columns
 from tests import command
@@ -452,7 +453,71 @@ def test_the_range_of_the_input_is_that_of_the_cycle_command():
         if limits is None:
             assert np.ptp(wanted) == pytest.approx(2.0 * np.pi), stem
         else:
-            assert limits == pytest.approx([wanted.min(), wanted.max()], abs=1e-5), stem
+            assert limits == pytest.approx([wanted.min(), wanted.max()], abs=1e-12), stem
+
+
+@needs_node
+@pytest.mark.parametrize("stem", ["000-P1", "hart-inversor", "elliptical-trammel", "excavator-arm"])
+def test_at_its_limits_a_page_has_no_rates_as_the_cycle_command_has_none(stem):
+    """Also where two groups of links turn back at once; beside a limit there are rates, and the way back is the same."""
+    act = """
+    const start = page.input(0), far = page.data.inputs[0].slides ? 4 * page.data.size : 2 * Math.PI, found = [];
+    const places = () => page.data.names.map((name) => page.point(name).position), first = places();
+    for (const sense of [-1, 1]) {
+      const there = page.moveTo(start + sense * far, 0), at = page.input(0), { w1, w2, why } = page.state;
+      const points = page.data.names.map((name) => page.point(name).velocity);
+      const none = [w1, w2, ...points].every((each) => each === null), told = page.undetermined;
+      page.moveTo(start, 0);
+      found.push({ there, at, none, why, told, back: places() });
+      page.moveTo(at + 1e-7 * far * -sense, 0);
+      found[found.length - 1].beside = page.state.w1 !== null;
+      page.moveTo(start, 0);
+    }
+    return { found, first };
+    """
+    mechanism = MODELS[stem]
+    (given, *_) = mechanism.inputs
+    motion = planar.cycle(mechanism, 4, pair=given.pair)
+    places = motion.inputs[given.pair].position
+    page_of_it = in_node({stem: mechanism}, act)[stem]
+    scale = known_of(mechanism).solver.unit
+    for found, row in zip(page_of_it["found"], (np.argmin(places), np.argmax(places)), strict=True):
+        rates = [point.velocity[row] for point in motion.points.values()]
+        assert np.isnan(rates).any()
+        assert not found["there"]
+        assert found["at"] == pytest.approx(places[row], abs=CLOSE)
+        assert found["none"]
+        assert found["why"] in found["told"]
+        assert found["told"].endswith(("no velocity", "no velocity is determined"))
+        assert found["beside"]
+        near(found["back"], page_of_it["first"], scale)
+
+
+@needs_node
+def test_what_is_singular_on_a_page_is_so_in_python():
+    """The least singular value of every group, at the file's position and one beside it, by both."""
+    act = """
+    page.moveTo(page.input(0) + (page.data.inputs[0].slides ? 0.02 * page.data.size : 0.1), 0);
+    const { linkage } = page, { slope } = linkage.closure(linkage.z, linkage.u), { F: rows } = page.data.counts;
+    const { by, least } = slopeScales(linkage);
+    const strengths = page.data.stages.map(({ z: [a, b], F: [c, d] }) => {
+      const columns = [];
+      for (let j = a; j < b; j++) {
+        const column = Array.from({ length: d - c }, (_, i) => slope[j * rows + c + i] / by[c + i]);
+        const size = Math.max(Math.hypot(...column), least[j]);
+        columns.push(column.map((each) => each / size));
+      }
+      const values = singularValues(columns);
+      return b > a ? Math.min(...values) / Math.max(1, ...values) : 1;
+    });
+    return { z: Array.from(linkage.z), u: Array.from(linkage.u), strengths };
+    """
+    some = {stem: each for stem, each in SOME.items() if each.inputs}
+    for stem, found in in_node(some, act).items():
+        solver = known_of(some[stem]).solver
+        z, u = np.array(found["z"]), np.array(found["u"])
+        slope = solver.program.slopes(z[None], u[None], solver.station.p)[0][0]
+        assert found["strengths"] == pytest.approx(strengths(solver, slope), rel=1e-9, abs=1e-12), stem
 
 
 @needs_node
@@ -479,7 +544,7 @@ def test_a_file_that_stands_at_a_dead_point_can_be_moved_off_it():
     mechanism = planar.from_dict(value)
     found = in_node({"dead": mechanism}, act)["dead"]
     assert (found["beyond"], found["back"]) == (False, True)
-    assert found["stood"] == pytest.approx(dead, abs=1e-5)
+    assert found["stood"] == pytest.approx(dead, abs=CLOSE)
     assert found["at"] == pytest.approx(dead - 0.2, abs=1e-5)
     value["inputs"][0]["position"] = f"{found['at']!r} rad"
     state = planar.solve(planar.from_dict(value | {"sketch": dict(found["points"])}))

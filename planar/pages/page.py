@@ -30,6 +30,7 @@ STYLES = (
 )
 SCRIPTS = (
     "uplot/uPlot.iife.min.js",
+    "singular.js",
     "solver.js",
     "page.js",
     "course.js",

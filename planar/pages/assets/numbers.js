@@ -64,6 +64,7 @@ class Numbers {
     const section = document.getElementById("numbers");
     const box = htmlPart("div", { class: "choosing" }, section);
     this.choosing(box);
+    this.why = htmlPart("p", { class: "why", hidden: "" }, section);
     this.place = htmlPart("div", { class: "tables" }, section);
     this.tables();
     page.on("chosen", () => { this.tables(); this.listed(); });
@@ -130,7 +131,9 @@ class Numbers {
   /** The numbers of now. */
   fill() {
     const { page } = this, { data } = page, rows = this.cells.map(({ kind, name }) => valuesOf(page, kind, name));
-    const greatest = greatestNumbers(page);
+    const greatest = greatestNumbers(page), why = page.undetermined;
+    this.why.textContent = why && `${why[0].toUpperCase()}${why.slice(1)}.`;
+    this.why.hidden = why === "";
     const at = data.inputs.map((each, k) => `${each.pair} = ${inputTold(page, page.input(k), k)}`).join(", ");
     for (const [caption, title] of this.captions) caption.textContent = at ? `${title} at ${at}` : title;
     this.cells.forEach(({ kind, cells }, r) => cells.forEach((cell, c) => {

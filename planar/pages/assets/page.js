@@ -24,6 +24,13 @@ class Page {
     this.frames = this.framesOf(this.state);
   }
 
+  /** Why there is no velocity and no acceleration here, as a sentence; "" where there are. */
+  get undetermined() {
+    const many = this.data.inputs.length > 1 ? "inputs" : "input";
+    const told = { "dead point": `dead point of the ${many}: no velocity`, "change point": "change point: no velocity is determined" };
+    return told[this.state.why] ?? "";
+  }
+
   /** Velocity and acceleration of every input, SI. */
   inputRates() { return this.data.inputs.map((each) => [each.velocity, each.acceleration]); }
 

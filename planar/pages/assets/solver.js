@@ -84,6 +84,7 @@ class Linkage {
     this.u = data.inputs.map((each, k) => each.position / this.scale[k]);
     this.z = Float64Array.from(data.z);
     this.last = null; // the step that led here
+    this.stop = null; // the way by which an exact dead point was come to
   }
 
   /** A linkage as this one, to go its own way. */
@@ -94,12 +95,14 @@ class Linkage {
     made.z = Float64Array.from(this.z);
     made.u = Array.from(this.u);
     made.last = before && { ...before, to: made.z };
+    made.stop = this.stop && { ...this.stop, to: this.stop.to === this.z ? made.z : null };
     return made;
   }
 
   /** Fill in the numbers of the pairs from the dimensions. */
   measure(d = this.d) {
     this.program.sizes(d, this.sizes);
+    this.scales = null; // of the slope: made where they are wanted
     this.p = this.sizes.subarray(0, this.data.counts.p);
   }
 
@@ -137,12 +140,17 @@ class Linkage {
   /** How the unknowns move with inputs moving at u1: (unknowns,), or null where that is not determined. */
   tangent(u, z, u1) {
     const { z: n, F: rows, u: m } = this.data.counts;
-    const y = [...z, ...u];
-    this.program.kinematics(y, new Float64Array(n + m), new Float64Array(n + m), this.p, this.rates);
-    const slope = this.slope();
+    const { slope } = this.closure(z, u);
     const right = new Float64Array(rows);
     for (let j = 0; j < m; j++) for (let i = 0; i < rows; i++) right[i] -= slope[(n + j) * rows + i] * u1[j];
     return this.inverse(slope, right);
+  }
+
+  /** What every constraint leaves open at unknowns and inputs, and the slope there: {F, slope}. */
+  closure(z, u) {
+    const { z: n, F: rows, u: m } = this.data.counts;
+    this.program.kinematics([...z, ...u], new Float64Array(n + m), new Float64Array(n + m), this.p, this.rates);
+    return { F: this.rates.subarray(0, rows), slope: this.slope() };
   }
 
   /** The slope that `kinematics` has just found: rows by unknowns and inputs, column by column. */
@@ -198,9 +206,21 @@ class Linkage {
         if (step * Math.max(count, 1) * FARTHEST >= SHORTEST) continue;
         const part = reached + Math.min(1 - reached, LEAVING / (Math.max(count, 1) * FARTHEST));
         at(reached).ready();
-        if (!this.leave(at(part))) break;
-        reached = part;
-        step = Math.min(whole, part);
+        if (this.leave(at(part))) {
+          reached = part;
+          step = Math.min(whole, part);
+          continue;
+        }
+        const { z, u, before } = this, dead = deadPointAhead(this, at, reached, count * FARTHEST);
+        if (dead !== null) {
+          // the side from which it came is kept: it leads back on its own branch
+          const { came } = this, signs = came ? came.signs : this.newton(u, z).signs;
+          if (dead.z.some((each, k) => each !== z[k])) this.stop = { u, z, to: dead.z, signs };
+          else this.stop = came && { ...came, to: dead.z };
+          this.last = before && { ...before, to: dead.z };
+          [this.z, this.u, reached] = [dead.z, Array.from(at(dead.part).u), dead.part];
+        }
+        break;
       }
     }
     at(reached).ready();
@@ -212,7 +232,7 @@ class Linkage {
   leave(there) {
     const free = this.free();
     if (free === null) return false;
-    const { before } = this, back = before ? free.reduce((sum, each, i) => sum + each * (before.z[i] - this.z[i]), 0) : 1;
+    const { came } = this, back = came ? free.reduce((sum, each, i) => sum + each * (came.z[i] - this.z[i]), 0) : 1;
     there.ready();
     for (const side of back < 0 ? [-1, 1] : [1, -1]) {
       for (const nudge of NUDGES) {
@@ -228,10 +248,9 @@ class Linkage {
 
   /** How the unknowns can move by themselves where their slope is singular, the greatest by 1; null where it is not. */
   free() {
-    const { z: n, F: rows, u: m } = this.data.counts;
+    const { z: n, F: rows } = this.data.counts;
     if (rows !== n || n === 0) return null;
-    this.program.kinematics([...this.z, ...this.u], new Float64Array(n + m), new Float64Array(n + m), this.p, this.rates);
-    const slope = this.slope(), square = new Float64Array(n * n);
+    const { slope } = this.closure(this.z, this.u), square = new Float64Array(n * n);
     let most = 0;
     for (let i = 0; i < n; i++) {
       for (let j = 0; j < n; j++) for (let k = 0; k < n; k++) square[j * n + i] += slope[i * n + k] * slope[j * n + k];
@@ -252,6 +271,9 @@ class Linkage {
 
   /** What is known of the step that led here; nothing where somebody else has put z. */
   get before() { return this.last && this.last.to === this.z ? this.last : null; }
+
+  /** From where it came here: to an exact dead point by a way of the inputs or of the dimensions, else by the last step. */
+  get came() { return this.stop && this.stop.to === this.z ? this.stop : this.before; }
 
   /** From where a step to inputs u is remembered: from here, but from one before where it is so short that it says
       nothing of the way. */
@@ -292,22 +314,23 @@ class Linkage {
       ahead = Math.max(ahead, Math.abs(guess[i] - this.z[i]));
     }
     if (!(gone < FAR) || moved > NEAR + JUMP * ahead) return false;
-    const signs = this.before ? this.before.signs : this.newton(this.u, this.z).signs;
+    const signs = this.came ? this.came.signs : this.newton(this.u, this.z).signs;
     return moved <= SMOOTH * ahead || found.signs.every((each, k) => each * signs[k] >= 0);
   }
 
   /** The signs of determinants at a new position; where one is not known there, that before. */
   agreed(signs) {
-    const { before } = this;
-    return before ? signs.map((each, k) => each || before.signs[k]) : signs;
+    const { came } = this;
+    return came ? signs.map((each, k) => each || came.signs[k]) : signs;
   }
 
-  /** Where everything is, in SI: w, and with rates of the inputs u1, u2 also w1, w2 (null where not determined). */
+  /** Where everything is, in SI: w, and with rates of the inputs u1, u2 also w1, w2; null at dead and change points, of
+      which `why` tells which it is. */
   state(u1 = null, u2 = null) {
     const { z: n, F: rows, w: many, u: m } = this.data.counts;
     const by = this.data.lengths.map((each) => (each ? this.data.size : 1));
     const scaled = (part) => Float64Array.from(part, (each, k) => each * by[k]);
-    if (u1 === null) return { w: scaled(this.program.positions(this.z, this.u, this.p, this.found).slice(0, many)), w1: null, w2: null };
+    if (u1 === null) return { w: scaled(this.program.positions(this.z, this.u, this.p, this.found).slice(0, many)), w1: null, w2: null, why: "" };
     const y = [...this.z, ...this.u], none = new Float64Array(n);
     const rates = (y1, y2) => this.program.kinematics(y, y1, y2, this.p, this.rates);
     const size = rows + many, column = (k) => this.rates.slice(k * size, (k + 1) * size);
@@ -315,11 +338,12 @@ class Linkage {
     rates([...none, ...v], [...none, ...a]);
     const slope = this.slope();
     const still = column(0).slice(rows);
-    const z1 = this.inverse(slope, column(1).slice(0, rows).map((each) => -each));
-    if (z1 === null) return { w: scaled(still), w1: null, w2: null };
+    const why = singularity(this, slope);
+    const z1 = why ? null : this.inverse(slope, column(1).slice(0, rows).map((each) => -each));
+    if (z1 === null) return { w: scaled(still), w1: null, w2: null, why: why || "change point" };
     rates([...z1, ...v], [...none, ...a]);
     const z2 = this.inverse(slope, column(2).slice(0, rows).map((each) => -each));
     rates([...z1, ...v], [...z2, ...a]);
-    return { w: scaled(still), w1: scaled(column(1).slice(rows)), w2: scaled(column(2).slice(rows)) };
+    return { w: scaled(still), w1: scaled(column(1).slice(rows)), w2: scaled(column(2).slice(rows)), why };
   }
 }
