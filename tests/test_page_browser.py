@@ -455,3 +455,53 @@ def test_every_control_has_a_name(shown):
           .map((each) => each.outerHTML)"""
     )
     assert nameless == []
+
+
+# diagrams
+
+
+def test_a_diagram_holds_the_whole_course_and_the_values_of_now_also_beside_a_dead_point(shown):
+    """Where the input is 1e-9 rad from its limit, rates are greater than in any row of the course."""
+    window = shown(MODELS["000-P1"])
+    window.wait_for_function("() => page.course !== null")
+    window.evaluate(
+        "page.chosen.toggle('link', 'DC'); for (const each of document.querySelectorAll('[name^=diagram]'))"
+        " if (!each.checked) each.click();"
+    )
+    act = """() => page.charts.charts.map((each) => ({
+      now: each.now(), data: each.plot.data.slice(1).flat().filter((value) => value !== null),
+      low: each.plot.scales.y.min, high: each.plot.scales.y.max,
+    }))"""
+    for to in ("page.data.inputs[0].position", "page.course.limits[1] - 1e-9", "page.course.limits[1]"):
+        window.evaluate(f"page.moveTo({to})")
+        settled(window)
+        charts = window.evaluate(act)
+        assert len(charts) == 11
+        for each in charts:
+            held = [value for value in (*each["data"], *each["now"]) if value is not None]
+            assert each["low"] <= min(held)
+            assert max(held) <= each["high"]
+    outgrown = window.evaluate("page.moveTo(page.course.limits[1] - 1e-9), " + act.split("=> ", 1)[1])
+    assert any(max(each["now"]) > max(each["data"]) for each in outgrown)
+
+
+def test_at_a_dead_point_the_page_says_so_and_shows_no_number_and_no_arrow(shown):
+    window = shown(MODELS["000-P1"])
+    window.wait_for_function("() => page.course !== null")
+    for box in window.locator("#layers").get_by_role("checkbox").all():
+        box.check()
+    window.evaluate("page.chosen.toggle('link', 'DC')")
+    assert window.locator("#drawing .layers .arrow").count() > 0
+    window.evaluate("page.moveTo(3)")
+    settled(window)
+    assert window.locator("#numbers .why").inner_text() == "Dead point of the input: no velocity."
+    assert window.locator(":is(#drawing .layers, #layers .beside) .arrow").count() == 0
+    heads = window.locator("#numbers table").last.locator("thead th").all_inner_texts()
+    cells = window.locator("#numbers table").last.locator("tbody td:not(.press)").all_inner_texts()
+    assert [each.split()[0] for each in heads] == ["link", "angle", "angular", "angular"]
+    assert cells[1:] == ["–", "–"]
+    assert "dead point of the input: no velocity" in window.locator("#layers").inner_text()
+    window.evaluate("page.moveTo(page.data.inputs[0].position)")
+    settled(window)
+    assert window.locator("#numbers .why").is_hidden()
+    assert window.locator("#drawing .layers .arrow").count() > 0

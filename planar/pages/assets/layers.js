@@ -204,5 +204,5 @@ function startLayers(page) {
   page.layers = new Layers(page, [paths, ...rates.map(arrows), ...acting, ...rates.map(polygon), centres, centrodes]);
   new Numbers(page);
   if (page.forces !== null) new ForceTables(page);
-  new Charts(page);
+  page.charts = new Charts(page);
 }
