@@ -505,3 +505,87 @@ def test_at_a_dead_point_the_page_says_so_and_shows_no_number_and_no_arrow(shown
     settled(window)
     assert window.locator("#numbers .why").is_hidden()
     assert window.locator("#drawing .layers .arrow").count() > 0
+
+
+# undo
+
+
+def test_what_was_entered_dragged_and_moved_is_undone_and_redone_by_keys_and_by_buttons(shown):
+    mechanism = MODELS["000-P1"]
+    window = shown(mechanism)
+    (given,) = mechanism.inputs
+    undo, redo = (window.get_by_role("button", name=name, exact=True) for name in ("Undo", "Redo"))
+    assert undo.is_disabled()
+    assert redo.is_disabled()
+
+    def here():
+        settled(window)
+        return window.evaluate("[Array.from(page.linkage.d), page.input(0), Array.from(page.linkage.z)]")
+
+    stood = [here()]
+    length = window.get_by_label("BC: length, number, mm")
+    length.fill("70")
+    length.press("Enter")
+    stood.append(here())
+    angle = window.get_by_label(f"{given.pair} (deg)")
+    angle.fill("75")
+    angle.press("Enter")
+    stood.append(here())
+    slider = window.get_by_role("slider", name=given.pair, exact=True)
+    slider.focus()
+    window.keyboard.press("ArrowRight")
+    stood.append(here())
+    window.get_by_label("Assembly, of 2").select_option(index=0)
+    window.get_by_label("Assembly, of 2").select_option(index=1)
+    stood += [here()]
+    window.keyboard.press("Control+z")
+    stood.insert(-1, here())
+    angle.focus()  # a number that nobody types at is not the browser's to undo
+    for k in (3, 2):
+        window.keyboard.press("Control+z")
+        assert here() == stood[k]
+    assert float(angle.input_value()) == 75.0
+    undo.click()
+    assert here() == stood[1]
+    assert float(length.input_value()) == 70.0
+    window.keyboard.press("Control+z")
+    assert here() == stood[0]
+    assert float(length.input_value()) == 66.0
+    assert undo.is_disabled()
+    same(window, planar.solve(mechanism))
+    for k, key in ((1, "Control+y"), (2, "Control+Shift+Z"), (3, None), (4, "Control+y"), (5, "Control+y")):
+        if key:
+            window.keyboard.press(key)
+        else:
+            redo.click()
+        assert here() == stood[k]
+    assert redo.is_disabled()
+
+
+def test_a_number_that_is_being_typed_is_the_browsers_to_undo(shown):
+    window = shown(MODELS["000-P1"])
+    length = window.get_by_label("BC: length, number, mm")
+    length.fill("70")
+    length.press("Enter")
+    settled(window)
+    length.press("End")
+    length.press_sequentially("5")
+    length.press("Control+z")
+    settled(window)
+    assert window.evaluate("page.linkage.d.some((each) => Math.abs(each - 0.07) < 1e-15)")  # nothing of the mechanism
+    length.press("Enter")
+    settled(window)
+    length.press("Control+z")
+    settled(window)
+    assert window.evaluate("page.linkage.d.every((each, k) => each === page.data.dimensions[k].value)")
+
+
+def test_a_whole_drag_and_a_whole_play_are_one_step_each(shown):
+    window = shown(MODELS["crank-rocker"])
+    start = window.evaluate("page.input(0)")
+    window.get_by_role("button", name="Play").click()
+    window.wait_for_function("([start]) => Math.abs(page.input(0) - start) > 0.1", arg=[start])
+    window.get_by_role("button", name="Undo").click()  # it stops, and goes back
+    settled(window)
+    assert window.evaluate("[controls.playing, page.input(0)]") == [False, start]
+    assert window.get_by_role("button", name="Undo").is_disabled()

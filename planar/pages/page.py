@@ -55,6 +55,7 @@ SCRIPTS = (
     "layers.js",
     "dimensions.js",
     "assemblies.js",
+    "undo.js",
     "saving.js",
 )
 
@@ -84,6 +85,7 @@ const controls = new Controls(page, document.getElementById("controls"), svg, dr
 new Courses(page);
 new Dimensions(page, document.getElementById("dimensions"));
 new Assemblies(page, document.getElementById("assemblies"));
+new UndoHistory(page, controls.bar, () => controls.pause());
 new Saving(page, document.getElementById("saving"), document.getElementById("drawing"));
 startLayers(page);
 """
