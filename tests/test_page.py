@@ -52,7 +52,7 @@ def hostile() -> Mechanism:
     for k in range(len(value["links"]) + len(pins)):
         text = text.replace(f'"\\u0001{k}"', json.dumps(new[k]))
     value = json.loads(text)
-    return planar.from_dict(value | {"name": HARMFUL, "about": HARMFUL, "notes": [HARMFUL]})
+    return planar.from_dict(value | {"name": HARMFUL, "about": HARMFUL, "source": HARMFUL, "notes": [HARMFUL]})
 
 
 def triangle(base: float) -> Mechanism:
@@ -127,12 +127,27 @@ def test_a_page_may_load_nothing():
 
 
 def test_texts_of_a_file_stay_texts():
-    plain, harmful = Elements(page(planar.load("four-bar"))), Elements(page(hostile()))
+    value = planar.to_dict(planar.load("four-bar")) | {"about": "a", "source": "s", "notes": ["n"]}
+    plain, harmful = Elements(page(planar.from_dict(value))), Elements(page(hostile()))
     assert [tag for tag, _ in harmful.tags] == [tag for tag, _ in plain.tags]
     assert harmful.data()["name"] == harmful.data()["about"] == HARMFUL
     assert harmful.data()["document"]["value"]["notes"] == [HARMFUL]
     title = next(k for k, (tag, _) in enumerate(harmful.tags) if tag == "title")
     assert harmful.texts[title].rstrip("\n") == HARMFUL
+    texts = [text.rstrip("\n") for text in harmful.texts.values()]
+    assert texts.count(HARMFUL) == 4  # title, heading, about, note
+    assert f"Source: {HARMFUL}" in texts
+
+
+def test_about_source_and_notes_of_the_file_stand_on_the_page_without_scripts():
+    mechanism = MODELS["two-stroke-engine"]
+    texts = {text.rstrip("\n") for text in Elements(page(mechanism)).texts.values()}
+    assert mechanism.about in texts
+    assert f"Source: {mechanism.source}" in texts
+    assert len(mechanism.notes) == 2
+    assert set(mechanism.notes) <= texts
+    bare = replace(mechanism, about="", source="", notes=())
+    assert not {"notes", "source"} & {part for _, each in Elements(page(bare)).tags for part in each.values()}
 
 
 def test_texts_in_a_template_are_not_filled_again():
@@ -459,7 +474,7 @@ def test_the_range_of_the_input_is_that_of_the_cycle_command():
 @needs_node
 @pytest.mark.parametrize("stem", ["000-P1", "hart-inversor", "elliptical-trammel", "excavator-arm"])
 def test_at_its_limits_a_page_has_no_rates_as_the_cycle_command_has_none(stem):
-    """Also where two groups of links turn back at once; beside a limit there are rates, and the way back is the same."""
+    """Also where two groups of links turn back at once; beside a limit there are rates, and it leads back on its branch."""
     act = """
     const start = page.input(0), far = page.data.inputs[0].slides ? 4 * page.data.size : 2 * Math.PI, found = [];
     const places = () => page.data.names.map((name) => page.point(name).position), first = places();

@@ -6,6 +6,7 @@ import csv
 import io
 import json
 from dataclasses import replace
+from html import escape
 from xml.etree import ElementTree
 
 import numpy as np
@@ -589,3 +590,75 @@ def test_a_whole_drag_and_a_whole_play_are_one_step_each(shown):
     settled(window)
     assert window.evaluate("[controls.playing, page.input(0)]") == [False, start]
     assert window.get_by_role("button", name="Undo").is_disabled()
+
+
+# within another page
+
+
+def test_within_a_frame_that_lets_no_download_through_the_text_is_there_to_be_copied(chromium, tmp_path):
+    mechanism = MODELS["crank-rocker"]
+    context = chromium.new_context()
+    inner = escape(view(mechanism, tmp_path / "page.html").read_text(encoding="utf-8"))
+    outer = tmp_path / "outer.html"
+    outer.write_text(
+        f'<!doctype html><iframe sandbox="allow-scripts" width="1000" height="900" srcdoc="{inner}"></iframe>',
+        encoding="utf-8",
+    )
+    window = context.new_page()
+    window.goto(outer.as_uri())
+    frame = window.frame_locator("iframe")
+    frame.get_by_role("button", name="Save: Mechanism (JSON)").click()
+    said = frame.locator("#said").inner_text()
+    assert "offered for download" in said
+    assert "Saved" not in said
+    assert planar.loads(frame.locator("textarea").input_value()) == mechanism
+    assert frame.get_by_role("button", name="Copy").count() == 1
+    context.close()
+
+
+def test_a_page_by_itself_says_that_a_file_is_offered(shown, tmp_path):
+    window = shown(MODELS["crank-rocker"])
+    downloaded(window, "Save: Mechanism (JSON)", tmp_path / "saved.json")
+    assert window.locator("#said").inner_text() == "Crank-rocker.json is offered for download."
+    assert window.locator("textarea").count() == 0
+
+
+# on paper
+
+
+def test_a_dark_page_is_printed_light_and_whole(shown, tmp_path):
+    window = shown(MODELS["two-stroke-engine"], scheme="dark")
+    window.wait_for_function("() => page.charts.charts.length > 0")
+    light = shown(MODELS["two-stroke-engine"])
+    light.wait_for_function("() => page.charts.charts.length > 0")
+    colours = "page.charts.charts.map((each) => [each.plot.series[1].stroke(), each.plot.axes[0].stroke()])"
+    assert window.evaluate(colours) != light.evaluate(colours)
+    paper = 660  # px: A4 and Letter less their margins
+    window.set_viewport_size({"width": paper, "height": 900})
+    window.emulate_media(media="print", color_scheme="dark")
+    window.evaluate("dispatchEvent(new Event('beforeprint'))")
+    settled(window)
+    style = (
+        "Object.fromEntries(['backgroundColor', 'color'].map((each) => [each, getComputedStyle(document.body)[each]]))"
+    )
+    assert window.evaluate(style) == light.evaluate(style)
+    assert window.evaluate(colours) == light.evaluate(colours)
+    assert window.evaluate("document.documentElement.scrollWidth") <= paper
+    outside = window.evaluate(
+        """() => {
+          const box = (each) => each.getBoundingClientRect(), whole = box(document.getElementById("drawing"));
+          const parts = document.querySelectorAll("#drawing .bars polyline, #drawing .letters text");
+          const out = (each) => each.left < whole.left || each.right > whole.right
+            || each.top < whole.top || each.bottom > whole.bottom;
+          return { count: parts.length, out: Array.from(parts).filter((each) => out(box(each))).length };
+        }"""
+    )
+    assert outside["count"] > 4
+    assert outside["out"] == 0
+    for seen in ("h1", "#numbers table", ".charts figure", "#notes"):
+        assert window.locator(seen).first.is_visible()
+    for unseen in ("#controls button", "#layers .choices", "#saving", "#numbers select"):
+        assert not window.locator(unseen).first.is_visible()
+    window.emulate_media(media="screen", color_scheme="dark")
+    window.evaluate("dispatchEvent(new Event('afterprint'))")
+    assert window.evaluate(colours) != light.evaluate(colours)

@@ -27,6 +27,7 @@ STYLES = (
     "stage.css",
     "layers.css",
     "dimensions.css",
+    "print.css",
 )
 SCRIPTS = (
     "uplot/uPlot.iife.min.js",
@@ -60,22 +61,43 @@ SCRIPTS = (
 )
 
 
-def page(mechanism: Mechanism, z: np.ndarray | None = None, window: Window | None = None) -> str:
+def page(
+    mechanism: Mechanism, z: np.ndarray | None = None, window: Window | None = None, back: str | None = None
+) -> str:
     """The page of a mechanism at its inputs.
 
     `z` are the unknowns of the assembly, left out that nearest to the sketch; `window` is the range that is run
-    through, left out a turn or from limit to limit. Raises NoAnswer where it has no position to start from.
+    through, left out a turn or from limit to limit; `back` is the address of an index that it links to. Raises
+    NoAnswer where it has no position to start from.
     """
     data, functions = carried(mechanism, z)
     data["window"] = window and window._asdict()
     scripts = "\n".join([*(asset(name) for name in SCRIPTS), functions, START])
     parts = {
         "title": escape(mechanism.name),
+        "back": f'<a class="back" href="{escape(back)}">All mechanisms</a>' if back else "",
+        "about": _about(mechanism),
+        "notes": _notes(mechanism),
         "styles": "\n".join(asset(name) for name in STYLES),
         "data": told(data),
         "scripts": scripts,
     }
     return filled(asset("page.html"), parts)
+
+
+def _about(mechanism: Mechanism) -> str:
+    """What the file says that the mechanism is, and where it is from."""
+    about = f"<p>{escape(mechanism.about)}</p>" if mechanism.about else ""
+    source = f'<p class="source">Source: {escape(mechanism.source)}</p>' if mechanism.source else ""
+    return about + source
+
+
+def _notes(mechanism: Mechanism) -> str:
+    """The notes of the file."""
+    if not mechanism.notes:
+        return ""
+    each = "".join(f"<li>{escape(note)}</li>" for note in mechanism.notes)
+    return f'<section id="notes"><h2>Notes</h2><ul>{each}</ul></section>\n'
 
 
 START = r"""

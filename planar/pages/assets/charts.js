@@ -5,6 +5,7 @@
 const SERIES = 6;        // colours of lines
 const DEGREES = [1, 2, 5, 10, 15, 30, 45, 60, 90, 180, 360, 720]; // between numbers of an axis
 const HEIGHT = 240;      // px
+const PAPER = 660;       // px: the width of a diagram that fits any paper
 
 /** Quantities over the course of points, links and inputs: {key, label, unit, kind, of(columns)}. */
 const DIAGRAMS = [
@@ -51,6 +52,9 @@ class Charts {
     page.on("move", () => this.mark());
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.build());
     new ResizeObserver(() => this.fit()).observe(this.place);
+    for (const [event, printed] of [["beforeprint", true], ["afterprint", false]]) {
+      addEventListener(event, () => { document.documentElement.classList.toggle("printed", this.printed = printed); this.build(); });
+    }
     this.build();
   }
 
@@ -108,7 +112,7 @@ class Charts {
     const values = (_, splits) => splits.map((each) => (each === null ? "" : short(each)));
     const axis = { font, labelFont: `600 ${font}`, labelSize: 24 * em, stroke: colour("--ink"), grid: line, ticks: line, values };
     const plot = new uPlot({
-      width: Math.max(280, place.clientWidth), height: HEIGHT,
+      width: this.width(), height: HEIGHT,
       scales: { x: { time: false, range: [xs[0], xs[xs.length - 1]] }, y: { range: () => made.limits } },
       axes: [
         { ...axis, size: 34 * em, label: `${pair}, ${inputUnit}`, incrs: inputUnit === "deg" ? DEGREES : undefined },
@@ -145,9 +149,12 @@ class Charts {
     page.moveTo(position + shift);
   }
 
+  /** Of a diagram, px. */
+  width() { return this.printed ? PAPER : Math.max(280, Math.floor(this.place.clientWidth)); }
+
   fit() {
-    const width = Math.floor(this.place.clientWidth);
-    for (const { plot } of this.charts) if (width > 0 && plot.width !== width) plot.setSize({ width, height: HEIGHT });
+    const width = this.width();
+    for (const { plot } of this.charts) if (this.place.clientWidth && plot.width !== width) plot.setSize({ width, height: HEIGHT });
     this.mark();
   }
 
