@@ -20,6 +20,7 @@ from planar.files import asset
 from planar.mechanism import Mechanism
 from planar.pages import gallery
 from planar.pages.carried import carried
+from planar.pages.kinds import KINDS, described, plain
 from planar.pages.page import SCRIPTS, filled, page, told
 from planar.pages.shown import framed, page_of, view
 from planar.solving.freedom import strengths
@@ -272,6 +273,11 @@ def test_a_gallery_has_a_page_for_each_and_an_index_that_moves(tmp_path):
     assert {each["href"] for each in (first, second, third)} <= names
     assert (first["name"], first["about"]) == (HARMFUL, HARMFUL)
     assert [tag for tag, _ in elements.tags].count("script") == 2
+    listed = [each["href"] for tag, each in elements.tags if tag == "a" and each["href"].endswith(".html")]
+    assert listed == [each["href"] for each in (first, second, third)]  # also without scripts
+    for name in names - {"index.html"}:
+        links = [each for tag, each in Elements((index.parent / name).read_text(encoding="utf-8")).tags if tag == "a"]
+        assert [each["href"] for each in links] == ["index.html"]
     assert (second["closed"], third["closed"]) == (True, False)
 
 
@@ -289,7 +295,14 @@ def test_the_gallery_command_writes_a_folder_and_tells_what_it_leaves_out(tmp_pa
 def test_the_index_is_small_and_its_links_are_where_the_motion_has_them():
     shown = [gallery.small(mechanism) for mechanism in SOME.values()]
     drawing = len(gallery.index([]).encode())
-    each = len(gallery.index([one | {"name": "", "about": "", "href": ""} for one in shown]).encode()) - drawing
+    each = (
+        len(
+            gallery.index(
+                [one | {"name": "", "about": "", "href": "", "kind": KINDS[0], "words": ""} for one in shown]
+            ).encode()
+        )
+        - drawing
+    )
     assert drawing + each / len(SOME) * len(MODELS) < 2 * LARGEST
     mechanism = MODELS["crank-rocker"]
     small = gallery.small(mechanism)
@@ -299,6 +312,32 @@ def test_the_index_is_small_and_its_links_are_where_the_motion_has_them():
         frame = motion.frames[link]
         wanted = np.stack([part.parts[0] for part in (frame.x, frame.y, frame.angle)], axis=1)
         assert np.abs(np.reshape(path, (-1, 3)) - wanted).max() < 1e-4 * max(1.0, np.abs(wanted).max())
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["four-bar", "4-bar", "4 bar", "4bar", "Four Bar", "fourbar", "FOUR\u2010BAR", "  four  bar ", "4\u2013bar's"],
+)
+def test_a_name_is_found_however_it_is_written(text):
+    assert plain(text).startswith("four bar")
+    assert plain("Hoecken's 12 links é") == "hoeckens twelve links e"
+
+
+def test_every_model_is_of_a_kind_that_its_structure_tells():
+    kinds = {stem: described(mechanism, stem)[0] for stem, mechanism in MODELS.items()}
+    assert set(kinds.values()) == set(KINDS)
+    for stem, wanted in {
+        "drag-link": "Four-bar linkages",
+        "hand-pump": "Slider-cranks and their inversions",
+        "oldham": "Double slider-cranks",
+        "klann-leg": "Six-bar linkages",
+        "jansen-leg": "Linkages of eight links and more",
+        "belt-arm": "Gears, belts and racks",
+        "rack-steering": "Gears, belts and racks",
+        "open-arm": "Open chains",
+        "pantograph": "Other linkages",
+    }.items():
+        assert kinds[stem] == wanted, stem
 
 
 # numbers
@@ -474,7 +513,7 @@ def test_the_range_of_the_input_is_that_of_the_cycle_command():
 @needs_node
 @pytest.mark.parametrize("stem", ["000-P1", "hart-inversor", "elliptical-trammel", "excavator-arm"])
 def test_at_its_limits_a_page_has_no_rates_as_the_cycle_command_has_none(stem):
-    """Also where two groups of links turn back at once; beside a limit there are rates, and it leads back on its branch."""
+    """Also where two groups of links turn back at once; beside a limit there are rates; back is its branch."""
     act = """
     const start = page.input(0), far = page.data.inputs[0].slides ? 4 * page.data.size : 2 * Math.PI, found = [];
     const places = () => page.data.names.map((name) => page.point(name).position), first = places();

@@ -15,12 +15,15 @@ import pytest
 import planar
 from planar.dimensions import changed, dimensions
 from planar.pages import gallery
+from planar.pages.kinds import KINDS, described
 from planar.pages.shown import view
 from tests.known import MODELS
 from tests.pages import browser, opened
 from tests.test_page import hostile, triangle
 
 CLOSE = 1e-12
+STEMS = ("crank-rocker", "slider-crank", "scotch-yoke", "watt-six-bar", "whitworth", "planetary-gear-set", "open-arm")
+"""Of the gallery."""
 SCREENS = {"phone": (390, 844), "desk": (1280, 900), "projector": (1920, 1080)}
 PLACES = "page.data.names.map((name) => Object.values(page.point(name)))"
 
@@ -257,7 +260,7 @@ def test_a_length_moved_to_and_fro_while_it_plays_leaves_it_on_its_branch_with_p
     assert saved.links != MODELS["crank-rocker"].links
     same(window, planar.solve(saved))
     window.get_by_role("button", name="Reset all dimensions").click()
-    window.get_by_role("button", name="To the position in the file").click()
+    window.get_by_role("button", name="Start").click()
     settled(window)
     same(window, planar.solve(MODELS["crank-rocker"]))
 
@@ -335,6 +338,58 @@ def test_texts_of_a_file_are_shown_and_never_run(shown, chromium, tmp_path):
     assert window.locator("#gallery strong").inner_text().split() == mechanism.name.split()
     window.locator("#gallery a").click()
     assert window.locator("#drawing").count() == 1
+    assert wrong == []
+    context.close()
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A gallery of some models of every kind."""
+    return gallery.gallery([(stem, MODELS[stem]) for stem in STEMS], tmp_path_factory.mktemp("gallery"))[0]
+
+
+@pytest.mark.parametrize(
+    ("words", "found"),
+    [
+        ("4-bar", {"Crank-rocker", "Watt six-bar"}),
+        ("FOURBAR chains", {"Crank-rocker", "Watt six-bar"}),
+        ("quadric", {"Crank-rocker", "Watt six-bar"}),
+        ("in-line crank slider", {"Slider-crank"}),
+        ("watt", {"Watt six-bar", "Whitworth quick return"}),
+        ("Watt II 6-bar", {"Watt six-bar", "Whitworth quick return"}),
+        ("quickest way", set()),
+        ("shaper", {"Whitworth quick return"}),
+        ("quick-returns", {"Whitworth quick return"}),
+        ("epicyclic", {"Planetary gear set"}),
+        ("sine mechanism", {"Scotch yoke"}),
+        ("open chain", {"Open arm"}),
+    ],
+)
+def test_the_gallery_finds_by_any_of_the_usual_words(words, found, chromium, folder):
+    context = chromium.new_context()
+    window, wrong = opened(context, folder)
+    window.get_by_label("Find").fill(words)
+    assert set(window.locator("#gallery li:visible strong").all_inner_texts()) == found
+    kinds = window.locator("#gallery h2:visible").all_inner_texts()
+    assert len(kinds) == len({described(MODELS[s], s)[0] for s in MODELS if MODELS[s].name in found and s in STEMS})
+    assert (window.locator("#none").inner_text() == "") == bool(found)
+    assert wrong == []
+    context.close()
+
+
+def test_from_a_page_of_a_gallery_a_link_leads_back_to_what_was_looked_for(chromium, folder):
+    context = chromium.new_context()
+    window, wrong = opened(context, folder)
+    assert window.locator("#gallery h2").all_inner_texts() == [
+        each for each in KINDS if each[:5] not in ("Linka", "Other")
+    ]
+    window.get_by_label("Find").fill("4-bar swings")
+    window.locator("#gallery a:visible").click()
+    window.get_by_role("link", name="All mechanisms").click()
+    assert window.locator("#gallery li:visible").count() == 7
+    window.go_back()
+    window.go_back()
+    assert window.locator("#gallery li:visible strong").all_inner_texts() == ["Crank-rocker"]
     assert wrong == []
     context.close()
 
@@ -456,6 +511,14 @@ def test_every_control_has_a_name(shown):
           .map((each) => each.outerHTML)"""
     )
     assert nameless == []
+    # WCAG 2, 2.5.3: who speaks what is written on a control means that control
+    misnamed = window.evaluate(
+        r"""Array.from(document.querySelectorAll(":is(button, a, summary)[aria-label]"))
+          .map((each) => [each.textContent, each.getAttribute("aria-label")]
+            .map((text) => text.toLowerCase().replaceAll(/[^\p{L}\p{N}]+/gu, " ").trim()))
+          .filter(([written, name]) => written && !name.includes(written))"""
+    )
+    assert misnamed == []
 
 
 # diagrams

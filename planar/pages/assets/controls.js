@@ -33,8 +33,7 @@ class Controls {
     this.button.addEventListener("click", () => (this.playing ? this.pause() : this.play()));
     this.turn = control("button", { type: "button" });
     this.turn.addEventListener("click", () => this.reverse());
-    const home = control("button", { type: "button", title: "Home" }, "Start");
-    home.setAttribute("aria-label", "To the position in the file");
+    const home = control("button", { type: "button", title: "To the position in the file (Home)" }, "Start");
     home.addEventListener("click", () => this.home());
     bar.append(this.button, this.turn, home, this.speeds());
     this.rows = inputs.map((given, k) => this.row(given, k, inputs.length > 1));
