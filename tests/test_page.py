@@ -6,9 +6,12 @@ import csv
 import io
 import json
 import re
+from base64 import b64decode
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -18,7 +21,7 @@ from planar.dimensions import changed, dimensions
 from planar.errors import BadInput, NoAnswer
 from planar.files import asset
 from planar.mechanism import Mechanism
-from planar.pages import gallery
+from planar.pages import gallery, notebook
 from planar.pages.carried import carried
 from planar.pages.kinds import KINDS, described, plain
 from planar.pages.page import SCRIPTS, filled, page, told
@@ -182,14 +185,92 @@ def test_no_two_scripts_of_a_page_give_one_name_to_two_things(scripts):
 # what Python shows as a page
 
 
-def test_a_mechanism_a_position_and_a_motion_show_themselves_in_a_notebook(tmp_path):
+def results() -> dict[str, Any]:
+    """One of everything that a notebook shows."""
+    mechanism = planar.load("two-stroke-engine")
+    state, motion = planar.solve(mechanism), planar.cycle(mechanism, 12)
+    return {
+        "mechanism": mechanism,
+        "state": state,
+        "motion": motion,
+        "forces": planar.forces(state),
+        "forces over": planar.forces(motion),
+        "centres": planar.centres(state),
+        "modes": planar.modes(mechanism, certify=False),
+        "circuits": planar.circuits(mechanism),
+    }
+
+
+def test_everything_shows_itself_in_a_notebook_as_a_table_a_picture_and_a_page():
+    layers = {"forces": ["paths", "forces"], "forces over": ["paths", "forces"], "centres": ["centres"]}
+    tables = {"forces": 4, "forces over": 2, "centres": 1, "modes": 2, "circuits": 2}
+    for kind, each in results().items():
+        elements = Elements(each._repr_html_())
+        (frame,) = (attributes for tag, attributes in elements.tags if tag == "iframe")
+        inner = Elements(frame["srcdoc"])
+        assert inner.data()["name"] == frame["title"] == "Two-stroke engine"
+        # what is left where a notebook is not trusted: neither frames nor scripts
+        assert not {"script", "svg", "style"} & {tag for tag, _ in elements.tags}
+        (image,) = (attributes for tag, attributes in elements.tags if tag == "img")
+        head, code = image["src"].split(",")
+        assert head == "data:image/svg+xml;base64"
+        picture = ElementTree.fromstring(b64decode(code))
+        letters = {text.text for text in picture.iter("{http://www.w3.org/2000/svg}text")}
+        assert letters >= set(results()["state"].point_names)
+        assert sum(tag == "table" for tag, _ in elements.tags) == tables.get(kind, 0), kind
+        assert inner.data()["layers"] == layers.get(kind, ["paths"])
+
+
+def test_tables_in_a_notebook_have_the_numbers_of_the_results_and_escaped_names():
+    forces = results()["forces"]
+    cells = {text.strip() for text in Elements(forces._repr_html_()).texts.values()}
+    assert f"{forces.inputs['O']:.6g}" in {cell.replace("\u2212", "-") for cell in cells}
+    harmful = planar.centres(planar.solve(hostile()))
+    assert not {"script"} & {tag for tag, _ in Elements(harmful._repr_html_()).tags}
+
+
+def test_everything_says_what_it_is_in_one_line():
+    for each in results().values():
+        line = repr(each)
+        assert "Two-stroke engine" in line
+        assert "\n" not in line
+        assert len(line) < 140
+    assert repr(results()["state"]) == "<State of 'Two-stroke engine' at O = 40 deg>"
+
+
+class Shell:
+    """A kernel's shell, in a run of a cell."""
+
+    kernel = None
+
+    def __init__(self):
+        self.cell, self.run = None, 0
+
+    def get_parent(self):
+        return {"metadata": {"cellId": self.cell} if self.cell else {}, "header": {"msg_id": self.run}}
+
+
+def test_one_output_of_a_notebook_carries_the_scripts_and_a_cell_that_is_run_again_does(monkeypatch):
+    shell = Shell()
+    monkeypatch.setattr(notebook, "_shown", {})
+    monkeypatch.setattr(notebook, "_shell", lambda: shell)
+    found = []
+    for run, cell in enumerate(["a", "a", "b", "c", "b", "a"]):
+        shell.cell, shell.run = cell, run if run != 1 else 0  # the first cell shows two
+        found.append(notebook.carries())
+    assert found == [True, False, False, False, True, True]
+    monkeypatch.setattr(notebook, "_shown", {})
+    shell.cell = None  # nothing is known of the cells
+    assert [notebook.carries() for _ in range(3)] == [True, False, False]
+    monkeypatch.setattr(notebook, "_shell", lambda: None)
+    assert [notebook.carries() for _ in range(2)] == [True, True]
+
+
+def test_an_output_that_shares_the_scripts_is_a_fraction_of_one_that_carries_them():
     mechanism = planar.load("four-bar")
-    state, motion = planar.solve(mechanism, {mechanism.inputs[0].pair: 1.0}), planar.cycle(mechanism, 12)
-    for each in (mechanism, state, motion):
-        (frame,) = (attributes for tag, attributes in Elements(each._repr_html_()).tags if tag == "iframe")
-        assert Elements(frame["srcdoc"]).data()["name"] == mechanism.name
-        assert frame["title"] == mechanism.name
-    assert Elements(page_of(state)).data()["inputs"][0]["position"] == 1.0
+    alone, carrying, sharing = (len(page(mechanism, library=each)) for each in (None, True, False))
+    assert carrying < 0.6 * alone
+    assert sharing < 0.15 * alone
 
 
 def test_the_page_of_a_position_stands_at_that_assembly_also_where_the_sketch_means_another():

@@ -14,9 +14,11 @@ import pytest
 
 import planar
 from planar.dimensions import changed, dimensions
-from planar.pages import gallery
+from planar.pages import gallery, notebook
 from planar.pages.kinds import KINDS, described
+from planar.pages.page import page
 from planar.pages.shown import view
+from planar.pages.still import still
 from tests.known import MODELS
 from tests.pages import browser, opened
 from tests.test_page import hostile, triangle
@@ -677,6 +679,71 @@ def test_within_a_frame_that_lets_no_download_through_the_text_is_there_to_be_co
     assert planar.loads(frame.locator("textarea").input_value()) == mechanism
     assert frame.get_by_role("button", name="Copy").count() == 1
     context.close()
+
+
+def outputs(chromium, *cells, scripts=True):
+    """A page with outputs as a notebook has them: a window, and what goes wrong in it."""
+    context = chromium.new_context(java_script_enabled=scripts)
+    window, wrong = context.new_page(), []
+    window.on("pageerror", lambda problem: wrong.append(str(problem)))
+    window.set_content("<!doctype html>" + "".join(f"<div class='output'>{each}</div>" for each in cells))
+    return window, wrong
+
+
+def cell(mechanism, library):
+    return notebook.output(mechanism.name, "", still(mechanism), page(mechanism, library=library))
+
+
+def test_outputs_of_one_notebook_share_the_scripts_of_one_in_any_order(chromium):
+    names = ("crank-rocker", "slider-crank", "whitworth")
+    cells = [cell(MODELS[name], library=k == 1) for k, name in enumerate(names)]
+    window, wrong = outputs(chromium, *cells)
+    for k in range(3):
+        window.frame_locator(f".output:nth-of-type({k + 1}) iframe").get_by_role("button", name="Play").wait_for()
+    # the one that carried them goes, and one that has none comes
+    window.evaluate(
+        """([html]) => {
+          document.querySelectorAll(".output")[1].remove();
+          document.querySelectorAll(".output")[0].innerHTML = html;
+        }""",
+        [cells[2]],
+    )
+    window.frame_locator(".output:nth-of-type(1) iframe").get_by_role("button", name="Play").wait_for()
+    assert wrong == []
+    window.context.close()
+
+
+def test_an_output_whose_scripts_are_gone_stays_a_picture_and_says_what_to_do(chromium):
+    mechanism = MODELS["crank-rocker"]
+    window, wrong = outputs(chromium, cell(mechanism, library=False))
+    frame = window.frame_locator("iframe")
+    frame.get_by_text("Run this cell again").wait_for()
+    assert frame.locator("#still svg polyline").count() > 3
+    window.evaluate(
+        "([html]) => { document.body.append(Object.assign(document.createElement('div'), { innerHTML: html })); }",
+        [cell(mechanism, library=True)],
+    )
+    frame.first.get_by_role("button", name="Play").first.wait_for()
+    assert wrong == []
+    window.context.close()
+
+
+def test_where_no_script_runs_a_still_picture_and_the_files_words_stand_there(chromium, tmp_path):
+    mechanism = MODELS["two-stroke-engine"]
+    window, _ = outputs(chromium, cell(mechanism, library=True), scripts=False)
+    alone = window.context.new_page()
+    alone.goto(view(mechanism, tmp_path / "page.html").as_uri())
+    for each in (window.frame_locator("iframe"), alone):
+        each.locator("#still svg").wait_for()
+        each.get_by_text(mechanism.about).wait_for()
+        each.get_by_text("scripts, which move it, do not run here").wait_for()
+    window.context.close()
+
+
+def test_the_still_picture_goes_once_the_mechanism_is_drawn(shown):
+    window = shown(MODELS["crank-rocker"])
+    assert window.locator("#drawing .bars polyline").count() > 0
+    assert window.locator("#still").count() == 0
 
 
 def test_a_page_by_itself_says_that_a_file_is_offered(shown, tmp_path):

@@ -11,6 +11,8 @@ import numpy as np
 from planar.files import asset
 from planar.mechanism import Mechanism
 from planar.pages.carried import carried
+from planar.pages.notebook import packed
+from planar.pages.still import still
 
 
 class Window(NamedTuple):
@@ -22,6 +24,7 @@ class Window(NamedTuple):
 
 
 STYLES = (
+    "still.css",
     "uplot/uPlot.min.css",
     "page.css",
     "stage.css",
@@ -62,25 +65,39 @@ SCRIPTS = (
 
 
 def page(
-    mechanism: Mechanism, z: np.ndarray | None = None, window: Window | None = None, back: str | None = None
+    mechanism: Mechanism,
+    z: np.ndarray | None = None,
+    window: Window | None = None,
+    *,
+    back: str | None = None,
+    layers: tuple[str, ...] = ("paths",),
+    library: bool | None = None,
 ) -> str:
     """The page of a mechanism at its inputs.
 
     `z` are the unknowns of the assembly, left out that nearest to the sketch; `window` is the range that is run
-    through, left out a turn or from limit to limit; `back` is the address of an index that it links to. Raises
-    NoAnswer where it has no position to start from.
+    through, left out a turn or from limit to limit. `back` is the address of an index that it links to, `layers` are
+    shown at first. `library` is of notebooks: the page carries the scripts for others beside it (True), or takes them
+    from one of those (False). Raises NoAnswer where it has no position to start from.
     """
     data, functions = carried(mechanism, z)
-    data["window"] = window and window._asdict()
-    scripts = "\n".join([*(asset(name) for name in SCRIPTS), functions, START])
+    data["window"], data["layers"] = window and window._asdict(), layers
+    styles, scripts = ("\n".join(asset(name) for name in names) for names in (STYLES, SCRIPTS))
+    start = f"{functions}\n{START}"
+    if library is not None:
+        key, carrying = packed(styles, scripts)
+        carrying = json.dumps(carrying) if library else "null"
+        styles = asset("still.css")
+        scripts, start = asset("shared.js"), f"shareScripts({json.dumps(key)}, {carrying}, () => {{\n{start}\n}});"
     parts = {
         "title": escape(mechanism.name),
         "back": f'<a class="back" href="{escape(back)}">All mechanisms</a>' if back else "",
         "about": _about(mechanism),
+        "still": still(mechanism, z),
         "notes": _notes(mechanism),
-        "styles": "\n".join(asset(name) for name in STYLES),
+        "styles": styles,
         "data": told(data),
-        "scripts": scripts,
+        "scripts": f"{scripts}\n{start}",
     }
     return filled(asset("page.html"), parts)
 
@@ -110,6 +127,7 @@ new Assemblies(page, document.getElementById("assemblies"));
 new UndoHistory(page, controls.bar, () => controls.pause());
 new Saving(page, document.getElementById("saving"), document.getElementById("drawing"));
 startLayers(page);
+document.getElementById("still").remove(); // what moves stands in its place
 """
 
 
