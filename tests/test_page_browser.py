@@ -736,7 +736,7 @@ def test_where_no_script_runs_a_still_picture_and_the_files_words_stand_there(ch
     for each in (window.frame_locator("iframe"), alone):
         each.locator("#still svg").wait_for()
         each.get_by_text(mechanism.about).wait_for()
-        each.get_by_text("scripts, which move it, do not run here").wait_for()
+        each.get_by_text("it moves once its scripts run").wait_for()
     window.context.close()
 
 

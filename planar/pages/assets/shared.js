@@ -10,7 +10,6 @@ function shareScripts(key, packed, start) {
   let outer = null;
   try { if (parent !== window && parent.document) outer = parent; } catch { /* another site's, or shut in */ }
   const begin = ({ styles, scripts }) => {
-    document.getElementById("waiting")?.remove();
     const style = document.createElement("style"), script = document.createElement("script");
     [style.textContent, script.textContent] = [styles, scripts];
     document.head.append(style);
