@@ -25,30 +25,30 @@ MANY = 8
 """Links of the least of the larger linkages."""
 
 SYNONYMS = (
-    ("four bar", "four link", "quadric chain"),
-    ("five bar", "five link"),
-    ("six bar", "six link"),
-    ("eight bar", "eight link"),
-    ("slider crank", "crank slider", "crank and piston"),
-    ("crank rocker", "crank and rocker", "lever crank"),
-    ("double crank", "drag link"),
-    ("double rocker", "triple rocker", "rocker rocker"),
-    ("quick return", "shaper", "slotted lever", "crank and slotted lever"),
-    ("scotch yoke", "sine mechanism", "cosine mechanism"),
-    ("elliptical trammel", "ellipsograph"),
-    ("epicyclic", "planetary", "sun and planet", "planet gear"),
-    ("gear", "geared", "toothed wheel"),
-    ("belt", "pulley"),
-    ("toggle", "knee"),
-    ("straight line", "line generator"),
-    ("hoecken", "hoeken", "hoekens", "hoeckens"),
-    ("leg", "walking", "strandbeest"),
-    ("engine", "piston", "motor"),
-    ("rack", "rack and pinion"),
-    ("excavator", "digger"),
-    ("lift", "jack", "scissors"),
-    ("inversor", "inverter"),
-    ("parallelogram", "parallel cranks"),
+    "four bar, four link, quadric chain",
+    "five bar, five link",
+    "six bar, six link",
+    "eight bar, eight link",
+    "slider crank, crank slider, crank and piston",
+    "crank rocker, crank and rocker, lever crank",
+    "double crank, drag link",
+    "double rocker, triple rocker, rocker rocker",
+    "quick return, shaper, slotted lever, crank and slotted lever",
+    "scotch yoke, sine mechanism, cosine mechanism",
+    "elliptical trammel, ellipsograph",
+    "epicyclic, planetary, sun and planet, planet gear",
+    "gear, geared, toothed wheel",
+    "belt, pulley",
+    "toggle, knee",
+    "straight line, line generator",
+    "hoecken, hoeken, hoekens, hoeckens",
+    "leg, walking, strandbeest",
+    "engine, piston, motor",
+    "rack, rack and pinion",
+    "excavator, digger",
+    "lift, jack, scissors",
+    "inversor, inverter",
+    "parallelogram, parallel cranks",
 )
 """Words of books and of readers for one thing: a mechanism that is found by one is found by all."""
 NUMBERS = ("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve")
@@ -93,5 +93,6 @@ def described(mechanism: Mechanism, name: str) -> tuple[str, str]:
     named = names(mechanism)
     under = kind(mechanism, named)
     text = plain(" ; ".join((mechanism.name, mechanism.about or "", name, *mechanism.ids, *named, under)))
-    more = [word for same in SYNONYMS if any(f" {word}" in f" {text}" for word in same) for word in same]
+    alike = [each.split(", ") for each in SYNONYMS]
+    more = [word for words in alike if any(f" {word}" in f" {text}" for word in words) for word in words]
     return under, " ".join([text, *more])

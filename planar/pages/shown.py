@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from tempfile import mkdtemp
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,9 +20,6 @@ from planar.plane import frame_at
 from planar.shown import Shown
 from planar.solving.position import known_of
 from planar.views.html import html
-
-if TYPE_CHECKING:
-    from rich.console import RenderableType
 
 LISTED = 12
 """Assemblies of the table that a notebook shows."""
@@ -90,8 +87,7 @@ def framed(shown: Shown) -> str | None:
 
     None where there is nothing of these, so that the text is shown.
     """
-    moving, layers, printed = _presented(shown)
-    table = "" if printed is None else html(printed)
+    moving, layers, table = _presented(shown)
     try:
         subject = _subject(moving)
         picture = still(subject.mechanism, subject.z)
@@ -101,7 +97,7 @@ def framed(shown: Shown) -> str | None:
     return output(subject.mechanism.name, table, picture, text)
 
 
-def _presented(shown: Any) -> tuple[Mechanism | State | Motion, tuple[str, ...], RenderableType | None]:
+def _presented(shown: Any) -> tuple[Mechanism | State | Motion, tuple[str, ...], str]:
     """Of what the page is, its layers, and the tables above it."""
     from planar.analysis.centres import Centres
     from planar.assemblies.modes import Modes, modes
@@ -112,14 +108,14 @@ def _presented(shown: Any) -> tuple[Mechanism | State | Motion, tuple[str, ...],
 
     if isinstance(shown, Forces):
         over = isinstance(shown.moving, Motion)
-        return shown.moving, ("paths", "forces"), forces_over.tables(shown) if over else forces.tables(shown, {})
+        return shown.moving, ("paths", "forces"), html(forces_over.tables(shown) if over else forces.tables(shown, {}))
     if isinstance(shown, Centres):
-        return shown.state, ("centres",), centres.table(shown)
+        return shown.state, ("centres",), html(centres.table(shown))
     if isinstance(shown, Modes):
-        return shown.mechanism, ("paths",), assemblies.table(shown, LISTED)
+        return shown.mechanism, ("paths",), html(assemblies.table(shown, LISTED))
     if isinstance(shown, Circuits):
-        return shown.mechanism, ("paths",), circuits.table(shown, modes(shown.mechanism, certify=False))
-    return shown, ("paths",), None
+        return shown.mechanism, ("paths",), html(circuits.table(shown, modes(shown.mechanism, certify=False)))
+    return shown, ("paths",), ""
 
 
 def _unknowns(shown: State | Motion, mechanism: Mechanism, row: int = 0) -> np.ndarray:

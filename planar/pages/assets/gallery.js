@@ -68,17 +68,22 @@ const shownModels = JSON.parse(document.getElementById("data").textContent).map(
   return { data, item, svg, seen: false, recording: null, drawing: null };
 });
 
+function draw(model) {
+  if (model.drawing) return;
+  model.recording = new Recording(model.data);
+  model.drawing = new Small(model.recording, model.svg);
+}
+
 const watcher = new IntersectionObserver((entries) => {
   for (const { target, isIntersecting } of entries) {
     const model = shownModels.find((each) => each.svg === target);
     model.seen = isIntersecting;
-    if (isIntersecting && !model.drawing) {
-      model.recording = new Recording(model.data);
-      model.drawing = new Small(model.recording, model.svg);
-    }
+    if (isIntersecting) draw(model);
   }
 }, { rootMargin: "100px" });
 for (const { svg } of shownModels) watcher.observe(svg);
+
+addEventListener("beforeprint", () => { for (const model of shownModels) draw(model); }); // also those not seen yet
 
 const run = document.getElementById("run"), find = document.getElementById("find"), none = document.getElementById("none");
 let running = !matchMedia("(prefers-reduced-motion: reduce)").matches, time = 0, last = null;

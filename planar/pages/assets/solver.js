@@ -340,7 +340,7 @@ class Linkage {
     const still = column(0).slice(rows);
     const why = singularity(this, slope);
     const z1 = why ? null : this.inverse(slope, column(1).slice(0, rows).map((each) => -each));
-    if (z1 === null) return { w: scaled(still), w1: null, w2: null, why: why || "change point" };
+    if (z1 === null) return { w: scaled(still), w1: null, w2: null, why: this.stop?.to === this.z ? "dead point" : why || "change point" };
     rates([...z1, ...v], [...none, ...a]);
     const z2 = this.inverse(slope, column(2).slice(0, rows).map((each) => -each));
     rates([...z1, ...v], [...z2, ...a]);

@@ -25,6 +25,7 @@ class UndoHistory {
 
   button(bar, text, keys, act) {
     const made = htmlPart("button", { type: "button", "aria-keyshortcuts": keys }, bar, text);
+    bar.querySelector(".speed")?.before(made);
     made.addEventListener("click", act);
     return made;
   }
