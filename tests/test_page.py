@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import re
+import sys
 from base64 import b64decode
 from dataclasses import replace
 from functools import cache
@@ -27,6 +28,7 @@ from planar.pages.carried import carried
 from planar.pages.kinds import KINDS, described, plain
 from planar.pages.page import SCRIPTS, filled, page, told
 from planar.pages.shown import framed, page_of, view
+from planar.pages.still import still
 from planar.solving.freedom import strengths
 from planar.solving.position import known_of
 from planar.views.columns import columns
@@ -221,6 +223,29 @@ def test_everything_shows_itself_in_a_notebook_as_a_table_a_picture_and_a_page()
         assert letters >= set(results()["state"].point_names)
         assert sum(tag == "table" for tag, _ in elements.tags) == tables.get(kind, 0), kind
         assert inner.data()["layers"] == layers.get(kind, ["paths"])
+
+
+def test_the_still_picture_is_to_scale_and_needs_no_drawing_library(monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    mechanism = planar.load("four-bar")
+    state = planar.solve(mechanism)
+    root = ElementTree.fromstring(still(mechanism))
+    svg = "{http://www.w3.org/2000/svg}"
+    pins = {tuple(float(each.get(part)) for part in ("cx", "cy")) for each in root.iter(f"{svg}circle")}
+    left, top, width, height = map(float, root.get("viewBox").split())
+    assert all(left < x < left + width and top < y < top + height for x, y in pins)
+    scale = 1000.0  # millimetres of paper in a metre: 1 to 1, as `planar plot four-bar scheme` has it
+    for name in "ABCDEFG":
+        x, y = state.point(name).position
+        assert min(np.hypot(cx - scale * x, cy + scale * y) for cx, cy in pins) < 0.01
+    boxes = []
+    for text in root.iter(f"{svg}text"):
+        size = float(text.get("font-size"))
+        x, y, half = float(text.get("x")), float(text.get("y")), 0.3 * size * len(text.text)
+        boxes.append((x - half, y - 0.7 * size, x + half, y))
+    for k, a in enumerate(boxes):
+        for b in boxes[:k]:
+            assert a[2] < b[0] or b[2] < a[0] or a[3] < b[1] or b[3] < a[1]
 
 
 def test_tables_in_a_notebook_have_the_numbers_of_the_results_and_escaped_names():
@@ -627,6 +652,37 @@ def test_at_its_limits_a_page_has_no_rates_as_the_cycle_command_has_none(stem):
         assert found["told"] in ("dead point of the input: no velocity", "dead point of the inputs: no velocity")
         assert found["beside"]
         near(found["back"], page_of_it["first"], scale)
+
+
+@needs_node
+@pytest.mark.parametrize("stem", ["000-P1", "umbrella", "hart-inversor"])
+def test_from_a_limit_it_comes_back_on_its_branch_however_it_came_there(stem):
+    """To the limit's own number, beyond it, there again while it stands there, and back by steps of all lengths."""
+    act = """
+    const start = page.input(0), scale = page.linkage.scale[0];
+    const places = () => page.data.names.map((name) => page.point(name).position), first = places(), found = [];
+    for (const sense of [-1, 1]) {
+      page.moveTo(start + sense * 7 * scale);
+      const limit = page.input(0);
+      for (const by of [0.3, 0.01, 1e-4, 1e-7]) {
+        for (const again of [0, 1, 3]) {
+          page.moveTo(limit - 0.03 * sense * scale);
+          const there = page.moveTo(limit), why = page.state.why;
+          for (let k = 0; k < again; k++) page.moveTo(limit + (k % 2 ? sense * scale : 0));
+          page.moveTo(limit - by * sense * scale);
+          page.moveTo(start);
+          found.push([there, why, places()]);
+        }
+      }
+    }
+    return { first, found };
+    """
+    found = in_node({stem: MODELS[stem]}, act)[stem]
+    assert len(found["found"]) == 24
+    for there, why, places in found["found"]:
+        assert there
+        assert why == "dead point"
+        near(places, found["first"], known_of(MODELS[stem]).solver.unit)
 
 
 @needs_node

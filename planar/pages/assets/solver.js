@@ -190,11 +190,19 @@ class Linkage {
   follow(count, at) {
     let reached = 0, step = 1 / Math.max(1, Math.ceil(count)), open = 0;
     const whole = step;
+    if (count === 0) return { reached: 1, open }; // nothing moves
     while (reached < 1) {
       const next = Math.min(1, reached + step), there = at(next);
       there.ready();
       const guess = this.foretold(there.u, next - reached), found = this.newton(there.u, guess);
-      if (found.closed && (count === 0 || this.continues(found, guess))) {
+      if (found.closed && this.continues(found, guess)) {
+        if (next === 1 && singularity(this, this.closure(found.z, there.u).slope)) {
+          // asked for is a dead point itself, on which Newton's method does not tell the sides apart
+          const close = 1 - SHORTEST / (count * FARTHEST);
+          if (reached < close) { step = close - reached; continue; }
+          if (this.standOn(deadPointAhead(this, at, reached, count * FARTHEST), at, reached)) { reached = 1; break; }
+          there.ready();
+        }
         this.last = { ...this.since(there.u), to: found.z, signs: this.agreed(found.signs), step: next - reached };
         this.z = found.z;
         this.u = Array.from(there.u);
@@ -211,15 +219,8 @@ class Linkage {
           step = Math.min(whole, part);
           continue;
         }
-        const { z, u, before } = this, dead = deadPointAhead(this, at, reached, count * FARTHEST);
-        if (dead !== null) {
-          // the side from which it came is kept: it leads back on its own branch
-          const { came } = this, signs = came ? came.signs : this.newton(u, z).signs;
-          if (dead.z.some((each, k) => each !== z[k])) this.stop = { u, z, to: dead.z, signs };
-          else this.stop = came && { ...came, to: dead.z };
-          this.last = before && { ...before, to: dead.z };
-          [this.z, this.u, reached] = [dead.z, Array.from(at(dead.part).u), dead.part];
-        }
+        const dead = deadPointAhead(this, at, reached, count * FARTHEST);
+        if (this.standOn(dead, at, reached)) reached = dead.part;
         break;
       }
     }
@@ -227,23 +228,43 @@ class Linkage {
     return { reached, open };
   }
 
-  /** Off an exact dead point, where no step leads: the unknowns go along what the slope leaves free, to the side from
-      which they came if that is known. Whether it came to another position. */
+  /** Stand on a dead point, if there is one, and keep the side from which it came: it leads back on its own branch. */
+  standOn(dead, at, reached) {
+    if (dead === null) return false;
+    at(reached).ready();
+    const { came, before, z, u } = this, signs = came ? came.signs : this.newton(u, z).signs;
+    if (dead.z.some((each, k) => each !== z[k])) this.stop = { u, z, to: dead.z, signs };
+    else this.stop = came && { ...came, to: dead.z };
+    this.last = before && { ...before, to: dead.z };
+    [this.z, this.u] = [dead.z, Array.from(at(dead.part).u)];
+    return true;
+  }
+
+  /** Off an exact dead point, where no step leads: the unknowns go back as they came, group by group on the same side
+      of it; where that is not known along what the slope leaves free. Whether it came to another position. */
   leave(there) {
-    const free = this.free();
+    const { came } = this, stop = this.stop?.to === this.z ? this.stop : null;
+    const free = stop ? this.towards(stop.z) : this.free();
     if (free === null) return false;
-    const { came } = this, back = came ? free.reduce((sum, each, i) => sum + each * (came.z[i] - this.z[i]), 0) : 1;
+    const back = came ? free.reduce((sum, each, i) => sum + each * (came.z[i] - this.z[i]), 0) : 1;
     there.ready();
     for (const side of back < 0 ? [-1, 1] : [1, -1]) {
       for (const nudge of NUDGES) {
         const found = this.newton(there.u, this.z.map((each, i) => each + side * nudge * free[i]));
         const gone = found.z.reduce((most, each, i) => Math.max(most, Math.abs(each - this.z[i])), 0);
         if (!found.closed || gone > 3 * nudge || found.signs.includes(0)) continue;
+        if (stop && found.signs.some((each, k) => each * stop.signs[k] < 0)) continue;
         [this.z, this.u] = [found.z, Array.from(there.u)];
         return true;
       }
     }
     return false;
+  }
+
+  /** The way from here to other unknowns, the greatest by 1. */
+  towards(z) {
+    const far = z.reduce((most, each, i) => Math.max(most, Math.abs(each - this.z[i])), 0);
+    return Float64Array.from(z, (each, i) => (each - this.z[i]) / far);
   }
 
   /** How the unknowns can move by themselves where their slope is singular, the greatest by 1; null where it is not. */
