@@ -149,6 +149,10 @@ class Mechanism(Shown):
     published: tuple[Published, ...] = ()
     remarks: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        driven = f", driven at {', '.join(given.pair for given in self.inputs)}" if self.inputs else ""
+        return f"<Mechanism {self.name!r}: {len(self.links)} links, {len(self.pairs)} pairs{driven}>"
+
     def __hash__(self) -> int:
         found = self.__dict__.get("_hash")
         if found is None:

@@ -27,7 +27,7 @@ from planar.results import (
 )
 from planar.shapes import Shape
 from planar.shown import Shown
-from planar.words import heading, hurrying, turning
+from planar.words import amount, heading, hurrying, turning
 
 Array = np.ndarray
 
@@ -46,6 +46,10 @@ class Moving(Shown):
     frames: Mapping[str, Frame]
     own: Mapping[str, tuple[Jet, ...]]
     shapes: Mapping[str, Shape]
+
+    def _placed(self, pair: str, position: float) -> str:
+        """A position of an input in the file's units: A = 60 deg."""
+        return f"{pair} = {amount(position, self._motions[pair].drive_kind.value, self.mechanism.units)}"
 
     @cached_property
     def _points(self) -> tuple[NamedPoint, ...]:
@@ -185,6 +189,10 @@ class State(Moving):
     "every pair's own coordinates, as jets"
     shapes: Mapping[str, Shape]
 
+    def __repr__(self) -> str:
+        at = [self._placed(given.pair, given.position) for given in self.mechanism.inputs]
+        return f"<State of {self.mechanism.name!r}{' at ' if at else ''}{', '.join(at)}>"
+
     @property
     def points(self) -> dict[str, PointState]:
         """Every point under its result name."""
@@ -282,6 +290,13 @@ class Motion(Moving):
     time: Array | None = None
     jerked: Jerked | None = None
     course: Course | None = None
+
+    def __repr__(self) -> str:
+        ends = [
+            f"{self._placed(name, float(given.position[0]))} to {self._placed(name, float(given.position[-1]))}"
+            for name, given in self.inputs.items()
+        ]
+        return f"<Motion of {self.mechanism.name!r}: {len(self)} positions, {', '.join(ends)}; {self.outcome.value}>"
 
     @cached_property
     def limits(self) -> tuple[Limit, ...]:

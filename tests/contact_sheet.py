@@ -18,7 +18,7 @@ GALLERY = (
     "jansen-leg",
     "peaucellier-lipkin",
     "whitworth",
-    "geneva-drive",
+    "slotted-lever",
     "planetary-gear-set",
     "rack-steering",
     "double-butterfly",

@@ -18,7 +18,7 @@ from planar.pages.page import told
 
 NODE = shutil.which("node") or shutil.which("nodejs")
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
-LOGIC = ("solver.js", "page.js", "dimensions.js", "saving.js")
+LOGIC = ("singular.js", "solver.js", "page.js", "dimensions.js", "saving.js")
 """The scripts of a page that need no document."""
 
 _carried = cache(carried)

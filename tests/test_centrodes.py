@@ -65,7 +65,7 @@ def test_both_curves_touch_in_the_pole_and_run_through_it_at_one_velocity(model)
     ("model", "link", "other"),
     [
         ("crank-rocker", "coupler", None),
-        ("geneva-drive", "wheel", "driver"),
+        ("slotted-lever", "CD", "OA"),
         ("drag-link", "coupler", None),
         ("jansen-leg", None, None),
     ],
@@ -98,7 +98,7 @@ def test_arcs_between_two_positions_are_as_long_on_both_curves_and_chords_come_t
     assert abs(4.0 * apart[2] - apart[1]) / 3.0 < 1e-2 * abs(apart[2])
 
 
-@pytest.mark.parametrize("model", ["four-bar", "geneva-drive", "cardan-gears", "crank-rocker"])
+@pytest.mark.parametrize("model", ["four-bar", "slotted-lever", "cardan-gears", "crank-rocker"])
 def test_rates_are_those_of_the_curve_and_the_curve_between_rows_is_exact_to_the_fourth_order(model):
     link, other = usual(MODELS[model])
     coarse, fine = (centrodes(run(model, steps), link, other) for steps in (60, 120))
@@ -261,8 +261,8 @@ def test_the_rate_of_the_input_does_not_matter():
 
 
 def test_seen_the_other_way_round_the_moving_centrode_is_the_fixed_one():
-    motion = run("geneva-drive")
-    one, other = centrodes(motion, "wheel", "driver"), centrodes(motion, "driver", "wheel")
+    motion = run("slotted-lever")
+    one, other = centrodes(motion, "CD", "OA"), centrodes(motion, "OA", "CD")
     assert one.fixed.position == pytest.approx(other.moving.position, nan_ok=True)
     assert one.moving.position == pytest.approx(other.fixed.position, nan_ok=True)
 
@@ -282,7 +282,7 @@ def test_names_that_are_not_there_are_refused():
     [
         ("four-bar", ("BC", "AD")),
         ("planetary-gear-set", ("planet", "frame")),
-        ("geneva-drive", ("wheel", "driver")),
+        ("gear-reducer", ("countershaft", "input shaft")),
         ("single-link", ("link", "frame")),
         ("slider-crank", ("rod", "frame")),
     ],
@@ -321,7 +321,7 @@ def pole(picture):
         ("antiparallelogram", ()),
         ("four-bar", ()),
         ("slider-crank", ()),
-        ("geneva-drive", ()),
+        ("slotted-lever", ()),
         ("hoeken-straight-line", ()),
         ("planetary-gear-set", ()),
         ("002-E3.6a", ()),  # never comes back, and its slide does not turn back in the file's position

@@ -208,7 +208,7 @@ def test_open_and_closed_chains(found):
 
 
 @pytest.mark.parametrize(
-    ("model", "higher"), [("planetary-gear-set", 2), ("slotted-yoke", 1), ("geneva-drive", 1), ("belt-arm", 1)]
+    ("model", "higher"), [("planetary-gear-set", 2), ("slotted-yoke", 1), ("slotted-lever", 1), ("belt-arm", 1)]
 )
 def test_with_higher_pairs_it_is_a_mechanism_but_no_linkage(model, higher, found):
     each = found(model)

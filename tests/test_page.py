@@ -6,9 +6,14 @@ import csv
 import io
 import json
 import re
+import sys
+from base64 import b64decode
 from dataclasses import replace
+from functools import cache
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -18,10 +23,13 @@ from planar.dimensions import changed, dimensions
 from planar.errors import BadInput, NoAnswer
 from planar.files import asset
 from planar.mechanism import Mechanism
-from planar.pages import gallery
+from planar.pages import gallery, notebook
 from planar.pages.carried import carried
+from planar.pages.kinds import KINDS, described, plain
 from planar.pages.page import SCRIPTS, filled, page, told
 from planar.pages.shown import framed, page_of, view
+from planar.pages.still import still
+from planar.solving.freedom import strengths
 from planar.solving.position import known_of
 from planar.views.columns import columns
 from tests import command
@@ -51,7 +59,7 @@ def hostile() -> Mechanism:
     for k in range(len(value["links"]) + len(pins)):
         text = text.replace(f'"\\u0001{k}"', json.dumps(new[k]))
     value = json.loads(text)
-    return planar.from_dict(value | {"name": HARMFUL, "about": HARMFUL, "notes": [HARMFUL]})
+    return planar.from_dict(value | {"name": HARMFUL, "about": HARMFUL, "source": HARMFUL, "notes": [HARMFUL]})
 
 
 def triangle(base: float) -> Mechanism:
@@ -126,12 +134,27 @@ def test_a_page_may_load_nothing():
 
 
 def test_texts_of_a_file_stay_texts():
-    plain, harmful = Elements(page(planar.load("four-bar"))), Elements(page(hostile()))
+    value = planar.to_dict(planar.load("four-bar")) | {"about": "a", "source": "s", "notes": ["n"]}
+    plain, harmful = Elements(page(planar.from_dict(value))), Elements(page(hostile()))
     assert [tag for tag, _ in harmful.tags] == [tag for tag, _ in plain.tags]
     assert harmful.data()["name"] == harmful.data()["about"] == HARMFUL
     assert harmful.data()["document"]["value"]["notes"] == [HARMFUL]
     title = next(k for k, (tag, _) in enumerate(harmful.tags) if tag == "title")
     assert harmful.texts[title].rstrip("\n") == HARMFUL
+    texts = [text.rstrip("\n") for text in harmful.texts.values()]
+    assert texts.count(HARMFUL) == 4  # title, heading, about, note
+    assert f"Source: {HARMFUL}" in texts
+
+
+def test_about_source_and_notes_of_the_file_stand_on_the_page_without_scripts():
+    mechanism = MODELS["two-stroke-engine"]
+    texts = {text.rstrip("\n") for text in Elements(page(mechanism)).texts.values()}
+    assert mechanism.about in texts
+    assert f"Source: {mechanism.source}" in texts
+    assert len(mechanism.notes) == 2
+    assert set(mechanism.notes) <= texts
+    bare = replace(mechanism, about="", source="", notes=())
+    assert not {"notes", "source"} & {part for _, each in Elements(page(bare)).tags for part in each.values()}
 
 
 def test_texts_in_a_template_are_not_filled_again():
@@ -165,14 +188,116 @@ def test_no_two_scripts_of_a_page_give_one_name_to_two_things(scripts):
 # what Python shows as a page
 
 
-def test_a_mechanism_a_position_and_a_motion_show_themselves_in_a_notebook(tmp_path):
+@cache
+def results() -> dict[str, Any]:
+    """One of everything that a notebook shows."""
+    mechanism = planar.load("two-stroke-engine")
+    state, motion = planar.solve(mechanism), planar.cycle(mechanism, 12)
+    return {
+        "mechanism": mechanism,
+        "state": state,
+        "motion": motion,
+        "forces": planar.forces(state),
+        "forces over": planar.forces(motion),
+        "centres": planar.centres(state),
+        "modes": planar.modes(mechanism, certify=False),
+        "circuits": planar.circuits(mechanism),
+    }
+
+
+def test_everything_shows_itself_in_a_notebook_as_a_table_a_picture_and_a_page():
+    layers = {"forces": ["paths", "forces"], "forces over": ["paths", "forces"], "centres": ["centres"]}
+    tables = {"forces": 4, "forces over": 2, "centres": 1, "modes": 2, "circuits": 2}
+    for kind, each in results().items():
+        elements = Elements(each._repr_html_())
+        (frame,) = (attributes for tag, attributes in elements.tags if tag == "iframe")
+        inner = Elements(frame["srcdoc"])
+        assert inner.data()["name"] == frame["title"] == "Two-stroke engine"
+        # what is left where a notebook is not trusted: neither frames nor scripts
+        assert not {"script", "svg", "style"} & {tag for tag, _ in elements.tags}
+        (image,) = (attributes for tag, attributes in elements.tags if tag == "img")
+        head, code = image["src"].split(",")
+        assert head == "data:image/svg+xml;base64"
+        picture = ElementTree.fromstring(b64decode(code))
+        letters = {text.text for text in picture.iter("{http://www.w3.org/2000/svg}text")}
+        assert letters >= set(results()["state"].point_names)
+        assert sum(tag == "table" for tag, _ in elements.tags) == tables.get(kind, 0), kind
+        assert inner.data()["layers"] == layers.get(kind, ["paths"])
+
+
+def test_the_still_picture_is_to_scale_and_needs_no_drawing_library(monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
     mechanism = planar.load("four-bar")
-    state, motion = planar.solve(mechanism, {mechanism.inputs[0].pair: 1.0}), planar.cycle(mechanism, 12)
-    for each in (mechanism, state, motion):
-        (frame,) = (attributes for tag, attributes in Elements(each._repr_html_()).tags if tag == "iframe")
-        assert Elements(frame["srcdoc"]).data()["name"] == mechanism.name
-        assert frame["title"] == mechanism.name
-    assert Elements(page_of(state)).data()["inputs"][0]["position"] == 1.0
+    state = planar.solve(mechanism)
+    root = ElementTree.fromstring(still(mechanism))
+    svg = "{http://www.w3.org/2000/svg}"
+    pins = {tuple(float(each.get(part)) for part in ("cx", "cy")) for each in root.iter(f"{svg}circle")}
+    left, top, width, height = map(float, root.get("viewBox").split())
+    assert all(left < x < left + width and top < y < top + height for x, y in pins)
+    scale = 1000.0  # millimetres of paper in a metre: 1 to 1, as `planar plot four-bar scheme` has it
+    for name in "ABCDEFG":
+        x, y = state.point(name).position
+        assert min(np.hypot(cx - scale * x, cy + scale * y) for cx, cy in pins) < 0.01
+    boxes = []
+    for text in root.iter(f"{svg}text"):
+        size = float(text.get("font-size"))
+        x, y, half = float(text.get("x")), float(text.get("y")), 0.3 * size * len(text.text)
+        boxes.append((x - half, y - 0.7 * size, x + half, y))
+    for k, a in enumerate(boxes):
+        for b in boxes[:k]:
+            assert a[2] < b[0] or b[2] < a[0] or a[3] < b[1] or b[3] < a[1]
+
+
+def test_tables_in_a_notebook_have_the_numbers_of_the_results_and_escaped_names():
+    forces = results()["forces"]
+    cells = {text.strip() for text in Elements(forces._repr_html_()).texts.values()}
+    assert f"{forces.inputs['O']:.6g}" in {cell.replace("\u2212", "-") for cell in cells}
+    harmful = planar.centres(planar.solve(hostile()))
+    assert not {"script"} & {tag for tag, _ in Elements(harmful._repr_html_()).tags}
+
+
+def test_everything_says_what_it_is_in_one_line():
+    for each in results().values():
+        line = repr(each)
+        assert "Two-stroke engine" in line
+        assert "\n" not in line
+        assert len(line) < 140
+    assert repr(results()["state"]) == "<State of 'Two-stroke engine' at O = 40 deg>"
+
+
+class Shell:
+    """A kernel's shell, in a run of a cell."""
+
+    kernel = None
+
+    def __init__(self):
+        self.cell, self.run = None, 0
+
+    def get_parent(self):
+        return {"metadata": {"cellId": self.cell} if self.cell else {}, "header": {"msg_id": self.run}}
+
+
+def test_one_output_of_a_notebook_carries_the_scripts_and_a_cell_that_is_run_again_does(monkeypatch):
+    shell = Shell()
+    monkeypatch.setattr(notebook, "_shown", {})
+    monkeypatch.setattr(notebook, "_shell", lambda: shell)
+    found = []
+    for run, cell in enumerate(["a", "a", "b", "c", "b", "a"]):
+        shell.cell, shell.run = cell, run if run != 1 else 0  # the first cell shows two
+        found.append(notebook.carries())
+    assert found == [True, False, False, False, True, True]
+    monkeypatch.setattr(notebook, "_shown", {})
+    shell.cell = None  # nothing is known of the cells
+    assert [notebook.carries() for _ in range(3)] == [True, False, False]
+    monkeypatch.setattr(notebook, "_shell", lambda: None)
+    assert [notebook.carries() for _ in range(2)] == [True, True]
+
+
+def test_an_output_that_shares_the_scripts_is_a_fraction_of_one_that_carries_them():
+    mechanism = planar.load("four-bar")
+    alone, carrying, sharing = (len(page(mechanism, library=each)) for each in (None, True, False))
+    assert carrying < 0.6 * alone
+    assert sharing < 0.15 * alone
 
 
 def test_the_page_of_a_position_stands_at_that_assembly_also_where_the_sketch_means_another():
@@ -256,6 +381,11 @@ def test_a_gallery_has_a_page_for_each_and_an_index_that_moves(tmp_path):
     assert {each["href"] for each in (first, second, third)} <= names
     assert (first["name"], first["about"]) == (HARMFUL, HARMFUL)
     assert [tag for tag, _ in elements.tags].count("script") == 2
+    listed = [each["href"] for tag, each in elements.tags if tag == "a" and each["href"].endswith(".html")]
+    assert listed == [each["href"] for each in (first, second, third)]  # also without scripts
+    for name in names - {"index.html"}:
+        links = [each for tag, each in Elements((index.parent / name).read_text(encoding="utf-8")).tags if tag == "a"]
+        assert [each["href"] for each in links] == ["index.html"]
     assert (second["closed"], third["closed"]) == (True, False)
 
 
@@ -273,7 +403,14 @@ def test_the_gallery_command_writes_a_folder_and_tells_what_it_leaves_out(tmp_pa
 def test_the_index_is_small_and_its_links_are_where_the_motion_has_them():
     shown = [gallery.small(mechanism) for mechanism in SOME.values()]
     drawing = len(gallery.index([]).encode())
-    each = len(gallery.index([one | {"name": "", "about": "", "href": ""} for one in shown]).encode()) - drawing
+    each = (
+        len(
+            gallery.index(
+                [one | {"name": "", "about": "", "href": "", "kind": KINDS[0], "words": ""} for one in shown]
+            ).encode()
+        )
+        - drawing
+    )
     assert drawing + each / len(SOME) * len(MODELS) < 2 * LARGEST
     mechanism = MODELS["crank-rocker"]
     small = gallery.small(mechanism)
@@ -283,6 +420,31 @@ def test_the_index_is_small_and_its_links_are_where_the_motion_has_them():
         frame = motion.frames[link]
         wanted = np.stack([part.parts[0] for part in (frame.x, frame.y, frame.angle)], axis=1)
         assert np.abs(np.reshape(path, (-1, 3)) - wanted).max() < 1e-4 * max(1.0, np.abs(wanted).max())
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["four-bar", "4-bar", "4 bar", "4bar", "Four Bar", "fourbar", "FOUR\u2010BAR", "  four  bar ", "4\u2013bar's"],
+)
+def test_a_name_is_found_however_it_is_written(text):
+    assert plain(text).startswith("four bar")
+    assert plain("Hoecken's 12 links é") == "hoeckens twelve links e"
+
+
+def test_a_mechanism_is_of_a_kind_that_its_structure_tells():
+    wanted = {
+        "drag-link": "Four-bar linkages",
+        "hand-pump": "Slider-cranks and their inversions",
+        "oldham": "Double slider-cranks",
+        "klann-leg": "Six-bar linkages",
+        "jansen-leg": "Linkages of eight links and more",
+        "belt-arm": "Gears, belts and racks",
+        "rack-steering": "Gears, belts and racks",
+        "open-arm": "Open chains",
+        "pantograph": "Other linkages",
+    }
+    assert {stem: described(MODELS[stem], stem)[0] for stem in wanted} == wanted
+    assert set(wanted.values()) == set(KINDS)
 
 
 # numbers
@@ -452,7 +614,102 @@ def test_the_range_of_the_input_is_that_of_the_cycle_command():
         if limits is None:
             assert np.ptp(wanted) == pytest.approx(2.0 * np.pi), stem
         else:
-            assert limits == pytest.approx([wanted.min(), wanted.max()], abs=1e-5), stem
+            assert limits == pytest.approx([wanted.min(), wanted.max()], abs=1e-12), stem
+
+
+@needs_node
+@pytest.mark.parametrize("stem", ["000-P1", "hart-inversor", "elliptical-trammel", "excavator-arm"])
+def test_at_its_limits_a_page_has_no_rates_as_the_cycle_command_has_none(stem):
+    """Also where two groups of links turn back at once; beside a limit there are rates; back is its branch."""
+    act = """
+    const start = page.input(0), far = page.data.inputs[0].slides ? 4 * page.data.size : 2 * Math.PI, found = [];
+    const places = () => page.data.names.map((name) => page.point(name).position), first = places();
+    for (const sense of [-1, 1]) {
+      const there = page.moveTo(start + sense * far, 0), at = page.input(0), { w1, w2, why } = page.state;
+      const points = page.data.names.map((name) => page.point(name).velocity);
+      const none = [w1, w2, ...points].every((each) => each === null), told = page.undetermined;
+      page.moveTo(start, 0);
+      found.push({ there, at, none, why, told, back: places() });
+      page.moveTo(at + 1e-7 * far * -sense, 0);
+      found[found.length - 1].beside = page.state.w1 !== null;
+      page.moveTo(start, 0);
+    }
+    return { found, first };
+    """
+    mechanism = MODELS[stem]
+    (given, *_) = mechanism.inputs
+    motion = planar.cycle(mechanism, 4, pair=given.pair)
+    places = motion.inputs[given.pair].position
+    page_of_it = in_node({stem: mechanism}, act)[stem]
+    scale = known_of(mechanism).solver.unit
+    for found, row in zip(page_of_it["found"], (np.argmin(places), np.argmax(places)), strict=True):
+        rates = [point.velocity[row] for point in motion.points.values()]
+        assert np.isnan(rates).any()
+        assert not found["there"]
+        assert found["at"] == pytest.approx(places[row], abs=CLOSE)
+        assert found["none"]
+        assert found["why"] == "dead point"
+        assert found["told"] in ("dead point of the input: no velocity", "dead point of the inputs: no velocity")
+        assert found["beside"]
+        near(found["back"], page_of_it["first"], scale)
+
+
+@needs_node
+@pytest.mark.parametrize("stem", ["000-P1", "umbrella", "hart-inversor"])
+def test_from_a_limit_it_comes_back_on_its_branch_however_it_came_there(stem):
+    """To the limit's own number, beyond it, there again while it stands there, and back by steps of all lengths."""
+    act = """
+    const start = page.input(0), scale = page.linkage.scale[0];
+    const places = () => page.data.names.map((name) => page.point(name).position), first = places(), found = [];
+    for (const sense of [-1, 1]) {
+      page.moveTo(start + sense * 7 * scale);
+      const limit = page.input(0);
+      for (const by of [0.3, 0.01, 1e-4, 1e-7]) {
+        for (const again of [0, 1, 3]) {
+          page.moveTo(limit - 0.03 * sense * scale);
+          const there = page.moveTo(limit), why = page.state.why;
+          for (let k = 0; k < again; k++) page.moveTo(limit + (k % 2 ? sense * scale : 0));
+          page.moveTo(limit - by * sense * scale);
+          page.moveTo(start);
+          found.push([there, why, places()]);
+        }
+      }
+    }
+    return { first, found };
+    """
+    found = in_node({stem: MODELS[stem]}, act)[stem]
+    assert len(found["found"]) == 24
+    for there, why, places in found["found"]:
+        assert there
+        assert why == "dead point"
+        near(places, found["first"], known_of(MODELS[stem]).solver.unit)
+
+
+@needs_node
+def test_what_is_singular_on_a_page_is_so_in_python():
+    """The least singular value of every group, at the file's position and one beside it, by both."""
+    act = """
+    page.moveTo(page.input(0) + (page.data.inputs[0].slides ? 0.02 * page.data.size : 0.1), 0);
+    const { linkage } = page, { slope } = linkage.closure(linkage.z, linkage.u), { F: rows } = page.data.counts;
+    const { by, least } = slopeScales(linkage);
+    const strengths = page.data.stages.map(({ z: [a, b], F: [c, d] }) => {
+      const columns = [];
+      for (let j = a; j < b; j++) {
+        const column = Array.from({ length: d - c }, (_, i) => slope[j * rows + c + i] / by[c + i]);
+        const size = Math.max(Math.hypot(...column), least[j]);
+        columns.push(column.map((each) => each / size));
+      }
+      const values = singularValues(columns);
+      return b > a ? Math.min(...values) / Math.max(1, ...values) : 1;
+    });
+    return { z: Array.from(linkage.z), u: Array.from(linkage.u), strengths };
+    """
+    some = {stem: each for stem, each in SOME.items() if each.inputs}
+    for stem, found in in_node(some, act).items():
+        solver = known_of(some[stem]).solver
+        z, u = np.array(found["z"]), np.array(found["u"])
+        slope = solver.program.slopes(z[None], u[None], solver.station.p)[0][0]
+        assert found["strengths"] == pytest.approx(strengths(solver, slope), rel=1e-9, abs=1e-12), stem
 
 
 @needs_node
@@ -479,7 +736,7 @@ def test_a_file_that_stands_at_a_dead_point_can_be_moved_off_it():
     mechanism = planar.from_dict(value)
     found = in_node({"dead": mechanism}, act)["dead"]
     assert (found["beyond"], found["back"]) == (False, True)
-    assert found["stood"] == pytest.approx(dead, abs=1e-5)
+    assert found["stood"] == pytest.approx(dead, abs=CLOSE)
     assert found["at"] == pytest.approx(dead - 0.2, abs=1e-5)
     value["inputs"][0]["position"] = f"{found['at']!r} rad"
     state = planar.solve(planar.from_dict(value | {"sketch": dict(found["points"])}))

@@ -6,6 +6,7 @@ import csv
 import io
 import json
 from dataclasses import replace
+from html import escape
 from xml.etree import ElementTree
 
 import numpy as np
@@ -13,13 +14,18 @@ import pytest
 
 import planar
 from planar.dimensions import changed, dimensions
-from planar.pages import gallery
+from planar.pages import gallery, notebook
+from planar.pages.kinds import KINDS, described
+from planar.pages.page import page
 from planar.pages.shown import view
+from planar.pages.still import still
 from tests.known import MODELS
 from tests.pages import browser, opened
 from tests.test_page import hostile, triangle
 
 CLOSE = 1e-12
+STEMS = ("crank-rocker", "slider-crank", "scotch-yoke", "watt-six-bar", "whitworth", "planetary-gear-set", "open-arm")
+"""Of the gallery."""
 SCREENS = {"phone": (390, 844), "desk": (1280, 900), "projector": (1920, 1080)}
 PLACES = "page.data.names.map((name) => Object.values(page.point(name)))"
 
@@ -130,6 +136,17 @@ def test_the_input_is_moved_by_keys_and_by_its_number(shown):
     settled(window)
     assert window.evaluate("page.input(0)") == pytest.approx(np.radians(100.0), abs=CLOSE)
     same(window, planar.solve(mechanism, {given.pair: np.radians(100.0)}))
+
+
+def test_the_numbers_are_headed_by_the_inputs_position_and_both_its_rates(shown):
+    window = shown(MODELS["002-E3.1"])
+    heads = window.locator("#numbers caption").all_inner_texts()
+    assert heads == ["Points at A = 60 deg, ω = 10.5 rad/s, α = −26 rad/s²"]
+    window = shown(MODELS["excavator-arm"])
+    (head,) = window.locator("#numbers caption").all_inner_texts()
+    for given in MODELS["excavator-arm"].inputs:
+        if given.velocity or given.acceleration:
+            assert f"v = {given.velocity:g} m/s, a = {given.acceleration:g} m/s²" in head.replace("\u2212", "-")
 
 
 def test_it_plays_and_stops(shown):
@@ -256,7 +273,7 @@ def test_a_length_moved_to_and_fro_while_it_plays_leaves_it_on_its_branch_with_p
     assert saved.links != MODELS["crank-rocker"].links
     same(window, planar.solve(saved))
     window.get_by_role("button", name="Reset all dimensions").click()
-    window.get_by_role("button", name="To the position in the file").click()
+    window.get_by_role("button", name="Start").click()
     settled(window)
     same(window, planar.solve(MODELS["crank-rocker"]))
 
@@ -334,6 +351,59 @@ def test_texts_of_a_file_are_shown_and_never_run(shown, chromium, tmp_path):
     assert window.locator("#gallery strong").inner_text().split() == mechanism.name.split()
     window.locator("#gallery a").click()
     assert window.locator("#drawing").count() == 1
+    assert wrong == []
+    context.close()
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A gallery of some models of every kind."""
+    return gallery.gallery([(stem, MODELS[stem]) for stem in STEMS], tmp_path_factory.mktemp("gallery"))[0]
+
+
+FOUND = {
+    "4-bar": {"Crank-rocker", "Watt six-bar"},
+    "FOURBAR chains": {"Crank-rocker", "Watt six-bar"},
+    "quadric": {"Crank-rocker", "Watt six-bar"},
+    "in-line crank slider": {"Slider-crank"},
+    "watt": {"Watt six-bar", "Whitworth quick return"},
+    "Watt II 6-bar": {"Watt six-bar", "Whitworth quick return"},
+    "quickest way": set(),
+    "shaper": {"Whitworth quick return"},
+    "quick-returns": {"Whitworth quick return"},
+    "epicyclic": {"Planetary gear set"},
+    "sine mechanism": {"Scotch yoke"},
+    "open chain": {"Open arm"},
+}
+"""What readers look for, and what of the gallery is that."""
+
+
+def test_the_gallery_finds_by_any_of_the_usual_words(chromium, folder):
+    context = chromium.new_context()
+    window, wrong = opened(context, folder)
+    for words, found in FOUND.items():
+        window.get_by_label("Find").fill(words)
+        assert set(window.locator("#gallery li:visible strong").all_inner_texts()) == found, words
+        kinds = {described(MODELS[stem], stem)[0] for stem in STEMS if MODELS[stem].name in found}
+        assert set(window.locator("#gallery h2:visible").all_inner_texts()) == kinds
+        assert (window.locator("#none").inner_text() == "") == bool(found)
+    assert wrong == []
+    context.close()
+
+
+def test_from_a_page_of_a_gallery_a_link_leads_back_to_what_was_looked_for(chromium, folder):
+    context = chromium.new_context()
+    window, wrong = opened(context, folder)
+    assert window.locator("#gallery h2").all_inner_texts() == [
+        each for each in KINDS if each[:5] not in ("Linka", "Other")
+    ]
+    window.get_by_label("Find").fill("4-bar swings")
+    window.locator("#gallery a:visible").click()
+    window.get_by_role("link", name="All mechanisms").click()
+    assert window.locator("#gallery li:visible").count() == 7
+    window.go_back()
+    window.go_back()
+    assert window.locator("#gallery li:visible strong").all_inner_texts() == ["Crank-rocker"]
     assert wrong == []
     context.close()
 
@@ -455,3 +525,282 @@ def test_every_control_has_a_name(shown):
           .map((each) => each.outerHTML)"""
     )
     assert nameless == []
+    # WCAG 2, 2.5.3: who speaks what is written on a control means that control
+    misnamed = window.evaluate(
+        r"""Array.from(document.querySelectorAll(":is(button, a, summary)[aria-label]"))
+          .map((each) => [each.textContent, each.getAttribute("aria-label")]
+            .map((text) => text.toLowerCase().replaceAll(/[^\p{L}\p{N}]+/gu, " ").trim()))
+          .filter(([written, name]) => written && !name.includes(written))"""
+    )
+    assert misnamed == []
+
+
+# diagrams
+
+
+def test_a_diagram_holds_the_whole_course_and_the_values_of_now_also_beside_a_dead_point(shown):
+    """Where the input is 1e-9 rad from its limit, rates are greater than in any row of the course."""
+    window = shown(MODELS["000-P1"])
+    window.wait_for_function("() => page.course !== null")
+    window.evaluate(
+        "page.chosen.toggle('link', 'DC'); for (const each of document.querySelectorAll('[name^=diagram]'))"
+        " if (!each.checked) each.click();"
+    )
+    act = """() => page.charts.charts.map((each) => ({
+      now: each.now(), data: each.plot.data.slice(1).flat().filter((value) => value !== null),
+      low: each.plot.scales.y.min, high: each.plot.scales.y.max,
+    }))"""
+    for to in ("page.data.inputs[0].position", "page.course.limits[1] - 1e-9", "page.course.limits[1]"):
+        window.evaluate(f"page.moveTo({to})")
+        settled(window)
+        charts = window.evaluate(act)
+        assert len(charts) == 11
+        for each in charts:
+            held = [value for value in (*each["data"], *each["now"]) if value is not None]
+            assert each["low"] <= min(held)
+            assert max(held) <= each["high"]
+    outgrown = window.evaluate("page.moveTo(page.course.limits[1] - 1e-9), " + act.split("=> ", 1)[1])
+    assert any(max(each["now"]) > max(each["data"]) for each in outgrown)
+
+
+def test_at_a_dead_point_the_page_says_so_and_shows_no_number_and_no_arrow(shown):
+    window = shown(MODELS["000-P1"])
+    window.wait_for_function("() => page.course !== null")
+    for box in window.locator("#layers").get_by_role("checkbox").all():
+        box.check()
+    window.evaluate("page.chosen.toggle('link', 'DC')")
+    assert window.locator("#drawing .layers .arrow").count() > 0
+    window.evaluate("page.moveTo(3)")
+    settled(window)
+    assert window.locator("#numbers .why").inner_text() == "Dead point of the input: no velocity."
+    assert window.locator(":is(#drawing .layers, #layers .beside) .arrow").count() == 0
+    heads = window.locator("#numbers table").last.locator("thead th").all_inner_texts()
+    cells = window.locator("#numbers table").last.locator("tbody td:not(.press)").all_inner_texts()
+    assert [each.split()[0] for each in heads] == ["link", "angle", "angular", "angular"]
+    assert cells[1:] == ["–", "–"]
+    assert "dead point of the input: no velocity" in window.locator("#layers").inner_text()
+    window.evaluate("page.moveTo(page.data.inputs[0].position)")
+    settled(window)
+    assert window.locator("#numbers .why").is_hidden()
+    assert window.locator("#drawing .layers .arrow").count() > 0
+
+
+# undo
+
+
+def test_what_was_entered_dragged_and_moved_is_undone_and_redone_by_keys_and_by_buttons(shown):
+    mechanism = MODELS["000-P1"]
+    window = shown(mechanism)
+    (given,) = mechanism.inputs
+    undo, redo = (window.get_by_role("button", name=name, exact=True) for name in ("Undo", "Redo"))
+    assert undo.is_disabled()
+    assert redo.is_disabled()
+
+    def here():
+        settled(window)
+        return window.evaluate("[Array.from(page.linkage.d), page.input(0), Array.from(page.linkage.z)]")
+
+    stood = [here()]
+    length = window.get_by_label("BC: length, number, mm")
+    length.fill("70")
+    length.press("Enter")
+    stood.append(here())
+    angle = window.get_by_label(f"{given.pair} (deg)")
+    angle.fill("75")
+    angle.press("Enter")
+    stood.append(here())
+    slider = window.get_by_role("slider", name=given.pair, exact=True)
+    slider.focus()
+    window.keyboard.press("ArrowRight")
+    stood.append(here())
+    window.get_by_label("Assembly, of 2").select_option(index=0)
+    window.get_by_label("Assembly, of 2").select_option(index=1)
+    stood += [here()]
+    window.keyboard.press("Control+z")
+    stood.insert(-1, here())
+    angle.focus()  # a number that nobody types at is not the browser's to undo
+    for k in (3, 2):
+        window.keyboard.press("Control+z")
+        assert here() == stood[k]
+    assert float(angle.input_value()) == 75.0
+    undo.click()
+    assert here() == stood[1]
+    assert float(length.input_value()) == 70.0
+    window.keyboard.press("Control+z")
+    assert here() == stood[0]
+    assert float(length.input_value()) == 66.0
+    assert undo.is_disabled()
+    same(window, planar.solve(mechanism))
+    for k, key in ((1, "Control+y"), (2, "Control+Shift+Z"), (3, None), (4, "Control+y"), (5, "Control+y")):
+        if key:
+            window.keyboard.press(key)
+        else:
+            redo.click()
+        assert here() == stood[k]
+    assert redo.is_disabled()
+
+
+def test_a_number_that_is_being_typed_is_the_browsers_to_undo(shown):
+    window = shown(MODELS["000-P1"])
+    length = window.get_by_label("BC: length, number, mm")
+    length.fill("70")
+    length.press("Enter")
+    settled(window)
+    length.press("End")
+    length.press_sequentially("5")
+    length.press("Control+z")
+    settled(window)
+    assert window.evaluate("page.linkage.d.some((each) => Math.abs(each - 0.07) < 1e-15)")  # nothing of the mechanism
+    length.press("Enter")
+    settled(window)
+    length.press("Control+z")
+    settled(window)
+    assert window.evaluate("page.linkage.d.every((each, k) => each === page.data.dimensions[k].value)")
+
+
+def test_a_whole_drag_and_a_whole_play_are_one_step_each(shown):
+    window = shown(MODELS["crank-rocker"])
+    start = window.evaluate("page.input(0)")
+    window.get_by_role("button", name="Play").click()
+    window.wait_for_function("([start]) => Math.abs(page.input(0) - start) > 0.1", arg=[start])
+    window.get_by_role("button", name="Undo").click()  # it stops, and goes back
+    settled(window)
+    assert window.evaluate("[controls.playing, page.input(0)]") == [False, start]
+    assert window.get_by_role("button", name="Undo").is_disabled()
+
+
+# within another page
+
+
+def test_within_a_frame_that_lets_no_download_through_the_text_is_there_to_be_copied(chromium, tmp_path):
+    mechanism = MODELS["crank-rocker"]
+    context = chromium.new_context()
+    inner = escape(view(mechanism, tmp_path / "page.html").read_text(encoding="utf-8"))
+    outer = tmp_path / "outer.html"
+    outer.write_text(
+        f'<!doctype html><iframe sandbox="allow-scripts" width="1000" height="900" srcdoc="{inner}"></iframe>',
+        encoding="utf-8",
+    )
+    window = context.new_page()
+    window.goto(outer.as_uri())
+    frame = window.frame_locator("iframe")
+    frame.get_by_role("button", name="Save: Mechanism (JSON)").click()
+    said = frame.locator("#said").inner_text()
+    assert "offered for download" in said
+    assert "Saved" not in said
+    assert planar.loads(frame.locator("textarea").input_value()) == mechanism
+    assert frame.get_by_role("button", name="Copy").count() == 1
+    context.close()
+
+
+def outputs(chromium, *cells, scripts=True):
+    """A page with outputs as a notebook has them: a window, and what goes wrong in it."""
+    context = chromium.new_context(java_script_enabled=scripts)
+    window, wrong = context.new_page(), []
+    window.on("pageerror", lambda problem: wrong.append(str(problem)))
+    window.set_content("<!doctype html>" + "".join(f"<div class='output'>{each}</div>" for each in cells))
+    return window, wrong
+
+
+def cell(mechanism, library):
+    return notebook.output(mechanism.name, "", still(mechanism), page(mechanism, library=library))
+
+
+def test_outputs_of_one_notebook_share_the_scripts_of_one_in_any_order(chromium):
+    names = ("crank-rocker", "slider-crank", "whitworth")
+    cells = [cell(MODELS[name], library=k == 1) for k, name in enumerate(names)]
+    window, wrong = outputs(chromium, *cells)
+    for k in range(3):
+        window.frame_locator(f".output:nth-of-type({k + 1}) iframe").get_by_role("button", name="Play").wait_for()
+    # the one that carried them goes, and one that has none comes
+    window.evaluate(
+        """([html]) => {
+          document.querySelectorAll(".output")[1].remove();
+          document.querySelectorAll(".output")[0].innerHTML = html;
+        }""",
+        [cells[2]],
+    )
+    window.frame_locator(".output:nth-of-type(1) iframe").get_by_role("button", name="Play").wait_for()
+    assert wrong == []
+    window.context.close()
+
+
+def test_an_output_whose_scripts_are_gone_stays_a_picture_and_says_what_to_do(chromium):
+    mechanism = MODELS["crank-rocker"]
+    window, wrong = outputs(chromium, cell(mechanism, library=False))
+    frame = window.frame_locator("iframe")
+    frame.get_by_text("Run this cell again").wait_for()
+    assert frame.locator("#still svg polyline").count() > 3
+    window.evaluate(
+        "([html]) => { document.body.append(Object.assign(document.createElement('div'), { innerHTML: html })); }",
+        [cell(mechanism, library=True)],
+    )
+    frame.first.get_by_role("button", name="Play").first.wait_for()
+    assert wrong == []
+    window.context.close()
+
+
+def test_where_no_script_runs_a_still_picture_and_the_files_words_stand_there(chromium, tmp_path):
+    mechanism = MODELS["two-stroke-engine"]
+    window, _ = outputs(chromium, cell(mechanism, library=True), scripts=False)
+    alone = window.context.new_page()
+    alone.goto(view(mechanism, tmp_path / "page.html").as_uri())
+    for each in (window.frame_locator("iframe"), alone):
+        each.locator("#still svg").wait_for()
+        each.get_by_text(mechanism.about).wait_for()
+        each.get_by_text("it moves once its scripts run").wait_for()
+    window.context.close()
+
+
+def test_the_still_picture_goes_once_the_mechanism_is_drawn(shown):
+    window = shown(MODELS["crank-rocker"])
+    assert window.locator("#drawing .bars polyline").count() > 0
+    assert window.locator("#still").count() == 0
+
+
+def test_a_page_by_itself_says_that_a_file_is_offered(shown, tmp_path):
+    window = shown(MODELS["crank-rocker"])
+    downloaded(window, "Save: Mechanism (JSON)", tmp_path / "saved.json")
+    assert window.locator("#said").inner_text() == "Crank-rocker.json is offered for download."
+    assert window.locator("textarea").count() == 0
+
+
+# on paper
+
+
+def test_a_dark_page_is_printed_light_and_whole(shown, tmp_path):
+    window = shown(MODELS["two-stroke-engine"], scheme="dark")
+    window.wait_for_function("() => page.charts.charts.length > 0")
+    light = shown(MODELS["two-stroke-engine"])
+    light.wait_for_function("() => page.charts.charts.length > 0")
+    colours = "page.charts.charts.map((each) => [each.plot.series[1].stroke(), each.plot.axes[0].stroke()])"
+    assert window.evaluate(colours) != light.evaluate(colours)
+    paper = 660  # px: A4 and Letter less their margins
+    window.set_viewport_size({"width": paper, "height": 900})
+    window.emulate_media(media="print", color_scheme="dark")
+    window.evaluate("dispatchEvent(new Event('beforeprint'))")
+    settled(window)
+    style = (
+        "Object.fromEntries(['backgroundColor', 'color'].map((each) => [each, getComputedStyle(document.body)[each]]))"
+    )
+    assert window.evaluate(style) == light.evaluate(style)
+    assert window.evaluate(colours) == light.evaluate(colours)
+    assert window.evaluate("document.documentElement.scrollWidth") <= paper
+    outside = window.evaluate(
+        """() => {
+          const box = (each) => each.getBoundingClientRect(), whole = box(document.getElementById("drawing"));
+          const parts = document.querySelectorAll("#drawing .bars polyline, #drawing .letters text");
+          const out = (each) => each.left < whole.left || each.right > whole.right
+            || each.top < whole.top || each.bottom > whole.bottom;
+          return { count: parts.length, out: Array.from(parts).filter((each) => out(box(each))).length };
+        }"""
+    )
+    assert outside["count"] > 4
+    assert outside["out"] == 0
+    for seen in ("h1", "#numbers table", ".charts figure", "#notes"):
+        assert window.locator(seen).first.is_visible()
+    for unseen in ("#controls button", "#layers .choices", "#saving", "#numbers select"):
+        assert not window.locator(unseen).first.is_visible()
+    window.emulate_media(media="screen", color_scheme="dark")
+    window.evaluate("dispatchEvent(new Event('afterprint'))")
+    assert window.evaluate(colours) != light.evaluate(colours)

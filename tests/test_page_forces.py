@@ -35,7 +35,7 @@ console.log(JSON.stringify(forces.at(state, inputs, linkage.d, forces.wound(stat
 def on_page(mechanism: Mechanism, **moved: list[float]) -> dict[str, Any]:
     """What the page's scripts find, with its inputs moved to `u` or its dimensions changed to `d` (SI)."""
     data, functions = carried(mechanism)
-    scripts = asset("solver.js") + asset("forces.js")
+    scripts = asset("singular.js") + asset("solver.js") + asset("forces.js")
     ran = subprocess.run(
         ["node", "-e", f"{scripts}\n{functions}\n{SCRIPT}"],
         input=json.dumps([data, moved]),

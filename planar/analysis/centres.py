@@ -22,6 +22,7 @@ from planar.analysis.walks import Walks
 from planar.graph import numbered, parting
 from planar.mechanism import Mechanism, named_points
 from planar.motion import State, Unknown
+from planar.shown import Shown
 
 Array = np.ndarray
 WORST_IN_CROSSING = 1e-9
@@ -74,7 +75,7 @@ class Line(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Centres:
+class Centres(Shown):
     """All n(n-1)/2 centres of a position, by two link names in any order."""
 
     state: State
@@ -91,6 +92,9 @@ class Centres:
     @cached_property
     def _by_links(self) -> dict[Two, Centre]:
         return {frozenset(centre.links): centre for centre in self.all}
+
+    def __repr__(self) -> str:
+        return f"<{len(self)} instantaneous centres of {self.state!r}>"
 
     def __getitem__(self, links: tuple[str, str]) -> Centre:
         two = frozenset(links)

@@ -20,6 +20,7 @@ from planar.motion import State
 from planar.plane import Frame
 from planar.program import length, placed
 from planar.shapes import Shape
+from planar.shown import Shown
 from planar.solving import refusals
 from planar.solving.position import Solver, known_of, solve
 from planar.words import listed, many
@@ -69,7 +70,7 @@ class Group(NamedTuple):
     "for how many of the choices before it"
 
 
-class Modes(Sequence["Mode"]):
+class Modes(Shown, Sequence["Mode"]):
     """All assemblies in a fixed order, which does not depend on the sketch: group after group of links.
 
     The list is made as it is read. It has a length where that can be told by solving a few thousand groups, those that
@@ -85,6 +86,9 @@ class Modes(Sequence["Mode"]):
         self._paths = self._tree.paths()
         self._ended = False
         self._listed: list[Mode] = []
+
+    def __repr__(self) -> str:
+        return f"<Modes of {self.mechanism.name!r} {self._solver.at()}>"
 
     def __reduce__(self) -> tuple[Any, ...]:
         # compiled equations stay in their process: another one lists them again

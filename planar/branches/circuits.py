@@ -15,6 +15,7 @@ from planar.branches.search import Interval, Search, same
 from planar.branches.traced import Branch, Traced
 from planar.mechanism import Drive, Mechanism, running_input, with_inputs
 from planar.motion import Motion
+from planar.shown import Shown
 from planar.solving.cycle import cycle
 from planar.solving.position import known_of
 
@@ -72,7 +73,7 @@ class Circuit:
         return np.concatenate([[0, 0], passed])[: len(self.motion)] % len(self.branches) + 1
 
 
-class Circuits(Sequence[Circuit]):
+class Circuits(Shown, Sequence[Circuit]):
     """All circuits, in an order that does not depend on the sketch: by the lowest input, then by the assemblies there.
 
     `critical`: positions of the input (rad from 0 to 2 pi, or m) at which assemblies meet: dead points, and where
@@ -102,6 +103,9 @@ class Circuits(Sequence[Circuit]):
 
     def __len__(self) -> int:
         return len(self._found)
+
+    def __repr__(self) -> str:
+        return f"<{len(self)} circuits of {self.mechanism.name!r} over {self.pair}, {self.complete.value}>"
 
     @cached_property
     def assembles(self) -> tuple[tuple[float, float], ...]:

@@ -20,6 +20,7 @@ from planar.dynamics.unit_rates import alone, refuse_surplus, slides
 from planar.errors import BadInput, NoAnswer, Outcome
 from planar.mechanism import Mechanism
 from planar.motion import Motion, State
+from planar.shown import Shown
 from planar.words import listed
 
 Array = np.ndarray
@@ -41,7 +42,7 @@ class Proof(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Forces:
+class Forces(Shown):
     """The forces at a position, or over a motion (then every array has a first axis for its n positions).
 
     `inputs["O"]` is what that input supplies: a torque (N m) at a pair whose motion is an angle, a force (N) at one
@@ -58,6 +59,9 @@ class Forces:
     undetermined: Mapping[str, str]
     proof: Proof
     bodies: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        return f"<Forces in {self.moving!r}: {len(self.reactions)} pairs, {len(self.acting)} acting>"
 
     @property
     def mechanism(self) -> Mechanism:

@@ -109,9 +109,16 @@ def carried(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[str
             "F": len(e.rows),
         },
         "stages": [
-            {"z": [s.unknowns.start, s.unknowns.stop], "F": [s.rows.start, s.rows.stop], "links": list(s.links)}
+            {
+                "z": [s.unknowns.start, s.unknowns.stop],
+                "F": [s.rows.start, s.rows.stop],
+                "links": list(s.links),
+                "beside": sorted({link for pair in s.pairs for link in solver.pairs[pair].links}),
+            }
             for s in e.stages
         ],
+        "row_lengths": [row.kind is Kind.LENGTH for row in e.rows],
+        "owners": [e.coordinates[column].owner for column in e.unknowns],
         "inputs": [_input(given, solver.slides(given.pair)) for given in mechanism.inputs],
         "dimensions": [_dimension(mechanism, each, solver.unit) for each in numbers.dimensions],
         "numbers": numbered(mechanism),

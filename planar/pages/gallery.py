@@ -15,12 +15,13 @@ from planar.files import asset, save
 from planar.mechanism import Mechanism
 from planar.motion import Motion
 from planar.pages.carried import drawn
+from planar.pages.kinds import KINDS, described
 from planar.pages.page import filled, page, told
 from planar.solving.cycle import cycle
 from planar.solving.position import known_of
 
 SCRIPTS = ("bodies.js", "symbols.js", "ground.js", "letters.js", "drawing.js", "gallery.js")
-STYLES = ("page.css", "stage.css", "gallery.css")
+STYLES = ("page.css", "stage.css", "gallery.css", "print.css")
 """The drawing as pages have it, and what moves many of them."""
 
 STEPS = 36
@@ -44,7 +45,7 @@ def gallery(
     taken, shown, refused = {"index"}, [], []
     for done, (name, mechanism) in enumerate(models, start=1):
         try:
-            text, moving = page(mechanism), small(mechanism)
+            text, moving = page(mechanism, back="index.html"), small(mechanism)
         except NoAnswer as problem:
             refused.append((name, problem))
             continue
@@ -53,17 +54,42 @@ def gallery(
                 progress(done, len(models))
         file = _new(name, taken)
         save(folder / f"{file}.html", text)
-        shown.append(moving | {"name": mechanism.name, "about": mechanism.about or "", "href": quote(f"{file}.html")})
+        under, words = described(mechanism, name)
+        titles = {"name": mechanism.name, "about": mechanism.about or "", "href": quote(f"{file}.html")}
+        shown.append(moving | titles | {"kind": under, "words": words})
     save(folder / "index.html", index(shown))
     return folder / "index.html", refused
 
 
 def index(shown: list[dict[str, Any]]) -> str:
-    """The page of small pictures."""
+    """The page of small pictures, kind after kind."""
+    shown = sorted(shown, key=lambda each: KINDS.index(each["kind"]))
+    kinds = [(kind, [each for each in shown if each["kind"] == kind]) for kind in KINDS]
+    kinds = [(kind, own) for kind, own in kinds if own]
+    links = "".join(f'<a href="#kind-{KINDS.index(kind)}">{escape(kind)}</a> ' for kind, _ in kinds)
     title = escape(f"{len(shown)} mechanisms" if len(shown) != 1 else "1 mechanism")
     scripts = "\n".join(asset(name) for name in SCRIPTS)
     styles = "\n".join(asset(name) for name in STYLES).replace("#drawing", ".small")  # a page has one drawing
-    return filled(asset("gallery.html"), {"title": title, "styles": styles, "data": told(shown), "scripts": scripts})
+    parts = {
+        "title": title,
+        "styles": styles,
+        "kinds": links if len(kinds) > 1 else "",
+        "list": "\n".join(_listed(kind, own) for kind, own in kinds),
+        "data": told(shown),
+        "scripts": scripts,
+    }
+    return filled(asset("gallery.html"), parts)
+
+
+def _listed(kind: str, shown: Sequence[dict[str, Any]]) -> str:
+    """The mechanisms of a kind, which stand there also without scripts."""
+    items = [
+        f'<li><a href="{escape(each["href"])}"><strong>{escape(each["name"])}</strong>'
+        f"<span>{escape(each['about'])}</span></a></li>"
+        for each in shown
+    ]
+    number = KINDS.index(kind)
+    return f'<section id="kind-{number}"><h2>{escape(kind)}</h2><ul>{"".join(items)}</ul></section>'
 
 
 def small(mechanism: Mechanism) -> dict[str, Any]:

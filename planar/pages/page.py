@@ -11,6 +11,8 @@ import numpy as np
 from planar.files import asset
 from planar.mechanism import Mechanism
 from planar.pages.carried import carried
+from planar.pages.notebook import packed
+from planar.pages.still import still
 
 
 class Window(NamedTuple):
@@ -22,14 +24,17 @@ class Window(NamedTuple):
 
 
 STYLES = (
+    "still.css",
     "uplot/uPlot.min.css",
     "page.css",
     "stage.css",
     "layers.css",
     "dimensions.css",
+    "print.css",
 )
 SCRIPTS = (
     "uplot/uPlot.iife.min.js",
+    "singular.js",
     "solver.js",
     "page.js",
     "course.js",
@@ -54,26 +59,62 @@ SCRIPTS = (
     "layers.js",
     "dimensions.js",
     "assemblies.js",
+    "undo.js",
     "saving.js",
 )
 
 
-def page(mechanism: Mechanism, z: np.ndarray | None = None, window: Window | None = None) -> str:
+def page(
+    mechanism: Mechanism,
+    z: np.ndarray | None = None,
+    window: Window | None = None,
+    *,
+    back: str | None = None,
+    layers: tuple[str, ...] = ("paths",),
+    library: bool | None = None,
+) -> str:
     """The page of a mechanism at its inputs.
 
     `z` are the unknowns of the assembly, left out that nearest to the sketch; `window` is the range that is run
-    through, left out a turn or from limit to limit. Raises NoAnswer where it has no position to start from.
+    through, left out a turn or from limit to limit. `back` is the address of an index that it links to, `layers` are
+    shown at first. `library` is of notebooks: the page carries the scripts for others beside it (True), or takes them
+    from one of those (False). Raises NoAnswer where it has no position to start from.
     """
     data, functions = carried(mechanism, z)
-    data["window"] = window and window._asdict()
-    scripts = "\n".join([*(asset(name) for name in SCRIPTS), functions, START])
+    data["window"], data["layers"] = window and window._asdict(), layers
+    styles, scripts = ("\n".join(asset(name) for name in names) for names in (STYLES, SCRIPTS))
+    start = f"{functions}\n{START}"
+    if library is not None:
+        key, carrying = packed(styles, scripts)
+        carrying = json.dumps(carrying) if library else "null"
+        styles = asset("still.css")
+        scripts, start = asset("shared.js"), f"shareScripts({json.dumps(key)}, {carrying}, () => {{\n{start}\n}});"
     parts = {
         "title": escape(mechanism.name),
-        "styles": "\n".join(asset(name) for name in STYLES),
+        "back": f'<a class="back" href="{escape(back)}">All mechanisms</a>' if back else "",
+        "about": _about(mechanism),
+        "still": still(mechanism, z),
+        "notes": _notes(mechanism),
+        "styles": styles,
         "data": told(data),
-        "scripts": scripts,
+        "scripts": f"{scripts}\n{start}",
     }
     return filled(asset("page.html"), parts)
+
+
+def _about(mechanism: Mechanism) -> str:
+    """What the file says that the mechanism is, and where it is from."""
+    about = f"<p>{escape(mechanism.about)}</p>" if mechanism.about else ""
+    source = f'<p class="source">Source: {escape(mechanism.source)}</p>' if mechanism.source else ""
+    return about + source
+
+
+def _notes(mechanism: Mechanism) -> str:
+    """The notes of the file."""
+    if not mechanism.notes:
+        return ""
+    each = "".join(f"<li>{escape(note)}</li>" for note in mechanism.notes)
+    return f'<section id="notes"><h2>Notes</h2><ul>{each}</ul></section>\n'
 
 
 START = r"""
@@ -83,8 +124,10 @@ const controls = new Controls(page, document.getElementById("controls"), svg, dr
 new Courses(page);
 new Dimensions(page, document.getElementById("dimensions"));
 new Assemblies(page, document.getElementById("assemblies"));
+new UndoHistory(page, controls.bar, () => controls.pause());
 new Saving(page, document.getElementById("saving"), document.getElementById("drawing"));
 startLayers(page);
+document.getElementById("still").remove(); // what moves stands in its place
 """
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from html import escape
 from pathlib import Path
 from tempfile import mkdtemp
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,12 +13,16 @@ from planar.errors import BadInput, NoAnswer
 from planar.files import save
 from planar.mechanism import Drive, Mechanism, with_inputs
 from planar.motion import Motion, State
+from planar.pages.notebook import carries, output
 from planar.pages.page import Window, page
+from planar.pages.still import still
 from planar.plane import frame_at
+from planar.shown import Shown
 from planar.solving.position import known_of
+from planar.views.html import html
 
-HEIGHT = 720
-"""Pixels of a page in a notebook."""
+LISTED = 12
+"""Assemblies of the table that a notebook shows."""
 
 
 def view(shown: Mechanism | State | Motion, path: str | Path | None = None) -> Path:
@@ -41,19 +45,31 @@ def view(shown: Mechanism | State | Motion, path: str | Path | None = None) -> P
     return made
 
 
+class Subject(NamedTuple):
+    """What a page is of: a mechanism at its inputs, the unknowns of an assembly, and a range."""
+
+    mechanism: Mechanism
+    z: np.ndarray | None = None
+    window: Window | None = None
+
+
 def page_of(shown: Mechanism | State | Motion) -> str:
     """The text of the page of a mechanism, a position or a motion."""
+    return page(*_subject(shown))
+
+
+def _subject(shown: Mechanism | State | Motion) -> Subject:
     if isinstance(shown, Mechanism):
-        return page(shown)
+        return Subject(shown)
     if isinstance(shown, State):
-        return page(shown.mechanism, _unknowns(shown, shown.mechanism))
+        return Subject(shown.mechanism, _unknowns(shown, shown.mechanism))
     ends = {name: given.position for name, given in shown.inputs.items()}
     # of inputs that run in time together the one that goes farthest runs on the page
     pair = max(ends, key=lambda name: float(np.ptp(ends[name])))
     window = Window(list(ends).index(pair), float(ends[pair].min()), float(ends[pair].max()))
     row = _start(shown, pair)
     there = with_inputs(shown.mechanism, tuple(Drive(name, float(at[row])) for name, at in ends.items()))
-    return page(there, _unknowns(shown, there, row), window if window.low < window.high else None)
+    return Subject(there, _unknowns(shown, there, row), window if window.low < window.high else None)
 
 
 def _start(motion: Motion, pair: str) -> int:
@@ -66,17 +82,40 @@ def _start(motion: Motion, pair: str) -> int:
     return int(np.argmin(np.abs(motion.inputs[pair].position - filed) + np.where(lost & ~lost.all(), np.inf, 0.0)))
 
 
-def framed(shown: Mechanism | State | Motion) -> str | None:
-    """The page inside an element that notebooks show; None where there is no position, so that they show the text."""
+def framed(shown: Shown) -> str | None:
+    """What a notebook shows of a mechanism or a result: tables of a result, a still picture, the page over it.
+
+    None where there is nothing of these, so that the text is shown.
+    """
+    moving, layers, table = _presented(shown)
     try:
-        text = page_of(shown)
+        subject = _subject(moving)
+        picture = still(subject.mechanism, subject.z)
+        text = page(*subject, layers=layers, library=carries())
     except (BadInput, NoAnswer):
-        return None
-    name = shown.name if isinstance(shown, Mechanism) else shown.mechanism.name
-    return (
-        f'<iframe title="{escape(name)}" srcdoc="{escape(text)}" '
-        f'style="width:100%;height:{HEIGHT}px;border:0"></iframe>'
-    )
+        return table or None
+    return output(subject.mechanism.name, table, picture, text)
+
+
+def _presented(shown: Any) -> tuple[Mechanism | State | Motion, tuple[str, ...], str]:
+    """Of what the page is, its layers, and the tables above it."""
+    from planar.analysis.centres import Centres
+    from planar.assemblies.modes import Modes, modes
+    from planar.branches.circuits import Circuits
+    from planar.dynamics.forces import Forces
+    from planar.views import centres, circuits, forces, forces_over
+    from planar.views import modes as assemblies
+
+    if isinstance(shown, Forces):
+        over = isinstance(shown.moving, Motion)
+        return shown.moving, ("paths", "forces"), html(forces_over.tables(shown) if over else forces.tables(shown, {}))
+    if isinstance(shown, Centres):
+        return shown.state, ("centres",), html(centres.table(shown))
+    if isinstance(shown, Modes):
+        return shown.mechanism, ("paths",), html(assemblies.table(shown, LISTED))
+    if isinstance(shown, Circuits):
+        return shown.mechanism, ("paths",), html(circuits.table(shown, modes(shown.mechanism, certify=False)))
+    return shown, ("paths",), ""
 
 
 def _unknowns(shown: State | Motion, mechanism: Mechanism, row: int = 0) -> np.ndarray:

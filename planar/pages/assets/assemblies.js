@@ -9,7 +9,6 @@ class Assemblies {
     const { list, more } = page.data.assemblies;
     if (list.length < 2) { section.remove(); return; }
     this.count = `${list.length}${more ? " and more" : ""}`;
-    this.current = null;
     this.select = Forms.element("select", { id: "assembly" });
     this.unlisted = Forms.element("option", { value: "" }, "none of those listed");
     list.forEach((each, k) => this.select.append(Forms.element("option", { value: k }, this.told(each, k))));
@@ -37,7 +36,7 @@ class Assemblies {
 
   take(k) {
     const { page } = this, { data } = page, moved = !this.asFiled();
-    this.current = k;
+    this.page.assembly = k;
     page.take(data.assemblies.list[k].z);
     const where = data.inputs.length ? Forms.inputs(page) : "the file's dimensions";
     page.say(`Assembly ${k + 1} of ${this.count}${moved ? `, back at ${where} with the file's dimensions` : ""}.`);
@@ -50,11 +49,11 @@ class Assemblies {
       const gap = (a, b, i) => Math.abs(data.unknown_angles[i] ? 2 * Math.sin((a - b) / 2) : a - b);
       const apart = data.assemblies.list.map(({ z }) => z.reduce((most, each, i) => Math.max(most, gap(each, linkage.z[i], i)), 0));
       const found = apart.findIndex((each) => each === Math.min(...apart));
-      this.current = apart[found] < Assemblies.NEAR ? found : null;
+      this.page.assembly = apart[found] < Assemblies.NEAR ? found : null;
     }
-    if (this.current === null) this.select.append(this.unlisted);
+    if (this.page.assembly === null) this.select.append(this.unlisted);
     else this.unlisted.remove();
-    this.select.value = this.current ?? "";
+    this.select.value = this.page.assembly ?? "";
     if (this.filed === filed) return;
     this.filed = filed;
     this.now.textContent = filed

@@ -105,7 +105,7 @@ const centres = {
   draw(ink, layers) {
     const { page } = layers, state = this.state, all = centresOf(page, standardFrames(page));
     Object.assign(state, { all, places: [] });
-    if (all === null) return "centres are not determined at a dead or change point";
+    if (all === null) return `no centres: ${page.undetermined || "the motions are not determined"}`;
     const shown = all.filter(({ links }) => state.which.value === "all" || links.includes(state.which.value));
     offer(state.pick, [["", "none"], ...shown.filter(({ at }) => at !== null).map(({ name }) => [name, `I${name}`])]);
     const picked = all.find(({ name, at }) => name === state.pick.value && at !== null) ?? null;

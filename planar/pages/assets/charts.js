@@ -5,6 +5,7 @@
 const SERIES = 6;        // colours of lines
 const DEGREES = [1, 2, 5, 10, 15, 30, 45, 60, 90, 180, 360, 720]; // between numbers of an axis
 const HEIGHT = 240;      // px
+const PAPER = 660;       // px: the width of a diagram that fits any paper
 
 /** Quantities over the course of points, links and inputs: {key, label, unit, kind, of(columns)}. */
 const DIAGRAMS = [
@@ -23,18 +24,11 @@ const DIAGRAMS = [
   { key: "push", label: "input force", unit: "N", kind: "input", of: (c, i) => c.effort[i] },
 ];
 
-/** By which rate of the points the rows are told that a diagram is to fit; positions fit all of them. */
-const CALM_BY = {
-  length: null, angle: null, "velocity": RATES.velocity.parts, "angular velocity": RATES.velocity.parts,
-  "acceleration": RATES.acceleration.parts, "angular acceleration": RATES.acceleration.parts,
-  "N·m": RATES.acceleration.parts, N: RATES.acceleration.parts,
-};
-
 class Charts {
   constructor(page) {
     this.page = page;
     const section = document.getElementById("numbers"), told = memory.read("diagrams");
-    this.on = new Set(told === null ? ["v", "w", "torque", "push"] : told.split(","));
+    this.on = new Set(told === null ? ["v", "w", "e", "torque", "push"] : told.split(","));
     // of inputs there are those whose efforts are such, where anything acts
     this.diagrams = DIAGRAMS.filter((each) => each.kind !== "input" || this.names(each).length);
     this.charts = [];
@@ -58,6 +52,9 @@ class Charts {
     page.on("move", () => this.mark());
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.build());
     new ResizeObserver(() => this.fit()).observe(this.place);
+    for (const [event, printed] of [["beforeprint", true], ["afterprint", false]]) {
+      addEventListener(event, () => { document.documentElement.classList.toggle("printed", this.printed = printed); this.build(); });
+    }
     this.build();
   }
 
@@ -104,7 +101,9 @@ class Charts {
       const columns = this.columns(kind, name, course);
       return Array.from(course.inputs, (_, i) => { const value = of(columns, i) * by; return Number.isFinite(value) ? value : null; });
     });
-    const limits = rangeOf(lines, course, CALM_BY[unit], unit === "length" ? page.data.size * by : 0);
+    const least = unit === "length" ? page.data.size * by : 0, now = (name) => by * of(this.columns(kind, name, null), 0);
+    const made = { by: byInput, tell: () => undefined, now: () => names.map(now), range: (here) => rangeOf([...lines, here], least) };
+    made.limits = made.range(made.now());
     const style = getComputedStyle(document.documentElement), colour = (name) => style.getPropertyValue(name).trim();
     const [from, to] = [course.inputs[0], course.inputs[course.count - 1]].map((each) => inputTold(page, each, k));
     const figure = htmlPart("figure", { "aria-label": `${label} of ${names.join(", ")} over ${pair}, from ${from} to ${to}` }, place);
@@ -112,9 +111,9 @@ class Charts {
     const line = { stroke: colour("--line"), width: 1 };
     const values = (_, splits) => splits.map((each) => (each === null ? "" : short(each)));
     const axis = { font, labelFont: `600 ${font}`, labelSize: 24 * em, stroke: colour("--ink"), grid: line, ticks: line, values };
-    const made = { tell: () => undefined }, plot = new uPlot({
-      width: Math.max(280, place.clientWidth), height: HEIGHT,
-      scales: { x: { time: false, range: [xs[0], xs[xs.length - 1]] }, y: { range: limits } },
+    const plot = new uPlot({
+      width: this.width(), height: HEIGHT,
+      scales: { x: { time: false, range: [xs[0], xs[xs.length - 1]] }, y: { range: () => made.limits } },
       axes: [
         { ...axis, size: 34 * em, label: `${pair}, ${inputUnit}`, incrs: inputUnit === "deg" ? DEGREES : undefined },
         { ...axis, size: 64 * em, label: `${label}, ${unitName}` },
@@ -133,7 +132,6 @@ class Charts {
       each.append(`${name} `);
       return htmlPart("span", {}, each);
     });
-    const now = (name) => by * of(this.columns(kind, name, null), 0);
     Object.assign(made, { tell: (idx) => {
       where.textContent = `${pair} = ${idx === null ? inputTold(page, page.input(), k) : `${short(xs[idx])} ${inputUnit}`}:`;
       told.forEach((each, i) => { each.textContent = `${short(idx === null ? now(names[i]) : lines[i][idx] ?? NaN)} ${unitName}`; });
@@ -141,7 +139,7 @@ class Charts {
     plot.root.setAttribute("aria-hidden", "true"); // the table above says its numbers
     const marker = htmlPart("div", { class: "marker" }, plot.over);
     plot.over.addEventListener("click", () => { if (plot.cursor.left >= 0) this.goTo(plot.posToVal(plot.cursor.left, "x") / byInput); });
-    return Object.assign(made, { plot, marker, by: byInput });
+    return Object.assign(made, { plot, marker });
   }
 
   /** Take the mechanism to a place of the range, the short way round where it turns. */
@@ -151,9 +149,12 @@ class Charts {
     page.moveTo(position + shift);
   }
 
+  /** Of a diagram, px. */
+  width() { return this.printed ? PAPER : Math.max(280, Math.floor(this.place.clientWidth)); }
+
   fit() {
-    const width = Math.floor(this.place.clientWidth);
-    for (const { plot } of this.charts) if (width > 0 && plot.width !== width) plot.setSize({ width, height: HEIGHT });
+    const width = this.width();
+    for (const { plot } of this.charts) if (this.place.clientWidth && plot.width !== width) plot.setSize({ width, height: HEIGHT });
     this.mark();
   }
 
@@ -163,6 +164,12 @@ class Charts {
     if (course === null) return;
     const at = course.within(page.input());
     for (const each of this.charts) {
+      // beside a dead point, between two rows of the course, a rate may be greater than all of them
+      const limits = each.range(each.now());
+      if (limits.some((end, k) => end !== each.limits[k])) {
+        each.limits = limits;
+        each.plot.setScale("y", { min: limits[0], max: limits[1] });
+      }
       each.marker.style.transform = `translateX(${each.plot.valToPos(at * each.by, "x")}px)`;
       this.tell(each);
     }
@@ -181,11 +188,10 @@ function turnsOf(page, course, name) {
   return angle[0] - wrapped(angle[0], page.data.counting.includes(name));
 }
 
-/** The range of an axis: what the lines need away from dead points, where rates outgrow every scale. */
-function rangeOf(lines, course, parts, least) {
+/** The range of an axis that holds all lines: the whole course, and the values of now. */
+function rangeOf(lines, least) {
   let low = Infinity, high = -Infinity;
-  const calm = parts === null ? [] : course.calm(parts), rows = calm.length ? calm : course.inputs.keys();
-  for (const i of rows) for (const line of lines) if (line[i] !== null) [low, high] = [Math.min(low, line[i]), Math.max(high, line[i])];
+  for (const line of lines) for (const each of line) if (Number.isFinite(each)) [low, high] = [Math.min(low, each), Math.max(high, each)];
   if (!(high >= low)) return [0, 1];
   // what stands still but for rounding is a straight line in the middle
   const room = Math.max(0.06 * (high - low), 1e-9 * least, 1e-9 * Math.max(Math.abs(low), Math.abs(high)), 1e-12);

@@ -11,6 +11,7 @@ class Controls {
     this.playing = false;
     this.sense = 1;
     this.speed = 1;
+    this.typed = null; // the number that is being typed
     this.known = new Map(); // the range of each input as last found
     this.make(section);
     dragging.taken = () => this.pause();
@@ -24,17 +25,17 @@ class Controls {
 
   make(section) {
     const { inputs } = this.page.data;
+    this.bar = control("div", { class: "buttons" });
+    section.append(this.bar);
     if (!inputs.length) return;
-    const bar = control("div", { class: "buttons" });
+    const { bar } = this;
     this.button = control("button", { type: "button", class: "main" }, "Play");
     this.button.addEventListener("click", () => (this.playing ? this.pause() : this.play()));
     this.turn = control("button", { type: "button" });
     this.turn.addEventListener("click", () => this.reverse());
-    const home = control("button", { type: "button", title: "Home" }, "Start");
-    home.setAttribute("aria-label", "To the position in the file");
+    const home = control("button", { type: "button", title: "To the position in the file (Home)" }, "Start");
     home.addEventListener("click", () => this.home());
     bar.append(this.button, this.turn, home, this.speeds());
-    section.append(bar);
     this.rows = inputs.map((given, k) => this.row(given, k, inputs.length > 1));
     section.append(...this.rows.map((row) => row.row));
     section.append(control("p", { class: "hint", id: "keys" }, "Take hold of any link and move it. Arrow keys step, space plays, Home goes back to the start."));
@@ -71,11 +72,15 @@ class Controls {
     name.append(document.createTextNode(given.pair));
     slider.addEventListener("input", () => this.to(this.near(k, slider.valueAsNumber * unit.si), k));
     slider.addEventListener("keydown", (event) => this.key(event, k));
+    number.addEventListener("input", () => { this.typed = number; });
+    number.addEventListener("keydown", ({ key }) => { if (key === "Enter") this.typed = null; });
+    number.addEventListener("blur", () => { this.typed = null; this.show(); });
     number.addEventListener("change", () => {
+      this.typed = null;
       const value = Number(number.value.trim().replace(",", "."));
       if (number.value.trim() && Number.isFinite(value)) this.to(value * unit.si, k);
       else this.page.say(`${given.pair}: a number in ${unit.name} is wanted.`);
-      this.show(true);
+      this.show();
     });
     ends.append(low, high);
     const line = control("div", { class: "line" });
@@ -143,7 +148,7 @@ class Controls {
   }
 
   /** Show where the inputs are; a number that is being typed only where that is done. */
-  show(always = false) {
+  show() {
     if (this.ran !== this.page.running) { // whoever has chosen it
       this.ran = this.page.running;
       this.sense = this.page.data.inputs[this.ran]?.velocity < 0 ? -1 : 1; // as the file has it
@@ -154,7 +159,7 @@ class Controls {
       slider.value = (whole ? position - turn * Math.floor((position - low) / turn) : position) / si;
       // read aloud where it stops, not sixty times a second
       if (!this.playing) slider.setAttribute("aria-valuetext", `${this.page.data.inputs[k].pair} ${amount(this.page, k)}`);
-      if (always || document.activeElement !== number) number.value = readable(position / si);
+      if (this.typed !== number) number.value = readable(position / si);
       if (chosen) chosen.checked = k === this.page.running;
     });
   }

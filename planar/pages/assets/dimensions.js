@@ -49,7 +49,7 @@ class Dimensions {
     this.all = Forms.element("button", { type: "button" }, "Reset all dimensions");
     this.all.addEventListener("click", () => this.reset());
     section.append(Forms.element("h2", {}, "Dimensions"), ...this.groups(), this.all);
-    page.on("size", () => this.show());
+    page.on("size", () => { this.quiet(); this.show(); });
     this.show();
   }
 

@@ -59,32 +59,31 @@ class Small extends Drawing {
   inside() { return true; }
 }
 
-const shownModels = JSON.parse(document.getElementById("data").textContent).map((data) => {
-  const item = document.createElement("li"), link = document.createElement("a");
-  const title = document.createElement("strong"), about = document.createElement("span");
-  const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
-  title.textContent = data.name;
-  about.textContent = data.about;
+const items = document.querySelectorAll("#gallery li");
+const shownModels = JSON.parse(document.getElementById("data").textContent).map((data, k) => {
+  const item = items[k], svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
   svg.setAttribute("class", "small");
   svg.setAttribute("aria-hidden", "true"); // its name stands below it
-  link.href = data.href;
-  link.append(svg, title, about);
-  item.append(link);
-  document.getElementById("gallery").append(item);
+  item.firstElementChild.prepend(svg);
   return { data, item, svg, seen: false, recording: null, drawing: null };
 });
+
+function draw(model) {
+  if (model.drawing) return;
+  model.recording = new Recording(model.data);
+  model.drawing = new Small(model.recording, model.svg);
+}
 
 const watcher = new IntersectionObserver((entries) => {
   for (const { target, isIntersecting } of entries) {
     const model = shownModels.find((each) => each.svg === target);
     model.seen = isIntersecting;
-    if (isIntersecting && !model.drawing) {
-      model.recording = new Recording(model.data);
-      model.drawing = new Small(model.recording, model.svg);
-    }
+    if (isIntersecting) draw(model);
   }
 }, { rootMargin: "100px" });
 for (const { svg } of shownModels) watcher.observe(svg);
+
+addEventListener("beforeprint", () => { for (const model of shownModels) draw(model); }); // also those not seen yet
 
 const run = document.getElementById("run"), find = document.getElementById("find"), none = document.getElementById("none");
 let running = !matchMedia("(prefers-reduced-motion: reduce)").matches, time = 0, last = null;
@@ -107,14 +106,38 @@ run.addEventListener("click", () => {
   told();
   if (running) requestAnimationFrame(frame);
 });
-find.addEventListener("input", () => {
-  const words = find.value.toLowerCase().split(/\s+/);
+
+/** What is looked for, as the texts are: see planar.pages.kinds. */
+const COUNTED = ["zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve"];
+function plain(text) {
+  const letters = text.toLowerCase().normalize("NFKD").replace(/\p{M}/gu, "").replace(/['’]/g, "");
+  const words = letters.replace(/[^\p{L}\p{N}]+/gu, " ").trim();
+  const apart = (told) => told.replace(new RegExp(`\\b(${COUNTED.join("|")})(bar|link)`, "g"), "$1 $2");
+  return apart(apart(words).replace(/\b(\d{1,2})(?= ?(?:bar|link))/g, (number) => COUNTED[number] ?? number));
+}
+
+/** Every word that is looked for begins a word of the text; an s at its end may be left out there. */
+function found(words, text) {
+  return words.every((word) => [word, word.replace(/(..)s$/, "$1")].some((each) => ` ${text}`.includes(` ${each}`)));
+}
+
+function search() {
+  const words = plain(find.value).split(" ").filter(Boolean);
   let left = 0;
   for (const { data, item } of shownModels) {
-    item.hidden = !words.every((word) => `${data.name} ${data.about}`.toLowerCase().includes(word));
+    item.hidden = !found(words, data.words);
     left += !item.hidden;
   }
-  none.textContent = left ? "" : "No mechanism of that name.";
-});
+  for (const section of document.querySelectorAll("#gallery section")) section.hidden = !section.querySelector("li:not([hidden])");
+  none.textContent = left ? "" : "No mechanism is found by these words.";
+  // so that the way back from a page leads to what was looked for
+  try { history.replaceState(null, "", find.value ? `#find=${encodeURIComponent(find.value)}` : "#"); } catch { /* no address */ }
+}
+find.addEventListener("input", search);
+const asked = /^#find=(.*)$/.exec(location.hash);
+if (asked) {
+  try { find.value = decodeURIComponent(asked[1]); } catch { /* no text */ }
+  search();
+}
 told();
 if (running) requestAnimationFrame(frame);

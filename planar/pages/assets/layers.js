@@ -65,7 +65,7 @@ class Layers {
     this.section = document.getElementById("layers");
     this.all = layers;
     const told = memory.read("layers");
-    this.on = new Set(told === null ? ["paths"] : told.split(",").filter((key) => layers.some((each) => each.key === key)));
+    this.on = new Set(told === null ? page.data.layers : told.split(",").filter((key) => layers.some((each) => each.key === key)));
     this.kept = new Map();  // what was drawn by layers that stay as they are
     this.stood = new Map(); // where letters stood, by layer
     this.group = svgPart("g", { class: "layers" });
@@ -204,5 +204,5 @@ function startLayers(page) {
   page.layers = new Layers(page, [paths, ...rates.map(arrows), ...acting, ...rates.map(polygon), centres, centrodes]);
   new Numbers(page);
   if (page.forces !== null) new ForceTables(page);
-  new Charts(page);
+  page.charts = new Charts(page);
 }

@@ -45,7 +45,7 @@ function arrows(rate) {
       const { page } = layers, names = page.chosen.points();
       const now = names.map((name) => page.point(name));
       if (!names.length) return `${Word}: choose points to see it`;
-      if (now[0][rate] === null) return `${Word}: not determined at a dead or change point`;
+      if (now[0][rate] === null) return `${Word}: ${page.undetermined}`;
       const usual = greatest(page, names, parts), most = Math.max(...now.map((point) => Math.hypot(...point[rate])));
       if (!(usual > 0)) return `${Word}: none of these points has one at the inputs' rates`;
       const { px, told } = roundScale(most > BEYOND * usual ? most : usual, LONGEST_ARROW, unitOf(page, unit));

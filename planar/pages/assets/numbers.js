@@ -46,6 +46,13 @@ function inputTold(page, value, k) {
   return `${short(value * by)} ${name}`;
 }
 
+/** The rates of an input at which the numbers are: ", ω = 10.5 rad/s, α = −26 rad/s²"; nothing where it rests. */
+function ratesTold(page, k) {
+  const { slides, velocity, acceleration } = page.data.inputs[k], [letters, unit] = slides ? ["va", "m/s"] : ["ωα", "rad/s"];
+  if (!velocity && !acceleration) return "";
+  return `, ${letters[0]} = ${short(velocity)} ${unit}, ${letters[1]} = ${short(acceleration)} ${unit}²`;
+}
+
 function lengthTold(page, value) {
   const [by, name] = unitOf(page, "length");
   return `${Number((value * by).toPrecision(3))} ${name}`;
@@ -64,6 +71,7 @@ class Numbers {
     const section = document.getElementById("numbers");
     const box = htmlPart("div", { class: "choosing" }, section);
     this.choosing(box);
+    this.why = htmlPart("p", { class: "why", hidden: "" }, section);
     this.place = htmlPart("div", { class: "tables" }, section);
     this.tables();
     page.on("chosen", () => { this.tables(); this.listed(); });
@@ -130,8 +138,10 @@ class Numbers {
   /** The numbers of now. */
   fill() {
     const { page } = this, { data } = page, rows = this.cells.map(({ kind, name }) => valuesOf(page, kind, name));
-    const greatest = greatestNumbers(page);
-    const at = data.inputs.map((each, k) => `${each.pair} = ${inputTold(page, page.input(k), k)}`).join(", ");
+    const greatest = greatestNumbers(page), why = page.undetermined;
+    this.why.textContent = why && `${why[0].toUpperCase()}${why.slice(1)}.`;
+    this.why.hidden = why === "";
+    const at = data.inputs.map((each, k) => `${each.pair} = ${inputTold(page, page.input(k), k)}${ratesTold(page, k)}`).join(", ");
     for (const [caption, title] of this.captions) caption.textContent = at ? `${title} at ${at}` : title;
     this.cells.forEach(({ kind, cells }, r) => cells.forEach((cell, c) => {
       const value = rows[r][c], [, unit] = QUANTITIES_OF[kind][c], [by] = unitOf(page, unit);

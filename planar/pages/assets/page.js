@@ -10,6 +10,7 @@ class Page {
     this.linkage = new Linkage(data, program);
     this.listeners = { move: [], size: [], said: [], course: [], chosen: [], shown: [], view: [] };
     this.running = 0; // which input is moved
+    this.assembly = null; // the number of the assembly that it was moved from, if it is one of those listed
     this.update();
   }
 
@@ -22,6 +23,13 @@ class Page {
     const rates = this.inputRates();
     this.state = this.linkage.state(rates.map((each) => each[0]), rates.map((each) => each[1]));
     this.frames = this.framesOf(this.state);
+  }
+
+  /** Why there is no velocity and no acceleration here, as a sentence; "" where there are. */
+  get undetermined() {
+    const many = this.data.inputs.length > 1 ? "inputs" : "input";
+    const told = { "dead point": `dead point of the ${many}: no velocity`, "change point": "change point: no velocity is determined" };
+    return told[this.state.why] ?? "";
   }
 
   /** Velocity and acceleration of every input, SI. */
@@ -72,6 +80,26 @@ class Page {
     linkage.measure();
     linkage.u = data.inputs.map((each, k) => each.position / linkage.scale[k]);
     linkage.z = Float64Array.from(z);
+    this.update();
+    this.emit("size", { reached: 1, open: 0 });
+    this.emit("move");
+  }
+
+  /** Where the mechanism is, to come back to. */
+  snapshot() {
+    const { linkage: { d, u, z, last, stop }, running, assembly } = this;
+    return { d: Array.from(d), u: Array.from(u), z: Float64Array.from(z), last, stop, of: z, running, assembly };
+  }
+
+  /** Take the mechanism back to a snapshot. */
+  restore({ d, u, z, last, stop, of, running, assembly }) {
+    const { linkage } = this;
+    Object.assign(linkage, { d: Array.from(d), u: Array.from(u), z: Float64Array.from(z) });
+    linkage.measure();
+    // what is known of the way there holds for the very same unknowns
+    linkage.last = last && last.to === of ? { ...last, to: linkage.z } : null;
+    linkage.stop = stop && stop.to === of ? { ...stop, to: linkage.z } : null;
+    Object.assign(this, { running, assembly });
     this.update();
     this.emit("size", { reached: 1, open: 0 });
     this.emit("move");

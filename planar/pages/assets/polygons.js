@@ -29,7 +29,7 @@ function polygon(rate) {
 function drawPolygon(page, svg, rate, state) {
   svg.replaceChildren();
   const found = images(page, rate);
-  if (found === null) return "not determined at a dead or change point";
+  if (found === null) return page.undetermined;
   const fit = polygonFit(page, svg, rate, found, state);
   if (fit === null) return "everything is at rest at the inputs' rates";
   const ink = new Ink(svg, 1), spot = ([x, y]) => [fit.pole[0] + x * fit.px, fit.pole[1] - y * fit.px];

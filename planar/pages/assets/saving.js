@@ -137,7 +137,7 @@ const Files = (() => {
 
 class Saving {
   constructor(page, section, drawing) {
-    this.page = page;
+    Object.assign(this, { page, section });
     this.waits = false;
     section.append(Forms.element("h2", {}, "Save"));
     this.button(section, "Mechanism (JSON)", () => this.save("json", "application/json", `${JSON.stringify(Files.mechanism(page), null, 2)}\n`));
@@ -155,9 +155,29 @@ class Saving {
   motion() {
     const { page } = this;
     this.waits = !page.course && page.data.inputs.length > 0;
-    if (this.waits) page.say("The motion is being found; it is saved in a moment.");
+    if (this.waits) page.say("The motion is being found; its table comes in a moment.");
     else if (page.course) this.save("csv", "text/csv", Files.motion(page));
     else page.say("There is no motion to save: nothing is driven.");
+  }
+
+  /** Inside another page, which may let no download through, the text stands there to be copied. */
+  copy(name, text) {
+    const area = Forms.element("textarea", { readonly: "", rows: 6, spellcheck: "false" }, text);
+    const press = Forms.element("button", { type: "button" }, "Copy");
+    press.addEventListener("click", async () => {
+      area.select();
+      try {
+        await navigator.clipboard.writeText(text);
+        this.page.say(`The text of ${name} is copied.`);
+      } catch {
+        this.page.say(`The text of ${name} is selected: copy it with the keyboard.`);
+      }
+    });
+    this.copied?.remove();
+    const label = Forms.element("label", {}, `If no download comes, as within some notebooks, copy the text of ${name}:`, area);
+    this.copied = Forms.element("div", { class: "copied" }, label, press);
+    this.section.append(this.copied);
+    this.page.say(`${name} is offered for download; its text to copy stands below the buttons.`);
   }
 
   save(suffix, type, text) {
@@ -165,6 +185,8 @@ class Saving {
     const link = Forms.element("a", { download: `${name}.${suffix}`, href: URL.createObjectURL(new Blob([text], { type })) });
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 10000);
-    this.page.say(`Saved ${link.download}.`);
+    // nothing tells whether a download came about; in a frame it may be forbidden
+    this.page.say(`${link.download} is offered for download.`);
+    if (window !== window.top) this.copy(link.download, text);
   }
 }

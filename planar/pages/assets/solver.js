@@ -84,6 +84,7 @@ class Linkage {
     this.u = data.inputs.map((each, k) => each.position / this.scale[k]);
     this.z = Float64Array.from(data.z);
     this.last = null; // the step that led here
+    this.stop = null; // the way by which an exact dead point was come to
   }
 
   /** A linkage as this one, to go its own way. */
@@ -94,12 +95,14 @@ class Linkage {
     made.z = Float64Array.from(this.z);
     made.u = Array.from(this.u);
     made.last = before && { ...before, to: made.z };
+    made.stop = this.stop && { ...this.stop, to: this.stop.to === this.z ? made.z : null };
     return made;
   }
 
   /** Fill in the numbers of the pairs from the dimensions. */
   measure(d = this.d) {
     this.program.sizes(d, this.sizes);
+    this.scales = null; // of the slope: made where they are wanted
     this.p = this.sizes.subarray(0, this.data.counts.p);
   }
 
@@ -137,12 +140,17 @@ class Linkage {
   /** How the unknowns move with inputs moving at u1: (unknowns,), or null where that is not determined. */
   tangent(u, z, u1) {
     const { z: n, F: rows, u: m } = this.data.counts;
-    const y = [...z, ...u];
-    this.program.kinematics(y, new Float64Array(n + m), new Float64Array(n + m), this.p, this.rates);
-    const slope = this.slope();
+    const { slope } = this.closure(z, u);
     const right = new Float64Array(rows);
     for (let j = 0; j < m; j++) for (let i = 0; i < rows; i++) right[i] -= slope[(n + j) * rows + i] * u1[j];
     return this.inverse(slope, right);
+  }
+
+  /** What every constraint leaves open at unknowns and inputs, and the slope there: {F, slope}. */
+  closure(z, u) {
+    const { z: n, F: rows, u: m } = this.data.counts;
+    this.program.kinematics([...z, ...u], new Float64Array(n + m), new Float64Array(n + m), this.p, this.rates);
+    return { F: this.rates.subarray(0, rows), slope: this.slope() };
   }
 
   /** The slope that `kinematics` has just found: rows by unknowns and inputs, column by column. */
@@ -182,11 +190,19 @@ class Linkage {
   follow(count, at) {
     let reached = 0, step = 1 / Math.max(1, Math.ceil(count)), open = 0;
     const whole = step;
+    if (count === 0) return { reached: 1, open }; // nothing moves
     while (reached < 1) {
       const next = Math.min(1, reached + step), there = at(next);
       there.ready();
       const guess = this.foretold(there.u, next - reached), found = this.newton(there.u, guess);
-      if (found.closed && (count === 0 || this.continues(found, guess))) {
+      if (found.closed && this.continues(found, guess)) {
+        if (next === 1 && singularity(this, this.closure(found.z, there.u).slope)) {
+          // asked for is a dead point itself, on which Newton's method does not tell the sides apart
+          const close = 1 - SHORTEST / (count * FARTHEST);
+          if (reached < close) { step = close - reached; continue; }
+          if (this.standOn(deadPointAhead(this, at, reached, count * FARTHEST), at, reached)) { reached = 1; break; }
+          there.ready();
+        }
         this.last = { ...this.since(there.u), to: found.z, signs: this.agreed(found.signs), step: next - reached };
         this.z = found.z;
         this.u = Array.from(there.u);
@@ -198,27 +214,46 @@ class Linkage {
         if (step * Math.max(count, 1) * FARTHEST >= SHORTEST) continue;
         const part = reached + Math.min(1 - reached, LEAVING / (Math.max(count, 1) * FARTHEST));
         at(reached).ready();
-        if (!this.leave(at(part))) break;
-        reached = part;
-        step = Math.min(whole, part);
+        if (this.leave(at(part))) {
+          reached = part;
+          step = Math.min(whole, part);
+          continue;
+        }
+        const dead = deadPointAhead(this, at, reached, count * FARTHEST);
+        if (this.standOn(dead, at, reached)) reached = dead.part;
+        break;
       }
     }
     at(reached).ready();
     return { reached, open };
   }
 
-  /** Off an exact dead point, where no step leads: the unknowns go along what the slope leaves free, to the side from
-      which they came if that is known. Whether it came to another position. */
+  /** Stand on a dead point, if there is one, and keep the side from which it came: it leads back on its own branch. */
+  standOn(dead, at, reached) {
+    if (dead === null) return false;
+    at(reached).ready();
+    const { came, before, z, u } = this, signs = came ? came.signs : this.newton(u, z).signs;
+    if (dead.z.some((each, k) => each !== z[k])) this.stop = { u, z, to: dead.z, signs };
+    else this.stop = came && { ...came, to: dead.z };
+    this.last = before && { ...before, to: dead.z };
+    [this.z, this.u] = [dead.z, Array.from(at(dead.part).u)];
+    return true;
+  }
+
+  /** Off an exact dead point, where no step leads: the unknowns go back as they came, group by group on the same side
+      of it; where that is not known along what the slope leaves free. Whether it came to another position. */
   leave(there) {
-    const free = this.free();
+    const { came } = this, stop = this.stop?.to === this.z ? this.stop : null;
+    const free = stop ? this.towards(stop.z) : this.free();
     if (free === null) return false;
-    const { before } = this, back = before ? free.reduce((sum, each, i) => sum + each * (before.z[i] - this.z[i]), 0) : 1;
+    const back = came ? free.reduce((sum, each, i) => sum + each * (came.z[i] - this.z[i]), 0) : 1;
     there.ready();
     for (const side of back < 0 ? [-1, 1] : [1, -1]) {
       for (const nudge of NUDGES) {
         const found = this.newton(there.u, this.z.map((each, i) => each + side * nudge * free[i]));
         const gone = found.z.reduce((most, each, i) => Math.max(most, Math.abs(each - this.z[i])), 0);
         if (!found.closed || gone > 3 * nudge || found.signs.includes(0)) continue;
+        if (stop && found.signs.some((each, k) => each * stop.signs[k] < 0)) continue;
         [this.z, this.u] = [found.z, Array.from(there.u)];
         return true;
       }
@@ -226,12 +261,17 @@ class Linkage {
     return false;
   }
 
+  /** The way from here to other unknowns, the greatest by 1. */
+  towards(z) {
+    const far = z.reduce((most, each, i) => Math.max(most, Math.abs(each - this.z[i])), 0);
+    return Float64Array.from(z, (each, i) => (each - this.z[i]) / far);
+  }
+
   /** How the unknowns can move by themselves where their slope is singular, the greatest by 1; null where it is not. */
   free() {
-    const { z: n, F: rows, u: m } = this.data.counts;
+    const { z: n, F: rows } = this.data.counts;
     if (rows !== n || n === 0) return null;
-    this.program.kinematics([...this.z, ...this.u], new Float64Array(n + m), new Float64Array(n + m), this.p, this.rates);
-    const slope = this.slope(), square = new Float64Array(n * n);
+    const { slope } = this.closure(this.z, this.u), square = new Float64Array(n * n);
     let most = 0;
     for (let i = 0; i < n; i++) {
       for (let j = 0; j < n; j++) for (let k = 0; k < n; k++) square[j * n + i] += slope[i * n + k] * slope[j * n + k];
@@ -252,6 +292,9 @@ class Linkage {
 
   /** What is known of the step that led here; nothing where somebody else has put z. */
   get before() { return this.last && this.last.to === this.z ? this.last : null; }
+
+  /** From where it came here: to an exact dead point by a way of the inputs or of the dimensions, else by the last step. */
+  get came() { return this.stop && this.stop.to === this.z ? this.stop : this.before; }
 
   /** From where a step to inputs u is remembered: from here, but from one before where it is so short that it says
       nothing of the way. */
@@ -292,22 +335,23 @@ class Linkage {
       ahead = Math.max(ahead, Math.abs(guess[i] - this.z[i]));
     }
     if (!(gone < FAR) || moved > NEAR + JUMP * ahead) return false;
-    const signs = this.before ? this.before.signs : this.newton(this.u, this.z).signs;
+    const signs = this.came ? this.came.signs : this.newton(this.u, this.z).signs;
     return moved <= SMOOTH * ahead || found.signs.every((each, k) => each * signs[k] >= 0);
   }
 
   /** The signs of determinants at a new position; where one is not known there, that before. */
   agreed(signs) {
-    const { before } = this;
-    return before ? signs.map((each, k) => each || before.signs[k]) : signs;
+    const { came } = this;
+    return came ? signs.map((each, k) => each || came.signs[k]) : signs;
   }
 
-  /** Where everything is, in SI: w, and with rates of the inputs u1, u2 also w1, w2 (null where not determined). */
+  /** Where everything is, in SI: w, and with rates of the inputs u1, u2 also w1, w2; null at dead and change points, of
+      which `why` tells which it is. */
   state(u1 = null, u2 = null) {
     const { z: n, F: rows, w: many, u: m } = this.data.counts;
     const by = this.data.lengths.map((each) => (each ? this.data.size : 1));
     const scaled = (part) => Float64Array.from(part, (each, k) => each * by[k]);
-    if (u1 === null) return { w: scaled(this.program.positions(this.z, this.u, this.p, this.found).slice(0, many)), w1: null, w2: null };
+    if (u1 === null) return { w: scaled(this.program.positions(this.z, this.u, this.p, this.found).slice(0, many)), w1: null, w2: null, why: "" };
     const y = [...this.z, ...this.u], none = new Float64Array(n);
     const rates = (y1, y2) => this.program.kinematics(y, y1, y2, this.p, this.rates);
     const size = rows + many, column = (k) => this.rates.slice(k * size, (k + 1) * size);
@@ -315,11 +359,12 @@ class Linkage {
     rates([...none, ...v], [...none, ...a]);
     const slope = this.slope();
     const still = column(0).slice(rows);
-    const z1 = this.inverse(slope, column(1).slice(0, rows).map((each) => -each));
-    if (z1 === null) return { w: scaled(still), w1: null, w2: null };
+    const why = singularity(this, slope);
+    const z1 = why ? null : this.inverse(slope, column(1).slice(0, rows).map((each) => -each));
+    if (z1 === null) return { w: scaled(still), w1: null, w2: null, why: this.stop?.to === this.z ? "dead point" : why || "change point" };
     rates([...z1, ...v], [...none, ...a]);
     const z2 = this.inverse(slope, column(2).slice(0, rows).map((each) => -each));
     rates([...z1, ...v], [...z2, ...a]);
-    return { w: scaled(still), w1: scaled(column(1).slice(rows)), w2: scaled(column(2).slice(rows)) };
+    return { w: scaled(still), w1: scaled(column(1).slice(rows)), w2: scaled(column(2).slice(rows)), why };
   }
 }

@@ -1,0 +1,85 @@
+"use strict";
+/* Undo and redo of what was done to the mechanism: its dimensions, its inputs, its assembly. All that changes between
+   the beginning of one act of the reader (a press, a key, a number entered) and the next is one step. */
+
+const MOST_STEPS = 200;
+
+class UndoHistory {
+  constructor(page, bar, before) {
+    Object.assign(this, { page, before, done: [], undone: [], open: false, changed: new WeakSet() });
+    this.stood = page.snapshot();
+    this.undoButton = this.button(bar, "Undo", "Control+Z", () => this.undo());
+    this.redoButton = this.button(bar, "Redo", "Control+Shift+Z Control+Y", () => this.redo());
+    for (const event of ["pointerdown", "click", "change"]) document.addEventListener(event, () => this.begin(), true);
+    document.addEventListener("keydown", (event) => {
+      if (!event.repeat) this.begin();
+      if (event.key === "Enter") this.changed.delete(event.target);
+    }, true);
+    document.addEventListener("keydown", (event) => this.key(event));
+    // a number that is being typed is the browser's to undo, until it is entered
+    document.addEventListener("input", ({ target }) => this.changed.add(target), true);
+    for (const event of ["change", "focusout"]) document.addEventListener(event, ({ target }) => this.changed.delete(target), true);
+    for (const event of ["move", "size"]) page.on(event, () => this.note());
+    this.show();
+  }
+
+  button(bar, text, keys, act) {
+    const made = htmlPart("button", { type: "button", "aria-keyshortcuts": keys }, bar, text);
+    bar.querySelector(".speed")?.before(made);
+    made.addEventListener("click", act);
+    return made;
+  }
+
+  /** A new act of the reader: what changes from here on is a step of its own. */
+  begin() { this.open = false; }
+
+  /** Something has changed. */
+  note() {
+    if (this.restoring) return;
+    const now = this.page.snapshot();
+    if (!this.open && !samePosition(this.stood, now)) {
+      this.done.push(this.stood);
+      if (this.done.length > MOST_STEPS) this.done.shift();
+      this.undone = [];
+      this.open = true;
+      this.show();
+    }
+    this.stood = now;
+  }
+
+  undo() { this.go(this.done, this.undone, "Undone"); }
+  redo() { this.go(this.undone, this.done, "Redone"); }
+
+  go(from, to, said) {
+    this.before(); // what plays stops
+    const there = from.pop();
+    this.begin();
+    if (there === undefined) { this.page.say(`Nothing is left to be ${said.toLowerCase()}.`); return; }
+    to.push(this.stood);
+    this.restoring = true;
+    try { this.page.restore(there); } finally { this.restoring = false; }
+    this.stood = this.page.snapshot();
+    this.show();
+    const at = Forms.inputs(this.page);
+    this.page.say(`${said}${at ? `: ${at}` : ""}.`);
+  }
+
+  key(event) {
+    if (!(event.ctrlKey || event.metaKey) || event.altKey) return;
+    const letter = event.key.toLowerCase(), back = letter === "z" && !event.shiftKey, on = letter === "y" || (letter === "z" && event.shiftKey);
+    if ((!back && !on) || this.changed.has(event.target)) return;
+    event.preventDefault();
+    if (back) this.undo(); else this.redo();
+  }
+
+  show() {
+    this.undoButton.disabled = !this.done.length;
+    this.redoButton.disabled = !this.undone.length;
+  }
+}
+
+/** Whether two snapshots are of one position of one mechanism. */
+function samePosition(a, b) {
+  const alike = (one, other) => one.every((each, k) => each === other[k]);
+  return alike(a.d, b.d) && alike(a.u, b.u) && alike(a.z, b.z);
+}
