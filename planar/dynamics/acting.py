@@ -7,14 +7,16 @@ is held against it.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from planar.algebra import Scalar, orders
 from planar.applied import MET, Load, Spring
+from planar.dynamics.attachment import Attachment, attachments
 from planar.dynamics.courses import factors
-from planar.mechanism import Mechanism, motions, named_points
+from planar.mechanism import motions
 from planar.motion import Moving
 from planar.plane import Frame, Vector
 from planar.program import size
@@ -44,7 +46,6 @@ class Field:
     def __init__(self, moving: Moving, shapes: Mapping[str, Shape]):
         self.moving, self.shapes = moving, shapes
         self.mechanism = moving.mechanism
-        self.points = carriers(self.mechanism)
         parts = [np.size(part) for frame in moving.frames.values() for part in orders(frame.angle)]
         self.many = max(parts, default=1)
 
@@ -67,10 +68,10 @@ class Field:
         """A link's angle or one of its rates (n,)."""
         return self._row(orders(self.moving.frames[link].angle)[rate])
 
-    def named(self, name: str) -> tuple[str, Vector]:
-        """The link that carries a named point, and where in its axes."""
-        link, point = self.points[name]
-        return link, self.shapes[link].at(point)
+    @cached_property
+    def attachments(self) -> Mapping[str, Attachment]:
+        """On which links loads and springs act."""
+        return attachments(self.mechanism)
 
     def velocity(self, link: str, at: Array) -> Array:
         """The velocity of what of a link is at places (n, 2) of the world."""
@@ -111,7 +112,8 @@ def _loads(field: Field, time: Array | None) -> Iterator[Acting]:
 def _load(field: Field, load: Load, factor: Array) -> Iterator[Acting]:
     none = np.zeros((field.many, 2))
     if load.point is not None and load.force is not None:
-        link, place = field.named(load.point)
+        link, point = field.attachments[load.point][:2]
+        place = field.shapes[link].at(point)
         force = Vector(*load.force)
         turned = field.frame(load.axes).turn(force) if load.axes is not None else force
         wide = np.stack(np.broadcast_arrays(*turned, factor)[:2], axis=-1) * factor[:, None]
@@ -175,7 +177,8 @@ def _spring(field: Field, spring: Spring, name: str) -> list[Acting]:
             Acting("spring", name, link, field.at(link, Vector(0.0, 0.0)), none, sense * couple)
             for link, sense in ((first, 1.0), (second, -1.0))
         ]
-    ends = [field.named(point) for point in spring.ends]
+    carried = [field.attachments[end] for end in spring.ends]
+    ends = [(each.link, field.shapes[each.link].at(each.point)) for each in carried]
     at, rate = ([field.at(*end, order) for end in ends] for order in (0, 1))
     way = at[1] - at[0]
     length = np.hypot(*way.T)
@@ -190,10 +193,3 @@ def _spring(field: Field, spring: Spring, name: str) -> list[Acting]:
         Acting("spring", name, link, place, sense * pull, 0.0 * length)
         for (link, _), place, sense in zip(ends, at, (1.0, -1.0), strict=True)
     ]
-
-
-def carriers(mechanism: Mechanism) -> dict[str, tuple[str, str]]:
-    """A (link, point) for every name of a point: as results have it, or `link.point`."""
-    named = named_points(mechanism)
-    own = {f"{link}.{point}": (link, point) for each in named for link, point in each.members}
-    return own | {each.name: each.members[0] for each in named}
