@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 import planar
 from planar.analysis.advantage import advantage, advantages
+from planar.dynamics.balance import Balancing
 from planar.dynamics.unit_rates import alone, slides
 from planar.errors import BadInput, NoAnswer, Outcome
 from planar.mechanism import Drive, Input, Load, Mechanism
@@ -514,3 +515,19 @@ def test_the_program_ends_with_no_answer_on_a_dead_point(tmp_path):
     ended = run(tmp_path, "forces", "dead.json", "--json")
     assert ended.status == 1
     assert json.loads(ended.out)["outcome"] == "dead point"
+
+
+def test_the_equations_are_set_up_once_wherever_inputs_stand_and_however_fast_they_run(monkeypatch):
+    """Setting them up takes ten times as long as a position; also loads that vary are none of their business."""
+    made = []
+    kept = Balancing.__init__
+    monkeypatch.setattr(Balancing, "__init__", lambda self, work: (made.append(work), kept(self, work))[1])
+    engine = replace(MODELS["two-stroke-engine"], gravity=(0.0, -9.81))
+    found = [planar.forces(solve(engine, {"O": angle})).inputs["O"] for angle in (0.3, 0.9, 2.1)]
+    faster = replace(engine, inputs=(engine.inputs[0]._replace(velocity=10.0),))
+    found.append(planar.forces(solve(faster)).inputs["O"])
+    assert len(made) == 1
+    assert len(set(found)) == 4
+    # and what acts is
+    planar.forces(solve(replace(engine, loads=())))
+    assert len(made) == 2
