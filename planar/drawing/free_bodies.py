@@ -87,9 +87,8 @@ class _FreeBody:
         strokes: list[Mark] = list(_body(self.scene, self.link))
         if self.two_force:
             strokes.insert(0, self._line_of_action())
-        strokes += dict.fromkeys(
-            symbols.dot(Vector(*self._spot(each)), "centre of mass", Pen.PIN) for each in self.arrows if each.massive
-        )
+        for at in dict.fromkeys(self._spot(each) for each in self.arrows if each.massive):
+            strokes += symbols.mass_centre(Vector(*at), "centre of mass")
         clear, letters = Clearance.of(strokes), list(_points(self.scene, self.link))
         for each in self.arrows:
             arrow = self._arrow(each, clear)
