@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from math import inf, nan, pi
 from typing import Any
@@ -11,9 +12,11 @@ import pytest
 
 import planar
 from planar.applied import Course, Load, Mass, Spring
+from planar.dynamics.attachment import attachments, choices
 from planar.dynamics.courses import factor
 from planar.errors import BadInput
 from planar.mechanism import Units
+from tests.command import run
 
 Value = dict[str, Any]
 
@@ -180,9 +183,9 @@ def test_a_load_varies_only_with_what_is_driven():
 )
 def test_what_is_made_in_python_is_checked(key, item, sentence):
     mechanism = replace(planar.from_dict(arm()), **{key: (item,)})
-    for run in (lambda: planar.forces(planar.solve(mechanism)), lambda: planar.simulate(mechanism, 1.0)):
+    for asked in (lambda: planar.forces(planar.solve(mechanism)), lambda: planar.simulate(mechanism, 1.0)):
         with pytest.raises(BadInput, match=sentence) as refused:
-            run()
+            asked()
         assert refused.value.place == f"{key}[0]"
 
 
@@ -230,3 +233,129 @@ def test_a_load_at_a_pin_acts_on_the_link_that_is_named_with_it():
     np.testing.assert_allclose(np.abs(apart), [30.0, 40.0], rtol=1e-9)
     (given,) = mechanism.inputs
     assert first.inputs[given.pair] == pytest.approx(second.inputs[given.pair], rel=1e-9)
+
+
+def pinned_slider(*pairs, **more):
+    """A crank, a rod and what slides at its end B; without a sliding block, a tool that is a link of its own."""
+    return planar.from_dict(
+        {
+            "planar": 1,
+            "frame": "f",
+            "links": {
+                "f": {"points": {"O": [0, 0]}},
+                "crank": {"ends": ["O", "A"], "length": 0.2},
+                "rod": {"ends": ["A", "B"], "length": 0.7},
+                **more,
+            },
+            "pairs": [{"turning": "O"}, {"turning": "A"}, *pairs],
+            "inputs": [{"pair": "O", "position": 0.8, "velocity": 2.0}],
+            "sketch": {"B": [0.82, 0.0]},
+        }
+    )
+
+
+BLOCK = {"sliding": "stroke", "on": "f", "block": "B", "line": {"through": "O"}}
+RAM = {"sliding": "stroke", "links": ["f", "ram"], "line": {"through": "O"}, "point": "T"}
+GUIDE = {"sliding": "stroke", "links": ["ram", "f"], "line": {"through": "T"}, "point": "O"}
+
+
+@pytest.mark.parametrize(
+    ("mechanism", "link", "others"),
+    [
+        (pinned_slider(BLOCK), "block B", ("rod.B",)),
+        # a ram that is a link of its own, wherever the point that slides is, and on whichever link the line is
+        (pinned_slider({"turning": "B"}, RAM, ram={"points": {"T": [0.3, 0], "B": [0, 0]}}), "ram", ("rod.B",)),
+        (pinned_slider({"turning": "B"}, GUIDE, ram={"points": {"T": [0.3, 0], "B": [0, 0]}}), "ram", ("rod.B",)),
+    ],
+)
+def test_a_load_at_a_pin_acts_on_what_slides_there(mechanism, link, others):
+    """A push along the slide goes through the pin as a whole; named on the rod it leaves the pin empty along it."""
+    at = attachments(mechanism)
+    assert at["B"] == (link, "B", others)
+    assert at["A"] == ("crank", "A", ("rod.A",))  # nothing slides there: the first in the file
+    assert at[f"{link}.B"] == (link, "B", ())
+    push = Load("B", (-500.0, 0.0))
+    found = [
+        planar.forces(planar.solve(replace(mechanism, loads=(load,))), inertia=False)
+        for load in (push, push._replace(point=others[0]))
+    ]
+    sense = [1.0 if each.reactions["B"].links[1] == link else -1.0 for each in found]
+    on_slider, on_rod = (by * each.reactions["B"].force for by, each in zip(sense, found, strict=True))
+    assert on_slider[0] == pytest.approx(500.0, rel=1e-12)
+    assert on_rod[0] == pytest.approx(0.0, abs=1e-9)
+    assert on_slider[1] == pytest.approx(on_rod[1], rel=1e-9)
+    assert found[0].inputs["O"] == pytest.approx(found[1].inputs["O"], rel=1e-12)
+
+
+def test_of_two_that_slide_at_a_pin_the_one_on_the_frame_bears_a_load():
+    """A pin with a block on the frame and one on a swinging lever."""
+    swing = {"sliding": "swing", "links": ["lever", "shoe"], "line": {"through": "P"}, "point": "B"}
+    mechanism = pinned_slider(
+        swing,
+        {"sliding": "stroke", "links": ["f", "piston"], "line": {"through": "O"}, "point": "B"},
+        {"turning": "B"},
+        {"turning": "P"},
+        f={"points": {"O": [0, 0], "P": [0.8, -1.0]}},
+        lever={"ends": ["P", "Q"], "length": 1.5},
+        shoe={"points": {"B": [0, 0]}},
+        piston={"points": {"B": [0, 0]}},
+    )
+    assert attachments(mechanism)["B"] == ("piston", "B", ("shoe.B", "rod.B"))
+
+
+def test_the_gudgeon_of_the_engine_carries_gas_and_inertia_by_the_equilibrium_of_piston_and_rod():
+    """Of the piston F_x = P + m a and F_y = -N; of the rod, about A, J e + s x (m_r a_G) = AB x (-F)."""
+    engine = planar.load("two-stroke-engine")
+    r, rod, s, speed = 0.03, 0.11, 0.035, 100.0 * np.pi
+    piston, rod_mass, inertia = 0.32, 0.36, 0.00075
+    for degrees, bar in ((40.0, 20.8), (135.0, 0.0), (300.0, 1.4)):
+        state = planar.solve(engine, {"O": np.radians(degrees)})
+        crank = r * np.exp(1j * np.radians(degrees))
+        lean = -np.arcsin(crank.imag / rod)
+        # the rates of sin(lean) = -r sin(t) / rod, twice
+        swing = -speed * crank.real / (rod * np.cos(lean))
+        bend = (speed**2 * crank.imag / rod + swing**2 * np.sin(lean)) / np.cos(lean)
+        along = np.exp(1j * lean) * (1j * bend - swing**2)
+        pin = -(speed**2) * crank
+        push = 283.0 * bar + piston * (pin + rod * along).real
+        turned = inertia * bend + (s * np.exp(-1j * lean) * rod_mass * (pin + s * along)).imag
+        # AB x (-F) = -(AB_x F_y - AB_y F_x)
+        thrust = (rod * np.sin(lean) * push - turned) / (rod * np.cos(lean))
+        found = planar.forces(state)
+        gudgeon = found.reactions["B"]
+        assert gudgeon.links == ("rod", "block B")
+        np.testing.assert_allclose(gudgeon.force, [push, thrust], rtol=1e-9, atol=1e-9 * abs(push))
+        np.testing.assert_allclose(found.reactions["stroke"].force, [0.0, -thrust], atol=1e-9 * abs(push))
+        if degrees == 40.0:
+            assert np.hypot(*gudgeon.force) == pytest.approx(5177.13, abs=0.01)
+
+
+def test_a_load_keeps_its_name_in_a_file_and_is_said_where_another_link_might_be_meant(tmp_path):
+    engine = planar.load("two-stroke-engine")
+    assert planar.to_dict(engine)["loads"][0]["point"] == "B"
+    assert planar.from_dict(planar.to_dict(engine)) == engine
+    sentence = "the load at 'B' acts on link 'block B', not on 'rod'; to have it there write 'rod.B'"
+    for words in (("forces",), ("forces", "--cycle"), ("inspect",), ("explain",)):
+        assert sentence in run(tmp_path, words[0], "two-stroke-engine", *words[1:]).done(), words
+        if words[0] != "explain":
+            told = json.loads(run(tmp_path, words[0], "two-stroke-engine", *words[1:], "--json").done())
+            assert sentence in told["remarks"], words
+    named = planar.from_dict(planar.to_dict(engine) | {"loads": [{"point": "rod.B", "force": [-283, 0]}]})
+    assert choices(named) == ()
+    assert planar.inspect(named).remarks == ()
+
+
+def test_inspect_lists_loads_springs_and_masses(tmp_path):
+    lamp = json.loads(run(tmp_path, "inspect", "balanced-lamp", "--json").done())["actions"]
+    assert [each["kind"] for each in lamp] == ["spring", "mass", "mass", "mass", "gravity"]
+    assert lamp[0] == {
+        "kind": "spring",
+        "at": "S to R",
+        "links": ["base", "arm"],
+        "amount": "490.5 N/m, free length 0 mm",
+    }
+    assert lamp[1]["at"] == "(200, 0) mm" and lamp[1]["links"] == ["arm"]
+    text = run(tmp_path, "inspect", "two-stroke-engine").done()
+    assert " force  B           block B  283 N at 180 deg, varies with O" in text
+    assert " mass   G           rod      0.36 kg, moment of inertia 0.00075 kg·m²" in text
+    assert "Loads, springs" not in run(tmp_path, "inspect", "four-bar").done()

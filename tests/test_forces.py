@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 import planar
 from planar.analysis.advantage import advantage, advantages
+from planar.dynamics.balance import Balancing
 from planar.dynamics.unit_rates import alone, slides
 from planar.errors import BadInput, NoAnswer, Outcome
 from planar.mechanism import Drive, Input, Load, Mechanism
@@ -441,9 +442,11 @@ def test_the_program_prints_torque_loads_power_advantage_and_the_slip(tmp_path):
     text = run(tmp_path, "forces", "000-P2").done()
     for part in (
         "O      216.609  N·m      45 deg  18.8496 rad/s  4082.98",
-        "D      BD     2000.00      0       -   2.04149  180.000              -  -4082.98",
+        "D      block D  2000.00      0       -   2.04149  180.000              -  -4082.98",
         "B:AB,BD  BD       AB     2059.15   166.234  -2000.00   489.986       0",
+        "D        block D  BD     2059.15   166.234  -2000.00   489.986       0",
         "stroke   block D  frame  489.986  -90.0000         0  -489.986       0",
+        "the load at 'D' acts on link 'block D', not on 'BD'; to have it there write 'BD.D'",
         "in: 4082.98 W from the inputs; out: 4082.98 W against the loads",
         "D       O               9.23324     9.23324  N per N·m  I16 I14 I46",
         "links 1 OA, 2 AB, 3 CB, 4 BD, 5 block D and 6 frame",
@@ -460,7 +463,8 @@ def test_the_program_prints_si_values(tmp_path):
     found = json.loads(run(tmp_path, "forces", "000-P2", "--json").done())
     assert found["inputs"]["O"]["torque"] == pytest.approx(216.6086, abs=1e-4)
     assert found["power"]["in"] == pytest.approx(found["power"]["out"], rel=1e-12)
-    assert [(each["kind"], each["name"], each["link"]) for each in found["loads"]] == [("load", "D", "BD")]
+    assert [(each["kind"], each["name"], each["link"]) for each in found["loads"]] == [("load", "D", "block D")]
+    assert [each for each in found["remarks"] if "acts on link 'block D', not on 'BD'" in each]
     assert found["reactions"]["stroke"]["force"] == pytest.approx([0.0, -489.98610015], abs=1e-6)
     assert found["reactions"]["stroke"]["links"] == ["frame", "block D"]
     assert found["advantage"]["D"]["O"]["by_centres"] == pytest.approx(9.23324, abs=1e-5)
@@ -512,3 +516,19 @@ def test_the_program_ends_with_no_answer_on_a_dead_point(tmp_path):
     ended = run(tmp_path, "forces", "dead.json", "--json")
     assert ended.status == 1
     assert json.loads(ended.out)["outcome"] == "dead point"
+
+
+def test_the_equations_are_set_up_once_wherever_inputs_stand_and_however_fast_they_run(monkeypatch):
+    """Setting them up takes ten times as long as a position; also loads that vary are none of their business."""
+    made = []
+    kept = Balancing.__init__
+    monkeypatch.setattr(Balancing, "__init__", lambda self, work: (made.append(work), kept(self, work))[1])
+    engine = replace(MODELS["two-stroke-engine"], gravity=(0.0, -9.81))
+    found = [planar.forces(solve(engine, {"O": angle})).inputs["O"] for angle in (0.3, 0.9, 2.1)]
+    faster = replace(engine, inputs=(engine.inputs[0]._replace(velocity=10.0),))
+    found.append(planar.forces(solve(faster)).inputs["O"])
+    assert len(made) == 1
+    assert len(set(found)) == 4
+    # and what acts is
+    planar.forces(solve(replace(engine, loads=())))
+    assert len(made) == 2

@@ -26,7 +26,7 @@ from planar.errors import BadInput
 from planar.mechanism import Drive, Mechanism
 from planar.units import unit
 from tests.command import run
-from tests.known import MODELS
+from tests.known import MODELS, state_of
 
 GRAVITY = (0.0, -9.81)
 
@@ -420,7 +420,8 @@ def test_a_pair_that_is_not_told_or_carries_nothing_has_no_curve_but_says_so():
     (picture,) = bearing_pictures(cranks, ["A"])
     assert picture.marks == ()
     assert "held more than once" in picture.notes[0]
-    (idle,) = bearing_pictures(MODELS["slider-crank"], ["A"])
+    shaft = replace(MODELS["slider-crank"], loads=(Load(link="crank", torque=5.0),))
+    (idle,) = bearing_pictures(shaft, ["A"])
     assert (idle.marks, idle.notes) == ((), ("it carries nothing",))
 
 
@@ -441,6 +442,26 @@ def test_commands_draw_all_three_and_refuse_what_is_for_others(tmp_path):
         ("torque", ["--fluctuation", "3"], "between 0 and 2"),
     ):
         assert said_of in run(tmp_path, "plot", "000-P2", what, "-o", str(tmp_path / "x.pdf"), *more).refused(2)
+
+
+@pytest.mark.parametrize("what", ["forces", "torque", "bearings"])
+def test_without_anything_that_acts_there_is_no_empty_picture_but_a_sentence(tmp_path, what):
+    picture = tmp_path / "x.png"
+    told = run(tmp_path, "plot", "toggle-press", what, "-o", str(picture)).refused(2)
+    assert told.startswith("$.loads: the mechanism has no loads, springs or masses; write forces (N) at points")
+    assert not picture.exists()
+    acting = state_of("four-bar") if what == "forces" else MODELS["four-bar"]
+    with pytest.raises(BadInput, match="has no loads, springs or masses"):
+        getattr(planar.plot, what)(acting)
+
+
+def test_the_space_diagram_of_free_bodies_says_on_which_link_of_a_pin_a_load_acts():
+    """The gas pushes the piston: its arrow is on the block, and the rod feels the gudgeon alone."""
+    pictures, _ = free_bodies(forces(state_of("two-stroke-engine")))
+    drawn = {picture.title: picture for picture in pictures}
+    assert "the load at 'B' acts on link 'block B', not on 'rod'" in " ".join(drawn["Space diagram"].notes)
+    pushed = {title for title, each in drawn.items() if strokes(each, "force P_B", Arrow)}
+    assert pushed == {"3  block B"}
 
 
 def test_many_links_go_on_sheets_no_larger_than_a_page_each_once():

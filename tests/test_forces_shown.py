@@ -152,9 +152,9 @@ def test_everything_that_acts_stands_in_the_table_with_its_power(tmp_path):
 
 
 def test_a_load_that_varies_with_time_is_told_at_the_start(tmp_path):
-    varying = Load("D", (1000.0, 0.0), varies=planar.Course(None, (0.0, 2.0), (0.5, 1.0)))
+    varying = Load("BD.D", (1000.0, 0.0), varies=planar.Course(None, (0.0, 2.0), (0.5, 1.0)))
     text = run(tmp_path, "forces", kept(tmp_path, replace(MODELS["000-P2"], loads=(varying,)))).done()
-    assert float(row(text, "Loads", "D")[2]) == 500.0
+    assert float(row(text, "Loads", "BD.D")[2]) == 500.0
     assert "loads that vary with time are those at 0 s" in text
 
 

@@ -14,7 +14,7 @@ import pytest
 import planar
 from planar.applied import Course, Load, Mass, Spring
 from planar.dimensions import changed, dimensions
-from planar.dynamics.acting import carriers
+from planar.dynamics.attachment import attachments
 from planar.files import asset
 from planar.mechanism import Mechanism, motions
 from planar.pages.carried import carried
@@ -51,7 +51,7 @@ def acted_on(mechanism: Mechanism, seed: int = 3) -> Mechanism:
     """A mechanism with a mass on every link, and loads and springs of every kind."""
     rng = np.random.default_rng(seed)
     links = [link.name for link in mechanism.links if link.name != mechanism.frame]
-    points, pairs, given = list(carriers(mechanism)), list(motions(mechanism)), mechanism.inputs[0]
+    points, pairs, given = list(attachments(mechanism)), list(motions(mechanism)), mechanism.inputs[0]
     course = Course(given.pair, (given.position - 1.0, given.position + 2.0), (0.5, 2.0))
     masses = (
         Mass(link, rng.uniform(0.5, 3.0), tuple(rng.uniform(-0.1, 0.1, 2)), rng.uniform(0.001, 0.1)) for link in links
@@ -143,3 +143,19 @@ def test_beside_a_chain_only_efforts_are_told():
     found, wanted = on_page(mechanism), planar.forces(planar.solve(mechanism))
     assert [each["effort"] for each in found["inputs"]] == pytest.approx(list(wanted.inputs.values()), rel=1e-9)
     assert all(pair["force"] == [None, None] for pair in found["pairs"]) and "chain" in found["why"]
+
+
+def test_a_page_says_on_which_link_of_a_pin_a_load_acts():
+    """The gas pushes the piston, as in Python; the note stands beside the layer of forces and its tables."""
+    engine = planar.load("two-stroke-engine")
+    found = on_page(engine)
+    assert [(each["name"], each["link"]) for each in found["acting"] if each["kind"] == "load"] == [("B", "block B")]
+    page = json.dumps({"data": carried(engine)[0]})
+    ran = subprocess.run(
+        ["node", "-e", f"{asset('layers_forces.js')}\nconsole.log(forceNotes({page}, {{ why: '' }}).join())"],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=60,
+    )
+    assert ran.stdout.strip() == "the load at 'B' acts on link 'block B', not on 'rod'; to have it there write 'rod.B'"

@@ -298,6 +298,7 @@ def test_hatching_is_only_at_the_frame(name):
     for pair in state.mechanism.pairs:
         if frame in pair.links:
             allowed |= {f"ground {pair.entry_name()}", f"guide {pair.name}", f"gear {pair.name}", f"band {pair.name}"}
+    allowed |= {f"ground of spring {k}" for k, each in enumerate(state.mechanism.springs, 1) if not each.turns}
     assert owners <= allowed
     for pair in state.mechanism.pairs:
         if frame in pair.links and pair.coincident():

@@ -7,8 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planar.analysis.actions import Action, actions
 from planar.analysis.mobility import Mobility, gruebler, mobility
 from planar.analysis.names import names
+from planar.dynamics.attachment import choices
 from planar.errors import BadInput, NoAnswer, Outcome, PlanarError
 from planar.graph import detached, numbered, pair_words
 from planar.mechanism import Input, Mechanism, entries
@@ -40,7 +42,8 @@ class Inspection:
     """See `inspect`. `mobility` is None where the mechanism cannot be assembled; `open_reason` then says why.
 
     `pairs`: of every type the pairs by the numbers of their links, as ("turning", ("O-1", "1-2")); `lower` and `higher`
-    how many; `is_mechanism` and `is_linkage` with the reasons.
+    how many; `is_mechanism` and `is_linkage` with the reasons. `actions` are its loads, springs and masses; `remarks`
+    say of which of them another link might have been meant.
     """
 
     name: str
@@ -57,6 +60,8 @@ class Inspection:
     mechanism_reason: str
     is_linkage: bool
     linkage_reason: str
+    actions: tuple[Action, ...]
+    remarks: tuple[str, ...]
 
 
 def inspect(mechanism: Mechanism) -> Inspection:
@@ -92,6 +97,8 @@ def inspect(mechanism: Mechanism) -> Inspection:
         mechanism_reason=why,
         is_linkage=is_mechanism and not higher,
         linkage_reason=_linkage_reason(is_mechanism, higher),
+        actions=actions(mechanism),
+        remarks=choices(mechanism),
     )
 
 

@@ -61,12 +61,11 @@ def forces(
         raise BadInput("--at", "the forces of a whole motion have no one position; say where it starts with --from")
     if not whole:
         _refuse(course)
+    from planar.dynamics.checked import refuse_unloaded
+
     mechanism = loaded(model, mode)
     spare(model, output)
-    if not (mechanism.loads or mechanism.springs or mechanism.masses):
-        from planar.views.loads import where_to_write
-
-        raise BadInput("$.loads", where_to_write(mechanism))
+    refuse_unloaded(mechanism)
     if whole:
         _over(mechanism, not static, as_json, output, course)
     else:

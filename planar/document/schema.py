@@ -78,7 +78,11 @@ INPUT: Schema = {
 }
 DRIVE: Schema = {key: INPUT[key] for key in ("position", "velocity", "acceleration")}
 VARIES: Schema = {"with": _TEXT, "at": several("quantity", 2, MOST), "factors": several("number", 2, MOST)}
-FORCE: Schema = {"point": _TEXT, "force": _vector("quantity"), "axes": _TEXT, "varies": described("varies")}
+AT_A_PIN: Schema = {
+    "description": "at a pin: on the link that slides there, else on the first, or on the one that is named, as rod.B"
+}
+"""Of the name of a point where something acts."""
+FORCE: Schema = {"point": _TEXT | AT_A_PIN, "force": _vector("quantity"), "axes": _TEXT, "varies": described("varies")}
 TORQUE: Schema = {"link": _TEXT, "torque": described("quantity"), "varies": described("varies")}
 EFFORT: Schema = {
     "pair": _TEXT,
@@ -87,7 +91,7 @@ EFFORT: Schema = {
     "varies": described("varies"),
 }
 SPRING: Schema = {
-    "points": several("text", 2, 2) | {"uniqueItems": True},
+    "points": several("text", 2, 2) | {"uniqueItems": True} | AT_A_PIN,
     "stiffness": described("amount"),
     "free_length": described("amount"),
     "damping": described("amount"),

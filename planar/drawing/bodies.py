@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from math import hypot
 from typing import NamedTuple
 
+from planar.drawing.elements import Element, elements
 from planar.mechanism import Mechanism
 from planar.pairs.marks import Block, Guide, Mark, Opening, Pin, PitchLine, Wheel
 from planar.plane import Vector
@@ -42,9 +43,10 @@ class Body(NamedTuple):
     guides: tuple[GuideLine, ...] = ()
 
 
-def all_marks(mechanism: Mechanism, shapes: Mapping[str, Shape]) -> tuple[Mark, ...]:
-    """What all pairs say of how they are drawn."""
-    return tuple(mark for pair in mechanism.pairs for mark in pair.marks(shapes, mechanism.pairs))
+def all_marks(mechanism: Mechanism, shapes: Mapping[str, Shape]) -> tuple[Mark | Element, ...]:
+    """What all pairs say of how they are drawn, and springs and masses."""
+    of_pairs = (mark for pair in mechanism.pairs for mark in pair.marks(shapes, mechanism.pairs))
+    return (*of_pairs, *elements(mechanism, shapes))
 
 
 def bodies(mechanism: Mechanism, shapes: Mapping[str, Shape]) -> dict[str, Body]:
@@ -67,7 +69,7 @@ def size(shapes: Mapping[str, Shape]) -> float:
     return max(spans) or 1.0
 
 
-def _body(link: str, points: Sequence[Vector], marks: Sequence[Mark], near: float) -> Body:
+def _body(link: str, points: Sequence[Vector], marks: Sequence[Mark | Element], near: float) -> Body:
     joints = distinct(_joints(link, marks), near)
     others = list(distinct((*joints, *points), near)[len(joints) :])
     guides = _guides(link, marks, joints, near)
@@ -96,7 +98,7 @@ def _body(link: str, points: Sequence[Vector], marks: Sequence[Mark], near: floa
     return Body(link, (line, *feet), (), tuple(tracers), joints, dots, guides)
 
 
-def _joints(link: str, marks: Iterable[Mark]) -> Iterable[Vector]:
+def _joints(link: str, marks: Iterable[Mark | Element]) -> Iterable[Vector]:
     """Where other links meet a link in a point."""
     for mark in marks:
         if isinstance(mark, Pin):
@@ -107,7 +109,7 @@ def _joints(link: str, marks: Iterable[Mark]) -> Iterable[Vector]:
             yield mark.centre
 
 
-def _guides(link: str, marks: Iterable[Mark], joints: Sequence[Vector], near: float) -> tuple[GuideLine, ...]:
+def _guides(link: str, marks: Iterable[Mark | Element], joints: Sequence[Vector], near: float) -> tuple[GuideLine, ...]:
     """The lines of a link, each with the joint on it, else the foot of the perpendicular from the nearest joint."""
     lines = [mark for mark in marks if isinstance(mark, Guide | Opening | PitchLine) and mark.link == link]
     made: list[GuideLine] = []

@@ -16,6 +16,8 @@ from planar.drawing.pushes import Push, pushes
 from planar.drawing.scene import Scene, standing
 from planar.drawing.scheme import point_letters, scheme, space_scale
 from planar.drawing.strokes import moving
+from planar.dynamics.attachment import choices
+from planar.dynamics.checked import refuse_unloaded
 from planar.dynamics.forces import Forces
 from planar.errors import BadInput
 from planar.graph import number_and_name, numbered
@@ -48,11 +50,12 @@ def free_bodies(forces: Forces, scale: str | Sequence[str] | None = None) -> tup
     """The scheme, every moving link by itself, and the title with the scales.
 
     One scale of length and one of force hold for all links and polygons. Strokes are `about` "force F_32", "couple
-    M_32", "polygon F_32" (a link's own feel) or "link AB". Raises BadInput for a scale that is none, and for forces
-    over a motion.
+    M_32", "polygon F_32" (a link's own feel) or "link AB". Raises BadInput for a scale that is none, for forces
+    over a motion, and for a mechanism on which nothing acts.
     """
     if isinstance(forces.moving, Motion):
         raise BadInput("forces", "free bodies are drawn at one position; give the forces of a state")
+    refuse_unloaded(forces.mechanism)
     given = scales(scale, ["length", "force"])
     state, mechanism = forces.moving, forces.mechanism
     felt = pushes(forces, size(mechanism, state.shapes))
@@ -61,7 +64,7 @@ def free_bodies(forces: Forces, scale: str | Sequence[str] | None = None) -> tup
     force = given.get("force") or _force_scale(felt.values())
     drawn = scheme(state, scene.scale)
     note = "F₃₂ is the force on link 3 by link 2, M₃₂ the couple"
-    pictures = [drawn._replace(title="Space diagram", notes=(note,))]
+    pictures = [drawn._replace(title="Space diagram", notes=(note, *choices(mechanism)))]
     pictures += [_FreeBody(scene, link, each, force, forces).picture() for link, each in felt.items()]
     arrows = any(push.force is not None for each in felt.values() for push in each)
     used = (scene.scale, force) if arrows else (scene.scale,)
@@ -84,9 +87,8 @@ class _FreeBody:
         strokes: list[Mark] = list(_body(self.scene, self.link))
         if self.two_force:
             strokes.insert(0, self._line_of_action())
-        strokes += dict.fromkeys(
-            symbols.dot(Vector(*self._spot(each)), "centre of mass", Pen.PIN) for each in self.arrows if each.massive
-        )
+        for at in dict.fromkeys(self._spot(each) for each in self.arrows if each.massive):
+            strokes += symbols.mass_centre(Vector(*at), "centre of mass")
         clear, letters = Clearance.of(strokes), list(_points(self.scene, self.link))
         for each in self.arrows:
             arrow = self._arrow(each, clear)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise, product
 from math import pi
@@ -11,7 +11,8 @@ from typing import Self
 import numpy as np
 
 from planar.drawing import symbols
-from planar.drawing.bodies import Body, unit
+from planar.drawing.bodies import Body, apart, unit
+from planar.drawing.elements import Coil
 from planar.drawing.paper import Scale
 from planar.drawing.picture import Arrow, Circle, Line, Mark, Pen, spot
 from planar.drawing.scene import Scene, Travel
@@ -25,6 +26,8 @@ BLOCK_END = symbols.BLOCK[0] / 2.0 + 2.0
 """mm: how far a fixed guide goes on beyond the middle of a block at the end of its travel."""
 LIFT = 0.8
 """mm: how far a guide may be off its block, where a rack lies between them."""
+SAME = 0.05
+"""mm: places nearer than this are one."""
 DOWN = (Vector(0, -1), Vector(-1, 0), Vector(1, 0), Vector(0, 1))
 SLANTS = tuple(Vector(x / 2**0.5, y / 2**0.5) for x, y in ((-1, -1), (1, -1), (-1, 1), (1, 1)))
 
@@ -85,7 +88,23 @@ def fixed(scene: Scene, beside: Iterable[Mark] = ()) -> tuple[Mark, ...]:
             strokes = symbols.support(at, clear.support(at), f"ground {mark.name}")
             made += strokes
             clear = clear.beside(strokes)
+    for name, at in _hung(scene, taken):
+        strokes = symbols.support(at, clear.support(at), f"ground of {name}")
+        made += strokes
+        clear = clear.beside(strokes)
     return tuple(made)
+
+
+def _hung(scene: Scene, pins: Sequence[Circle]) -> Iterator[tuple[str, Vector]]:
+    """Where springs hang on the frame, but at its pins; once where several do."""
+    met = [Vector(*pin.centre) for pin in pins]
+    for mark in scene.marks:
+        if isinstance(mark, Coil):
+            for link, place in zip(mark.links, mark.at, strict=True):
+                at = scene.place(link, place)
+                if link == scene.mechanism.frame and all(apart(at, other) > SAME for other in met):
+                    met.append(at)
+                    yield mark.name, at
 
 
 def _stretch(scene: Scene, name: str, through: Vector, way: Vector, half: float) -> tuple[float, float]:

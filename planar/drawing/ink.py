@@ -54,7 +54,13 @@ INK = {
     Pen.SHARE: Ink(0.2, "#0b46a8"),
     Pen.MEAN: Ink(0.25, "#333333", (4.0, 0.9, 0.5, 0.9)),
 }
-FILLS = {Fill.PAPER: "#ffffff", Fill.LINK: "#ece7dd", Fill.ABOVE: "#c9c9c9", Fill.BELOW: "#ececec"}
+FILLS = {
+    Fill.PAPER: "#ffffff",
+    Fill.LINK: "#ece7dd",
+    Fill.SOLID: "#000000",
+    Fill.ABOVE: "#c9c9c9",
+    Fill.BELOW: "#ececec",
+}
 """Colours of areas; those that are not here are empty."""
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from planar.drawing.chart import number
 from planar.drawing.runs import closing, steady
+from planar.dynamics.checked import refuse_unloaded
 from planar.dynamics.flywheel import turns
 from planar.dynamics.forces import Forces, forces
 from planar.errors import BadInput
@@ -71,9 +72,10 @@ class Loaded(NamedTuple):
 def loaded(what: Forces | Motion | Mechanism) -> Loaded:
     """Forces as they are given, or those over a whole cycle at the input's steady speed.
 
-    Without a speed in the file inertia is left out. Raises BadInput for the forces of one position, and what
-    `planar.cycle` and `planar.forces` raise.
+    Without a speed in the file inertia is left out. Raises BadInput for the forces of one position, for a mechanism on
+    which nothing acts, and what `planar.cycle` and `planar.forces` raise.
     """
+    refuse_unloaded(what if isinstance(what, Mechanism) else what.mechanism)
     notes = []
     if isinstance(what, Forces):
         found = what

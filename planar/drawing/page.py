@@ -22,6 +22,7 @@ from planar.drawing.picture import Letter, Picture, extent
 from planar.drawing.polygons import polygon_picture
 from planar.drawing.scheme import scheme, space_scale, standing
 from planar.drawing.typeset import Sheet, Style, lift
+from planar.dynamics.attachment import choices
 from planar.errors import BadInput
 from planar.mechanism import QUANTITIES
 from planar.motion import State
@@ -162,7 +163,7 @@ def _strips(solution: Solution, used: Mapping[str, Scale]) -> Iterator[Strip]:
     yield from lines(("3. Results",), PART, before=5.0, keep=True)
     yield from _results(solution)
     yield from _compared(solution)
-    notes = [*solution.state.remarks, *mechanism.notes]
+    notes = [*choices(mechanism), *solution.state.remarks, *mechanism.notes]
     if notes:
         yield from lines(("Notes",), TOPIC, before=4.0, keep=True)
     for note in notes:

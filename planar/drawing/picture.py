@@ -85,6 +85,8 @@ class Fill(Enum):
     """Hides what lies below."""
     LINK = "link"
     """The light tone of a link that is a plate."""
+    SOLID = "solid"
+    """The black of a mark, such as a centre of mass."""
     ABOVE = "above"
     """What of a curve is above its mean."""
     BELOW = "below"

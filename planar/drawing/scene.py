@@ -12,6 +12,7 @@ import numpy as np
 
 from planar.algebra import Jet
 from planar.drawing.bodies import NEAR, Body, all_marks, off_line, size
+from planar.drawing.elements import Element
 from planar.drawing.paper import Scale
 from planar.mechanism import Mechanism, named_points
 from planar.pairs.marks import Block, Guide, Mark
@@ -62,8 +63,8 @@ class Scene:
     travel: Travel = field(default_factory=dict)
 
     @cached_property
-    def marks(self) -> tuple[Mark, ...]:
-        """What its pairs say of how they are drawn."""
+    def marks(self) -> tuple[Mark | Element, ...]:
+        """What its pairs say of how they are drawn, and its springs and masses."""
         return all_marks(self.mechanism, self.shapes)
 
     @cached_property

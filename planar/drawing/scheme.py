@@ -8,6 +8,8 @@ from math import atan2, hypot, pi, remainder
 
 from planar.drawing import symbols
 from planar.drawing.bodies import Body, all_marks, bodies
+from planar.drawing.element_strokes import centre_letters
+from planar.drawing.elements import Centre
 from planar.drawing.ground import Clearance, fixed, ground_marks
 from planar.drawing.labels import SAME
 from planar.drawing.paper import WIDTH, Scale, fitting
@@ -67,7 +69,7 @@ def scheme(
     if numbers:
         strokes += _numbers(scene, strokes, clear)
     if letters:
-        strokes += point_letters(scene)
+        strokes += (*point_letters(scene), *centre_letters(scene))
     return Picture(tuple(strokes), mechanism.name, (f"Space diagram, {scale}",))
 
 
@@ -82,6 +84,8 @@ def space_scale(mechanism: Mechanism, frames: Mapping[str, Frame], shapes: Mappi
             x, y = frames[mark.link].carry(mark.centre)
             r = abs(mark.radius)
             places += [Vector(x - r, y - r), Vector(x + r, y + r)]
+        elif isinstance(mark, Centre):
+            places.append(frames[mark.link].carry(mark.at))
     xs, ys = zip(*places, strict=True) if places else ((0.0,), (0.0,))
     width, height = float(max(xs) - min(xs)), float(max(ys) - min(ys))
     fits = fitting("length", mechanism.units.length, width, height)

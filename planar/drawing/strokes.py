@@ -1,4 +1,4 @@
-"""What moves of a mechanism as strokes on paper: plates, wheels, bars, cylinders, slots, blocks and pins."""
+"""What moves of a mechanism as strokes on paper: plates, wheels, bars, springs, slots, blocks, masses and pins."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 
 from planar.drawing import symbols
 from planar.drawing.bodies import Body, off_line
+from planar.drawing.element_strokes import centres, springs
 from planar.drawing.paper import Scale
 from planar.drawing.picture import Circle, Fill, Line, Mark, Pen
 from planar.drawing.scene import OVER, Scene, Travel, Tube
@@ -33,13 +34,14 @@ def body_marks(
 
 
 def moving(scene: Scene, pen: Pen = Pen.LINK) -> tuple[Mark, ...]:
-    """Plates, wheels, bars, slots, blocks and pins of a scene."""
+    """Plates, wheels, bars, springs, slots, blocks, centres of mass and pins of a scene."""
     plates = [
         symbols.area(f"link {body.link}", pen, Fill.LINK, *(scene.place(body.link, p) for p in body.plate))
         for body in scene.bodies.values()
         if body.plate
     ]
-    return (*plates, *_wheels(scene), *racks(scene), *cylinders(scene, pen), *bars(scene, pen), *_sliders(scene, pen))
+    solid = (*plates, *_wheels(scene), *racks(scene), *cylinders(scene, pen), *bars(scene, pen))
+    return (*solid, *springs(scene), *_sliders(scene, pen))
 
 
 def bars(scene: Scene, pen: Pen) -> Iterator[Line]:
@@ -159,6 +161,7 @@ def _sliders(scene: Scene, pen: Pen) -> Iterator[Mark]:
         if isinstance(mark, Block) and mark.name not in scene.tubes:
             at, way = scene.place(mark.link, mark.at), scene.way(mark.link, mark.way)
             yield symbols.block(at, way, f"block {scene.named(mark.name)}")
+    yield from centres(scene)
     yield from pins(scene)
     for link, body in scene.bodies.items():
         for point, at in scene.shapes[link].points.items():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import acos, atan2, ceil, degrees, pi, sqrt
+from math import acos, atan2, ceil, degrees, pi, remainder, sqrt
 
 from planar.drawing.picture import Circle, Fill, Line, Mark, Pen, spot
 from planar.plane import Vector, direction
@@ -30,6 +30,57 @@ BORE = 4.4
 """mm: the width of a cylinder."""
 OPENING = 15.0, 3.6
 """mm: length and width of a slot."""
+
+MASS = 1.9
+"""mm: the radius of the mark of a centre of mass."""
+SPIRAL = 1.9, 4.6
+"""mm: the least and the greatest radius of a torsional spring."""
+COILS_ROUND = 2
+"""Turns of a torsional spring, but for half a turn, without a couple."""
+VANE = 5.4, 7.8, 1.9
+"""mm: the radii between which a torsional damper is drawn; rad: how far it reaches round."""
+
+Path = tuple[tuple[float, float], ...]
+"""Places by the part of a length at which they are, and how far they are off its line to the left (mm)."""
+WIDE = 1.9
+"""mm: half the width of a spring, and of a damper."""
+ASIDE = 3.2
+"""mm: a spring and a damper that stand side by side are so far off their middle."""
+
+
+def _zigzag(low: float, high: float, off: float) -> Path:
+    """A spring between parts of a length, as far off its line (mm): six coils between straight ends."""
+    lead = 0.14 * (high - low)
+    step = (high - low - 2.0 * lead) / 12.0
+    teeth = [(low + lead + step * (k + 0.5), off + (WIDE if k % 2 else -WIDE)) for k in range(12)]
+    return ((low, off), (low + lead, off), *teeth, (high - lead, off), (high, off))
+
+
+def _dashpot(low: float, high: float, off: float) -> tuple[Path, ...]:
+    """A damper alike: a rod with its piston in a cylinder that is open to one side."""
+    far = high - low
+    mouth, piston, base = low + 0.34 * far, low + 0.5 * far, low + 0.66 * far
+    return (
+        ((low, off), (piston, off)),
+        ((piston, off - 0.65 * WIDE), (piston, off + 0.65 * WIDE)),
+        ((mouth, off + WIDE), (base, off + WIDE), (base, off - WIDE), (mouth, off - WIDE)),
+        ((base, off), (high, off)),
+    )
+
+
+COILS: dict[str, tuple[Path, ...]] = {
+    "spring": (_zigzag(0.0, 1.0, 0.0),),
+    "damper": _dashpot(0.0, 1.0, 0.0),
+    "both": (
+        ((0.0, 0.0), (0.1, 0.0)),
+        ((0.1, -ASIDE), (0.1, ASIDE)),
+        _zigzag(0.1, 0.9, ASIDE),
+        *_dashpot(0.1, 0.9, -ASIDE),
+        ((0.9, -ASIDE), (0.9, ASIDE)),
+        ((0.9, 0.0), (1.0, 0.0)),
+    ),
+}
+"""Springs and dampers between two places."""
 
 
 def quarter(way: Vector) -> Vector:
@@ -97,6 +148,44 @@ def opening(at: Vector, way: Vector, about: str, pen: Pen) -> Line:
     along, turn = way * (OPENING[0] / 2.0 - radius), atan2(way.y, way.x)
     half = [direction(turn - pi / 2.0 + pi * k / 8.0) * radius for k in range(9)]
     return area(about, pen, Fill.PAPER, *(at + along + each for each in half), *(at - along - each for each in half))
+
+
+def coil(start: Vector, stop: Vector, symbol: str, about: str) -> tuple[Line, ...]:
+    """A spring or a damper between two places that are apart."""
+    whole = stop - start
+    left = quarter(whole * (1.0 / sqrt(whole.dot(whole))))
+    paths = COILS[symbol]
+    return tuple(line(about, Pen.PIN, *(start + whole * part + left * off for part, off in path)) for path in paths)
+
+
+def spiral(at: Vector, first: float, second: float, wound: float, symbol: str, about: str) -> tuple[Line, ...]:
+    """A torsional spring about a pin: its outer end to the direction of one link, its inner end to that of the other.
+
+    Its coils are those without a couple, and by how much it is `wound` more. A damper: a vane on the one link in a part
+    of a ring on the other (rad).
+    """
+    strokes = []
+    if symbol != "damper":
+        low, high = SPIRAL
+        whole = 2.0 * pi * COILS_ROUND + remainder(second - first - wound, 2.0 * pi) + wound
+        parts = [k / 60.0 for k in range(61)]
+        spots = (at + direction(first + whole * part) * (high + (low - high) * part) for part in parts)
+        strokes.append(line(about, Pen.PIN, *spots))
+    if symbol != "spring":
+        low, high, sweep = VANE
+        turns = [first - sweep / 2.0 + sweep * k / 12.0 for k in range(13)]
+        ring = [at + direction(turn) * low for turn in turns] + [at + direction(turn) * high for turn in turns[::-1]]
+        vane = direction(first + wound * sweep / (2.5 * pi))
+        strokes.append(line(about, Pen.PIN, *ring))
+        strokes.append(line(about, Pen.PIN, at + vane * PIN, at + vane * (high - 0.5)))
+    return tuple(strokes)
+
+
+def mass_centre(at: Vector, about: str) -> tuple[Mark, ...]:
+    """A centre of mass: a circle of which two opposite quarters are black."""
+    quarters = [(at, *(at + direction(start + pi * k / 16.0) * MASS for k in range(9))) for start in (0.0, pi)]
+    whole = Circle(spot(at), MASS, Pen.PIN, about, Fill.PAPER)
+    return whole, *(area(about, Pen.PIN, Fill.SOLID, *corners) for corners in quarters)
 
 
 def cylinder(base: Vector, mouth: Vector, way: Vector, about: str) -> Line:

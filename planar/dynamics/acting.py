@@ -6,15 +6,17 @@ is held against it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from planar.algebra import Scalar, orders
+from planar.algebra import orders
 from planar.applied import MET, Load, Spring
+from planar.dynamics.attachment import Attachment, attachments
 from planar.dynamics.courses import factors
-from planar.mechanism import Mechanism, motions, named_points
+from planar.mechanism import motions
 from planar.motion import Moving
 from planar.plane import Frame, Vector
 from planar.program import size
@@ -44,14 +46,13 @@ class Field:
     def __init__(self, moving: Moving, shapes: Mapping[str, Shape]):
         self.moving, self.shapes = moving, shapes
         self.mechanism = moving.mechanism
-        self.points = carriers(self.mechanism)
         parts = [np.size(part) for frame in moving.frames.values() for part in orders(frame.angle)]
         self.many = max(parts, default=1)
+        self._known: dict[str, Array] = {}
 
     def frame(self, link: str) -> Frame:
         """A link's axes at every position, rates left out."""
-        frame = self.moving.frames[link]
-        return Frame(*(self._row(orders(part)[0]) for part in frame[:5]), frame.fixed)
+        return Frame(*self._parts(link)[0], self.moving.frames[link].fixed)
 
     @property
     def frames(self) -> dict[str, Frame]:
@@ -60,26 +61,33 @@ class Field:
 
     def at(self, link: str, place: Vector, rate: int = 0) -> Array:
         """Where a place of a link is, or one of its rates (n, 2)."""
-        carried = self.moving.frames[link].carry(place)
-        return np.stack([self._row(orders(each)[rate]) for each in carried], axis=-1)
+        x, y, cosine, sine, _ = self._parts(link)[rate]  # a place goes with these as they go
+        across, up = cosine * place.x - sine * place.y, sine * place.x + cosine * place.y
+        return np.stack([x + across, y + up], axis=-1)
 
     def turning(self, link: str, rate: int = 1) -> Array:
         """A link's angle or one of its rates (n,)."""
-        return self._row(orders(self.moving.frames[link].angle)[rate])
+        return self._parts(link)[rate][4]
 
-    def named(self, name: str) -> tuple[str, Vector]:
-        """The link that carries a named point, and where in its axes."""
-        link, point = self.points[name]
-        return link, self.shapes[link].at(point)
+    @cached_property
+    def attachments(self) -> Mapping[str, Attachment]:
+        """On which links loads and springs act."""
+        return attachments(self.mechanism)
 
     def velocity(self, link: str, at: Array) -> Array:
         """The velocity of what of a link is at places (n, 2) of the world."""
-        arm = at - self.at(link, Vector(0.0, 0.0))
-        turns = self.turning(link)[:, None] * np.stack([-arm[:, 1], arm[:, 0]], axis=-1)
-        return self.at(link, Vector(0.0, 0.0), 1) + turns
+        place, rate = self._parts(link)[:2]
+        return np.stack([rate[0] - rate[4] * (at[:, 1] - place[1]), rate[1] + rate[4] * (at[:, 0] - place[0])], axis=-1)
 
-    def _row(self, value: Scalar) -> Array:
-        return np.broadcast_to(np.asarray(value, dtype=float), (self.many,))
+    def _parts(self, link: str) -> Array:
+        """The five numbers of a link's axes, and their two rates (3, 5, n)."""
+        if link not in self._known:
+            found = np.empty((3, 5, self.many))
+            for k, part in enumerate(self.moving.frames[link][:5]):
+                for rate, value in enumerate(orders(part)[:3]):
+                    found[rate, k] = value
+            self._known[link] = found
+        return self._known[link]
 
 
 def acting(field: Field, time: Array | None, efforts: Array, inertia: bool) -> list[Acting]:
@@ -92,11 +100,26 @@ def acting(field: Field, time: Array | None, efforts: Array, inertia: bool) -> l
     return found + (list(_inertia(field)) if inertia else [])
 
 
-def power(field: Field, all_of: list[Acting]) -> Array:
+class Speeds(NamedTuple):
+    """How what something acts on moves: its place (acting, n, 2), m/s, and its link (acting, n), rad/s."""
+
+    velocity: Array
+    turning: Array
+
+
+def speeds(field: Field, all_of: Sequence[Acting]) -> Speeds:
+    """Of all that acts at once."""
+    velocity = [field.velocity(each.link, each.at) for each in all_of]
+    turning = [field.turning(each.link) for each in all_of]
+    many = len(all_of), field.many
+    return Speeds(np.array(velocity).reshape(*many, 2), np.array(turning).reshape(many))
+
+
+def power(field: Field, all_of: Sequence[Acting], at: Speeds) -> Array:
     """The power of each (acting, n), W."""
     rows = [
-        (each.force * field.velocity(each.link, each.at)).sum(axis=1) + each.couple * field.turning(each.link)
-        for each in all_of
+        each.force[:, 0] * velocity[:, 0] + each.force[:, 1] * velocity[:, 1] + each.couple * turning
+        for each, velocity, turning in zip(all_of, *at, strict=True)
     ]
     return np.array(rows).reshape(len(all_of), field.many)
 
@@ -111,7 +134,8 @@ def _loads(field: Field, time: Array | None) -> Iterator[Acting]:
 def _load(field: Field, load: Load, factor: Array) -> Iterator[Acting]:
     none = np.zeros((field.many, 2))
     if load.point is not None and load.force is not None:
-        link, place = field.named(load.point)
+        link, point = field.attachments[load.point][:2]
+        place = field.shapes[link].at(point)
         force = Vector(*load.force)
         turned = field.frame(load.axes).turn(force) if load.axes is not None else force
         wide = np.stack(np.broadcast_arrays(*turned, factor)[:2], axis=-1) * factor[:, None]
@@ -138,7 +162,8 @@ def _effort(field: Field, kind: str, name: str, pair: str, effort: Array) -> lis
 def _driven(field: Field, pair: str) -> Array:
     given = next(each for each in field.mechanism.inputs if each.pair == pair)
     inputs = getattr(field.moving, "inputs", {})
-    return field._row(inputs[pair].position if pair in inputs else given.position)
+    position = inputs[pair].position if pair in inputs else given.position
+    return np.broadcast_to(np.asarray(position, dtype=float), (field.many,))
 
 
 def _weights(field: Field) -> Iterator[Acting]:
@@ -175,7 +200,8 @@ def _spring(field: Field, spring: Spring, name: str) -> list[Acting]:
             Acting("spring", name, link, field.at(link, Vector(0.0, 0.0)), none, sense * couple)
             for link, sense in ((first, 1.0), (second, -1.0))
         ]
-    ends = [field.named(point) for point in spring.ends]
+    carried = [field.attachments[end] for end in spring.ends]
+    ends = [(each.link, field.shapes[each.link].at(each.point)) for each in carried]
     at, rate = ([field.at(*end, order) for end in ends] for order in (0, 1))
     way = at[1] - at[0]
     length = np.hypot(*way.T)
@@ -190,10 +216,3 @@ def _spring(field: Field, spring: Spring, name: str) -> list[Acting]:
         Acting("spring", name, link, place, sense * pull, 0.0 * length)
         for (link, _), place, sense in zip(ends, at, (1.0, -1.0), strict=True)
     ]
-
-
-def carriers(mechanism: Mechanism) -> dict[str, tuple[str, str]]:
-    """A (link, point) for every name of a point: as results have it, or `link.point`."""
-    named = named_points(mechanism)
-    own = {f"{link}.{point}": (link, point) for each in named for link, point in each.members}
-    return own | {each.name: each.members[0] for each in named}

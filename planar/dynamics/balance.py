@@ -9,8 +9,8 @@ import casadi as ca
 import numpy as np
 
 from planar.called import Called
-from planar.dynamics.work import Work, work
-from planar.mechanism import Mechanism
+from planar.dynamics.work import Work
+from planar.mechanism import Input, Mechanism
 
 Array = np.ndarray
 
@@ -67,7 +67,14 @@ class Balancing:
         return Balance(constraints, *(each[..., : self.many] for each in (drives, loads, inertia)))
 
 
-@lru_cache(maxsize=32)
 def balancing(mechanism: Mechanism) -> Balancing:
-    """The function of a mechanism, kept for the next time."""
-    return Balancing(work(mechanism))
+    """The function of a mechanism, kept for the next time, wherever its inputs then stand and however fast they run."""
+    inputs = tuple(Input(given.pair, 0.0) for given in mechanism.inputs)
+    loads = tuple(load._replace(varies=None) for load in mechanism.loads)
+    acted_on = mechanism.links, mechanism.pairs, inputs, loads, mechanism.springs, mechanism.masses, mechanism.gravity
+    return _balancing(Mechanism("", mechanism.frame, *acted_on))
+
+
+@lru_cache(maxsize=32)
+def _balancing(mechanism: Mechanism) -> Balancing:
+    return Balancing(Work(mechanism))

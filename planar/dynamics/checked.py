@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Iterator
 from math import isfinite
 
 from planar.applied import Load, Mass, Spring
-from planar.dynamics.acting import carriers
+from planar.dynamics.attachment import attachments
 from planar.errors import BadInput
-from planar.mechanism import Mechanism, motions
+from planar.mechanism import Mechanism, motions, named_points
 
 Wrong = Iterator[str]
 
@@ -25,12 +26,32 @@ def check(mechanism: Mechanism) -> None:
         raise BadInput("gravity", "gravity is two finite numbers")
 
 
+def refuse_unloaded(mechanism: Mechanism) -> None:
+    """Raise BadInput where a mechanism has no loads, springs or masses, so that there are no forces to be shown."""
+    if not (mechanism.loads or mechanism.springs or mechanism.masses):
+        raise BadInput("$.loads", _how_to_load(mechanism))
+
+
+def _how_to_load(mechanism: Mechanism) -> str:
+    """That nothing acts on a mechanism, and how what acts is written, with names of its own."""
+    frame = mechanism.frame
+    moving = [each.name for each in named_points(mechanism) if frame not in (link for link, _ in each.members)]
+    links = [link.name for link in mechanism.links if link.name != frame]
+    load = {"point": moving[-1], "force": [-100, 0]} if moving else {"link": links[-1], "torque": 10} if links else {}
+    mass = {"link": links[-1], "mass": 2, "at": [0, 0]} if links else {}
+    example = json.dumps({"loads": [load], "masses": [mass]}, ensure_ascii=False)[1:-1] if links else '"loads": []'
+    return (
+        "the mechanism has no loads, springs or masses; write forces (N) at points or torques (N m) on links, "
+        f"and masses (kg), as {example} in its file"
+    )
+
+
 class _Known:
     """The names of one mechanism."""
 
     def __init__(self, mechanism: Mechanism):
         self.names = {
-            "point": tuple(carriers(mechanism)),
+            "point": tuple(attachments(mechanism)),
             "link": tuple(link.name for link in mechanism.links),
             "pair": tuple(motions(mechanism)),
             "input": tuple(given.pair for given in mechanism.inputs),

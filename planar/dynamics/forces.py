@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.dynamics.acting import Acting, Field, acting, power
+from planar.dynamics.acting import Acting, Field, Speeds, acting, power, speeds
 from planar.dynamics.balance import Balancing, balancing
 from planar.dynamics.checked import check
 from planar.dynamics.courses import factors
@@ -130,7 +130,8 @@ def forces(moving: State | Motion, inertia: bool = True) -> Forces:
         )
     supplied, whys = efforts(solved)
     all_of = acting(field, time, supplied, inertia)
-    powers = power(field, all_of)
+    moved = speeds(field, all_of)
+    powers = power(field, all_of, moved)
     all_of = [each._replace(power=row) for each, row in zip(all_of, powers, strict=True)]
     told = {pair.name: reaction(pair, field, reactions, solved) for pair in mechanism.pairs}
     equilibrium, bodies = left_open(field, all_of, told, reactions.arm)
@@ -145,7 +146,7 @@ def forces(moving: State | Motion, inertia: bool = True) -> Forces:
         told,
         tuple(all_of),
         undetermined,
-        Proof(_open(powers, field, all_of), routes, equilibrium),
+        Proof(_open(powers, all_of, moved), routes, equilibrium),
         bodies,
     )
     return _at_one(found) if one else found
@@ -156,41 +157,41 @@ def _balanced(equations: Balancing, field: Field, time: Array | None, inertia: b
     body, moving = equations.work, field.moving
     inputs = {name: np.broadcast_to(each.position, (field.many,)) for name, each in moving.inputs.items()}
     q, q1, q2 = body.coordinates(moving)
-    balance = equations.over(q, q1, q2, factors(body.mechanism, inputs, time, field.many), body.wound(q[0]))
+    balance = equations.over(q, q1, q2, factors(moving.mechanism, inputs, time, field.many), body.wound(q[0]))
     if not inertia:
         balance = balance._replace(inertia=np.zeros_like(balance.inertia))
     return Reactions(equations, balance, field)
 
 
-def _open(powers: Array, field: Field, all_of: Sequence[Acting]) -> float | None:
+def _open(powers: Array, all_of: Sequence[Acting], moved: Speeds) -> float | None:
     """What all powers (acting, n) add up to, beside the greatest of them; None where that is rounding alone."""
     told = np.isfinite(powers).all(axis=0)
     greatest = float(np.abs(powers[:, told]).max(initial=0.0))
-    if greatest <= ROUNDED * _could(field, all_of):
+    if greatest <= ROUNDED * _could(all_of, moved):
         return None
     return float(np.abs(powers[:, told].sum(axis=0)).max(initial=0.0)) / greatest
 
 
-def _could(field: Field, all_of: Sequence[Acting]) -> float:
+def _could(all_of: Sequence[Acting], moved: Speeds) -> float:
     """The power that the greatest force would have at the greatest speed: powers are rounding beside it."""
-    pushed, fastest = _most(each.force for each in all_of), _most(field.velocity(each.link, each.at) for each in all_of)
-    turned, spun = _most(each.couple for each in all_of), _most(field.turning(each.link) for each in all_of)
-    return pushed * fastest + turned * spun
+    pushed, turned = _most(each.force for each in all_of), _most(each.couple for each in all_of)
+    return pushed * _most(moved.velocity) + turned * _most(moved.turning)
 
 
 def _most(values: Iterable[Array | float]) -> float:
-    return max((float(np.abs(np.nan_to_num(each)).max(initial=0.0)) for each in values), default=0.0)
+    flat = [np.ravel(each) for each in values]
+    return float(np.abs(np.nan_to_num(np.concatenate(flat))).max(initial=0.0)) if flat else 0.0
 
 
 def _routes(state: State, field: Field, all_of: Sequence[Acting], supplied: Array) -> float | None:
     """How far the efforts are from those by virtual power, beside what each input would supply against every part."""
-    worst = None
+    worst, others = None, [each for each in all_of if each.kind != "input"]
     for given, effort in zip(state.mechanism.inputs, supplied, strict=True):
-        others = [each for each in all_of if each.kind != "input"]
         unit = Field(alone(state, given.pair), field.shapes)
-        parts = power(unit, others)
+        moved = speeds(unit, others)
+        parts = power(unit, others, moved)
         whole = float(np.abs(parts).sum())
-        could = _could(unit, others)
+        could = _could(others, moved)
         beside = whole if whole > ROUNDED * could else could
         if beside and np.isfinite(effort):
             worst = max(worst or 0.0, abs(float(parts.sum() + effort)) / beside)

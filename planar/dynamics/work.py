@@ -18,7 +18,7 @@ import numpy as np
 
 from planar.algebra import orders
 from planar.applied import MET, Load, Mass, Spring
-from planar.dynamics.acting import carriers
+from planar.dynamics.attachment import Attachment, attachments
 from planar.mechanism import Mechanism, motions
 from planar.motion import Moving
 from planar.pairs import Pair
@@ -39,7 +39,7 @@ class Work:
         self.links = tuple(link.name for link in mechanism.links if link.name != mechanism.frame)
         self.column = {link: 3 * k for k, link in enumerate(self.links)}
         self.named = motions(mechanism)
-        self.carriers = carriers(mechanism)
+        self.attachments = attachments(mechanism)
         own = {pair.name: len(pair.coordinates) for pair in mechanism.pairs}
         self.many = 3 * len(self.links)
         self.q, self.q1, self.q2 = (ca.SX.sym(name, self.many + sum(own.values())) for name in ("q", "q1", "q2"))
@@ -183,7 +183,8 @@ class Work:
         if spring.turns:
             way = self.frames[second].angle - self.frames[first].angle - spring.free - self.turns[number]
             return 0.5 * spring.stiffness * way**2, 0.5 * spring.damping * self._rate(way) ** 2
-        apart = ca.vertcat(*(self.point(second) - self.point(first)))
+        ends = self.attachments
+        apart = ca.vertcat(*(self.place(ends[second]) - self.place(ends[first])))
         square = ca.dot(apart, apart)
         away = ca.sqrt(square)
         met = square <= (MET * self.unit) ** 2
@@ -200,7 +201,7 @@ class Work:
         found, effort = ca.SX.zeros(q.numel()), ca.SX.zeros(q.numel())
         if load.point is not None and load.force is not None:
             force = Vector(*load.force)
-            at = ca.vertcat(*self.point(load.point))
+            at = ca.vertcat(*self.place(self.attachments[load.point]))
             turned = self.frames[load.axes].turn(force) if load.axes is not None else force
             found += ca.jtimes(at, q, ca.vertcat(*turned), True)
         if load.link is not None and load.torque is not None and load.link in self.column:
@@ -210,10 +211,9 @@ class Work:
             effort += load.effort * ca.gradient(pair.drive(*self.of(pair)), q)
         return found, effort
 
-    def point(self, name: str) -> Vector:
-        """Where a named point is."""
-        link, point = self.carriers[name]
-        return self.frames[link].carry(self.shapes[link].at(point))
+    def place(self, at: Attachment) -> Vector:
+        """Where something acts."""
+        return self.frames[at.link].carry(self.shapes[at.link].at(at.point))
 
     def _rate(self, value: ca.SX) -> ca.SX:
         return ca.jtimes(value, self.q, self.q1)

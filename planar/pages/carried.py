@@ -17,6 +17,8 @@ from planar.assemblies.modes import modes
 from planar.branches.circuits import circuits
 from planar.dimensions import Dimension, changed, dimensions
 from planar.drawing.bodies import all_marks
+from planar.drawing.elements import Element
+from planar.drawing.symbols import COILS
 from planar.graph import numbered
 from planar.mechanism import Mechanism, counting, misfits, named_points
 from planar.motion import State
@@ -160,6 +162,7 @@ def looks(mechanism: Mechanism, numbers: Numbers) -> dict[str, Any]:
         "points": points,
         "names": list(points),
         "marks": [_mark(mark, numbers) for mark in all_marks(numbers.mechanism, numbers.shapes)],
+        "coils": COILS,
     }
 
 
@@ -258,7 +261,7 @@ def _as_far(mechanism: Mechanism, each: Dimension, value: float, to: float) -> f
     return value
 
 
-def _mark(mark: Mark, numbers: Numbers) -> dict[str, Any]:
+def _mark(mark: Mark | Element, numbers: Numbers) -> dict[str, Any]:
     """A mark with its numbers as places."""
 
     def told(value: Any) -> Any:

@@ -20,7 +20,7 @@ from planar.pages.page import filled, page, told
 from planar.solving.cycle import cycle
 from planar.solving.position import known_of
 
-SCRIPTS = ("bodies.js", "symbols.js", "ground.js", "letters.js", "drawing.js", "gallery.js")
+SCRIPTS = ("bodies.js", "symbols.js", "ground.js", "springs.js", "letters.js", "drawing.js", "gallery.js")
 STYLES = ("page.css", "stage.css", "gallery.css", "print.css")
 """The drawing as pages have it, and what moves many of them."""
 

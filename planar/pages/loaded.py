@@ -8,6 +8,7 @@ from typing import Any
 import casadi as ca
 
 from planar.applied import Course, Load, Spring
+from planar.dynamics.attachment import choices
 from planar.dynamics.forces import forces
 from planar.dynamics.told import borne
 from planar.dynamics.unit_rates import slides
@@ -88,6 +89,7 @@ def loaded(mechanism: Mechanism, d: ca.SX, state: State, unit: float) -> tuple[d
         "massive": bool(mechanism.masses),
         "timed": any(load.varies is not None and load.varies.input is None for load in mechanism.loads),
         "untold": _untold(state),
+        "choices": list(choices(mechanism)),
     }
     data["inertia"] = rows.add(work.inertia.T)[0]
     table = ca.vertcat(*rows.rows)
@@ -158,7 +160,8 @@ def _acting(rows: Rows) -> Iterator[dict[str, Any]]:
         if spring.turns:
             ends = [(link, rows.origin(link)) for link in spring.ends]
         else:
-            ends = [(work.carriers[point][0], rows.place(work.point(point))) for point in spring.ends]
+            hung = [work.attachments[end] for end in spring.ends]
+            ends = [(each.link, rows.place(work.place(each))) for each in hung]
         yield {"kind": "spring", "name": str(number), "row": row, "on": ends}
         row += 1
 
@@ -167,7 +170,8 @@ def _loaded_links(load: Load, rows: Rows) -> Mapping[str, int]:
     """The links on which a load acts, each with the place."""
     on: dict[str, int] = {}
     if load.point is not None:
-        on[rows.work.carriers[load.point][0]] = rows.place(rows.work.point(load.point))
+        at = rows.work.attachments[load.point]
+        on[at.link] = rows.place(rows.work.place(at))
     if load.link is not None:
         on.setdefault(load.link, rows.origin(load.link))
     if load.pair is not None:

@@ -41,6 +41,7 @@ SCRIPTS = (
     "bodies.js",
     "symbols.js",
     "ground.js",
+    "springs.js",
     "letters.js",
     "poses.js",
     "drawing.js",

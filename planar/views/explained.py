@@ -12,6 +12,7 @@ from planar.analysis.notation import Row
 from planar.analysis.phrases import Paper, Phrase, number, plain
 from planar.analysis.sections import Section
 from planar.analysis.solution import LinkResult, PointResult, SlideResult, Solution, Worked
+from planar.dynamics.attachment import choices
 from planar.units import Unit, shown, unit
 from planar.views.table import heading, paragraphs, plain_table, published
 
@@ -34,7 +35,7 @@ def explained(solution: Solution, scales: Scales | None = None) -> RenderableTyp
     parts += [Text(), *_results(solution)]
     if solution.comparisons:
         parts.append(published(solution.comparisons, mechanism.units))
-    notes = [*solution.state.remarks, *mechanism.notes]
+    notes = [*choices(mechanism), *solution.state.remarks, *mechanism.notes]
     if notes:
         parts += [Text("Notes", style="bold"), paragraphs(("-", note) for note in notes)]
     return Group(*parts)

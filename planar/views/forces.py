@@ -10,6 +10,7 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planar.analysis.published import Comparison
+from planar.dynamics.attachment import choices
 from planar.dynamics.forces import Forces
 from planar.dynamics.told import Reaction
 from planar.errors import Outcome
@@ -50,7 +51,7 @@ def tables(forces: Forces, advantages: ratios.Advantages, comparisons: Sequence[
         parts += [published(comparisons, units), Text()]
     parts.append(paragraphs(proved(forces)))
     notes = (*undetermined(forces), *_time(forces), *dict.fromkeys(each.why for each in told if each.why))
-    notes += state.remarks
+    notes += (*choices(forces.mechanism), *state.remarks)
     if notes:
         parts += [Text(), paragraphs(("-", sentence) for sentence in notes)]
     return Group(*head, *parts)
@@ -205,7 +206,7 @@ def record(forces: Forces, advantages: ratios.Advantages, comparisons: Sequence[
         "power": {"in": _known(forces.power_in), "out": forces.power_out},
         "advantage": ratios.record(advantages),
         **said(forces),
-        "remarks": list(forces.moving.remarks),
+        "remarks": [*choices(forces.mechanism), *forces.moving.remarks],
     }
     return found | ({"published": [each.record() for each in comparisons]} if comparisons else {})
 

@@ -9,6 +9,7 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from planar.dynamics.attachment import choices
 from planar.dynamics.forces import Forces
 from planar.dynamics.told import Reaction
 from planar.views import forces as at_one
@@ -27,7 +28,7 @@ def tables(forces: Forces) -> RenderableType:
     motion = forces.moving
     parts: list[RenderableType] = [*head(motion), Text(at_one.balanced(forces)), Text(), _efforts(forces)]
     parts += [_reactions(forces), paragraphs([*_shaking(forces), *at_one.proved(forces)])]
-    notes = (*_undetermined(forces), *motion.remarks)
+    notes = (*_undetermined(forces), *choices(forces.mechanism), *motion.remarks)
     if notes:
         parts += [Text(), paragraphs(("-", sentence) for sentence in notes)]
     return Group(*parts)
@@ -146,4 +147,5 @@ def _values(each: Reaction) -> dict[str, Array]:
 def said(forces: Forces) -> dict[str, Any]:
     """What is said of the whole motion, as JSON values; forces in a pair are on the second of the links `between`."""
     between = {name: list(each.links) for name, each in forces.reactions.items()}
-    return {"between": between, **at_one.said(forces)}
+    remarks = [*choices(forces.mechanism), *forces.moving.remarks]
+    return {"between": between, "remarks": remarks, **at_one.said(forces)}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from rich.console import Group, RenderableType
 from rich.text import Text
 
@@ -25,7 +27,18 @@ def inspection(found: Inspection) -> RenderableType:
         *((" ", f"{len(pairs)} {kind}: {', '.join(pairs)}") for kind, pairs in found.pairs),
         *_mobility(found),
     ]
-    return Group(Text(found.name, style="bold"), Text(), paragraphs(said), Text(), links)
+    return Group(Text(found.name, style="bold"), Text(), paragraphs(said), Text(), links, *_acting(found))
+
+
+def _acting(found: Inspection) -> Iterator[RenderableType]:
+    """Loads, springs and masses, where there are any."""
+    if found.actions:
+        acting = plain_table("Loads, springs and masses", "what", "at", "on", "how much", left=(0, 1, 2, 3))
+        for each in found.actions:
+            acting.add_row(each.kind, each.at, listed(each.links) if each.links else "", each.amount)
+        yield acting
+    if found.remarks:
+        yield paragraphs(("-", remark) for remark in found.remarks)
 
 
 def _mobility(found: Inspection) -> list[tuple[str, str]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from planar.dynamics.acting import Acting, Field
 from planar.dynamics.forces import Forces
-from planar.mechanism import Mechanism, Units, named_points
+from planar.mechanism import Units
 from planar.units import shown, unit
 from planar.views.fitted import FittedTable
 from planar.views.table import ROUNDING, counted, heading, plain_table
@@ -91,17 +90,3 @@ def record(rows: Iterable[Moved]) -> list[dict[str, Any]]:
         | {"velocity": each.velocity.tolist(), "angular_velocity": each.angular_velocity, "power": each.acting.power}
         for each in rows
     ]
-
-
-def where_to_write(mechanism: Mechanism) -> str:
-    """That nothing acts on a file's mechanism, and how it is written, with names of its own."""
-    frame = mechanism.frame
-    moving = [each.name for each in named_points(mechanism) if frame not in (link for link, _ in each.members)]
-    links = [link.name for link in mechanism.links if link.name != frame]
-    load = {"point": moving[-1], "force": [-100, 0]} if moving else {"link": links[-1], "torque": 10}
-    mass = {"link": links[-1], "mass": 2, "at": [0, 0]}
-    example = json.dumps({"loads": [load], "masses": [mass]}, ensure_ascii=False)[1:-1] if links else '"loads": []'
-    return (
-        "the mechanism has no loads, springs or masses; write forces (N) at points or torques (N m) on links, "
-        f"and masses (kg), as {example} in its file"
-    )

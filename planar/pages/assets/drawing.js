@@ -2,7 +2,7 @@
 /* The mechanism drawn as in a textbook: one group per link and height, moved by a transform; what stands still below,
    pins and letters above. `page.view` says where places in the world lie on the screen. */
 
-const HEIGHTS = ["ground", "plates", "wheels", "tubes", "bars", "sliders", "pins", "drives", "letters"];
+const HEIGHTS = ["ground", "plates", "wheels", "tubes", "bars", "springs", "sliders", "pins", "drives", "letters"];
 const MARGIN = 12;     // mm about everything that moves
 const FOOT = 6;        // mm below for the bar of the scale
 const FINGER = 24;     // px: as wide a link can be taken hold of
@@ -98,7 +98,7 @@ class Drawing {
     for (const [link, body] of Object.entries(this.look)) {
       found[link] = [...body.sides.flat(), ...body.tracers.flat(), ...body.joints, ...body.dots, ...body.guides.map((each) => each.foot)];
     }
-    for (const { link, at } of this.marks.filter((mark) => mark.kind === "Block")) found[link].push(at);
+    for (const { link, at } of this.marks.filter((mark) => ["Block", "Centre"].includes(mark.kind))) found[link].push(at);
     return found;
   }
 
@@ -167,6 +167,7 @@ class Drawing {
       for (const side of body.tracers) this.bar(link, "tracer", ...side);
       this.guideLines(link, body);
     }
+    this.springs = new Springs(this);
     this.sliders(moving);
   }
 
@@ -237,6 +238,7 @@ class Drawing {
       this.avoid(mark.link, corner(1, 1), corner(-1, 1), corner(-1, -1), corner(1, -1), corner(1, 1));
       if (mark.link !== frame) this.edge(mark.link, corner(-1, 0), corner(1, 0));
     }
+    massCentres(this);
     for (const mark of marks) {
       const at = { Pin: [mark.links?.[0], mark.at?.[0]], Opening: [mark.pin, mark.at] }[mark.kind];
       if (!at) continue;
@@ -345,6 +347,10 @@ class Drawing {
       name, away: (blocks.has(name) ? Symbols.BLOCK[1] / 2 + 0.5 : this.pinned.has(name) ? Symbols.PIN + 0.5 : 0.9) * mm,
     }));
     this.spots = points.map(([, { links, at }]) => [links[0], this.px(at[0].map((k) => this.page.size(k)))]);
+    for (const { link, at, letter } of marks.filter((mark) => mark.kind === "Centre" && mark.letter)) {
+      items.push({ name: letter, away: (Symbols.MASS + 0.4) * mm });
+      this.spots.push([link, this.px(at)]);
+    }
     this.letters = new Letters(this.levels.letters, items, Math.max(13, 3.3 * mm));
   }
 
@@ -367,6 +373,7 @@ class Drawing {
       const [p, q] = [first, second].map((wheel) => this.screen(wheel.link, this.px(wheel.centre)));
       group.setAttribute("transform", `translate(${p[0].toFixed(2)},${p[1].toFixed(2)}) rotate(${((Math.atan2(q[1] - p[1], q[0] - p[0]) * 180) / Math.PI).toFixed(3)})`);
     }
+    this.springs.place();
     this.stroke();
     if (!this.inside() && !this.growing) return this.grow();
     const settled = this.letters.place(this.spots.map(([link, at]) => this.screen(link, at)), this.strokes, [this.width, this.height], jump);
@@ -379,7 +386,8 @@ class Drawing {
   /** Where all strokes are on the screen, [x, y, x, y, ...]; sixty times a second, so nothing is made anew. */
   stroke() {
     const { page, scale, origin, edges } = this;
-    if (this.strokes?.length !== 4 * edges.length) this.strokes = new Float64Array(4 * edges.length);
+    const many = 4 * edges.length + this.springs.room;
+    if (this.strokes?.length !== many) this.strokes = new Float64Array(many);
     for (let k = 0; k < edges.length; k++) {
       const f = page.frames[edges[k][0]], x = origin[0] + f.x * scale, y = origin[1] - f.y * scale;
       for (let end = 0; end < 2; end++) {
@@ -388,6 +396,7 @@ class Drawing {
         this.strokes[4 * k + 2 * end + 1] = y - f.sin * at[0] + f.cos * at[1];
       }
     }
+    this.springs.avoided(this.strokes, 4 * edges.length);
   }
 
   /** Whether everything is on the picture; several inputs together may leave what each alone covers. */

@@ -77,6 +77,14 @@ function groundOf(scene) {
   const made = [], lines = [], sides = Object.create(null), seen = new Set(), middle = strokes.middle();
   const pinned = marks.filter((mark) => mark.kind === "Pin" && mark.links.includes(frame));
   const fixed = pinned.map((mark) => px(mark.at[mark.links.indexOf(frame)]));
+  for (const { kind, name, links, at } of marks) { // where springs hang on the frame, but at its pins
+    if (kind === "Coil") links.forEach((link, k) => {
+      const spot = px(at[k]);
+      if (link !== frame || fixed.some((other) => Plane.apart(other, spot) < 0.05 * mm)) return;
+      pinned.push({ name: `${name} ${k}` });
+      fixed.push(spot);
+    });
+  }
   for (const at of fixed) strokes.add(on(at, [1, 0], -Symbols.PIN * mm), on(at, [1, 0], Symbols.PIN * mm));
   const banded = new Set(marks.filter((mark) => mark.kind === "Band").map((mark) => mark.name));
 

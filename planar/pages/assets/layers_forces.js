@@ -142,7 +142,8 @@ const forceArrows = {
 
 /** What else there is to say of forces. */
 function forceNotes(page, found) {
-  return [found.why, page.data.forces.timed ? "loads that vary with time are those at 0 s" : ""].filter(Boolean);
+  const { timed, choices } = page.data.forces;
+  return [found.why, timed ? "loads that vary with time are those at 0 s" : "", ...choices].filter(Boolean);
 }
 
 /** The index of a load's, weight's, spring's or input's letter. */

@@ -48,9 +48,13 @@ function inputTold(page, value, k) {
 
 /** The rates of an input at which the numbers are: ", ω = 10.5 rad/s, α = −26 rad/s²"; nothing where it rests. */
 function ratesTold(page, k) {
-  const { slides, velocity, acceleration } = page.data.inputs[k], [letters, unit] = slides ? ["va", "m/s"] : ["ωα", "rad/s"];
+  const { slides, velocity, acceleration } = page.data.inputs[k], letters = slides ? "va" : "ωα";
   if (!velocity && !acceleration) return "";
-  return `, ${letters[0]} = ${short(velocity)} ${unit}, ${letters[1]} = ${short(acceleration)} ${unit}²`;
+  const kinds = slides ? ["velocity", "acceleration"] : ["angular velocity", "angular acceleration"];
+  return [velocity, acceleration].map((rate, order) => {
+    const [by, name] = unitOf(page, kinds[order]);
+    return `, ${letters[order]} = ${short(rate * by)} ${name}`;
+  }).join("");
 }
 
 function lengthTold(page, value) {

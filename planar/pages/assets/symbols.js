@@ -12,6 +12,10 @@ const Symbols = (() => {
   const RIM = 1.8;                       // from the pitch circle of an internal wheel to its rim
   const BAR = 2.4;                       // the height of a rack behind its pitch line
   const BORE = 4.4;                      // the width of a cylinder
+  const MASS = 1.9;                      // the radius of a centre of mass
+  const WIDE = 1.9;                      // half the width of a spring
+  const SPIRAL = [1.9, 4.6], ROUNDS = 2; // least and greatest radius of a torsional spring, and its turns
+  const VANE = [5.4, 7.8, 1.9];          // radii of a torsional damper, and how far it reaches round (rad)
   const SLOT = 3.6;                      // the width of a slot
 
   /** An SVG element; attributes and texts are set as such, never parsed. */
@@ -146,7 +150,40 @@ const Symbols = (() => {
     return area("drive-head", tip, plus(foot, across), minus(foot, across));
   }
 
+  /** A spring or a damper between two places, of its paths [[part of the length, mm off the line], ...], as a path's d. */
+  function coil(start, stop, paths, mm) {
+    const whole = minus(stop, start), left = quarter(unit(whole));
+    return paths.map((path) => `M${told(path.map(([part, off]) => on(on(start, whole, part), left, off * mm)))}`).join("");
+  }
+
+  /** An angle less whole turns, from -half a turn to half a turn. */
+  function wrapped(turn) { return turn - 2 * Math.PI * Math.round(turn / (2 * Math.PI)); }
+
+  /** A torsional spring, or damper, about a pin between the directions of two links, as planar.drawing.symbols has it. */
+  function spiral(at, first, second, wound, symbol, mm) {
+    const spot = (turn, radius) => [at[0] + radius * mm * Math.cos(turn), at[1] - radius * mm * Math.sin(turn)], paths = [];
+    if (symbol !== "damper") {
+      const [low, high] = SPIRAL, far = 2 * Math.PI * ROUNDS + wrapped(second - first - wound) + wound;
+      paths.push(Array.from({ length: 61 }, (_, k) => spot(first + (far * k) / 60, high + ((low - high) * k) / 60)));
+    }
+    if (symbol !== "spring") {
+      const [low, high, sweep] = VANE, turns = Array.from({ length: 13 }, (_, k) => first - sweep / 2 + (sweep * k) / 12);
+      const vane = first + (wound * sweep) / (2.5 * Math.PI);
+      paths.push([...turns.map((turn) => spot(turn, low)), ...turns.reverse().map((turn) => spot(turn, high))]);
+      paths.push([spot(vane, PIN), spot(vane, high - 0.5)]);
+    }
+    return paths.map((path) => `M${told(path)}`).join("");
+  }
+
+  /** A centre of mass: a circle of which two opposite quarters are black. */
+  function massCentre(at, mm) {
+    const r = short(MASS * mm), [x, y] = at.map(short);
+    const quarters = `M${x},${y}L${short(x + r)},${y}A${r},${r},0,0,0,${x},${short(y - r)}ZM${x},${y}L${short(x - r)},${y}A${r},${r},0,0,0,${x},${short(y + r)}Z`;
+    return [circle("mass", at, MASS * mm), element("path", { class: "quarters", d: quarters })];
+  }
+
   return {
+    coil, spiral, wrapped, massCentre, MASS, WIDE,
     element, quarter, told, line, area, rail, support, pin, dot, block, opening, cylinder, piston, rack, wheel, rimHatching,
     band, arc, arrow, PIN, BLOCK, STAND, BASE, HATCH, SLOT, BAR,
   };
