@@ -20,6 +20,7 @@ import pytest
 from rich.console import Console
 
 import planar
+from planar.cli import main
 from planar.drawing.panels import panels
 from planar.drawing.picture import Letter
 from planar.drawing.scheme import scheme
@@ -352,3 +353,12 @@ def test_a_saved_table_holds_what_is_wider_than_a_page(suffix: str) -> None:
         wide = float(re.search(r'viewBox="0 0 ([\d.]+)', text).group(1))
         ends = [float(x) + float(w) for x, w in re.findall(r'<text[^>]*x="([\d.]+)"[^>]*textLength="([\d.]+)"', text)]
         assert max(ends) <= wide
+
+
+@pytest.mark.parametrize("width", [60, 80])
+def test_the_list_of_commands_has_every_sentence_whole(width: int, tmp_path: Path) -> None:
+    text = run(tmp_path, "--help", COLUMNS=str(width)).done()
+    assert "..." not in text.split("Commands:")[1]
+    for command in main.commands.values():
+        assert " ".join(command.help.split()) in " ".join(text.split())
+    assert all(len(line) <= 80 for line in text.splitlines())
