@@ -20,12 +20,14 @@ import pytest
 from rich.console import Console
 
 import planar
+from planar.cli import main
 from planar.drawing.panels import panels
 from planar.drawing.picture import Letter
 from planar.drawing.scheme import scheme
 from planar.pages.carried import carried
 from planar.views.fitted import plain_table
-from planar.views.table import kept, paragraphs
+from planar.views.saved import written
+from planar.views.table import direction, kept, paragraphs
 from tests.command import FROM_OUTSIDE, ROOT, run
 
 WIDTHS = (40, 60, 80, 100, 200)
@@ -333,3 +335,30 @@ def test_a_ratio_of_like_for_like_has_no_unit(tmp_path: Path) -> None:
         if re.search(r"\bI\d\d I\d\d", each)
     ]
     assert line.split() == ["output", "shaft", "O1", "9.00000", "9.00000", "I14", "I13", "I34"]
+
+
+def test_a_direction_lies_above_minus_180_up_to_180_degrees() -> None:
+    """Of a vector to the left, whatever rounding leaves of its other part."""
+    told = [direction(np.array([-2.0, y])) for y in (0.0, -0.0, 1e-16, -1e-16)]
+    assert told == [pi] * 4
+    assert direction(np.array([0.0, -3.0])) == -pi / 2.0
+
+
+@pytest.mark.parametrize("suffix", [".txt", ".svg", ".html"])
+def test_a_saved_table_holds_what_is_wider_than_a_page(suffix: str) -> None:
+    name = "a" * 150
+    text = written(table([(name, "12345.6", "-140.000", "to the left", "-1599.61")]), suffix)
+    assert name in text
+    if suffix == ".svg":
+        wide = float(re.search(r'viewBox="0 0 ([\d.]+)', text).group(1))
+        ends = [float(x) + float(w) for x, w in re.findall(r'<text[^>]*x="([\d.]+)"[^>]*textLength="([\d.]+)"', text)]
+        assert max(ends) <= wide
+
+
+@pytest.mark.parametrize("width", [60, 80])
+def test_the_list_of_commands_has_every_sentence_whole(width: int, tmp_path: Path) -> None:
+    text = run(tmp_path, "--help", COLUMNS=str(width)).done()
+    assert "..." not in text.split("Commands:")[1]
+    for command in main.commands.values():
+        assert " ".join(command.help.split()) in " ".join(text.split())
+    assert all(len(line) <= 80 for line in text.splitlines())

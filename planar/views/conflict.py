@@ -24,7 +24,7 @@ def conflict_table(conflict: Conflict, runs: Sequence[Circuits]) -> RenderableTy
     parts: list[RenderableType] = [*head, paragraphs((" -", each) for each in (*conflict.said, *map(_within, runs)))]
     changes = (*conflict.dimensions, *conflict.positions)
     if changes:
-        table = plain_table("It would go together with one of these changed", "", "to", "instead of", "change")
+        table = plain_table("It would go together with one of these changed", "what", "to", "instead of", "change")
         for each in changes:
             by = amount(each.value - each.was, each.kind, units)
             table.add_row(each.name, each.shown, amount(each.was, each.kind, units), by)

@@ -12,7 +12,7 @@ from planar.dynamics.forces import Forces
 from planar.mechanism import Units
 from planar.units import shown, unit
 from planar.views.fitted import FittedTable
-from planar.views.table import ROUNDING, counted, heading, plain_table
+from planar.views.table import ROUNDING, counted, direction, heading, plain_table
 
 Array = np.ndarray
 
@@ -77,8 +77,7 @@ def arrow(vector: Array | None, degree: str, beside: float = 0.0) -> tuple[str, 
     if vector is None or not np.isfinite(vector).all():
         return "-", "-"
     size = float(np.hypot(*vector))
-    x, y = (float(part) if abs(part) > ROUNDING * size else 0.0 for part in vector)
-    way = counted(unit(degree).from_si(float(np.arctan2(y, x)))) if size > ROUNDING * beside else ""
+    way = counted(unit(degree).from_si(direction(vector))) if size > ROUNDING * beside else ""
     return counted(size, beside), way
 
 

@@ -108,7 +108,7 @@ def _rows(modes: Modes, shown: Sequence[Mode], names: Sequence[str], circuits: C
         "proved",
         "",
         left=(len(names) + leading + 2, len(names) + leading + 3),
-        keys=1 + leading,
+        keys=1 + several,
     )
     by = unit(length)
     for mode in shown:

@@ -5,21 +5,22 @@ from __future__ import annotations
 import io
 import re
 
+from rich.cells import cell_len
 from rich.console import Console, RenderableType
 from rich.terminal_theme import DEFAULT_TERMINAL_THEME
 
 from planar.errors import BadInput
 
 WIDTH = 124
-"""Characters; the widest table of a textbook mechanism takes about 120."""
+"""Characters, but for what cannot be narrower."""
 
 
 def written(renderable: RenderableType, suffix: str) -> str:
     """Tables in the format that a file's suffix names. Raises BadInput."""
-    console = Console(
-        record=True, width=WIDTH, file=io.StringIO(), force_terminal=True, markup=False, emoji=False, highlight=False
-    )
-    console.print(renderable, crop=False)
+    console = _printed(renderable, WIDTH)
+    longest = max(map(cell_len, console.export_text(clear=False).splitlines()), default=0)
+    if longest > WIDTH:  # a picture would be cut where its width ends
+        console = _printed(renderable, longest)
     formats = {
         ".txt": console.export_text,
         ".html": lambda: console.export_html(theme=DEFAULT_TERMINAL_THEME),
@@ -28,6 +29,15 @@ def written(renderable: RenderableType, suffix: str) -> str:
     if suffix not in formats:
         raise BadInput(suffix or "the file", f"tables are written to {', '.join(formats)} files")
     return formats[suffix]()
+
+
+def _printed(renderable: RenderableType, width: int) -> Console:
+    """A console on which it stands."""
+    console = Console(
+        record=True, width=width, file=io.StringIO(), force_terminal=True, markup=False, emoji=False, highlight=False
+    )
+    console.print(renderable, crop=False)
+    return console
 
 
 def _without_fonts(svg: str) -> str:

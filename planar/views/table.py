@@ -149,7 +149,7 @@ def _points(state: State) -> FittedTable:
 def _arrow(vector: np.ndarray, of: Unit, units: Units) -> tuple[str, str]:
     """A vector's magnitude and direction; without a direction where it is nothing."""
     size = float(np.hypot(*vector))
-    way = number(unit(units.angle).from_si(float(np.arctan2(vector[1], vector[0])))) if size > 1e-14 else ""
+    way = number(unit(units.angle).from_si(direction(vector))) if size > 1e-14 else ""
     return number(of.from_si(size)), way
 
 
@@ -197,6 +197,13 @@ def _relative(text: str, relative: RelativeState, state: State) -> RenderableTyp
 
 def _reported(value: float | None, kind: str, units: Units) -> str:
     return "-" if value is None else number(shown(kind, units)[1].from_si(value))
+
+
+def direction(vector: np.ndarray) -> float:
+    """The direction of a vector (rad), above -pi up to pi; what rounding leaves of a part is none."""
+    least = ROUNDING * float(np.hypot(*vector))
+    x, y = (float(part) if abs(part) > least else 0.0 for part in vector)
+    return float(np.arctan2(y, x))
 
 
 def kept(value: float, of: str = "") -> str:

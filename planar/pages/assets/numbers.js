@@ -27,8 +27,13 @@ const QUANTITIES_OF = {
 
 function size2(vector) { return vector ? Math.hypot(...vector) : undefined; }
 
-/** Of a vector; none of one that is nothing but rounding. */
-function direction(vector) { return vector && Math.hypot(...vector) > 1e-14 ? Math.atan2(vector[1], vector[0]) : undefined; }
+/** Of a vector, above −π up to π, with parts that are nothing but rounding left out; none of one that is nothing else. */
+function direction(vector) {
+  const size = vector && Math.hypot(...vector);
+  if (!(size > 1e-14)) return undefined;
+  const [x, y] = vector.map((part) => (Math.abs(part) > 1e-12 * size ? part : 0));
+  return Math.atan2(y, x);
+}
 
 /** Between −π and π, unless the link's angle counts turns. */
 function wrapped(angle, counts) {
