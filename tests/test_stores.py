@@ -108,6 +108,21 @@ def test_whatever_file_of_a_store_is_damaged_its_block_is_solved_again_or_the_st
         assert {each.name for each in files_of(store)} == {each.name for each in sound}
 
 
+def test_a_store_whose_own_mark_is_damaged_is_refused(store):
+    little(store)
+    mark = store / {".zarr": "zarr.json", ".parquet": "_planar.json"}[store.suffix]
+    sound = mark.read_text()
+    for wrong in (
+        re.sub(r'"block": 2', '"block": 0', sound),
+        sound[:-3],
+        sound.replace('"fingerprint"', '"fingerprinu"'),
+    ):
+        assert wrong != sound
+        mark.write_text(wrong)
+        with pytest.raises(BadInput, match="something else than this sweep"):
+            little(store)
+
+
 @pytest.mark.parametrize("damage", DAMAGES)
 def test_what_is_damaged_is_never_read_as_a_number(store, damage):
     found = little(store)

@@ -41,7 +41,7 @@ class Store(Sink):
                 self.size = int(about["block"])
             except (BadInput, ValueError, KeyError, TypeError):
                 about = {}
-            if not isinstance(about, dict) or about.get("fingerprint") != self.mark:
+            if not isinstance(about, dict) or about.get("fingerprint") != self.mark or self.size < 1:
                 raise another(path)
             self.plan = plan = plan._replace(size=self.size)
         else:

@@ -64,10 +64,12 @@ def sweep(
 
     `executor`, any of `concurrent.futures`' kind, solves the blocks elsewhere; a block that is lost there is tried
     again, then solved here. `block` is how many designs are solved together. `store`, a path ending in .zarr or
-    .parquet, takes the results block by block; the same sweep into the same store goes on with the blocks that are
-    missing. `progress` is called with how many designs are done, and how many there are.
+    .parquet, takes the results block by block, with checksums, into a folder of its own; the same sweep into the same
+    store goes on with the blocks that are missing or damaged. `progress` is called with how many designs are done, and
+    how many there are.
 
-    Raises BadInput for a name that is not there, a range or a store that cannot be.
+    Raises BadInput for a name that is not there, a range or a store that cannot be; NotWritten, which is one, where a
+    store finds no more room.
     """
     values = checked(mechanism, designs)
     if block is not None and (isinstance(block, bool) or not isinstance(block, Integral) or block < 1):

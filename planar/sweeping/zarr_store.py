@@ -40,9 +40,10 @@ class Store(Sink):
                 about = dict(self.group.attrs)
             except UNREADABLE:
                 about = {}
-            if about.get("fingerprint") != mark or not isinstance(about.get("block"), int):
+            size = about.get("block")
+            if about.get("fingerprint") != mark or not isinstance(size, int) or size < 1:
                 raise another(path)
-            self.size = about["block"]
+            self.size = size
             self.plan = plan = plan._replace(size=self.size)
         else:
             # written at once: a store is this sweep's from its first moment
