@@ -25,9 +25,10 @@ class Course(NamedTuple):
 class Load(NamedTuple):
     """A force (N) at a point, a torque (N m, anticlockwise) on a link, or an effort between the links of a pair.
 
-    The force is given in the frame's axes, or in those of the link `axes`, with which it turns. An `effort` (N where
-    the pair's motion is a length, N m where it is an angle) acts on the second link, and its opposite on the first: in
-    the positive sense of the pair's motion.
+    At a pin a `point` without its link is of the link that slides there, else of the first (see
+    `planar.dynamics.attachment`). The force is given in the frame's axes, or in those of the link `axes`, with which it
+    turns. An `effort` (N where the pair's motion is a length, N m where it is an angle) acts on the second link, and
+    its opposite on the first: in the positive sense of the pair's motion.
     """
 
     point: str | None = None

@@ -16,6 +16,7 @@ from planar.drawing.animation import scripted
 from planar.drawing.picture import Circle, Fill, Letter, Line
 from planar.drawing.positions import positions
 from planar.drawing.scheme import scheme
+from planar.errors import BadInput
 from tests.known import MODELS, state_of
 from tests.pages import browser, opened
 
@@ -149,6 +150,12 @@ def test_the_mark_of_a_centre_is_at_the_centre_and_within_the_drawing():
         np.subtract(mark.centre, pin) / np.hypot(*np.subtract(mark.centre, pin)), [cos(radians(50)), sin(radians(50))]
     )
     assert np.hypot(*np.subtract(mark.centre, pin)) < 160.0
+
+
+def test_a_spring_or_mass_made_in_python_that_is_nowhere_is_refused_in_a_sentence():
+    for more in ({"springs": (Spring(points=("S", "Z"), stiffness=1.0),)}, {"masses": (Mass("arm", 1.0, "Z"),)}):
+        with pytest.raises(BadInput, match="no point 'Z'"):
+            scheme(planar.solve(replace(LAMP, **more)))
 
 
 ENDS = """() => {

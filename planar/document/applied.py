@@ -51,7 +51,7 @@ def _load(cursor: Cursor, mechanism: Mechanism, named: Mapping[str, Pair], point
 
 
 def _end(cursor: Cursor, points: Mapping[str, str]) -> str:
-    """A point where something acts: on the link that is named with it, at a pin else on the first of its links."""
+    """A point where something acts, as it is written: `link.point` where several links share it and one is named."""
     name = cursor.as_text()
     found = point_named(cursor, name, points)
     shared = sum(each == found for other, each in points.items() if other != found) > 1

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from planar.applied import Mass, Spring
 from planar.dynamics.attachment import attachments
+from planar.dynamics.checked import check
 from planar.graph import numbered
 from planar.mechanism import Mechanism, named_points
 from planar.plane import Vector
@@ -52,13 +53,17 @@ Element = Coil | Spiral | Centre
 
 
 def elements(mechanism: Mechanism, shapes: Mapping[str, Shape]) -> Iterator[Element]:
-    """What is drawn of a mechanism's springs and masses."""
+    """What is drawn of a mechanism's springs and masses. Raises BadInput where they are none of its own."""
+    if not (mechanism.springs or mechanism.masses):
+        return
+    check(mechanism)
+    where = attachments(mechanism)
     for number, spring in enumerate(mechanism.springs, start=1):
         symbol = ("both" if spring.damping else "spring") if spring.stiffness or not spring.damping else "damper"
         if spring.turns:
             yield _spiral(mechanism, shapes, spring, f"spring {number}", symbol)
         else:
-            ends = [attachments(mechanism)[end] for end in spring.ends]
+            ends = [where[end] for end in spring.ends]
             first, second = (shapes[each.link].at(each.point) for each in ends)
             yield Coil(f"spring {number}", (ends[0].link, ends[1].link), (first, second), symbol)
     masses = [mass for mass in mechanism.masses if mass.mass]

@@ -12,6 +12,7 @@ import numpy as np
 
 from planar.drawing import symbols
 from planar.drawing.bodies import Body, apart, unit
+from planar.drawing.element_strokes import springs
 from planar.drawing.elements import Coil
 from planar.drawing.paper import Scale
 from planar.drawing.picture import Arrow, Circle, Line, Mark, Pen, spot
@@ -57,7 +58,8 @@ def fixed(scene: Scene, beside: Iterable[Mark] = ()) -> tuple[Mark, ...]:
         for mark in scene.marks
         if isinstance(mark, Pin) and frame in mark.links
     ]
-    clear = Clearance.of((*bars(scene, Pen.LINK), *cylinders(scene, Pen.LINK), *racks(scene), *taken, *beside))
+    moving = (*bars(scene, Pen.LINK), *cylinders(scene, Pen.LINK), *racks(scene), *springs(scene))
+    clear = Clearance.of((*moving, *taken, *beside))
     middle = clear.middle()
     wheels: set[tuple[Vector | float, ...]] = set()
     banded = {mark.name for mark in scene.marks if isinstance(mark, Band)}
