@@ -14,7 +14,7 @@ from planar.judged import Judged
 from planar.mechanism import Mechanism, misfits
 from planar.pairs import Kind
 from planar.plane import Frame
-from planar.program import extent, gathered, greatest, placed, shapes
+from planar.program import Program, extent, gathered, greatest, placed, shapes
 from planar.solving.gate import Gate
 from planar.solving.outline import outline
 from planar.words import amount, listed
@@ -55,12 +55,27 @@ class Setup:
         """The same for a mechanism that differs from this one in its inputs' numbers alone."""
         lawful = any(given.law is not None for given in mechanism.inputs)
         if lawful or not self.extended:
-            return type(self)(mechanism)
+            there = type(self)(mechanism)
+            return there.solved_by(self.program) if self.deflated else there
         there = object.__new__(type(self))
         there.__dict__.update(self.__dict__)
         there.mechanism, there.gate = mechanism, self.gate.moved(mechanism)
         there.station = Station(*self._inputs(mechanism), self.station.p)
         return there
+
+    def solved_by(self, program: Program) -> Self:
+        """The same with more constraints, which hold wherever its own do on the motion; see `solving.deflation`."""
+        there = object.__new__(type(self))
+        there.__dict__.update(self.__dict__)
+        for name in ("by", "least", "_reaches"):
+            there.__dict__.pop(name, None)
+        there.program, there.equations = program, program.equations
+        return there
+
+    @property
+    def deflated(self) -> bool:
+        """Whether it has more constraints than those of its pairs and inputs."""
+        return self.program is not self.outline.program
 
     def _inputs(self, mechanism: Mechanism) -> tuple[Array, Array, Array]:
         """Positions, velocities and accelerations of a mechanism's inputs (scaled)."""
@@ -72,7 +87,7 @@ class Setup:
     @property
     def judged(self) -> Judged | None:
         """What judges positions in compiled functions, for the structures that have it."""
-        return self.outline.judged
+        return None if self.deflated else self.outline.judged
 
     @cached_property
     def by(self) -> Array:
