@@ -17,6 +17,13 @@ from planar.solving.gate import TOUCHING
 from planar.solving.setup import Setup
 from planar.words import amount, listed, many
 
+Array = np.ndarray
+
+MOST = 4
+"""Ways that are told one by one."""
+DIFFERENT = 1e-3
+"""Rates of an angle on two ways that tell them apart."""
+
 
 def free(setup: Setup) -> NoAnswer:
     """Links that the inputs leave free whatever the dimensions, or that nothing joins to the frame."""
@@ -76,13 +83,40 @@ def _ends(setup: Setup, names: Sequence[str]) -> list[str]:
     return list(dict.fromkeys(link for name in names for link in setup.named[name].links))
 
 
-def change_point(setup: Setup, links: Sequence[str], mobility: int) -> NoAnswer:
-    """A position from which the mechanism may go on in several ways."""
+def change_point(setup: Setup, links: Sequence[str], mobility: int, z: Array) -> NoAnswer:
+    """A position from which the mechanism may go on in several ways, and how one is chosen."""
     return NoAnswer(
         Outcome.CHANGE_POINT,
         f"{setup.at()} the mechanism has {_freedoms(setup, mobility)}: {_links(links)} may move in more than one way "
-        f"from here; move the input, or give a further input",
+        f"from here; move the input, or give a further input{_choices(setup, z)}",
     )
+
+
+def _choices(setup: Setup, z: Array) -> str:
+    """By which number a cycle goes on along which way, told by the link that moves most differently on them."""
+    if len(setup.mechanism.inputs) != 1 or not setup.extended:
+        return ""
+    from planar.solving.change_point import starting
+    from planar.solving.curve import Curve
+
+    found = starting(Curve(setup, setup.station.p, setup.station.u, np.ones(1)), np.append(z, 0.0))
+    if found is None or len(found.ways) < 2:
+        return ""
+    columns = list(setup.equations.unknowns)
+    (slides,) = setup.outline.slide
+    rates = np.array([way.tangent[:-1] / way.advance for way in found.ways]) * setup.scale[columns]
+    rates /= setup.unit if slides else 1.0
+    angles = [setup.equations.coordinates[column].kind is not Kind.LENGTH for column in columns]
+    apart = np.ptp(rates, axis=0)
+    most = int(np.argmax(np.where(angles, apart, 0.0) if np.any(apart[angles] > DIFFERENT) else apart))
+    what = setup.equations.coordinates[columns[most]].owner
+    moved = [f"{k} moves {what!r} by {_rounded(rate)}" for k, rate in enumerate(rates[:MOST, most], 1)]
+    each = f"{'rad' if angles[most] else 'm'} for each {'m' if slides else 'rad'} of the input"
+    return f"; a cycle goes on by the way whose number `branches` (--branch) has: {', '.join(moved)} {each}"
+
+
+def _rounded(rate: float) -> str:
+    return f"{round(rate, 6) + 0.0:.4g}"
 
 
 def dead_point(setup: Setup, links: Sequence[str]) -> NoAnswer:
