@@ -81,10 +81,8 @@ class Ranged:
         first = here if start is None else start / self.scale
         walk = self.walk(follow(self.solver, self.p, self.found.z, self.u, self._at(first)), first)
         if walk.here.clear < LEAST and not walk.leaves:
-            raise BadInput(
-                "start",
-                "branches of the motion cross where the circuit would start; choose one by branches, or start elsewhere",
-            )
+            told = "branches of the motion cross where the circuit would start; choose one by branches, or start it"
+            raise BadInput("start", told + " elsewhere")
         whole = circuit(self.solver, walk)
         turn = np.inf if self.slides else 2.0 * pi
         spacing = min(max(abs(each.ends[1] - each.ends[0]) for each in whole.stretches), turn) / steps
