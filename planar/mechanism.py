@@ -10,7 +10,7 @@ from numbers import Real
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from planar.applied import Course, Load, Mass, Spring
-from planar.errors import BadInput
+from planar.errors import BadInput, listed
 from planar.pairs.base import Pair
 from planar.shapes import Along, At, Distances, Link, Place, Point, Shape
 from planar.shown import Shown
@@ -207,7 +207,7 @@ def running_input(mechanism: Mechanism, pair: str | None) -> int:
     if pair is None and len(names) > 1:
         raise BadInput("inputs", f"there are several inputs, {', '.join(names)}; name the one that runs")
     if pair is not None and pair not in names:
-        raise BadInput(pair, f"there is no input at {pair!r}; inputs are at {', '.join(names)}")
+        raise BadInput(pair, f"there is no input at {pair!r}; inputs are at {listed(names)}")
     return 0 if pair is None else names.index(pair)
 
 
@@ -218,19 +218,21 @@ def check(mechanism: Mechanism) -> None:
     """
     points = {link.name: set(link.names) for link in mechanism.links}
     if mechanism.frame not in points:
-        raise BadInput("frame", f"there is no link {mechanism.frame!r} to be the frame")
+        raise BadInput("frame", f"there is no link {mechanism.frame!r} to be the frame; links are {listed(points)}")
     for pair in mechanism.pairs:
         for link in pair.bodies:
             if link not in points:
-                raise BadInput(pair.name, f"there is no link {link!r}; links are {', '.join(points)}")
+                raise BadInput(pair.name, f"there is no link {link!r}; links are {listed(points)}")
         rides = pair.rides()
         for link, point in (*pair.coincident(), *((rides[0],) if rides else ())):
             if point not in points[link]:
-                raise BadInput(pair.name, f"link {link!r} has no point {point!r}")
+                raise BadInput(
+                    pair.name, f"link {link!r} has no point {point!r}; its points are {listed(sorted(points[link]))}"
+                )
     named = motions(mechanism)
     for given in mechanism.inputs:
         if given.pair not in named:
-            raise BadInput(given.pair, f"there is no pair {given.pair!r} to be driven; pairs are {', '.join(named)}")
+            raise BadInput(given.pair, f"there is no pair {given.pair!r} to be driven; pairs are {listed(named)}")
     wrong = unlawful(mechanism)
     if wrong:
         raise BadInput(*wrong)
@@ -289,3 +291,21 @@ def named_points(mechanism: Mechanism) -> tuple[NamedPoint, ...]:
         own = point if alone[point] == 1 and point not in names else f"{link}.{point}"
         grouped.setdefault(together.get((link, point), own), []).append((link, point))
     return tuple(NamedPoint(name, tuple(members)) for name, members in grouped.items())
+
+
+def unjoined(mechanism: Mechanism) -> dict[str, tuple[str, ...]]:
+    """The points that several links carry under one name though no pair keeps them together there: a link of each.
+
+    Of those alone that a link has as an end, or a link that one pair at most joins: a name may stand twice by chance.
+    """
+    found: dict[str, dict[str, str]] = {}
+    for each in named_points(mechanism):
+        for link, point in each.members:
+            found.setdefault(point, {}).setdefault(each.name, link)
+    joints = Counter(link for pair in mechanism.pairs for link in pair.links)
+    ends = {(link.name, end) for link in mechanism.links for end in link.ends or ()}
+    return {
+        point: tuple(links.values())
+        for point, links in found.items()
+        if len(links) > 1 and any((link, point) in ends or joints[link] < 2 for link in links.values())
+    }

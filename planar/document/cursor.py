@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import cached_property
@@ -11,7 +11,7 @@ from math import isnan
 from typing import Any
 
 from planar.document.schema import FORBIDDEN, HUGE
-from planar.errors import BadInput
+from planar.errors import BadInput, listed
 from planar.mechanism import FARTHEST, Units
 from planar.shapes import Link, shape
 from planar.units import UnitError, example, quantity, unit
@@ -268,7 +268,7 @@ class Cursor:
     def as_link(self) -> str:
         name = self.as_text()
         if name not in self.whole.links:
-            raise self.refuse(None, f"there is no link {name!r}{did_you_mean(name, self.whole.links)}")
+            raise self.refuse(None, f"there is no link {name!r}{offered(name, self.whole.links, 'links')}")
         return name
 
     def link(self, key: str) -> str:
@@ -292,7 +292,7 @@ class Cursor:
     def carried(self, point: str, link: str, key: str) -> None:
         known = self.whole.links[link].names
         if point not in known:
-            raise self.refuse(key, f"link {link!r} has no point {point!r}{did_you_mean(point, known)}")
+            raise self.refuse(key, f"link {link!r} has no point {point!r}{offered(point, known, 'its points')}")
 
     def point(self, key: str, link: str) -> str:
         found = self[key].as_text()
@@ -322,6 +322,12 @@ def called(value: Any) -> str:
     text = repr(value) if isinstance(value, str | int | float) else ""
     name = next(name for kind, name in kinds.items() if isinstance(value, kind))
     return f"the {name.split()[1]} {text}" if 0 < len(text) < 40 else name
+
+
+def offered(word: str, known: Iterable[str], what: str) -> str:
+    """A clause that offers the nearest known name, or the names that there are."""
+    names = list(known)
+    return did_you_mean(word, names) or (f"; {what} are {listed(names)}" if names else "; there is none")
 
 
 def did_you_mean(word: str, known: Any, sentence: str = "did you mean {!r}?", cutoff: float = 0.6) -> str:

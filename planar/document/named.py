@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import json
+from collections.abc import Iterable, Mapping
 
-from planar.document.cursor import Cursor, did_you_mean
+from planar.document.cursor import Cursor, offered
+from planar.errors import listed
 from planar.mechanism import Mechanism, named_points
 from planar.pairs import Pair
 
@@ -19,7 +21,22 @@ def motion(cursor: Cursor, known: Mapping[str, Pair]) -> Pair:
     reverse = name.partition(":")[0] + ":" + ",".join(reversed(name.partition(":")[2].split(",")))
     if reverse in known:
         raise cursor.refuse(None, f"the links of {name!r} stand in the other order in the file; write {reverse!r}")
-    raise cursor.refuse(None, f"there is no pair {name!r}{did_you_mean(name, known)}")
+    carriers = cursor.carriers(name)
+    if len(carriers) > 1:
+        told = (
+            f"there is no pair {name!r}, though {_links(carriers)} carry that point; add {_turning(name)} to the pairs"
+        )
+        raise cursor.refuse(None, told)
+    raise cursor.refuse(None, f"there is no pair {name!r}{offered(name, known, 'pairs')}")
+
+
+def _links(names: Iterable[str]) -> str:
+    return f"links {listed(map(repr, names))}"
+
+
+def _turning(point: str) -> str:
+    """The pair that joins all links that carry a point."""
+    return json.dumps({"turning": point}, ensure_ascii=False)
 
 
 def point_names(mechanism: Mechanism) -> dict[str, str]:
@@ -35,5 +52,10 @@ def point_named(cursor: Cursor, name: str, points: Mapping[str, str]) -> str:
         return points[name]
     several = [other for other in points if other.endswith(f".{name}")]
     if several:
-        raise cursor.refuse(None, f"several points are called {name!r}; write {' or '.join(map(repr, several))}")
-    raise cursor.refuse(None, f"there is no point {name!r}{did_you_mean(name, points)}")
+        told = f"several points are called {name!r}"
+        carriers = cursor.carriers(name)
+        if len(carriers) > 1 and not any(points[other] == name for other in several):
+            told = f"no pair joins {_links(carriers)} at {name!r}; add {_turning(name)} to the pairs, or"
+            raise cursor.refuse(None, f"{told} write {listed(map(repr, several), last=' or ')} for one of them")
+        raise cursor.refuse(None, f"{told}; write {listed(map(repr, several), last=' or ')}")
+    raise cursor.refuse(None, f"there is no point {name!r}{offered(name, dict.fromkeys(points.values()), 'points')}")

@@ -10,6 +10,7 @@ import numpy as np
 
 from planar.algebra import Jet, Scalar
 from planar.errors import BadInput
+from planar.errors import listed as several
 from planar.judged import Judged
 from planar.mechanism import Mechanism, misfits
 from planar.pairs import Kind
@@ -17,7 +18,7 @@ from planar.plane import Frame
 from planar.program import Program, extent, gathered, greatest, placed, shapes
 from planar.solving.gate import Gate
 from planar.solving.outline import outline
-from planar.words import amount, listed
+from planar.words import amount
 
 Array = np.ndarray
 
@@ -153,7 +154,7 @@ class Setup:
 
     def where(self, u: Array) -> str:
         """A position of the inputs in words: A = 60 deg."""
-        return listed([self.told(given.pair, at) for given, at in zip(self.mechanism.inputs, u, strict=True)])
+        return several([self.told(given.pair, at) for given, at in zip(self.mechanism.inputs, u, strict=True)])
 
     def told(self, pair: str, position: float) -> str:
         """A position of one input in words."""
