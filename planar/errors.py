@@ -62,6 +62,12 @@ class BadInput(PlanarError):
         super().__init__(f"{self.place}: {self.sentence}")
 
 
+def no_format(suffix: str, what: str, endings: Iterable[str]) -> BadInput:
+    """What to say of a file whose name ends in what cannot be written: the endings that can."""
+    place = f"a file name that ends in {suffix!r}" if suffix else "a file name without an ending"
+    return BadInput(place, f"{what} can be written to files that end in {listed(endings, last=' or ')}")
+
+
 class NoAnswer(PlanarError):
     """The mechanism is well described but has no answer here; `outcome` says which kind, `more` what a program asks.
 

@@ -296,16 +296,19 @@ def named_points(mechanism: Mechanism) -> tuple[NamedPoint, ...]:
 def unjoined(mechanism: Mechanism) -> dict[str, tuple[str, ...]]:
     """The points that several links carry under one name though no pair keeps them together there: a link of each.
 
-    Of those alone that a link has as an end, or a link that one pair at most joins: a name may stand twice by chance.
+    Of those alone that are an end of a link, or on a link without ends that one pair at most joins: a name may stand
+    twice by chance.
     """
     found: dict[str, dict[str, str]] = {}
     for each in named_points(mechanism):
         for link, point in each.members:
             found.setdefault(point, {}).setdefault(each.name, link)
     joints = Counter(link for pair in mechanism.pairs for link in pair.links)
-    ends = {(link.name, end) for link in mechanism.links for end in link.ends or ()}
+    loose = [link for link in mechanism.links if link.ends is None and joints[link.name] < 2]
+    likely = {(link.name, end) for link in mechanism.links for end in link.ends or ()}
+    likely |= {(link.name, point) for link in loose for point in link.names}
     return {
         point: tuple(links.values())
         for point, links in found.items()
-        if len(links) > 1 and any((link, point) in ends or joints[link] < 2 for link in links.values())
+        if len(links) > 1 and any((link, point) in likely for link in links.values())
     }

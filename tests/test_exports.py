@@ -476,7 +476,7 @@ def test_the_ending_of_a_file_may_be_in_capitals():
 @pytest.mark.parametrize("suffix", [".xlsx", "", ".parq"])
 @pytest.mark.parametrize("asking", [writable, lambda suffix: written(timed(), suffix)])
 def test_an_unknown_ending_is_answered_with_all_that_there_are(asking, suffix):
-    with pytest.raises(BadInput, match=r"a run is written to \.csv, \.json, \.npz, \.parquet files"):
+    with pytest.raises(BadInput, match=r"files that end in \.csv, \.json, \.npz or \.parquet"):
         asking(suffix)
 
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping
 
-from planar.document.cursor import Cursor, offered
+from planar.document.cursor import Cursor, did_you_mean, offered
 from planar.errors import listed
 from planar.mechanism import Mechanism, named_points
-from planar.pairs import Pair
+from planar.pairs import Pair, joining
 
 
 def motion(cursor: Cursor, known: Mapping[str, Pair]) -> Pair:
@@ -24,7 +23,7 @@ def motion(cursor: Cursor, known: Mapping[str, Pair]) -> Pair:
     carriers = cursor.carriers(name)
     if len(carriers) > 1:
         told = (
-            f"there is no pair {name!r}, though {_links(carriers)} carry that point; add {_turning(name)} to the pairs"
+            f"there is no pair {name!r}, though {_links(carriers)} carry that point; add {joining(name)} to the pairs"
         )
         raise cursor.refuse(None, told)
     raise cursor.refuse(None, f"there is no pair {name!r}{offered(name, known, 'pairs')}")
@@ -32,11 +31,6 @@ def motion(cursor: Cursor, known: Mapping[str, Pair]) -> Pair:
 
 def _links(names: Iterable[str]) -> str:
     return f"links {listed(map(repr, names))}"
-
-
-def _turning(point: str) -> str:
-    """The pair that joins all links that carry a point."""
-    return json.dumps({"turning": point}, ensure_ascii=False)
 
 
 def point_names(mechanism: Mechanism) -> dict[str, str]:
@@ -52,10 +46,9 @@ def point_named(cursor: Cursor, name: str, points: Mapping[str, str]) -> str:
         return points[name]
     several = [other for other in points if other.endswith(f".{name}")]
     if several:
-        told = f"several points are called {name!r}"
-        carriers = cursor.carriers(name)
-        if len(carriers) > 1 and not any(points[other] == name for other in several):
-            told = f"no pair joins {_links(carriers)} at {name!r}; add {_turning(name)} to the pairs, or"
-            raise cursor.refuse(None, f"{told} write {listed(map(repr, several), last=' or ')} for one of them")
-        raise cursor.refuse(None, f"{told}; write {listed(map(repr, several), last=' or ')}")
-    raise cursor.refuse(None, f"there is no point {name!r}{offered(name, dict.fromkeys(points.values()), 'points')}")
+        told = f"several points are called {name!r}; write {listed(map(repr, several), last=' or ')}"
+        if len(cursor.carriers(name)) > 1 and name not in points.values():
+            told += f", or add {joining(name)} to the pairs, if it is one pin of {_links(cursor.carriers(name))}"
+        raise cursor.refuse(None, told)
+    near = did_you_mean(name, points) or offered(name, dict.fromkeys(points.values()), "points")
+    raise cursor.refuse(None, f"there is no point {name!r}{near}")

@@ -5,7 +5,6 @@ What finds causes and remedies is loaded only when something is refused.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,7 +12,7 @@ import numpy as np
 from planar.errors import MOST_NAMES, Ending, NoAnswer, Outcome
 from planar.errors import listed as several
 from planar.mechanism import unjoined
-from planar.pairs import Kind
+from planar.pairs import Kind, joining
 from planar.program import length
 from planar.solving.assemble import Failure
 from planar.solving.gate import TOUCHING
@@ -62,8 +61,7 @@ def _forgotten(setup: Setup, links: Sequence[str]) -> str:
     shared = {point: carriers for point, carriers in unjoined(mechanism).items() if loose & set(carriers)}
     if shared:
         told = [f"{_links(carriers)} at {point!r}" for point, carriers in shared.items()]
-        pairs = [json.dumps({"turning": point}, ensure_ascii=False) for point in shared]
-        return f"no pair joins {several(told, 3)}: add {several(pairs, 3)} to the pairs"
+        return f"no pair joins {several(told, 3)}: add {several(map(joining, shared), 3)} to the pairs"
     moving = [link.name for link in mechanism.links if link.name != mechanism.frame]
     joints = {link: [pair.entry_name() for pair in mechanism.pairs if link in pair.links] for link in moving}
     hanging = [f"link {link!r} hangs at {names[0]!r} alone" for link, names in joints.items() if len(names) == 1]

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from planar.errors import BadInput
+from planar.errors import no_format
 from planar.motion import Motion
 from planar.results import Limit
 from planar.views import parquet
@@ -26,7 +26,7 @@ ROWS = 500
 def writable(suffix: str) -> None:
     """Make sure, before a long run, that it can be written to a file of this suffix. Raises BadInput."""
     if suffix.lower() not in _FORMATS:
-        raise BadInput(suffix or "the file", f"a run is written to {', '.join(_FORMATS)} files")
+        raise no_format(suffix, "a run", _FORMATS)
     if suffix.lower() == ".parquet":
         parquet.ready()
 

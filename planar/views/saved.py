@@ -8,7 +8,7 @@ import re
 from rich.console import Console, RenderableType
 from rich.terminal_theme import DEFAULT_TERMINAL_THEME
 
-from planar.errors import BadInput
+from planar.errors import no_format
 
 WIDTH = 124
 """Characters; the widest table of a textbook mechanism takes about 120."""
@@ -26,7 +26,7 @@ def written(renderable: RenderableType, suffix: str) -> str:
         ".svg": lambda: _without_fonts(console.export_svg(title="planar", theme=DEFAULT_TERMINAL_THEME)),
     }
     if suffix not in formats:
-        raise BadInput(suffix or "the file", f"tables are written to {', '.join(formats)} files")
+        raise no_format(suffix, "tables", formats)
     return formats[suffix]()
 
 
