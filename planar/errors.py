@@ -6,6 +6,8 @@ from typing import Any
 
 MOST_NAMES = 12
 """Names that a sentence lists; of more it tells how many."""
+JOINERS = "\u200c\u200d"
+"""Invisible, but letters of some scripts need them."""
 LONGEST_PLACE, LONGEST, LONGEST_REASON = 200, 300, 1200
 """Characters of a place, of a sentence about it, and of a reason why there is no answer."""
 
@@ -37,6 +39,11 @@ def listed(names: Iterable[str], most: int | None = MOST_NAMES, last: str = " an
     if most is not None and len(every) > most + 1:
         every = [*every[:most], f"{len(every) - most} more"]
     return last.join(filter(None, (", ".join(every[:-1]), every[-1]))) if every else "none"
+
+
+def unshown(text: str) -> str:
+    """The first character that cannot be shown in a line, or turns the order of others there; empty where all can."""
+    return next((each for each in text if not (each.isprintable() or each in JOINERS)), "")
 
 
 def _shown(text: str, longest: int) -> str:

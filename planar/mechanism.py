@@ -10,7 +10,7 @@ from numbers import Real
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from planar.applied import Course, Load, Mass, Spring
-from planar.errors import BadInput, listed
+from planar.errors import BadInput, listed, unshown
 from planar.pairs.base import Pair
 from planar.shapes import Along, At, Distances, Link, Place, Point, Shape
 from planar.shown import Shown
@@ -217,6 +217,10 @@ def check(mechanism: Mechanism) -> None:
     What comes from a file has been checked at its place there.
     """
     points = {link.name: set(link.names) for link in mechanism.links}
+    names = (*points, *(name for link in mechanism.links for name in link.names), *(p.name for p in mechanism.pairs))
+    for name in names:
+        if unshown(name):
+            raise BadInput(name, f"the name {name!r} holds a character that cannot be shown")
     if mechanism.frame not in points:
         raise BadInput("frame", f"there is no link {mechanism.frame!r} to be the frame; links are {listed(points)}")
     for pair in mechanism.pairs:

@@ -11,13 +11,13 @@ from math import isnan
 from typing import Any
 
 from planar.document.schema import FORBIDDEN, HUGE
-from planar.errors import BadInput, listed
+from planar.errors import BadInput, listed, unshown
 from planar.mechanism import FARTHEST, Units
 from planar.shapes import Link, shape
 from planar.units import UnitError, example, quantity, unit
 
-_JOINERS = {0x200C: None, 0x200D: None}  # invisible, but letters of some scripts need them
-_UNSHOWN = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff]")  # control characters, halves of characters
+# control characters, what turns the order of letters, halves of characters
+_UNSHOWN = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
 
 
 @dataclass(frozen=True)
@@ -143,9 +143,16 @@ class Cursor:
         found = [mark for mark in FORBIDDEN if mark in name]
         if found:
             raise self.refuse(None, f"the name {name!r} holds {found[0]!r}; names contain none of . : ,")
-        if not name.translate(_JOINERS).isprintable():
+        if unshown(name):
             raise self.refuse(None, f"the name {name!r} holds a character that cannot be shown")
         return name
+
+    def as_line(self) -> str:
+        """A text that stands in one line of tables and pages."""
+        text = self.as_text()
+        if unshown(text):
+            raise self.refuse(None, f"this text stands in a line, and {unshown(text)!r} cannot be shown in one")
+        return text
 
     def names(self, key: str, count: int) -> tuple[str, ...]:
         found = tuple(item.as_name() for item in self[key].items())

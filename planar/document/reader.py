@@ -60,12 +60,12 @@ def read(value: Any) -> Mechanism:
     links = dict(full.whole.links)
     pairs = _pairs(full)
     bare = Mechanism(
-        name=full.text("name", "") or "mechanism",
+        name=(full["name"].as_line() if full.has("name") else "") or "mechanism",
         frame=frame,
         links=tuple(links.values()),
         pairs=pairs,
         units=units,
-        ids=tuple(item.as_text() for item in full.listed("ids")),
+        ids=tuple(item.as_line() for item in full.listed("ids")),
         about=full.text("about"),
         source=full.text("source"),
         geometry=full.one_of("geometry", GEOMETRY),
@@ -336,7 +336,7 @@ def _published(cursor: Cursor, mechanism: Mechanism, points: Mapping[str, str]) 
         if relative_to is not None:
             relative_to = point_named(cursor["relative_to"], relative_to, points)
     return Published(
-        symbol=cursor["symbol"].as_text(),
+        symbol=cursor["symbol"].as_line(),
         quantity=quantity,
         of=of,
         value=cursor.optional("value", kind) if cursor.has("value") and cursor["value"].value is not None else None,
@@ -344,7 +344,7 @@ def _published(cursor: Cursor, mechanism: Mechanism, points: Mapping[str, str]) 
         relative_to=relative_to,
         component=cursor.one_of("component", ("x", "y")),
         sense=cursor.one_of("sense", SENSES),
-        case=cursor.text("case"),
+        case=cursor["case"].as_line() if cursor.has("case") else None,
         note=cursor.text("note"),
         slip=cursor.text("slip"),
         inputs=_drives(cursor, "inputs", mechanism),
