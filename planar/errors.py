@@ -1,7 +1,15 @@
 """What can go wrong, and the sentence in which it is said."""
 
+from collections.abc import Iterable
 from enum import StrEnum
 from typing import Any
+
+MOST_NAMES = 12
+"""Names that a sentence lists; of more it tells how many."""
+JOINERS = "\u200c\u200d"
+"""Invisible, but letters of some scripts need them."""
+LONGEST_PLACE, LONGEST, LONGEST_REASON = 200, 300, 1200
+"""Characters of a place, of a sentence about it, and of a reason why there is no answer."""
 
 
 class Outcome(StrEnum):
@@ -25,6 +33,19 @@ class Ending(StrEnum):
     LOST = "lost"
 
 
+def listed(names: Iterable[str], most: int | None = MOST_NAMES, last: str = " and ") -> str:
+    """Names in a sentence: a, b and c; of very many the first, and how many more."""
+    every = list(names)
+    if most is not None and len(every) > most + 1:
+        every = [*every[:most], f"{len(every) - most} more"]
+    return last.join(filter(None, (", ".join(every[:-1]), every[-1]))) if every else "none"
+
+
+def unshown(text: str) -> str:
+    """The first character that cannot be shown in a line, or turns the order of others there; empty where all can."""
+    return next((each for each in text if not (each.isprintable() or each in JOINERS)), "")
+
+
 def _shown(text: str, longest: int) -> str:
     """The text as one line that a screen can show, whatever a file put into it."""
     if len(text) > longest:
@@ -43,8 +64,8 @@ class BadInput(PlanarError):
     """
 
     def __init__(self, place: str, sentence: str):
-        self.place = _shown(place, 200)
-        self.sentence = _shown(sentence, 300)
+        self.place = _shown(place, LONGEST_PLACE)
+        self.sentence = _shown(sentence, LONGEST)
         super().__init__(f"{self.place}: {self.sentence}")
 
 
@@ -52,11 +73,20 @@ class NotWritten(BadInput):
     """A result that was found could not be written whole, as on a full disk; `place` is where it was to go."""
 
 
-class NoAnswer(PlanarError):
-    """The mechanism is well described but has no answer here; `outcome` says which kind, `more` what a program asks."""
+def no_format(suffix: str, what: str, endings: Iterable[str]) -> BadInput:
+    """What to say of a file whose name ends in what cannot be written: the endings that can."""
+    place = f"a file name that ends in {suffix!r}" if suffix else "a file name without an ending"
+    return BadInput(place, f"{what} can be written to files that end in {listed(endings, last=' or ')}")
 
-    def __init__(self, outcome: Outcome, reason: str):
-        super().__init__(f"{outcome.value}: {reason}")
+
+class NoAnswer(PlanarError):
+    """The mechanism is well described but has no answer here; `outcome` says which kind, `more` what a program asks.
+
+    The sentence names a few of very many links or pairs; a program finds all of them in `more`.
+    """
+
+    def __init__(self, outcome: Outcome, reason: str, **more: Any):
         self.outcome = outcome
-        self.reason = reason
-        self.more: dict[str, Any] = {}
+        self.reason = _shown(reason, LONGEST_REASON)
+        super().__init__(f"{outcome.value}: {self.reason}")
+        self.more: dict[str, Any] = more

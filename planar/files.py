@@ -9,8 +9,9 @@ import re
 import stat
 import sys
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,8 @@ from planar.document import read
 from planar.errors import BadInput, NotWritten
 from planar.mechanism import Mechanism
 
+MOST_FILES = 10_000
+"""Files of a folder that are looked at for one that may be meant."""
 LARGEST = 8 * 1024 * 1024
 """Bytes; a mechanism of ten thousand links takes about two million."""
 OUT_OF_ROOM = {getattr(errno, name) for name in ("ENOSPC", "EDQUOT", "EFBIG", "EIO", "EPIPE") if hasattr(errno, name)}
@@ -55,7 +58,11 @@ def dumps(mechanism: Mechanism) -> str:
 def load(model: str | Path) -> Mechanism:
     """The mechanism in a file, or the model of that name or id that comes along. Raises BadInput."""
     path = found(model)
-    return loads(bytes_of(path), str(path))
+    content = bytes_of(path)
+    if path.suffix.lower() not in ("", ".json") and not content.lstrip(b"\xef\xbb\xbf \t\r\n").startswith((b"{", b"[")):
+        told = "name a JSON file that describes a mechanism, or a model that comes along by its name"
+        raise BadInput(str(path), f"this is a {path.suffix} file and no mechanism; {told}")
+    return loads(content, str(path))
 
 
 def save(path: Path, content: str | bytes) -> None:
@@ -228,11 +235,26 @@ def found(model: str | Path) -> Path:
     for file in known.values():
         if str(model) in _parsed(bytes_of(file), str(file)).get("ids", ()):
             return file
+    raise BadInput(str(model), _missing(path, known))
+
+
+def _missing(path: Path, models: Iterable[str]) -> str:
+    """What to say of an argument that is no file and no model: what was meant, by its looks a path or a name."""
     from difflib import get_close_matches
 
-    near = get_close_matches(str(model), known, 1, 0.5)
-    meant = f"; did you mean the model {near[0]!r}?" if near else "; `planar models` lists the models that come along"
-    raise BadInput(str(model), f"there is no such file, and no model of that name{meant}")
+    name = path.name.lower()
+    stem = name.removesuffix(".json").replace("_", "-").replace(" ", "-")
+    alone = len(path.parts) == 1
+    if alone and (stem in models or not path.suffix):
+        near = get_close_matches(stem, models, 1, 0.6)
+        meant = f"did you mean the model {near[0]!r}?" if near else "`planar models` lists the models that come along"
+        return f"there is no such file, and no model of that name; {meant}"
+    if not path.parent.is_dir():
+        return f"there is no such file: there is no folder {str(path.parent)!r}"
+    there = {each.name.lower(): each.name for each in islice(path.parent.glob("*.json"), MOST_FILES)}
+    near = get_close_matches(name, there, 1, 0.6)
+    told = f"; did you mean {str(path.parent / there[near[0]])!r}?" if near else ""
+    return f"there is no such file{told or '; name a mechanism file (JSON), or a model that comes along by its name'}"
 
 
 def model_files() -> tuple[Path, ...]:

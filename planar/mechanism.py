@@ -10,7 +10,7 @@ from numbers import Real
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from planar.applied import Course, Load, Mass, Spring
-from planar.errors import BadInput
+from planar.errors import BadInput, listed, unshown
 from planar.pairs.base import Pair
 from planar.shapes import Along, At, Distances, Link, Place, Point, Shape
 from planar.shown import Shown
@@ -211,7 +211,7 @@ def running_input(mechanism: Mechanism, pair: str | None) -> int:
     if pair is None and len(names) > 1:
         raise BadInput("inputs", f"there are several inputs, {', '.join(names)}; name the one that runs")
     if pair is not None and pair not in names:
-        raise BadInput(pair, f"there is no input at {pair!r}; inputs are at {', '.join(names)}")
+        raise BadInput(pair, f"there is no input at {pair!r}; inputs are at {listed(names)}")
     return 0 if pair is None else names.index(pair)
 
 
@@ -221,20 +221,26 @@ def check(mechanism: Mechanism) -> None:
     What comes from a file has been checked at its place there.
     """
     points = {link.name: set(link.names) for link in mechanism.links}
+    names = (*points, *(name for link in mechanism.links for name in link.names), *(p.name for p in mechanism.pairs))
+    for name in names:
+        if unshown(name):
+            raise BadInput(name, f"the name {name!r} holds a character that cannot be shown")
     if mechanism.frame not in points:
-        raise BadInput("frame", f"there is no link {mechanism.frame!r} to be the frame")
+        raise BadInput("frame", f"there is no link {mechanism.frame!r} to be the frame; links are {listed(points)}")
     for pair in mechanism.pairs:
         for link in pair.bodies:
             if link not in points:
-                raise BadInput(pair.name, f"there is no link {link!r}; links are {', '.join(points)}")
+                raise BadInput(pair.name, f"there is no link {link!r}; links are {listed(points)}")
         rides = pair.rides()
         for link, point in (*pair.coincident(), *((rides[0],) if rides else ())):
             if point not in points[link]:
-                raise BadInput(pair.name, f"link {link!r} has no point {point!r}")
+                raise BadInput(
+                    pair.name, f"link {link!r} has no point {point!r}; its points are {listed(sorted(points[link]))}"
+                )
     named = motions(mechanism)
     for given in mechanism.inputs:
         if given.pair not in named:
-            raise BadInput(given.pair, f"there is no pair {given.pair!r} to be driven; pairs are {', '.join(named)}")
+            raise BadInput(given.pair, f"there is no pair {given.pair!r} to be driven; pairs are {listed(named)}")
     wrong = unlawful(mechanism)
     if wrong:
         raise BadInput(*wrong)
@@ -293,3 +299,24 @@ def named_points(mechanism: Mechanism) -> tuple[NamedPoint, ...]:
         own = point if alone[point] == 1 and point not in names else f"{link}.{point}"
         grouped.setdefault(together.get((link, point), own), []).append((link, point))
     return tuple(NamedPoint(name, tuple(members)) for name, members in grouped.items())
+
+
+def unjoined(mechanism: Mechanism) -> dict[str, tuple[str, ...]]:
+    """The points that several links carry under one name though no pair keeps them together there: a link of each.
+
+    Of those alone that are an end of a link, or on a link without ends that one pair at most joins: a name may stand
+    twice by chance.
+    """
+    found: dict[str, dict[str, str]] = {}
+    for each in named_points(mechanism):
+        for link, point in each.members:
+            found.setdefault(point, {}).setdefault(each.name, link)
+    joints = Counter(link for pair in mechanism.pairs for link in pair.links)
+    loose = [link for link in mechanism.links if link.ends is None and joints[link.name] < 2]
+    likely = {(link.name, end) for link in mechanism.links for end in link.ends or ()}
+    likely |= {(link.name, point) for link in loose for point in link.names}
+    return {
+        point: tuple(links.values())
+        for point, links in found.items()
+        if len(links) > 1 and any((link, point) in likely for link in links.values())
+    }

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from planar.algebra import Jet, orders
-from planar.errors import BadInput, Outcome
+from planar.errors import BadInput, Outcome, listed
 from planar.mechanism import Mechanism, NamedPoint, counting, motions, named_points
 from planar.pairs import Kind, Pair
 from planar.plane import Frame, Vector, frame_at
@@ -101,13 +101,13 @@ class Moving(Shown):
 
     def _frame(self, link: str) -> Frame:
         if link not in self.frames:
-            raise Unknown(f"there is no link {link!r}; links are {', '.join(self.frames)}")
+            raise Unknown(f"there is no link {link!r}; links are {listed(self.frames)}")
         return self.frames[link]
 
     def _motion(self, name: str) -> tuple[Pair, Parts]:
         """A pair, and the relative motion that its results are of."""
         if name not in self._motions:
-            raise Unknown(f"there is no pair {name!r}; pairs are {', '.join(self._motions)}")
+            raise Unknown(f"there is no pair {name!r}; pairs are {listed(self._motions)}")
         pair = self._motions[name]
         numbers = pair.measure([self.shapes[link] for link in pair.bodies])
         frames = [self.frames[link] for link in pair.bodies]
@@ -164,7 +164,7 @@ class Moving(Shown):
     def _named(self, name: str) -> NamedPoint:
         if name in self._point_names:
             return self._point_names[name]
-        raise Unknown(f"there is no point {name!r}; points are {', '.join(self.point_names)}")
+        raise Unknown(f"there is no point {name!r}; points are {listed(self.point_names)}")
 
     def _carried(self, named: NamedPoint) -> Vector:
         link, point = named.members[0]

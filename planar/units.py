@@ -83,6 +83,24 @@ _UNIT = re.compile(r"[A-Za-zµμΩ]+(\^[+-]?[0-9])?((\s*/\s*|\s*\*\s*|\s*·\s*|\
 _SPELLINGS = str.maketrans({"−": "-", "°": "deg", "²": "^2", "³": "^3", "µ": "u", "μ": "u", "⁻": "^-", "¹": "1"})
 
 
+_WORDS = {
+    "rev": "turn",
+    "revs": "turn",
+    "revolutions": "turn",
+    "Nm": "N m",
+    "Nmm": "N mm",
+    "kNm": "kN m",
+    "kgm": "kg m",
+    "kgmm": "kg mm",
+    "Ns": "N s",
+}
+"""Words that people write for units, each as it is looked up."""
+_RATES = frozenset({"1/s", "/s", "s^-1", "1/sec", "/sec", "1/min", "/min", "min^-1"})
+"""Rates of what they do not say."""
+NAMED = 3
+"""Letters from which on a word is a unit's name, whose capitals say nothing, and no symbol."""
+
+
 class UnitError(ValueError):
     """A text is no quantity, or one of another kind; its text says which and what would do."""
 
@@ -109,9 +127,40 @@ def unit(text: str) -> Unit:
     spelled = re.sub(r"(?<=[A-Za-z])\^-(?=\^?[0-9])", "^-", spelled)
     if spelled in TABLE:
         return Unit(*TABLE[spelled])
+    if spelled == "r/min":
+        spelled = "rpm"
+    spelled = re.sub(r"(?<=[A-Za-z])[.-](?=[A-Za-z])", " ", spelled).rstrip(".")
+    spelled = re.sub(r"[A-Za-z]+", lambda word: _WORDS.get(word[0], word[0]), spelled)
+    if spelled in TABLE:
+        return Unit(*TABLE[spelled])
     if not _UNIT.fullmatch(spelled):
         raise UnitError(f"{text!r} is not a unit")
-    return _looked_up(spelled)
+    try:
+        return _looked_up(spelled)
+    except UnitError:
+        meant = _other_capitals(spelled)
+        if meant is None:
+            raise
+        return meant
+
+
+def _other_capitals(spelled: str) -> Unit | None:
+    """The one unit of the table that is written so but for capitals, or one whose name is; None where several are."""
+    small = spelled.lower()
+    alike = [key for key in TABLE if key.lower() == small]
+    if alike:
+        return Unit(*TABLE[alike[0]]) if len(alike) == 1 else None
+    words = re.findall(r"[A-Za-z]+", spelled)
+    if small == spelled or any(word != word.lower() and len(word) < NAMED for word in words):
+        return None
+    try:
+        return _looked_up(small)
+    except UnitError:
+        return None
+
+
+def _unclear(spelled: str) -> UnitError:
+    return UnitError(f"{spelled!r} leaves open whether turns or radians are meant; write rad/s, deg/s or rpm")
 
 
 def shown(kind: str, declared: tuple[str, str]) -> tuple[str, Unit]:
@@ -165,6 +214,8 @@ def quantity(text: str, kind: str) -> float:
     number, written = match.groups()
     if not written:
         raise UnitError(f"{text!r} has no unit; write a number, or a text such as {example(kind)!r}")
+    if kind == "angular velocity" and written in _RATES:
+        raise _unclear(written)
     found = unit(written)
     if found.kind != kind:
         raise UnitError(
@@ -204,7 +255,7 @@ def _looked_up(spelled: str) -> Unit:
     try:
         one = registry.Quantity(1.0, spelled.replace("^", "**").replace("·", "*"))
         if any(name.endswith(("hertz", "counts_per_second")) for name in one._units):
-            raise UnitError(f"{spelled!r} leaves open whether turns or radians are meant; write rad/s, deg/s or rpm")
+            raise _unclear(spelled)
         # compared in root units, not by dimension: an angle is no dimension to pint, but the radian is a root unit
         root = one.to_root_units().units
         for kind, si in SI.items():
@@ -215,7 +266,7 @@ def _looked_up(spelled: str) -> Unit:
         raise
     except (pint.PintError, ArithmeticError, AssertionError, LookupError, ValueError, TypeError, AttributeError):
         raise UnitError(f"{spelled!r} is not a known unit") from None
-    raise UnitError(f"{spelled!r} measures none of {', '.join(SI)}")
+    raise UnitError(f"{spelled!r} measures none of the kinds that a mechanism has, such as {', '.join(tuple(SI)[:5])}")
 
 
 def _of_size(spelled: str, kind: str, factor: float) -> Unit:

@@ -7,6 +7,7 @@ from math import atan2, hypot, pi
 
 import numpy as np
 
+from planar.errors import listed as several
 from planar.mechanism import Units
 from planar.units import unit
 
@@ -53,5 +54,10 @@ def many(count: int, what: str, plural: str = "") -> str:
 
 
 def listed(names: Sequence[str]) -> str:
-    """Names in a sentence: a, b and c."""
-    return " and ".join(filter(None, (", ".join(names[:-1]), names[-1]))) if names else "none"
+    """All names in a sentence: a, b and c. Where they may be very many, see `errors.listed`."""
+    return several(names, None)
+
+
+def quoted(names: Sequence[str]) -> str:
+    """The first of names, in quotes, and how many more there are."""
+    return several([repr(name) for name in names])

@@ -5,7 +5,7 @@ import pytest
 
 import planar
 from planar import files
-from planar.errors import Outcome
+from planar.errors import NoAnswer, Outcome
 from tests.test_cycle import (
     PARALLELOGRAM,
     TURN,
@@ -281,3 +281,68 @@ def test_a_range_up_to_a_dead_point_that_was_told_is_solved():
         motion = planar.cycle(mechanism, 6, start=0.5, stop=end.input - short)
         assert motion.residual < 1e-12
         assert motion.inputs["A"].position[-1] == pytest.approx(end.input, abs=2e-9)
+
+
+# starts on a change point
+
+LINES = {"forth": (0.0, 1.0), "back": (0.0, -1.0), "both ways": (-1.0, 1.0), "a turn": (0.0, TURN)}
+
+
+@pytest.mark.parametrize("away", LINES.values(), ids=LINES)
+@pytest.mark.parametrize(("at", "crossed_first"), [(0.0, False), (np.pi, True)])
+@pytest.mark.parametrize("number", [1, 2])
+def test_a_flat_start_goes_on_as_parallelogram_or_crossed_as_its_number_says(number, at, crossed_first, away):
+    """By number 1 the least moves: at 0 DC with the crank, not three times as fast; at pi a third as fast, crossed."""
+    mechanism = four_bar(*PARALLELOGRAM, at)
+    motion = planar.cycle(mechanism, 6, at + away[0], at + away[1], branches=[number])
+    theta = motion.inputs["A"].position
+    assert (motion.outcome, len(motion)) == (Outcome.SOLVED, 7)
+    phi, first, second = crossed(theta) if (number == 1) is crossed_first else (theta, 2.0, 1.0)
+    same_angles(motion.link("DC").angle, phi, 1e-12)
+    same_rates(motion, "DC", first, second)
+    assert passes_gate(mechanism, motion)
+    assert [each.input for each in motion.limits if each.kind == "change point"][:1] == pytest.approx([at], abs=1e-9)
+    assert any(f"starts there by number {number}" in each for each in motion.remarks)
+
+
+@pytest.mark.parametrize("number", [1, 2])
+def test_the_circuit_from_a_flat_start_and_the_run_in_time_take_the_way_of_that_number(number):
+    mechanism = four_bar(*PARALLELOGRAM, 0.0)
+    for given in ({"circuit": True}, {"duration": 1.0}):
+        motion = planar.cycle(mechanism, 6, branches=[number], **given)
+        theta = motion.inputs["A"].position
+        same_angles(motion.link("DC").angle, crossed(theta)[0] if number == 2 else theta, 1e-12)
+        assert np.isfinite(motion.link("DC").angular_velocity).all()
+
+
+def test_numbers_after_the_first_are_of_the_change_points_that_are_met_then():
+    motion = planar.cycle(four_bar(*PARALLELOGRAM, 0.0), 8, branches=[2, 2])
+    theta = motion.inputs["A"].position
+    expected = np.where(theta < np.pi - 1e-9, crossed(theta)[0], theta)
+    same_angles(motion.link("DC").angle, expected, 1e-11)
+
+
+def test_a_rhombus_that_starts_flat_stays_one_or_keeps_its_follower_at_rest():
+    for number, phi in ((1, None), (2, np.pi)):
+        motion = planar.cycle(four_bar(1, 1, 1, 1, np.pi), 6, np.pi, np.pi + 2.0, branches=[number])
+        theta = motion.inputs["A"].position
+        same_angles(motion.link("DC").angle, theta if phi is None else phi, 1e-11)
+        same_angles(motion.link("BC").angle, 0.0 * theta if phi is None else theta + np.pi, 1e-11)
+
+
+def test_a_slider_crank_of_equal_lengths_that_starts_upright_goes_on_folded_or_passes():
+    upright = np.pi / 2
+    for number, reach in ((1, 0.0), (2, 0.1)):
+        mechanism = slider_crank(0.05, 0.05, 0.0, upright)
+        motion = planar.cycle(mechanism, 8, upright - 1.0, upright + 1.0, branches=[number])
+        theta = motion.inputs["O"].position
+        np.testing.assert_allclose(motion.pair("s")["displacement"], reach * np.cos(theta), atol=1e-13)
+        np.testing.assert_allclose(motion.pair("s")["velocity"], -3.0 * reach * np.sin(theta), atol=1e-9)
+
+
+def test_a_start_on_a_change_point_says_which_number_goes_which_way():
+    for act in (planar.solve, planar.cycle):
+        with pytest.raises(NoAnswer) as refused:
+            act(four_bar(*PARALLELOGRAM, 0.0))
+        assert refused.value.outcome is Outcome.CHANGE_POINT
+        assert "1 moves 'DC' by 1, 2 moves 'DC' by -3 rad for each rad of the input" in refused.value.reason

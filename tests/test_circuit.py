@@ -211,6 +211,30 @@ def test_the_circuit_from_a_dead_point_ends_there_whichever_way_round(side, numb
     assert np.exp(1j * first) != pytest.approx(np.exp(1j * other.link("DC").angle[10]), abs=0.1)
 
 
+@pytest.mark.parametrize("number", [1, 2])
+def test_a_start_on_a_dead_point_to_the_last_bit_goes_either_way(number):
+    """Crank 5 at (-3, 4), coupler 3 and follower 7 upright on (-3, 0): the slope is singular without any rounding."""
+    links = {
+        "f": {"points": {"O": [0, 0], "Q": [-3, 0]}},
+        "OA": {"ends": ["O", "A"], "length": 5},
+        "AB": {"ends": ["A", "B"], "length": 3},
+        "QB": {"ends": ["Q", "B"], "length": 7},
+    }
+    limit = float(np.arctan2(4, -3))
+    value = {"planar": 1, "frame": "f", "links": links, "pairs": [{"turning": name} for name in "OABQ"]}
+    value |= {"inputs": [{"pair": "O", "position": limit, "velocity": 1.0}], "sketch": {"B": [-3, 7]}}
+    mechanism = files.from_dict(value)
+    motion = planar.cycle(mechanism, 12, circuit=True, branches=[number])
+    assert (motion.outcome, motion.reason) == (Outcome.SOLVED, "")
+    np.testing.assert_allclose(motion.inputs["O"].position[[0, 12, 24]], [limit, -limit, limit], atol=1e-12)
+    comes_back(mechanism, motion, 1e-7)
+    # two assemblies are mirrored at the line AQ; of the two ways round the one has each first
+    a, b = (motion.point(name).position[6] for name in "AB")
+    side = (a[0] + 3) * b[1] - a[1] * (b[0] + 3)
+    other = planar.cycle(mechanism, 12, circuit=True, branches=[3 - number]).point("B").position[6]
+    assert side * ((a[0] + 3) * other[1] - a[1] * (other[0] + 3)) < 0.0
+
+
 def test_the_whole_range_from_a_dead_point_is_that_from_elsewhere():
     """Without a range of its own it is one assembly from limit to limit."""
     for number in (1, 2):

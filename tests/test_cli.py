@@ -553,3 +553,46 @@ print(os.environ["OPENBLAS_NUM_THREADS"], file=sys.stderr)
     environment |= {"PYTHONPATH": str(ROOT)} | ({} if said is None else {"OPENBLAS_NUM_THREADS": said})
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=False)
     assert done.stderr.strip() == (said or "1")
+
+
+# commands and files that there are not
+
+
+@pytest.mark.parametrize(
+    ("word", "meant"), [("mobility", "inspect"), ("slove", "solve"), ("Assemblies", "modes"), ("velocity", "solve")]
+)
+def test_a_command_by_another_name_is_answered_with_the_one_that_does_it(word: str, meant: str, tmp_path: Path) -> None:
+    assert f"did you mean {meant!r}?" in run(tmp_path, word).refused(2)
+
+
+def test_a_word_that_is_no_command_is_answered_with_the_commands(tmp_path: Path) -> None:
+    sentence = run(tmp_path, "zzz", "four-bar").refused(2)
+    for word in ("no such command 'zzz'", "animate", "solve and view", "planar --help"):
+        assert word in sentence
+
+
+def test_every_other_name_of_a_command_is_of_one_that_there_is_and_is_none_itself() -> None:
+    from planar.cli import main
+    from planar.cli.ending import SYNONYMS
+
+    assert set(SYNONYMS.values()) <= set(main.commands)
+    assert not set(SYNONYMS) & set(main.commands)
+
+
+@pytest.mark.parametrize(
+    ("words", "endings"),
+    [
+        (["solve", "four-bar"], ".txt, .html or .svg"),
+        (["cycle", "four-bar", "--steps", "2"], ".csv, .json, .npz or .parquet"),
+        (["plot", "four-bar", "scheme"], ".png, .svg or .pdf"),
+        (["view", "four-bar"], ".html or .htm"),
+        (["animate", "four-bar"], ".gif or .mp4"),
+    ],
+)
+def test_a_format_that_is_not_written_is_answered_with_those_that_are(
+    words: list[str], endings: str, tmp_path: Path
+) -> None:
+    sentence = run(tmp_path, *words, "-o", "x.docx").refused(2)
+    assert "'.docx'" in sentence
+    assert f"can be written to files that end in {endings}" in sentence
+    assert not (tmp_path / "x.docx").exists()

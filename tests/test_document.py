@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from math import cos, inf, isfinite, nan, pi, sin
 from typing import Any
 
@@ -989,6 +990,28 @@ def test_a_name_of_characters_that_no_screen_shows_is_refused(name: str) -> None
     value = base()
     value["links"][name] = {"points": {"Q": [0, 0]}}
     assert refused(value).place == f"$.links[{name!r}]"
+
+
+@pytest.mark.parametrize("text", ["a\nb", "a\tb", "a\u202eb", "a\u2028b", "a\u200bb"])
+def test_a_text_that_stands_in_one_line_of_a_table_holds_nothing_that_breaks_or_turns_it(text: str) -> None:
+    for path, place in ((["name"], "$.name"), (["ids"], "$.ids[0]")):
+        value = put(base(), path, [text] if path == ["ids"] else text)
+        assert refused(value).place == place
+    published = [{"symbol": text, "quantity": "angular velocity", "of": "BC"}]
+    assert refused(put(base(), ["published"], published)).place == "$.published[0].symbol"
+
+
+@pytest.mark.parametrize("mark", ["\u202a", "\u202e", "\u2066", "\u2069"])
+def test_no_text_turns_the_order_of_letters(mark: str) -> None:
+    assert refused(put(base(), ["about"], f"a{mark}b")).place == "$.about"
+    assert refused(put(base(), ["notes"], [f"a{mark}b"])).place == "$.notes[0]"
+
+
+def test_what_is_made_in_python_has_names_that_can_be_shown_too() -> None:
+    made = planar.from_dict(base())
+    links = tuple(replace(link, name="A\nB") if link.name == "AB" else link for link in made.links)
+    with pytest.raises(BadInput, match="cannot be shown"):
+        planar.solve(replace(made, links=links))
 
 
 def test_half_a_character_in_a_text_is_refused() -> None:

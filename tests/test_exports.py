@@ -87,8 +87,9 @@ def things(motion):
 
 
 def table_of(content):
-    """Heads with their cells, as any reader of CSV finds them."""
+    """Heads with their cells, as any reader of CSV finds them, the apostrophe taken off that marks a text."""
     heads, *rows = csv.reader(io.StringIO(content.decode(), newline=""))
+    heads = [head.removeprefix("'") for head in heads]
     assert len(set(heads)) == len(heads)
     assert {len(row) for row in rows} == {len(heads)}
     return dict(zip(heads, zip(*rows, strict=True), strict=True))
@@ -424,7 +425,10 @@ def test_json_has_no_word_for_an_infinite_number():
 # names
 
 
-@pytest.mark.parametrize("name", ['say "P"', "Kolben-Ø é 点", "two\nlines", "a\rreturn", "a,b", " P ", "nan", "a/b"])
+FORMULAS = ["=SUM(A1)", '=HYPERLINK("x","y")', "+1", "-P", "@me", "'quoted'"]
+
+
+@pytest.mark.parametrize("name", ['say "P"', "Kolben-Ø é 点", "a,b", " P ", "nan", "a/b", *FORMULAS])
 def test_a_name_comes_back_as_it_is(name, monkeypatch):
     """Files allow fewer names than Python does; a pin of several links has commas in its own."""
     monkeypatch.setattr("planar.document.cursor.Cursor.checked_name", lambda self, text: text)
@@ -443,6 +447,17 @@ def test_a_name_comes_back_as_it_is(name, monkeypatch):
         np.testing.assert_array_equal(arrays[f"points/{name}/position"], place)
         assert dict(arrays["units"])[f"points/{name}/position"] == "m"
     np.testing.assert_array_equal(planar.dataset(motion).point_position.sel(point=name), place)
+
+
+@pytest.mark.parametrize("name", FORMULAS)
+def test_no_head_of_a_csv_file_is_a_formula_in_a_spreadsheet(name, monkeypatch):
+    monkeypatch.setattr("planar.document.cursor.Cursor.checked_name", lambda self, text: text)
+    value = files.to_dict(planar.load("single-link"))
+    value["links"]["link"]["ends"][1] = name
+    content = written(planar.cycle(files.from_dict(value), 3), ".csv").decode()
+    heads = next(csv.reader(io.StringIO(content, newline="")))
+    assert f"'{name} x [mm]" in heads
+    assert not any(head[0] in "=+-@" for head in heads)
 
 
 def test_a_link_named_as_what_a_pair_reports_keeps_a_head_of_its_own():
@@ -476,7 +491,7 @@ def test_the_ending_of_a_file_may_be_in_capitals():
 @pytest.mark.parametrize("suffix", [".xlsx", "", ".parq"])
 @pytest.mark.parametrize("asking", [writable, lambda suffix: written(timed(), suffix)])
 def test_an_unknown_ending_is_answered_with_all_that_there_are(asking, suffix):
-    with pytest.raises(BadInput, match=r"a run is written to \.csv, \.json, \.npz, \.parquet files"):
+    with pytest.raises(BadInput, match=r"files that end in \.csv, \.json, \.npz or \.parquet"):
         asking(suffix)
 
 

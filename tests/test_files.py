@@ -108,6 +108,31 @@ def test_what_is_no_file_and_no_model_is_refused_with_where_to_look() -> None:
     assert "`planar models`" in problem.sentence
 
 
+def test_a_path_that_is_not_there_is_answered_with_the_file_beside_it_and_with_no_model(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    written(tmp_path, "{}", "hart-inversor2.json")
+    assert "did you mean 'hart-inversor2.json'?" in refused("hart-invresor2.json").sentence
+    (tmp_path / "hart-inversor2.json").unlink()
+    for name in ("hart-invresor2.json", "mechanism.json", "four-barr.json"):
+        sentence = refused(name).sentence
+        assert "no such file" in sentence
+        assert "did you mean" not in sentence
+    assert "there is no folder 'elsewhere'" in refused("elsewhere/four-bar.json").sentence
+
+
+def test_a_models_name_in_other_letters_or_with_json_behind_is_answered_with_it() -> None:
+    for name in ("FOUR-BAR", "four_bar", "four-bar.json", "four-bra"):
+        assert "did you mean the model 'four-bar'?" in refused(name).sentence
+
+
+@pytest.mark.parametrize("content", [b"PK\x03\x04\x00\xff", b"<svg/>", b"A,B\n1,2\n", b"%PDF-1.4"])
+def test_a_file_of_another_kind_is_answered_with_what_is_read(content: bytes, tmp_path: Path) -> None:
+    problem = refused(written(tmp_path, content, "x.docx"))
+    assert "a .docx file and no mechanism; name a JSON file" in problem.sentence
+
+
 def test_a_folder_is_no_file(tmp_path: Path) -> None:
     problem = refused(tmp_path)
     assert problem.place == str(tmp_path)

@@ -424,7 +424,7 @@ def test_a_mechanism_made_in_python_is_solved_as_one_from_a_file():
     ("changes", "words"),
     [
         ({"frame": "X"}, "no link 'X' to be the frame"),
-        ({"inputs": (planar.Input("Q", 1.0),)}, "no pair 'Q' to be driven; pairs are A, B, C, D"),
+        ({"inputs": (planar.Input("Q", 1.0),)}, "no pair 'Q' to be driven; pairs are A, B, C and D"),
         ({"links": ()}, "no link 'AD' to be the frame"),
         ({"links": (planar.Link("AD", (planar.Point("A", planar.At(0, 0)),)),)}, "there is no link 'AB'"),
     ],

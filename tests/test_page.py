@@ -32,6 +32,7 @@ from planar.pages.still import still
 from planar.solving.freedom import strengths
 from planar.solving.position import known_of
 from planar.views.columns import columns
+from planar.views.run import written
 from tests import command
 from tests.known import MODELS
 from tests.pages import in_node, needs_node
@@ -41,6 +42,8 @@ HARMFUL = (
     "</script><script>window.hacked=1</script><img src=x onerror='window.hacked=1'>"
     "\"'`${window.hacked=1}&lt;\u2028\u2029🦾{data}{scripts}"
 )
+HARMFUL_LINE = HARMFUL.replace("\u2028\u2029", "")
+"""The same for what stands in one line."""
 HARMFUL_NAME = "</script><img src=x onerror='hacked=1'>\"`${hacked=1}&lt;🦾"
 SOME = dict(list(MODELS.items())[::4])
 """Models for what takes long for each."""
@@ -59,7 +62,7 @@ def hostile() -> Mechanism:
     for k in range(len(value["links"]) + len(pins)):
         text = text.replace(f'"\\u0001{k}"', json.dumps(new[k]))
     value = json.loads(text)
-    return planar.from_dict(value | {"name": HARMFUL, "about": HARMFUL, "source": HARMFUL, "notes": [HARMFUL]})
+    return planar.from_dict(value | {"name": HARMFUL_LINE, "about": HARMFUL, "source": HARMFUL, "notes": [HARMFUL]})
 
 
 def triangle(base: float) -> Mechanism:
@@ -137,12 +140,12 @@ def test_texts_of_a_file_stay_texts():
     value = planar.to_dict(planar.load("four-bar")) | {"about": "a", "source": "s", "notes": ["n"]}
     plain, harmful = Elements(page(planar.from_dict(value))), Elements(page(hostile()))
     assert [tag for tag, _ in harmful.tags] == [tag for tag, _ in plain.tags]
-    assert harmful.data()["name"] == harmful.data()["about"] == HARMFUL
+    assert (harmful.data()["name"], harmful.data()["about"]) == (HARMFUL_LINE, HARMFUL)
     assert harmful.data()["document"]["value"]["notes"] == [HARMFUL]
     title = next(k for k, (tag, _) in enumerate(harmful.tags) if tag == "title")
-    assert harmful.texts[title].rstrip("\n") == HARMFUL
+    assert harmful.texts[title].rstrip("\n") == HARMFUL_LINE
     texts = [text.rstrip("\n") for text in harmful.texts.values()]
-    assert texts.count(HARMFUL) == 4  # title, heading, about, note
+    assert texts.count(HARMFUL_LINE) == texts.count(HARMFUL) == 2  # title and heading, about and note
     assert f"Source: {HARMFUL}" in texts
 
 
@@ -379,7 +382,7 @@ def test_a_gallery_has_a_page_for_each_and_an_index_that_moves(tmp_path):
     elements = Elements(index.read_text(encoding="utf-8"))
     first, second, third = elements.data()
     assert {each["href"] for each in (first, second, third)} <= names
-    assert (first["name"], first["about"]) == (HARMFUL, HARMFUL)
+    assert (first["name"], first["about"]) == (HARMFUL_LINE, HARMFUL)
     assert [tag for tag, _ in elements.tags].count("script") == 2
     listed = [each["href"] for tag, each in elements.tags if tag == "a" and each["href"].endswith(".html")]
     assert listed == [each["href"] for each in (first, second, third)]  # also without scripts
@@ -595,6 +598,22 @@ def test_the_motion_is_saved_with_the_columns_and_numbers_of_the_cycle_command(s
     for found, (head, values) in zip(table.T, wanted.items(), strict=True):
         scale = np.abs(values[calm]).max() or 1.0
         assert np.abs(found[: len(values)][calm] - values[calm]).max() < 1e-8 * max(scale, 1e-3), head
+
+
+@needs_node
+def test_heads_that_spreadsheets_would_take_for_formulas_are_marked_as_texts_as_by_the_cycle_command():
+    value = planar.to_dict(MODELS["crank-rocker"])
+    crank = next(link for link in value["links"].values() if "ends" in link)
+    crank["points"] = crank.get("points", {}) | {"=A1+1": {"along": crank["ends"], "distance": 1}}
+    mechanism = planar.from_dict(value)
+    act = """
+    new Courses(page);
+    while (!page.course) await new Promise((go) => setTimeout(go, 5));
+    return Files.motion(page).split("\\n")[0];
+    """
+    heads = in_node({"formula": mechanism}, act, "course.js")["formula"]
+    assert heads == written(planar.cycle(mechanism, 2), ".csv").decode().split("\n")[0]
+    assert "'=A1+1 x [" in heads
 
 
 @needs_node

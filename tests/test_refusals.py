@@ -443,3 +443,95 @@ def test_an_input_at_what_is_held_fast_is_told_what_to_drive_instead(given, fast
 
 def test_a_ring_of_gears_that_closes_is_not_jammed():
     assert solved(wheels(1.0, ("O", 20), ("W", 5))).link("b").angular_velocity == pytest.approx(-0.5)
+
+
+# pairs that were forgotten
+
+
+@pytest.mark.parametrize("point", "BD")
+def test_a_pin_that_was_forgotten_is_named_with_the_links_that_it_would_join_and_mends_it(point):
+    whole = four_bar()
+    part = whole | {"pairs": [pair for pair in whole["pairs"] if pair["turning"] != point]}
+    with pytest.raises(NoAnswer) as refused:
+        planar.solve(planar.from_dict(part))
+    links = " and ".join(repr(name) for name, link in whole["links"].items() if point in str(link))
+    assert f"no pair joins links {links} at {point!r}" in refused.value.reason
+    advice = json.loads(re.search(r"add ({.*?}) to the pairs", refused.value.reason)[1])
+    assert planar.solve(planar.from_dict(part | {"pairs": [*part["pairs"], advice]})).mobility == 1
+
+
+@pytest.mark.parametrize(("point", "place"), [("A", "$.inputs[0].pair"), ("C", "$.sketch.C")])
+def test_a_pin_that_was_forgotten_is_named_where_the_file_counts_on_it(point, place):
+    whole = four_bar()
+    with pytest.raises(planar.BadInput) as refused:
+        planar.from_dict(whole | {"pairs": [pair for pair in whole["pairs"] if pair["turning"] != point]})
+    assert refused.value.place == place
+    assert f'add {{"turning": "{point}"}} to the pairs' in refused.value.sentence
+
+
+def test_a_guide_that_was_forgotten_leaves_a_link_that_hangs_by_one_pair():
+    whole = slider_crank()
+    with pytest.raises(NoAnswer) as refused:
+        planar.solve(planar.from_dict(whole | {"pairs": whole["pairs"][:2], "sketch": {}}))
+    assert "link 'rod' hangs at 'A' alone: add the pair that joins it to the rest" in refused.value.reason
+
+
+def test_names_that_stand_twice_by_chance_are_no_forgotten_pins():
+    whole = four_bar()
+    for name in ("AB", "BC", "DC"):
+        whole["links"][name]["points"] = {"G": [10, 0]}
+    whole["pairs"] = [pair for pair in whole["pairs"] if pair["turning"] != "D"]
+    with pytest.raises(NoAnswer) as refused:
+        planar.solve(planar.from_dict(whole))
+    assert "'G'" not in refused.value.reason
+
+
+# very many names
+
+
+def test_of_very_many_links_a_sentence_names_a_few_and_counts_the_rest_and_a_program_gets_all(tmp_path):
+    """An arm of 400 links: 399 of them are free."""
+    many = 400
+    links = {"f": {"points": {"P0": [0, 0]}}}
+    links |= {f"link number {k}": {"ends": [f"P{k}", f"P{k + 1}"], "length": 1} for k in range(many)}
+    arm = value(links, pins([f"P{k}" for k in range(many)]), [("P0", 10)])
+    with pytest.raises(NoAnswer) as refused:
+        planar.solve(planar.from_dict(arm))
+    assert len(str(refused.value)) < 1400
+    assert "and 387 more can still move" in refused.value.reason
+    assert refused.value.more["links"] == [f"link number {k}" for k in range(1, many)]
+    told = json.loads(run(tmp_path, "solve", written(tmp_path, arm), "--json").out)
+    assert len(told["links"]) == many - 1
+
+
+def test_whatever_the_reason_is_made_of_it_is_bounded_and_one_line():
+    for text in ("x" * 10**6, "a\nb\x1b[31m" * 10**4):
+        problem = NoAnswer(Outcome.DEAD_POINT, text)
+        assert len(problem.reason) < 3000
+        assert str(problem).isprintable()
+
+
+# what is not there
+
+
+@pytest.mark.parametrize(
+    ("key", "wrong", "offers"),
+    [
+        ("pairs", [{"turning": "A", "links": ["f", "4"]}], "links are f, AB, BC and DC"),
+        ("pairs", [{"turning": "A", "links": ["f", "AB"], "points": ["Z", "A"]}], "its points are A and D"),
+        ("frame", "4", "links are f, AB, BC and DC"),
+        ("inputs", [{"pair": "Q4", "position": 1}], "pairs are A, B, C and D"),
+        ("sketch", {"Q4": [1, 2]}, "points are A, D, B and C"),
+    ],
+)
+def test_what_is_not_there_is_answered_with_what_there_is(key, wrong, offers):
+    with pytest.raises(planar.BadInput) as refused:
+        planar.from_dict(four_bar() | {key: wrong})
+    assert offers in refused.value.sentence
+
+
+def test_of_very_many_names_that_there_are_a_few_are_listed():
+    links = {f"l{k}": {"points": {"P": [0, 0]}} for k in range(50)}
+    with pytest.raises(planar.BadInput) as refused:
+        planar.from_dict({"planar": 1, "frame": "Q", "links": links, "pairs": []})
+    assert refused.value.sentence.endswith("l10, l11 and 38 more")

@@ -166,6 +166,47 @@ def test_an_exponent_without_its_mark_is_not_taken_for_one() -> None:
     assert "not a unit" in refused("2 m/s2", "acceleration")
 
 
+@pytest.mark.parametrize(
+    ("text", "kind", "same"),
+    [
+        ("60 RPM", "angular velocity", "60 rpm"),
+        ("60 Rpm", "angular velocity", "60 rpm"),
+        ("60 rev/min", "angular velocity", "60 rpm"),
+        ("60 r/min", "angular velocity", "60 rpm"),
+        ("2 rev/s", "angular velocity", "120 rpm"),
+        ("3 revolutions/min", "angular velocity", "3 rpm"),
+        ("5 RAD/S^2", "angular acceleration", "5 rad/s^2"),
+        ("50 MM", "length", "50 mm"),
+        ("50 CM", "length", "50 cm"),
+        ("2 IN", "length", "2 in"),
+        ("50 Millimeters", "length", "50 mm"),
+        ("50 mm.", "length", "50 mm"),
+        ("60 Deg", "angle", "60 deg"),
+        ("60 Degrees", "angle", "60 deg"),
+        ("1 rev", "angle", "360 deg"),
+        ("5 KN", "force", "5 kN"),
+        ("5 Newton", "force", "5 N"),
+        ("5 Nm", "torque", "5 N m"),
+        ("5 N-m", "torque", "5 N m"),
+        ("5 N.m", "torque", "5 N m"),
+        ("5 Nmm", "torque", "0.005 N m"),
+        ("5 kNm", "torque", "5000 N m"),
+        ("5 Kg", "mass", "5 kg"),
+        ("5 kgm^2", "moment of inertia", "5 kg m^2"),
+        ("5 M/S", "velocity", "5 m/s"),
+        ("5 N/MM", "stiffness", "5 N/mm"),
+    ],
+)
+def test_units_are_read_as_people_spell_them(text: str, kind: str, same: str) -> None:
+    assert quantity(text, kind) == pytest.approx(quantity(same, kind), rel=1e-15)
+
+
+def test_capitals_that_mean_another_unit_are_taken_at_their_word() -> None:
+    """A megametre is no millimetre, and a nanometre no newton metre."""
+    assert quantity("1 Mm", "length") == pytest.approx(1e6)
+    assert "is a length" in refused("5 nm", "torque")
+
+
 # refusals
 
 
@@ -190,7 +231,10 @@ def test_an_exponent_without_its_mark_is_not_taken_for_one() -> None:
         ("2 N m", "force", ["is a torque", "a force is wanted"]),
         ("5 Hz", "angular velocity", ["'Hz'", "turns or radians", "rad/s, deg/s or rpm"]),
         ("5 kHz", "angular velocity", ["turns or radians"]),
-        ("5 s^-1", "angular velocity", ["'s^-1'", "measures none of"]),
+        ("5 s^-1", "angular velocity", ["'s^-1'", "turns or radians", "rad/s, deg/s or rpm"]),
+        ("5 1/s", "angular velocity", ["turns or radians"]),
+        ("5 NM", "torque", ["'NM'", "not a known unit"]),
+        ("5 Nm", "force", ["is a torque"]),
         ("5 kg", "force", ["is a mass", "a force is wanted"]),
         ("5 K", "force", ["'K'", "measures none of"]),
         ("5 m^2", "length", ["measures none of"]),

@@ -14,7 +14,7 @@ from planar.analysis.branches import branches
 from planar.analysis.kennedy import WORST, Construction, Found, Through, Two, unit
 from planar.analysis.primary import primary
 from planar.analysis.proof import AS_ONE, Proof, as_one, proved, ways
-from planar.analysis.ratios import Moved, motions_of
+from planar.analysis.ratios import EXACT, Moved, motions_of
 from planar.analysis.standing import standing
 from planar.analysis.ties import Rates
 from planar.analysis.ties import rates as rates_of
@@ -158,6 +158,9 @@ class _Search:
         moved: Moved | None = None
         while left := self._left():
             moved = moved or motions_of(self.walks.rates, self.walks, self.middle, self.size)
+            further = moved.links is None and self.ways.count == 1
+            if further:
+                moved = Moved({link: each[0] for link, each in self.ways.links.items()}, "", EXACT)
             if moved.links is None:
                 self.why_open = moved.why
                 return
@@ -171,7 +174,8 @@ class _Search:
                 self.as_one.add(two)
                 continue
             nearly = self.construction.lines(two) > 1
-            self.by_equations[two] = "the lines known are one, or nearly" if nearly else "no two lines are known"
+            told = "the lines known are one, or nearly" if nearly else "no two lines are known"
+            self.by_equations[two] = f"{told}, and to first order more could move" if further else told
             self.construction.add(two, Found(unit(relative), moved.error / length))
             self.construction.run()
 

@@ -61,10 +61,11 @@ def measured(constraints: Constraints, w: Array) -> Mobility:
         finite, place = motion_from(constraints, w)
     left = null_space(constraints.slope(place).T)
     surplus = max(0, finite - count)
+    everywhere = finite < null_space(constraints.slope(place)).shape[1]
     sets: tuple[tuple[str, ...], ...] = ()
     if surplus and left.shape[1] == surplus:
         sets = smallest_sets(left, constraints.pair_of_row, lambda name: farthest_first(mechanism, name))
-    return Mobility(count, here, finite, surplus, sets, tuple(_why(count, here, finite, sets)))
+    return Mobility(count, here, finite, surplus, sets, tuple(_why(count, here, finite, sets, everywhere)))
 
 
 def standing(setup: Solver, constraints: Constraints) -> Array:
@@ -79,9 +80,14 @@ def standing(setup: Solver, constraints: Constraints) -> Array:
     return setup.program.positions(z, setup.station.u, setup.station.p).full().ravel()
 
 
-def _why(count: int, here: int, finite: int, sets: tuple[tuple[str, ...], ...]) -> list[str]:
+def _why(count: int, here: int, finite: int, sets: tuple[tuple[str, ...], ...], everywhere: bool) -> list[str]:
     told = []
-    if here > finite:
+    if here > finite and finite and everywhere:
+        told.append(
+            f"in every position of the motion the pairs allow {many(here - finite, 'more way')}, but to first order "
+            f"only: to second order they hold it, so that a little play lets it move far"
+        )
+    elif here > finite:
         what = "nothing moves on from here" if finite == 0 else "branches of the motion cross here, or it turns back"
         told.append(
             f"in this position the pairs allow {many(here - finite, 'more way')}, but to first order only: {what}"

@@ -13,6 +13,7 @@ from planar.analysis.ratios import chosen
 from planar.analysis.ties import part
 from planar.motion import State
 from planar.solving.constraints import Constraints, null_space
+from planar.solving.position import Solver
 from planar.solving.setup import Setup
 
 Array = np.ndarray
@@ -57,11 +58,27 @@ class Stand(NamedTuple):
 
 
 def stand(state: State) -> Stand:
-    """A position in all coordinates, nothing eliminated."""
-    setup = Setup(state.mechanism)
+    """A position in all coordinates, nothing eliminated.
+
+    Where constraints hold all along a motion to second order what they leave free to first order, that is no motion.
+    """
+    setup = Solver(state.mechanism)
     constraints = Constraints(setup)
     w = setup.coordinates(state.frames, state.own)
-    return Stand(setup, constraints, w, null_space(constraints.slope(w)) if w.size else np.zeros((0, 0)))
+    free = null_space(constraints.slope(w)) if w.size else np.zeros((0, 0))
+    regular = setup.regular(w[list(setup.equations.unknowns)]) if free.shape[1] > 1 else None
+    if regular is not None:
+        free = _moving(*regular)
+    return Stand(setup, constraints, w, free)
+
+
+def _moving(solver: Solver, z: Array) -> Array:
+    """The motions at unknowns z (coordinates, ways), inputs left aside."""
+    y = np.concatenate([z, solver.station.u])
+    slope = np.hstack([each[0] for each in solver.program.slopes(z[None], solver.station.u[None], solver.station.p)])
+    ways = null_space(slope)
+    found = [solver.program.kinematics(y, way, 0.0 * y, solver.station.p).w1 for way in ways.T]
+    return np.linalg.qr(np.array(found).T)[0]
 
 
 def poles(state: State, here: Stand, free: Array, middle: Array, size: float) -> dict[str, Array]:

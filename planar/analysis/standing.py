@@ -12,8 +12,8 @@ from planar.program import placed
 from planar.solving import refusals
 from planar.solving.constraints import Constraints, null_space
 from planar.solving.follow import follow
-from planar.solving.freedom import SINGULAR, slope_at, strengths
-from planar.solving.position import Solver
+from planar.solving.freedom import SINGULAR, strengths
+from planar.solving.position import known_of
 
 
 def standing(mechanism: Mechanism, drives: Sequence[Drive] = ()) -> State:
@@ -21,11 +21,10 @@ def standing(mechanism: Mechanism, drives: Sequence[Drive] = ()) -> State:
 
     Raises NoAnswer where the mechanism cannot be assembled, or inputs leave it free or cannot be moved there.
     """
-    solver = Solver(mechanism)
-    found = solver.assembly()
-    z, remarks = found.z, solver.remarks(found)
+    known = known_of(mechanism)
+    solver, z, remarks = known.solver, known.assembly.z, known.remarks
     if drives:
-        there = Solver(with_inputs(mechanism, tuple(drives)))
+        there = solver.moved(with_inputs(mechanism, tuple(drives)))
         z = follow(there, there.station.p, z, solver.station.u, there.station.u)
         solver = there
     u, p = solver.station.u, solver.station.p
@@ -36,8 +35,11 @@ def standing(mechanism: Mechanism, drives: Sequence[Drive] = ()) -> State:
     w = solver.program.positions(z, u, p).full().ravel()
     frames, own = placed((w * solver.scale).tolist(), solver.column, solver.shapes, solver.pairs)
     solver.refuse_gap(frames, own)
-    mobility = null_space(Constraints(solver).slope(w)).shape[1] if w.size else 0
-    if np.any(strengths(solver, slope_at(solver, z, u)) < SINGULAR):
+    slopes = solver.program.slopes(z[None], u[None], p)
+    # what is held to second order only is no freedom: the pairs' own slope does not see it, the deflated one does
+    slope = np.hstack([each[0] for each in slopes]) if solver.deflated else Constraints(solver).slope(w)
+    mobility = null_space(slope).shape[1] if w.size else 0
+    if np.any(strengths(solver, slopes[0][0]) < SINGULAR):
         told = "the inputs are on a dead point or a change point, where places are exact to the root of rounding only"
         remarks = (*remarks, told)
     return State(solver.mechanism, mobility, residual, remarks, frames, own, solver.shapes)

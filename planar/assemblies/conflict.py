@@ -19,7 +19,7 @@ from planar.solving.assemble import Failure, search
 from planar.solving.candidates import Candidates
 from planar.solving.position import Solver, known_of
 from planar.solving.remedy import Change, mending, moving
-from planar.words import listed
+from planar.words import quoted
 
 MARGIN = 1e-9
 """By so much more a side of a ring is called too long: part of the others together."""
@@ -62,12 +62,11 @@ class Conflict:
     @property
     def said(self) -> tuple[str, ...]:
         """What is in conflict, and how surely."""
-        names = [repr(name) for name in self.pairs]
-        held = f"pair{'s' * (len(names) != 1)} {listed(names)}"
+        held = f"pair{'s' * (len(self.pairs) != 1)} {quoted(self.pairs)}"
         if self.inputs:
-            held += f" and the input{'s' * (len(self.inputs) != 1)} at {listed([repr(name) for name in self.inputs])}"
-        others = [repr(given.pair) for given in self.mechanism.inputs if given.pair not in self.inputs]
-        moved = f"moving the input{'s' * (len(others) != 1)} at {listed(others)} does not mend it" if others else ""
+            held += f" and the input{'s' * (len(self.inputs) != 1)} at {quoted(self.inputs)}"
+        others = [given.pair for given in self.mechanism.inputs if given.pair not in self.inputs]
+        moved = f"moving the input{'s' * (len(others) != 1)} at {quoted(others)} does not mend it" if others else ""
         if self.complete is Completeness.NOT:
             sure = "no position was found by a search from many starts, which is no proof"
             sure += f"; if there is none, {moved}" if moved else ""

@@ -11,12 +11,46 @@ from typing import Any, NoReturn
 
 import click
 
-from planar.errors import BadInput, NoAnswer, NotWritten
+from planar.errors import BadInput, NoAnswer, NotWritten, listed
 
 NO_ANSWER, BAD_INPUT, NOT_WRITTEN = 1, 2, 3
 """Exit statuses; 0 is done."""
 CLOSED_PIPE = 128 + 13
 """What a shell tells of programs that the closing of their pipe ends (SIGPIPE is signal 13), as by `| head`."""
+
+
+SYNONYMS = {
+    "advantage": "forces",
+    "analyse": "solve",
+    "analyze": "solve",
+    "animation": "animate",
+    "assemblies": "modes",
+    "branches": "circuits",
+    "check": "inspect",
+    "dof": "inspect",
+    "draw": "plot",
+    "dynamics": "simulate",
+    "export": "cycle",
+    "info": "inspect",
+    "kinematics": "solve",
+    "list": "models",
+    "mobility": "inspect",
+    "motion": "cycle",
+    "move": "cycle",
+    "names": "inspect",
+    "open": "view",
+    "page": "view",
+    "poles": "centres",
+    "position": "solve",
+    "reactions": "forces",
+    "run": "cycle",
+    "show": "view",
+    "statics": "forces",
+    "steps": "explain",
+    "validate": "inspect",
+    "velocity": "solve",
+}
+"""Commands by other words for what they do."""
 
 
 class Commands(click.Group):
@@ -39,6 +73,19 @@ class Commands(click.Group):
                 stream.reconfigure(errors="backslashreplace")  # what the screen's alphabet lacks
         with _ending() if args else nullcontext():  # without any words click shows the help
             return super().parse_args(ctx, args)
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        name = args[0]
+        if not name.startswith("-") and self.get_command(ctx, name) is None:
+            from difflib import get_close_matches
+
+            near = get_close_matches(name.lower(), self.commands, 1) or [SYNONYMS.get(name.lower(), "")]
+            if near[0]:
+                ctx.fail(f"no such command {name!r}; did you mean {near[0]!r}?")
+            ctx.fail(f"no such command {name!r}; commands are {listed(sorted(self.commands), None)}")
+        return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: click.Context) -> Any:
         with _ending():

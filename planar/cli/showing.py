@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from planar.cli.shared import advancing, at, busy, drives, loaded, main, moded, output, spare
-from planar.errors import BadInput
+from planar.errors import no_format
 
 SUFFIXES = (".html", ".htm")
 
@@ -23,7 +23,7 @@ def view(model: str, output: Path | None, at: tuple[str, ...], mode: int | None)
     from planar.solving.position import solve
 
     if output is not None and output.suffix.lower() not in SUFFIXES:
-        raise BadInput(output.suffix or "the file", f"a page is written to {' or '.join(SUFFIXES)} files")
+        raise no_format(output.suffix, "a page", SUFFIXES)
     mechanism = loaded(model, mode)
     spare(model, output)
     with busy(mechanism.name):

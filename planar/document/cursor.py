@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import cached_property
@@ -11,13 +11,13 @@ from math import isnan
 from typing import Any
 
 from planar.document.schema import FORBIDDEN, HUGE
-from planar.errors import BadInput
+from planar.errors import BadInput, listed, unshown
 from planar.mechanism import FARTHEST, Units
 from planar.shapes import Link, shape
 from planar.units import UnitError, example, quantity, unit
 
-_JOINERS = {0x200C: None, 0x200D: None}  # invisible, but letters of some scripts need them
-_UNSHOWN = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff]")  # control characters, halves of characters
+# control characters, what turns the order of letters, halves of characters
+_UNSHOWN = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
 
 
 @dataclass(frozen=True)
@@ -143,9 +143,16 @@ class Cursor:
         found = [mark for mark in FORBIDDEN if mark in name]
         if found:
             raise self.refuse(None, f"the name {name!r} holds {found[0]!r}; names contain none of . : ,")
-        if not name.translate(_JOINERS).isprintable():
+        if unshown(name):
             raise self.refuse(None, f"the name {name!r} holds a character that cannot be shown")
         return name
+
+    def as_line(self) -> str:
+        """A text that stands in one line of tables and pages."""
+        text = self.as_text()
+        if unshown(text):
+            raise self.refuse(None, f"this text stands in a line, and {unshown(text)!r} cannot be shown in one")
+        return text
 
     def names(self, key: str, count: int) -> tuple[str, ...]:
         found = tuple(item.as_name() for item in self[key].items())
@@ -268,7 +275,7 @@ class Cursor:
     def as_link(self) -> str:
         name = self.as_text()
         if name not in self.whole.links:
-            raise self.refuse(None, f"there is no link {name!r}{did_you_mean(name, self.whole.links)}")
+            raise self.refuse(None, f"there is no link {name!r}{offered(name, self.whole.links, 'links')}")
         return name
 
     def link(self, key: str) -> str:
@@ -292,7 +299,7 @@ class Cursor:
     def carried(self, point: str, link: str, key: str) -> None:
         known = self.whole.links[link].names
         if point not in known:
-            raise self.refuse(key, f"link {link!r} has no point {point!r}{did_you_mean(point, known)}")
+            raise self.refuse(key, f"link {link!r} has no point {point!r}{offered(point, known, 'its points')}")
 
     def point(self, key: str, link: str) -> str:
         found = self[key].as_text()
@@ -322,6 +329,12 @@ def called(value: Any) -> str:
     text = repr(value) if isinstance(value, str | int | float) else ""
     name = next(name for kind, name in kinds.items() if isinstance(value, kind))
     return f"the {name.split()[1]} {text}" if 0 < len(text) < 40 else name
+
+
+def offered(word: str, known: Iterable[str], what: str) -> str:
+    """A clause that offers the nearest known name, or the names that there are."""
+    names = list(known)
+    return did_you_mean(word, names) or (f"; {what} are {listed(names)}" if names else "; there is none")
 
 
 def did_you_mean(word: str, known: Any, sentence: str = "did you mean {!r}?", cutoff: float = 0.6) -> str:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
-from planar.document.cursor import Cursor, did_you_mean
+from planar.document.cursor import Cursor, did_you_mean, offered
+from planar.errors import listed
 from planar.mechanism import Mechanism, named_points
-from planar.pairs import Pair
+from planar.pairs import Pair, joining
 
 
 def motion(cursor: Cursor, known: Mapping[str, Pair]) -> Pair:
@@ -19,7 +20,17 @@ def motion(cursor: Cursor, known: Mapping[str, Pair]) -> Pair:
     reverse = name.partition(":")[0] + ":" + ",".join(reversed(name.partition(":")[2].split(",")))
     if reverse in known:
         raise cursor.refuse(None, f"the links of {name!r} stand in the other order in the file; write {reverse!r}")
-    raise cursor.refuse(None, f"there is no pair {name!r}{did_you_mean(name, known)}")
+    carriers = cursor.carriers(name)
+    if len(carriers) > 1:
+        told = (
+            f"there is no pair {name!r}, though {_links(carriers)} carry that point; add {joining(name)} to the pairs"
+        )
+        raise cursor.refuse(None, told)
+    raise cursor.refuse(None, f"there is no pair {name!r}{offered(name, known, 'pairs')}")
+
+
+def _links(names: Iterable[str]) -> str:
+    return f"links {listed(map(repr, names))}"
 
 
 def point_names(mechanism: Mechanism) -> dict[str, str]:
@@ -35,5 +46,9 @@ def point_named(cursor: Cursor, name: str, points: Mapping[str, str]) -> str:
         return points[name]
     several = [other for other in points if other.endswith(f".{name}")]
     if several:
-        raise cursor.refuse(None, f"several points are called {name!r}; write {' or '.join(map(repr, several))}")
-    raise cursor.refuse(None, f"there is no point {name!r}{did_you_mean(name, points)}")
+        told = f"several points are called {name!r}; write {listed(map(repr, several), last=' or ')}"
+        if len(cursor.carriers(name)) > 1 and name not in points.values():
+            told += f", or add {joining(name)} to the pairs, if it is one pin of {_links(cursor.carriers(name))}"
+        raise cursor.refuse(None, told)
+    near = did_you_mean(name, points) or offered(name, dict.fromkeys(points.values()), "points")
+    raise cursor.refuse(None, f"there is no point {name!r}{near}")

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from planar.document.applied import read_applied
-from planar.document.cursor import Cursor, Whole, called, did_you_mean
+from planar.document.cursor import Cursor, Whole, called, did_you_mean, offered
 from planar.document.named import motion, point_named, point_names
 from planar.document.schema import (
     ALONG,
@@ -55,17 +55,17 @@ def read(value: Any) -> Mechanism:
     frame = top["frame"].as_text()
     links = {name: _link(name, cursor) for name, cursor in top["links"].members()}
     if frame not in links:
-        raise top.refuse("frame", f"there is no link {frame!r} to be the frame{did_you_mean(frame, links)}")
+        raise top.refuse("frame", f"there is no link {frame!r} to be the frame{offered(frame, links, 'links')}")
     full = _written_out(replace(top, whole=Whole(units, frame, links)))
     links = dict(full.whole.links)
     pairs = _pairs(full)
     bare = Mechanism(
-        name=full.text("name", "") or "mechanism",
+        name=(full["name"].as_line() if full.has("name") else "") or "mechanism",
         frame=frame,
         links=tuple(links.values()),
         pairs=pairs,
         units=units,
-        ids=tuple(item.as_text() for item in full.listed("ids")),
+        ids=tuple(item.as_line() for item in full.listed("ids")),
         about=full.text("about"),
         source=full.text("source"),
         geometry=full.one_of("geometry", GEOMETRY),
@@ -192,7 +192,7 @@ def _axis(cursor: Cursor, points: tuple[str, ...]) -> tuple[str, str] | None:
     first, second = cursor.names("axis", 2)
     for end in (first, second):
         if end not in points:
-            raise cursor.refuse("axis", f"there is no point {end!r} on this link{did_you_mean(end, points)}")
+            raise cursor.refuse("axis", f"there is no point {end!r} on this link{offered(end, points, 'its points')}")
     if first == second:
         raise cursor.refuse("axis", "the axis needs two different points")
     return first, second
@@ -306,7 +306,7 @@ def _drives(cursor: Cursor, key: str, mechanism: Mechanism) -> tuple[Drive, ...]
     found = []
     for name, drive in cursor[key].members():
         if name not in known:
-            raise drive.refuse(None, f"there is no input at {name!r}{did_you_mean(name, known)}")
+            raise drive.refuse(None, f"there is no input at {name!r}{offered(name, known, 'the pairs with inputs')}")
         drive.only(*DRIVE)
         kinds = known[name].driven()
         found.append(
@@ -336,7 +336,7 @@ def _published(cursor: Cursor, mechanism: Mechanism, points: Mapping[str, str]) 
         if relative_to is not None:
             relative_to = point_named(cursor["relative_to"], relative_to, points)
     return Published(
-        symbol=cursor["symbol"].as_text(),
+        symbol=cursor["symbol"].as_line(),
         quantity=quantity,
         of=of,
         value=cursor.optional("value", kind) if cursor.has("value") and cursor["value"].value is not None else None,
@@ -344,7 +344,7 @@ def _published(cursor: Cursor, mechanism: Mechanism, points: Mapping[str, str]) 
         relative_to=relative_to,
         component=cursor.one_of("component", ("x", "y")),
         sense=cursor.one_of("sense", SENSES),
-        case=cursor.text("case"),
+        case=cursor["case"].as_line() if cursor.has("case") else None,
         note=cursor.text("note"),
         slip=cursor.text("slip"),
         inputs=_drives(cursor, "inputs", mechanism),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from planar.document.cursor import Cursor, Whole
+from planar.errors import listed
 from planar.mechanism import Drive, Mechanism, motions
 
 
@@ -12,7 +13,7 @@ def read_drive(mechanism: Mechanism, pair: str, position: str) -> Drive:
     """An input moved to a position written as text: a number in the file's units, or a quantity. Raises BadInput."""
     known = {given.pair: motions(mechanism)[given.pair] for given in mechanism.inputs}
     if pair not in known:
-        told = f"there is no input at {pair!r}; inputs are at {', '.join(known) or 'no pair'}"
+        told = f"there is no input at {pair!r}; inputs are at {listed(known) if known else 'no pair'}"
         raise Cursor(pair, pair).refuse(None, told)
     try:
         value: Any = float(position)

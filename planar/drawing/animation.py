@@ -21,7 +21,7 @@ from planar.drawing.picture import Circle, Fill, Line, Mark, Pen, Spot, extent
 from planar.drawing.positions import chosen_points, coupler_points
 from planar.drawing.runs import Run, closing, smooth, steady
 from planar.drawing.scheme import body_marks, ground_marks
-from planar.errors import BadInput
+from planar.errors import BadInput, no_format
 from planar.mechanism import Mechanism
 from planar.motion import Motion
 from planar.words import amount
@@ -100,7 +100,7 @@ def animate(
     """
     kind = f".{str(suffix).lower().lstrip('.')}"
     if kind not in SUFFIXES:
-        raise BadInput("suffix", f"an animation is a {' or a '.join(SUFFIXES)} file, not {suffix!r:.40}")
+        raise no_format(str(suffix), "an animation", SUFFIXES)
     if isinstance(fps, bool) or not isinstance(fps, Real) or not 1.0 <= fps <= FASTEST:
         raise BadInput("fps", f"1 to {FASTEST:g} frames a second are wanted, not {fps!r:.40}")
     ready()

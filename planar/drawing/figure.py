@@ -13,7 +13,7 @@ from planar.drawing.labels import Placed, placed
 from planar.drawing.lettering import font, measured, shown, wrapped
 from planar.drawing.outline import Head, check, head, pointed, sweep
 from planar.drawing.picture import Arrow, Circle, Letter, Line, Mark, Pen, Picture, Spot, extent
-from planar.errors import BadInput
+from planar.errors import BadInput, no_format
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -178,7 +178,7 @@ def pages(figures: Sequence[Figure], suffix: str) -> bytes:
 
     kind = suffix.lower().removeprefix(".")
     if kind not in METADATA:
-        raise BadInput(suffix, "a drawing is saved as .png, .svg or .pdf")
+        raise no_format(suffix, "a drawing", (f".{each}" for each in METADATA))
     if not figures:
         raise BadInput(suffix, "there is nothing to draw")
     if len(figures) > 1 and kind != "pdf":

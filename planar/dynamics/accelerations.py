@@ -20,7 +20,7 @@ from planar.dynamics.courses import factors
 from planar.dynamics.work import Work
 from planar.errors import NoAnswer, Outcome
 from planar.solving.timed import by_law
-from planar.words import listed
+from planar.words import quoted
 
 Array = np.ndarray
 
@@ -163,7 +163,7 @@ class Accelerations:
         moved = [link for link, at in self.work.column.items() if way[at : at + 3].max() > 0.1 * way.max()]
         return NoAnswer(
             Outcome.TOO_FEW_INPUTS,
-            f"link{'s' * (len(moved) != 1)} {listed([repr(link) for link in moved])} can move without anything that "
+            f"link{'s' * (len(moved) != 1)} {quoted(moved)} can move without anything that "
             f"has a mass, so nothing tells how fast; give {'one of them' if len(moved) > 1 else 'it'} a mass with an "
             f"inertia, or let an input drive it",
         )

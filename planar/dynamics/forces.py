@@ -21,7 +21,7 @@ from planar.errors import BadInput, NoAnswer, Outcome
 from planar.mechanism import Mechanism
 from planar.motion import Motion, State
 from planar.shown import Shown
-from planar.words import listed
+from planar.words import quoted
 
 Array = np.ndarray
 
@@ -123,7 +123,7 @@ def forces(moving: State | Motion, inertia: bool = True) -> Forces:
             "the ends of a spring or damper meet here, so that its force has no direction; move the input",
         )
     if one and not solved.balanced.all():
-        told = listed([repr(given.pair) for given in mechanism.inputs])
+        told = quoted([given.pair for given in mechanism.inputs])
         raise NoAnswer(
             Outcome.DEAD_POINT,
             f"no forces in the pairs balance the links here, which the inputs at {told} cannot hold; move the input",

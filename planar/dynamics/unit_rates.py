@@ -9,7 +9,7 @@ from planar.mechanism import Input, Mechanism, motions
 from planar.motion import State
 from planar.pairs import Kind
 from planar.solving.position import Solver
-from planar.words import listed
+from planar.words import quoted
 
 
 def alone(state: State, pair: str) -> State:
@@ -28,7 +28,7 @@ def refuse_surplus(state: State) -> None:
     if state.mobility < len(given):
         raise NoAnswer(
             Outcome.TOO_MANY_INPUTS,
-            f"the {len(given)} inputs at {listed([each.pair for each in given])} drive a mechanism of mobility "
+            f"the {len(given)} inputs at {quoted([each.pair for each in given])} drive a mechanism of mobility "
             f"{state.mobility}: none moves alone, and equilibrium does not tell what each supplies; "
             f"leave out {len(given) - state.mobility} of them",
         )

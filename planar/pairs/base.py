@@ -147,6 +147,11 @@ class Pair(ABC):
         return None
 
     @classmethod
+    def joining(cls, point: str) -> dict[str, Any] | None:
+        """The entry by which this type joins all links that carry a point of this name; None for one that does not."""
+        return None
+
+    @classmethod
     @abstractmethod
     def read(cls, entry: Entry) -> tuple[Self, ...]:
         """The pairs that one entry of a file describes."""

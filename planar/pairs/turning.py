@@ -97,6 +97,10 @@ class Turning(Pair):
         )
 
     @classmethod
+    def joining(cls, point: str) -> dict[str, Any]:
+        return {cls.keyword: point}
+
+    @classmethod
     def read(cls, entry: Entry) -> tuple[Self, ...]:
         entry.only(cls.keyword, *cls.members)
         pin = entry.name("turning")

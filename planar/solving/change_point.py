@@ -32,6 +32,10 @@ NEARLY = 1e-2
 """A point is on a way if it is no further from it than this part of its distance from the change point."""
 ALIKE = 1e-6
 """Ways that are nearer to one another are one."""
+ASIDE = 1e-6
+"""rad or sizes: so far a position on a change point is from it at most, known to the root of rounding."""
+RESTING = 1e-7
+"""A rate of the inputs along a way below this is none."""
 HALF, LEAST_HALF = 0.02, 1e-4
 """Half the length of the arc that is taken as a polynomial beside a change point, and where it is given up."""
 AGREES = 1e-11
@@ -176,15 +180,46 @@ def crossing(curve: Curve, here: Point, y: Array) -> Crossing | None:
     came = None if first is None else ways.way(first)
     if first is None or came is None or not _leads(curve, here, came):
         return None
-    size = len(first)
-    found = [first]
+    found = _directions(ways, [first])
+    others = [ways.way(c) for c in found[1:]]
+    told = tuple(way for way in others if way is not None)
+    return Crossing(y, (came, *told), len(told) == len(others), len(first) - 1)
+
+
+def starting(curve: Curve, y: Array) -> Crossing | None:
+    """The change point on which a position lies to rounding, with all ways on which the inputs move.
+
+    First those on which the unknowns move least for the inputs, whichever way these go; None where the position is no
+    such point.
+    """
+    size = len(y)
+    start = np.linalg.svd(curve.slope(y))[2][size - 2 :].T
+    near = _refined(curve, y, start)
+    if near is not None and near.null.shape[1] > 2:
+        near = _refined(curve, near.y, near.null)
+    if near is None or np.linalg.norm(near.y - y) > ASIDE or near.open > curve.solver.tolerance:
+        return None
+    ways = _Ways(curve, near.y)
+    found = _directions(ways, [])
+    told = [way for way in map(ways.way, found) if way is not None]
+    moving = [way if way.advance > 0.0 else way.turned() for way in told if abs(way.advance) > RESTING]
+    if not moving:
+        return None
+    # as the inputs' own way goes, so that both ways from here count alike
+    sense = np.sign(curve.way[np.argmax(np.abs(curve.way))])
+    rates = [tuple(np.round(sense * way.tangent[:-1] / way.advance, 6)) for way in moving]
+    order = sorted(range(len(moving)), key=lambda k: (round(float(np.linalg.norm(rates[k])), 6), rates[k]))
+    return Crossing(near.y, tuple(moving[k] for k in order), len(told) == len(found), near.null.shape[1] - 1)
+
+
+def _directions(ways: _Ways, found: list[Array]) -> list[Array]:
+    """The directions in which the conditions of second order are met, beside those found already."""
+    size = ways.null.shape[1]
     for start in np.random.default_rng(0).normal(size=(STARTS * size, size)):
         c = ways.root(start)
         if c is not None and all(min(np.linalg.norm(c - a), np.linalg.norm(c + a)) > ALIKE for a in found):
             found.append(c)
-    others = [ways.way(c) for c in found[1:]]
-    told = tuple(way for way in others if way is not None)
-    return Crossing(y, (came, *told), len(told) == len(others), size - 1)
+    return found
 
 
 def _leads(curve: Curve, here: Point, way: Point) -> bool:

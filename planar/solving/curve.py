@@ -120,9 +120,9 @@ class Curve:
         many = len(y) - 1
         if len(slope) == many and least > REGULAR:
             system = np.vstack([slope, towards])
-            tangent = _solved(system, np.append(np.zeros(many), 1.0))
-            size = float(np.linalg.norm(tangent))
-            if size * float(np.linalg.norm(towards)) < ASIDE:
+            tangent = _regular(system, np.append(np.zeros(many), 1.0))
+            size = np.inf if tangent is None else float(np.linalg.norm(tangent))
+            if tangent is not None and size * float(np.linalg.norm(towards)) < ASIDE:
                 tangent /= size
                 system[many] = tangent
                 bend = _solved(system, np.append(-self.second(y, tangent), 0.0))
@@ -179,14 +179,18 @@ class Curve:
 def _solved(system: Array, known: Array) -> Array:
     """The shortest solution in the sense of least squares; straight away where the system is square and regular."""
     if system.shape[0] == system.shape[1]:
-        try:
-            found = np.linalg.solve(system, known)
-        except np.linalg.LinAlgError:
-            pass
-        else:
-            if np.max(np.abs(found), initial=0.0) < FARTHEST:
-                return found
+        found = _regular(system, known)
+        if found is not None and np.max(np.abs(found), initial=0.0) < FARTHEST:
+            return found
     return np.linalg.lstsq(system, known, rcond=1e-14)[0]
+
+
+def _regular(system: Array, known: Array) -> Array | None:
+    """The solution of a square system; None where it is singular to the last bit, as on an exact dead point."""
+    try:
+        return np.linalg.solve(system, known)
+    except np.linalg.LinAlgError:
+        return None
 
 
 def _sizes(slope: Array) -> Array:

@@ -43,7 +43,8 @@ def cycle(
 
     Where branches of the motion cross, it goes on smoothly; `branches` are the numbers of the ways taken at the first,
     second ... change point instead, counted from the file's position each way: 1 smoothly, 2 the next by the angle from
-    that. At a start on a dead point they tell the two ways apart.
+    that. At a start on a dead point they tell the two ways apart; at one on a change point the ways that lead through
+    it, first that on which the rest moves least for the input, and without a number nothing goes on from there.
 
     Where an input has a law, or a `duration` (s) is given, the run is one in time: every input follows its law, else
     the file's constant acceleration, for the longest law or the duration; `steps` divide the time.

@@ -15,7 +15,7 @@ from planar.roots import root
 from planar.solving.branch import Branch, cancelling
 from planar.solving.curve import Arc, Curve, Point, Traced
 from planar.solving.straight import STRAIGHT, Told, course
-from planar.solving.walk import Missed, Passed, Walk
+from planar.solving.walk import AT, Missed, Passed, Walk
 
 Array = np.ndarray
 
@@ -145,6 +145,14 @@ class Trip:
         """Whether a place lies on what has been followed already."""
         return self._piece is not None and place <= self._piece.stop
 
+    @property
+    def start(self) -> tuple[Array, Local]:
+        """The unknowns where it starts on a change point by a way that was asked for, with their rates along it."""
+        found = self.to(0.0)
+        assert found is not None
+        assert found[1] is not None
+        return found[0], found[1]
+
     def to(self, place: float) -> tuple[Array, Local | None] | None:
         """The unknowns so far along the way, with rates where the slope is singular; None if it ends before."""
         while self._piece is None or not self.holds(place):
@@ -180,7 +188,7 @@ def onwards(curve: Curve, y: Array, branches: list[int]) -> Point:
     ahead = np.zeros_like(y)
     ahead[-1] = 1.0
     here = curve.at(y, ahead)
-    if rests(here):
+    if rests(here) and here.clear > AT:
         most = int(np.argmax(np.abs(here.tangent)))
         second = bool(branches) and branches.pop(0) > 1
         return here if bool(here.tangent[most] > 0.0) is not second else here.turned()
@@ -301,6 +309,8 @@ def run(
         ahead = np.vstack([u[base], u[done:]])
         trip, places = _trip(solver, p, found[base], ahead, branches[len(met_on_way) :])
         before = len(met_on_way)
+        if trip.walk.leaves and base == done - 1:
+            found[base], local[base] = trip.start
         for place, following in pairwise([*places, np.inf]):
             at = trip.to(place)
             met_on_way[before:] = met(trip.walk, place)
@@ -327,7 +337,8 @@ def _untold(solver: Followed, samples: int) -> Told:
 
 def _trip(solver: Followed, p: Array, z: Array, u: Array, branches: Sequence[int]) -> tuple[Trip, list[float]]:
     """A trip from the first of these inputs towards the next, and the places of those that lie on the same way."""
-    way = u[1] - u[0]
+    away = np.max(np.abs(u - u[0]), axis=1, initial=0.0)
+    way = u[int(np.argmax(away > 0.0))] - u[0]
     reach = float(np.max(np.abs(way), initial=0.0))
     if reach == 0.0:
         return Trip(solver, p, z, u[0], way), [0.0]

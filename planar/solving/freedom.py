@@ -64,7 +64,7 @@ def mobility(setup: Setup, z: Array, motion: Rates) -> int:
 
         ways = ways_on(setup, motion.w)
         always = any(always_weak(setup, stage, z) for stage in weak) if ways is None else ways > inputs
-        return refusals.ever_free(setup, links) if always else refusals.change_point(setup, links, found)
+        return refusals.ever_free(setup, links) if always else refusals.change_point(setup, links, found, z)
 
     raise Crossing(refused) if found == inputs + 1 else refused()
 

@@ -106,12 +106,15 @@ class Gate:
         return found
 
     def _greatest(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Jet]], order: int) -> Array:
-        """The greatest rate of an order (lengths of the size), what a velocity makes of itself in an arc included."""
+        """The greatest rate of an order (lengths of the size), what a velocity makes of itself in an arc included.
+
+        A velocity along a line counts as one in an arc of the size: what turning leaves there but for rounding is none.
+        """
         rates = [np.zeros(1)]
         for frame in frames.values():
             if not frame.fixed:
-                rates += [np.abs(frame.angle.parts[k]) ** (order / k) for k in range(1, order + 1)]
-                rates += [np.abs(value.parts[order]) / self.unit for value in (frame.x, frame.y)]
+                for value, size in ((frame.angle, 1.0), (frame.x, self.unit), (frame.y, self.unit)):
+                    rates += [(np.abs(value.parts[k]) / size) ** (order / k) for k in range(1, order + 1)]
         rates += [np.abs(jet.parts[order]) / self.unit for each in own.values() for jet in each]
         greatest = np.maximum.reduce(np.broadcast_arrays(*rates))
         return np.where(greatest == 0.0, 1.0, greatest)

@@ -155,7 +155,7 @@ def along(
                 point = arc.at(curve, x)
                 yield noted("stroke end", output.name, point, float(watched.along(curve, point)[k, 0]))
         for each in met(walk, last)[passed:]:
-            if not np.array_equal(each.passed.crossing.y, arc.after.y):
+            if not (each.passed.starts or np.array_equal(each.passed.crossing.y, arc.after.y)):
                 break  # farther on: a walk that has gone its whole way knows them all
             yield noted("change point", pair, each.passed.crossing.ways[0], None, crossed(setup, each))
             passed += 1

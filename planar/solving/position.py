@@ -81,7 +81,7 @@ class Solver(Setup):
 
     def remarks(self, found: Assembly) -> tuple[str, ...]:
         """What there is to say of an assembly."""
-        if not (found.ties or found.stopped):
+        if not (found.ties or found.stopped or self.deflated):
             return self.mechanism.remarks
         from planar.solving.remarks import remarks  # only where there is something to say
 
@@ -92,6 +92,19 @@ class Solver(Setup):
         if surely_determined(self, z):
             return True
         return bool(np.all(strengths(self, slope_at(self, z, self.station.u)) >= SINGULAR))
+
+    def regular(self, z: Array) -> tuple[Solver, Array] | None:
+        """A solver, and the unknowns, for constraints that are singular at z and all along the motion from there; None
+        where they are not, or something is free."""
+        if self.deflated:
+            return None
+        weak = strengths(self, slope_at(self, z, self.station.u)) < SINGULAR
+        if not weak.any():
+            return None
+        from planar.solving.deflation import deflated  # few mechanisms are of this kind
+
+        found = deflated(self, [stage for stage in self.equations.stages if weak[stage.level]], z)
+        return found and (self.solved_by(found[0]), found[1])
 
     def _unassembled(self, failure: Failure) -> NoAnswer:
         found = strengths(self, slope_at(self, failure.z, self.station.u))
@@ -125,13 +138,18 @@ class Solver(Setup):
         still = self.program.kinematics(y, np.concatenate([rest, s.u1]), given, s.p)
         try:
             found = mobility(self, z, still)
-        except Crossing as crossing:
+        except (Crossing, NoAnswer) as problem:
+            regular = self.regular(z)
+            if regular is not None:
+                return regular[0].state(regular[1], remarks)
+            if not isinstance(problem, Crossing):
+                raise
             from planar.solving.crossing import passing  # few positions are of this kind
 
             through = passing(self, z)
             state = through and self._passed(through, remarks)
             if state is None:
-                raise crossing.refused() from None
+                raise problem.refused() from None
             return state
         y1 = np.concatenate([cancelled(still.slope, still.F1), s.u1])
         moving = self.program.kinematics(y, y1, given, s.p)
@@ -205,16 +223,35 @@ class Known:
     """What is kept of a mechanism from one solution to the next."""
 
     def __init__(self, mechanism: Mechanism):
-        self.solver = Solver(mechanism)
+        self._bare = Solver(mechanism)
         self.ends: dict[Any, Any] = {}
         "the ends of the ranges of its inputs"
 
     @cached_property
+    def solver(self) -> Solver:
+        """What solves its positions: where it can be assembled, regular all along the motion if that can be."""
+        return self._start[0]
+
+    @property
     def assembly(self) -> Assembly:
         """The assembly nearest to the sketch. Raises NoAnswer."""
-        found = self.solver.assembly()
-        found.z.flags.writeable = False
+        found = self._start[1]
+        if isinstance(found, NoAnswer):
+            raise found.with_traceback(None)
         return found
+
+    @cached_property
+    def _start(self) -> tuple[Solver, Assembly | NoAnswer]:
+        solver = self._bare
+        try:
+            found = solver.assembly()
+        except NoAnswer as problem:
+            return solver, problem
+        regular = None if surely_determined(solver, found.z) else solver.regular(found.z)
+        if regular is not None:
+            solver, found = regular[0], found._replace(z=regular[1])
+        found.z.flags.writeable = False
+        return solver, found
 
     @cached_property
     def remarks(self) -> tuple[str, ...]:

@@ -80,8 +80,9 @@ class Ranged:
         here = float(self.u[self.index])
         first = here if start is None else start / self.scale
         walk = self.walk(follow(self.solver, self.p, self.found.z, self.u, self._at(first)), first)
-        if walk.here.clear < LEAST:
-            raise BadInput("start", "branches of the motion cross where the circuit would start; start it elsewhere")
+        if walk.here.clear < LEAST and not walk.leaves:
+            told = "branches of the motion cross where the circuit would start; choose one by branches, or start it"
+            raise BadInput("start", told + " elsewhere")
         whole = circuit(self.solver, walk)
         turn = np.inf if self.slides else 2.0 * pi
         spacing = min(max(abs(each.ends[1] - each.ends[0]) for each in whole.stretches), turn) / steps
@@ -125,14 +126,21 @@ class Ranged:
         if not before.any():
             found = self._from_here(grid)
             if len(found.z) < 2 and found.stopped is not None:
-                if found.stopped.outcome is Outcome.BRANCH_LOST:
-                    self.solver.state(self.found.z)  # says if it is a change point that nothing leads on from
-                raise found.stopped
+                raise self._problem(found, found.stopped)
             return shortened(found)
         down = self._from_here(grid[before][::-1])
         if down.stopped is not None:
-            raise down.stopped
+            raise self._problem(down, down.stopped)
         return spliced(down, self._from_here(grid[~before]))
+
+    def _problem(self, found: Run, problem: NoAnswer) -> NoAnswer:
+        """What to say of a run that stopped: of one that did not start, if it is a change point that it stands on."""
+        if len(found.z) < 2 and problem.outcome is Outcome.BRANCH_LOST:
+            try:
+                self.solver.state(self.found.z)
+            except NoAnswer as told:
+                return told
+        return problem
 
     def _from_here(self, grid: Array) -> Run:
         here = self.u[self.index]
@@ -258,7 +266,7 @@ class _Course:
     def __init__(self, ranged: Ranged, found: Rows, whole: tuple[Circuit, Walk] | None):
         self.ranged, self.found, self.whole = ranged, found, whole
         self.singular = frozenset(found.local)
-        self.forks = tuple(float(each.u[ranged.index]) * ranged.scale for each in found.met if each.passed.went)
+        self.forks = tuple(float(each.u[ranged.index]) * ranged.scale for each in found.met if each.passed.switches)
 
     def limits(self, motion: Motion) -> tuple[Limit, ...]:
         """See `Motion.limits`."""

@@ -9,13 +9,22 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from planar.errors import Ending, NoAnswer, Outcome
-from planar.pairs import Kind
+from planar.errors import MOST_NAMES, Ending, NoAnswer, Outcome
+from planar.errors import listed as several
+from planar.mechanism import unjoined
+from planar.pairs import Kind, joining
 from planar.program import length
 from planar.solving.assemble import Failure
 from planar.solving.gate import TOUCHING
 from planar.solving.setup import Setup
-from planar.words import amount, listed, many
+from planar.words import amount, listed, many, quoted
+
+Array = np.ndarray
+
+MOST = 4
+"""Ways that are told one by one."""
+DIFFERENT = 1e-3
+"""Rates of an angle on two ways that tell them apart."""
 
 
 def free(setup: Setup) -> NoAnswer:
@@ -26,7 +35,9 @@ def free(setup: Setup) -> NoAnswer:
     if apart:
         return NoAnswer(
             Outcome.TOO_FEW_INPUTS,
-            f"no chain of pairs joins {_links(apart)} to the frame {setup.mechanism.frame!r}; add a pair",
+            f"no chain of pairs joins {_links(apart)} to the frame {setup.mechanism.frame!r}; "
+            f"{_forgotten(setup, apart) or 'add a pair'}",
+            **_whole(apart),
         )
     jam = jammed(setup)
     if jam is not None:
@@ -35,11 +46,31 @@ def free(setup: Setup) -> NoAnswer:
     links = list(dict.fromkeys(link for stage in stages for link in stage.links))
     ways = sum(length(stage.unknowns) - length(stage.rows) for stage in stages)
     inputs = len(setup.mechanism.inputs)
+    forgotten = _forgotten(setup, links)
     return NoAnswer(
         Outcome.TOO_FEW_INPUTS,
         f"with {many(inputs, 'input')} {_links(links)} can still move in {many(ways, 'way')}; "
-        f"give an input at {_pairs_of(setup, links, 6)}{_surplus(setup)}",
+        f"{f'{forgotten}, or ' if forgotten else ''}give an input at {_pairs_of(setup, links, 6)}{_surplus(setup)}",
+        **_whole(links),
     )
+
+
+def _forgotten(setup: Setup, links: Sequence[str]) -> str:
+    """Points that free links share with others but no pair joins, else of links that hang by one pair."""
+    mechanism, loose = setup.mechanism, set(links)
+    shared = {point: carriers for point, carriers in unjoined(mechanism).items() if loose & set(carriers)}
+    if shared:
+        told = [f"{_links(carriers)} at {point!r}" for point, carriers in shared.items()]
+        return f"no pair joins {several(told, 3)}: add {several(map(joining, shared), 3)} to the pairs"
+    moving = [link.name for link in mechanism.links if link.name != mechanism.frame]
+    joints = {link: [pair.entry_name() for pair in mechanism.pairs if link in pair.links] for link in moving}
+    hanging = [f"link {link!r} hangs at {names[0]!r} alone" for link, names in joints.items() if len(names) == 1]
+    return f"{several(hanging, 3)}: add the pair that joins it to the rest" if hanging else ""
+
+
+def _whole(links: Sequence[str]) -> dict[str, list[str]]:
+    """All links, for a program, where the sentence names the first of them."""
+    return {"links": list(links)} if len(links) > MOST_NAMES + 1 else {}
 
 
 def ever_free(setup: Setup, links: Sequence[str]) -> NoAnswer:
@@ -51,6 +82,7 @@ def ever_free(setup: Setup, links: Sequence[str]) -> NoAnswer:
         Outcome.TOO_FEW_INPUTS,
         f"with {many(len(setup.mechanism.inputs), 'input')} {_links(links)} can still move, while some of the links "
         f"hold each other more than once; give an input at {_pairs_of(setup, links, 6)}",
+        **_whole(links),
     )
 
 
@@ -76,13 +108,41 @@ def _ends(setup: Setup, names: Sequence[str]) -> list[str]:
     return list(dict.fromkeys(link for name in names for link in setup.named[name].links))
 
 
-def change_point(setup: Setup, links: Sequence[str], mobility: int) -> NoAnswer:
-    """A position from which the mechanism may go on in several ways."""
+def change_point(setup: Setup, links: Sequence[str], mobility: int, z: Array) -> NoAnswer:
+    """A position from which the mechanism may go on in several ways, and how one is chosen."""
     return NoAnswer(
         Outcome.CHANGE_POINT,
         f"{setup.at()} the mechanism has {_freedoms(setup, mobility)}: {_links(links)} may move in more than one way "
-        f"from here; move the input, or give a further input",
+        f"from here; move the input, or give a further input{_choices(setup, z)}",
+        **_whole(links),
     )
+
+
+def _choices(setup: Setup, z: Array) -> str:
+    """By which number a cycle goes on along which way, told by the link that moves most differently on them."""
+    if len(setup.mechanism.inputs) != 1 or not setup.extended:
+        return ""
+    from planar.solving.change_point import starting
+    from planar.solving.curve import Curve
+
+    found = starting(Curve(setup, setup.station.p, setup.station.u, np.ones(1)), np.append(z, 0.0))
+    if found is None or len(found.ways) < 2:
+        return ""
+    columns = list(setup.equations.unknowns)
+    (slides,) = setup.outline.slide
+    rates = np.array([way.tangent[:-1] / way.advance for way in found.ways]) * setup.scale[columns]
+    rates /= setup.unit if slides else 1.0
+    angles = [setup.equations.coordinates[column].kind is not Kind.LENGTH for column in columns]
+    apart = np.ptp(rates, axis=0)
+    most = int(np.argmax(np.where(angles, apart, 0.0) if np.any(apart[angles] > DIFFERENT) else apart))
+    what = setup.equations.coordinates[columns[most]].owner
+    moved = [f"{k} moves {what!r} by {_rounded(rate)}" for k, rate in enumerate(rates[:MOST, most], 1)]
+    each = f"{'rad' if angles[most] else 'm'} for each {'m' if slides else 'rad'} of the input"
+    return f"; a cycle goes on by the way whose number `branches` (--branch) has: {', '.join(moved)} {each}"
+
+
+def _rounded(rate: float) -> str:
+    return f"{round(rate, 6) + 0.0:.4g}"
 
 
 def dead_point(setup: Setup, links: Sequence[str]) -> NoAnswer:
@@ -91,6 +151,7 @@ def dead_point(setup: Setup, links: Sequence[str]) -> NoAnswer:
         Outcome.DEAD_POINT,
         f"{setup.at()} {_inputs(setup)} cannot move {_links(links)}, whose velocity is not determined; "
         f"move the input away from here, or drive {_pairs_of(setup, links, 4)}",
+        **_whole(links),
     )
 
 
@@ -171,7 +232,7 @@ def _surplus(setup: Setup) -> str:
     from planar.solving.dependence import conflicting
 
     sets = conflicting(setup) if len(setup.mechanism.inputs) > 1 else ()
-    return f", and leave one out of those at {_named(sets[0])}, which move one another" if sets else ""
+    return f", and leave one out of those at {quoted(sets[0])}, which move one another" if sets else ""
 
 
 def _leave_out(setup: Setup) -> str:
@@ -182,7 +243,7 @@ def _leave_out(setup: Setup) -> str:
     if not sets:
         return "; leave one out"
     told = [
-        f"the input at {each[0]!r} cannot move" if len(each) == 1 else f"those at {_named(each)} move one another"
+        f"the input at {each[0]!r} cannot move" if len(each) == 1 else f"those at {quoted(each)} move one another"
         for each in sets[:3]
     ]
     which = "one of each" if len(sets) > 1 else "it" if len(sets[0]) == 1 else "one of them"
@@ -205,12 +266,8 @@ def broken_rates(setup: Setup, what: str, pair: str, gap: float, at: str = "") -
     )
 
 
-def _named(names: Sequence[str]) -> str:
-    return listed([repr(name) for name in names])
-
-
 def _links(names: Sequence[str]) -> str:
-    return f"link{'s' * (len(names) != 1)} {_named(names)}"
+    return f"link{'s' * (len(names) != 1)} {quoted(names)}"
 
 
 def _inputs(setup: Setup) -> str:
@@ -218,7 +275,7 @@ def _inputs(setup: Setup) -> str:
 
 
 def _at(pairs: Sequence[str]) -> str:
-    return f"the input{'s' * (len(pairs) != 1)} at {_named(pairs)}"
+    return f"the input{'s' * (len(pairs) != 1)} at {quoted(pairs)}"
 
 
 def _freedoms(setup: Setup, mobility: int) -> str:

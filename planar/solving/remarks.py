@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from planar.equations import Stage
+from planar.pairs import Kind
 from planar.program import placed
 from planar.solving import assemble
 from planar.solving.assemble import Assembly
 from planar.solving.candidates import Candidates
 from planar.solving.setup import Setup
 from planar.units import unit
-from planar.words import listed, many
+from planar.words import listed, many, quoted
 
 Array = np.ndarray
 
@@ -36,7 +37,20 @@ def remarks(setup: Setup, candidates: Candidates, found: Assembly) -> tuple[str,
             f"the search for the assembly nearest to the sketch stopped after {assemble.EXPANSIONS} groups and took "
             f"the nearest on its way; sketch more points to be sure of the one that is meant"
         )
+    if setup.deflated:
+        told.append(_touching(setup))
     return tuple(told)
+
+
+def _touching(setup: Setup) -> str:
+    """What to say of constraints that hold to second order what they leave free to first order, all along."""
+    rows = setup.equations.rows
+    touching = [stage for stage in setup.equations.stages if any(row.kind is Kind.PURE for row in rows[stage.rows])]
+    links = list(dict.fromkeys(link for stage in touching for link in stage.links))
+    return (
+        f"all along the motion the pairs hold link{'s' * (len(links) != 1)} {quoted(links)} "
+        f"to second order only; to first order more could move, so that a little play lets it move far"
+    )
 
 
 def _stands(setup: Setup, candidates: Candidates, stage: Stage, z: Array) -> str:
@@ -45,7 +59,7 @@ def _stands(setup: Setup, candidates: Candidates, stage: Stage, z: Array) -> str
         (name, link, point) for name, (level, link, point) in candidates.first.items() if level == stage.level
     ]
     if not placed_here:
-        return f"one assembly of {listed([repr(link) for link in stage.links])}"
+        return f"one assembly of {quoted(stage.links)}"
     name, link, point = max(placed_here, key=lambda each: len(_sharing(candidates, each[0])))
     w = setup.program.coordinates(z, setup.station.u, setup.station.p) * setup.scale
     frames, _ = placed(w, setup.column, [link], {})

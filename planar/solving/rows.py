@@ -64,8 +64,8 @@ def rows(found: Run, given: Given, dead: tuple[int, ...] = ()) -> Rows:
 def spliced(down: Run, up: Run) -> Run:
     """Two runs from one position, which is no row, as one through it: the first backwards, then the second."""
     back = len(down.z) - 1
-    local = {back - row: each for row, each in down.local.items()}
-    local |= {back + row - 1: each for row, each in up.local.items()}
+    local = {back - row: each for row, each in down.local.items() if row}
+    local |= {back + row - 1: each for row, each in up.local.items() if row}
     return Run(
         np.vstack([down.z[:0:-1], up.z[1:]]),
         down.general + up.general,

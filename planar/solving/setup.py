@@ -10,14 +10,15 @@ import numpy as np
 
 from planar.algebra import Jet, Scalar
 from planar.errors import BadInput
+from planar.errors import listed as several
 from planar.judged import Judged
 from planar.mechanism import Mechanism, misfits
 from planar.pairs import Kind
 from planar.plane import Frame
-from planar.program import extent, gathered, greatest, placed, shapes
+from planar.program import Program, extent, gathered, greatest, placed, shapes
 from planar.solving.gate import Gate
 from planar.solving.outline import outline
-from planar.words import amount, listed
+from planar.words import amount
 
 Array = np.ndarray
 
@@ -55,12 +56,27 @@ class Setup:
         """The same for a mechanism that differs from this one in its inputs' numbers alone."""
         lawful = any(given.law is not None for given in mechanism.inputs)
         if lawful or not self.extended:
-            return type(self)(mechanism)
+            there = type(self)(mechanism)
+            return there.solved_by(self.program) if self.deflated else there
         there = object.__new__(type(self))
         there.__dict__.update(self.__dict__)
         there.mechanism, there.gate = mechanism, self.gate.moved(mechanism)
         there.station = Station(*self._inputs(mechanism), self.station.p)
         return there
+
+    def solved_by(self, program: Program) -> Self:
+        """The same with more constraints, which hold wherever its own do on the motion; see `solving.deflation`."""
+        there = object.__new__(type(self))
+        there.__dict__.update(self.__dict__)
+        for name in ("by", "least", "_reaches"):
+            there.__dict__.pop(name, None)
+        there.program, there.equations = program, program.equations
+        return there
+
+    @property
+    def deflated(self) -> bool:
+        """Whether it has more constraints than those of its pairs and inputs."""
+        return self.program is not self.outline.program
 
     def _inputs(self, mechanism: Mechanism) -> tuple[Array, Array, Array]:
         """Positions, velocities and accelerations of a mechanism's inputs (scaled)."""
@@ -72,7 +88,7 @@ class Setup:
     @property
     def judged(self) -> Judged | None:
         """What judges positions in compiled functions, for the structures that have it."""
-        return self.outline.judged
+        return None if self.deflated else self.outline.judged
 
     @cached_property
     def by(self) -> Array:
@@ -138,7 +154,7 @@ class Setup:
 
     def where(self, u: Array) -> str:
         """A position of the inputs in words: A = 60 deg."""
-        return listed([self.told(given.pair, at) for given, at in zip(self.mechanism.inputs, u, strict=True)])
+        return several([self.told(given.pair, at) for given, at in zip(self.mechanism.inputs, u, strict=True)])
 
     def told(self, pair: str, position: float) -> str:
         """A position of one input in words."""

@@ -100,7 +100,7 @@ class _Course:
         solver, found = self.timed.solver, self.found
         watched = outputs(solver)
         met = list(self._crossings())
-        switched = [at for at, each in met if each.passed.went]
+        switched = [at for at, each in met if each.passed.switches]
         told = list(self._turns(motion, watched, switched))
         for at, each in met:
             pair = next(g.pair for g, w in zip(solver.mechanism.inputs, each.way, strict=True) if w)

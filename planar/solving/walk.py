@@ -9,7 +9,7 @@ import numpy as np
 
 from planar.pairs import Kind
 from planar.roots import root
-from planar.solving.change_point import Beside, Crossing, beside, crossing, nearest
+from planar.solving.change_point import Beside, Crossing, beside, crossing, nearest, starting
 from planar.solving.curve import Arc, Curve, Point, between
 
 Array = np.ndarray
@@ -22,6 +22,8 @@ CLOSE = 1.5
 """How many times shorter than the distances from singular slopes at its two ends a step must be."""
 SUSPECTED, AGAIN = 0.15, 0.2
 """Where to look for a change point: so near to a singular slope, and again where it is so many times nearer."""
+AT = 1e-5
+"""So near to a singular slope a start may be a change point, known to the root of rounding."""
 AHEAD = 10.0
 """A change point farther ahead than so many times the distance within which there is none is another one."""
 ARCS = 50_000
@@ -30,10 +32,17 @@ ENDLESS = 100.0
 
 
 class Passed(NamedTuple):
-    """A change point that a walk went through: the ways, by the first of which it came, and by which it went on."""
+    """A change point that a walk went through: the ways, by the first of which it came, and by which it went on; or
+    on which it started."""
 
     crossing: Crossing
     went: int
+    starts: bool = False
+
+    @property
+    def switches(self) -> bool:
+        """Whether it went on by another way than smoothly."""
+        return self.went != 0 and not self.starts
 
 
 class Missed(NamedTuple):
@@ -49,7 +58,7 @@ class Walk:
     """One walk along a curve from a point: its arcs, one after the other, and what it met on the way.
 
     `branches` are the numbers of the ways taken at change points, in the order in which they are met: 1 goes on
-    smoothly, 2 takes the way nearest to that, and so on; 1 where the list ends.
+    smoothly, 2 takes the way nearest to that, and so on; 1 where the list ends. Of a start on one see `starting`.
     """
 
     def __init__(self, curve: Curve, start: Point, branches: Sequence[int] = ()):
@@ -60,12 +69,17 @@ class Walk:
         self.step = FIRST
         self._looked, self._approaching = np.inf, False
         self.endless = False
+        self._out_of: Beside | None = None
         coordinates, unknowns = curve.program.equations.coordinates, curve.program.equations.unknowns
+        self._leave()
         self._slides = np.array([coordinates[column].kind is Kind.LENGTH for column in unknowns], dtype=bool)
 
     def arcs(self) -> Iterator[Arc]:
         """The arcs of the curve; they end where it cannot be followed further."""
         farthest = max(ENDLESS, 2.0 * self._out(self.here.y))
+        if self._out_of is not None:
+            self.here = self._out_of.after
+            yield self._out_of.arc(self._out_of.middle, self._out_of.after)
         for _ in range(ARCS):
             here = self.here
             if self._approaching and here.clear < min(SUSPECTED, AGAIN * self._looked, self.step):
@@ -90,6 +104,23 @@ class Walk:
                 return
             self.here = after
             yield arc
+
+    @property
+    def leaves(self) -> bool:
+        """Whether it starts on a change point, by a way that was asked for."""
+        return self._out_of is not None
+
+    def _leave(self) -> None:
+        """Start by the way of the next number where that is asked for and the start is a change point."""
+        if not (self.branches and self.here.clear < AT):
+            return
+        found = starting(self.curve, self.here.y)
+        went = min(self.branches[0], len(found.ways)) - 1 if found else 0
+        out = found and beside(self.curve, found.ways[went], found.lost)
+        if found is not None and out is not None:
+            del self.branches[0]
+            self.here, self._out_of = out.middle, out
+            self.passed.append(Passed(found, went, True))
 
     def _out(self, y: Array) -> float:
         """How far the farthest slide is out (sizes)."""

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from planar.errors import BadInput
+from planar.errors import no_format
 from planar.motion import Motion
 from planar.results import Limit
 from planar.views import parquet
@@ -19,6 +19,8 @@ from planar.views.columns import MEASURES, Told, about, columns, told
 Array = np.ndarray
 
 _NOTHING: Mapping[str, Any] = MappingProxyType({})
+FORMULAS = ("=", "+", "-", "@", "'")
+"""What a formula begins with in spreadsheets, and what marks a text there."""
 ROWS = 500
 """Of a CSV file that are made at a time: enough to be quick, few enough for the memory of many columns."""
 
@@ -26,7 +28,7 @@ ROWS = 500
 def writable(suffix: str) -> None:
     """Make sure, before a long run, that it can be written to a file of this suffix. Raises BadInput."""
     if suffix.lower() not in _FORMATS:
-        raise BadInput(suffix or "the file", f"a run is written to {', '.join(_FORMATS)} files")
+        raise no_format(suffix, "a run", _FORMATS)
     if suffix.lower() == ".parquet":
         parquet.ready()
 
@@ -101,7 +103,12 @@ def _csv(motion: Motion, more: Iterable[Told]) -> bytes:
 
 
 def _cell(text: str) -> str:
-    """A text as a cell, in quotes where it holds what ends a cell (RFC 4180)."""
+    """A text as a cell, in quotes where it holds what ends a cell (RFC 4180).
+
+    What a spreadsheet would take for a formula has an apostrophe before it, and so has what begins with one: a reader
+    takes one apostrophe off.
+    """
+    text = f"'{text}" if text[:1] in FORMULAS else text
     return '"' + text.replace('"', '""') + '"' if any(mark in text for mark in ',"\n\r') else text
 
 

@@ -9,7 +9,7 @@ from rich.cells import cell_len
 from rich.console import Console, RenderableType
 from rich.terminal_theme import DEFAULT_TERMINAL_THEME
 
-from planar.errors import BadInput
+from planar.errors import no_format
 
 WIDTH = 124
 """Characters, but for what cannot be narrower."""
@@ -27,7 +27,7 @@ def written(renderable: RenderableType, suffix: str) -> str:
         ".svg": lambda: _without_fonts(console.export_svg(title="planar", theme=DEFAULT_TERMINAL_THEME)),
     }
     if suffix not in formats:
-        raise BadInput(suffix or "the file", f"tables are written to {', '.join(formats)} files")
+        raise no_format(suffix, "tables", formats)
     return formats[suffix]()
 
 

@@ -86,8 +86,12 @@ const Files = (() => {
     return new XMLSerializer().serializeToString(copy);
   }
 
-  /** A text as a cell, in quotes where it holds what ends a cell (RFC 4180). */
-  const cell = (text) => (/[",\n\r]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
+  /** A text as a cell: an apostrophe before what a spreadsheet would take for a formula, in quotes where it holds what
+   ends a cell (RFC 4180). */
+  const cell = (text) => {
+    const safe = /^[=+\-@']/.test(text) ? `'${text}` : text;
+    return /[",\n\r]/.test(safe) ? `"${safe.replaceAll('"', '""')}"` : safe;
+  };
 
   /** The motion of the input that runs, with the heads of `planar cycle -o motion.csv`; the other inputs stand still. */
   function motion(page) {
