@@ -85,16 +85,20 @@ def outputs(setup: Setup) -> Outputs:
 
 
 def until(parts: Iterable[Piece], last: float) -> Iterator[Piece]:
-    """The pieces of a curve up to a place of the inputs on their way, or to the dead point before it."""
+    """The pieces of a curve up to a place of the inputs on their way, or to the dead point before it.
+
+    A dead point at the very place, to rounding, is not left out.
+    """
     for piece in parts:
         ends = piece.dead is not None and piece.first != piece.last
-        if ends or piece.stop < last - SEAM:
+        if piece.stop <= last + SEAM and not (piece.dead is None and piece.start >= last):
             yield piece
             if ends:
                 return
             continue
-        x = root(lambda x, arc=piece.arc: float(arc.rough(x)[-1]) - last, piece.first, piece.last)
-        yield piece._replace(last=x, stop=last, dead=None)
+        if piece.start < last:
+            x = root(lambda x, arc=piece.arc: float(arc.rough(x)[-1]) - last, piece.first, piece.last)
+            yield piece._replace(last=x, stop=last, dead=None)
         return
 
 
@@ -140,8 +144,6 @@ def along(
     if rests(walk.here):
         yield noted("input dead point", pair, walk.here)
     before: _End | None = None
-    if rests(walk.here):
-        yield noted("input dead point", pair, walk.here)
     for piece in parts:
         arc = piece.arc
         if before is None or arc.exact:
