@@ -23,6 +23,8 @@ class Ending(StrEnum):
     DEAD_POINT = "dead point"
     ENDLESS = "endless"
     LOST = "lost"
+    FAR = "far"
+    SPENT = "spent"
 
 
 def _shown(text: str, longest: int) -> str:

@@ -6,13 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.errors import Ending, NoAnswer, Outcome
+from planar.errors import NoAnswer, Outcome
 from planar.pairs import Kind
 from planar.solving.curve import Curve, Point
 from planar.solving.follow import Local, Piece, pieces, rests
 from planar.solving.position import Solver
 from planar.solving.setup import Setup
-from planar.solving.walk import ENDLESS, Walk
+from planar.solving.walk import OUT, Walk
 
 Array = np.ndarray
 
@@ -70,13 +70,12 @@ def circuit(setup: Solver, walk: Walk) -> Circuit:
             if closing is not None:
                 return Circuit((*found, closing), rests(start))
         found.append(piece)
-        out = not counts[-1] and abs(piece.stop) > ENDLESS
+        out = not counts[-1] and abs(piece.stop) > OUT
         if out or len(found) > PIECES:
             told = "the input slides on without an end" if out else "the motion does not come back within so many turns"
             raise NoAnswer(Outcome.BRANCH_LOST, f"{told}; name where the range starts and stops instead of the circuit")
-    here = walk.here.y
-    ending = Ending.ENDLESS if walk.endless else Ending.LOST
-    raise setup.ends(curve.inputs(here), walk.here.tangent, ending)
+    u, ending = walk.end
+    raise setup.ends(u, walk.here.tangent, ending)
 
 
 def _turning(setup: Setup) -> Array:

@@ -12,6 +12,8 @@ from planar.program import Program
 Array = np.ndarray
 
 CORRECTIONS = 10
+CLOSED = 1e-10
+"""A corrected point leaves no more open than this, where it is far out this part of how far."""
 NUDGE = 1e-6
 """The part of a step over which the change of a slope is taken."""
 NOTHING = 1e-10
@@ -171,7 +173,7 @@ class Curve:
                 break
             before = gap
             y = y + _solved(np.vstack([slope, normal]), np.append(-left, 0.0))
-        return y if before <= 1e-10 else None
+        return y if before <= CLOSED * max(1.0, float(np.max(np.abs(y)))) else None
 
     def polished(self, y: Array, lost: int) -> Array:
         """A position beside a change point, closed to round-off but not moved from one branch to the other.

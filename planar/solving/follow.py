@@ -15,7 +15,7 @@ from planar.roots import root
 from planar.solving.branch import Branch, cancelling
 from planar.solving.curve import Arc, Curve, Point, Traced
 from planar.solving.straight import STRAIGHT, Told, course
-from planar.solving.walk import Missed, Passed, Walk
+from planar.solving.walk import Missed, Passed, Walk, Work
 
 Array = np.ndarray
 
@@ -23,7 +23,10 @@ CORRECTIONS = 8
 NEARLY = 0.1
 """A correction longer than this part of an arc has gone astray."""
 RESTING = 1e-7
-"""A rate of the inputs along the curve below this is none: the position is a dead point to rounding."""
+"""The square root of twice what the inputs may have left (rad or sizes) of their way to where they turn back at a dead
+point to rounding; also the least rate of the inputs along the curve from which one is left."""
+STUCK = 1e-13
+"""A rate of the inputs along the curve, for one of what is farthest out, that is rounding."""
 SEAM = 1e-9
 """rad or sizes: so near to the end of a way a change point is at that end."""
 
@@ -131,22 +134,42 @@ class Trip:
     The way is one in which the fastest input goes one rad or size a unit.
     """
 
-    def __init__(self, solver: Followed, p: Array, z: Array, start: Array, way: Array, branches: Sequence[int] = ()):
+    def __init__(
+        self,
+        solver: Followed,
+        p: Array,
+        z: Array,
+        start: Array,
+        way: Array,
+        branches: Sequence[int] = (),
+        work: Work | None = None,
+    ):
         reach = float(np.max(np.abs(way), initial=0.0)) or 1.0
         self.curve = Curve(solver, p, start, way / reach)
         numbers = list(branches)
-        self.walk = Walk(self.curve, onwards(self.curve, np.append(z, 0.0), numbers), numbers)
+        self.walk = Walk(self.curve, onwards(self.curve, np.append(z, 0.0), numbers), numbers, work)
         self.here = self.walk.here
         self.dead: Point | None = None
         self._pieces = pieces(self.walk)
         self._piece: Piece | None = None
+        self._wanted = 0.0
 
     def holds(self, place: float) -> bool:
         """Whether a place lies on what has been followed already."""
         return self._piece is not None and place <= self._piece.stop
 
+    @property
+    def end(self) -> tuple[Array, Ending]:
+        """The inputs beyond which it does not go, and why."""
+        if self.dead is not None:
+            return self.curve.inputs(self.dead.y), Ending.DEAD_POINT
+        if self.walk.limit is not None and self._wanted < self.walk.limit:
+            return self.curve.inputs(self.here.y), Ending.FAR
+        return self.walk.end
+
     def to(self, place: float) -> tuple[Array, Local | None] | None:
         """The unknowns so far along the way, with rates where the slope is singular; None if it ends before."""
+        self._wanted = place
         while self._piece is None or not self.holds(place):
             if self.dead is not None:
                 return None
@@ -168,8 +191,13 @@ def met(walk: Walk, last: float = np.inf) -> tuple[Met, ...]:
 
 
 def rests(point: Point) -> bool:
-    """Whether a point is a dead point to rounding."""
-    return abs(point.advance) < RESTING
+    """Whether a point is a dead point to rounding.
+
+    With rate g and second derivative b of the inputs by arc length it is g^2 / 2b before where they turn back. A small
+    rate alone does not tell: it is small as well where slides go far out for little of the inputs.
+    """
+    g, b = float(point.tangent[-1]), float(point.bend[-1])
+    return g * g <= RESTING**2 * abs(b) or abs(g) * max(1.0, float(np.max(np.abs(point.y)))) < STUCK
 
 
 def onwards(curve: Curve, y: Array, branches: list[int]) -> Point:
@@ -260,14 +288,16 @@ def run(
     u: Array,
     branches: Sequence[int] = (),
     rates: tuple[Array, Array] | None = None,
+    work: Work | None = None,
 ) -> Run:
     """The unknowns at every sample of a run of inputs u (samples, inputs), from those of the first.
 
     The whole run is one call of the compiled program; every sample then passes both parts of the gate, and from
     one that does not the general path goes on until the compiled program can take over again. With first and second
-    `rates` of the inputs the run tells those of its samples as well, so far as they are surely sound.
+    `rates` of the inputs the run tells those of its samples as well, so far as they are surely sound. What the general
+    path does is counted in `work`.
     """
-    samples = len(u)
+    samples, work = len(u), work or Work()
     found = np.empty((samples, z.size))
     found[0] = z
     done, general = 1, 0
@@ -299,14 +329,15 @@ def run(
         while base and base in local and (u[done] - u[done - 1]) @ local[base].way < 0.0:
             base -= 1  # what turns back on a change point comes back by the branch on which it came
         ahead = np.vstack([u[base], u[done:]])
-        trip, places = _trip(solver, p, found[base], ahead, branches[len(met_on_way) :])
+        trip, places = _trip(solver, p, found[base], ahead, branches[len(met_on_way) :], work)
         before = len(met_on_way)
         for place, following in pairwise([*places, np.inf]):
             at = trip.to(place)
             met_on_way[before:] = met(trip.walk, place)
             if at is None:
                 missed += trip.walk.missed
-                last = trip.here.y[:-1], trip.curve.inputs(trip.here.y)
+                endless = trip.end[1] is Ending.ENDLESS
+                last = None if endless else (trip.here.y[:-1], trip.curve.inputs(trip.here.y))
                 stopped = ended(solver, trip)
                 known = told and told.cut(slice(done))
                 return Run(found[:done], general, stopped, last, local, tuple(met_on_way), tuple(missed), known)
@@ -325,26 +356,27 @@ def _untold(solver: Followed, samples: int) -> Told:
     return Told(np.empty((samples, 3, many)), np.zeros(samples, dtype=bool), 0.0)
 
 
-def _trip(solver: Followed, p: Array, z: Array, u: Array, branches: Sequence[int]) -> tuple[Trip, list[float]]:
+def _trip(
+    solver: Followed, p: Array, z: Array, u: Array, branches: Sequence[int], work: Work
+) -> tuple[Trip, list[float]]:
     """A trip from the first of these inputs towards the next, and the places of those that lie on the same way."""
     way = u[1] - u[0]
     reach = float(np.max(np.abs(way), initial=0.0))
     if reach == 0.0:
-        return Trip(solver, p, z, u[0], way), [0.0]
+        return Trip(solver, p, z, u[0], way, (), work), [0.0]
     axis = way / reach
     gone = (u[1:] - u[0]) @ axis / float(axis @ axis)
     aside = np.max(np.abs(u[1:] - u[0] - gone[:, None] * axis), axis=1) > STRAIGHT
     back = np.diff(gone, prepend=0.0) < 0.0
     off = aside | back
     many = int(np.argmax(off)) if off.any() else len(gone)
-    return Trip(solver, p, z, u[0], way, branches), gone[:many].tolist()
+    return Trip(solver, p, z, u[0], way, branches, work), gone[:many].tolist()
 
 
 def ended(solver: Followed, trip: Trip) -> NoAnswer:
     """Why a trip goes no further."""
-    here = trip.here
-    ending = Ending.ENDLESS if trip.walk.endless else Ending.LOST if trip.dead is None else Ending.DEAD_POINT
-    return solver.ends(trip.curve.inputs(here.y), here.tangent, ending)
+    u, ending = trip.end
+    return solver.ends(u, trip.here.tangent, ending)
 
 
 def _passing(solver: Followed, p: Array, z: Array, u: Array) -> int:

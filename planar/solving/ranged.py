@@ -8,19 +8,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.errors import BadInput, NoAnswer, Outcome
+from planar.errors import BadInput, Ending, NoAnswer, Outcome
 from planar.mechanism import Drive, Mechanism, running_input, with_inputs
 from planar.motion import Motion
 from planar.results import Limit
-from planar.solving import limits
+from planar.solving import limits, refusals
 from planar.solving.circuit import Circuit, circuit
 from planar.solving.curve import Curve
-from planar.solving.follow import Local, Run, Trip, ended, follow, met, onwards, pieces, run
+from planar.solving.follow import Local, Run, Trip, follow, met, onwards, pieces, run
+from planar.solving.freedom import moved_by
 from planar.solving.position import known_of
 from planar.solving.rates import Given
 from planar.solving.rows import Rows, joined, motion, reversed_, rows, shortened, spliced
 from planar.solving.straight import Told, course
-from planar.solving.walk import ENDLESS, Missed, Walk
+from planar.solving.walk import OUT, Missed, Walk, Work
 from planar.words import listed
 
 Array = np.ndarray
@@ -32,13 +33,14 @@ LEAST = 1e-5
 
 
 class _End(NamedTuple):
-    """An end of a range: the unknowns and the position there, and whether it is a dead point, or the input goes on."""
+    """An end of a range: the unknowns and the position at its last row, why it ends, None where the input goes on; the
+    inputs beyond which it does not go, and the links that move there."""
 
     z: Array
     position: float
-    dead: bool
-    open: bool
-    problem: NoAnswer | None = None
+    ending: Ending | None
+    limit: Array
+    links: tuple[str, ...] = ()
     missed: tuple[Missed, ...] = ()
 
 
@@ -57,6 +59,7 @@ class Ranged:
         self.u, self.p = self.solver.station.u, self.solver.station.p
         self.branches, self.third = tuple(branches), third
         self.found = self.known.assembly
+        self.work = Work()
 
     def between(self, steps: int, start: float | None, stop: float | None, back: bool) -> Motion:
         """The run over a range, or over the one that the input has by itself; and back again if wanted."""
@@ -138,7 +141,7 @@ class Ranged:
         here = self.u[self.index]
         given = self._given(np.append(here, grid))
         rates = None if self.third else (given.u1, given.u2)
-        return run(self.solver, self.p, self.found.z, given.u, self.branches, rates)
+        return run(self.solver, self.p, self.found.z, given.u, self.branches, rates, self.work)
 
     def _whole(self, steps: int, here: float) -> Rows:
         """One turn on where the input makes it, else all between its limits."""
@@ -166,7 +169,7 @@ class Ranged:
         local = {row + 1: each for row, each in found.local.items()}
         told = found.told and found.told.padded(1, 1)
         whole = found._replace(z=np.vstack([low.z, found.z, high.z]), local=local, told=told)
-        dead = tuple(index for index, end in ((0, low), (steps, high)) if end.dead)
+        dead = tuple(index for index, end in ((0, low), (steps, high)) if end.ending is Ending.DEAD_POINT)
         return self._limited(rows(whole, self._given(grid), dead), (low, high))
 
     def _turn(self, steps: int, here: float) -> Rows | _End | None:
@@ -177,24 +180,32 @@ class Ranged:
             return Rows(sure.z, given, told=Told(sure.parts, np.ones(steps + 1, dtype=bool), sure.open))
         if sure is not None and len(sure.z) <= steps:
             end = self._end(self.found.z, here, 1.0)  # walking tells it sooner than a run would
-            if not end.open:
+            if end.ending is not None:
                 return end
         found = self._run(steps, here, here + 2.0 * pi)
         return found if found.outcome is Outcome.SOLVED else None
 
     def _limited(self, found: Rows, ends: tuple[_End, ...]) -> Rows:
-        """Rows of a range that ends by itself, with what there is to say of it."""
-        for end in ends:
-            if end.problem is not None:
-                found = found.stopped(end.problem)
+        """Rows of a range that ends by itself, with what there is to say of its ends."""
         if found.outcome is not Outcome.SOLVED:
             return found
-        told = listed([self.solver.told(self.pair, end.position) for end in ends if end.dead])
+        reasons = []
+        for ending in dict.fromkeys(end.ending for end in ends):
+            alike = [end for end in ends if end.ending is ending]
+            where = listed([self.solver.where(end.limit) for end in alike])
+            if ending is Ending.DEAD_POINT:
+                reasons.append(f"the range of {self.pair!r} ends at {where}")
+            elif ending is not None:
+                links = list(dict.fromkeys(link for end in alike for link in end.links))
+                problem = refusals.ended(self.solver, links, where, ending)
+                found = found.stopped(problem)
+                reasons.append(problem.reason)
+            if ending is Ending.ENDLESS:
+                last = listed([self.solver.told(self.pair, end.position) for end in alike])
+                reasons.append(f"the rows go as far as {last}")
         dead = tuple(row % len(found.z) for row in found.dead)
         missed = (*found.missed, *(each for end in ends for each in end.missed))
-        return found._replace(
-            dead=dead, missed=missed, reason=f"the range of {self.pair!r} ends at {told}" if told else ""
-        )
+        return found._replace(dead=dead, missed=missed, reason="; ".join(reasons))
 
     def _stopped(self, found: Run, given: Given) -> Rows:
         """A run that did not come to its end, with a last row where it stopped."""
@@ -238,18 +249,20 @@ class Ranged:
 
     def _end(self, z: Array, here: float, sign: float) -> _End:
         """Where the range of the input ends, one way from a position with unknowns z."""
-        far = ENDLESS if self.slides else 2.0 * pi
-        trip = Trip(self.solver, self.p, z, self._at(here), self._at(here + sign) - self._at(here), self.branches)
+        far = OUT if self.slides else 2.0 * pi
+        start = self._at(here)
+        trip = Trip(self.solver, self.p, z, start, self._at(here + sign) - start, self.branches, self.work)
         found = trip.to(far)
         if found is not None:
             if self.slides:
                 told = "the slide goes on without a limit; name where the range starts and stops"
                 raise BadInput(self.pair, told)
-            return _End(found[0], here + sign * far, False, True)
-        y = trip.here.y
-        problem = None if trip.dead is not None else ended(self.solver, trip)
-        missed = tuple(trip.walk.missed)
-        return _End(y[:-1], here + sign * float(y[-1]), trip.dead is not None, False, problem, missed)
+            return _End(found[0], here + sign * far, None, self._at(here + sign * far))
+        limit, ending = trip.end
+        # what goes out without an end is shown as far as it is well out
+        last = trip.walk.out if ending is Ending.ENDLESS and trip.walk.out is not None else trip.here
+        links = tuple(moved_by(self.solver, last.tangent[:-1]))
+        return _End(last.y[:-1], here + sign * float(last.y[-1]), ending, limit, links, tuple(trip.walk.missed))
 
 
 class _Course:
