@@ -177,8 +177,7 @@ def test_a_slide_that_goes_out_without_an_end_is_lost_there():
     }
     problem = refused(value, {"O": 100.0 * DEG})
     assert problem.outcome is Outcome.BRANCH_LOST
-    # followed as far as 100 lengths of the mechanism
-    for word in ("beyond O = 89", "without an end", "drive 'rail'"):
+    for word in ("beyond O = 90 deg", "without an end", "drive 'rail'"):
         assert word in problem.reason
 
 

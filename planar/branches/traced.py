@@ -9,9 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.errors import NoAnswer
-from planar.solving.circuit import PIECES, circuit
+from planar.solving.circuit import circuit
 from planar.solving.curve import Curve
-from planar.solving.follow import Piece, onwards, pieces
+from planar.solving.period import PIECES
+from planar.solving.pieces import Piece, onwards, pieces
 from planar.solving.position import Solver
 from planar.solving.walk import OUT, Walk
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from math import ceil, pi
 from typing import NamedTuple
 
@@ -15,13 +15,14 @@ from planar.results import Limit
 from planar.solving import limits, refusals
 from planar.solving.circuit import Circuit, circuit
 from planar.solving.curve import Curve
-from planar.solving.follow import Local, Run, Trip, follow, met, onwards, pieces, run
+from planar.solving.follow import Run, Trip, follow, run
 from planar.solving.freedom import moved_by
+from planar.solving.pieces import Local, met, onwards
 from planar.solving.position import known_of
 from planar.solving.rates import Given
 from planar.solving.rows import Rows, joined, motion, reversed_, rows, shortened, spliced
 from planar.solving.straight import Told, course
-from planar.solving.walk import OUT, Missed, Walk, Work
+from planar.solving.walk import ARCS, OUT, Missed, Walk, Work
 from planar.words import listed
 
 Array = np.ndarray
@@ -30,6 +31,12 @@ SEAM = 1e-9
 """Parts of a step: what rounding leaves of one."""
 LEAST = 1e-5
 """rad or sizes: a range shorter than this is none."""
+ARCS_PER_TURN = 100
+"""Arcs by which what may be spent grows with each turn that is asked for."""
+MOST = 1e5
+"""rad or sizes of the input's way beyond which it grows no more."""
+
+Progress = Callable[[float, float], None]
 
 
 class _End(NamedTuple):
@@ -45,9 +52,19 @@ class _End(NamedTuple):
 
 
 class Ranged:
-    """One input of a mechanism that runs while the others stand still."""
+    """One input of a mechanism that runs while the others stand still.
 
-    def __init__(self, mechanism: Mechanism, pair: str | None, branches: Sequence[int], third: bool):
+    `progress(done, total)` is called now and then, in rad or m of the input's way.
+    """
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        pair: str | None,
+        branches: Sequence[int],
+        third: bool,
+        progress: Progress | None = None,
+    ):
         names = [given.pair for given in mechanism.inputs]
         self.index = running_input(mechanism, pair)
         still = tuple(Drive(name, None, 0.0, 0.0) for k, name in enumerate(names) if k != self.index)
@@ -59,7 +76,8 @@ class Ranged:
         self.u, self.p = self.solver.station.u, self.solver.station.p
         self.branches, self.third = tuple(branches), third
         self.found = self.known.assembly
-        self.work = Work()
+        self.progress = progress
+        self.work = self.budget(0.0)
 
     def between(self, steps: int, start: float | None, stop: float | None, back: bool) -> Motion:
         """The run over a range, or over the one that the input has by itself; and back again if wanted."""
@@ -82,7 +100,8 @@ class Ranged:
         """The whole circuit of the assembly, through its dead points, back to where it starts."""
         here = float(self.u[self.index])
         first = here if start is None else start / self.scale
-        walk = self.walk(follow(self.solver, self.p, self.found.z, self.u, self._at(first)), first)
+        work = self.budget(0.0)
+        walk = self.walk(follow(self.solver, self.p, self.found.z, self.u, self._at(first)), first, work=work)
         if walk.here.clear < LEAST:
             raise BadInput("start", "branches of the motion cross where the circuit would start; start it elsewhere")
         whole = circuit(self.solver, walk)
@@ -114,6 +133,7 @@ class Ranged:
     def _run(self, steps: int, first: float, last: float) -> Rows:
         grid = np.linspace(first, last, steps + 1)
         given = self._given(grid)
+        self.work = self.budget(abs(last - first) + abs(first - float(self.u[self.index])), first)
         found = self._through(grid)
         return rows(found, given) if found.stopped is None else self._stopped(found, given)
 
@@ -237,15 +257,25 @@ class Ranged:
         inputs[..., self.index] = positions
         return inputs
 
-    def walk(self, z: Array, first: float, way: float = 1.0, towards: Array | None = None) -> Walk:
-        """A walk from a position of the input, in the direction in which it goes on, or towards other unknowns."""
+    def budget(self, reach: float, first: float | None = None) -> Work:
+        """What may be spent on so long a way of the input; who asked is told how far from `first` it has come."""
+        tell = None
+        if self.progress is not None and first is not None:
+            inform, total = self.progress, reach * self.scale
+
+            def tell(u: Array) -> None:
+                inform(min(abs(float(u[self.index]) - first) * self.scale, total), total)
+
+        return Work(ARCS + int(ARCS_PER_TURN * min(reach, MOST) / (2.0 * pi)), tell)
+
+    def walk(self, z: Array, first: float, way: float = 1.0, work: Work | None = None) -> Walk:
+        """A walk from a position of the input, in the direction in which it goes on."""
         axis = np.zeros_like(self.u)
         axis[self.index] = way
         curve = Curve(self.solver, self.p, self._at(first), axis)
         numbers = list(self.branches)
         y = np.append(z, 0.0)
-        start = onwards(curve, y, numbers) if towards is None else curve.at(y, towards)
-        return Walk(curve, start, numbers)
+        return Walk(curve, onwards(curve, y, numbers), numbers, work)
 
     def _end(self, z: Array, here: float, sign: float) -> _End:
         """Where the range of the input ends, one way from a position with unknowns z."""
@@ -259,10 +289,9 @@ class Ranged:
                 raise BadInput(self.pair, told)
             return _End(found[0], here + sign * far, None, self._at(here + sign * far))
         limit, ending = trip.end
-        # what goes out without an end is shown as far as it is well out
-        last = trip.walk.out if ending is Ending.ENDLESS and trip.walk.out is not None else trip.here
-        links = tuple(moved_by(self.solver, last.tangent[:-1]))
-        return _End(last.y[:-1], here + sign * float(last.y[-1]), ending, limit, links, tuple(trip.walk.missed))
+        last, u = trip.last or (z, start)
+        links = tuple(moved_by(self.solver, trip.here.tangent[:-1]))
+        return _End(last, float(u[self.index]), ending, limit, links, tuple(trip.walk.missed))
 
 
 class _Course:
@@ -287,19 +316,23 @@ class _Course:
         back = self._turns_back(u)
         first, last = float(u[0]), float(u[(len(u) - 1) // 2 if back else -1])
         here, sense = float(ranged.u[ranged.index]), 1.0 if last >= first else -1.0
-        down = list(self._along(here, first, -sense)) if sense * first < sense * here else []
-        walk = ranged.walk(ranged.found.z, here, sense)
-        up = list(self._along(here, last, sense, walk)) if sense * last > sense * here else []
+        down = self._over(here, first, -sense)
+        up = self._over(here, last, sense)
         low, high = sorted((first * ranged.scale, last * ranged.scale))
         room = SEAM * ranged.scale
         told = [each for each in (*down[::-1], *up) if low - room <= each.limit.input <= high + room]
-        return limits.limits(ranged.solver, ranged.pair, walk.curve, told)
+        curve = ranged.walk(ranged.found.z, here).curve
+        return limits.limits(ranged.solver, ranged.pair, curve, told)
 
     def _turns_back(self, u: Array) -> bool:
         return len(u) > 2 and u[0] == u[-1] and u[1] == u[-2]
 
-    def _along(self, here: float, last: float, way: float, walk: Walk | None = None) -> Iterator[limits.Found]:
-        """What is met from the file's own position to another."""
-        ranged, far = self.ranged, abs(last - here)
-        walk = walk or ranged.walk(ranged.found.z, here, way)
-        return limits.along(ranged.solver, ranged.pair, here, way, walk, limits.until(pieces(walk), far), far)
+    def _over(self, here: float, last: float, way: float) -> list[limits.Found]:
+        """What is met from the file's own position to another, if that lies that way."""
+        ranged, far = self.ranged, way * (last - here)
+        if far <= 0.0:
+            return []
+        walk = ranged.walk(ranged.found.z, here, way, work=ranged.budget(far))
+        met_there = limits.over(ranged.solver, ranged.pair, here, way, walk, far)
+        # all with the input on its way up, whichever way it was followed
+        return [each.turned(way) for each in met_there]

@@ -30,7 +30,8 @@ ARCS = 10_000
 NEAR_BY = 4.0
 """Lengths of the size: where a slide is farther out than this, steps along it grow with how far it is."""
 OUT = 100.0
-"""Lengths of the size, or times as far as it was: so far out a slide is shown that goes out without an end."""
+"""Lengths of the size, or times the greatest number of a pair: so far out a slide is shown that goes out without an
+end."""
 FARTHEST = 6e6
 """Lengths of the size: farther out than this the gate tells nothing."""
 CONVERGES = 0.25
@@ -93,12 +94,13 @@ class Walk:
         kinds = [equations.coordinates[column].kind for column in equations.unknowns]
         self._slides = np.array([kind is Kind.LENGTH for kind in kinds], dtype=bool)
         turns = any(kind is not Kind.LENGTH for kind, way in zip(equations.drives, curve.way, strict=True) if way)
-        self._turning = np.append(~self._slides, turns)
+        self.turning = np.append(~self._slides, turns)
+        "which entries of y come back after whole turns: angles, and the place of inputs that turn"
 
     def arcs(self) -> Iterator[Arc]:
         """The arcs of the curve; they end where it cannot be followed further, `ending` and `limit` say why."""
-        first = self._out(self.here.y)
-        shown, farthest = OUT * max(1.0, first), max(FARTHEST, 2.0 * first)
+        shown = OUT * max(1.0, float(np.max(np.abs(self.curve.p), initial=0.0)))
+        farthest = max(FARTHEST, 2.0 * self._out(self.here.y))
         while True:
             here = self.here
             if not self.work.spend(self.curve.inputs(here.y)):
@@ -146,7 +148,7 @@ class Walk:
         here, curve = self.here, self.curve
         bent = float(np.linalg.norm(here.bend))
         # far out a step of a slide may be longer, but not that of an angle
-        turning = float(np.max(np.abs(here.tangent[self._turning]), initial=0.0))
+        turning = float(np.max(np.abs(here.tangent[self.turning]), initial=0.0))
         longest = LONGEST / max(turning, min(1.0, NEAR_BY / max(out, 1.0)))
         step = min(self.step, longest, 1.2 * here.clear, 0.8 * BENT / max(bent, 1e-300))
         while step > SHORTEST:
