@@ -167,7 +167,7 @@ def not_assembled(setup: Setup, failure: Failure) -> NoAnswer:
         Outcome.CANNOT_BE_ASSEMBLED,
         f"{setup.at()} {links} cannot be joined: at the nearest, pair {pair!r} stays open by "
         f"{amount(gaps[pair] * by, what, setup.mechanism.units)}; "
-        f"{remedy(setup, failure) or f'change the input or a dimension of {links}'}",
+        f"{remedy(setup, failure, f'change the input or a dimension of {links}')}",
     )
 
 
