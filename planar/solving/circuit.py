@@ -65,7 +65,9 @@ def circuit(setup: Solver, walk: Walk) -> Circuit:
         found.append(piece)
         out = not turning[-1] and abs(piece.stop) > OUT
         if out or len(found) > PIECES:
-            told = "the input slides on without an end" if out else "the motion does not come back within so many turns"
+            told = (
+                "the input slides on without an end" if out else f"the motion does not come back within {PIECES} arcs"
+            )
             raise NoAnswer(Outcome.BRANCH_LOST, f"{told}; name where the range starts and stops instead of the circuit")
     u, ending = walk.end
     raise setup.ends(u, walk.here.tangent, ending)

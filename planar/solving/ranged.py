@@ -212,7 +212,7 @@ class Ranged:
         reasons = []
         for ending in dict.fromkeys(end.ending for end in ends):
             alike = [end for end in ends if end.ending is ending]
-            where = listed([self.solver.where(end.limit) for end in alike])
+            where = listed([self.solver.told(self.pair, float(end.limit[self.index])) for end in alike])
             if ending is Ending.DEAD_POINT:
                 reasons.append(f"the range of {self.pair!r} ends at {where}")
             elif ending is not None:
@@ -332,7 +332,7 @@ class _Course:
         ranged, far = self.ranged, way * (last - here)
         if far <= 0.0:
             return []
-        walk = ranged.walk(ranged.found.z, here, way, work=ranged.budget(far))
+        walk = ranged.walk(ranged.found.z, here, way, work=ranged.budget(far, here))
         met_there = limits.over(ranged.solver, ranged.pair, here, way, walk, far)
         # all with the input on its way up, whichever way it was followed
         return [each.turned(way) for each in met_there]
