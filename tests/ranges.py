@@ -68,7 +68,7 @@ def four_bar(rng: np.random.Generator, lengths: tuple[float, ...] | None = None)
 def beside(rng: np.random.Generator) -> tuple[Case, float] | None:
     """A four-bar whose lengths miss those of a change-point linkage by little, and by how much."""
     a, b, c, _ = rng.uniform(0.3, 2.0, 4)
-    gap = rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-11.0, -4.0)
+    gap = rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-11.0, -8.0)
     d = (a + b - c, a + c - b, b + c - a)[rng.integers(3)] + gap
     case = four_bar(rng, (a, b, c, d)) if d > 0.1 else None
     return case and (case, abs(gap))

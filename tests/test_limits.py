@@ -73,21 +73,22 @@ def test_a_full_turn_is_kept_where_the_range_misses_a_dead_point_by_little_and_l
             np.testing.assert_allclose(places(motion, DEAD), [-limit, limit], atol=1e-12)
 
 
-@pytest.mark.parametrize("short", [1e-9, 1e-10, 1e-11, 1e-12])
+@pytest.mark.parametrize("short", [1e-9, 1e-10, 3e-11, 1e-11, 1e-12])
 def test_both_dead_points_of_a_slider_crank_that_all_but_turns_are_told(short):
-    """r = 1, l = 1 - short: the rod reaches its line up to sin(theta) = l."""
-    motion = planar.cycle(slider_crank(1.0, 1.0 - short, 0.0, 1.0), 7)
-    limit = np.arctan2(1.0 - short, np.sqrt(short * (2.0 - short)))
-    far = 32.0 * EPS / np.sqrt(2.0 * short)  # an ulp of a length moves the limit by that
-    np.testing.assert_allclose(places(motion, DEAD), [-limit, limit], atol=far, rtol=0)
-    assert motion.reason.count("O = ") == 2
+    """l = r - short: the rod reaches its line up to sin(theta) = l / r."""
+    for r, theta in ((1.0, 1.0), (1.0, -0.3), (0.7, 0.4)):
+        motion = planar.cycle(slider_crank(r, r - short, 0.0, theta), 3)
+        limit = np.arctan2(r - short, np.sqrt(short * (2.0 * r - short)))
+        far = 32.0 * EPS / np.sqrt(2.0 * short)  # an ulp of a length moves the limit by that
+        np.testing.assert_allclose(places(motion, DEAD), [-limit, limit], atol=far, rtol=0)
+        assert motion.reason.count("O = ") == 2
 
 
 def test_a_motion_whose_reason_names_dead_points_has_them_among_its_limits():
     """Four-bars beside change-point linkages, where a dead point lies within the rounding of a regular place."""
     rng = np.random.default_rng(8)
     looked_at = 0
-    while looked_at < 6:
+    while looked_at < 4:
         drawn = ranges.beside(rng)
         if drawn is None:
             continue
