@@ -280,6 +280,7 @@ def test_what_comes_round_is_followed_once_however_many_turns_it_makes(lengths, 
     theta = motion.inputs["A"].position
     wanted = theta if lengths is PARALLELOGRAM else rocker(*lengths, theta)
     np.testing.assert_allclose(np.angle(np.exp(1j * (motion.link("DC").angle - wanted))), 0.0, atol=1e-10)
+    assert len(motion.remarks) < 20  # what is met again and again is not told a thousand times
     limits, in_all = arcs_of(monkeypatch, lambda: motion.limits)
     assert in_all < 100
     turn = [each for each in few.limits if each.input < 1.0 + TURN]
@@ -328,6 +329,39 @@ def test_a_run_that_takes_too_much_work_says_how_far_it_came(monkeypatch):
     beyond = planar.cycle(mechanism, 90, stop=1.0 + 0.9 * TURN)  # by a finer grid, as is advised
     assert beyond.outcome is Outcome.SOLVED
     assert [each.kind for each in beyond.limits][-1] == "not followed further"
+
+
+def test_of_a_range_that_takes_too_much_work_one_way_the_other_end_is_told_as_well(monkeypatch):
+    """A scissor lift a little off its dimensions: fully up its bars all but coincide and can hardly be told apart."""
+    value = files.to_dict(planar.load("scissor-lift"))
+    for k, link in enumerate(value["links"].values()):
+        if "length" in link:
+            link["length"] *= 1 + 1e-5 * np.sin(7.0 * k)
+    monkeypatch.setattr("planar.solving.ranged.ARCS", 100)
+    motion = planar.cycle(files.from_dict(value), 6)
+    assert motion.outcome is Outcome.BRANCH_LOST
+    low, high = motion.inputs["foot"].position[[0, -1]]
+    assert 0.0 < low < 1e-3
+    assert abs(high - 0.6) < 1e-4
+    assert f"followed as far as foot = {1e3 * low:.6g} mm, which took all the work" in motion.reason
+    assert f"the range of 'foot' ends at foot = {1e3 * high:.6g} mm" in motion.reason
+
+
+def test_a_cart_with_a_linkage_on_it_runs_along_its_rail_as_far_as_is_asked(monkeypatch):
+    """Nothing but the cart moves, and nothing is near to anything."""
+    value = files.to_dict(four_bar(*ROCKER, 1.0))
+    links = value["links"]
+    links["AD"]["points"]["F"] = [0.0, 0.0]
+    value |= {"frame": "rail", "links": {"rail": {"points": {"R": [0, 0]}}, **links}}
+    value["pairs"].append({"sliding": "along", "links": ["rail", "AD"], "line": {"through": "R"}, "point": "F"})
+    value["inputs"].append({"pair": "along", "position": 0.0, "velocity": 1.0})
+    value["sketch"] = {}
+    mechanism = files.from_dict(value)
+    motion, arcs = arcs_of(monkeypatch, planar.cycle, mechanism, 3, 0.0, 9000.0, "along")
+    assert motion.outcome is Outcome.SOLVED
+    np.testing.assert_allclose(motion.point("A").position[:, 0], [0.0, 3000.0, 6000.0, 9000.0], atol=1e-9)
+    assert len(motion.limits) == 0
+    assert arcs < 300
 
 
 # dead points

@@ -52,7 +52,7 @@ def cycle(
     With `jerk` the motion has third rates too (beside a change point, where they come from a polynomial through the
     branch, to about 1e-5 of the greatest). `motion.limits` are the dead points, change points and ends of strokes.
     A motion that ends before `stop` says so in its `outcome` and `reason`; its last row is the dead point itself, where
-    no velocity is determined: rates are NaN there. One that takes too much work ends as well: more than 10,000 arcs of
+    no velocity is determined: rates are NaN there. One that takes too much work ends as well: more than 5,000 arcs of
     the curve of positions, and 100 more for each turn of the range. `progress(done, total)` is called while a long
     range is followed, in rad or m of the input's way. Raises BadInput for an input or a range that is not there,
     NoAnswer where there is no position to start from.

@@ -94,7 +94,8 @@ class Ranged:
         if found.stopped is not None:
             return self._told(self._stopped(found, self._given(grid)), back)
         whole = found._replace(z=np.vstack([found.z, end.z]), told=found.told and found.told.padded(0, 1))
-        return self._told(self._limited(rows(whole, self._given(grid), (steps,)), (end,)), back)
+        dead = (steps,) if end.ending is Ending.DEAD_POINT else ()
+        return self._told(self._limited(rows(whole, self._given(grid), dead), (end,)), back)
 
     def round(self, steps: int, start: float | None) -> Motion:
         """The whole circuit of the assembly, through its dead points, back to where it starts."""
@@ -281,7 +282,7 @@ class Ranged:
         """Where the range of the input ends, one way from a position with unknowns z."""
         far = OUT if self.slides else 2.0 * pi
         start = self._at(here)
-        trip = Trip(self.solver, self.p, z, start, self._at(here + sign) - start, self.branches, self.work)
+        trip = Trip(self.solver, self.p, z, start, self._at(here + sign) - start, self.branches, self.budget(0.0))
         found = trip.to(far)
         if found is not None:
             if self.slides:

@@ -25,7 +25,7 @@ SUSPECTED, AGAIN = 0.15, 0.2
 """Where to look for a change point: so near to a singular slope, and again where it is so many times nearer."""
 AHEAD = 10.0
 """A change point farther ahead than so many times the distance within which there is none is another one."""
-ARCS = 10_000
+ARCS = 5_000
 """Arcs that are walked for one answer; a turn of a usual linkage has some fifty."""
 NEAR_BY = 4.0
 """Lengths of the size: where a slide is farther out than this, steps along it grow with how far it is."""
@@ -115,7 +115,7 @@ class Walk:
             elif here.clear > SUSPECTED:
                 self._looked = np.inf
             out = self._out(here.y)
-            after = None if out > farthest else self._next(out)
+            after = None if out > farthest else self._next()
             if after is None:
                 self.limit = _limit(here, int(np.argmax(np.abs(here.y[:-1]) * self._slides))) if out > OUT else None
                 if self.limit is not None:
@@ -143,11 +143,12 @@ class Walk:
         """How far the farthest slide is out (sizes)."""
         return float(np.max(np.abs(y[:-1][self._slides]), initial=0.0))
 
-    def _next(self, out: float) -> Point | None:
+    def _next(self) -> Point | None:
         """The next point: a predictor of second order, Newton's corrector, and the second part of the gate."""
         here, curve = self.here, self.curve
         bent = float(np.linalg.norm(here.bend))
         # far out a step of a slide may be longer, but not that of an angle
+        out = max(self._out(here.y), 0.0 if self.turning[-1] else abs(float(here.y[-1])))
         turning = float(np.max(np.abs(here.tangent[self.turning]), initial=0.0))
         longest = LONGEST / max(turning, min(1.0, NEAR_BY / max(out, 1.0)))
         step = min(self.step, longest, 1.2 * here.clear, 0.8 * BENT / max(bent, 1e-300))
