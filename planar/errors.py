@@ -31,6 +31,8 @@ class Ending(StrEnum):
     DEAD_POINT = "dead point"
     ENDLESS = "endless"
     LOST = "lost"
+    FAR = "far"
+    SPENT = "spent"
 
 
 def listed(names: Iterable[str], most: int | None = MOST_NAMES, last: str = " and ") -> str:

@@ -30,21 +30,23 @@ class Case(NamedTuple):
     ends: tuple[float, float]
 
 
-def four_bar(rng: np.random.Generator) -> Case | None:
-    """Any four-bar of Grashof's or not, its crank anywhere in its range; None near a change-point linkage.
+def four_bar(rng: np.random.Generator, lengths: tuple[float, ...] | None = None) -> Case | None:
+    """Any four-bar of Grashof's or not, its crank anywhere in its range; None near a change-point linkage, unless these
+    are its `lengths`.
 
     The crank a turns as far as the triangle of the coupler b and the follower c on the diagonal f can be closed,
     |b - c| <= f <= b + c, where f^2 = a^2 + d^2 - 2 a d cos(theta).
     """
-    a, b, c, d = rng.uniform(0.3, 2.0, 4)
+    a, b, c, d = rng.uniform(0.3, 2.0, 4) if lengths is None else lengths
     low, high = (np.sign(gap) * np.sqrt(abs(gap)) for gap in ((d - a) ** 2 - (b - c) ** 2, (b + c) ** 2 - (d + a) ** 2))
-    if min(abs(a + b - c - d), abs(a + c - b - d), abs(a + d - b - c), abs(b + c + a - d), abs(b + c + d - a)) < ALMOST:
+    least = min(abs(a + b - c - d), abs(a + c - b - d), abs(a + d - b - c), abs(b + c + a - d), abs(b + c + d - a))
+    if lengths is None and least < ALMOST:
         return None
     if abs(d - a) > b + c or d + a < abs(b - c):
         return None  # cannot be assembled at all
     # half-angle formulas: cosines lose half of the digits near 0 and pi
-    first = 0.0 if low > 0.0 else 2.0 * np.arcsin(np.sqrt(((b - c) ** 2 - (d - a) ** 2) / (4.0 * a * d)))
-    last = np.pi if high > 0.0 else 2.0 * np.arcsin(np.sqrt(((b + c) ** 2 - (d - a) ** 2) / (4.0 * a * d)))
+    first = 0.0 if low > 0.0 else 2.0 * np.arcsin(np.sqrt((b - c - d + a) * (b - c + d - a) / (4.0 * a * d)))
+    last = np.pi if high > 0.0 else 2.0 * np.arccos(np.sqrt((d + a - b - c) * (d + a + b + c) / (4.0 * a * d)))
     if last - first < SHORT:
         return None
     theta = rng.uniform(first + 0.01 * (last - first), last - 0.01 * (last - first))
@@ -61,6 +63,15 @@ def four_bar(rng: np.random.Generator) -> Case | None:
         "DC": {"ends": ["D", "C"], "length": c},
     }
     return _case(links, [{"turning": name} for name in "ABCD"], "AD", "A", theta, ends, rng)
+
+
+def beside(rng: np.random.Generator) -> tuple[Case, float] | None:
+    """A four-bar whose lengths miss those of a change-point linkage by little, and by how much."""
+    a, b, c, _ = rng.uniform(0.3, 2.0, 4)
+    gap = rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-11.0, -8.0)
+    d = (a + b - c, a + c - b, b + c - a)[rng.integers(3)] + gap
+    case = four_bar(rng, (a, b, c, d)) if d > 0.1 else None
+    return case and (case, abs(gap))
 
 
 def slider_crank(rng: np.random.Generator) -> Case | None:

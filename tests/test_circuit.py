@@ -160,7 +160,7 @@ def test_a_circuit_keeps_to_its_branch_through_change_points_or_takes_another():
 
 
 def test_a_circuit_that_does_not_come_back_says_so():
-    for model, words in (("rolling-wheel", "does not come back within so many turns|goes on without an end"),):
+    for model, words in (("rolling-wheel", "slides on without an end"),):
         with pytest.raises(NoAnswer, match=words) as refused:
             planar.cycle(planar.load(model), 12, circuit=True)
         assert refused.value.outcome is Outcome.BRANCH_LOST

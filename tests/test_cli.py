@@ -248,6 +248,17 @@ def test_a_mechanism_without_an_answer_ends_with_1_and_the_reason(tmp_path: Path
     assert told["reason"] in sentence
 
 
+def test_an_interrupt_ends_a_long_run_with_130_and_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("planar.solving.follow.course", interrupted)
+    for words in (["four-bar"], ["four-bar", "--json"]):
+        ended = run(tmp_path, "cycle", *words, "--to", "3000rad")
+        assert ended.refused(130) == "interrupted: stopped by the user before it was done"
+    assert json.loads(ended.out)["outcome"] == "interrupted"
+
+
 def test_bad_input_ends_with_2_and_names_the_place(tmp_path: Path) -> None:
     value = json.loads(json.dumps(FOUR_BAR))
     value["links"]["AB"]["lenght"] = value["links"]["AB"].pop("length")

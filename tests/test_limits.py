@@ -8,8 +8,11 @@ import pytest
 import planar
 from planar import files
 from planar.errors import BadInput, NoAnswer, Outcome
+from planar.solving.walk import Work
 from tests import ranges
 from tests.test_cycle import PARALLELOGRAM, ROCKER, TRIPLE, TURN, four_bar, rocker, slider_crank
+
+EPS = float(np.finfo(float).eps)
 
 DEAD, STROKE, CHANGE = "input dead point", "stroke end", "change point"
 
@@ -68,6 +71,297 @@ def test_a_full_turn_is_kept_where_the_range_misses_a_dead_point_by_little_and_l
         if not turns:
             limit = 2 * np.arccos(np.sqrt(((d + a) ** 2 - (b + c) ** 2) / (4 * a * d)))
             np.testing.assert_allclose(places(motion, DEAD), [-limit, limit], atol=1e-12)
+
+
+@pytest.mark.parametrize("short", [1e-9, 1e-10, 3e-11, 1e-11, 1e-12])
+def test_both_dead_points_of_a_slider_crank_that_all_but_turns_are_told(short):
+    """l = r - short: the rod reaches its line up to sin(theta) = l / r."""
+    for r, theta in ((1.0, 1.0), (1.0, -0.3), (0.7, 0.4)):
+        motion = planar.cycle(slider_crank(r, r - short, 0.0, theta), 3)
+        limit = np.arctan2(r - short, np.sqrt(short * (2.0 * r - short)))
+        far = 32.0 * EPS / np.sqrt(2.0 * short)  # an ulp of a length moves the limit by that
+        np.testing.assert_allclose(places(motion, DEAD), [-limit, limit], atol=far, rtol=0)
+        assert motion.reason.count("O = ") == 2
+
+
+def test_a_motion_whose_reason_names_dead_points_has_them_among_its_limits():
+    """Four-bars beside change-point linkages, where a dead point lies within the rounding of a regular place."""
+    rng = np.random.default_rng(8)
+    looked_at = 0
+    while looked_at < 4:
+        drawn = ranges.beside(rng)
+        if drawn is None:
+            continue
+        (mechanism, _, ends), gap = drawn
+        motion = planar.cycle(mechanism, 5)
+        dead = places(motion, DEAD)
+        if abs(ends[1] - ends[0] - TURN) < 1e-12:
+            assert dead == []
+            assert motion.reason == ""
+            continue
+        looked_at += 1
+        np.testing.assert_allclose(dead, ends, atol=64.0 * EPS / np.sqrt(gap), rtol=0)
+        assert motion.reason.count("A = ") == 2
+        past = planar.cycle(mechanism, 5, stop=ends[1] + 0.1)
+        assert past.outcome is Outcome.DEAD_POINT
+        np.testing.assert_allclose(places(past, DEAD), ends[1:], atol=64.0 * EPS / np.sqrt(gap), rtol=0)
+
+
+# ill-conditioned all along
+
+
+def arcs_of(monkeypatch, walk, *given, **more):
+    """What a call gives, and how many arcs were walked for it."""
+    counted = []
+    real = Work.spend
+    monkeypatch.setattr(Work, "spend", lambda self, u: counted.append(1) or real(self, u))
+    try:
+        return walk(*given, **more), len(counted)
+    finally:
+        monkeypatch.undo()
+
+
+def nearly_redundant(slope, r, rod):
+    """A crank pushes a wedge of a small slope under a follower, whose own wedge of that slope pushes a jaw as far."""
+    links = {
+        "frame": {"points": {"O": [0, 0], "G": [2, 0], "H": [0, 1]}},
+        "crank": {"ends": ["O", "A"], "length": r},
+        "rod": {"ends": ["A", "B"], "length": rod},
+        "wedge": {"points": {"B": [0, 0]}},
+        "follower": {"points": {"P": [0, 0]}},
+        "jaw": {"points": {"J": [0, 0]}},
+    }
+    pairs = [
+        {"turning": "O"},
+        {"turning": "A"},
+        {"turning": "B"},
+        {"sliding": "in", "links": ["frame", "wedge"], "line": {"through": "O"}, "point": "B"},
+        {"slot": "face", "links": ["wedge", "follower"], "line": {"through": "B", "angle": slope}, "point": "P"},
+        {
+            "sliding": "guide",
+            "links": ["frame", "follower"],
+            "line": {"through": "G", "angle": np.pi / 2},
+            "point": "P",
+            "turn": -np.pi / 2,
+        },
+        {"sliding": "out", "links": ["frame", "jaw"], "line": {"through": "H"}, "point": "J"},
+        {"slot": "under", "links": ["follower", "jaw"], "line": {"through": [0, 1], "angle": slope}, "point": "J"},
+    ]
+    inputs = [{"pair": "O", "position": 0.2, "velocity": 1.0}]
+    value = {"planar": 1, "frame": "frame", "links": links, "pairs": pairs, "inputs": inputs}
+    return files.from_dict(value)
+
+
+@pytest.mark.parametrize("slope", [1e-3, 2e-5])
+def test_a_linkage_that_is_ill_conditioned_all_along_runs_through_its_whole_range(slope, monkeypatch):
+    """Its slopes are nearly singular everywhere, by as much, and so no nearer to a change point than others'."""
+    motion, arcs = arcs_of(monkeypatch, planar.cycle, nearly_redundant(slope, 0.9, 0.6), 12)
+    limit = np.arcsin(0.6 / 0.9)
+    np.testing.assert_allclose(motion.inputs["O"].position[[0, -1]], [-limit, limit], atol=1e-11)
+    np.testing.assert_allclose(places(motion, DEAD), [-limit, limit], atol=1e-11)
+    theta = motion.inputs["O"].position
+    # the jaw goes with the wedge: the follower rises by tan(slope) of what the wedge goes, and so gives it back
+    wedge, jaw = motion.pair("in")["displacement"], motion.pair("out")["displacement"]
+    np.testing.assert_allclose(wedge, 0.9 * np.cos(theta) + np.sqrt(0.36 - (0.9 * np.sin(theta)) ** 2), atol=1e-7)
+    np.testing.assert_allclose(jaw - jaw[0], wedge - wedge[0], atol=1e3 * EPS / slope)
+    assert arcs < 200
+
+
+# slides that go out without an end
+
+
+def lever(rail, off=0.0, through=(1.0, 0.0)):
+    """A slotted lever about the origin carries a block along a rail: it goes out for ever as the lines get parallel."""
+    links = {
+        "frame": {"points": {"O": [0, 0]}},
+        "lever": {"points": {"O": [0, 0], "L": [0, off]}},
+        "rod": {"points": {"P": [0, 0]}},
+    }
+    pairs = [
+        {"turning": "O"},
+        {"sliding": "rail", "links": ["frame", "rod"], "line": {"through": list(through), "angle": rail}, "point": "P"},
+        {"sliding": "slot", "on": "lever", "block": "P", "line": {"through": "L"}},
+    ]
+    inputs = [{"pair": "O", "position": rail - 70, "velocity": "1 rad/s"}]
+    units = {"angle": "deg"}
+    return files.from_dict(
+        {"planar": 1, "units": units, "frame": "frame", "links": links, "pairs": pairs, "inputs": inputs}
+    )
+
+
+@pytest.mark.parametrize(("rail", "off"), [(90, 0.0), (63, 0.3), (124, -0.4)])
+def test_where_lines_become_parallel_both_ends_are_told_where_that_is(rail, off):
+    mechanism = lever(rail, off)
+    motion = planar.cycle(mechanism, 12)
+    assert motion.outcome is Outcome.BRANCH_LOST
+    assert f"beyond O = {rail - 180} deg and O = {rail} deg: towards there" in motion.reason
+    assert "slide out without an end, as where lines become parallel" in motion.reason
+    # shown within a degree or so of them
+    np.testing.assert_allclose(np.degrees(motion.inputs["O"].position[[0, -1]]), [rail - 180, rail], atol=1.0)
+    assert places(motion, DEAD) == []
+
+
+@pytest.mark.parametrize("through", [(1.0, 0.0), (1e-3, 0.0), (30.0, 0.0)])
+def test_short_of_where_lines_become_parallel_a_position_and_a_run_agree(through):
+    mechanism = lever(90, 0.0, through)
+    for degrees in (-89.9, 89.99):
+        rise = through[0] * np.tan(np.radians(degrees))
+        here = planar.solve(mechanism, {"O": np.radians(degrees)}).pair("rail")["displacement"]
+        motion = planar.cycle(mechanism, 3, stop=np.radians(degrees))
+        assert motion.outcome is Outcome.SOLVED
+        np.testing.assert_allclose([here, motion.pair("rail")["displacement"][-1]], rise, rtol=1e-11)
+    for degrees in (135.0,):
+        with pytest.raises(NoAnswer, match="cannot go beyond O = 90 deg"):
+            planar.solve(mechanism, {"O": np.radians(degrees)})
+        motion = planar.cycle(mechanism, 3, stop=np.radians(degrees))
+        assert motion.outcome is Outcome.BRANCH_LOST
+        assert "cannot go beyond O = 90 deg" in motion.reason
+        assert places(motion, DEAD) == []
+
+
+def wedges(face, lift, reach, through):
+    """Three slides in a ring: a wedge on the floor lifts a rod, without an end."""
+    points = {"A": [0, 0]} | ({"end": [reach, 0]} if reach else {})
+    links = {"frame": {"points": {"O": [0, 0]}}, "wedge": {"points": points}, "rod": {"points": {"B": [0, 0]}}}
+    pairs = [
+        {"sliding": "floor", "links": ["frame", "wedge"], "line": {"through": "O"}, "point": "A"},
+        {
+            "sliding": "face",
+            "links": ["wedge", "rod"],
+            "line": {"through": "A", "angle": face},
+            "point": "B",
+            "turn": -face,
+        },
+        {
+            "sliding": "lift",
+            "links": ["frame", "rod"],
+            "line": {"through": list(through), "angle": lift},
+            "point": "B",
+            "turn": -lift,
+        },
+    ]
+    inputs = [{"pair": "floor", "position": 0.5, "velocity": 1.0}]
+    units = {"angle": "deg"}
+    return files.from_dict(
+        {"planar": 1, "units": units, "frame": "frame", "links": links, "pairs": pairs, "inputs": inputs}
+    )
+
+
+@pytest.mark.parametrize("reach", [0.0, 0.1])
+@pytest.mark.parametrize(("face", "lift", "through"), [(30, 90, (0.0, 0.0)), (30, 60, (1.0, 0.0)), (5, 80, (0.3, 0.2))])
+def test_slides_without_an_end_have_no_limit(face, lift, through, reach):
+    mechanism = wedges(face, lift, reach, through)
+    up = np.exp(1j * np.radians(lift))
+    normal = 1j * np.exp(1j * np.radians(face))
+
+    def rise(x):
+        """Where the rod's line meets the wedge's face: normal . (through + s up - x) = 0."""
+        return float((np.conj(normal) * (x - complex(*through))).real / (np.conj(normal) * up).real)
+
+    for x in (-5000.0, 70.0, 5000.0):
+        here = planar.solve(mechanism, {"floor": x}).pair("lift")["displacement"]
+        motion = planar.cycle(mechanism, 4, 0.0, x)
+        assert motion.outcome is Outcome.SOLVED
+        np.testing.assert_allclose([here, motion.pair("lift")["displacement"][-1]], rise(x), rtol=1e-12)
+    with pytest.raises(BadInput, match="goes on without a limit"):
+        planar.cycle(mechanism)
+
+
+# many turns
+
+
+@pytest.mark.parametrize("lengths", [ROCKER, PARALLELOGRAM])
+def test_what_comes_round_is_followed_once_however_many_turns_it_makes(lengths, monkeypatch):
+    mechanism = four_bar(*lengths, 1.0)
+    few, some = arcs_of(monkeypatch, planar.cycle, mechanism, 12, stop=1.0 + 3 * TURN)
+    motion, arcs = arcs_of(monkeypatch, planar.cycle, mechanism, 12, stop=1.0 + 1000 * TURN)
+    assert arcs == some < 100
+    assert motion.outcome is Outcome.SOLVED
+    theta = motion.inputs["A"].position
+    wanted = theta if lengths is PARALLELOGRAM else rocker(*lengths, theta)
+    np.testing.assert_allclose(np.angle(np.exp(1j * (motion.link("DC").angle - wanted))), 0.0, atol=1e-10)
+    assert len(motion.remarks) < 20  # what is met again and again is not told a thousand times
+    limits, in_all = arcs_of(monkeypatch, lambda: motion.limits)
+    assert in_all < 100
+    turn = [each for each in few.limits if each.input < 1.0 + TURN]
+    assert len(limits) == 1000 * len(turn)
+    for first, last in zip(turn, limits[-len(turn) :], strict=True):
+        assert (first.kind, first.of) == (last.kind, last.of)
+        assert last.input == pytest.approx(first.input + 999 * TURN, abs=1e-9)
+
+
+def test_wheels_that_count_turns_are_followed_for_as_many_as_they_need(monkeypatch):
+    """3 to 2: after one turn of the crank all stands otherwise, after two as before."""
+    mechanism = planar.load("geared-five-bar")
+    first = mechanism.inputs[0].position
+    (pair,) = (each.pair for each in mechanism.inputs)
+    rows, arcs = arcs_of(monkeypatch, planar.cycle, mechanism, 7, stop=first + 7 * 143 * TURN)
+    assert arcs < 200
+    point = rows.point_names[-1]
+    once = planar.cycle(mechanism, 2, stop=first + 2 * TURN)
+    moved = {
+        name: np.abs(once.point(name).position[0] - once.point(name).position[1]).max() for name in once.point_names
+    }
+    point = max(moved, key=moved.get)
+    assert moved[point] > 1e-3
+    np.testing.assert_allclose(rows.point(point).position[::2], once.point(point).position[[0, 0, 0, 0]], atol=1e-9)
+    np.testing.assert_allclose(rows.point(point).position[1::2], once.point(point).position[[1, 1, 1, 1]], atol=1e-9)
+    assert rows.inputs[pair].position[-1] == first + 7 * 143 * TURN
+
+
+def test_a_run_says_how_far_it_has_come():
+    told = []
+    planar.cycle(four_bar(*ROCKER, 1.0), 3, stop=1.0 + 3 * TURN, progress=lambda *each: told.append(each))
+    done, total = np.array(told).T
+    assert np.all(np.diff(done) >= 0.0)
+    np.testing.assert_allclose(total, 3 * TURN)
+
+
+def test_a_run_that_takes_too_much_work_says_how_far_it_came(monkeypatch):
+    monkeypatch.setattr("planar.solving.ranged.ARCS", 10)
+    monkeypatch.setattr("planar.solving.ranged.ARCS_PER_TURN", 0)
+    mechanism = four_bar(*ROCKER, 1.0)
+    motion = planar.cycle(mechanism, 2, stop=1.0 + 0.9 * TURN)
+    assert motion.outcome is Outcome.BRANCH_LOST
+    reached = motion.inputs["A"].position[-1]
+    assert 1.0 < reached < 1.0 + 0.9 * TURN
+    assert f"was followed as far as A = {reached:.6g} rad, which took all the work" in motion.reason
+    beyond = planar.cycle(mechanism, 90, stop=1.0 + 0.9 * TURN)  # by a finer grid, as is advised
+    assert beyond.outcome is Outcome.SOLVED
+    assert [each.kind for each in beyond.limits][-1] == "not followed further"
+
+
+def test_of_a_range_that_takes_too_much_work_one_way_the_other_end_is_told_as_well(monkeypatch):
+    """A scissor lift a little off its dimensions: fully up its bars all but coincide and can hardly be told apart."""
+    value = files.to_dict(planar.load("scissor-lift"))
+    for k, link in enumerate(value["links"].values()):
+        if "length" in link:
+            link["length"] *= 1 + 1e-5 * np.sin(7.0 * k)
+    monkeypatch.setattr("planar.solving.ranged.ARCS", 100)
+    motion = planar.cycle(files.from_dict(value), 6)
+    assert motion.outcome is Outcome.BRANCH_LOST
+    low, high = motion.inputs["foot"].position[[0, -1]]
+    assert 0.0 < low < 1e-3
+    assert abs(high - 0.6) < 1e-4
+    assert f"followed as far as foot = {1e3 * low:.6g} mm, which took all the work" in motion.reason
+    assert f"the range of 'foot' ends at foot = {1e3 * high:.6g} mm" in motion.reason
+
+
+def test_a_cart_with_a_linkage_on_it_runs_along_its_rail_as_far_as_is_asked(monkeypatch):
+    """Nothing but the cart moves, and nothing is near to anything."""
+    value = files.to_dict(four_bar(*ROCKER, 1.0))
+    links = value["links"]
+    links["AD"]["points"]["F"] = [0.0, 0.0]
+    value |= {"frame": "rail", "links": {"rail": {"points": {"R": [0, 0]}}, **links}}
+    value["pairs"].append({"sliding": "along", "links": ["rail", "AD"], "line": {"through": "R"}, "point": "F"})
+    value["inputs"].append({"pair": "along", "position": 0.0, "velocity": 1.0})
+    value["sketch"] = {}
+    mechanism = files.from_dict(value)
+    motion, arcs = arcs_of(monkeypatch, planar.cycle, mechanism, 3, 0.0, 9000.0, "along")
+    assert motion.outcome is Outcome.SOLVED
+    np.testing.assert_allclose(motion.point("A").position[:, 0], [0.0, 3000.0, 6000.0, 9000.0], atol=1e-9)
+    assert len(motion.limits) == 0
+    assert arcs < 300
 
 
 # dead points

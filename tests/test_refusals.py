@@ -10,6 +10,10 @@ import pytest
 import planar
 from planar import files
 from planar.errors import NoAnswer, Outcome
+from planar.solving import remedy
+from planar.solving.assemble import Failure, search
+from planar.solving.candidates import Candidates
+from planar.solving.setup import Setup
 from tests.command import run
 from tests.test_cli import written
 
@@ -177,8 +181,7 @@ def test_a_slide_that_goes_out_without_an_end_is_lost_there():
     }
     problem = refused(value, {"O": 100.0 * DEG})
     assert problem.outcome is Outcome.BRANCH_LOST
-    # followed as far as 100 lengths of the mechanism
-    for word in ("beyond O = 89", "without an end", "drive 'rail'"):
+    for word in ("beyond O = 90 deg", "without an end", "drive 'rail'"):
         assert word in problem.reason
 
 
@@ -288,6 +291,21 @@ def test_where_no_single_length_helps_none_is_offered():
     assert problem.outcome is Outcome.CANNOT_BE_ASSEMBLED
     assert "it would go together" not in problem.reason
     assert "change the input or a dimension of" in problem.reason
+
+
+def test_a_remedy_is_looked_for_as_long_as_an_assembly_and_no_longer(monkeypatch):
+    """Groups solved are counted: those of the search, and as many again at most."""
+    given = six_bar(15)
+    solved = []
+    real = Candidates.of
+    monkeypatch.setattr(Candidates, "of", lambda *each, **more: solved.append(1) or real(*each, **more))
+    assert isinstance(search(Candidates(Setup(files.from_dict(given)))), Failure)
+    searched = len(solved)
+    for least, words in ((0, "looked for only as long as for an assembly"), (remedy.LEAST_EFFORT, "would go together")):
+        monkeypatch.setattr(remedy, "LEAST_EFFORT", least)
+        solved.clear()
+        assert words in refused(given | {"name": f"least {least}"}).reason
+        assert len(solved) <= searched + max(least, searched)
 
 
 # dead points and change points

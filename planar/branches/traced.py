@@ -9,11 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.errors import NoAnswer
-from planar.solving.circuit import PIECES, circuit
+from planar.solving.circuit import circuit
 from planar.solving.curve import Curve
-from planar.solving.follow import Piece, onwards, pieces
+from planar.solving.period import PIECES
+from planar.solving.pieces import Piece, onwards, pieces
 from planar.solving.position import Solver
-from planar.solving.walk import ENDLESS, Walk
+from planar.solving.walk import OUT, Walk
 
 Array = np.ndarray
 
@@ -154,11 +155,11 @@ def _open(solver: Solver, index: int, z: Array, reason: str) -> Traced:
             if piece.dead is not None:
                 rests.append(first + way * piece.stop)
                 found.append([])
-            out = not turns and abs(piece.stop) > ENDLESS
+            out = not turns and abs(piece.stop) > OUT
             if out or sum(map(len, found)) > PIECES:
                 break
         crossed |= bool(walk.passed)
-        if not (out or walk.endless):
+        if not (out or walk.limit is not None):
             lost = reason
         sides.append([Leg(walk.curve, tuple(each), first, way) for each in found if each])
     back, ahead = sides

@@ -13,8 +13,8 @@ import click
 
 from planar.errors import BadInput, NoAnswer, NotWritten, listed
 
-NO_ANSWER, BAD_INPUT, NOT_WRITTEN = 1, 2, 3
-"""Exit statuses; 0 is done."""
+NO_ANSWER, BAD_INPUT, NOT_WRITTEN, INTERRUPTED = 1, 2, 3, 130
+"""Exit statuses; 0 is done, 130 what shells give for an interrupt from the keyboard."""
 CLOSED_PIPE = 128 + 13
 """What a shell tells of programs that the closing of their pipe ends (SIGPIPE is signal 13), as by `| head`."""
 
@@ -104,6 +104,9 @@ def _ending() -> Iterator[None]:
         _refuse(str(problem), "bad input", str(problem), BAD_INPUT)
     except NoAnswer as problem:
         _refuse(str(problem), problem.outcome.value, problem.reason, NO_ANSWER, problem.more)
+    except KeyboardInterrupt:
+        told = "stopped by the user before it was done"
+        _refuse(f"interrupted: {told}", "interrupted", told, INTERRUPTED)
     except click.UsageError as problem:
         told = problem.format_message().rstrip(".").replace(". Did", "; did").replace(". (", " (")
         if not told.endswith(("?", "?)")):

@@ -148,15 +148,15 @@ def busy(doing: str) -> AbstractContextManager[Any]:
 
 
 @contextmanager
-def advancing(doing: str) -> Iterator[Callable[[float, float], None] | None]:
-    """A bar on a terminal that shows how much of a long work is done."""
+def advancing(doing: str, gone: bool = False) -> Iterator[Callable[[float, float], None] | None]:
+    """A bar on a terminal that shows how much of a long work is done; it may be gone when that is."""
     if not sys.stderr.isatty():
         yield None
         return
     from rich.console import Console
     from rich.progress import Progress
 
-    with Progress(console=Console(stderr=True, markup=False)) as bar:
+    with Progress(console=Console(stderr=True, markup=False), transient=gone) as bar:
         task = bar.add_task(doing.replace("[", r"\["), total=None)
         yield lambda done, total: bar.update(task, completed=done, total=total)
 

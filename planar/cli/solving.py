@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from planar.cli.shared import (
+    advancing,
     as_json,
     at,
     busy,
@@ -146,8 +147,8 @@ def cycle(
         from planar.views.run import writable
 
         writable(output.suffix)
-    with busy(f"{mechanism.name}: {steps} steps"):
-        motion = run(mechanism, steps, **course, jerk=jerk)
+    with advancing(f"{mechanism.name}: {steps} steps", gone=True) as progress:
+        motion = run(mechanism, steps, **course, jerk=jerk, progress=progress)
         if not as_json:
             motion.limits  # noqa: B018 - solved for while the sign is up
         told = {name: _answers(motion, name) for name in asked}

@@ -33,11 +33,13 @@ class Assembly(NamedTuple):
 class Failure(NamedTuple):
     """The group at which every way to assemble ends.
 
-    `z`: the unknowns where it is nearest to closing, those of earlier groups filled in.
+    `z`: the unknowns where it is nearest to closing, those of earlier groups filled in; `groups`: how many were solved
+    in search of it.
     """
 
     stage: Stage
     z: Array
+    groups: int = 0
 
 
 class _Node(NamedTuple):
@@ -101,5 +103,5 @@ def search(candidates: Candidates, sound: Callable[[Array], bool] | None = None)
             )
     if chosen is None:
         assert worst is not None
-        return worst
+        return worst._replace(groups=expansions)
     return Assembly((taken or chosen).z, (taken or chosen).ties if tied else (), expansions >= EXPANSIONS)

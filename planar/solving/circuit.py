@@ -6,21 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.errors import Ending, NoAnswer, Outcome
-from planar.pairs import Kind
-from planar.solving.curve import Curve, Point
-from planar.solving.follow import Local, Piece, pieces, rests
+from planar.errors import NoAnswer, Outcome
+from planar.solving.curve import Curve
+from planar.solving.period import BACK, PIECES, closing, home
+from planar.solving.pieces import Local, Piece, pieces, rests
 from planar.solving.position import Solver
-from planar.solving.setup import Setup
-from planar.solving.walk import ENDLESS, Walk
+from planar.solving.walk import OUT, Walk
 
 Array = np.ndarray
-
-PIECES = 1500
-"""Linkages whose circuit is longer, as with wheels of many teeth, are followed over a range instead."""
-BACK = 1e-7
-"""rad or sizes: a curve that comes so near to its start, in its direction, is closed."""
-SAME = 1e-9
 
 
 class Stretch(NamedTuple):
@@ -58,53 +51,23 @@ class Circuit(NamedTuple):
 def circuit(setup: Solver, walk: Walk) -> Circuit:
     """The circuit from where a walk stands. Raises NoAnswer where it is not found to close."""
     start, curve = walk.here, walk.curve
-    counts = _turning(setup)
+    turning = walk.turning
     found: list[Piece] = []
     for piece in pieces(walk):
         if piece.first == piece.last:
             continue
         if len(found) > 1:
-            if piece.dead is not None and rests(start) and _home(piece.dead.y, start, counts)[1] < BACK:
+            if piece.dead is not None and rests(start) and home(piece.dead.y, start, turning)[1] < BACK:
                 return Circuit((*found, piece), True)
-            closing = _closing(curve, piece, start, counts)
-            if closing is not None:
-                return Circuit((*found, closing), rests(start))
+            last = closing(curve, piece, start, turning)
+            if last is not None:
+                return Circuit((*found, last), rests(start))
         found.append(piece)
-        out = not counts[-1] and abs(piece.stop) > ENDLESS
+        out = not turning[-1] and abs(piece.stop) > OUT
         if out or len(found) > PIECES:
-            told = "the input slides on without an end" if out else "the motion does not come back within so many turns"
+            told = (
+                "the input slides on without an end" if out else f"the motion does not come back within {PIECES} arcs"
+            )
             raise NoAnswer(Outcome.BRANCH_LOST, f"{told}; name where the range starts and stops instead of the circuit")
-    here = walk.here.y
-    ending = Ending.ENDLESS if walk.endless else Ending.LOST
-    raise setup.ends(curve.inputs(here), walk.here.tangent, ending)
-
-
-def _turning(setup: Setup) -> Array:
-    """Which entries of y come back after whole turns: angles, and the input if it turns."""
-    kinds = [setup.equations.coordinates[column].kind for column in setup.equations.unknowns]
-    driven = [setup.slides(given.pair) for given in setup.mechanism.inputs]
-    return np.array([kind is Kind.ANGLE for kind in kinds] + [not any(driven)])
-
-
-def _home(y: Array, start: Point, counts: Array) -> tuple[Array, float]:
-    """The start, whole turns away so as to be nearest to y, and how far it is."""
-    turns = np.where(counts, np.round((y - start.y) / (2.0 * np.pi)), 0.0)
-    home = start.y + 2.0 * np.pi * turns
-    return home, float(np.linalg.norm(y - home))
-
-
-def _closing(curve: Curve, piece: Piece, start: Point, counts: Array) -> Piece | None:
-    """The piece up to the circuit's start, if that lies on it and the curve goes on from there as it did."""
-    arc = piece.arc
-    length = abs(piece.last - piece.first)
-    home, far = _home(arc.after.y, start, counts)
-    if far > 2.0 * length + BACK:
-        return None
-    x = float(arc.axis @ (home - arc.origin))
-    low, high = sorted((piece.first, piece.last))
-    if not low - SAME <= x <= high + SAME:
-        return None
-    here = arc.at(curve, x)
-    if np.linalg.norm(here.y - home) > BACK or here.tangent @ start.tangent < 0.5 or not curve.closes(home):
-        return None
-    return Piece(arc, piece.first, x, piece.start, float(home[-1]), None)
+    u, ending = walk.end
+    raise setup.ends(u, walk.here.tangent, ending)

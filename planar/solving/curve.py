@@ -12,6 +12,8 @@ from planar.program import Program
 Array = np.ndarray
 
 CORRECTIONS = 10
+CLOSED = 1e-10
+"""A corrected point leaves no more open than this, where it is far out this part of how far."""
 NUDGE = 1e-6
 """The part of a step over which the change of a slope is taken."""
 NOTHING = 1e-10
@@ -24,6 +26,8 @@ REGULAR = 1e-4
 """A least singular value (columns of one size) from which on tangents are solved for without looking at all of them."""
 ASIDE = 100.0
 """How many times longer than its part in the direction asked for a tangent may be for that."""
+SHORT = 0.25
+"""rad or sizes: a distance from singular slopes from which on no step is shortened."""
 FARTHEST = 1e3
 """A longer step is that of a singular system, solved once more in the sense of least squares."""
 
@@ -142,11 +146,22 @@ class Curve:
         return float(np.linalg.svd(slope / _sizes(slope), compute_uv=False)[many - 1])
 
     def _clear(self, y: Array, tangent: Array, slope: Array, least: float) -> float:
-        """How far along the curve J keeps its rank: until it has changed by its least singular value (Weyl)."""
+        """How far along the curve J keeps its rank: until it has changed by its least singular value (Weyl).
+
+        Constraints that nearly depend on one another all along keep J near a singular one, but do not bring it nearer.
+        Where Weyl's bound would shorten a step the sharper one is taken, which does not change when constraints are
+        combined: J (I + J^+ E) keeps its rank while the norm of J^+ E is below one. (P. Deuflhard, Newton Methods for
+        Nonlinear Problems, 2004, sec. 2.1: affine covariance.)
+        """
         if len(y) == 1:
             return np.inf
-        change = np.linalg.norm((self.slope(y + NUDGE * tangent) - slope) / _sizes(slope)) / NUDGE
-        return least / max(float(change), 1e-300)
+        sizes = _sizes(slope)
+        change = (self.slope(y + NUDGE * tangent) - slope) / (sizes * NUDGE)
+        clear = least / max(float(np.linalg.norm(change)), 1e-300)
+        if clear >= SHORT or least < NOTHING:
+            return clear
+        turned = np.linalg.lstsq(slope / sizes, change, rcond=0.1 * NOTHING)[0]
+        return max(clear, 1.0 / max(float(np.linalg.norm(turned)), 1e-300))
 
     def corrected(self, y: Array, normal: Array) -> Array | None:
         """The point of the curve near y in the plane through y with this normal; None where Newton finds none."""
@@ -158,7 +173,7 @@ class Curve:
                 break
             before = gap
             y = y + _solved(np.vstack([slope, normal]), np.append(-left, 0.0))
-        return y if before <= 1e-10 else None
+        return y if before <= CLOSED * max(1.0, float(np.max(np.abs(y)))) else None
 
     def polished(self, y: Array, lost: int) -> Array:
         """A position beside a change point, closed to round-off but not moved from one branch to the other.

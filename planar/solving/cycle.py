@@ -8,7 +8,7 @@ from numbers import Integral, Real
 from planar.errors import BadInput
 from planar.mechanism import FARTHEST, Mechanism
 from planar.motion import Motion
-from planar.solving.ranged import Ranged
+from planar.solving.ranged import Progress, Ranged
 from planar.solving.timed import Timed
 
 MOST_STEPS = 10**5
@@ -29,6 +29,7 @@ def cycle(
     branches: Sequence[int] = (),
     duration: float | None = None,
     jerk: bool = False,
+    progress: Progress | None = None,
 ) -> Motion:
     """The motion of the assembly nearest to the sketch while one input runs from `start` to `stop` (rad or m).
 
@@ -52,8 +53,10 @@ def cycle(
     With `jerk` the motion has third rates too (beside a change point, where they come from a polynomial through the
     branch, to about 1e-5 of the greatest). `motion.limits` are the dead points, change points and ends of strokes.
     A motion that ends before `stop` says so in its `outcome` and `reason`; its last row is the dead point itself, where
-    no velocity is determined: rates are NaN there. Raises BadInput for an input or a range that is not there, NoAnswer
-    where there is no position to start from.
+    no velocity is determined: rates are NaN there. One that takes too much work ends as well: more than 5,000 arcs of
+    the curve of positions, and 100 more for each turn of the range. `progress(done, total)` is called while a long
+    range is followed, in rad or m of the input's way. Raises BadInput for an input or a range that is not there,
+    NoAnswer where there is no position to start from.
     """
     if isinstance(steps, bool) or not isinstance(steps, Integral) or not 1 <= steps <= MOST_STEPS:
         raise BadInput("steps", f"a whole number of steps from 1 to {MOST_STEPS} is wanted, not {steps!r:.40}")
@@ -79,5 +82,5 @@ def cycle(
         return Timed(mechanism, branches, jerk).over(int(steps), duration)
     if circuit and (stop is not None or there_and_back):
         raise BadInput("circuit", "a circuit goes all round; it has no end to stop at, and comes back by itself")
-    runner = Ranged(mechanism, pair, branches, jerk)
+    runner = Ranged(mechanism, pair, branches, jerk, progress)
     return runner.round(int(steps), start) if circuit else runner.between(int(steps), start, stop, there_and_back)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import pairwise
+from itertools import chain, pairwise
 from types import MappingProxyType
 from typing import NamedTuple, Protocol
 
@@ -11,21 +11,20 @@ import numpy as np
 
 from planar.errors import Ending, NoAnswer
 from planar.program import Program, length
-from planar.roots import root
 from planar.solving.branch import Branch, cancelling
-from planar.solving.curve import Arc, Curve, Point, Traced
+from planar.solving.curve import Curve, Point, Traced
+from planar.solving.period import Period, Round
+from planar.solving.pieces import Local, Met, Piece, met, onwards, pieces
 from planar.solving.straight import STRAIGHT, Told, course
-from planar.solving.walk import AT, Missed, Passed, Walk
+from planar.solving.walk import Missed, Walk, Work
 
 Array = np.ndarray
 
 CORRECTIONS = 8
-NEARLY = 0.1
-"""A correction longer than this part of an arc has gone astray."""
-RESTING = 1e-7
-"""A rate of the inputs along the curve below this is none: the position is a dead point to rounding."""
-SEAM = 1e-9
-"""rad or sizes: so near to the end of a way a change point is at that end."""
+LEAST_WINDOW = 8
+"""Samples that are tried at once where none has passed before."""
+AHEAD = 1000
+"""Samples that one trip is to come to at most."""
 
 
 class Followed(Traced, Protocol):
@@ -33,23 +32,6 @@ class Followed(Traced, Protocol):
 
     def ends(self, u: Array, tangent: Array, ending: Ending) -> NoAnswer:
         """What to say of a motion that ends at inputs u, towards which it went along a tangent."""
-
-
-class Local(NamedTuple):
-    """Rates where a slope is singular: first, second and third derivative of the unknowns (3, unknowns) by the distance
-    of the inputs along a way; and how much rank the slope lacks at the change point."""
-
-    rates: Array
-    way: Array
-    lost: int
-
-
-class Met(NamedTuple):
-    """A change point on the way: the unknowns and inputs there, what the walk knows of it, and along which way."""
-
-    u: Array
-    passed: Passed
-    way: Array
 
 
 class Run(NamedTuple):
@@ -69,81 +51,56 @@ class Run(NamedTuple):
     told: Told | None = None
 
 
-class Piece(NamedTuple):
-    """A part of an arc on which the inputs go one way: from and to where on its axis, from and to where on the way of
-    the inputs, and the dead point at its end, if one is there."""
-
-    arc: Arc
-    first: float
-    last: float
-    start: float
-    stop: float
-    dead: Point | None
-
-    def holds(self, place: float) -> bool:
-        """Whether the inputs come to a place within this piece."""
-        return min(self.start, self.stop) <= place <= max(self.start, self.stop)
-
-    def at(self, curve: Curve, place: float) -> tuple[Array, Local | None]:
-        """The unknowns where the inputs are at a place, with their rates where the slope is singular."""
-        arc = self.arc
-        if self.dead is not None and place == self.stop:
-            return self.dead.y[:-1], None
-        x = root(lambda x: float(arc.rough(x)[-1]) - place, self.first, self.last)
-        rough = arc.rough(x)
-        rough[-1] = place
-        if arc.exact:
-            return curve.closed(rough, arc.lost)[:-1], Local(derivatives(arc, x), curve.way, arc.lost)
-        ahead = np.zeros_like(rough)
-        ahead[-1] = 1.0
-        y = curve.corrected(rough, ahead)
-        if y is None or np.linalg.norm(y - rough) > NEARLY * abs(self.last - self.first) or not curve.closes(y):
-            y = arc.y(curve, root(lambda x: float(arc.y(curve, x)[-1]) - place, self.first, self.last))
-        return y[:-1], None
-
-
-def pieces(walk: Walk) -> Iterator[Piece]:
-    """A walk's arcs, parted at dead points."""
-    curve = walk.curve
-    if rests(walk.here) and walk.here.bend[-1] < 0.0:
-        here = walk.here
-        yield Piece(Arc(here, here, here.y, here.tangent, 1.0, here.y[None], 1), 0.0, 0.0, 0.0, 0.0, here)
-    for arc in walk.arcs():
-        (first, last), before = arc.ends, arc.before
-        if rests(before) and rests(arc.after) and abs(arc.after.y[-1] - before.y[-1]) < SEAM:
-            yield Piece(arc, first, first, float(before.y[-1]), float(before.y[-1]), before)
-            return  # all else moves on while the inputs rest
-        while True:
-            dead = turning(curve, arc, before, first, last)
-            if dead is None:
-                break
-            at = float(arc.axis @ (dead.y - arc.origin))
-            if before is not arc.before and abs(at - first) <= STRAIGHT:
-                break  # the dead point from which this part starts
-            yield Piece(arc, first, at, float(before.y[-1]), float(dead.y[-1]), dead)
-            first, before = at, dead
-        yield Piece(arc, first, last, float(before.y[-1]), float(arc.after.y[-1]), None)
-
-
 class Trip:
     """Goes along a straight way of the inputs to its first dead point, and tells the unknowns at places in their order.
 
     The way is one in which the fastest input goes one rad or size a unit.
     """
 
-    def __init__(self, solver: Followed, p: Array, z: Array, start: Array, way: Array, branches: Sequence[int] = ()):
+    def __init__(
+        self,
+        solver: Followed,
+        p: Array,
+        z: Array,
+        start: Array,
+        way: Array,
+        branches: Sequence[int] = (),
+        work: Work | None = None,
+    ):
         reach = float(np.max(np.abs(way), initial=0.0)) or 1.0
         self.curve = Curve(solver, p, start, way / reach)
         numbers = list(branches)
-        self.walk = Walk(self.curve, onwards(self.curve, np.append(z, 0.0), numbers), numbers)
+        self.walk = Walk(self.curve, onwards(self.curve, np.append(z, 0.0), numbers), numbers, work)
         self.here = self.walk.here
         self.dead: Point | None = None
-        self._pieces = pieces(self.walk)
+        self._pieces, self._round = pieces(self.walk), Round(self.walk)
         self._piece: Piece | None = None
+        self._period: Period | None = None
+        self._wanted = self._reached = 0.0
 
     def holds(self, place: float) -> bool:
         """Whether a place lies on what has been followed already."""
-        return self._piece is not None and place <= self._piece.stop
+        return self._piece is not None and (place <= self._piece.stop or self._period is not None)
+
+    @property
+    def end(self) -> tuple[Array, Ending]:
+        """The inputs beyond which it does not go, and why."""
+        if self.dead is not None:
+            return self.curve.inputs(self.dead.y), Ending.DEAD_POINT
+        if self.walk.limit is not None and self._wanted < self.walk.limit:
+            return self.curve.inputs(self.here.y), Ending.FAR
+        return self.walk.end
+
+    @property
+    def last(self) -> tuple[Array, Array] | None:
+        """Unknowns and inputs of the last position before that; where a slide goes out without an end, of one well out.
+        None where it has been beyond that already."""
+        here = self.here
+        if self.end[1] is Ending.ENDLESS:
+            here = self.walk.out or here
+            if here.y[-1] <= self._reached:
+                return None
+        return here.y[:-1], self.curve.inputs(here.y)
 
     @property
     def start(self) -> tuple[Array, Local]:
@@ -155,6 +112,7 @@ class Trip:
 
     def to(self, place: float) -> tuple[Array, Local | None] | None:
         """The unknowns so far along the way, with rates where the slope is singular; None if it ends before."""
+        self._wanted = place
         while self._piece is None or not self.holds(place):
             if self.dead is not None:
                 return None
@@ -163,80 +121,15 @@ class Trip:
                 return None
             self.dead = self._piece.dead
             self.here = self.dead or self._piece.arc.after
+            self._period = self._round.after(self._piece)
+        self._reached = place
+        if self._period is not None and place > self._piece.stop:
+            return self._period.at(self.curve, place)
         return self._piece.at(self.curve, place)
 
-
-def met(walk: Walk, last: float = np.inf) -> tuple[Met, ...]:
-    """The change points that a walk has passed up to a place of the inputs on their way."""
-    return tuple(
-        Met(walk.curve.inputs(each.crossing.y), each, walk.curve.way)
-        for each in walk.passed
-        if each.crossing.y[-1] <= last + SEAM
-    )
-
-
-def rests(point: Point) -> bool:
-    """Whether a point is a dead point to rounding."""
-    return abs(point.advance) < RESTING
-
-
-def onwards(curve: Curve, y: Array, branches: list[int]) -> Point:
-    """The point at y, to be left so that the inputs go on.
-
-    At a dead point two ways lead on: the first so that the most moved unknown grows; a number is taken off `branches`.
-    """
-    ahead = np.zeros_like(y)
-    ahead[-1] = 1.0
-    here = curve.at(y, ahead)
-    if rests(here) and here.clear > AT:
-        most = int(np.argmax(np.abs(here.tangent)))
-        second = bool(branches) and branches.pop(0) > 1
-        return here if bool(here.tangent[most] > 0.0) is not second else here.turned()
-    return here
-
-
-def turning(curve: Curve, arc: Arc, before: Point, first: float, last: float) -> Point | None:
-    """The first dead point on an arc between two places on its axis, at which the inputs turn back, if there is one."""
-    g0 = before.advance
-    # of a dead point that was found on the arc rounding may leave more, on a small curve, than is a rest anywhere
-    from_dead = before is not arc.before or rests(before)
-    if from_dead:
-        g0 = RESTING * float(np.sign(before.bend[-1]))
-    sense = float(np.sign(g0))
-    g0, g1 = abs(g0), sense * arc.after.advance
-    if rests(arc.after) and not from_dead and sense * arc.after.bend[-1] < 0.0:
-        # at its very end, whichever sign rounding gives what is left of the rate
-        left = arc.after.advance / abs(float(arc.after.bend[-1]))
-        return arc.after if arc.exact else arc.at(curve, last + sense * left * float(np.sign(last - first)))
-    if g1 > 0.0:
-        # between two points that go on the inputs may have gone back in the meantime
-        s0, s1, gone = sense * before.bend[-1], sense * arc.after.bend[-1], abs(last - first)
-        if s0 >= 0.0 or s1 <= 0.0:
-            return None
-        least, part = min((cubic(g0, s0 * gone, g1, s1 * gone, part), part) for part in np.linspace(0.05, 0.95, 19))
-        x = first + part * (last - first)
-        if least > 0.0 or sense * arc.at(curve, x).advance > 0.0:
-            return None
-        last = x
-    at = root(lambda x: sense * arc.at(curve, x).advance if x != first else g0, first, last)
-    return arc.at(curve, at)
-
-
-def cubic(g0: float, s0: float, g1: float, s1: float, part: float) -> float:
-    """The cubic with these values and slopes at 0 and 1, at a part of the way between."""
-    t = part
-    return (2 * t**3 - 3 * t**2 + 1) * g0 + (t**3 - 2 * t**2 + t) * s0 + (3 * t**2 - 2 * t**3) * g1 + (t**3 - t**2) * s1
-
-
-def derivatives(arc: Arc, x: float) -> Array:
-    """The first three derivatives of the unknowns by the place of the inputs (3, unknowns), on an exact arc."""
-    y1, y2, y3 = (arc.rough(x, order) for order in (1, 2, 3))
-    t1, t2, t3 = y1[-1], y2[-1], y3[-1]
-    # the chain rule, solved for the derivatives of the inverse
-    x1 = 1.0 / t1
-    x2 = -t2 * x1**3
-    x3 = (3.0 * t2**2 / t1 - t3) * x1**4
-    return np.array([y1 * x1, y2 * x1**2 + y1 * x2, y3 * x1**3 + 3.0 * y2 * x1 * x2 + y1 * x3])[:, :-1]
+    def met(self, last: float) -> tuple[Met, ...]:
+        """The change points passed up to a place that it has come to."""
+        return met(self.walk, last) if self._period is None else tuple(self._period.met(self.curve, last))
 
 
 def follow(solver: Followed, p: Array, z: Array, start: Array, stop: Array) -> Array:
@@ -258,7 +151,7 @@ def followed(solver: Followed, p: Array, z: Array, start: Array, stop: Array) ->
     if found is None:
         raise ended(solver, trip)
     local = {} if found[1] is None else {1: found[1]}
-    return Run(np.stack([z, found[0]]), 1, None, None, local, met(trip.walk, reach), tuple(trip.walk.missed))
+    return Run(np.stack([z, found[0]]), 1, None, None, local, trip.met(reach), tuple(trip.walk.missed))
 
 
 def run(
@@ -268,94 +161,140 @@ def run(
     u: Array,
     branches: Sequence[int] = (),
     rates: tuple[Array, Array] | None = None,
+    work: Work | None = None,
 ) -> Run:
     """The unknowns at every sample of a run of inputs u (samples, inputs), from those of the first.
 
     The whole run is one call of the compiled program; every sample then passes both parts of the gate, and from
     one that does not the general path goes on until the compiled program can take over again. With first and second
-    `rates` of the inputs the run tells those of its samples as well, so far as they are surely sound.
+    `rates` of the inputs the run tells those of its samples as well, so far as they are surely sound. What the general
+    path does is counted in `work`.
     """
-    samples = len(u)
+    samples, work = len(u), work or Work()
     found = np.empty((samples, z.size))
     found[0] = z
-    done, general = 1, 0
+    done, general, window = 1, 0, samples
     local: dict[int, Local] = {}
     met_on_way: list[Met] = []
+    told = _Sure(solver, samples) if rates is not None else None
     missed: list[Missed] = []
-    told = _untold(solver, samples) if rates is not None else None
+    trip: Trip | None = None
+    steps: Iterator[tuple[float, float]] = iter(())
+    before = 0
     while done < samples:
-        rest = slice(done - 1, None)
-        sure = course(solver, found[done - 1], u[rest], *(each[rest] for each in rates)) if rates is not None else None
-        if sure is not None and told is not None:
-            through = len(sure.z)
-            if through:
-                # of what is beside a change point more is known than can be read off its slope
-                first = int(done - 1 in local)
-                same = slice(done - 1 + first, done - 1 + through)
-                found[same] = sure.z[first:]
-                told.parts[same], told.sure[same] = sure.parts[first:], True
-                told = told._replace(open=max(told.open, sure.open))
-                done += through - 1
-        elif solver.program.square:
-            found[done:] = solver.program.run(found[done - 1], u[done:], p)
-            passed = _passing(solver, p, found[done - 1 :], u[done - 1 :])
-            found[done : done + passed] = _settled(solver.program, p, found[done : done + passed], u[done:][:passed])
-            done += passed
-        if done == samples:
-            break
-        base = done - 1
-        while base and base in local and (u[done] - u[done - 1]) @ local[base].way < 0.0:
-            base -= 1  # what turns back on a change point comes back by the branch on which it came
-        ahead = np.vstack([u[base], u[done:]])
-        trip, places = _trip(solver, p, found[base], ahead, branches[len(met_on_way) :])
-        before = len(met_on_way)
-        if trip.walk.leaves and base == done - 1:
-            found[base], local[base] = trip.start
-        for place, following in pairwise([*places, np.inf]):
+        first, last = done, min(done + window, samples)
+        done = _at_once(solver, p, (found, u), slice(done - 1, last), rates, told, done - 1 in local)
+        # of what comes after a sample that did not pass no more is tried than has passed before
+        window = max(LEAST_WINDOW, 2 * (done - first))
+        if done > first:
+            steps = iter(())
+        if done == last:
+            continue
+        at_once = next(steps, None)
+        if trip is None or at_once is None:
+            missed += trip.walk.missed if trip is not None else ()
+            base = done - 1
+            while base and base in local and (u[done] - u[done - 1]) @ local[base].way < 0.0:
+                base -= 1  # what turns back on a change point comes back by the branch on which it came
+            ahead = np.vstack([u[base], u[done : done + AHEAD]])
+            trip, places = _trip(solver, p, found[base], ahead, branches[len(met_on_way) :], work)
+            steps, before = pairwise([*places, np.inf]), len(met_on_way)
+            at_once = next(steps)
+            if trip.walk.leaves and base == done - 1:
+                found[base], local[base] = trip.start
+        for place, following in chain([at_once], steps):
             at = trip.to(place)
-            met_on_way[before:] = met(trip.walk, place)
             if at is None:
-                missed += trip.walk.missed
-                last = trip.here.y[:-1], trip.curve.inputs(trip.here.y)
+                met_on_way[before:] = trip.met(place)
+                known = told and told.of(done)
                 stopped = ended(solver, trip)
-                known = told and told.cut(slice(done))
-                return Run(found[:done], general, stopped, last, local, tuple(met_on_way), tuple(missed), known)
+                return Run(
+                    found[:done],
+                    general,
+                    stopped,
+                    trip.last,
+                    local,
+                    tuple(met_on_way),
+                    (*missed, *trip.walk.missed),
+                    known,
+                )
             found[done] = at[0]
             if at[1] is not None:
                 local[done] = at[1]
             done, general = done + 1, general + 1
             if at[1] is None and not trip.holds(following):
                 break
-        missed += trip.walk.missed
-    return Run(found, general, None, None, local, tuple(met_on_way), tuple(missed), told)
+        met_on_way[before:] = trip.met(place)
+    missed += trip.walk.missed if trip is not None else ()
+    return Run(found, general, None, None, local, tuple(met_on_way), tuple(missed), told and told.of(samples))
 
 
-def _untold(solver: Followed, samples: int) -> Told:
-    many = len(solver.program.equations.coordinates)
-    return Told(np.empty((samples, 3, many)), np.zeros(samples, dtype=bool), 0.0)
+class _Sure:
+    """What a run tells of its samples so far."""
+
+    def __init__(self, solver: Followed, samples: int):
+        many = len(solver.program.equations.coordinates)
+        self.parts, self.sure, self.open = np.empty((samples, 3, many)), np.zeros(samples, dtype=bool), 0.0
+
+    def of(self, samples: int) -> Told:
+        """Of its first samples."""
+        return Told(self.parts[:samples], self.sure[:samples], self.open)
 
 
-def _trip(solver: Followed, p: Array, z: Array, u: Array, branches: Sequence[int]) -> tuple[Trip, list[float]]:
+def _at_once(
+    solver: Followed,
+    p: Array,
+    samples: tuple[Array, Array],
+    rest: slice,
+    rates: tuple[Array, Array] | None,
+    told: _Sure | None,
+    beside: bool,
+) -> int:
+    """Fill in unknowns of the samples after the first of the `rest` in one call, as far as they pass both parts of the
+    gate; how many are known then. Of a first one `beside` a change point more is known than can be read off its slope.
+    """
+    (found, u), first = samples, rest.start
+    sure = course(solver, found[first], u[rest], *(each[rest] for each in rates)) if rates is not None else None
+    if sure is not None and told is not None:
+        through = len(sure.z)
+        if not through:
+            return first + 1
+        same = slice(first + beside, first + through)
+        found[same] = sure.z[beside:]
+        told.parts[same], told.sure[same] = sure.parts[beside:], True
+        told.open = max(told.open, sure.open)
+        return first + through
+    if not solver.program.square:
+        return first + 1
+    after = slice(first + 1, rest.stop)
+    found[after] = solver.program.run(found[first], u[after], p)
+    after = slice(first + 1, first + 1 + _passing(solver, p, found[rest], u[rest]))
+    found[after] = _settled(solver.program, p, found[after], u[after])
+    return after.stop
+
+
+def _trip(
+    solver: Followed, p: Array, z: Array, u: Array, branches: Sequence[int], work: Work
+) -> tuple[Trip, list[float]]:
     """A trip from the first of these inputs towards the next, and the places of those that lie on the same way."""
     away = np.max(np.abs(u - u[0]), axis=1, initial=0.0)
     way = u[int(np.argmax(away > 0.0))] - u[0]
     reach = float(np.max(np.abs(way), initial=0.0))
     if reach == 0.0:
-        return Trip(solver, p, z, u[0], way), [0.0]
+        return Trip(solver, p, z, u[0], way, (), work), [0.0]
     axis = way / reach
     gone = (u[1:] - u[0]) @ axis / float(axis @ axis)
     aside = np.max(np.abs(u[1:] - u[0] - gone[:, None] * axis), axis=1) > STRAIGHT
     back = np.diff(gone, prepend=0.0) < 0.0
     off = aside | back
     many = int(np.argmax(off)) if off.any() else len(gone)
-    return Trip(solver, p, z, u[0], way, branches), gone[:many].tolist()
+    return Trip(solver, p, z, u[0], way, branches, work), gone[:many].tolist()
 
 
 def ended(solver: Followed, trip: Trip) -> NoAnswer:
     """Why a trip goes no further."""
-    here = trip.here
-    ending = Ending.ENDLESS if trip.walk.endless else Ending.LOST if trip.dead is None else Ending.DEAD_POINT
-    return solver.ends(trip.curve.inputs(here.y), here.tangent, ending)
+    u, ending = trip.end
+    return solver.ends(u, trip.here.tangent, ending)
 
 
 def _passing(solver: Followed, p: Array, z: Array, u: Array) -> int:

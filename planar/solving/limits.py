@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
 
 from planar.algebra import Jet, orders
+from planar.errors import Ending
 from planar.pairs import Kind, Pair
 from planar.program import placed
 from planar.results import Limit
 from planar.roots import root
 from planar.solving.curve import Curve, Point
-from planar.solving.follow import SEAM, Piece, cubic, met, rests
 from planar.solving.passing import crossed
+from planar.solving.period import Round
+from planar.solving.pieces import SEAM, Met, Piece, cubic, met, pieces, rests
 from planar.solving.setup import Setup
 from planar.solving.walk import Walk
 
@@ -85,24 +88,74 @@ def outputs(setup: Setup) -> Outputs:
 
 
 def until(parts: Iterable[Piece], last: float) -> Iterator[Piece]:
-    """The pieces of a curve up to a place of the inputs on their way, or to the dead point before it."""
+    """The pieces of a curve up to a place of the inputs on their way, or to the dead point before it.
+
+    A dead point at the very place, to rounding, is not left out.
+    """
     for piece in parts:
         ends = piece.dead is not None and piece.first != piece.last
-        if ends or piece.stop < last - SEAM:
+        if piece.stop <= last + SEAM and not (piece.dead is None and piece.start >= last):
             yield piece
             if ends:
                 return
             continue
-        x = root(lambda x, arc=piece.arc: float(arc.rough(x)[-1]) - last, piece.first, piece.last)
-        yield piece._replace(last=x, stop=last, dead=None)
+        if piece.start < last:
+            x = root(lambda x, arc=piece.arc: float(arc.rough(x)[-1]) - last, piece.first, piece.last)
+            yield piece._replace(last=x, stop=last, dead=None)
         return
 
 
 class Found(NamedTuple):
-    """A limit, and the point of the curve where it is."""
+    """A limit, the point of the curve where it is, and what is known of a change point that is passed there."""
 
     limit: Limit
     point: Point
+    passed: Met | None = None
+
+    def turned(self, way: float) -> Found:
+        """The same, its point on the curve along which the input goes the other way, if that is -1."""
+        y = np.append(self.point.y[:-1], way * self.point.y[-1])
+        return self._replace(point=self.point._replace(y=y))
+
+
+def over(setup: Setup, pair: str, start: float, way: float, walk: Walk, last: float) -> Iterator[Found]:
+    """What a walk meets up to a place of the input on its way; see `along`.
+
+    Of a walk that comes back after some turns of the input what it meets in these is told for all.
+    """
+    known: list[Piece] = []
+    begin = walk.here
+    parts, whole, period = pieces(walk), Round(walk), None
+    for piece in parts:
+        known.append(piece)
+        period = whole.after(piece)
+        if period is not None or piece.dead is not None or piece.stop > last:
+            break
+    if period is None or last < period.length:
+        yield from along(setup, pair, start, way, walk, until(chain(known, parts), last), last, begin)
+        return
+    once = list(along(setup, pair, start, way, walk, period.pieces, period.length))
+    watched, scale = outputs(setup), setup.unit if setup.slides(pair) else 1.0
+    index = {output.name: k for k, output in enumerate(watched.pairs)}
+
+    def grows(limit: Limit, point: Point) -> float:
+        """By how much an output that turns with the input is farther on each time."""
+        if limit.of not in index:
+            return way * period.length * scale
+        return (
+            float(watched.along(walk.curve, point._replace(y=point.y + period.turns))[index[limit.of], 0]) - limit.value
+        )
+
+    grown = [grows(limit, point) for limit, point, _ in once]
+    many, turns = int((last + SEAM) / period.length) + 1, period.turns
+    for times in range(many):
+        for (limit, point, passed), by in zip(once, grown, strict=True):
+            there = point._replace(y=point.y + times * turns)
+            if there.y[-1] > last + SEAM:
+                continue
+            place = (start + way * float(there.y[-1])) * scale
+            told = limit.told if passed is None else crossed(setup, passed._replace(u=walk.curve.inputs(there.y)))
+            yield Found(limit._replace(input=place, value=limit.value + times * by, told=told), there, passed)
 
 
 def limits(setup: Setup, pair: str, curve: Curve, found: Iterable[Found]) -> tuple[Limit, ...]:
@@ -123,25 +176,33 @@ def _same(one: Found, other: Found) -> bool:
 
 
 def along(
-    setup: Setup, pair: str, start: float, way: float, walk: Walk, parts: Iterable[Piece], last: float = np.inf
+    setup: Setup,
+    pair: str,
+    start: float,
+    way: float,
+    walk: Walk,
+    parts: Iterable[Piece],
+    last: float = np.inf,
+    begin: Point | None = None,
 ) -> Iterator[Found]:
     """What a walk meets on which the input at `pair` runs from `start` one way (1) or the other.
 
-    `parts` are its pieces, up to a place of the input on that way or all round a circuit.
+    `parts` are its pieces, up to a place of the input on that way or all round a circuit; `begin` is where they begin,
+    if that may be a dead point.
     """
     curve, watched = walk.curve, outputs(setup)
     unit = setup.unit if setup.slides(pair) else 1.0
     passed = 0
 
-    def noted(kind: str, of: str, point: Point, value: float | None = None, told: str = "") -> Found:
+    def noted(
+        kind: str, of: str, point: Point, value: float | None = None, told: str = "", through: Met | None = None
+    ) -> Found:
         place = (start + way * float(point.y[-1])) * unit
-        return Found(Limit(kind, of, place, place if value is None else value, None, told), point)
+        return Found(Limit(kind, of, place, place if value is None else value, None, told), point, through)
 
-    if rests(walk.here):
-        yield noted("input dead point", pair, walk.here)
+    if begin is not None and rests(begin):
+        yield noted("input dead point", pair, begin)
     before: _End | None = None
-    if rests(walk.here):
-        yield noted("input dead point", pair, walk.here)
     for piece in parts:
         arc = piece.arc
         if before is None or arc.exact:
@@ -157,11 +218,14 @@ def along(
         for each in met(walk, last)[passed:]:
             if not (each.passed.starts or np.array_equal(each.passed.crossing.y, arc.after.y)):
                 break  # farther on: a walk that has gone its whole way knows them all
-            yield noted("change point", pair, each.passed.crossing.ways[0], None, crossed(setup, each))
+            yield noted("change point", pair, each.passed.crossing.ways[0], None, crossed(setup, each), each)
             passed += 1
         if piece.dead is not None and piece.first != piece.last:
             yield noted("input dead point", pair, piece.dead)
         before = after
+    if walk.ending is Ending.SPENT:
+        told = "what lies beyond was not followed: it takes more work than one answer may; name a nearer range"
+        yield noted("not followed further", pair, walk.here, None, told)
 
 
 def _turns(
@@ -208,7 +272,9 @@ def _named(setup: Setup, watched: Outputs, curve: Curve, pair: str, found: list[
     for output in watched.pairs:
         if output.drive_kind is not Kind.LENGTH or frame not in output.links:
             continue
-        of = [(limit.value, point) for limit, point in found if limit.kind == "stroke end" and limit.of == output.name]
+        of = [
+            (limit.value, point) for limit, point, _ in found if limit.kind == "stroke end" and limit.of == output.name
+        ]
         if len(of) < 2:
             continue
         (low, at_low), (high, at_high) = min(of, key=lambda each: each[0]), max(of, key=lambda each: each[0])
@@ -219,7 +285,7 @@ def _named(setup: Setup, watched: Outputs, curve: Curve, pair: str, found: list[
             distances = [watched.distance(curve, point, output, pins[0]) for point in (at_low, at_high)]
             far = distances[1] >= distances[0] - SAME * setup.unit
         ends[output.name] = (low, high, far)
-    for limit, _ in found:
+    for limit, _, _ in found:
         if limit.kind != "stroke end" or limit.of not in ends:
             yield limit
             continue

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from planar.solving.follow import Met
+from planar.solving.pieces import Met
 from planar.solving.setup import Setup
 from planar.solving.walk import Missed
 from planar.words import listed, many
 
 NEARBY = 1e-2
 """rad or sizes: a change point of a neighbouring linkage that is farther away is not worth a word."""
+MOST = 12
+"""Change points that are told one by one."""
 
 
 def on_the_way(setup: Setup, met: Sequence[Met], missed: Sequence[Missed]) -> tuple[str, ...]:
@@ -24,6 +26,8 @@ def on_the_way(setup: Setup, met: Sequence[Met], missed: Sequence[Missed]) -> tu
                 f"the motion comes within {each.distance:.1g} (rad, or lengths of the mechanism's size) of a change "
                 f"point of a linkage that differs from this one by {each.open * setup.unit:.1g} m"
             ] = None
+    if len(told) > MOST:
+        return (*list(told)[:MOST], f"and so on at {many(len(told) - MOST, 'more place')}; see the motion's limits")
     return tuple(told)
 
 

@@ -58,13 +58,16 @@ def solve(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = 
     z = known.ways.to(there.station.u) if there.unit == here.unit else None
     if z is not None:
         return there.state(z, known.remarks)
-    way = followed(there, there.station.p, found.z, here.station.u, there.station.u)
+    # in the lengths of the size here: without a link's length a farther input makes the size greater
+    scale = np.where(here.outline.slide, there.unit / here.unit, 1.0)
+    way = followed(here, here.station.p, found.z, here.station.u, there.station.u * scale)
     told = known.remarks
     if way.met or way.missed:
         from planar.solving.passing import on_the_way
 
-        told = (*told, *on_the_way(there, way.met, way.missed))
-    return there.state(way.z[-1], told)
+        told = (*told, *on_the_way(here, way.met, way.missed))
+    by = (here.scale / there.scale)[list(here.equations.unknowns)]
+    return there.state(way.z[-1] * by, told)
 
 
 class Solver(Setup):

@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from math import ceil, pi
 from typing import NamedTuple
 
 import numpy as np
 
-from planar.errors import BadInput, NoAnswer, Outcome
+from planar.errors import BadInput, Ending, NoAnswer, Outcome
 from planar.mechanism import Drive, Mechanism, running_input, with_inputs
 from planar.motion import Motion
 from planar.results import Limit
-from planar.solving import limits
+from planar.solving import limits, refusals
 from planar.solving.circuit import Circuit, circuit
 from planar.solving.curve import Curve
-from planar.solving.follow import Local, Run, Trip, ended, follow, met, onwards, pieces, run
+from planar.solving.follow import Run, Trip, follow, run
+from planar.solving.freedom import moved_by
+from planar.solving.pieces import Local, met, onwards
 from planar.solving.position import known_of
 from planar.solving.rates import Given
 from planar.solving.rows import Rows, joined, motion, reversed_, rows, shortened, spliced
 from planar.solving.straight import Told, course
-from planar.solving.walk import ENDLESS, Missed, Walk
+from planar.solving.walk import ARCS, OUT, Missed, Walk, Work
 from planar.words import listed
 
 Array = np.ndarray
@@ -29,23 +31,40 @@ SEAM = 1e-9
 """Parts of a step: what rounding leaves of one."""
 LEAST = 1e-5
 """rad or sizes: a range shorter than this is none."""
+ARCS_PER_TURN = 100
+"""Arcs by which what may be spent grows with each turn that is asked for."""
+MOST = 1e5
+"""rad or sizes of the input's way beyond which it grows no more."""
+
+Progress = Callable[[float, float], None]
 
 
 class _End(NamedTuple):
-    """An end of a range: the unknowns and the position there, and whether it is a dead point, or the input goes on."""
+    """An end of a range: the unknowns and the position at its last row, why it ends, None where the input goes on; the
+    inputs beyond which it does not go, and the links that move there."""
 
     z: Array
     position: float
-    dead: bool
-    open: bool
-    problem: NoAnswer | None = None
+    ending: Ending | None
+    limit: Array
+    links: tuple[str, ...] = ()
     missed: tuple[Missed, ...] = ()
 
 
 class Ranged:
-    """One input of a mechanism that runs while the others stand still."""
+    """One input of a mechanism that runs while the others stand still.
 
-    def __init__(self, mechanism: Mechanism, pair: str | None, branches: Sequence[int], third: bool):
+    `progress(done, total)` is called now and then, in rad or m of the input's way.
+    """
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        pair: str | None,
+        branches: Sequence[int],
+        third: bool,
+        progress: Progress | None = None,
+    ):
         names = [given.pair for given in mechanism.inputs]
         self.index = running_input(mechanism, pair)
         still = tuple(Drive(name, None, 0.0, 0.0) for k, name in enumerate(names) if k != self.index)
@@ -57,6 +76,8 @@ class Ranged:
         self.u, self.p = self.solver.station.u, self.solver.station.p
         self.branches, self.third = tuple(branches), third
         self.found = self.known.assembly
+        self.progress = progress
+        self.work = self.budget(0.0)
 
     def between(self, steps: int, start: float | None, stop: float | None, back: bool) -> Motion:
         """The run over a range, or over the one that the input has by itself; and back again if wanted."""
@@ -73,13 +94,15 @@ class Ranged:
         if found.stopped is not None:
             return self._told(self._stopped(found, self._given(grid)), back)
         whole = found._replace(z=np.vstack([found.z, end.z]), told=found.told and found.told.padded(0, 1))
-        return self._told(self._limited(rows(whole, self._given(grid), (steps,)), (end,)), back)
+        dead = (steps,) if end.ending is Ending.DEAD_POINT else ()
+        return self._told(self._limited(rows(whole, self._given(grid), dead), (end,)), back)
 
     def round(self, steps: int, start: float | None) -> Motion:
         """The whole circuit of the assembly, through its dead points, back to where it starts."""
         here = float(self.u[self.index])
         first = here if start is None else start / self.scale
-        walk = self.walk(follow(self.solver, self.p, self.found.z, self.u, self._at(first)), first)
+        work = self.budget(0.0)
+        walk = self.walk(follow(self.solver, self.p, self.found.z, self.u, self._at(first)), first, work=work)
         if walk.here.clear < LEAST and not walk.leaves:
             told = "branches of the motion cross where the circuit would start; choose one by branches, or start it"
             raise BadInput("start", told + " elsewhere")
@@ -112,6 +135,7 @@ class Ranged:
     def _run(self, steps: int, first: float, last: float) -> Rows:
         grid = np.linspace(first, last, steps + 1)
         given = self._given(grid)
+        self.work = self.budget(abs(last - first) + abs(first - float(self.u[self.index])), first)
         found = self._through(grid)
         return rows(found, given) if found.stopped is None else self._stopped(found, given)
 
@@ -146,7 +170,7 @@ class Ranged:
         here = self.u[self.index]
         given = self._given(np.append(here, grid))
         rates = None if self.third else (given.u1, given.u2)
-        return run(self.solver, self.p, self.found.z, given.u, self.branches, rates)
+        return run(self.solver, self.p, self.found.z, given.u, self.branches, rates, self.work)
 
     def _whole(self, steps: int, here: float) -> Rows:
         """One turn on where the input makes it, else all between its limits."""
@@ -174,7 +198,7 @@ class Ranged:
         local = {row + 1: each for row, each in found.local.items()}
         told = found.told and found.told.padded(1, 1)
         whole = found._replace(z=np.vstack([low.z, found.z, high.z]), local=local, told=told)
-        dead = tuple(index for index, end in ((0, low), (steps, high)) if end.dead)
+        dead = tuple(index for index, end in ((0, low), (steps, high)) if end.ending is Ending.DEAD_POINT)
         return self._limited(rows(whole, self._given(grid), dead), (low, high))
 
     def _turn(self, steps: int, here: float) -> Rows | _End | None:
@@ -185,24 +209,32 @@ class Ranged:
             return Rows(sure.z, given, told=Told(sure.parts, np.ones(steps + 1, dtype=bool), sure.open))
         if sure is not None and len(sure.z) <= steps:
             end = self._end(self.found.z, here, 1.0)  # walking tells it sooner than a run would
-            if not end.open:
+            if end.ending is not None:
                 return end
         found = self._run(steps, here, here + 2.0 * pi)
         return found if found.outcome is Outcome.SOLVED else None
 
     def _limited(self, found: Rows, ends: tuple[_End, ...]) -> Rows:
-        """Rows of a range that ends by itself, with what there is to say of it."""
-        for end in ends:
-            if end.problem is not None:
-                found = found.stopped(end.problem)
+        """Rows of a range that ends by itself, with what there is to say of its ends."""
         if found.outcome is not Outcome.SOLVED:
             return found
-        told = listed([self.solver.told(self.pair, end.position) for end in ends if end.dead])
+        reasons = []
+        for ending in dict.fromkeys(end.ending for end in ends):
+            alike = [end for end in ends if end.ending is ending]
+            where = listed([self.solver.told(self.pair, float(end.limit[self.index])) for end in alike])
+            if ending is Ending.DEAD_POINT:
+                reasons.append(f"the range of {self.pair!r} ends at {where}")
+            elif ending is not None:
+                links = list(dict.fromkeys(link for end in alike for link in end.links))
+                problem = refusals.ended(self.solver, links, where, ending)
+                found = found.stopped(problem)
+                reasons.append(problem.reason)
+            if ending is Ending.ENDLESS:
+                last = listed([self.solver.told(self.pair, end.position) for end in alike])
+                reasons.append(f"the rows go as far as {last}")
         dead = tuple(row % len(found.z) for row in found.dead)
         missed = (*found.missed, *(each for end in ends for each in end.missed))
-        return found._replace(
-            dead=dead, missed=missed, reason=f"the range of {self.pair!r} ends at {told}" if told else ""
-        )
+        return found._replace(dead=dead, missed=missed, reason="; ".join(reasons))
 
     def _stopped(self, found: Run, given: Given) -> Rows:
         """A run that did not come to its end, with a last row where it stopped."""
@@ -234,30 +266,41 @@ class Ranged:
         inputs[..., self.index] = positions
         return inputs
 
-    def walk(self, z: Array, first: float, way: float = 1.0, towards: Array | None = None) -> Walk:
-        """A walk from a position of the input, in the direction in which it goes on, or towards other unknowns."""
+    def budget(self, reach: float, first: float | None = None) -> Work:
+        """What may be spent on so long a way of the input; who asked is told how far from `first` it has come."""
+        tell = None
+        if self.progress is not None and first is not None:
+            inform, total = self.progress, reach * self.scale
+
+            def tell(u: Array) -> None:
+                inform(min(abs(float(u[self.index]) - first) * self.scale, total), total)
+
+        return Work(ARCS + int(ARCS_PER_TURN * min(reach, MOST) / (2.0 * pi)), tell)
+
+    def walk(self, z: Array, first: float, way: float = 1.0, work: Work | None = None) -> Walk:
+        """A walk from a position of the input, in the direction in which it goes on."""
         axis = np.zeros_like(self.u)
         axis[self.index] = way
         curve = Curve(self.solver, self.p, self._at(first), axis)
         numbers = list(self.branches)
         y = np.append(z, 0.0)
-        start = onwards(curve, y, numbers) if towards is None else curve.at(y, towards)
-        return Walk(curve, start, numbers)
+        return Walk(curve, onwards(curve, y, numbers), numbers, work)
 
     def _end(self, z: Array, here: float, sign: float) -> _End:
         """Where the range of the input ends, one way from a position with unknowns z."""
-        far = ENDLESS if self.slides else 2.0 * pi
-        trip = Trip(self.solver, self.p, z, self._at(here), self._at(here + sign) - self._at(here), self.branches)
+        far = OUT if self.slides else 2.0 * pi
+        start = self._at(here)
+        trip = Trip(self.solver, self.p, z, start, self._at(here + sign) - start, self.branches, self.budget(0.0))
         found = trip.to(far)
         if found is not None:
             if self.slides:
                 told = "the slide goes on without a limit; name where the range starts and stops"
                 raise BadInput(self.pair, told)
-            return _End(found[0], here + sign * far, False, True)
-        y = trip.here.y
-        problem = None if trip.dead is not None else ended(self.solver, trip)
-        missed = tuple(trip.walk.missed)
-        return _End(y[:-1], here + sign * float(y[-1]), trip.dead is not None, False, problem, missed)
+            return _End(found[0], here + sign * far, None, self._at(here + sign * far))
+        limit, ending = trip.end
+        last, u = trip.last or (z, start)
+        links = tuple(moved_by(self.solver, trip.here.tangent[:-1]))
+        return _End(last, float(u[self.index]), ending, limit, links, tuple(trip.walk.missed))
 
 
 class _Course:
@@ -282,19 +325,23 @@ class _Course:
         back = self._turns_back(u)
         first, last = float(u[0]), float(u[(len(u) - 1) // 2 if back else -1])
         here, sense = float(ranged.u[ranged.index]), 1.0 if last >= first else -1.0
-        down = list(self._along(here, first, -sense)) if sense * first < sense * here else []
-        walk = ranged.walk(ranged.found.z, here, sense)
-        up = list(self._along(here, last, sense, walk)) if sense * last > sense * here else []
+        down = self._over(here, first, -sense)
+        up = self._over(here, last, sense)
         low, high = sorted((first * ranged.scale, last * ranged.scale))
         room = SEAM * ranged.scale
         told = [each for each in (*down[::-1], *up) if low - room <= each.limit.input <= high + room]
-        return limits.limits(ranged.solver, ranged.pair, walk.curve, told)
+        curve = ranged.walk(ranged.found.z, here).curve
+        return limits.limits(ranged.solver, ranged.pair, curve, told)
 
     def _turns_back(self, u: Array) -> bool:
         return len(u) > 2 and u[0] == u[-1] and u[1] == u[-2]
 
-    def _along(self, here: float, last: float, way: float, walk: Walk | None = None) -> Iterator[limits.Found]:
-        """What is met from the file's own position to another."""
-        ranged, far = self.ranged, abs(last - here)
-        walk = walk or ranged.walk(ranged.found.z, here, way)
-        return limits.along(ranged.solver, ranged.pair, here, way, walk, limits.until(pieces(walk), far), far)
+    def _over(self, here: float, last: float, way: float) -> list[limits.Found]:
+        """What is met from the file's own position to another, if that lies that way."""
+        ranged, far = self.ranged, way * (last - here)
+        if far <= 0.0:
+            return []
+        walk = ranged.walk(ranged.found.z, here, way, work=ranged.budget(far, here))
+        met_there = limits.over(ranged.solver, ranged.pair, here, way, walk, far)
+        # all with the input on its way up, whichever way it was followed
+        return [each.turned(way) for each in met_there]

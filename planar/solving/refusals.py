@@ -169,11 +169,24 @@ def ended(setup: Setup, links: Sequence[str], where: str, ending: Ending) -> NoA
             f"{_inputs(setup)} cannot go beyond {where}: towards there {_links(links)} slide out without an end, as "
             f"where lines become parallel; stop short of it, or drive {_pairs_of(setup, links, 4)}",
         )
+    drive = _pairs_of(setup, links, 4)
+    if ending is Ending.FAR:
+        return NoAnswer(
+            Outcome.BRANCH_LOST,
+            f"this assembly can be followed only to {where}: there {_links(links)} are out by millions of times the "
+            f"mechanism's size; stop short of it, or drive {drive}",
+        )
+    if ending is Ending.SPENT:
+        return NoAnswer(
+            Outcome.BRANCH_LOST,
+            f"this assembly was followed as far as {where}, which took all the work that one answer may; stop there "
+            f"and go on from there, divide the range into more steps, or drive {drive}",
+        )
     meet = f"motions of {_links(links)} meet" if links else "motions meet"
     return NoAnswer(
         Outcome.BRANCH_LOST,
         f"this assembly can be followed only to {where}: there {meet} that cannot be told apart; stop short of it, or "
-        f"drive {_pairs_of(setup, links, 4)}",
+        f"drive {drive}",
     )
 
 
@@ -215,7 +228,7 @@ def not_assembled(setup: Setup, failure: Failure) -> NoAnswer:
         Outcome.CANNOT_BE_ASSEMBLED,
         f"{setup.at()} {links} cannot be joined: at the nearest, pair {pair!r} stays open by "
         f"{amount(gaps[pair] * by, what, setup.mechanism.units)}; "
-        f"{remedy(setup, failure) or f'change the input or a dimension of {links}'}",
+        f"{remedy(setup, failure, f'change the input or a dimension of {links}')}",
     )
 
 

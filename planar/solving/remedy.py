@@ -16,7 +16,7 @@ from planar.mechanism import Drive, Mechanism, with_inputs
 from planar.program import fitted, shapes
 from planar.shapes import Unplaced
 from planar.solving.assemble import Assembly, Failure, search
-from planar.solving.candidates import Candidates, closing_of
+from planar.solving.candidates import Candidate, Candidates, closing_of
 from planar.solving.newton import newton, polished
 from planar.solving.setup import Setup
 from planar.units import unit
@@ -47,6 +47,39 @@ FLAT = 1e-3
 PROVED = 4
 """Changes, the least first, that are tried by assembling the whole."""
 DIGITS, ALL_DIGITS = 5, 15
+LEAST_EFFORT = 200
+"""Groups that may be solved in search of a remedy though that of an assembly took fewer."""
+MOVED = 0.1
+"""What it takes to move a group on from where it was, for one of solving it from a sketch."""
+
+
+class Spent(Exception):
+    """More groups would have to be solved than may be."""
+
+
+class Effort:
+    """How many groups may yet be solved."""
+
+    def __init__(self, groups: float):
+        self.left = groups
+
+    def spend(self, groups: float) -> None:
+        """Count groups. Raises Spent where there are none left."""
+        self.left -= groups
+        if self.left < 0.0:
+            raise Spent
+
+
+class _Counted(Candidates):
+    """Candidates for which effort is spent."""
+
+    def __init__(self, setup: Setup, effort: Effort):
+        super().__init__(setup)
+        self._effort = effort
+
+    def of(self, stage: Stage, z: Array, every: bool = False) -> tuple[list[Candidate], Array]:
+        self._effort.spend(1.0)
+        return super().of(stage, z, every)
 
 
 class Change(NamedTuple):
@@ -74,26 +107,37 @@ class _Number:
     changed: Callable[[float], Mechanism]
 
 
-def remedy(setup: Setup, failure: Failure) -> str | None:
-    """A clause that says which dimension to make how long, or where to move an input; None where nothing was found.
+def remedy(setup: Setup, failure: Failure, otherwise: str) -> str:
+    """A clause that says which dimension to make how long, or where to move an input; `otherwise` where there is none.
 
-    A change is offered only after the mechanism with it, rounded as it is printed, has been assembled.
+    A change is offered only after the mechanism with it, rounded as it is printed, has been assembled. No more is spent
+    on it than on the search for an assembly; where that did not do it is said.
     """
+    effort = Effort(max(LEAST_EFFORT, failure.groups))
     beside = (link for name in failure.stage.pairs for link in setup.pairs[name].bodies)
     links = frozenset((*failure.stage.links, *beside))
-    told = [
-        f"with {each.name} = {each.shown} instead of {amount(each.was, each.kind, setup.mechanism.units)}"
-        for each in islice(mending(setup, failure, links), 1)
-    ]
-    told += [f"at {each.name} = {each.shown}" for each in islice(moving(setup, failure), 1)]
-    return f"it would go together {', or '.join(told)}" if told else None
+    told, cut = [], False
+    try:
+        for change in islice(moving(setup, failure, effort=effort), 1):
+            told.append(f"at {change.name} = {change.shown}")
+        for change in islice(mending(setup, failure, links, effort=effort), 1):
+            was = amount(change.was, change.kind, setup.mechanism.units)
+            told.insert(0, f"with {change.name} = {change.shown} instead of {was}")
+    except Spent:
+        cut = True
+    if told:
+        return f"it would go together {', or '.join(told)}"
+    return f"{otherwise} (which, was looked for only as long as for an assembly)" if cut else otherwise
 
 
-def mending(setup: Setup, failure: Failure, links: frozenset[str], thorough: bool = False) -> Iterator[Change]:
+def mending(
+    setup: Setup, failure: Failure, links: frozenset[str], thorough: bool = False, effort: Effort | None = None
+) -> Iterator[Change]:
     """Changes of one dimension of these links each that let the whole go together, the least first.
 
     Each is the least with which the assembly goes together that comes nearest without it; only a `thorough` search
-    looks whether another does with less, and tries all changes on the whole.
+    looks whether another does with less, and tries all changes on the whole. Raises Spent where there is an end to the
+    `effort`.
     """
     mechanism = setup.mechanism
     return _least_first(
@@ -111,11 +155,16 @@ def mending(setup: Setup, failure: Failure, links: frozenset[str], thorough: boo
             for each in islice(dimensions(mechanism, links), MOST)
         ],
         thorough,
+        effort or Effort(np.inf),
     )
 
 
 def moving(
-    setup: Setup, failure: Failure, inputs: Collection[str] | None = None, thorough: bool = False
+    setup: Setup,
+    failure: Failure,
+    inputs: Collection[str] | None = None,
+    thorough: bool = False,
+    effort: Effort | None = None,
 ) -> Iterator[Change]:
     """Positions of one input each, of these or of all, at which the whole goes together: as `mending`."""
     mechanism = setup.mechanism
@@ -135,15 +184,18 @@ def moving(
             if inputs is None or given.pair in inputs
         ],
         thorough,
+        effort or Effort(np.inf),
     )
 
 
-def _least_first(setup: Setup, failure: Failure, numbers: list[_Number], thorough: bool) -> Iterator[Change]:
+def _least_first(
+    setup: Setup, failure: Failure, numbers: list[_Number], thorough: bool, effort: Effort
+) -> Iterator[Change]:
     found = []
     for number in numbers:
-        value = _closing_value(setup, failure, number)
+        value = _closing_value(setup, failure, number, effort)
         if value is not None:
-            value = _with_less(number, value) if thorough else value
+            value = _with_less(number, value, effort) if thorough else value
             found.append((abs(value - number.was) / number.size, number, value))
     # of changes that are as small, that of a link's length
     found.sort(key=lambda each: (round(each[0], 6), not each[1].name.endswith(".length")))
@@ -155,23 +207,23 @@ def _least_first(setup: Setup, failure: Failure, numbers: list[_Number], thoroug
         # first a little beyond, where it goes together with ease; what is held twice needs the very value
         for shown in (f"{_rounded(near, value > number.was):.6g}", f"{near:.{DIGITS}g}", f"{near:.{ALL_DIGITS}g}"):
             there = by.to_si(float(shown))
-            if goes_together(number.changed(there)):
+            if goes_together(number.changed(there), effort):
                 yield Change(number.name, number.kind, number.was, there, f"{shown} {name}")
                 break
 
 
-def _with_less(number: _Number, value: float) -> float:
+def _with_less(number: _Number, value: float, effort: Effort) -> float:
     """A value at which another assembly just goes together, if less of the change will do for that."""
     open_, closed = number.was, number.was + LESS * (value - number.was)
-    if not goes_together(number.changed(closed)):
+    if not goes_together(number.changed(closed), effort):
         return value
     while abs(closed - open_) > ROUNDED * number.size:
         tried = 0.5 * (open_ + closed)
-        open_, closed = (open_, tried) if goes_together(number.changed(tried)) else (tried, closed)
+        open_, closed = (open_, tried) if goes_together(number.changed(tried), effort) else (tried, closed)
     return closed
 
 
-def _closing_value(setup: Setup, failure: Failure, number: _Number) -> float | None:
+def _closing_value(setup: Setup, failure: Failure, number: _Number, effort: Effort) -> float | None:
     """The value (m or rad) of a number at which what stays open just closes; None where there is none.
 
     What stays open at the nearest position falls as the number changes by its share in it: Newton's method for a zero
@@ -180,8 +232,8 @@ def _closing_value(setup: Setup, failure: Failure, number: _Number) -> float | N
     value, z, nudge = number.was, failure.z, 1e-7 * number.size
     open_at, way, least, found, retreats = number.was, 0.0, CLOSED, None, 0
     for _ in range(LONGEST):
-        here = _at(setup, failure.stage, number.changed(value), z)
-        beside = here and _at(setup, failure.stage, number.changed(value + nudge), z)
+        here = _at(setup, failure.stage, number.changed(value), z, effort)
+        beside = here and _at(setup, failure.stage, number.changed(value + nudge), z, effort)
         if here is None or beside is None:
             if retreats == RETREATS:
                 break
@@ -209,10 +261,12 @@ def _closing_value(setup: Setup, failure: Failure, number: _Number) -> float | N
         value = max(value + step, 0.5 * (value + number.least))
     if found is None or found == number.was:
         return None
-    return _least_closed(setup, failure.stage, number, (open_at, found), z)
+    return _least_closed(setup, failure.stage, number, (open_at, found), z, effort)
 
 
-def _least_closed(setup: Setup, stage: Stage, number: _Number, between: tuple[float, float], z: Array) -> float:
+def _least_closed(
+    setup: Setup, stage: Stage, number: _Number, between: tuple[float, float], z: Array, effort: Effort
+) -> float:
     """Of a value at which a group is open and one at which it is closed, the one between them where that changes.
 
     The last step of Newton's method may have gone too far.
@@ -221,7 +275,7 @@ def _least_closed(setup: Setup, stage: Stage, number: _Number, between: tuple[fl
     part = NEARLY
     while abs(closed - open_) > ROUNDED * number.size:
         tried = closed + part * (open_ - closed)
-        there = _at(setup, stage, number.changed(tried), z)
+        there = _at(setup, stage, number.changed(tried), z, effort)
         gap = np.inf if there is None else float(np.linalg.norm(there.left(there.nearest())))
         if gap > CLOSED and part == NEARLY:
             break
@@ -248,8 +302,9 @@ class _There:
         return self._closing(z[None, self._stage.unknowns])[0][0]
 
 
-def _at(setup: Setup, stage: Stage, mechanism: Mechanism, z: Array) -> _There | None:
+def _at(setup: Setup, stage: Stage, mechanism: Mechanism, z: Array, effort: Effort) -> _There | None:
     """A group of a mechanism with other numbers, those before it moved on from z; None where they cannot be."""
+    effort.spend(MOVED)
     try:
         p = fitted(mechanism, shapes(mechanism), setup.unit)
     except Unplaced:
@@ -271,9 +326,9 @@ def _rounded(value: float, up: bool) -> float:
     return (ceil if up else floor)(value / size) * size
 
 
-def goes_together(mechanism: Mechanism) -> bool:
-    """Whether the whole can be assembled at its inputs."""
+def goes_together(mechanism: Mechanism, effort: Effort) -> bool:
+    """Whether the whole can be assembled at its inputs. Raises Spent."""
     try:
-        return isinstance(search(Candidates(Setup(mechanism))), Assembly)
+        return isinstance(search(_Counted(Setup(mechanism), effort)), Assembly)
     except Unplaced:
         return False

@@ -14,9 +14,10 @@ from planar.motion import Motion
 from planar.program import placed
 from planar.results import Limit
 from planar.roots import root
-from planar.solving.follow import SEAM, Met, Run, followed, run
+from planar.solving.follow import Run, followed, run
 from planar.solving.limits import STILL, Outputs, outputs
 from planar.solving.passing import crossed
+from planar.solving.pieces import SEAM, Met
 from planar.solving.position import known_of
 from planar.solving.rates import Given, rates
 from planar.solving.rows import Rows, motion, rows

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from planar.errors import Ending
 from planar.pairs import Kind
 from planar.roots import root
 from planar.solving.change_point import Beside, Crossing, beside, crossing, nearest, starting
@@ -26,9 +27,20 @@ AT = 1e-5
 """So near to a singular slope a start may be a change point, known to the root of rounding."""
 AHEAD = 10.0
 """A change point farther ahead than so many times the distance within which there is none is another one."""
-ARCS = 50_000
-ENDLESS = 100.0
-"""Lengths of the size: what slides out so far goes out without an end."""
+ARCS = 5_000
+"""Arcs that are walked for one answer; a turn of a usual linkage has some fifty."""
+NEAR_BY = 4.0
+"""Lengths of the size: where a slide is farther out than this, steps along it grow with how far it is."""
+OUT = 100.0
+"""Lengths of the size, or times the greatest number of a pair: so far out a slide is shown that goes out without an
+end."""
+FARTHEST = 6e6
+"""Lengths of the size: farther out than this the gate tells nothing."""
+CONVERGES = 0.25
+"""Where a slide goes out without an end the inputs tend to a limit with a power of the slide's inverse; beyond half of
+the square root, which is the lowest that lines becoming parallel give, they do."""
+STANDS = 1e-12
+"""rad or sizes: inputs that move less than this stand still."""
 
 
 class Passed(NamedTuple):
@@ -54,6 +66,20 @@ class Missed(NamedTuple):
     open: float
 
 
+class Work:
+    """What may be spent on one answer, counted in arcs, and who is told of each: where the inputs are."""
+
+    def __init__(self, most: int = ARCS, tell: Callable[[Array], None] | None = None):
+        self.left, self._tell = most, tell
+
+    def spend(self, u: Array) -> bool:
+        """Count an arc from inputs u (inputs,); False where nothing is left to spend."""
+        self.left -= 1
+        if self._tell is not None:
+            self._tell(u)
+        return self.left >= 0
+
+
 class Walk:
     """One walk along a curve from a point: its arcs, one after the other, and what it met on the way.
 
@@ -61,27 +87,39 @@ class Walk:
     smoothly, 2 takes the way nearest to that, and so on; 1 where the list ends. Of a start on one see `starting`.
     """
 
-    def __init__(self, curve: Curve, start: Point, branches: Sequence[int] = ()):
-        self.curve, self.here = curve, start
+    def __init__(self, curve: Curve, start: Point, branches: Sequence[int] = (), work: Work | None = None):
+        self.curve, self.here, self.work = curve, start, work or Work()
         self.branches = list(branches)
         self.passed: list[Passed] = []
         self.missed: list[Missed] = []
         self.step = FIRST
         self._looked, self._approaching = np.inf, False
-        self.endless = False
         self._out_of: Beside | None = None
-        coordinates, unknowns = curve.program.equations.coordinates, curve.program.equations.unknowns
         self._leave()
-        self._slides = np.array([coordinates[column].kind is Kind.LENGTH for column in unknowns], dtype=bool)
+        self.ending = Ending.LOST
+        self.limit: float | None = None
+        "the place of the inputs to which the curve tends while a slide goes out without an end"
+        self.out: Point | None = None
+        "where a slide has come out far, and went on"
+        equations = curve.program.equations
+        kinds = [equations.coordinates[column].kind for column in equations.unknowns]
+        self._slides = np.array([kind is Kind.LENGTH for kind in kinds], dtype=bool)
+        turns = any(kind is not Kind.LENGTH for kind, way in zip(equations.drives, curve.way, strict=True) if way)
+        self.turning = np.append(~self._slides, turns)
+        "which entries of y come back after whole turns: angles, and the place of inputs that turn"
 
     def arcs(self) -> Iterator[Arc]:
-        """The arcs of the curve; they end where it cannot be followed further."""
-        farthest = max(ENDLESS, 2.0 * self._out(self.here.y))
+        """The arcs of the curve; they end where it cannot be followed further, `ending` and `limit` say why."""
+        shown = OUT * max(1.0, float(np.max(np.abs(self.curve.p), initial=0.0)))
+        farthest = max(FARTHEST, 2.0 * self._out(self.here.y))
         if self._out_of is not None:
             self.here = self._out_of.after
             yield self._out_of.arc(self._out_of.middle, self._out_of.after)
-        for _ in range(ARCS):
+        while True:
             here = self.here
+            if not self.work.spend(self.curve.inputs(here.y)):
+                self.ending = Ending.SPENT
+                return
             if self._approaching and here.clear < min(SUSPECTED, AGAIN * self._looked, self.step):
                 through = list(self._through())
                 if through:
@@ -90,18 +128,22 @@ class Walk:
                     continue
             elif here.clear > SUSPECTED:
                 self._looked = np.inf
-            after = self._next()
+            out = self._out(here.y)
+            after = None if out > farthest else self._next()
             if after is None:
+                self.limit = _limit(here, int(np.argmax(np.abs(here.y[:-1]) * self._slides))) if out > OUT else None
+                if self.limit is not None:
+                    self.ending = Ending.ENDLESS
+                elif out > farthest:
+                    self.ending = Ending.FAR
                 return
             self._note(after)
             self._approaching = after.clear < here.clear
             arc = between(here, after)
-            if self._out(after.y) > farthest:
+            if self.out is None and self._out(after.y) > shown:
                 first, last = arc.ends
-                x = root(lambda x, arc=arc: self._out(arc.y(self.curve, x)) - farthest, first, last)
-                self.here, self.endless = arc.at(self.curve, x), True
-                yield between(here, self.here)
-                return
+                x = root(lambda x, arc=arc: self._out(arc.y(self.curve, x)) - shown, first, last)
+                self.out = arc.at(self.curve, x)
             self.here = after
             yield arc
 
@@ -122,6 +164,12 @@ class Walk:
             self.here, self._out_of = out.middle, out
             self.passed.append(Passed(found, went, True))
 
+    @property
+    def end(self) -> tuple[Array, Ending]:
+        """The inputs beyond which the arcs do not go, and why."""
+        y = self.here.y if self.limit is None else np.append(self.here.y[:-1], self.limit)
+        return self.curve.inputs(y), self.ending
+
     def _out(self, y: Array) -> float:
         """How far the farthest slide is out (sizes)."""
         return float(np.max(np.abs(y[:-1][self._slides]), initial=0.0))
@@ -130,7 +178,11 @@ class Walk:
         """The next point: a predictor of second order, Newton's corrector, and the second part of the gate."""
         here, curve = self.here, self.curve
         bent = float(np.linalg.norm(here.bend))
-        step = min(self.step, LONGEST, 1.2 * here.clear, 0.8 * BENT / max(bent, 1e-300))
+        # far out a step of a slide may be longer, but not that of an angle
+        out = max(self._out(here.y), 0.0 if self.turning[-1] else abs(float(here.y[-1])))
+        turning = float(np.max(np.abs(here.tangent[self.turning]), initial=0.0))
+        longest = LONGEST / max(turning, min(1.0, NEAR_BY / max(out, 1.0)))
+        step = min(self.step, longest, 1.2 * here.clear, 0.8 * BENT / max(bent, 1e-300))
         while step > SHORTEST:
             y = curve.corrected(here.y + step * here.tangent + 0.5 * step**2 * here.bend, here.tangent)
             if y is not None:
@@ -194,6 +246,22 @@ class Walk:
         """How near the walk comes to change points of neighbouring linkages."""
         for k, each in enumerate(self.missed):
             self.missed[k] = each._replace(distance=min(each.distance, float(np.linalg.norm(after.y - each.y))))
+
+
+def _limit(here: Point, slide: int) -> float | None:
+    """The place to which the inputs tend as a slide goes out without an end; None where they go on with it.
+
+    Far out t = limit + c s^-k, of which the first and second derivative by s tell k and the rest of the way.
+    """
+    s, s1, s2 = here.y[slide], here.tangent[slide], here.bend[slide]
+    t, t1, t2 = here.y[-1], here.tangent[-1], here.bend[-1]
+    if s * s1 <= 0.0:
+        return None
+    first, second = t1 / s1, (t2 * s1 - t1 * s2) / s1**3
+    if abs(s * first) < STANDS:
+        return float(t)
+    power = -s * second / first - 1.0
+    return float(t + s * first / power) if power > CONVERGES else None
 
 
 def outgoing(found: Crossing, here: Point) -> list[tuple[int, Array]]:
