@@ -540,8 +540,8 @@ def test_a_geared_five_bar_closes_only_after_two_turns():
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["-o", "m.xlsx"], [".xlsx", ".csv, .json, .npz, .parquet"]),
-        (["-o", "m"], ["the file", ".csv"]),
+        (["-o", "m.xlsx"], [".xlsx", ".csv, .json, .npz or .parquet"]),
+        (["-o", "m"], ["a file name without an ending", ".csv"]),
         (["-o", "no/m.csv"], ["m.csv", "cannot be written"]),
         (["-o", "m.csv", "--json"], ["-o", "give one of the two"]),
         (["--from", "30mm"], ["an angle is wanted"]),

@@ -161,9 +161,9 @@ def test_relative_motion_of_points_on_no_common_link_asks_for_axes():
 @pytest.mark.parametrize("name", ["nobody", "BC", "X.Y"])
 def test_unknown_names_are_answered_with_the_known_ones(name):
     state = planar.solve(four_bar(0.5, 1.2, 1.0, 1.4, 1.0, 3.0, 1.0, {"C": [1.5, 1.0]}))
-    with pytest.raises(Unknown, match="points are A, D, B, C"):
+    with pytest.raises(Unknown, match="points are A, D, B and C"):
         state.point(name)
-    with pytest.raises(Unknown, match="pairs are A, B, C, D"):
+    with pytest.raises(Unknown, match="pairs are A, B, C and D"):
         state.pair(name)
 
 

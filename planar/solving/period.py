@@ -24,12 +24,13 @@ ROOM = 16
 
 
 class Period(NamedTuple):
-    """The pieces from a start to where the curve is back there, what y (n + 1,) has grown by: whole turns, and the
-    change points passed."""
+    """The pieces from a start to where the curve is back there, what y (n + 1,) has grown by: whole turns, the change
+    points passed, and that on which it started."""
 
     pieces: tuple[Piece, ...]
     turns: Array
     passed: tuple[Met, ...]
+    started: tuple[Met, ...]
 
     @property
     def length(self) -> float:
@@ -53,6 +54,7 @@ class Period(NamedTuple):
 
     def met(self, curve: Curve, last: float) -> Iterator[Met]:
         """The change points passed up to a place of the inputs."""
+        yield from self.started
         for times in range(int((last + SEAM) / self.length) + 1):
             by = times * self.length * curve.way
             for each in self.passed:
@@ -82,7 +84,8 @@ class Round:
             return None
         turns = home(last.arc.y(self.walk.curve, last.last), self.start, self.walk.turning)[0] - self.start.y
         passed = tuple(each for each in met(self.walk) if SEAM < each.passed.crossing.y[-1] <= turns[-1] + SEAM)
-        found = Period((*self._pieces[:-1], last), turns, passed)
+        started = tuple(each for each in met(self.walk) if each.passed.starts)
+        found = Period((*self._pieces[:-1], last), turns, passed, started)
         return found if self._goes_on(found) else None
 
     def _goes_on(self, found: Period) -> bool:
