@@ -24,6 +24,8 @@ from planar.results import (
     PointMotion,
     PointState,
     RelativeState,
+    turns_to_least,
+    wrapped,
 )
 from planar.shapes import Shape
 from planar.shown import Shown
@@ -69,19 +71,15 @@ class Moving(Shown):
     def _motions(self) -> Mapping[str, Pair]:
         return motions(self.mechanism)
 
-    def _turns_of_link(self, name: str, angle: float) -> float:
-        """The whole turns (rad) between the angle that a link's unknown has at first and the one that is told."""
-        return 0.0 if name in self._counting else _wrapped(angle) - angle
-
     def _turns_of_pair(self, name: str, position: float) -> float:
-        """The same of the relative angle at a pair, whose input's own position is told; of a length 0."""
+        """The whole turns (rad) from a pair's first angle to the one told, of an input its own; of a length 0."""
         pair = self._motions[name]
         if pair.drive_kind is not Kind.ANGLE or self._counting.issuperset(pair.links):
             return 0.0
         if name in self.inputs:
             started = float(np.ravel(self.inputs[name].position)[0])
             return 2.0 * np.pi * round((started - position) / (2.0 * np.pi))
-        return _wrapped(position) - position
+        return wrapped(position) - position
 
     def _turns_of_swing(self, name: str, positions: Array) -> float:
         """The whole turns (rad) by which the angle at a pair is told off these of its unknown; of a length 0."""
@@ -89,10 +87,6 @@ class Moving(Shown):
         if pair.drive_kind is not Kind.ANGLE or name in self.inputs or self._counting.issuperset(pair.links):
             return self._turns_of_pair(name, float(positions[0]))
         return turns_to_least(positions)
-
-    def _turns_of_link_swing(self, name: str, angles: Array) -> float:
-        """The same of a link's angle."""
-        return 0.0 if name in self._counting else turns_to_least(angles)
 
     @property
     def point_names(self) -> tuple[str, ...]:
@@ -225,7 +219,7 @@ class State(Moving):
         angle, velocity, acceleration = map(float, orders(self._frame(name).angle))
         fastest, hardest = self._greatest_of_links
         sense = _sense(turning(velocity, fastest), velocity * acceleration, abs(velocity) * hardest)
-        return LinkState(angle + self._turns_of_link(name, angle), velocity, acceleration, sense)
+        return LinkState(angle if name in self._counting else wrapped(angle), velocity, acceleration, sense)
 
     def pair(self, name: str) -> dict[str, float | None]:
         """What a pair reports of its relative motion (SI). Raises Unknown."""
@@ -361,7 +355,9 @@ class Motion(Moving):
     def link(self, name: str) -> LinkMotion:
         """A link by name. Its angle starts between -pi and pi unless a pair counts its turns. Raises Unknown."""
         angle, velocity, acceleration = self._rows(orders(self._frame(name).angle))
-        return LinkMotion(angle + self._turns_of_link(name, float(angle[0])), velocity, acceleration)
+        if name not in self._counting:
+            angle = angle - (angle[0] - wrapped(float(angle[0])))
+        return LinkMotion(angle, velocity, acceleration)
 
     def jerk(self, point: str) -> Array:
         """A point's third rate (n, 2) (m/s^3). Raises Unknown, and BadInput where the motion was made without."""
@@ -380,11 +376,7 @@ class Motion(Moving):
         return self.jerked
 
     def pair(self, name: str) -> dict[str, Array | None]:
-        """What a pair reports of its relative motion at every position, each (n,) (SI). Raises Unknown.
-
-        An angle starts between -pi and pi, as a link's; that of an input is the input's position, and where the turns
-        of both links are counted it has these.
-        """
+        """What a pair reports at every position, each (n,) (SI). An angle starts as a link's. Raises Unknown."""
         pair, parts = self._motion(name)
         position, velocity, acceleration = self._rows(parts)
         return pair.report(position + self._turns_of_pair(name, float(position[0])), velocity, acceleration)
@@ -418,22 +410,6 @@ def _sense(way: str, power: float, scale: float) -> str:
     return way if way == "at rest" else f"{way}, {hurrying(power, scale)}"
 
 
-def _wrapped(angle: float) -> float:
-    """The same direction as an angle between -pi and pi."""
-    return float(np.arctan2(np.sin(angle), np.cos(angle))) if abs(angle) > np.pi else angle
-
-
-def turns_to_least(angles: Array) -> float:
-    """The whole turns (rad) to add to angles so that their least lies between -pi and pi, as positions have it.
-
-    Of such as turn right round it is the first that lies there.
-    """
-    first = float(angles[0] if np.ptp(angles) >= 2.0 * np.pi else np.min(angles))
-    return 0.0 if abs(first) <= np.pi + SEAM else _wrapped(first) - first
-
-
-SEAM = 1e-9
-"""rad: an angle so little beyond half a turn is told as half a turn."""
 Parts = tuple[Any, Any, Any]
 """A number with its first and second rate: floats, or arrays over a motion."""
 

@@ -114,3 +114,21 @@ class Jerked(NamedTuple):
 
     frames: Mapping[str, Frame]
     own: Mapping[str, tuple[Jet, ...]]
+
+
+SEAM = 1e-9
+"""rad: an angle so little beyond half a turn is told as half a turn."""
+
+
+def wrapped(angle: float) -> float:
+    """The same direction as an angle between -pi and pi."""
+    return float(np.arctan2(np.sin(angle), np.cos(angle))) if abs(angle) > np.pi else angle
+
+
+def turns_to_least(angles: Array) -> float:
+    """The whole turns (rad) to add to angles so that their least lies between -pi and pi, as positions have it.
+
+    Of such as turn right round it is the first that lies there.
+    """
+    first = float(angles[0] if np.ptp(angles) >= 2.0 * np.pi else np.min(angles))
+    return 0.0 if abs(first) <= np.pi + SEAM else wrapped(first) - first

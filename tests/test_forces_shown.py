@@ -184,7 +184,7 @@ def test_the_tables_have_the_extremes_of_every_position_and_where(tmp_path):
     way = np.degrees(np.arctan2(*found.reactions["A"].force[most, ::-1]))
     assert [float(each) for each in row(text, "Reactions", "A")[3:6]] == pytest.approx([force[most], way, at[most]])
     shaken = np.hypot(*found.shaking[0].T)
-    assert f"shaking up to {shaken.max():#.6g} N (at O, deg: {at[shaken.argmax()]:#.6g})" in text
+    assert f"shaking up to {shaken.max():#.6g} N (at O = {at[shaken.argmax()]:#.6g} deg)" in text
 
 
 @pytest.mark.parametrize("suffix", ["csv", "npz", "json"])

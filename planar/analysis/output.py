@@ -16,6 +16,7 @@ from planar.errors import BadInput, NoAnswer
 from planar.mechanism import motions
 from planar.motion import Moving, Parts, Unknown
 from planar.pairs import Kind
+from planar.results import turns_to_least
 from planar.roots import root
 
 Array = np.ndarray
@@ -57,10 +58,11 @@ class Output:
         self.near = SAME * steady.solver.unit if length else SAME
         self._off = 0.0
         self._values = np.broadcast_to(self.of(moving)[0], steady.positions.shape)
-        if not length:
-            off = moving._turns_of_swing if self._pair else moving._turns_of_link_swing
-            self._off = off(name, self._values)
-            self._values = self._values + self._off
+        if self._pair:
+            self._off = moving._turns_of_swing(name, self._values)
+        elif not length and name not in moving._counting:
+            self._off = turns_to_least(self._values)
+        self._values = self._values + self._off
 
     def of(self, moving: Moving) -> Parts:
         """Its value and rates in a state, or over a motion (n,)."""
