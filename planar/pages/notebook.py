@@ -41,13 +41,9 @@ def _shell() -> Any | None:
     return shell if hasattr(shell, "kernel") and hasattr(shell, "get_parent") else None
 
 
+@cache
 def packed(styles: str, scripts: str) -> tuple[str, str]:
     """Styles and scripts for outputs to share: a key of this version of them, and the text that one carries."""
-    return _packed(styles, scripts)
-
-
-@cache
-def _packed(styles: str, scripts: str) -> tuple[str, str]:
     text = json.dumps({"styles": styles, "scripts": scripts}).encode()
     return sha256(text).hexdigest()[:16], b64encode(zlib.compress(text, 9)).decode()
 

@@ -27,7 +27,8 @@ class Page {
 
   /** Why there is no velocity and no acceleration here, as a sentence; "" where there are. */
   get undetermined() {
-    const many = this.data.inputs.length > 1 ? "inputs" : "input";
+    const { length } = this.data.inputs, many = length > 1 ? "inputs" : "input";
+    if (this.state.why && !length) return "the links could also move here: no velocity is determined";
     const told = { "dead point": `dead point of the ${many}: no velocity`, "change point": "change point: no velocity is determined" };
     return told[this.state.why] ?? "";
   }

@@ -9,6 +9,7 @@ const TRIAL = 1e-4;          // rad, sizes: the first of them
 const TURNED = 1e-13;        // the part of the inputs in a unit step along the curve that is none
 const ALMOST = 3e-5;         // rad, sizes: so near to it the third order of a step is rounding
 const APPROACH = 0.8;        // of the way to it, where it cannot be stood on
+const TURNING = 1e-3;        // the same so near to a dead point; its square upon one
 const BESIDE = 1e-3;         // rad, sizes: how far the inputs, or the square of the unknowns, may still have to go
 
 /** The singular values of a matrix given by its columns, by one-sided Jacobi rotations (Golub and Van Loan, 8.6). */
@@ -123,7 +124,7 @@ function deadPointAhead(linkage, at, reached, far) {
     for (let round = 0; round < SEARCHES && Math.abs(way[n]) > TURNED; round++) {
       if (last !== null) step *= -way[n] / (way[n] - last.way[n]);
       if (!(Math.abs(step) < NUDGES[NUDGES.length - 1])) return null;
-      if (!onto && last !== null && Math.abs(step) < ALMOST) return y.map((each, k) => each + step * (way[k] + (0.5 * step * (way[k] - last.way[k])) / last.step));
+      if (!onto && last !== null && Math.abs(step) < ALMOST) return Math.abs(way[n]) > TURNING ? null : y.map((each, k) => each + step * (way[k] + (0.5 * step * (way[k] - last.way[k])) / last.step));
       if (!onto && last !== null) step *= APPROACH;
       last = { way, step };
       y = corrected(y.map((each, k) => each + step * way[k]), way);
@@ -131,7 +132,7 @@ function deadPointAhead(linkage, at, reached, far) {
       if (way === null) return null;
       if (Math.abs(step) < 1e-12 || way[n] === last.way[n]) break;
     }
-    return y;
+    return Math.abs(way[n]) > TURNING ** 2 ? null : y; // at a change point the way may go on
   };
   const accepted = (y) => {
     if (y === null) return null;

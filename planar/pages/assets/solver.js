@@ -186,8 +186,9 @@ class Linkage {
     return done;
   }
 
-  /** Follow a branch along a way: `at` says for a part from 0 to 1 which inputs and numbers there are. */
-  follow(count, at) {
+  /** Follow a branch along a way: `at` says for a part from 0 to 1 which inputs and numbers there are; `near` is a way that
+      ends close to a dead point. */
+  follow(count, at, near = false) {
     let reached = 0, step = 1 / Math.max(1, Math.ceil(count)), open = 0;
     const whole = step;
     if (count === 0) return { reached: 1, open }; // nothing moves
@@ -196,11 +197,8 @@ class Linkage {
       there.ready();
       const guess = this.foretold(there.u, next - reached), found = this.newton(there.u, guess);
       if (found.closed && this.continues(found, guess)) {
-        if (next === 1 && singularity(this, this.closure(found.z, there.u).slope)) {
-          // asked for is a dead point itself, on which Newton's method does not tell the sides apart
-          const close = 1 - SHORTEST / (count * FARTHEST);
-          if (reached < close) { step = close - reached; continue; }
-          if (this.standOn(deadPointAhead(this, at, reached, count * FARTHEST), at, reached)) { reached = 1; break; }
+        if (next === 1 && !near && singularity(this, this.closure(found.z, there.u).slope)) {
+          if (this.arrive(count, at, reached)) { reached = 1; break; }
           there.ready();
         }
         this.last = { ...this.since(there.u), to: found.z, signs: this.agreed(found.signs), step: next - reached };
@@ -226,6 +224,16 @@ class Linkage {
     }
     at(reached).ready();
     return { reached, open };
+  }
+
+  /** Go on from a part of a way to its end where that is a dead point itself, on which Newton's method does not tell the
+      sides apart: close to it first. Whether it is one. */
+  arrive(count, at, from) {
+    const { z, u, last, stop } = this, close = Math.max(from, 1 - SHORTEST / (count * FARTHEST)), way = close - from;
+    const { reached } = this.follow(count * way, (part) => at(from + part * way), true);
+    if (reached === 1 && this.standOn(deadPointAhead(this, at, close, count * FARTHEST), at, close)) return true;
+    Object.assign(this, { z, u, last, stop });
+    return false;
   }
 
   /** Stand on a dead point, if there is one, and keep the side from which it came: it leads back on its own branch. */
