@@ -1,7 +1,11 @@
 """What can go wrong, and the sentence in which it is said."""
 
+from collections.abc import Iterable
 from enum import StrEnum
 from typing import Any
+
+MANY = 12
+"""Characters that a warning names."""
 
 
 class Outcome(StrEnum):
@@ -56,3 +60,16 @@ class NoAnswer(PlanarError):
         self.outcome = outcome
         self.reason = reason
         self.more: dict[str, Any] = {}
+
+
+class MissingGlyphs(UserWarning):
+    """No installed font has some `characters` of a drawing's texts."""
+
+    def __init__(self, characters: Iterable[str]):
+        self.characters = tuple(sorted(set(characters)))
+        named = ", ".join(f"{each} (U+{ord(each):04X})" for each in self.characters[:MANY])
+        more = f" and {len(self.characters) - MANY} more" if len(self.characters) > MANY else ""
+        super().__init__(
+            f"no installed font has {named}{more}, so drawings show \N{REPLACEMENT CHARACTER} instead: install one that"
+            " does, such as Noto Sans with its parts for other scripts"
+        )
