@@ -274,7 +274,8 @@ def test_what_a_book_prints_goes_with_its_own_assembly_only(tmp_path):
 
 def test_the_sheet_has_a_window_for_each_with_its_number(tmp_path):
     sheets = sheets_of(planar.modes(tower(5), certify=False))
-    assert [len(pictures) for pictures, _ in sheets] == [SHEET, 32 - SHEET]
+    assert [len(pictures) for pictures, _ in sheets] == [16, 16]
+    assert SHEET >= 16
     assert "32 assemblies" in sheets[0][1]
     ((pictures, heading),) = sheets_of(planar.modes(planar.load("jansen-leg"), certify=False))
     assert "8 assemblies" in heading
