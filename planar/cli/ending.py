@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from types import MappingProxyType
@@ -11,7 +12,7 @@ from typing import Any
 
 import click
 
-from planar.errors import BadInput, NoAnswer
+from planar.errors import BadInput, MissingGlyphs, NoAnswer
 
 NO_ANSWER, BAD_INPUT = 1, 2
 """Exit statuses; 0 is done."""
@@ -28,7 +29,7 @@ class Commands(click.Group):
             return super().parse_args(ctx, args)
 
     def invoke(self, ctx: click.Context) -> Any:
-        with _ending():
+        with _ending(), _missing_glyphs_named():
             return super().invoke(ctx)
 
 
@@ -46,6 +47,26 @@ def _ending() -> Iterator[None]:
             told += f"; see `{problem.ctx.command_path if problem.ctx else 'planar'} --help`"
         wrong = str(BadInput("command line", told[0].lower() + told[1:]))
         _refuse(wrong, "bad input", wrong, BAD_INPUT)
+
+
+@contextmanager
+def _missing_glyphs_named() -> Iterator[None]:
+    """What no font can show is named in one line, however many texts have it; other warnings go their way."""
+    found: set[str] = set()
+    before = warnings.showwarning
+
+    def collect(message: Warning | str, *rest: Any) -> None:
+        if isinstance(message, MissingGlyphs):
+            found.update(message.characters)
+        else:
+            before(message, *rest)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", MissingGlyphs)
+        warnings.showwarning = collect
+        yield
+    if found:
+        click.echo(f"planar: {MissingGlyphs(found)}", err=True)
 
 
 def _refuse(
