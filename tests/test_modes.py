@@ -11,9 +11,10 @@ from PIL import Image
 
 import planar
 from planar.assemblies.completeness import Completeness
+from planar.drawing import symbols
 from planar.drawing.assemblies import SHEET, sheets_of
 from planar.drawing.paper import given
-from planar.drawing.picture import Letter
+from planar.drawing.picture import Circle, Letter
 from planar.files import models
 from tests import command
 from tests.bars import bars, four_bar, tower
@@ -284,6 +285,9 @@ def test_the_sheet_has_a_window_for_each_with_its_number(tmp_path):
     scale = given(pictures[0].notes[0])
     windows = [next(mark for mark in picture.marks if mark.about.startswith("window")) for picture in pictures]
     assert len({window.spots for window in windows}) == 1
+    pins = [mark.radius for mark in pictures[0].marks if isinstance(mark, Circle) and mark.about.startswith("pin ")]
+    assert pins
+    assert max(pins) < 0.8 * symbols.PIN  # small drawings have small pins
     for picture, mode in zip(pictures, planar.modes(planar.load("jansen-leg"), certify=False), strict=True):
         at = next(np.array(mark.at) for mark in picture.marks if isinstance(mark, Letter) and mark.text == "foot")
         assert at * scale.per_mm == pytest.approx(mode.points["foot"])
