@@ -92,3 +92,15 @@ class NoAnswer(PlanarError):
         self.reason = _shown(reason, LONGEST_REASON)
         super().__init__(f"{outcome.value}: {self.reason}")
         self.more: dict[str, Any] = more
+
+
+class MissingGlyphs(UserWarning):
+    """No installed font has some `characters` of a drawing's texts."""
+
+    def __init__(self, characters: Iterable[str]):
+        self.characters = tuple(sorted(set(characters)))
+        named = listed([f"{each} (U+{ord(each):04X})" for each in self.characters])
+        super().__init__(
+            f"no installed font has {named}, so drawings show \N{REPLACEMENT CHARACTER} instead: install one that"
+            " does, such as Noto Sans with its parts for other scripts"
+        )

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import re
+from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations, count
-from typing import NamedTuple
-
-import networkx as nx
+from typing import TYPE_CHECKING, NamedTuple
 
 from planar.mechanism import Mechanism, entries, motions
 from planar.pairs import Kind, Pair
+
+if TYPE_CHECKING:
+    import networkx as nx
 
 _NUMBER = re.compile(r"0|[1-9][0-9]{0,3}")
 """A link's name that is its number."""
@@ -21,6 +23,8 @@ def linkage(mechanism: Mechanism) -> nx.Graph:
 
     A pin of n links is one pair node with n edges.
     """
+    import networkx as nx
+
     graph = nx.Graph(name=mechanism.name)
     graph.add_nodes_from(("link", link.name) for link in mechanism.links)
     for group in entries(mechanism):
@@ -32,12 +36,16 @@ def linkage(mechanism: Mechanism) -> nx.Graph:
 
 def detached(mechanism: Mechanism) -> tuple[str, ...]:
     """Links that no chain of pairs joins to the frame."""
+    import networkx as nx
+
     joined = nx.node_connected_component(linkage(mechanism), ("link", mechanism.frame))
     return tuple(link.name for link in mechanism.links if ("link", link.name) not in joined)
 
 
 def farthest_first(mechanism: Mechanism, name: str) -> tuple[str, ...]:
     """The other pairs, those first that are most links and pairs away from this one."""
+    import networkx as nx
+
     entry_of = {pair.name: pair.entry_name() for pair in mechanism.pairs}
     away = nx.single_source_shortest_path_length(linkage(mechanism), ("pair", entry_of[name]))
     others = [other for other in entry_of if other != name]
@@ -66,13 +74,17 @@ def likenesses(first: Figure, second: Figure) -> Iterator[Likeness]:
     marks = (sorted((graph.degree(node), mark) for node, mark in graph.nodes(data="mark")) for graph in (a, b))
     if next(marks) != next(marks):
         return
-    matcher = nx.isomorphism.GraphMatcher(a, b, node_match=lambda one, other: one["mark"] == other["mark"])
+    from networkx.isomorphism import GraphMatcher
+
+    matcher = GraphMatcher(a, b, node_match=lambda one, other: one["mark"] == other["mark"])
     for found in matcher.isomorphisms_iter():
         links = {name: found[what, name][1] for what, name in found if what == "link"}
         yield Likeness(links, {index: found[what, index][1] for what, index in found if what == "pair"})
 
 
 def _marked(figure: Figure) -> nx.Graph:
+    import networkx as nx
+
     graph = nx.Graph()
     for index, (kind, links) in enumerate(figure.joints):
         graph.add_node(("pair", index), mark=kind.value)
@@ -84,18 +96,24 @@ def _marked(figure: Figure) -> nx.Graph:
 
 def joined(figure: Figure, links: Sequence[str]) -> bool:
     """Whether each of these links is joined to all the others."""
+    import networkx as nx
+
     graph = _marked(figure)
     return bool(graph) and nx.is_connected(graph) and all(("link", link) in graph for link in links)
 
 
 def loops(figure: Figure) -> int:
     """How many independent loops the links make."""
+    import networkx as nx
+
     graph = _marked(figure)
     return graph.number_of_edges() - graph.number_of_nodes() + nx.number_connected_components(graph)
 
 
 def trees(links: Sequence[str]) -> tuple[tuple[tuple[str, str], ...], ...]:
     """Every choice of n - 1 pairs that a pin of n links may stand for."""
+    import networkx as nx
+
     choices = combinations(tuple(combinations(links, 2)), len(links) - 1)
     return tuple(pairs for pairs in choices if len({*sum(pairs, ())}) == len(links) and nx.is_forest(nx.Graph(pairs)))
 
@@ -109,17 +127,21 @@ def numbered(mechanism: Mechanism) -> dict[str, str]:
     one, else the second; without inputs it is the file's first.
     """
     place = {link.name: index for index, link in enumerate(mechanism.links) if link.name != mechanism.frame}
-    graph = nx.Graph()
-    graph.add_nodes_from(place)
+    beside: dict[str, set[str]] = {link: set() for link in place}
     for group in entries(mechanism):
-        graph.add_edges_from(combinations(_meeting(group, place), 2))
+        meeting = _meeting(group, place)
+        for link in meeting:
+            beside[link].update(meeting)
     named = motions(mechanism)
     driven = [link for given in mechanism.inputs[:1] for link in reversed(named[given.pair].links) if link in place]
     order: dict[str, None] = {}
     for start in (*driven[:1], *place):
-        if start not in order:
-            ways = nx.bfs_edges(graph, start, sort_neighbors=lambda links: sorted(links, key=place.__getitem__))
-            order |= dict.fromkeys((start, *(link for _, link in ways)))
+        waiting = deque([start])
+        while waiting:
+            link = waiting.popleft()
+            if link not in order:
+                order[link] = None
+                waiting += sorted(beside[link], key=place.__getitem__)
     own = {link for link in (*order, mechanism.frame) if _NUMBER.fullmatch(link)}
     free = (str(number) for number in count(1) if str(number) not in own)
     numbers = {link: link if link in own else next(free) for link in (*order, mechanism.frame)}

@@ -6,39 +6,20 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from planar.analysis.centres import centres as all_centres
-from planar.assemblies.modes import Modes
-from planar.assemblies.modes import modes as all_modes
-from planar.branches.circuits import Circuits
-from planar.branches.circuits import circuits as all_circuits
-from planar.branches.located import located
-from planar.drawing import animation
-from planar.drawing.assemblies import sheets_of
-from planar.drawing.bearings import bearing_pictures
-from planar.drawing.centres import REACH, centres_picture, chosen
-from planar.drawing.centrodes import centrodes_picture
-from planar.drawing.circle import circle_picture
-from planar.drawing.circuits import circuits_figures
-from planar.drawing.diagrams import diagrams
-from planar.drawing.directions import directions_picture
 from planar.drawing.figure import figure, on_sheets, saved
-from planar.drawing.free_bodies import free_bodies
-from planar.drawing.page import sheets, solution_pages
-from planar.drawing.panels import Scales, panels
 from planar.drawing.paper import scales
-from planar.drawing.positions import loci as loci_picture
-from planar.drawing.positions import positions as positions_picture
-from planar.drawing.scheme import scheme as scheme_picture
-from planar.drawing.torque import torque_picture
-from planar.dynamics.flywheel import FLUCTUATION
-from planar.dynamics.forces import Forces
-from planar.dynamics.forces import forces as all_forces
 from planar.files import save as write
-from planar.mechanism import Mechanism
-from planar.motion import Motion, State
 
+# what only some drawings need is imported where they are made: that takes longer than to draw
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from planar.assemblies.modes import Modes
+    from planar.branches.circuits import Circuits
+    from planar.drawing.panels import Scales
+    from planar.dynamics.forces import Forces
+    from planar.mechanism import Mechanism
+    from planar.motion import Motion, State
 
 __all__ = [
     "acceleration",
@@ -63,33 +44,43 @@ __all__ = [
 
 def scheme(state: State, scale: Scales = None) -> Figure:
     """The kinematic scheme of a position: links numbered, points lettered. Raises BadInput for a scale that is none."""
-    return figure([scheme_picture(state, scales(scale, ["length"]).get("length"))])
+    from planar.drawing.scheme import scheme as picture
+
+    return figure([picture(state, scales(scale, ["length"]).get("length"))])
 
 
 def velocity(state: State, scale: Scales = None) -> Figure:
     """The space diagram and the velocity polygon of a position, each to its scale."""
+    from planar.drawing.panels import panels
+
     return figure(panels(state, scale, 2), state.mechanism.name)
 
 
 def acceleration(state: State, scale: Scales = None) -> Figure:
     """The space diagram, the velocity polygon and the acceleration polygon of a position, each to its scale."""
+    from planar.drawing.panels import panels
+
     return figure(panels(state, scale, 3), state.mechanism.name)
 
 
 def centres(
-    state: State, scale: Scales = None, links: str | Sequence[str] | None = None, reach: float = REACH
+    state: State, scale: Scales = None, links: str | Sequence[str] | None = None, reach: float | None = None
 ) -> Figure:
     """The scheme of a position with its instantaneous centres, and beside it the circle diagram.
 
     `links` chooses: of one all its centres, of several those between any two of them; left out, all centres, or of
     more than 28 those that pairs show and those against the frame. Centres within `reach` times the mechanism's greater
-    extent are drawn in their places, arrows lead to the others. Raises BadInput for a link that there is not, a scale
-    that is none, and a reach below 1.
+    extent (left out: twice) are drawn in their places, arrows lead to the others. Raises BadInput for a link that
+    there is not, a scale that is none, and a reach below 1.
     """
+    from planar.analysis.centres import centres as all_centres
+    from planar.drawing.centres import REACH, centres_picture, chosen
+    from planar.drawing.circle import circle_picture
+
     found = all_centres(state)
     shown = chosen(found, links)
     pictures = [
-        centres_picture(found, shown, scales(scale, ["length"]).get("length"), reach),
+        centres_picture(found, shown, scales(scale, ["length"]).get("length"), REACH if reach is None else reach),
         circle_picture(found, shown),
     ]
     return figure(pictures, state.mechanism.name)
@@ -99,12 +90,16 @@ def positions(
     motion: Motion | Mechanism, count: int = 12, points: Sequence[str] | None = None, scale: Scales = None
 ) -> Figure:
     """The mechanism in `count` + 1 positions, its joints lettered A0, A1, ...; TDC and BDC where a slider has them."""
-    return figure([positions_picture(motion, count, points, scales(scale, ["length"]).get("length"))])
+    from planar.drawing.positions import positions as picture
+
+    return figure([picture(motion, count, points, scales(scale, ["length"]).get("length"))])
 
 
 def loci(motion: Motion | Mechanism, points: Sequence[str] | None = None, scale: Scales = None) -> Figure:
     """The paths of points (left out: of those that no link on the frame carries)."""
-    return figure([loci_picture(motion, points, scales(scale, ["length"]).get("length"))])
+    from planar.drawing.positions import loci as picture
+
+    return figure([picture(motion, points, scales(scale, ["length"]).get("length"))])
 
 
 def centrodes(
@@ -114,14 +109,20 @@ def centrodes(
 
     Without a `link` those of the first coupler. Raises BadInput for a link that is not there, or a scale that is none.
     """
+    from planar.drawing.centrodes import centrodes_picture
+
     return figure([centrodes_picture(motion, link, other, scales(scale, ["length"]).get("length"))])
 
 
 def modes(assemblies: Modes | Mechanism, scale: Scales = None) -> list[Figure]:
-    """Every assembly drawn small, numbered, to one scale, the sketch's own marked: sheets of 24, four at the most.
+    """Every assembly drawn small, numbered, to one scale, the sketch's own marked: sheets of 20, 96 at the most.
 
     Raises BadInput for a scale that is none, and NoAnswer where there is no assembly.
     """
+    from planar.assemblies.modes import Modes
+    from planar.assemblies.modes import modes as all_modes
+    from planar.drawing.assemblies import sheets_of
+
     found = assemblies if isinstance(assemblies, Modes) else all_modes(assemblies)
     return [figure(*sheet) for sheet in sheets_of(found, scales(scale, ["length"]).get("length"))]
 
@@ -133,6 +134,12 @@ def circuits(found: Circuits | Mechanism, of: str | None = None, assemblies: Mod
     `assemblies` are marked, left out those at the mechanism's inputs. Raises BadInput for an output that is not there,
     and NoAnswer where no circuit was found.
     """
+    from planar.assemblies.modes import modes as all_modes
+    from planar.branches.circuits import Circuits
+    from planar.branches.circuits import circuits as all_circuits
+    from planar.branches.located import located
+    from planar.drawing.circuits import circuits_figures
+
     of_all = found if isinstance(found, Circuits) else all_circuits(found)
     here = all_modes(of_all.mechanism, certify=False) if assemblies is None else assemblies
     return circuits_figures(of_all, located(of_all, here), of)
@@ -144,16 +151,24 @@ def forces(found: Forces | State, scale: Scales = None) -> list[Figure]:
     One scale of length and one of force, such as "1 cm = 500 N", hold for all. What equilibrium does not tell is named
     and not drawn. Raises BadInput for forces over a motion and scales that are none, and what `planar.forces` raises.
     """
+    from planar.drawing.free_bodies import free_bodies
+    from planar.dynamics.forces import Forces
+    from planar.dynamics.forces import forces as all_forces
+
     return on_sheets(*free_bodies(found if isinstance(found, Forces) else all_forces(found), scale))
 
 
-def torque(found: Forces | Motion | Mechanism, of: str | None = None, fluctuation: float = FLUCTUATION) -> Figure:
+def torque(found: Forces | Motion | Mechanism, of: str | None = None, fluctuation: float | None = None) -> Figure:
     """The torque or force of an input over a cycle at its steady speed: mean, parts, greatest and least, flywheel.
 
-    `of` left out: of the input that runs; `fluctuation` is the flywheel's coefficient of fluctuation of speed. Forces
-    over a motion are drawn as they are. Raises BadInput for an input that there is not, and a coefficient that is none.
+    `of` left out: of the input that runs; `fluctuation` is the flywheel's coefficient of fluctuation of speed (left
+    out: 0.02). Forces over a motion are drawn as they are. Raises BadInput for an input that there is not, and a
+    coefficient that is none.
     """
-    return figure([torque_picture(found, of, fluctuation)])
+    from planar.drawing.torque import torque_picture
+    from planar.dynamics.flywheel import FLUCTUATION
+
+    return figure([torque_picture(found, of, FLUCTUATION if fluctuation is None else fluctuation)])
 
 
 def bearings(found: Forces | Motion | Mechanism, pairs: Sequence[str] | None = None) -> list[Figure]:
@@ -162,12 +177,33 @@ def bearings(found: Forces | Motion | Mechanism, pairs: Sequence[str] | None = N
     Polar load diagrams in the frame's axes; of a sliding pair the force across its line and the couple over the input.
     Raises BadInput for a pair that there is not.
     """
+    from planar.drawing.bearings import bearing_pictures
+    from planar.mechanism import Mechanism
+
     mechanism = found if isinstance(found, Mechanism) else found.mechanism
     return on_sheets(bearing_pictures(found, pairs), f"{mechanism.name}: loads of the pairs")
 
 
+def diagrams(
+    motion: Motion | Mechanism, of: str | None = None, chords: int | None = None, width: float = 120.0
+) -> Figure:
+    """S-t, V-t and a-t diagrams of a slide, point or link over a motion in time, or a run at the input's steady speed.
+
+    `of` left out: the first slide on the frame that is not driven, else the angle of the link on a pin of the frame
+    that is farthest along. A slide on the frame is measured from its top dead centre, where the run starts. `width`
+    is the length of the time axis in mm on paper; `chords` adds graphical differentiation over so many intervals
+    (Machine Elements, 1.3.6 (iii)). Where the file gives no speed, rates are per radian (or metre) of the input.
+    Raises BadInput for a name that is not there, NoAnswer where there is no motion.
+    """
+    from planar.drawing.diagrams import diagrams as drawn
+
+    return drawn(motion, of, chords, width)
+
+
 def solution(state: State, scale: Scales = None) -> list[Figure]:
     """The worked solution of a position on pages of A4."""
+    from planar.drawing.page import solution_pages
+
     return solution_pages(state, scales=scales(scale))
 
 
@@ -177,6 +213,8 @@ def two_directions(state: State, link: str, points: Sequence[str] | None = None,
     `points` left out: the two joints of the link that lie farthest apart. Raises BadInput for a link or points that
     there are not, a link at rest, and a scale that is none.
     """
+    from planar.drawing.directions import directions_picture
+
     given = scales(scale)
     return figure([directions_picture(state, link, points, given.get("length"), given.get("velocity"))])
 
@@ -191,8 +229,10 @@ def animate(
 
     Raises BadInput for another kind of file, and where what writes it is not installed.
     """
+    from planar.drawing.animation import animate as moving
+
     path = Path(file)
-    write(path, animation.animate(motion, path.suffix, points, progress))
+    write(path, moving(motion, path.suffix, points, progress))
 
 
 def save(figures: Figure | Sequence[Figure], file: str | Path) -> None:
@@ -201,5 +241,9 @@ def save(figures: Figure | Sequence[Figure], file: str | Path) -> None:
     Raises BadInput for another kind of file, and where it cannot be written.
     """
     path = Path(file)
-    several = isinstance(figures, Sequence)
-    write(path, sheets(figures, path.suffix) if several else saved(figures, path.suffix))
+    if not isinstance(figures, Sequence):
+        write(path, saved(figures, path.suffix))
+        return
+    from planar.drawing.page import sheets
+
+    write(path, sheets(figures, path.suffix))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from math import atan2, hypot, pi
 
 import numpy as np
@@ -61,3 +61,17 @@ def listed(names: Sequence[str]) -> str:
 def quoted(names: Sequence[str]) -> str:
     """The first of names, in quotes, and how many more there are."""
     return several([repr(name) for name in names])
+
+
+def ranged(numbers: Iterable[int]) -> str:
+    """Numbers in a sentence, three or more in a row by their ends: 1–4, 7 and 9."""
+    runs: list[list[int]] = []
+    for number in sorted({*numbers}):
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    short = [run for run in runs if len(run) > 2]
+    parts = [(run[0], f"{run[0]}–{run[-1]}") for run in short]
+    parts += [(number, str(number)) for run in runs if run not in short for number in run]
+    return listed([text for _, text in sorted(parts)])

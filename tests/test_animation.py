@@ -201,6 +201,7 @@ def test_what_cannot_be_meant_is_refused_in_a_sentence(arguments, sentence):
         animate(planar.load("four-bar"), **arguments)
 
 
+@pytest.mark.filterwarnings("ignore::planar.errors.MissingGlyphs")
 def test_hostile_names_do_no_harm():
     mechanism = planar.load("004-SC12")
     pair = replace(mechanism.pairs[0], name="$x_{机", pin="$x_{机")

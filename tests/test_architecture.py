@@ -81,6 +81,7 @@ LIBRARIES = {
     "pint": {"units"},
     "rich": {"views", "cli"},
     "matplotlib": {"drawing", "plot"},
+    "fontTools": {"drawing"},
     "PIL": {"drawing"},
     "imageio_ffmpeg": {"drawing"},
     "click": {"cli"},
@@ -179,6 +180,13 @@ def test_solving_loads_neither_scipy_nor_networkx_nor_what_only_pictures_need():
     loaded = loaded_by("import planar; planar.solve(planar.load('000-P1'))")
     assert not loaded & {"scipy", "networkx", "rich", "click", "pint", "matplotlib"}
     assert "casadi" in loaded
+
+
+def test_drawing_loads_only_what_it_draws_with():
+    loaded = loaded_by("import planar; planar.plot.acceleration(planar.solve(planar.load('000-P1')))")
+    assert "matplotlib.figure" in loaded
+    assert not loaded & {"scipy", "networkx", "rich", "click", "matplotlib.pyplot", "matplotlib.backends.backend_pdf"}
+    assert not loaded & {"planar.branches.circuits", "planar.assemblies.modes", "planar.dynamics.forces"}
 
 
 def test_importing_planar_loads_no_library_at_all():

@@ -6,6 +6,7 @@ import sys
 from functools import cache
 from itertools import combinations, pairwise
 from math import acos, degrees, isclose, pi
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,10 +14,17 @@ import pytest
 import planar
 from planar.assemblies.choice import numbered
 from planar.assemblies.completeness import Completeness
+from planar.drawing.circuit_alike import alike_together
+from planar.drawing.circuit_curves import Chart, Marked, Strand, Window
 from planar.drawing.lettering import signed
 from planar.files import models
+from planar.words import ranged
 from tests import command
+from tests.fonts import own_fonts  # noqa: F401
 from tests.test_diagrams import boxes
+
+pytestmark = pytest.mark.filterwarnings("ignore::planar.errors.MissingGlyphs")
+"""Names that no font here may have."""
 
 LONG = "the pin of the rocker in the left bearing block"
 
@@ -292,8 +300,10 @@ def test_no_text_lies_on_another_or_leaves_the_sheet(name, pair):
             assert apart, f"{one!r} lies on {other!r}"
 
 
-def test_the_command_draws_it(folder):
-    command.run(folder, "plot", "rocker.json", "circuits", "-o", "a.svg").done()
+def test_the_command_draws_it(folder, own_fonts):  # noqa: F811
+    ended = command.run(folder, "plot", "rocker.json", "circuits", "-o", "a.svg")
+    assert ended.status == 0
+    assert "no installed font has 机" in ended.err
     text = (folder / "a.svg").read_text(encoding="utf-8")
     assert text.count('id="branch 1"') == 2
     assert "机" not in text
@@ -333,3 +343,31 @@ def test_to_say_it_no_library_is_loaded_that_solving_does_without():
     ended = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
     assert "of 2 at the file's inputs" in ended.stdout
     assert not set(ended.stdout.split()) & {"scipy", "flint", "networkx", "matplotlib"}
+
+
+def curve_of(number, shift=0.0, branches=1, rows=200):
+    """A circuit as it is drawn: a sine, in as many rows as asked."""
+    x = np.linspace(0.0, 6.0, rows)
+    branch = SimpleNamespace(turns=1)
+    circuit = SimpleNamespace(number=number, closed=True, branches=[branch] * branches)
+    return Chart(circuit, (Strand(1, x, np.sin(x) + shift),), (), (Marked(number, 1.0, 0.5, number == 1),), False)
+
+
+def test_circuits_that_look_the_same_are_drawn_once():
+    shown = Window(0.0, 6.0, False, (), 1.0)
+    alike = [curve_of(1), curve_of(2, rows=317), curve_of(3, shift=0.1), curve_of(4, branches=2), curve_of(5)]
+    found = alike_together(alike, shown)
+    assert [[each.number for each in (chart.circuit, *chart.others)] for chart in found] == [[1, 2, 5], [3], [4]]
+    assert [each.number for each in found[0].marked] == [1, 2, 5]
+
+
+def test_panels_of_circuits_that_look_the_same_are_one_with_their_numbers():
+    (made,) = planar.plot.circuits(planar.circuits(planar.load("scissor-lift")))
+    titles = [text.get_text() for axes in made.axes for text in axes.texts if text.get_gid() == "title"]
+    assert [title.split(" of ")[0] for title in titles] == ["Circuits 1, 3, 5 and 7", "Circuits 2, 4, 6 and 8"]
+
+
+def test_numbers_in_a_row_are_told_by_their_ends():
+    assert ranged([3, 1, 2, 7, 9, 8, 12]) == "1–3, 7–9 and 12"
+    assert ranged([1, 3, 5, 7]) == "1, 3, 5 and 7"
+    assert ranged([4, 5]) == "4 and 5"

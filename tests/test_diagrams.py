@@ -351,6 +351,7 @@ def test_no_text_lies_on_another_or_leaves_the_sheet(model, of, width, chords):
         assert apart, f"{one!r} lies on {other!r}"
 
 
+@pytest.mark.filterwarnings("ignore::planar.errors.MissingGlyphs")
 @pytest.mark.parametrize("name", ["$x_{\n\\frac{1", "机构 \U0001f600", "x" * 400])
 def test_hostile_names_are_shown_as_texts(name):
     (wide, _), found = boxes(diagrams(replace(planar.load("004-SC12"), name=name)))

@@ -151,6 +151,20 @@ def test_pages_of_one_solution_are_one_picture_or_one_document() -> None:
     assert len(pypdfium2.PdfDocument(document("double-butterfly"))) == len(figures)
 
 
+def test_no_formula_is_read_by_matplotlib_and_words_are_drawn_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    """That takes milliseconds for each of some hundreds, and a text of its own for every word nearly as long."""
+
+    def parse(*words: object) -> None:
+        raise AssertionError(words)
+
+    monkeypatch.setattr("matplotlib.mathtext.MathTextParser.parse", parse)
+    figures = solution_pages(planar.solve(planar.load("ten-link")))
+    assert len(sheets(figures, ".pdf")) > 1000
+    texts = [text.get_text() for figure in figures for text in figure.texts]
+    assert any(r"\omega" in text for text in texts)
+    assert len(texts) < sum(len(text.split()) for text in texts) / 2.0
+
+
 def test_the_same_solution_is_the_same_file() -> None:
     first, second = (sheets(solution_pages(planar.solve(planar.load("single-link"))), ".pdf") for _ in range(2))
     assert first == second
@@ -162,6 +176,7 @@ def test_a_scale_too_large_for_a_page_is_refused() -> None:
         solution_pages(state, (), scales(["1 cm = 0.01 m/s"]))
 
 
+@pytest.mark.filterwarnings("ignore::planar.errors.MissingGlyphs")
 def test_hostile_names_are_set_as_they_are() -> None:
     figures = solution_pages(planar.solve(planar.from_dict(hostile())))
     text = "".join(page.get_textpage().get_text_range() for page in pypdfium2.PdfDocument(sheets(figures, ".pdf")))
@@ -213,7 +228,7 @@ def test_a_long_table_has_its_head_on_every_page() -> None:
     for texts in told:
         assert texts.count("Number") == 1
         assert f"/ {len(figures)}" in " ".join(texts)
-    assert sum(texts.count("row") for texts in told) == 120
+    assert sum(text.startswith("row ") for texts in told for text in texts) == 120
 
 
 def test_what_is_higher_than_a_page_ends_nowhere_in_a_loop() -> None:
@@ -225,7 +240,7 @@ def test_what_is_higher_than_a_page_ends_nowhere_in_a_loop() -> None:
 def test_a_heading_stays_with_what_it_heads() -> None:
     strips = [*(strip for k in range(200) for strip in (*lines((f"Head {k}",), keep=True), *lines((f"text {k}",))))]
     for figure in paged(strips):
-        texts = [text.get_text() for text in figure.texts if text.get_text() in ("Head", "text")]
+        texts = [text.get_text().split()[0] for text in figure.texts[:-1]]
         assert texts[-1] == "text"
         assert texts[0] == "Head"
     assert A4[0] - 2.0 * MARGIN == ROOM

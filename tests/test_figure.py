@@ -14,12 +14,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planar.drawing.figure import PAGE, figure, pages, saved
+from planar.drawing.fonts import UNKNOWN
 from planar.drawing.ink import FILLS, HEAD_LENGTH, HEAD_WIDTH, INK, ready
 from planar.drawing.labels import placed
-from planar.drawing.lettering import UNKNOWN
+from planar.drawing.page import sheets
 from planar.drawing.picture import Arrow, Circle, Fill, Letter, Line, Pen, Picture
 from planar.errors import BadInput
 from tests.draws import draws
+from tests.fonts import own_fonts  # noqa: F401
 from tests.test_labels import HOSTILE
 
 INCH = 25.4
@@ -278,7 +280,8 @@ def test_letters_are_drawn_exactly_in_their_boxes():
         assert (columns.max() + 1) / 20.0 == pytest.approx(right - left + 3.0, abs=0.5)
 
 
-def test_a_plain_text_is_never_read_as_mathtext():
+@pytest.mark.filterwarnings("ignore::planar.errors.MissingGlyphs")
+def test_a_plain_text_is_never_read_as_mathtext(own_fonts):  # noqa: F811
     marks = tuple(Letter(text, (0.0, 9.0 * n), f"letter {n}") for n, text in enumerate(HOSTILE))
     made = figure([Picture(marks, "$\\frac{$ <b>", ("a_b^ $x$", "中文 \ud800"))], "$title$ &amp;")
     for kind in ("png", "svg", "pdf"):
@@ -290,6 +293,7 @@ def test_a_plain_text_is_never_read_as_mathtext():
     assert "&lt;b&gt;</text>" in page
 
 
+@pytest.mark.filterwarnings("ignore::planar.errors.MissingGlyphs")
 def test_hostile_names_of_marks_leave_a_page_that_can_be_read():
     from xml.etree import ElementTree
 
@@ -415,7 +419,7 @@ def test_pages_of_a_book_are_the_figures_in_order_each_of_its_own_size():
 def test_what_cannot_be_saved_is_refused_in_one_sentence():
     made = figure([scheme()])
     for suffix in ("jpg", ".eps", "", "svgz"):
-        with pytest.raises(BadInput, match=r"saved as \.png, \.svg or \.pdf"):
+        with pytest.raises(BadInput, match=r"can be written to files that end in \.png, \.svg or \.pdf"):
             saved(made, suffix)
     for suffix in ("png", ".svg"):
         with pytest.raises(BadInput, match=r"2 sheets need pages, which only \.pdf has"):
@@ -457,3 +461,14 @@ def test_letters_of_a_figure_stay_clear_of_the_other_axes_and_inside_their_own()
             left, low, right, top = box_of(made, text)
             assert own[0] < left and own[1] < low and right < own[2] and top < own[3]
     assert all(apart(one, other) for one, other in pairwise([box_of(made, axes) for axes in made.axes]))
+
+
+@pytest.mark.parametrize(("count", "columns", "rows"), [(1, 1, 1), (2, 1, 2), (5, 2, 3), (9, 3, 3)])
+def test_many_sheets_in_one_picture_are_wrapped(count, columns, rows):
+    corners = ((0.0, 0.0), (90.0, 0.0), (90.0, 90.0), (0.0, 90.0))
+    square = figure([Picture((Line(corners, Pen.LINK, "square", closed=True),))])
+    one = png_pixels(sheets([square], ".png"))
+    many = png_pixels(sheets([square] * count, ".png"))
+    assert many.shape == (rows * one.shape[0], columns * one.shape[1], 3)
+    dark = [part.min() < 128 for row in np.vsplit(many[::-1], rows) for part in np.hsplit(row, columns)]
+    assert dark == [True] * count + [False] * (rows * columns - count)

@@ -685,3 +685,9 @@ def test_letters_and_numbers_can_be_left_out():
 def test_the_same_position_is_drawn_the_same():
     for name in ("excavator-arm", "chain-42"):
         assert scheme(solved(name)) == drawn(name)
+
+
+def test_a_drawing_whose_pins_would_lie_on_each_other_takes_a_whole_sheet():
+    assert scheme(solved("stephenson-valve-gear")).notes == ("Space diagram, 1 cm = 100 mm",)
+    # others keep to the paper of a drawing
+    assert scheme(solved("walschaerts-valve-gear")).notes == ("Space diagram, 1 cm = 200 mm",)

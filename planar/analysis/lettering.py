@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from planar.analysis.ties import Rates
 from planar.analysis.walks import NEAR, Place
@@ -52,6 +52,11 @@ class Lettering:
     def shown(self, place: Place) -> str:
         """The name of a place's point in the space diagram."""
         return self.points[self.letter(place)]
+
+    def below(self, letters: Iterable[str]) -> dict[str, tuple[str, str]]:
+        """Of those letters whose points have no name in the mechanism the link, and the point that it lies at."""
+        found = {letter: self.places[letter][0] for letter in letters if self.points[letter] not in self.members}
+        return {letter: (place.link, place.over) for letter, place in found.items()}
 
     def plain(self, place: Place) -> str:
         """The letter of a place in the velocity polygon."""

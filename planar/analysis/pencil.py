@@ -85,7 +85,9 @@ class _Pencil:
                 self._locate(Place(moved[0][0], self.rates.local(*moved[0]), each.name))
         shown = {letter: point for letter, point in self.lettering.points.items() if letter in self.letters}
         kind = "velocity" if self.order == 1 else "acceleration"
-        return Polygon(self.state, kind, tuple(self.pole), self.letters, shown, tuple(self.stages))
+        return Polygon(
+            self.state, kind, tuple(self.pole), self.letters, shown, tuple(self.stages), self.lettering.below(shown)
+        )
 
     def _stands(self, rate: Rate) -> Rate:
         return self.alike.get(rate, rate)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple
@@ -158,3 +159,5 @@ class Polygon:
     "the point of the space diagram for each letter that is no head of a part"
     stages: tuple[Stage, ...]
     "in the order of drawing"
+    below: Mapping[str, tuple[str, str]]
+    "for each letter of a point that has no name in the mechanism its link, and the point of another that it lies at"

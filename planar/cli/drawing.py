@@ -73,7 +73,6 @@ def plot(
 ) -> None:
     """A drawing to scale: scheme, polygons, free bodies of a position; loci, diagrams, loads of a run; circuits."""
     from planar import plot as drawn
-    from planar.dynamics.flywheel import FLUCTUATION
     from planar.solving.position import solve
 
     steps_told = click.get_current_context().get_parameter_source("steps") is ParameterSource.COMMANDLINE
@@ -119,7 +118,7 @@ def plot(
                 "loci": lambda: drawn.loci(moving, points or None, scales),
                 "centrodes": lambda: drawn.centrodes(moving, *links, scale=scales),
                 "diagrams": lambda: drawn.diagrams(moving, of, steps if chords else None),
-                "torque": lambda: drawn.torque(moving, of, FLUCTUATION if fluctuation is None else fluctuation),
+                "torque": lambda: drawn.torque(moving, of, fluctuation),
                 "bearings": lambda: drawn.bearings(moving, pairs or None),
             }[what]()
         drawn.save(figure, output)

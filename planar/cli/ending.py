@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from types import MappingProxyType
@@ -11,7 +12,7 @@ from typing import Any, NoReturn
 
 import click
 
-from planar.errors import BadInput, NoAnswer, NotWritten, listed
+from planar.errors import BadInput, MissingGlyphs, NoAnswer, NotWritten, listed
 
 NO_ANSWER, BAD_INPUT, NOT_WRITTEN, INTERRUPTED = 1, 2, 3, 130
 """Exit statuses; 0 is done, 130 what shells give for an interrupt from the keyboard."""
@@ -88,7 +89,7 @@ class Commands(click.Group):
         return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: click.Context) -> Any:
-        with _ending():
+        with _ending(), _missing_glyphs_named():
             return super().invoke(ctx)
 
 
@@ -113,6 +114,26 @@ def _ending() -> Iterator[None]:
             told += f"; see `{problem.ctx.command_path if problem.ctx else 'planar'} --help`"
         wrong = str(BadInput("command line", told[0].lower() + told[1:]))
         _refuse(wrong, "bad input", wrong, BAD_INPUT)
+
+
+@contextmanager
+def _missing_glyphs_named() -> Iterator[None]:
+    """What no font can show is named in one line, however many texts have it; other warnings go their way."""
+    found: set[str] = set()
+    before = warnings.showwarning
+
+    def collect(message: Warning | str, *rest: Any) -> None:
+        if isinstance(message, MissingGlyphs):
+            found.update(message.characters)
+        else:
+            before(message, *rest)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", MissingGlyphs)
+        warnings.showwarning = collect
+        yield
+    if found:
+        click.echo(f"planar: {MissingGlyphs(found)}", err=True)
 
 
 def _refuse(

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from planar.drawing.bodies import bodies
+from planar.drawing.fonts import families, shown
 from planar.drawing.ink import FILLS, INK, ready
-from planar.drawing.lettering import FAMILY, shown
 from planar.drawing.paper import Scale
 from planar.drawing.picture import Circle, Fill, Line, Mark, Pen, Spot, extent
 from planar.drawing.positions import chosen_points, coupler_points
@@ -191,8 +191,9 @@ class _Stage:
         self.casts: dict[tuple[Any, ...], list[Artist]] = {}
         units = run.motion.mechanism.units
         self.kind, self.units = ("length" if run.slides else "angle"), units
+        family = list(families(shown(run.given.pair)))
         self.text = self.axes.text(
-            script.low[0] + EDGE, script.low[1] + 2.0, "", family=FAMILY, fontsize=9.0, va="bottom", parse_math=False
+            script.low[0] + EDGE, script.low[1] + 2.0, "", family=family, fontsize=9.0, va="bottom", parse_math=False
         )
 
     def shot(self, index: int) -> Array:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import floor, log10
+from math import ceil, floor, log10
 
 from planar.assemblies.modes import Mode, Modes
 from planar.drawing.bodies import bodies
 from planar.drawing.ground import fixed
 from planar.drawing.paper import Scale
-from planar.drawing.picture import Line, Mark, Pen, Picture, Spot, extent
+from planar.drawing.picture import Arrow, Circle, Line, Mark, Pen, Picture, Spot, extent
 from planar.drawing.scene import Scene
 from planar.drawing.scheme import point_letters, space_scale
 from planar.drawing.strokes import moving
@@ -18,12 +18,14 @@ from planar.errors import Outcome
 from planar.units import unit
 from planar.words import many
 
-SHEET = 24
-"""Assemblies of one sheet."""
+SHEET = 20
+"""Assemblies of one sheet, at the most."""
 MOST = 96
 """Assemblies that are drawn."""
-ROOMS = ((2, (125.0, 100.0)), (6, (82.0, 75.0)), (SHEET, (61.0, 58.0)))
+ROOMS = ((2, (130.0, 110.0)), (6, (86.0, 66.0)), (8, (62.0, 66.0)), (SHEET, (49.0, 48.0)))
 """mm for each drawing, where there are so many at the most."""
+SMALLER = ((2, 1.0), (8, 0.75), (MOST, 0.6))
+"""The size of pins and supports, where there are so many at the most, of their size in a drawing by itself."""
 LETTERED = 10
 """Points: of more the windows would be full of letters."""
 LETTER = 7.0
@@ -32,7 +34,7 @@ AROUND = 4.5
 """mm between a drawing and its window, for letters."""
 LARGE = 4.0
 """How much larger than on its own sheet a drawing is made to be measured, so that symbols hardly count."""
-ROUND = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
+ROUND = (1.0, 1.2, 1.4, 1.6, 1.8, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 7.0, 8.0, 10.0)
 """First digits of a scale: finer steps than a ruler likes, so that the drawings fill their windows."""
 THICK = 3
 """How many times the window of the sketch's own assembly is drawn, each outside the one before."""
@@ -46,8 +48,9 @@ def sheets_of(modes: Modes, scale: Scale | None = None) -> list[tuple[list[Pictu
     shown = list(modes[:MOST])
     if not shown:
         raise modes.refusal()
+    by = next(by for most, by in SMALLER if len(shown) <= most)
     chosen = scale or _fitting(shown)
-    drawn = [_marks(mode, chosen) for mode in shown]
+    drawn = [_marks(mode, chosen, by) for mode in shown]
     # letters keep near their spots, within the window
     low, high = extent([mark for marks in drawn for mark in marks])
     window = (low[0] - AROUND, low[1] - AROUND), (high[0] + AROUND, high[1] + AROUND)
@@ -56,10 +59,13 @@ def sheets_of(modes: Modes, scale: Scale | None = None) -> list[tuple[list[Pictu
         _picture(mode, marks, window, near is not None and near.choices == mode.choices)
         for mode, marks in zip(shown, drawn, strict=True)
     ]
-    for first in range(0, len(pictures), SHEET):
+    # sheets that are about as full as each other
+    count = ceil(len(pictures) / SHEET)
+    size = ceil(len(pictures) / count)
+    for first in range(0, len(pictures), size):
         pictures[first] = pictures[first]._replace(notes=(str(chosen),))
     heading = f"{modes.mechanism.name}: {_counted(modes, len(shown))}"
-    return [(pictures[first : first + SHEET], heading) for first in range(0, len(pictures), SHEET)]
+    return [(pictures[first : first + size], heading) for first in range(0, len(pictures), size)]
 
 
 def _counted(modes: Modes, shown: int) -> str:
@@ -87,11 +93,29 @@ def _fitting(shown: Sequence[Mode]) -> Scale:
     return Scale("length", by.to_si(digit * power) / 10.0, mechanism.units.length)
 
 
-def _marks(mode: Mode, scale: Scale) -> list[Mark]:
+def _marks(mode: Mode, scale: Scale, by: float = 1.0) -> list[Mark]:
+    """A drawing to scale, its symbols so much smaller than usual."""
     mechanism, shapes = mode.mechanism, mode.shapes
-    scene = Scene(mechanism, bodies(mechanism, shapes), mode.frames, shapes, scale)
+    larger = replace(scale, per_mm=scale.per_mm * by)
+    scene = Scene(mechanism, bodies(mechanism, shapes), mode.frames, shapes, larger)
     letters = list(point_letters(scene, LETTER))
-    return [*fixed(scene), *moving(scene), *(letters if len(letters) <= LETTERED else [])]
+    marks = [*fixed(scene), *moving(scene), *(letters if len(letters) <= LETTERED else [])]
+    return [_shrunk(mark, by) for mark in marks]
+
+
+def _shrunk(mark: Mark, by: float) -> Mark:
+    """A mark with all its places and radii so much smaller; a letter keeps its size."""
+
+    def place(at: Spot) -> Spot:
+        return by * at[0], by * at[1]
+
+    if isinstance(mark, Line):
+        return mark._replace(spots=tuple(map(place, mark.spots)))
+    if isinstance(mark, Arrow):
+        return mark._replace(tail=place(mark.tail), head=place(mark.head))
+    if isinstance(mark, Circle):
+        return mark._replace(centre=place(mark.centre), radius=by * mark.radius)
+    return mark._replace(at=place(mark.at), away=by * mark.away)
 
 
 def _picture(mode: Mode, marks: Sequence[Mark], window: tuple[Spot, Spot], own: bool) -> Picture:

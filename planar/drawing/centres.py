@@ -333,7 +333,6 @@ class _Sheet:
         counts.append((sum(each.homogeneous is None for each in self.found), "of no place"))
         total = len(self.found)
         yield f"{total} centre{'s' * (total != 1)}: {', '.join(f'{count} {told}' for count, told in counts if count)}"
-        yield self._proof()
         if any(self.of[name].how != "pair" for name in self.spots):
             yield "Dots: shown by pairs; rings: found on lines of centres"
         if any(each.centre.direction is None for each in arrows):
@@ -348,12 +347,6 @@ class _Sheet:
         yield from none[:FEW]
         if len(none) > FEW:
             yield f"and {len(none) - FEW} more of this kind"
-
-    def _proof(self) -> str:
-        proof = self.found.proof
-        worst = max(figure for figure in proof if figure is not None)
-        by = "three links" if proof.routes is None else "three links, Jacobian"
-        return f"Proof ({by}): worst figure {f'{worst:.1e}' if worst else '0'}"
 
 
 def _few(names: Sequence[str]) -> list[str]:

@@ -67,6 +67,8 @@ class Chart(NamedTuple):
     marked: tuple[Marked, ...]
     left_out: bool
     "whether turns of the input are left out"
+    others: tuple[Circuit, ...] = ()
+    "circuits that look the same"
 
 
 class Window(NamedTuple):

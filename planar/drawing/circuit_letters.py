@@ -7,18 +7,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planar.drawing.circuit_curves import Chart
+from planar.drawing.circuit_curves import Chart, Marked
 from planar.drawing.circuit_sheet import DEAD, LINES, MARK, RULE, SMALL, Sheet, Spot, plain
 from planar.drawing.lettering import measured, signed
 from planar.units import unit
+from planar.words import ranged
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Array = np.ndarray
 
-AWAY, EDGE = 3.2, 2.0
-"""mm from an assembly to its number, and from there to the panel's edge at the least."""
+AWAY, EDGE, SAME = 3.2, 2.0, 0.3
+"""mm from an assembly to its number, from there to the panel's edge at the least, and between marks that are one."""
 DIRECTIONS = np.arange(8) * np.pi / 4.0
 FRACTIONS = np.linspace(0.12, 0.88, 20)
 """Of a strand: where its number may stand."""
@@ -91,9 +92,14 @@ def letter_numbers(axes: Axes, sheet: Sheet, chart: Chart) -> None:
 def _letter_assemblies(axes: Axes, sheet: Sheet, chart: Chart, taken: Sequence[Array]) -> list[Array]:
     """Marks and numbers of the assemblies; what they take of the panel besides (mm)."""
     lettered: list[Array] = []
+    together: dict[tuple[float, float], list[Marked]] = {}
     for each in chart.marked:
         spot = sheet.mm(np.array(each.x), np.array(each.y))
-        filled = "black" if each.own else "white"
+        near = next((key for key in together if np.hypot(*(spot[0] - key)) <= SAME), tuple(spot[0]))
+        together.setdefault(near, []).append(each)
+    for key, marked in together.items():
+        spot = np.array([key])
+        filled = "black" if any(each.own for each in marked) else "white"
         axes.plot(
             *(spot[0] / sheet.size),
             transform=axes.transAxes,
@@ -107,7 +113,8 @@ def _letter_assemblies(axes: Axes, sheet: Sheet, chart: Chart, taken: Sequence[A
         inside = around[((around > EDGE) & (around < np.array(sheet.size) - EDGE)).all(axis=1)]
         at = _clearest(inside, np.concatenate([*taken, *lettered, spot]))
         lettered += [at[None], spot]
-        _letter(axes, sheet, at, "" if each.number is None else str(each.number), "black", "assembly")
+        told = ranged(each.number for each in marked if each.number is not None)
+        _letter(axes, sheet, at, told if any(each.number is not None for each in marked) else "", "black", "assembly")
     return lettered
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from planar.branches.circuits import Circuits
 from planar.drawing.circuit_curves import Reading, Window
-from planar.drawing.lettering import FAMILY
+from planar.drawing.fonts import families
 
 Array = np.ndarray
 Spot = tuple[float, float]
@@ -57,6 +57,6 @@ class Sheet(NamedTuple):
         )
 
 
-def plain(gid: str) -> dict[str, Any]:
-    """How a text is drawn as it stands, whatever is in it."""
-    return {"family": FAMILY, "parse_math": False, "gid": gid}
+def plain(gid: str, text: str = "", heavy: bool = False) -> dict[str, Any]:
+    """How a text is drawn as it stands, whatever is in it; without one only digits and such as every font has."""
+    return {"family": list(families(text, heavy=heavy)), "parse_math": False, "gid": gid}

@@ -11,16 +11,18 @@ import numpy as np
 
 from planar.branches.circuits import Circuits
 from planar.branches.located import Located
+from planar.drawing.circuit_alike import alike_together
 from planar.drawing.circuit_curves import Chart, Reading, Window, charts, readings, telling, window
 from planar.drawing.circuit_letters import letter_dead_points, letter_numbers
 from planar.drawing.circuit_sheet import GAP, HERE, LARGE, LINES, MARK, NORMAL, OTHER, SMALL, Sheet, Spot, plain
+from planar.drawing.fonts import FAMILY
 from planar.drawing.ink import POINT, ready
-from planar.drawing.lettering import FAMILY, clipped, measured, signed, wrapped
+from planar.drawing.lettering import clipped, measured, signed, wrapped
 from planar.drawing.paper import DEGREES, PLAIN, round_step
 from planar.drawing.runs import MOST_TURNS
 from planar.errors import NoAnswer, Outcome
 from planar.units import unit
-from planar.words import amount, many
+from planar.words import amount, many, ranged
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -54,7 +56,7 @@ def circuits_figures(circuits: Circuits, lying: Sequence[Located], of: str | Non
     outputs = readings(circuits.mechanism, telling(circuits, shown) if of is None else of)
     figures = []
     for reading in outputs:
-        drawn = charts(circuits, circuits[:MOST], reading, shown, lying)
+        drawn = alike_together(charts(circuits, circuits[:MOST], reading, shown, lying), shown)
         sheets = [drawn[first : first + SHEET] for first in range(0, len(drawn), SHEET)]
         columns, *size = next(rest for most, *rest in PANELS if min(len(drawn), SHEET) <= most)
         figures += [_figure(circuits, reading, shown, sheet, columns, (size[0], size[1])) for sheet in sheets]
@@ -101,12 +103,12 @@ def _figure(
     named = f"{reading.name} over the input {circuits.pair}"
     for text, points, down in ((circuits.mechanism.name, LARGE, 3.0), (f"Circuits: {named}", NORMAL, 8.5)):
         told = clipped(text, points, whole - 8.0)
-        made.text(0.5, 1.0 - down / height, told, fontsize=points, ha="center", va="top", **plain("title"))
+        made.text(0.5, 1.0 - down / height, told, fontsize=points, ha="center", va="top", **plain("title", told))
     for index, row_ in enumerate(keys):
         _key(made, row_, foot - 4.0 - line * (index + 0.5), whole, height)
     for index, text in enumerate(lines):
         at = foot - 4.0 - line * (len(keys) + index + 0.3)
-        made.text(6.0 / whole, at / height, text, fontsize=SMALL, va="top", **plain("caption"))
+        made.text(6.0 / whole, at / height, text, fontsize=SMALL, va="top", **plain("caption", text))
     return made
 
 
@@ -137,10 +139,10 @@ def _panel(axes: Axes, sheet: Sheet, chart: Chart, others: Sequence[Chart], firs
     for side in axes.spines.values():
         side.set_linewidth(0.5)
     x_name = clipped(sheet.circuits.pair, NORMAL, sheet.size[0] - 20.0)
-    axes.set_xlabel(f"{x_name} ({sheet.across})", fontsize=NORMAL, labelpad=2.0, **plain("input"))
+    axes.set_xlabel(f"{x_name} ({sheet.across})", fontsize=NORMAL, labelpad=2.0, **plain("input", x_name))
     if first:
         y_name = clipped(sheet.reading.name, NORMAL, sheet.size[1] - 10.0)
-        axes.set_ylabel(f"{y_name} ({sheet.up})", fontsize=NORMAL, labelpad=2.0, **plain("output"))
+        axes.set_ylabel(f"{y_name} ({sheet.up})", fontsize=NORMAL, labelpad=2.0, **plain("output", y_name))
     _gaps(axes, sheet)
     axes.axvline(across.from_si(sheet.shown.at), zorder=2, gid="file", **HERE)
     for other in others:
@@ -159,9 +161,13 @@ def _panel(axes: Axes, sheet: Sheet, chart: Chart, others: Sequence[Chart], firs
         )
     letter_numbers(axes, sheet, chart)
     letter_dead_points(axes, sheet, chart)
-    title = f"Circuit {chart.circuit.number} of {len(sheet.circuits)}{_goes(chart)}"
+    numbers = [each.number for each in (chart.circuit, *chart.others)]
+    named = f"Circuit{'s' * (len(numbers) > 1)} {ranged(numbers)}"
+    title = clipped(
+        f"{named} of {len(sheet.circuits)}{_goes(chart)}", NORMAL, sheet.size[0] + BETWEEN / 2.0, heavy=True
+    )
     axes.annotate(
-        clipped(title, NORMAL, sheet.size[0]),
+        title,
         (0.0, 1.0),
         (0.0, (sheet.head - 3.5 if chart.dead else TITLE - 3.5) / POINT),
         "axes fraction",
@@ -170,7 +176,7 @@ def _panel(axes: Axes, sheet: Sheet, chart: Chart, others: Sequence[Chart], firs
         fontweight="bold",
         ha="left",
         va="bottom",
-        **plain("title"),
+        **plain("title", title, heavy=True),
     )
 
 
@@ -257,5 +263,5 @@ def _key(made: Figure, keys: Sequence[Key], up: float, whole: float, height: flo
     for text, style in keys:
         xs = [left, left + SAMPLE - 1.5] if style["ls"] else [left + SAMPLE - 3.0]
         made.add_artist(Line2D([x / whole for x in xs], [up / height] * len(xs), gid="key", **style))
-        made.text((left + SAMPLE) / whole, up / height, text, fontsize=SMALL, va="center", **plain("key"))
+        made.text((left + SAMPLE) / whole, up / height, text, fontsize=SMALL, va="center", **plain("key", text))
         left += _long((text, style))

@@ -10,8 +10,9 @@ import numpy as np
 
 from planar.drawing.curves import Chords, Curve, chords, default_subject, slide_of, subject
 from planar.drawing.diagram_notes import Ordinate, Sheet, caption, inner, raised
+from planar.drawing.fonts import FAMILY, families
 from planar.drawing.ink import POINT, ready
-from planar.drawing.lettering import FAMILY, clipped, signed
+from planar.drawing.lettering import clipped, measured, signed
 from planar.drawing.paper import DEGREES, PLAIN, fitting, round_step
 from planar.drawing.runs import steady
 from planar.errors import BadInput
@@ -45,14 +46,7 @@ SYMBOLS = {False: ("S", "V", "a"), True: ("φ", "ω", "ε")}
 def diagrams(
     motion: Motion | Mechanism, of: str | None = None, chords: int | None = None, width: float = 120.0
 ) -> Figure:
-    """S-t, V-t and a-t diagrams of a slide, point or link over a motion in time, or a run at the input's steady speed.
-
-    `of` left out: the first slide on the frame that is not driven, else the angle of the link on a pin of the frame
-    that is farthest along. A slide on the frame is measured from its top dead centre, where the run starts. `width`
-    is the length of the time axis in mm on paper; `chords` adds graphical differentiation over so many intervals
-    (Machine Elements, 1.3.6 (iii)). Where the file gives no speed, rates are per radian (or metre) of the input.
-    Raises BadInput for a name that is not there, NoAnswer where there is no motion.
-    """
+    """S-t, V-t and a-t diagrams, as `planar.plot.diagrams` has them. Raises BadInput, NoAnswer."""
     if isinstance(width, bool) or not isinstance(width, Real) or not NARROWEST <= width <= WIDEST:
         raise BadInput("width", f"a time axis of {NARROWEST:g} to {WIDEST:g} mm is wanted, not {width!r:.40}")
     if chords is not None and (
@@ -72,6 +66,8 @@ def diagrams(
 def _drawn(sheet: Sheet) -> Figure:
     ready()
     from matplotlib.figure import Figure
+
+    from planar.drawing.written import write
 
     ordinates = [_ordinate(sheet, index) for index in range(3)]
     lines = caption(sheet, ordinates, SMALL, LEFT + sheet.width + RIGHT - 8.0)
@@ -97,8 +93,8 @@ def _drawn(sheet: Sheet) -> Figure:
         bottom -= BETWEEN / 2.0
     _head(made, sheet, charts[0], size)
     for index, (text, math) in enumerate(lines):
-        at = (4.0 / size[0], (3.0 + line * (len(lines) - index)) / size[1])
-        made.text(*at, text, family=FAMILY, fontsize=SMALL, va="top", parse_math=math, gid="caption")
+        at = (4.0 / size[0], (3.0 + line * (len(lines) - index) - SMALL * POINT) / size[1])
+        write(made, text, at, SMALL, math=math, gid="caption")
     return made
 
 
@@ -165,6 +161,8 @@ def _written(values: Array, ordinate: Ordinate) -> Array:
 
 def _stems(axes: Axes, sheet: Sheet, ordinate: Ordinate, curve: Curve, found: Chords) -> None:
     """Chords as points on thin stems at the middles of the intervals, lettered V_1, V_2 on the free side of zero."""
+    from planar.drawing.written import write
+
     rates = _written(found.rates, ordinate)
     hollow = "white" if curve.name == "y" else CHORD
     axes.vlines(found.times, 0.0, rates, color=CHORD, lw=0.5, zorder=3, gid="stem")
@@ -182,17 +180,11 @@ def _stems(axes: Axes, sheet: Sheet, ordinate: Ordinate, curve: Curve, found: Ch
             if low >= ordinate.low and high <= ordinate.high and not ((near > low - 0.4) & (near < high + 0.4)).any():
                 if side * rate > 0.0:
                     continue
-                at = (time, 0.7 * side * per_mm)
-                axes.text(
-                    *at,
-                    f"${ordinate.symbol}_{{{number}}}$",
-                    family=FAMILY,
-                    fontsize=SMALL - 0.5,
-                    color=CHORD,
-                    ha="center",
-                    va="bottom" if side > 0 else "top",
-                    gid=f"{ordinate.symbol}_{number}",
-                )
+                name = f"{ordinate.symbol}_{number}"
+                text = f"${ordinate.symbol}_{{{number}}}$"
+                _, high, below = measured(text, SMALL - 0.5, math=True)
+                at = (time, (0.7 + below if side > 0 else below - high - 0.7) * per_mm)
+                write(axes, text, at, SMALL - 0.5, math=True, ha="center", color=CHORD, gid=name)
                 break
 
 
@@ -247,12 +239,13 @@ def _head(made: Figure, sheet: Sheet, chart: Axes, size: tuple[float, float]) ->
     """Title, dead centres, stroke, and which curve is which."""
     mechanism = sheet.run.motion.mechanism
     rows = ((mechanism.name, LARGE, 3.0), (f"Kinematic diagrams of {sheet.subject.words}", NORMAL, 8.5))
-    for text, points, down in rows:
+    for whole, points, down in rows:
+        text = clipped(whole, points, size[0] - 8.0)
         made.text(
             0.5,
             1.0 - down / size[1],
-            clipped(text, points, size[0] - 8.0),
-            family=FAMILY,
+            text,
+            family=list(families(text)),
             fontsize=points,
             ha="center",
             va="top",

@@ -222,4 +222,4 @@ class _Sheet:
 
 def _simple(name: str) -> bool:
     """Whether a name can stand as an index in a formula."""
-    return name.isascii() and name.isalnum()
+    return name.isalnum()

@@ -8,9 +8,10 @@ from io import BytesIO
 from math import hypot
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from planar.drawing.fonts import outlined, quiet, shown
 from planar.drawing.ink import FILLS, INK, POINT, Ink, ready
 from planar.drawing.labels import Placed, placed
-from planar.drawing.lettering import font, measured, shown, wrapped
+from planar.drawing.lettering import measured, wrapped
 from planar.drawing.outline import Head, check, head, pointed, sweep
 from planar.drawing.picture import Arrow, Circle, Letter, Line, Mark, Pen, Picture, Spot, extent
 from planar.errors import BadInput, no_format
@@ -40,6 +41,8 @@ SETTINGS = {
     "svg.fonttype": "none",
     "svg.hashsalt": "planar",
     "pdf.fonttype": 42,
+    # matplotlib 3.11 reads this one to see how many characters of a PDF's font may stand together
+    "ps.fonttype": 42,
     "pdf.compression": 6,
     "pdf.use14corefonts": False,
     "text.usetex": False,
@@ -174,7 +177,6 @@ def pages(figures: Sequence[Figure], suffix: str) -> bytes:
     """Figures as the pages of one PDF, or a single one as png or svg. Raises BadInput."""
     ready()
     from matplotlib import rc_context
-    from matplotlib.backends.backend_pdf import PdfPages
 
     kind = suffix.lower().removeprefix(".")
     if kind not in METADATA:
@@ -184,12 +186,9 @@ def pages(figures: Sequence[Figure], suffix: str) -> bytes:
     if len(figures) > 1 and kind != "pdf":
         raise BadInput(suffix, f"{len(figures)} sheets need pages, which only .pdf has")
     out = BytesIO()
-    with rc_context(SETTINGS):
+    with rc_context(SETTINGS), quiet():
         if kind == "pdf":
-            with PdfPages(out, metadata=METADATA[kind]) as book:
-                for each in figures:
-                    book.savefig(each)
-            return out.getvalue()
+            return _book(figures)
         across, up = figures[0].get_size_inches() * RESOLUTION
         if kind == "png" and (across * up > PIXELS or max(across, up) >= 2**16):
             raise BadInput(suffix, f"{across:.0f} x {up:.0f} pixels are too many: choose .pdf, .svg or a smaller scale")
@@ -197,9 +196,25 @@ def pages(figures: Sequence[Figure], suffix: str) -> bytes:
     return _any_font(out.getvalue()) if kind == "svg" else out.getvalue()
 
 
+def _book(figures: Sequence[Figure]) -> bytes:
+    from matplotlib import rc_context
+    from matplotlib.backends.backend_pdf import PdfPages
+
+    from planar.drawing.written import families_of
+
+    out = BytesIO()
+    used = {family for each in figures for family in families_of(each)}
+    # where a font cannot be embedded as it is, all are embedded as drawings of their letters
+    fonts = {} if outlined(used) else {"pdf.fonttype": 3, "ps.fonttype": 3}
+    with rc_context(fonts), PdfPages(out, metadata=METADATA["pdf"]) as book:
+        for each in figures:
+            book.savefig(each)
+    return out.getvalue()
+
+
 def _any_font(page: bytes) -> bytes:
-    """An SVG page whose letters any font without serifs can show where matplotlib's own is not installed."""
-    return re.sub(rb"(font(?:-family)?: [^;\"]*'DejaVu Sans[^';\"]*')(?=[;\"])", rb"\1, sans-serif", page)
+    """An SVG page whose letters any font without serifs can show where those that it names are not installed."""
+    return re.sub(rb"(font(?:-family)?: [^;\"]*'DejaVu Sans[^;\"]*')(?=[;\"])", rb"\1, sans-serif", page)
 
 
 def cell(picture: Picture) -> _Cell:
@@ -236,10 +251,10 @@ def _rows(cells: Sequence[_Cell]) -> list[list[_Cell]]:
 
 def _write(made: Figure, line: str, at: Spot, size: float) -> None:
     """One line of text, centred, on its base line (mm from the sheet's lower left corner)."""
+    from planar.drawing.written import write
+
     width, height = made.get_size_inches() * INCH
-    properties = font(size, heavy=size != NOTE)
-    where = at[0] / width, at[1] / height
-    made.text(*where, line, fontproperties=properties, ha="center", va="baseline", color="black", parse_math=False)
+    write(made, line, (at[0] / width, at[1] / height), size, heavy=size != NOTE, ha="center")
 
 
 def put(made: Figure, cell: _Cell, corner: Spot) -> None:
@@ -263,24 +278,16 @@ def put(made: Figure, cell: _Cell, corner: Spot) -> None:
 
 def _letter(axes: Axes, letters: Sequence[Placed], order: int) -> None:
     """Letters in their boxes and the lines that lead to their spots, above all else."""
+    from planar.drawing.written import write
+
     for letter, box, leader in letters:
         if leader is not None:
             _line(axes, leader, INK[Pen.LEADER], f"{letter.about} leader", order)
-        _, tall, below = measured(letter.text, letter.size, letter.slanted, letter.math)
-        written = axes.text(
-            # centred, as the same font is a little wider or narrower in other programs
-            (box.left + box.right) / 2.0,
-            box.bottom + below,
-            letter.text,
-            fontproperties=font(letter.size, letter.slanted),
-            ha="center",
-            va="baseline",
-            color="black",
-            parse_math=letter.math,
-            # so that the text's own extent is its box and not a full line (from matplotlib 3.11 on)
-            linespacing=max(tall / (letter.size * POINT), 1e-3),
-        )
-        _named(written, letter.about, order + 1)
+        below = measured(letter.text, letter.size, letter.slanted, letter.math).below
+        # centred, as the same font is a little wider or narrower in other programs
+        at = (box.left + box.right) / 2.0, box.bottom + below
+        looks = {"math": letter.math, "slanted": letter.slanted, "ha": "center"}
+        _named(write(axes, letter.text, at, letter.size, **looks), letter.about, order + 1)
 
 
 def _named(artist: Artist, about: str, order: float) -> None:

@@ -6,11 +6,12 @@ import re
 from collections.abc import Callable, Mapping
 
 from planar.analysis.phrases import Chord, Fraction, Name, Phrase, Piece, Quantity, Raised, Spot, Symbol, bare, primed
+from planar.drawing.textline import LETTER
 
 GREEK = {"ω": r"\omega", "α": r"\alpha"}
-SIMPLE = re.compile(r"[A-Za-z0-9][A-Za-z0-9′″]{0,23}")
+SIMPLE = re.compile(f"{LETTER}(?:{LETTER}|[′″]){{0,23}}")
 """A name, or a word of it, that may stand in a formula; any other is set as the text that it is."""
-ITALIC = re.compile(r"([A-Za-z][0-9]{0,2}[′″]*){1,2}|([A-Z][0-9]{0,2}[′″]*){1,6}")
+ITALIC = re.compile(r"([^\W\d_][0-9]{0,2}[′″]*){1,2}|([A-Z][0-9]{0,2}[′″]*){1,6}")
 """Names of points, of links and of lines between points, which are slanted; words are upright."""
 COUNTED = re.compile(r"[0-9.()×+/ −]*")
 """Numbers and what stands between them."""

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from functools import cache, lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from functools import lru_cache
+from typing import NamedTuple
 
+from planar.drawing.fonts import shown
 from planar.drawing.ink import POINT, ready
 from planar.drawing.picture import Letter
+from planar.drawing.textline import text_line
 
-if TYPE_CHECKING:
-    from matplotlib.font_manager import FontProperties
-
-FAMILY = "DejaVu Sans"
-"""The font that comes along with matplotlib, so that a drawing is the same everywhere."""
 LONGEST = 60
 """Characters of a plain letter that are shown; of longer ones the middle is left out."""
-UNKNOWN = "\N{REPLACEMENT CHARACTER}"
 
 
 class Size(NamedTuple):
@@ -27,36 +23,11 @@ class Size(NamedTuple):
     below: float
 
 
-def font(points: float, slanted: bool = False, heavy: bool = False) -> FontProperties:
-    """The font at a size (points)."""
-    ready()
-    from matplotlib.font_manager import FontProperties
-
-    style, weight = "oblique" if slanted else "normal", "bold" if heavy else "normal"
-    return FontProperties(family=FAMILY, style=style, weight=weight, size=points)
-
-
-@cache
-def _known(character: str, slanted: bool, heavy: bool) -> bool:
-    """Whether the font has a glyph for it."""
-    from matplotlib.font_manager import findfont, get_font
-
-    return bool(get_font(findfont(font(9.0, slanted, heavy))).get_char_index(ord(character)))
-
-
-def shown(text: str, slanted: bool = False, heavy: bool = False) -> str:
-    """The text on one line, with U+FFFD for what the font lacks; spaces of any kind become plain ones."""
-    spaced = " ".join(text.split())
-    return "".join(each if each.isprintable() and _known(each, slanted, heavy) else UNKNOWN for each in spaced)
-
-
 def fit(letter: Letter) -> Letter:
     """The letter with a text that can be drawn as it stands; `math` stays only where that is mathtext without fault."""
     ready()
-    from matplotlib.cbook import is_math_text
-
     text = shown(letter.text, letter.slanted)
-    math = letter.math and bool(is_math_text(text))
+    math = letter.math and "$" in text
     if math:
         try:
             measured(text, letter.size, letter.slanted, True)
@@ -85,11 +56,8 @@ def joined(letters: list[Letter]) -> Letter:
 @lru_cache(maxsize=4096)
 def measured(text: str, points: float, slanted: bool = False, math: bool = False, heavy: bool = False) -> Size:
     """The size on paper of one line of text (mm). Raises ValueError where mathtext is faulty."""
-    ready()
-    from matplotlib.textpath import text_to_path
-
-    sizes = text_to_path.get_text_width_height_descent(text, font(points, slanted, heavy), math)
-    return Size(*(float(each) * POINT for each in sizes))
+    line, size = text_line(text, math, slanted, heavy), POINT * points
+    return Size(size * line.width, size * (line.up + line.down), size * line.down)
 
 
 def wrapped(text: str, points: float, width: float, heavy: bool = False) -> list[str]:
@@ -118,11 +86,11 @@ def wrapped(text: str, points: float, width: float, heavy: bool = False) -> list
     return [*lines, line] if line else lines
 
 
-def clipped(text: str, points: float, room: float) -> str:
+def clipped(text: str, points: float, room: float, heavy: bool = False) -> str:
     """A plain text on one line of at most so many mm, the rest left out."""
-    text = shown(text)
-    while len(text) > 1 and measured(text, points).width > room:
-        text = f"{text[: min(len(text) - 2, int(len(text) * room / measured(text, points).width))]}…"
+    text = shown(text, heavy=heavy)
+    while len(text) > 1 and (wide := measured(text, points, heavy=heavy).width) > room:
+        text = f"{text[: min(len(text) - 2, int(len(text) * room / wide))]}…"
     return text
 
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from io import BytesIO
-from logging import ERROR, getLogger
+from math import isclose
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,14 +13,15 @@ from planar.analysis.phrases import Name, Phrase, number
 from planar.analysis.published import Comparison
 from planar.analysis.sections import Section
 from planar.analysis.solution import Solution, Worked, worked_solution
-from planar.drawing.figure import SETTINGS, cell, pages, put
-from planar.drawing.flow import PAGE, ROOM, Column, Strip, lines, paged, table
+from planar.drawing.figure import INCH, SETTINGS, cell, pages, put
+from planar.drawing.flow import HEIGHT, PAGE, ROOM, WIDTH, Column, Strip, lines, paged, table
+from planar.drawing.fonts import quiet
 from planar.drawing.ink import ready
 from planar.drawing.paper import Scale, fitting
 from planar.drawing.picture import Letter, Picture, extent
 from planar.drawing.polygons import polygon_picture
 from planar.drawing.scheme import scheme, space_scale, standing
-from planar.drawing.typeset import Sheet, Style, lift
+from planar.drawing.typeset import Sheet, Style
 from planar.dynamics.attachment import choices
 from planar.errors import BadInput
 from planar.mechanism import QUANTITIES
@@ -30,7 +30,6 @@ from planar.units import own, shown, unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-    from matplotlib.text import Text
 
 ROOMS = {"length": (80.0, 80.0), "velocity": (80.0, 90.0), "acceleration": (80.0, 90.0)}
 """mm that a drawing takes at the most, unless its scale is given."""
@@ -62,18 +61,19 @@ def solution_pages(
 
 
 def sheets(figures: Sequence[Figure], suffix: str) -> bytes:
-    """Pages as a .pdf file, or below each other as one .png picture. Raises BadInput."""
+    """Pages as a .pdf file, or together as one .png picture. Raises BadInput."""
     if suffix.lower() != ".png":
-        with _level(figures), _quiet():
-            return pages(figures, suffix)
+        return pages(figures, suffix)
     from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.image import imsave
 
-    high = sum(figure.get_size_inches()[1] for figure in figures)
+    sizes = np.array([figure.get_size_inches() for figure in figures])
+    columns = _columns(len(figures), *sizes.max(axis=0))
+    high = sum(sizes[row : row + columns, 1].max() for row in range(0, len(sizes), columns))
     dots = min(RESOLUTION, int(HIGHEST / high))
     found = []
-    with rc_context(SETTINGS):
+    with rc_context(SETTINGS), quiet():
         for figure in figures:
             canvas = FigureCanvasAgg(figure)
             figure.set_dpi(dots)
@@ -81,38 +81,26 @@ def sheets(figures: Sequence[Figure], suffix: str) -> bytes:
             found.append(np.asarray(canvas.buffer_rgba())[..., :3].copy())
     out = BytesIO()
     wide = max(page.shape[1] for page in found)
-    found = [np.pad(page, ((0, 0), (0, wide - page.shape[1]), (0, 0)), constant_values=255) for page in found]
-    imsave(out, np.vstack(found), format="png", dpi=dots, metadata={"Software": None})
+    rows = []
+    for first in range(0, len(found), columns):
+        row = found[first : first + columns]
+        tall = max(page.shape[0] for page in row)
+        row += [np.zeros((0, 0, 3), dtype=np.uint8)] * (columns - len(row))
+        rows.append(np.hstack([_padded(page, tall, wide) for page in row]))
+    imsave(out, np.vstack(rows), format="png", dpi=dots, metadata={"Software": None})
     return out.getvalue()
 
 
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """The writer of fonts does not tell how old the book face is."""
-    log = getLogger("fontTools")
-    before = log.level
-    log.setLevel(ERROR)
-    try:
-        yield
-    finally:
-        log.setLevel(before)
+def _columns(count: int, width: float, height: float) -> int:
+    """Sheets (inches) side by side, so that the picture is about square; upright pages of A4 are below each other."""
+    if isclose(INCH * width, WIDTH, abs_tol=0.1) and isclose(INCH * height, HEIGHT, abs_tol=0.1):
+        return 1
+    return max(each for each in range(1, count + 1) if each == 1 or each * width <= -(-count // each) * height)
 
 
-@contextmanager
-def _level(figures: Sequence[Figure]) -> Iterator[None]:
-    """Formulas on their base lines, as PDF files have them."""
-    moved: list[tuple[Text, float]] = []
-    for figure in figures:
-        high = 72.0 * figure.get_size_inches()[1]
-        for text in figure.texts:
-            if text.get_parse_math():
-                moved.append((text, text.get_position()[1]))
-                text.set_y(moved[-1][1] - lift(text.get_text(), text.get_fontsize()) / high)
-    try:
-        yield
-    finally:
-        for text, y in moved:
-            text.set_y(y)
+def _padded(page: np.ndarray, tall: int, wide: int) -> np.ndarray:
+    """A page with white paper on the right and below it."""
+    return np.pad(page, ((0, tall - page.shape[0]), (0, wide - page.shape[1]), (0, 0)), constant_values=255)
 
 
 def _fitting(solution: Solution) -> dict[str, Scale]:

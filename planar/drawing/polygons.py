@@ -15,6 +15,7 @@ from planar.analysis.polygons import Meeting, Polygon, Simultaneous, Triangle, V
 from planar.analysis.ties import Rates, Slide, rates
 from planar.drawing.paper import Scale, fitting
 from planar.drawing.picture import Arrow, Circle, Letter, Line, Mark, Pen, Picture, spot
+from planar.drawing.textline import LETTER
 from planar.mechanism import named_points
 from planar.units import own
 
@@ -31,7 +32,7 @@ STILL = {"velocity": "everything is at rest", "acceleration": "nothing is accele
 TURNING = {"velocity": "no lettered point moves", "acceleration": "no lettered point is accelerated"}
 """Of links that turn about their only points."""
 PRIME = "′"
-SIMPLE = re.compile(f"[A-Za-z][A-Za-z0-9]*{PRIME}*")
+SIMPLE = re.compile(f"{LETTER}+{PRIME}*")
 """A letter as textbooks have it, with digits and primes, or a word; any other text is shown as it stands."""
 LOWERED = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 Ends = tuple[str, str]
@@ -63,6 +64,7 @@ def polygon_picture(polygon: Polygon, scale: Scale | None = None) -> Picture:
     notes = [f"{polygon.kind} polygon".capitalize(), *([said] if still else [str(scale), scale.mu])]
     if len(polygon.pole) > MANY:
         notes.append(f"at the pole: {', '.join(polygon.points[letter] for letter in polygon.pole)}")
+    notes += [] if still else _legend(polygon)
     return Picture(_Sheet(polygon, scale).marks(), polygon.state.mechanism.name, tuple(notes))
 
 
@@ -73,7 +75,27 @@ def letter_text(polygon: Polygon, letter: str) -> tuple[str, bool]:
         return f"${base}_{{{index}}}$".replace(PRIME, "'"), True
     if index:
         base += index.translate(LOWERED) if index == "1" else f"_{index}"
-    return base.replace(PRIME * 3, "‴").replace(PRIME * 2, "″"), False
+    return _primed(base), False
+
+
+def _primed(base: str) -> str:
+    """A letter with its primes as one character."""
+    return base.replace(PRIME * 3, "‴").replace(PRIME * 2, "″")
+
+
+def _legend(polygon: Polygon) -> Iterator[str]:
+    """What letters stand for that are not those of points in the space diagram."""
+    if polygon.kind == "acceleration":
+        parts = any(letter not in polygon.points for letter in polygon.letters)
+        yield "index 1: accelerations of points" + ("; other indices: ends of their parts" if parts else "")
+    links: dict[str, list[str]] = {}
+    for letter, (link, _) in polygon.below.items():
+        links.setdefault(link, []).append(letter)
+    for link, letters in links.items():
+        bare = ", ".join(_primed(_indexed(polygon, letter)[0]) for letter in letters)
+        at = ", ".join(polygon.below[letter][1] for letter in letters)
+        whose = "the frame" if link == polygon.state.mechanism.frame else link
+        yield f"{bare}: the point{'s' * (len(letters) > 1)} of {whose} at {at}"
 
 
 def _indexed(polygon: Polygon, letter: str) -> Ends:

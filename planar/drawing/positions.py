@@ -14,6 +14,7 @@ from planar.drawing.paper import HEIGHT, WIDTH, Scale, fitting
 from planar.drawing.picture import Circle, Fill, Letter, Line, Mark, Pen, Picture, spot
 from planar.drawing.runs import Run, closing, steady
 from planar.drawing.scheme import body_marks, ground_marks, scheme
+from planar.drawing.textline import LETTER
 from planar.errors import BadInput
 from planar.mechanism import Drive, Mechanism, NamedPoint, motions, named_points, with_inputs
 from planar.motion import Motion
@@ -227,8 +228,8 @@ def _letters(run: Run, chosen: Sequence[str], rows: Sequence[int], scale: Scale)
 
 
 def _numbered(name: str, indices: Sequence[int]) -> tuple[str, bool]:
-    """A name with the numbers of its positions, and whether that is mathtext: a plain name of letters only is."""
-    if re.fullmatch(r"[A-Za-z]+[0-9]*", name):
+    """A name with the numbers of its positions, and whether that is mathtext: a name of letters and digits is."""
+    if re.fullmatch(f"(?![0-9]){LETTER}+", name):
         base = name if len(name) == 1 else f"\\mathit{{{name}}}"
         return ", ".join(f"${base}_{{{index}}}$" for index in indices), True
     return ", ".join(f"{name}{str(index).translate(LOWERED)}" for index in indices), False

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from itertools import product
+from itertools import combinations, product
 from math import atan2, hypot, pi, remainder
 
 from planar.drawing import symbols
@@ -12,7 +12,7 @@ from planar.drawing.element_strokes import centre_letters
 from planar.drawing.elements import Centre
 from planar.drawing.ground import Clearance, fixed, ground_marks
 from planar.drawing.labels import SAME
-from planar.drawing.paper import WIDTH, Scale, fitting
+from planar.drawing.paper import HEIGHT, WIDTH, Scale, fitting
 from planar.drawing.picture import Arrow, Letter, Line, Mark, Pen, Picture, spot
 from planar.drawing.scene import Scene, Travel, standing
 from planar.drawing.strokes import body_marks, moving
@@ -28,6 +28,10 @@ from planar.units import shown
 
 __all__ = ["body_marks", "ground_marks", "point_letters", "scheme", "space_scale", "standing"]
 
+CROWDED = 2.2 * symbols.PIN
+"""mm between pins within which they lie on each other."""
+SHEET = (240.0, 150.0)
+"""mm of a sheet of A4 on its side that a crowded drawing may take, its letters and symbols left out."""
 SMALLEST = 60.0
 """mm: a figure that would be smaller may be higher than others."""
 SWEEP = 1.75
@@ -58,7 +62,7 @@ def scheme(
     fits = space_scale(mechanism, frames, state.shapes)
     if scale is not None and scale.per_mm * FINEST < fits.per_mm:
         raise BadInput("scale", "the drawing would be metres large on paper: choose a smaller one")
-    scale = scale or fits
+    scale = scale or _uncrowded(fits, mechanism, frames, state.shapes)
     scene = Scene(mechanism, bodies(mechanism, state.shapes), frames, state.shapes, scale, travel or {})
     strokes: list[Mark] = [*fixed(scene), *moving(scene), *_fixed_points(scene)]
     clear = Clearance.of(strokes)
@@ -73,8 +77,13 @@ def scheme(
     return Picture(tuple(strokes), mechanism.name, (f"Space diagram, {scale}",))
 
 
-def space_scale(mechanism: Mechanism, frames: Mapping[str, Frame], shapes: Mapping[str, Shape]) -> Scale:
-    """The round scale at which all points, bodies and wheels of a mechanism in a position fit the paper."""
+def space_scale(
+    mechanism: Mechanism,
+    frames: Mapping[str, Frame],
+    shapes: Mapping[str, Shape],
+    room: tuple[float, float] = (WIDTH, HEIGHT),
+) -> Scale:
+    """The round scale at which all points, bodies and wheels of a mechanism in a position fit a room (mm)."""
     places = [frames[link].carry(point) for link, shape in shapes.items() for point in shape.points.values()]
     for link, body in bodies(mechanism, shapes).items():
         corners = [*(end for side in body.sides for end in side), *(guide.foot for guide in body.guides)]
@@ -88,10 +97,21 @@ def space_scale(mechanism: Mechanism, frames: Mapping[str, Frame], shapes: Mappi
             places.append(frames[mark.link].carry(mark.at))
     xs, ys = zip(*places, strict=True) if places else ((0.0,), (0.0,))
     width, height = float(max(xs) - min(xs)), float(max(ys) - min(ys))
-    fits = fitting("length", mechanism.units.length, width, height)
+    fits = fitting("length", mechanism.units.length, width, height, room)
     if fits.on_paper(max(width, height)) >= SMALLEST:
         return fits
     return fitting("length", mechanism.units.length, width, height, (WIDTH, WIDTH))
+
+
+def _uncrowded(fits: Scale, mechanism: Mechanism, frames: Mapping[str, Frame], shapes: Mapping[str, Shape]) -> Scale:
+    """The scale, or where pins would lie on each other the one that fits a whole sheet."""
+    pins = {mark.name for mark in all_marks(mechanism, shapes) if isinstance(mark, Pin)}
+    named = [each.members[0] for each in named_points(mechanism) if each.name in pins]
+    places = [frames[link].carry(shapes[link].at(point)) for link, point in named]
+    apart = [fits.on_paper(hypot(*(one - other))) for one, other in combinations(places, 2)]
+    if not any(SAME < each < CROWDED for each in apart):
+        return fits
+    return space_scale(mechanism, frames, shapes, SHEET)
 
 
 def _fixed_points(scene: Scene) -> Iterator[Mark]:

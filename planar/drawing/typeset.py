@@ -3,26 +3,26 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
-from functools import cache, lru_cache
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import lru_cache
+from itertools import groupby
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from planar.analysis.phrases import Paper, Phrase, Quantity, measured, plain
+from planar.drawing.fonts import BOOK, shown
 from planar.drawing.formulas import formula
 from planar.drawing.ink import POINT, ready
-from planar.drawing.lettering import FAMILY as OTHER
-from planar.drawing.lettering import shown
+from planar.drawing.textline import text_line
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-    from matplotlib.font_manager import FontProperties
 
-FAMILY = "STIXGeneral"
-"""The book face that comes along with matplotlib, for texts and formulas alike."""
 LEADING = 1.32
 """From one line to the next, in sizes of the font, where nothing in them is higher."""
-SPACE = 0.27
-"""Between words, in sizes of the font."""
+SPACE = 0.25
+"""Between words, in sizes of the font: that of the book face."""
+ALIKE = 0.1
+"""mm by which each of several words may be moved when they are drawn as one text."""
 CLEAR = 1.5
 """mm between lines with tall formulas."""
 INCH = 25.4
@@ -69,44 +69,11 @@ class Style(NamedTuple):
 TEXT = Style()
 
 
-@lru_cache(maxsize=256)
-def font(size: float, heavy: bool = False, slanted: bool = False, family: str = FAMILY) -> FontProperties:
-    """A font, with formulas in the same face."""
-    ready()
-    from matplotlib.font_manager import FontProperties
-
-    return FontProperties(
-        family=family,
-        size=size,
-        weight="bold" if heavy else "normal",
-        style="italic" if slanted else "normal",
-        math_fontfamily="stix",
-    )
-
-
-@cache
-def _has(character: str, heavy: bool, slanted: bool) -> bool:
-    from matplotlib.font_manager import findfont, get_font
-
-    return bool(get_font(findfont(font(10.0, heavy, slanted))).get_char_index(ord(character)))
-
-
-def family(text: str, heavy: bool = False, slanted: bool = False) -> str:
-    """The book face, or the one of the drawings where the book face lacks a letter."""
-    return FAMILY if all(_has(each, heavy, slanted) for each in text) else OTHER
-
-
 @lru_cache(maxsize=8192)
 def atom(text: str, math: bool, style: Style) -> Atom:
     """A text with its extent on paper. Raises ValueError where a formula is faulty."""
-    ready()
-    from matplotlib.textpath import text_to_path
-
-    shape = font(style.size, style.heavy, style.slanted, FAMILY if math else family(text, style.heavy, style.slanted))
-    width, height, down = (
-        float(each) * POINT for each in text_to_path.get_text_width_height_descent(text, shape, math)
-    )
-    return Atom(text, math, style.size, style.heavy, style.slanted, width, height - down, down)
+    line, by = text_line(text, math, style.slanted, style.heavy, BOOK), POINT * style.size
+    return Atom(text, math, style.size, style.heavy, style.slanted, by * line.width, by * line.up, by * line.down)
 
 
 def words(phrase: Phrase, style: Style = TEXT, paper: Mapping[str, Paper] | None = None) -> list[Word]:
@@ -116,7 +83,7 @@ def words(phrase: Phrase, style: Style = TEXT, paper: Mapping[str, Paper] | None
         told = formula(piece) if not isinstance(piece, str) else None
         if told is not None:
             try:
-                found[-1].append(atom(f"${told}$", True, style))
+                found[-1].append(atom(f"${told if told.isascii() else shown(told)}$", True, style))
                 continue
             except ValueError:
                 pass
@@ -131,25 +98,15 @@ def words(phrase: Phrase, style: Style = TEXT, paper: Mapping[str, Paper] | None
             if index:
                 found.append([])
             if part:
-                found[-1].append(atom(_shown(part, style), False, style))
+                found[-1].append(atom(_short(part, style), False, style))
     return [tuple(word) for word in found if word]
 
 
-@lru_cache(maxsize=8192)
-def lift(text: str, size: float) -> float:
-    """Points by which PDF files have a formula too high: they count its height in whole points."""
-    from matplotlib.textpath import text_to_path
-
-    whole, exact = (text_to_path.mathtext_parser.parse(text, 72, font(many * size)).glyphs for many in (1.0, 100.0))
-    return float(whole[0][-1]) - float(exact[0][-1]) / 100.0 if whole else 0.0
-
-
-def _shown(text: str, style: Style) -> str:
+def _short(text: str, style: Style) -> str:
     """A word that the fonts can show, with the middle of a very long one left out."""
     if len(text) > LONGEST:
         text = f"{text[: LONGEST * 2 // 3]}…{text[-LONGEST // 3 :]}"
-    here = family(text, style.heavy, style.slanted) == FAMILY
-    return text if here else shown(text, style.slanted, style.heavy) or "?"
+    return shown(text, style.slanted, style.heavy) or "?"
 
 
 def set_lines(phrase: Phrase, width: float, style: Style = TEXT, paper: Mapping[str, Paper] | None = None) -> list[Row]:
@@ -207,6 +164,25 @@ def _lined(line: Sequence[Atom | None], space: float) -> Row:
     )
 
 
+def _runs(atoms: Sequence[tuple[float, Atom]]) -> Iterator[tuple[float, Atom]]:
+    """The same with neighbouring words as one text: to draw each by itself takes long."""
+    for math, group in groupby(atoms, lambda each: each[1].math):
+        several = list(group)
+        if math:
+            yield from several
+            continue
+        start, first = several[0]
+        text, end = "", start
+        for away, each in several:
+            text += f" {each.text}" if away > end + ALIKE else each.text
+            end = away + each.width
+        whole = atom(text, False, Style(first.size, first.heavy, first.slanted))
+        if abs(start + whole.width - end) <= ALIKE * len(several):
+            yield start, whole
+        else:
+            yield from several
+
+
 def height(row: Row, size: float) -> float:
     """mm that a line takes: at least the leading of its font."""
     leading = LEADING * size * POINT
@@ -227,17 +203,19 @@ class Sheet(NamedTuple):
 
     def row(self, row: Row, x: float, y: float) -> None:
         """A line of text from x on, on its base line y."""
-        for away, each in row.atoms:
-            face = FAMILY if each.math else family(each.text, each.heavy, each.slanted)
-            self.figure.text(
-                (x + away) / self.width,
-                y / self.height,
+        from planar.drawing.written import write
+
+        for away, each in _runs(row.atoms):
+            at = (x + away) / self.width, y / self.height
+            write(
+                self.figure,
                 each.text,
-                fontproperties=font(each.size, each.heavy, each.slanted, face),
-                ha="left",
-                va="baseline",
-                parse_math=each.math,
-                color="black",
+                at,
+                each.size,
+                math=each.math,
+                slanted=each.slanted,
+                heavy=each.heavy,
+                family=BOOK,
             )
 
     def rule(self, x: tuple[float, float], y: float, thick: float) -> None:
