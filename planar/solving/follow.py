@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from itertools import pairwise
 from types import MappingProxyType
 from typing import NamedTuple, Protocol
@@ -14,6 +15,7 @@ from planar.program import Program, length
 from planar.roots import root
 from planar.solving.branch import Branch, cancelling
 from planar.solving.curve import Arc, Curve, Point, Traced
+from planar.solving.periods import by_periods
 from planar.solving.straight import STRAIGHT, Told, course
 from planar.solving.walk import Missed, Passed, Walk
 
@@ -24,6 +26,8 @@ NEARLY = 0.1
 """A correction longer than this part of an arc has gone astray."""
 RESTING = 1e-7
 """A rate of the inputs along the curve below this is none: the position is a dead point to rounding."""
+NEAR = 0.125
+"""rad or sizes from one position to the next, where few are asked for on a far way."""
 SEAM = 1e-9
 """rad or sizes: so near to the end of a way a change point is at that end."""
 
@@ -245,6 +249,9 @@ def followed(solver: Followed, p: Array, z: Array, start: Array, stop: Array) ->
     reach = float(np.max(np.abs(way), initial=0.0))
     if reach == 0.0:
         return Run(np.stack([z, z]), 0)
+    whole = by_periods(solver, z, np.stack([start, stop]), partial(_near, solver, p))
+    if whole is not None:
+        return Run(whole, 1)
     trip = Trip(solver, p, z, start, way)
     found = trip.to(reach)
     if found is None:
@@ -268,8 +275,10 @@ def run(
     `rates` of the inputs the run tells those of its samples as well, so far as they are surely sound.
     """
     samples = len(u)
-    found = np.empty((samples, z.size))
-    found[0] = z
+    found = by_periods(solver, z, u, partial(_near, solver, p))
+    if found is not None:
+        return Run(found, samples - 1)
+    found = np.vstack([z, np.empty((samples - 1, z.size))])
     done, general = 1, 0
     local: dict[int, Local] = {}
     met_on_way: list[Met] = []
@@ -318,6 +327,17 @@ def run(
                 break
         missed += trip.walk.missed
     return Run(found, general, None, None, local, tuple(met_on_way), tuple(missed), told)
+
+
+def _near(solver: Followed, p: Array, z: Array, start: Array, u: Array) -> Array | None:
+    """The unknowns at inputs u (samples, inputs) that are reached one after the other from others; None where a change
+    point is met. Raises NoAnswer where the motion ends."""
+    most = max(int(np.abs(np.diff(np.vstack([start, u]), axis=0)).max() / NEAR), 1)
+    ways = [np.linspace(a, b, most + 1)[1:] for a, b in pairwise(np.vstack([start, u]))]
+    found = run(solver, p, z, np.vstack([start, *ways]))
+    if found.stopped is not None:
+        raise found.stopped
+    return None if found.met or found.missed else found.z[most::most]
 
 
 def _untold(solver: Followed, samples: int) -> Told:
