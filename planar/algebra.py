@@ -39,6 +39,15 @@ def sqrt(x: Scalar) -> Scalar:
     return _by_its_own("sqrt", x)
 
 
+def hypot(x: Scalar, y: Scalar) -> Scalar:
+    """The length of (x, y), however large or small its square."""
+    if type(x) is float and type(y) is float:
+        return math.hypot(x, y)
+    if isinstance(x, float | np.ndarray) and isinstance(y, float | np.ndarray):
+        return np.hypot(x, y)
+    return sqrt(x * x + y * y)
+
+
 def atan2(y: Scalar, x: Scalar) -> Scalar:
     """The angle of the direction (x, y), between -pi and pi."""
     if type(y) is float and hasattr(x, "__arctan2__"):  # a number over a symbol
@@ -109,6 +118,35 @@ class Jet:
 
     def sin(self) -> Jet:
         return Jet(*self._turned()[1])
+
+
+class Terms(Jet):
+    """The sizes of a quantity's terms and of their derivatives: a formula run on these says how much it adds up.
+
+    What cancels in the formula does not here: + and - both add, and every number counts by its size.
+    """
+
+    __slots__ = ()
+
+    def _lifted(self, other: Scalar) -> tuple[Scalar, ...]:
+        return other.parts if isinstance(other, Terms) else (abs(other),) + (0.0,) * (len(self.parts) - 1)
+
+    def __add__(self, other: Scalar) -> Terms:
+        return Terms(*super().__add__(other).parts)
+
+    def __neg__(self) -> Terms:
+        return self
+
+    def __mul__(self, other: Scalar) -> Terms:
+        return Terms(*super().__mul__(other if isinstance(other, Terms) else abs(other)).parts)
+
+    __sub__ = __radd__ = __rsub__ = __add__
+    __rmul__ = __mul__
+
+
+def terms(value: Jet) -> Terms:
+    """The sizes of a quantity and its derivatives, each for itself."""
+    return Terms(*(abs(part) for part in value.parts))
 
 
 def orders(value: Scalar) -> tuple[Scalar, ...]:

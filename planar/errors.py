@@ -23,6 +23,7 @@ class Outcome(StrEnum):
     TOO_MANY_INPUTS = "too many inputs"
     INPUT_JAMMED = "input jammed"
     BRANCH_LOST = "branch lost"
+    TOO_INEXACT = "too inexact"
 
 
 class Ending(StrEnum):

@@ -5,23 +5,27 @@ It says yes to what is surely sound. To what it does not, the general path says 
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property, lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 
+from planar.algebra import Jet, Terms, terms
 from planar.called import Called
 from planar.elimination import stack
 from planar.equations import Equations
 from planar.mechanism import Mechanism, motions
 from planar.pairs import Kind
+from planar.plane import Frame, frame_at, terms_of
 from planar.program import CACHED, NEWTON_STEPS, Program, compact, length, placed, program, solved, structure
 
 Array = np.ndarray
 
-MOST_TURNS = 1e6
-"""Turns, or sizes: beyond them rounding leaves too little of an angle to judge anything by."""
+CARRIED = 1e-3
+"""The rates of a constraint are judged by its own terms, and by this part of the greatest speed anywhere: some rounding
+of that is carried round a loop into terms that are small, as where a link comes to rest."""
 LARGEST = 12
 """Unknowns of a group: the expressions of a larger one would be too long."""
 
@@ -43,6 +47,8 @@ class Verdict(NamedTuple):
     "no more than the least strength of any group, see `solving.freedom`"
     least: Array
     "no more than the least singular value of any group, columns of one size"
+    amplified: Array
+    "by how much, at most, round-off is greater in the rates, see `solving.accuracy`"
 
 
 class Stride(NamedTuple):
@@ -107,13 +113,17 @@ class Judged:
         w1 = ca.jtimes(e.w, rates.y, rates.v)
         w2 = ca.jtimes(w1, rates.y, rates.v) + ca.jtimes(e.w, rates.y, rates.a)
         w1, w2 = ca.substitute([w1, w2], [rates.v, rates.a], [ca.vertcat(z1, u1), ca.vertcat(z2, u2)])
-        strength = ca.SX(1.0)
+        strength, lost = ca.SX(1.0), ca.SX(1.0)
         for stage, block in zip(e.stages, rates.blocks, strict=True):
             if length(stage.unknowns):
-                strength = ca.fmin(strength, _strength(block, by[stage.rows], least[stage.unknowns]))
+                own = _strength(block, by[stage.rows], least[stage.unknowns])
+                strength = ca.fmin(strength, own)
+                for k in range(block.size2()):
+                    lost = ca.fmax(lost, 1.0 / (ca.norm_2(block[:, k]) * own * own))
+        lost = lost * ca.fmax(_most(ca.fabs(e.w)) / np.pi, 1.0)
         clear, distances = rates.clear(ca.vertcat(ways, axis))
         judged = self._gate(e.w, w1, w2, e.u, u1, u2, e.p)
-        outputs = [ca.horzcat(e.w, w1, w2), stack([*judged, strength, clear]), ways, distances]
+        outputs = [ca.horzcat(e.w, w1, w2), stack([*judged, strength, clear, lost]), ways, distances]
         given = [e.z, axis, e.u, u1, u2, e.p, by, least]
         return compact("position", given, [ca.densify(each) for each in outputs])
 
@@ -157,6 +167,7 @@ class Judged:
             ca.SX.sym(name, size) for name, size in (*((n, e.u.numel()) for n in ("u", "u1", "u2")), ("p", e.p.numel()))
         )
         closures, kinds, contacts, counted = self._closures(w, u, p)
+        whole = self._terms((w, w1, w2), (u, u1, u2), p)
         x, x1, x2 = ca.vertcat(w, u), ca.vertcat(w1, u1), ca.vertcat(w2, u2)
 
         def rates(of: ca.SX) -> tuple[ca.SX, ca.SX]:
@@ -167,14 +178,18 @@ class Judged:
             ca.fabs(ca.sin(left)) + 1.0 - ca.cos(left) if kind is Kind.ANGLE else ca.fabs(left)
             for kind, left in zip(kinds, ca.vertsplit(closures) if kinds else [], strict=True)
         ]
+        broken = []
+        lengths = [k for k, kind in enumerate(kinds) if kind is Kind.LENGTH]
+        for order, left in enumerate(rates(closures), 1):
+            scale = stack(size.parts[order] for size in whole)
+            scale = scale + CARRIED * _most(scale[lengths])
+            broken.append(_most(ca.fabs(left) / ca.if_else(scale == 0.0, 1.0, scale)))
         greatest = self._greatest(w1, w2)
-        broken = [_most(ca.fabs(each) / size) for each, size in zip(rates(closures), greatest, strict=True)]
         open_ = [
             _most(ca.fabs(each) / size)
             for each, size in zip((contacts, *rates(contacts)), (1.0, *greatest), strict=True)
         ]
         many = ca.fmax(_most(ca.fabs(counted)) / (2.0 * np.pi), 1.0)
-        many = ca.if_else(many > MOST_TURNS, 1e-300, many)
         total = sum(gaps, ca.SX(0.0)) + ca.sum1(ca.vertcat(w, w1, w2))
         verdict = [_most(stack(gaps)) / many, total, *broken, _most(stack(open_))]
         inner = ca.Function("gate", [w, w1, w2, u, u1, u2, p], verdict)
@@ -188,33 +203,50 @@ class Judged:
         found = [_most(ca.fabs(w1)), ca.fmax(_most(ca.fabs(w2)), _most(w1[turns] ** 2))]
         return [ca.if_else(each == 0.0, 1.0, each) for each in found]
 
+    def _terms(self, w: tuple[ca.SX, ...], u: tuple[ca.SX, ...], p: ca.SX) -> list[Terms]:
+        """The sizes of the terms of every constraint and every input, with their rates."""
+        sizes = [terms(Jet(*each)) for each in zip(*(ca.vertsplit(each) for each in w), strict=True)]
+        frames, own = self._placed(sizes, terms_of)
+        given = [terms(Jet(*each)) for each in zip(*(ca.vertsplit(each) for each in u), strict=True)]
+        return [each for _, each in self._rows(frames, own, given, p)]
+
+    def _placed(self, w: Sequence[Any], frame: Callable[..., Frame]) -> tuple[dict[str, Frame], dict[str, tuple]]:
+        column = {(c.owner, c.part): k for k, c in enumerate(self.equations.coordinates)}
+        pairs = {pair.name: pair for pair in self.structure.pairs}
+        return placed(w, column, [link.name for link in self.structure.links], pairs, frame)
+
+    def _rows(
+        self, frames: dict[str, Frame], own: dict[str, tuple], u: Sequence[Any], p: ca.SX
+    ) -> Iterator[tuple[Kind, Any]]:
+        """(kind, what is left open) of every constraint, then of every input."""
+        mechanism, values = self.structure, iter(ca.vertsplit(p) if p.numel() else ())
+        numbers: dict[str, list[ca.SX]] = {}
+        for pair in mechanism.pairs:
+            numbers[pair.name] = [next(values) for _ in pair.measures]
+            left = pair.residual([frames[link] for link in pair.bodies], numbers[pair.name], own[pair.name])
+            yield from zip(pair.constrains, left, strict=True)
+        named = motions(mechanism)
+        for given, at in zip(mechanism.inputs, u, strict=True):
+            pair = named[given.pair]
+            known = numbers.get(pair.name, [])
+            yield (
+                pair.drive_kind,
+                pair.drive([frames[link] for link in pair.bodies], known, own.get(pair.name, ())) - at,
+            )
+
     def _closures(self, w: ca.SX, u: ca.SX, p: ca.SX) -> tuple[ca.SX, list[Kind], ca.SX, ca.SX]:
         """What every constraint and every input leaves open with its kind, gaps of contacts, and what counts turns."""
         mechanism, first = self.structure, 0
-        column = {(c.owner, c.part): k for k, c in enumerate(self.equations.coordinates)}
-        pairs = {pair.name: pair for pair in mechanism.pairs}
-        frames, own = placed(ca.vertsplit(w), column, [link.name for link in mechanism.links], pairs)
-        numbers: dict[str, list[ca.SX]] = {}
-        closures: list[ca.SX] = []
-        kinds: list[Kind] = []
+        frames, own = self._placed(ca.vertsplit(w), frame_at)
+        rows = list(self._rows(frames, own, ca.vertsplit(u) if u.numel() else [], p))
         contacts: list[ca.SX] = []
         for pair in mechanism.pairs:
-            numbers[pair.name] = [p[first + k] for k in range(len(pair.measures))]
+            gap = pair.apart([p[first + k] for k in range(len(pair.measures))], own[pair.name])
             first += len(pair.measures)
-            closures += pair.residual([frames[link] for link in pair.bodies], numbers[pair.name], own[pair.name])
-            kinds += pair.constrains
-            gap = pair.apart(numbers[pair.name], own[pair.name])
             contacts += [gap] if isinstance(gap, ca.SX) else []
-        named = motions(mechanism)
-        for k, given in enumerate(mechanism.inputs):
-            pair = named[given.pair]
-            known = numbers.get(pair.name, [])
-            drive = pair.drive([frames[link] for link in pair.bodies], known, own.get(pair.name, ()))
-            closures.append(drive - u[k])
-            kinds.append(pair.drive_kind)
         counted = [frame.angle for frame in frames.values() if not frame.fixed]
         counted += [each for values in own.values() for each in values]
-        return stack(closures), kinds, stack(contacts), stack(counted)
+        return stack(left for _, left in rows), [kind for kind, _ in rows], stack(contacts), stack(counted)
 
 
 class _Rates:

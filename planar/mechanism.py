@@ -67,8 +67,14 @@ QUANTITIES = {
 """What a published value may be of, and what it is measured in."""
 
 
+HUGE = 10**100
+"""SI; beyond it squares, and squares of squares, overflow."""
+TINY = 1e-100
+"""SI; a number that is not 0 is no smaller, or its square is none."""
 FARTHEST = 1e4
-"""rad or m: to where a position is followed step by step, and how far an angle may count."""
+"""rad or m: to where a position is followed step by step."""
+MOST_COUNTED = 1e12
+"""rad: how far an angle may count; beyond it rounding leaves less than three digits of where it points."""
 
 
 class Input(NamedTuple):
@@ -183,8 +189,8 @@ def with_inputs(mechanism: Mechanism, drives: tuple[Drive, ...]) -> Mechanism:
         for value in drive[1:]:
             if value is not None and (isinstance(value, bool) or not isinstance(value, Real) or not isfinite(value)):
                 raise BadInput(drive.pair, f"an input moves to a finite number (rad or m), not {value!r:.60}")
-            if value is not None and abs(value) > FARTHEST:
-                raise BadInput(drive.pair, f"an input moves to {FARTHEST:g} rad or m at most")
+            if value is not None and abs(value) > MOST_COUNTED:
+                raise BadInput(drive.pair, f"an input moves to {MOST_COUNTED:g} rad or m at most")
     changes = {drive.pair: drive for drive in drives}
     for pair in changes.keys() - {given.pair for given in mechanism.inputs}:
         known = ", ".join(given.pair for given in mechanism.inputs) or "none"

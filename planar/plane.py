@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from planar.algebra import Scalar, cos, sin
+from planar.algebra import Scalar, Terms, cos, sin
 
 
 class Vector(NamedTuple):
@@ -71,3 +71,10 @@ GROUND = Frame(0.0, 0.0, 1.0, 0.0, 0.0, True)
 def frame_at(x: Scalar, y: Scalar, angle: Scalar) -> Frame:
     """A frame with its cos and sin made afresh from its angle."""
     return Frame(x, y, cos(angle), sin(angle), angle)
+
+
+def terms_of(x: Terms, y: Terms, angle: Terms) -> Frame:
+    """The sizes of a frame's parts and of their rates, its axes in whatever direction they are."""
+    _, first, second = angle.parts
+    axes = Terms(1.0, first, second + first * first)
+    return Frame(x, y, axes, axes, angle)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property, lru_cache
 from math import hypot
 from typing import NamedTuple
@@ -67,7 +67,9 @@ class Assemblies:
             whole[self._unknowns] = own[0]
             for _ in range(POLISHED):
                 whole[self._unknowns] = self._polished(whole, u, p)[0][0]
-            left = np.maximum(left, self._polished(whole, u, p)[1][0, 0])
+            # the greatest of what is left open does not see what is not a number
+            sure = np.isfinite(whole[self._unknowns]).all()
+            left = np.maximum(left, self._polished(whole, u, p)[1][0, 0] if sure else np.nan)
             found.append(whole[self._unknowns])
         return found, float(left), bend
 
@@ -150,7 +152,7 @@ class Program:
         """(y, y1, y2, p) -> F and w, one after the other, with their first and second rates, and dF/dy."""
         e = self.equations
         both = ca.vertcat(e.F, e.w)
-        y, y1, y2, first, second = _derivatives(e, both)
+        y, y1, y2, first, second = derivatives(e, both)
         slopes = ca.jacobian(e.F, y)
         outputs = [ca.horzcat(both, first, second), slopes]
         return ca.Function("kinematics", [y, y1, y2, e.p], [ca.densify(output) for output in outputs])
@@ -158,7 +160,7 @@ class Program:
     @cached_property
     def _third(self) -> ca.Function:
         e = self.equations
-        y, y1, y2, _, second = _derivatives(e, e.F)
+        y, y1, y2, _, second = derivatives(e, e.F)
         third = ca.jtimes(second, y, y1) + ca.jtimes(second, y1, y2)
         return ca.Function("third", [y, y1, y2, e.p], [ca.densify(third)])
 
@@ -166,7 +168,7 @@ class Program:
     def _jerks(self) -> ca.Function:
         e = self.equations
         both = ca.vertcat(e.F, e.w)
-        y, y1, y2, _, second = _derivatives(e, both)
+        y, y1, y2, _, second = derivatives(e, both)
         y3 = ca.SX.sym("y3", y.numel())
         third = ca.jtimes(second, y, y1) + ca.jtimes(second, y1, y2) + ca.jtimes(second, y2, y3)
         return ca.Function("jerks", [y, y1, y2, y3, e.p], [ca.densify(third)])
@@ -300,7 +302,7 @@ class Program:
         return all(length(stage.rows) == length(stage.unknowns) and not stage.free for stage in self.equations.stages)
 
 
-def _derivatives(e: Equations, value: ca.SX) -> tuple[ca.SX, ...]:
+def derivatives(e: Equations, value: ca.SX) -> tuple[ca.SX, ...]:
     """y = (z, u) with symbols for its derivatives, and those of an expression in y.
 
     The chain rule twice: d/dt = (d/dy) y1, d2/dt2 = (d/dy)(d/dt) y1 + (d/dy) y2.
@@ -397,11 +399,18 @@ def scaled(values: Sequence[float], kinds: Sequence[Kind], unit: float) -> list[
 
 
 def placed(
-    w: Sequence[Scalar] | Array, column: Mapping[tuple[str, str], int], links: Iterable[str], pairs: Mapping[str, Pair]
+    w: Sequence[Scalar] | Array,
+    column: Mapping[tuple[str, str], int],
+    links: Iterable[str],
+    pairs: Mapping[str, Pair],
+    framed: Callable[..., Frame] = frame_at,
 ) -> tuple[dict[str, Frame], dict[str, tuple[Scalar, ...]]]:
-    """Frames of links and own coordinates of pairs from w, whose entries may be floats, arrays or jets."""
+    """Frames of links and own coordinates of pairs from w, whose entries may be floats, arrays or jets.
+
+    `framed` makes a frame of x, y and angle.
+    """
     frames = {
-        link: frame_at(*(w[column[link, part]] for part in ("x", "y", "angle"))) if (link, "x") in column else GROUND
+        link: framed(*(w[column[link, part]] for part in ("x", "y", "angle"))) if (link, "x") in column else GROUND
         for link in links
     }
     own = {name: tuple(w[column[name, part]] for part, _ in pair.coordinates) for name, pair in pairs.items()}

@@ -314,8 +314,8 @@ def test_of_several_inputs_one_runs_and_the_others_stand_still():
         ({"steps": 2.0}, "steps: "),
         ({"steps": True}, "steps: "),
         ({"steps": 10**7}, "steps: .*1000000"),
-        ({"start": np.nan}, "start: a number up to 10000"),
-        ({"stop": np.inf}, "stop: a number up to 10000"),
+        ({"start": np.nan}, r"start: a number up to 1e\+12"),
+        ({"stop": np.inf}, r"stop: a number up to 1e\+12"),
         ({"pair": "B"}, "there is no input at 'B'; inputs are at A"),
     ],
 )

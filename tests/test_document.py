@@ -766,6 +766,8 @@ MISTAKES = [
     mistake("links/AB/length", "50 deg", "$.links.AB.length", "angle", "length is wanted"),
     mistake("links/AB/length", "50 parsnips", "$.links.AB.length", "'parsnips'"),
     mistake("links/AB/length", "1e999 m", "$.links.AB.length", "too large"),
+    mistake("links/AB/length", 1e-155, "$.links.AB.length", "too small", "write 0"),
+    mistake("links/AD/points/D", [1e-200, 0], "$.links.AD.points.D[0]", "too small"),
     mistake("links/AB/length", inf, "$.links.AB.length", "too large"),
     mistake("links/AB/length", nan, "$.links.AB.length", "not a number"),
     mistake("links/AB/length", 10**400, "$.links.AB.length", "too large"),
@@ -1085,7 +1087,7 @@ def finite(m: Mechanism) -> bool:
 
 NAMES = st.text(st.characters(exclude_categories=("C", "Z"), exclude_characters=".:,"), min_size=1, max_size=6)
 LENGTHS = st.floats(1e-3, 1e3)
-SIGNED = st.floats(-1e3, 1e3)
+SIGNED = st.floats(-1e3, 1e3).map(lambda x: x if abs(x) > 1e-90 else 0.0)  # no length is smaller, in any unit
 SPELLED = {
     "length": st.one_of(
         SIGNED, st.integers(-99, 99), SIGNED.map(lambda x: f"{x!r} in"), SIGNED.map(lambda x: f"{x}mm")

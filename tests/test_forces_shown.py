@@ -421,4 +421,7 @@ def test_the_lamp_is_in_balance_wherever_it_stands():
     found = planar.forces(planar.cycle(MODELS["balanced-lamp"], 24, 0.1, 1.5), inertia=False)
     acting = [each for each in found.acting if each.kind in ("weight", "spring")]
     assert max(np.abs(each.power).max() for each in acting) > 0.1
-    np.testing.assert_allclose(found.inputs["O"], 0.0, atol=1e-13)
+    # the pins carry up to eighty times the weights, since arm and stay lie all but in one line: every one of the
+    # nine equations of the three links rounds moments as great as these forces at the arm's length
+    held = sum(np.linalg.norm(found.reactions[name].force, axis=-1) for name in "OPAB")
+    assert np.all(np.abs(found.inputs["O"]) <= 9.0 * np.finfo(float).eps * held * 0.4)

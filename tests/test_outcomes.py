@@ -331,7 +331,7 @@ def test_three_cranks_not_in_line_carry_each_other_over_their_dead_points(positi
     assert turned.link("k").angle == pytest.approx(0.0, abs=1e-12)
 
 
-@pytest.mark.parametrize("value", [float("nan"), float("inf"), "60 deg", [1.0], 1j, True, 1e9])
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), "60 deg", [1.0], 1j, True, 1e13])
 def test_an_input_moves_only_to_a_finite_number(value):
     with pytest.raises(BadInput, match="an input moves to"):
         solve(changed(), {"A": value})

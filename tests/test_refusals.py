@@ -134,6 +134,10 @@ CASES = {
     "change point": (PARALLELOGRAM, ["A = 180 deg", "2 freedoms for 1 input", "'BC' and 'DC'", "a further input"]),
     "too few inputs": (twins(("A", 50)), ["1 input", "'p', 'r' and 'q'", "1 way", "'U' or 'V' or 'P' or 'R'"]),
     "too many inputs": (beside(("A", 50), ("U", 60)), ["'A' and 'U'", "the input at 'U' cannot move", "leave it out"]),
+    "too inexact": (
+        four_bar(a=44, b=1e-11, c=56, theta=0, sketch={"C": [44, 0]}),
+        ["A = 0 deg", "link 'BC' has an arm of 1e-13", "lengthen link 'BC'"],
+    ),
     "input jammed": (beside(("U", 60)), ["'U'", "'f' and 'p' fast", "'AB', 'BC' and 'DC'", "drive 'A' or 'B'"]),
 }
 

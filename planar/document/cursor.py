@@ -10,9 +10,9 @@ from functools import cached_property
 from math import isnan
 from typing import Any
 
-from planar.document.schema import FORBIDDEN, HUGE
+from planar.document.schema import FORBIDDEN
 from planar.errors import BadInput, listed, unshown
-from planar.mechanism import FARTHEST, Units
+from planar.mechanism import HUGE, MOST_COUNTED, TINY, Units
 from planar.shapes import Link, shape
 from planar.units import UnitError, example, quantity, unit
 
@@ -180,6 +180,8 @@ class Cursor:
             found = self._bare(self.as_number(), kind)
         if not abs(found) < HUGE:
             raise self.refuse(None, "the number is too large")
+        if kind == "length" and 0.0 < abs(found) < TINY:
+            raise self.refuse(None, f"the number is too small; write 0, or {TINY:g} m at least")
         return found
 
     def as_number(self) -> float:
@@ -243,8 +245,9 @@ class Cursor:
 
     def turned(self, key: str) -> float:
         found = self.quantity(key, "angle")
-        if abs(found) > FARTHEST:
-            raise self.refuse(key, f"an angle counts {FARTHEST:g} rad of turns at most")
+        if abs(found) > MOST_COUNTED:
+            told = f"beyond {MOST_COUNTED:g} rad rounding leaves less than three digits of where an angle points"
+            raise self.refuse(key, f"{told}; count fewer turns")
         return found
 
     def optional(self, key: str, kind: str) -> float | None:

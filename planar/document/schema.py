@@ -8,23 +8,24 @@ from __future__ import annotations
 from typing import Any
 
 from planar.laws import MOST, MOTIONS, Piece
-from planar.mechanism import QUANTITIES
+from planar.mechanism import HUGE, QUANTITIES, TINY
 from planar.pairs import Pair, pair_types
 from planar.pairs.base import Schema, described, several
 from planar.units import LONGEST
 
 FORMAT = 1
-HUGE = 10**100
-"""SI; beyond it squares, and squares of squares, overflow."""
 FORBIDDEN = ".:,"
 GEOMETRY = ("given", "recovered", "fitted", "underdetermined")
 SENSES = ("clockwise", "anticlockwise", "to the left", "to the right", "upwards", "downwards")
 
 _TEXT: Schema = {"type": "string"}
 _TEXTS: Schema = {"type": "array", "items": _TEXT}
+_NOTHING: Schema = {"exclusiveMinimum": -TINY, "exclusiveMaximum": TINY, "not": {"const": 0}}
 _BOUNDED: Schema = {"type": "number", "exclusiveMinimum": -HUGE, "exclusiveMaximum": HUGE}
+_LENGTH: Schema = {**_BOUNDED, "not": _NOTHING}
 _FROM_ZERO: Schema = {"type": "number", "minimum": 0, "exclusiveMaximum": HUGE}
-_SIZE: Schema = {"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": HUGE}
+_ABOVE_ZERO: Schema = {"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": HUGE}
+_SIZE: Schema = {**_ABOVE_ZERO, "not": _NOTHING}
 _NUMBER = r"([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\s*(?![eE][+-]?[0-9])[A-Za-zµμΩ°]"
 """A number and the beginning of its unit."""
 
@@ -178,7 +179,7 @@ def schema() -> dict[str, Any]:
             "text": _TEXT,
             "number": _BOUNDED,
             "quantity": _quantity(_BOUNDED, "[+−-]?", "10.5 rad/s"),
-            "length": _quantity(_BOUNDED, "[+−-]?", "50 mm"),
+            "length": _quantity(_LENGTH, "[+−-]?", "50 mm"),
             "amount": _quantity(_FROM_ZERO, "[+]?", "2 kg"),
             "size": _quantity(_SIZE, "[+]?", "50 mm"),
             "angle": _quantity(_BOUNDED, "[+−-]?", "60 deg"),
@@ -200,7 +201,7 @@ def schema() -> dict[str, Any]:
                 **{"not": {"required": ["ends", "axis"]}},
             ),
             "varies": _object(VARIES, "at", "factors"),
-            "time": _quantity(_SIZE, "[+]?", "0.5 s"),
+            "time": _quantity(_ABOVE_ZERO, "[+]?", "0.5 s"),
             "piece": {"oneOf": [_piece(kind) for kind in MOTIONS.values()]},
             "drives": {"type": "object", "additionalProperties": _object(DRIVE)},
             "pair": {"oneOf": [_pair(kind) for kind in pair_types().values()]},

@@ -13,6 +13,7 @@ from planar.grouped.lots import Batch, Inputs, Lot, Marked, batch
 from planar.grouped.parting import EPS
 from planar.grouped.structure import GROUNDED, Joint, Signature
 from planar.pins import Laid, joined
+from planar.solving.gate import SHORT_ARM
 
 Array = np.ndarray
 
@@ -86,7 +87,7 @@ def bars(laid: Sequence[Laid], wanted: Sequence[int] | None) -> Bars | None:
     """
     whole = _whole(laid)
     peeled = _peeled(laid, whole)
-    which = np.flatnonzero(~peeled.odd)
+    which = np.flatnonzero(~(peeled.odd | _short(whole, peeled)))
     if not which.size:
         return None
     number = np.full(len(laid), -1)
@@ -122,6 +123,22 @@ def bars(laid: Sequence[Laid], wanted: Sequence[int] | None) -> Bars | None:
     turns = [levels[0], *([_together(levels[1:])] if len(levels) > 1 else [])]
     lot = Lot(many, unit, tolerance, levels, turns, inputs, sketch, points, sketch, len(names))
     return Bars(which, lot, own, start, links)
+
+
+def _short(whole: _Whole, peeled: _Peeled) -> Array:
+    """The linkages with a bar so short that rounding may take digits, other than a crank (linkages,)."""
+    order = np.argsort(whole.link, kind="stable")
+    link, at = whole.link[order], whole.local[order]
+    exempt = np.zeros(len(whole.owner), dtype=bool)
+    exempt[whole.link[peeled.cranks]] = True
+    exempt[whole.link0[:-1]] = True
+    found = np.zeros(len(whole.unit), dtype=bool)
+    for ahead in range(1, int(np.bincount(link).max(initial=0))):
+        both = np.flatnonzero((link[ahead:] == link[:-ahead]) & ~exempt[link[ahead:]])
+        arm = np.hypot(*(at[both + ahead] - at[both]).T)
+        owner = whole.owner[link[both]]
+        found[owner[(arm > 0.0) & (arm < SHORT_ARM * whole.unit[owner])]] = True
+    return found
 
 
 def _peeled(laid: Sequence[Laid], whole: _Whole) -> _Peeled:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
-from math import hypot
+from itertools import combinations
+from math import hypot, inf
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +17,7 @@ from planar.mechanism import Mechanism, check
 from planar.pairs import Pair
 from planar.plane import Vector, frame_at
 from planar.shapes import At, Link, Shape, shape
+from planar.solving.gate import EPS, SHORT_ARM
 
 LARGEST = 8
 """Links of a group: larger ones are left to the general path, which solves the whole."""
@@ -145,6 +147,10 @@ class _Parting:
             self.driven[place] = k
             self.even[place] = False  # an input is of the second body against the first
             self.weights[place] += 1
+        turned = {link for place in self.driven for link in self.ends[place]}
+        for k, each in enumerate(self.shapes.values()):
+            if k != self.frame and k not in turned and _shortest(each) < SHORT_ARM * self.unit:
+                raise Unparted(f"link {self.names[k]} is so short that rounding takes digits")
         self.number = number
         self.shared = self._shared()
         self.place = [-1] * many
@@ -363,4 +369,7 @@ def _size(shapes: Iterable[Shape]) -> tuple[float, float]:
     return greatest or 1.0, reach
 
 
-EPS = 2.0**-52
+def _shortest(shape: Shape) -> float:
+    """The least distance between two points of a link that do not coincide (m)."""
+    apart = (hypot(b.x - a.x, b.y - a.y) for a, b in combinations(shape.points.values(), 2))
+    return min(filter(None, apart), default=inf)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
-from planar.algebra import Scalar, atan2, sqrt
+from planar.algebra import Scalar, atan2, hypot
 from planar.pairs.base import Effort, Entry, Kind, Pair, Quantity, Schema, described
 from planar.plane import Frame, Vector, direction
 from planar.shapes import Shape, Spot
@@ -35,7 +35,8 @@ class Line(NamedTuple):
         way = direction(self.angle)
         if self.to is not None:
             whole = shape.at(self.to) - shape.at(self.through)
-            way = whole * (1.0 / sqrt(whole.dot(whole)))
+            size = hypot(whole.x, whole.y)
+            way = Vector(whole.x / size, whole.y / size)
         return (*shape.at(self.through), *way)
 
     def angle_on(self, shape: Shape) -> Scalar:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from numbers import Integral, Real
 
 from planar.errors import BadInput
-from planar.mechanism import FARTHEST, Mechanism
+from planar.mechanism import MOST_COUNTED, Mechanism
 from planar.motion import Motion
 from planar.solving.ranged import Progress, Ranged
 from planar.solving.timed import Timed
@@ -60,7 +60,11 @@ def cycle(
     """
     if isinstance(steps, bool) or not isinstance(steps, Integral) or not 1 <= steps <= MOST_STEPS:
         raise BadInput("steps", f"a whole number of steps from 1 to {MOST_STEPS} is wanted, not {steps!r:.40}")
-    for name, value, most in (("start", start, FARTHEST), ("stop", stop, FARTHEST), ("duration", duration, LONGEST)):
+    for name, value, most in (
+        ("start", start, MOST_COUNTED),
+        ("stop", stop, MOST_COUNTED),
+        ("duration", duration, LONGEST),
+    ):
         if value is None:
             continue
         if isinstance(value, bool) or not isinstance(value, Real) or not abs(value) <= most:

@@ -10,17 +10,24 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from planar.algebra import Jet
-from planar.judged import MOST_TURNS
+from planar.algebra import Jet, terms
+from planar.judged import CARRIED
 from planar.mechanism import Mechanism, motions
 from planar.pairs import Kind, Pair
-from planar.plane import Frame
+from planar.plane import Frame, terms_of
 from planar.shapes import Shape
 
 Array = np.ndarray
 TOUCHING = 1e-6
 """Sizes: dimensions in files are rounded, so a contact that guides keep closed may be open by as much."""
 EPS = float(np.finfo(float).eps)
+SURELY_KEPT = 1e-7
+"""Relative errors by round-off that are surely below this are neither looked for nor told."""
+MOST_LOST = 1e-3
+"""Angles (rad) and rates that may have greater relative errors are no answer: less than three digits are sure."""
+SHORT_ARM = EPS / (SURELY_KEPT * 1e-2**2)
+"""Sizes: where no link has a shorter arm and no group is nearer than 1e-2 to being singular, which backends keep clear
+of, rounding surely takes no more than that."""
 
 
 class Gate:
@@ -66,7 +73,6 @@ class Gate:
         counted += [np.abs(length) / self.unit for lengths in own.values() for length in lengths]
         many = np.fmax.reduce(np.broadcast_arrays(2.0 * np.pi, *counted)) / (2.0 * np.pi)
         many = np.where(np.isfinite(many), many, 1.0)
-        many = np.where(many > MOST_TURNS, 1e-300, many)
         return np.nan_to_num(np.array(np.broadcast_arrays(*gaps)) / many, nan=np.inf, posinf=np.inf)
 
     def apart(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Jet]]) -> tuple[str, float] | None:
@@ -87,22 +93,33 @@ class Gate:
     def rate_gaps(
         self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Jet]], inputs: Sequence[Jet] | None = None
     ) -> list[tuple[Array, str]]:
-        """How far velocities, then accelerations, break the worst constraint, as a part of the greatest; its pair.
+        """How far velocities, then accelerations, break the worst constraint, as a part of its own terms; its pair.
 
         Of jets of arrays, an array. `inputs` are the inputs with their rates, else the mechanism's own.
         """
         u = [Jet(*given[1:4]) for given in self.mechanism.inputs] if inputs is None else inputs
-        closures = [(kind, left) for kind, left in self._closures(frames, own, u) if isinstance(left, Jet)]
-        units = np.array([self.unit if kind is Kind.LENGTH else 1.0 for kind, _ in closures])
+        sizes = {
+            name: frame if frame.fixed else terms_of(*(terms(part) for part in (frame.x, frame.y, frame.angle)))
+            for name, frame in frames.items()
+        }
+        own_sizes = {name: [terms(each) for each in values] for name, values in own.items()}
+        given = [terms(each) for each in u]
+        both = zip(self._closures(frames, own, u), self._closures(sizes, own_sizes, given), strict=True)
+        closures = [(kind, left, whole) for (kind, left), (_, whole) in both if isinstance(left, Jet)]
         found = []
         for order in (1, 2):
-            if not closures:
+            speeds = [whole.parts[order] / self.unit for kind, _, whole in closures if kind is Kind.LENGTH]
+            carried = CARRIED * np.maximum.reduce(np.broadcast_arrays(np.zeros(1), *speeds))
+            gaps = [
+                np.abs(left.parts[order]) / _scale(whole.parts[order], carried * self._by(kind))
+                for kind, left, whole in closures
+            ]
+            if not gaps:
                 found.append((np.zeros(1), ""))
                 continue
-            broken = np.array(np.broadcast_arrays(*(left.parts[order] for _, left in closures))).T
-            gaps = np.nan_to_num((np.abs(broken) / units).T / self._greatest(frames, own, order), nan=np.inf)
-            worst = int(np.argmax(gaps.reshape(len(closures), -1).max(axis=1)))
-            found.append((gaps.max(axis=0), self.names[worst]))
+            part = np.nan_to_num(np.array(np.broadcast_arrays(*gaps)), nan=np.inf)
+            worst = int(np.argmax(part.reshape(len(closures), -1).max(axis=1)))
+            found.append((part.max(axis=0), self.names[worst]))
         return found
 
     def _greatest(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Jet]], order: int) -> Array:
@@ -119,6 +136,9 @@ class Gate:
         greatest = np.maximum.reduce(np.broadcast_arrays(*rates))
         return np.where(greatest == 0.0, 1.0, greatest)
 
+    def _by(self, kind: Kind) -> float:
+        return self.unit if kind is Kind.LENGTH else 1.0
+
     def _closures(self, frames, own, u=None):  # noqa: ANN001, ANN202 - floats, arrays or jets alike
         """(kind, what is left open) of every constraint, then of every input."""
         for pair in self.mechanism.pairs:
@@ -128,6 +148,12 @@ class Gate:
             pair = self.motions[given.pair]
             drive = pair.drive([frames[link] for link in pair.bodies], self.numbers[pair.name], own.get(pair.name, ()))
             yield pair.drive_kind, drive - (given.position if u is None else u[index])
+
+
+def _scale(whole: Array, carried: Array) -> Array:
+    """What a row that should vanish is divided by; one where nothing moves."""
+    scale = whole + carried
+    return np.where(scale == 0.0, 1.0, scale)
 
 
 def _lengths(pair: Pair, numbers: Sequence[float]) -> list[float]:

@@ -16,6 +16,7 @@ from planar.motion import State
 from planar.plane import Frame
 from planar.program import CACHED, Rates, length, placed, program
 from planar.solving import refusals
+from planar.solving.accuracy import doubts
 from planar.solving.assemble import Assembly, Failure, search
 from planar.solving.candidates import Candidates
 from planar.solving.follow import Local, followed
@@ -157,7 +158,11 @@ class Solver(Setup):
         y1 = np.concatenate([cancelled(still.slope, still.F1), s.u1])
         moving = self.program.kinematics(y, y1, given, s.p)
         y2 = np.concatenate([cancelled(moving.slope, moving.F2), s.u2])
-        return self._stated(self.program.kinematics(y, y1, y2, s.p), found, residual, remarks)
+        motion = self.program.kinematics(y, y1, y2, s.p)
+        doubt = doubts(self, motion.slope[None], motion.w[None], y[None], y1[None], y2[None])
+        if doubt is not None and doubt.errors.lost[0]:
+            raise doubt.refused(self, 0, self.at())
+        return self._stated(motion, found, residual, (*remarks, doubt.remark()) if doubt else remarks)
 
     def _surely(self, z: Array, remarks: tuple[str, ...]) -> State | None:
         """The state by compiled functions alone, where they find nothing to look at."""
@@ -192,7 +197,7 @@ class Solver(Setup):
         s = self.station
         residual = float(self.open_along(z[None], s.u[None])[0])
         given = Given(s.u[None], s.u1[None], s.u2[None], 0.0 * s.u[None])
-        w, w1, w2 = (part[0] for part in rates(self, z[None], given, {0: local}, False))
+        w, w1, w2 = (part[0] for part in rates(self, z[None], given, {0: local}, False).parts)
         if residual > self.tolerance or not np.isfinite(w1).all():
             return self.state(z)  # says why not
         none = np.zeros(0)

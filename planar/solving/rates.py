@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.solving.accuracy import Doubts, doubts
 from planar.solving.branch import cancelling
 from planar.solving.curve import truncated
 from planar.solving.follow import Local
@@ -15,6 +16,8 @@ from planar.solving.setup import Setup
 
 Array = np.ndarray
 
+BESIDE = 1e-3
+"""Strength of a group from which on its rates are taken from its slope, however near a change point is."""
 ALONG = 1e-9
 """A part of the inputs' rates that is this much aside of the way along which a change point was passed is none."""
 
@@ -28,8 +31,16 @@ class Given(NamedTuple):
     u3: Array
 
 
-def rates(setup: Setup, z: Array, given: Given, local: Mapping[int, Local], third: bool) -> list[Array]:
-    """w with its first, second and, where asked for, third rate at samples (samples, coordinates).
+class Rated(NamedTuple):
+    """w with its first, second and, where asked for, third rate at samples, each (samples, coordinates), and of which
+    samples the accuracy is in doubt."""
+
+    parts: list[Array]
+    doubts: Doubts | None
+
+
+def rates(setup: Setup, z: Array, given: Given, local: Mapping[int, Local], third: bool) -> Rated:
+    """The rates at samples.
 
     NaN where none is determined: at dead points. At change points they are those of the branch that was followed.
     """
@@ -40,8 +51,10 @@ def rates(setup: Setup, z: Array, given: Given, local: Mapping[int, Local], thir
         return np.hstack([rate, of_inputs])
 
     rest = program.kinematics(y, whole(none, given.u1), whole(none, given.u2), p)
-    strong = strengths(setup, rest.slope).min(axis=-1, initial=1.0) >= SINGULAR
-    known = {index: _carried(each, given, index) for index, each in local.items()}
+    strength = strengths(setup, rest.slope).min(axis=-1, initial=1.0)
+    strong = strength >= SINGULAR
+    # near by, the rates along a branch are those of a linkage that has the change point exactly
+    known = {index: _carried(each, given, index) for index, each in local.items() if strength[index] < BESIDE}
     known = {index: each for index, each in known.items() if each is not None}
     weak = ~strong
     weak[list(known)] = False
@@ -61,13 +74,14 @@ def rates(setup: Setup, z: Array, given: Given, local: Mapping[int, Local], thir
     z2 = solved(program.kinematics(y, y1, whole(none, given.u2), p).F2, 2)
     y2 = whole(z2, given.u2)
     found = program.kinematics(y, y1, y2, p)
-    parts = [found.w, found.w1, found.w2]
+    parts, sure = [found.w, found.w1, found.w2], np.flatnonzero(strong)
     if third:
         z3 = solved(program.jerks(y, y1, y2, whole(none, given.u3), p)[0], 3)
         parts.append(program.jerks(y, y1, y2, whole(z3, given.u3), p)[1])
     for part in parts[1:]:
         part[weak] = np.nan
-    return parts
+    found_doubts = doubts(setup, rest.slope[sure], found.w[sure], y[sure], y1[sure], y2[sure]) if sure.size else None
+    return Rated(parts, found_doubts and found_doubts._replace(rows=sure[found_doubts.rows]))
 
 
 def _carried(local: Local, given: Given, index: int) -> Array | None:

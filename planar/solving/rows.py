@@ -13,14 +13,17 @@ from planar.errors import NoAnswer, Outcome
 from planar.motion import Course, Motion
 from planar.results import InputMotion, Jerked
 from planar.solving import refusals
+from planar.solving.accuracy import Doubts
 from planar.solving.assemble import Assembly
 from planar.solving.follow import Local, Met, Run
+from planar.solving.gate import MOST_LOST
 from planar.solving.passing import on_the_way
 from planar.solving.placing import laid
 from planar.solving.position import Solver
 from planar.solving.rates import Given, rates
 from planar.solving.straight import Told, stacked
 from planar.solving.walk import Missed
+from planar.words import many
 
 Array = np.ndarray
 
@@ -118,17 +121,17 @@ def motion(
     solver: Solver, assembly: Assembly, run: Rows, third: bool, course: Course, time: Array | None = None
 ) -> Motion:
     """The motion; raises NoAnswer where the gate does not let it pass."""
-    told = run.told if not third else None
+    told, remarks = run.told if not third else None, ()
     if told is not None and told.sure.all():
         parts, residual = list(told.parts.transpose(1, 0, 2)), told.open
     elif told is not None:
         rest = np.flatnonzero(~told.sure)
-        looked_at, residual = _looked_at(solver, run.of(rest), third)
+        looked_at, residual, remarks = _looked_at(solver, run.of(rest), third)
         whole = told.parts.copy()
         whole[rest] = np.stack(looked_at, axis=1)
         parts, residual = list(whole.transpose(1, 0, 2)), max(residual, told.open)
     else:
-        parts, residual = _looked_at(solver, run, third)
+        parts, residual, remarks = _looked_at(solver, run, third)
     inputs = {each.pair: _input(solver, run.given, index) for index, each in enumerate(solver.mechanism.inputs)}
     frames, own = laid(solver, parts[:3])
     return Motion(
@@ -137,7 +140,7 @@ def motion(
         outcome=run.outcome,
         reason=run.reason,
         residual=residual,
-        remarks=(*solver.remarks(assembly), *on_the_way(solver, run.met, run.missed)),
+        remarks=(*solver.remarks(assembly), *on_the_way(solver, run.met, run.missed), *remarks),
         frames=frames,
         own=own,
         shapes=solver.shapes,
@@ -147,31 +150,71 @@ def motion(
     )
 
 
-def _looked_at(solver: Solver, run: Rows, third: bool) -> tuple[list[Array], float]:
-    """w with its rates by the general path (rows, coordinates) of each order, and what the worst constraint leaves
-    open."""
+class _Looked(NamedTuple):
+    """Rows on the general path: w with its rates (rows, coordinates) of each order, what the worst constraint leaves
+    open, and what there is to say."""
+
+    parts: list[Array]
+    open: float
+    remarks: tuple[str, ...] = ()
+
+
+def _looked_at(solver: Solver, run: Rows, third: bool) -> _Looked:
+    """Rows by the general path; rates that cannot be believed are not numbers, unless none can: then NoAnswer."""
     z, given = run.z, run.given
     gaps = solver.gaps(z, given.u)
     residual = float(gaps.max(initial=0.0))
     if not residual <= solver.tolerance:
         pair, row = np.unravel_index(int(np.argmax(gaps)), gaps.shape)
         raise refusals.not_closed(solver, solver.gate.names[pair], residual, f"at {solver.where(given.u[row])}")
-    parts = rates(solver, z, given, run.local, third)
+    parts, doubt = rates(solver, z, given, run.local, third)
     for part in parts[1:]:
         # where the input turns back, no velocity of the rest goes with one of the input
         part[list(run.dead)] = np.nan
+    remarks = _without(solver, given, parts, doubt) if doubt is not None else ()
     frames, own = laid(solver, parts[:3])
     determined = ~np.isnan(parts[1]).any(axis=1) if parts[1].size else np.ones(len(z), dtype=bool)
     inputs = [_input(solver, given, index) for index in range(len(solver.mechanism.inputs))]
     gaps_of_rates = solver.gate.rate_gaps(frames, own, [Jet(*each) for each in inputs])
     for (broken, pair), what in zip(gaps_of_rates, ("velocities", "accelerations"), strict=True):
         of_rows = np.where(determined, np.broadcast_to(broken, (len(z),)), 0.0)
+        wrong = of_rows > 1e3 * solver.tolerance
+        if not wrong.any():
+            continue
         row = int(np.argmax(of_rows))
-        if of_rows[row] > 1e3 * solver.tolerance:
-            at = f"at {solver.where(given.u[row])}"
+        at = f"at {solver.where(given.u[row])}"
+        if wrong[determined].all():
             raise refusals.broken_rates(solver, what, pair, float(of_rows[row]), at)
+        for part in parts[1:]:
+            part[wrong] = np.nan
+        remarks = (*remarks, f"{at} no rates are given: they would break pair {pair!r}, next to a change point")
+        determined &= ~wrong
     solver.refuse_gap(frames, own)
-    return parts, residual
+    return _Looked(parts, residual, remarks)
+
+
+def _without(solver: Solver, given: Given, parts: list[Array], doubt: Doubts) -> tuple[str, ...]:
+    """What to say of rows of which rounding leaves few digits; the rates of those with too few taken away.
+
+    Raises NoAnswer where the places are lost too, or the rates of all rows.
+    """
+    lost, remarks = doubt.errors.lost, []
+    if lost.any():
+        worst = int(np.argmax(np.where(lost, np.nan_to_num(doubt.errors.greatest, nan=np.inf), 0.0)))
+        places = ~(doubt.errors.places <= MOST_LOST)
+        some = doubt.rows[lost]
+        if places.any() or len(some) == int((~np.isnan(parts[1]).any(axis=1)).sum()):
+            k = int(np.argmax(places)) if places.any() else worst
+            raise doubt.refused(solver, k, f"at {solver.where(given.u[doubt.rows[k]])}")
+        for part in parts[1:]:
+            part[some] = np.nan
+        told = doubt.refused(solver, worst, f"at {solver.where(given.u[doubt.rows[worst]])}").reason
+        remarks.append(f"{many(len(some), 'row')} without rates: {told}")
+    kept = np.flatnonzero(~lost)
+    if kept.size:
+        row = doubt.rows[kept[np.argmax(doubt.errors.greatest[kept])]]
+        remarks.append(doubt.remark(f" at {solver.where(given.u[row])}"))
+    return tuple(remarks)
 
 
 def _input(solver: Solver, given: Given, index: int) -> InputMotion:

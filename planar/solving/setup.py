@@ -12,7 +12,7 @@ from planar.algebra import Jet, Scalar
 from planar.errors import BadInput
 from planar.errors import listed as several
 from planar.judged import Judged
-from planar.mechanism import Mechanism, misfits
+from planar.mechanism import HUGE, TINY, Mechanism, misfits
 from planar.pairs import Kind
 from planar.plane import Frame
 from planar.program import Program, extent, gathered, greatest, placed, shapes
@@ -43,6 +43,11 @@ class Setup:
         self.column, self.pairs, self.named = self.outline.column, self.outline.pairs, self.outline.named
         for pair, wrong in misfits(mechanism.pairs, self.shapes, mechanism.units):
             raise BadInput(pair.name, wrong)
+        for name, shape in self.shapes.items():
+            for point, at in shape.points.items():
+                if not all(value == 0.0 or TINY <= abs(value) < HUGE for value in at):
+                    told = f"a place is 0, or from {TINY:g} to {HUGE:.0e} m, not [{at.x:g}, {at.y:g}]"
+                    raise BadInput(f"{name}.{point}", told)
         extents = {name: extent(shape) for name, shape in self.shapes.items()}
         self.unit = greatest(mechanism, extents, self.outline.slide)
         self.gate = Gate(mechanism, self.shapes, self.unit, self.named)

@@ -9,7 +9,7 @@ import numpy as np
 
 from planar.judged import Stride, Verdict
 from planar.solving.branch import CLOSE, allowed
-from planar.solving.gate import TOUCHING
+from planar.solving.gate import EPS, SURELY_KEPT, TOUCHING
 from planar.solving.setup import Setup
 
 Array = np.ndarray
@@ -123,6 +123,7 @@ def course(setup: Setup, z: Array, u: Array, u1: Array, u2: Array) -> Course | N
     fine &= np.maximum(told.broken, told.broken_second) <= 1e3 * setup.tolerance
     fine &= told.apart <= TOUCHING
     fine &= told.strength >= STRONG
+    fine &= EPS * told.amplified <= SURELY_KEPT
     if z.size:
         with np.errstate(invalid="ignore", over="ignore"):
             fine[1:] &= _keeps(judged.starts, settled, gone, ways[:, 0], distances[:, 0], square)
@@ -138,6 +139,7 @@ def _passes(setup: Setup, told: Verdict) -> bool:
         and told.broken <= 1e3 * tolerance
         and told.broken_second <= 1e3 * tolerance
         and told.apart <= TOUCHING
+        and EPS * told.amplified <= SURELY_KEPT
     )
 
 

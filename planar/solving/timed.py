@@ -156,7 +156,7 @@ class _Course:
             row -= 1  # from a change point several ways lead on
         way = followed(solver, solver.station.p, self.found.z[row], self.found.given.u[row], given.u[0])
         local = {0: way.local[1]} if 1 in way.local else {}
-        parts = [part[0] * solver.scale for part in rates(solver, way.z[-1:], given, local, False)]
+        parts = [part[0] * solver.scale for part in rates(solver, way.z[-1:], given, local, False).parts]
         jets = [Jet(*(float(part[column]) for part in parts)) for column in range(len(parts[0]))]
         frames, own = placed(jets, solver.column, solver.shapes, solver.pairs)
         named = solver.named[pair]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cached_property, lru_cache
+from itertools import combinations
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from planar.pairs.base import Pair
 from planar.program import scaled
 from planar.shapes import Shape, shape
 from planar.solving.candidates import Candidates
-from planar.solving.gate import EPS
+from planar.solving.gate import EPS, SHORT_ARM
 from planar.solving.position import Solver
 from planar.sweeping.designs import liftable
 
@@ -122,6 +123,19 @@ class Base:
             for index in range(many):
                 own = {name: at_design(each, index) for name, each in shapes.items()}
                 found[index] |= any(pair.misfit(self.mechanism.pairs, own, str) for pair in choosy)
+        return found
+
+    def short(self, shapes: Mapping[str, Shape], many: int) -> Array:
+        """The designs with a link whose arm is so short that rounding may take digits (designs,)."""
+        found = np.zeros(many, dtype=bool)
+        column, known_from = self.solver.column, self.program.equations.known_from
+        for link, at in shapes.items():
+            if known_from[column[link, "angle"]] < 0 if (link, "angle") in column else True:
+                continue  # what the input turns is turned exactly
+            pinned = {point for pair in self.mechanism.pairs for owner, point in pair.coincident() if owner == link}
+            for one, other in combinations([at.points[point] for point in sorted(pinned)], 2):
+                arm = np.hypot(other.x - one.x, other.y - one.y)
+                found |= (arm > 0.0) & (arm < SHORT_ARM * self.unit)
         return found
 
     def roots(self) -> tuple[tuple[Array, int], ...]:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.errors import Outcome
-from planar.mechanism import Mechanism
+from planar.mechanism import FARTHEST, Mechanism
 from planar.native.room import room
 from planar.sweeping.assembling import assembled
 from planar.sweeping.base import Base, base, spread
@@ -144,6 +144,7 @@ class _Solving:
         start = assembled(base_, shapes, p, self.u, tolerance, closing(block.backend))
         self.ends = start.ends
         fit = start.sure & ~base_.unfit(block.designs, shapes) & np.all(np.isfinite(p), axis=0)
+        fit &= ~base_.short(shapes, self.many)
         offsets = np.zeros((block.steps + 1, len(self.u)))
         u0 = self.u.copy()
         u0[base_.index] = self.first / self.scale
@@ -211,6 +212,8 @@ class _Solving:
         far = float(np.max(np.abs(gone), initial=0.0))
         if far == 0.0:
             return march, fit
+        if far > FARTHEST:
+            return march, np.zeros_like(fit)
         places = np.linspace(0.0, 1.0, int(np.ceil(far / GENTLE)) + 2)
         with np.errstate(all="ignore"):
             (last,) = deque(rows(march, (self.u + place * gone for place in places)), maxlen=1)

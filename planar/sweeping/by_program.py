@@ -86,7 +86,7 @@ def rows(task: March, inputs: Iterable[Array], columns: Columns | None = None) -
             moves = [after - z, *moves[:3]]
         z = after
         w = columns.positions(z, u.T)
-        good = good & (closed.left(w, u) <= task.tolerance)
+        good = good & (closed.left(w, u) <= task.tolerance) & closed.exact(w)
         here = branches.here(z, u.T)
         good = good & branches.regular(here)
         if before is not None:

@@ -10,7 +10,7 @@ import numpy as np
 from planar.mechanism import Mechanism
 from planar.program import Program, placed
 from planar.solving.branch import CLOSE, Branch, allowed, cancelling
-from planar.solving.gate import Gate
+from planar.solving.gate import EPS, SURELY_KEPT, Gate
 from planar.sweeping.columns import Columns
 
 Array = np.ndarray
@@ -57,7 +57,10 @@ class Branches(Branch):
         for stage in self.program.equations.stages:
             own = here.slopes[:, stage.rows, stage.unknowns]
             if own.size:
-                found &= volume(own) > (WEAK if own.shape[1] <= 2 else WEAK**1.5)
+                arm = np.minimum(np.linalg.norm(own, axis=1).min(axis=1), 1.0)
+                # short arms lose digits too, see `solving.accuracy`
+                least = np.maximum(WEAK, np.sqrt(EPS / SURELY_KEPT / np.maximum(arm, 1e-300)))
+                found &= volume(own) > (least if own.shape[1] <= 2 else least**1.5)
         return found
 
 
@@ -101,6 +104,10 @@ class Closed:
     def placed(self, w):  # noqa: ANN001, ANN201 - arrays or jets alike
         """Frames of links and own coordinates of pairs from w (coordinates, designs)."""
         return placed(w, self.column, self.links, self.pairs)
+
+    def exact(self, w: Array) -> Array:
+        """Whether no angle or length is so great that rounding takes digits of it (designs,)."""
+        return EPS * np.abs(w).max(axis=0, initial=0.0) <= np.pi * SURELY_KEPT
 
     def left(self, w: Array, u: Array) -> Array:
         """What the worst constraint leaves open (designs,); w (coordinates, designs), u (inputs, designs)."""

@@ -141,7 +141,7 @@ class Prepared:
             float(np.ravel(each)[0]) != own.position for each, own in zip(given, base_.mechanism.inputs, strict=True)
         ):
             return False
-        if not np.all(np.isfinite(p)) or (arrays and base_.unfit(arrays, shapes).any()):
+        if not np.all(np.isfinite(p)) or base_.short(shapes, 1).any() or (arrays and base_.unfit(arrays, shapes).any()):
             return False
         start = assembled(base_, shapes, p, u, self.tolerance, closing("native"))
         if not start.sure[0]:
