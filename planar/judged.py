@@ -180,9 +180,12 @@ class Judged:
         ]
         broken = []
         lengths = [k for k, kind in enumerate(kinds) if kind is Kind.LENGTH]
+        fastest = ca.SX(0.0)
         for order, left in enumerate(rates(closures), 1):
             scale = stack(size.parts[order] for size in whole)
-            scale = scale + CARRIED * _most(scale[lengths])
+            # a velocity counts as one in an arc of the size: what turning leaves there but for rounding is none
+            fastest = ca.fmax(_most(scale[lengths]), fastest**2)
+            scale = scale + CARRIED * fastest
             broken.append(_most(ca.fabs(left) / ca.if_else(scale == 0.0, 1.0, scale)))
         greatest = self._greatest(w1, w2)
         open_ = [

@@ -24,7 +24,11 @@ from planar.results import (
     PointMotion,
     PointState,
     RelativeState,
+    quarter_turned,
+    third_rate,
     turns_to_least,
+    vector_orders,
+    vectors_of,
     wrapped,
 )
 from planar.shapes import Shape
@@ -116,21 +120,21 @@ class Moving(Shown):
         p, q = self._named(point), self._named(other)
         axes = axes or self._between(p, q)
         frame = self._frame(axes)
-        r = [_both(*parts) for parts in _parts_of(self._carried(p) - self._carried(q))]
+        r = [vectors_of(*parts) for parts in vector_orders(self._carried(p) - self._carried(q))]
         _, omega, alpha = (np.asarray(part)[..., None] for part in orders(frame.angle))
-        local = [_both(*parts) for parts in _parts_of(self._local(p, axes) - self._local(q, axes))]
+        local = [vectors_of(*parts) for parts in vector_orders(self._local(p, axes) - self._local(q, axes))]
         cos, sin = (np.asarray(orders(each)[0])[..., None] for each in (frame.cos, frame.sin))
-        sliding, sliding_acceleration = (cos * each + sin * _quarter(each) for each in local[1:])
+        sliding, sliding_acceleration = (cos * each + sin * quarter_turned(each) for each in local[1:])
         return RelativeState(
             axes=axes,
             position=r[0],
             velocity=r[1],
-            rotation=omega * _quarter(r[0]),
+            rotation=omega * quarter_turned(r[0]),
             sliding=sliding,
             acceleration=r[2],
             centripetal=-(omega**2) * r[0],
-            tangential=alpha * _quarter(r[0]),
-            coriolis=2.0 * omega * _quarter(sliding),
+            tangential=alpha * quarter_turned(r[0]),
+            coriolis=2.0 * omega * quarter_turned(sliding),
             sliding_acceleration=sliding_acceleration,
         )
 
@@ -228,7 +232,7 @@ class State(Moving):
         return pair.report(position + self._turns_of_pair(name, position), rate, second)
 
     def _point(self, named: NamedPoint) -> PointState:
-        position, velocity, acceleration = (_both(*part) for part in _parts_of(self._carried(named)))
+        position, velocity, acceleration = (vectors_of(*part) for part in vector_orders(self._carried(named)))
         fastest, hardest = self._greatest_of_points
         scale = float(np.hypot(*velocity)) * hardest
         sense = _sense(heading(velocity, fastest), float(velocity @ acceleration), scale)
@@ -237,7 +241,7 @@ class State(Moving):
     @cached_property
     def _greatest_of_points(self) -> tuple[float, float]:
         """The greatest velocity and acceleration of any point (m/s, m/s^2): rates are at rest beside these."""
-        parts = np.array([_parts_of(self._carried(each)) for each in self._points])
+        parts = np.array([vector_orders(self._carried(each)) for each in self._points])
         speeds = np.hypot(parts[:, :, 0], parts[:, :, 1]).max(axis=0, initial=0.0)
         return float(speeds[1]), float(speeds[2])
 
@@ -363,12 +367,12 @@ class Motion(Moving):
         """A point's third rate (n, 2) (m/s^3). Raises Unknown, and BadInput where the motion was made without."""
         link, own = self._named(point).members[0]
         place = self._jerked().frames[link].carry(self.shapes[link].at(own))
-        return np.stack(self._rows((_third(place.x), _third(place.y))), axis=1)
+        return np.stack(self._rows((third_rate(place.x), third_rate(place.y))), axis=1)
 
     def angular_jerk(self, link: str) -> Array:
         """A link's third rate (n,) (rad/s^3). Raises Unknown, and BadInput where the motion was made without."""
         self._frame(link)
-        return self._rows((_third(self._jerked().frames[link].angle),))[0]
+        return self._rows((third_rate(self._jerked().frames[link].angle),))[0]
 
     def _jerked(self) -> Jerked:
         if self.jerked is None:
@@ -412,22 +416,3 @@ def _sense(way: str, power: float, scale: float) -> str:
 
 Parts = tuple[Any, Any, Any]
 """A number with its first and second rate: floats, or arrays over a motion."""
-
-
-def _third(value: Any) -> Any:
-    """The third rate of a jet that has one; a plain number is at rest."""
-    return value.parts[3] if isinstance(value, Jet) else 0.0
-
-
-def _parts_of(vector: Vector) -> list[tuple[Any, Any]]:
-    return list(zip(orders(vector.x), orders(vector.y), strict=True))
-
-
-def _both(x: Any, y: Any) -> Array:
-    """x and y as vectors (..., 2)."""
-    return np.stack(np.broadcast_arrays(np.asarray(x, dtype=float), y), axis=-1)
-
-
-def _quarter(vectors: Array) -> Array:
-    """Vectors (..., 2) turned a quarter anticlockwise."""
-    return np.stack([-vectors[..., 1], vectors[..., 0]], axis=-1)

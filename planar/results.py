@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from planar.algebra import Jet
-from planar.plane import Frame
+from planar.algebra import Jet, orders
+from planar.plane import Frame, Vector
 
 Array = np.ndarray
 
@@ -132,3 +132,23 @@ def turns_to_least(angles: Array) -> float:
     """
     first = float(angles[0] if np.ptp(angles) >= 2.0 * np.pi else np.min(angles))
     return 0.0 if abs(first) <= np.pi + SEAM else wrapped(first) - first
+
+
+def third_rate(value: Any) -> Any:
+    """The third rate of a jet that has one; a plain number is at rest."""
+    return value.parts[3] if isinstance(value, Jet) else 0.0
+
+
+def vector_orders(vector: Vector) -> list[tuple[Any, Any]]:
+    """x and y of a vector, then of its rates."""
+    return list(zip(orders(vector.x), orders(vector.y), strict=True))
+
+
+def vectors_of(x: Any, y: Any) -> Array:
+    """x and y as vectors (..., 2)."""
+    return np.stack(np.broadcast_arrays(np.asarray(x, dtype=float), y), axis=-1)
+
+
+def quarter_turned(vectors: Array) -> Array:
+    """Vectors (..., 2) turned a quarter anticlockwise."""
+    return np.stack([-vectors[..., 1], vectors[..., 0]], axis=-1)

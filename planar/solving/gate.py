@@ -108,7 +108,13 @@ class Gate:
         closures = [(kind, left, whole) for (kind, left), (_, whole) in both if isinstance(left, Jet)]
         found = []
         for order in (1, 2):
-            speeds = [whole.parts[order] / self.unit for kind, _, whole in closures if kind is Kind.LENGTH]
+            # a velocity counts as one in an arc of the size: what turning leaves there but for rounding is none
+            speeds = [
+                (whole.parts[k] / self.unit) ** (order / k)
+                for kind, _, whole in closures
+                if kind is Kind.LENGTH
+                for k in range(1, order + 1)
+            ]
             carried = CARRIED * np.maximum.reduce(np.broadcast_arrays(np.zeros(1), *speeds))
             gaps = [
                 np.abs(left.parts[order]) / _scale(whole.parts[order], carried * self._by(kind))

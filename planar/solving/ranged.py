@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.errors import BadInput, Ending, NoAnswer, Outcome
-from planar.mechanism import Drive, Mechanism, running_input, with_inputs
+from planar.mechanism import FARTHEST, Drive, Mechanism, running_input, with_inputs
 from planar.motion import Motion
 from planar.results import Limit
 from planar.solving import limits, refusals
@@ -32,9 +32,7 @@ SEAM = 1e-9
 LEAST = 1e-5
 """rad or sizes: a range shorter than this is none."""
 ARCS_PER_TURN = 100
-"""Arcs by which what may be spent grows with each turn that is asked for."""
-MOST = 1e5
-"""rad or sizes of the input's way beyond which it grows no more."""
+"""Arcs by which what may be spent grows with each turn that is asked for, as far as a motion is followed at most."""
 
 Progress = Callable[[float, float], None]
 
@@ -275,7 +273,7 @@ class Ranged:
             def tell(u: Array) -> None:
                 inform(min(abs(float(u[self.index]) - first) * self.scale, total), total)
 
-        return Work(ARCS + int(ARCS_PER_TURN * min(reach, MOST) / (2.0 * pi)), tell)
+        return Work(ARCS + int(ARCS_PER_TURN * min(reach, FARTHEST) / (2.0 * pi)), tell)
 
     def walk(self, z: Array, first: float, way: float = 1.0, work: Work | None = None) -> Walk:
         """A walk from a position of the input, in the direction in which it goes on."""
