@@ -58,7 +58,7 @@ if TYPE_CHECKING:
     from planar.sweeping.sweep import sweep
     from planar.views.dataset import dataset
 
-__version__ = "0.8.0"
+__version__ = "0.8.1"
 
 _ROOMS = {
     "Advantage": "analysis.advantage",

@@ -1,6 +1,6 @@
 """Letters are placed near what they name, clear of strokes and of each other."""
 
-import time
+from functools import partial
 from math import cos, hypot, pi, radians, sin
 
 import numpy as np
@@ -16,6 +16,7 @@ from planar.drawing.picture import Arrow, Circle, Letter, Line, Pen
 from planar.errors import MissingGlyphs
 from tests.draws import draws
 from tests.fonts import own_fonts  # noqa: F401
+from tests.work import calls
 
 HOSTILE = [
     "$x",
@@ -203,16 +204,19 @@ def test_no_letters_and_blank_letters_take_no_place():
     assert placed([Letter(" \n", (0.0, 0.0))], []) == ()
 
 
-def test_a_hundred_and_fifty_letters_among_six_hundred_strokes_take_little_time():
+def crowd(many):
+    """So many letters and four times as many strokes, as close to one another however many they are."""
     rng = np.random.default_rng(3)
-    letters = [Letter(f"P{n}", tuple(rng.uniform((0.0, 0.0), (200.0, 150.0)))) for n in range(150)]
-    starts = rng.uniform((0.0, 0.0), (200.0, 150.0), (600, 2))
-    marks = [Line((tuple(one), tuple(one + rng.normal(0.0, 8.0, 2))), Pen.LINK) for one in starts]
-    placed(letters[:1], marks[:1])
-    began = time.process_time()
-    found = placed(letters, marks)
-    assert time.process_time() - began < 1.5
-    assert len(found) == 150
+    sheet = np.array([200.0, 150.0]) * np.sqrt(many / 150)
+    letters = [Letter(f"P{n}", tuple(rng.uniform((0.0, 0.0), sheet))) for n in range(many)]
+    starts = rng.uniform((0.0, 0.0), sheet, (4 * many, 2))
+    return letters, [Line((tuple(one), tuple(one + rng.normal(0.0, 8.0, 2))), Pen.LINK) for one in starts]
+
+
+def test_twice_as_many_letters_among_strokes_take_about_twice_the_work():
+    placed(*crowd(10))
+    some, more = (calls(partial(placed, *crowd(many))) for many in (50, 100))
+    assert more < 3.0 * some
 
 
 @pytest.mark.filterwarnings("ignore::planar.errors.MissingGlyphs")
