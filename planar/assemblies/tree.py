@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
-import casadi as ca
 import numpy as np
 
 from planar.assemblies.completeness import Completeness, Roots
 from planar.equations import Stage
 from planar.pairs import Kind
 from planar.program import POLISHED, length
-from planar.solving.candidates import MEETING
+from planar.solving.candidates import MEETING, hanging
 from planar.solving.newton import CLOSED
 from planar.solving.setup import Setup
 
@@ -220,19 +219,6 @@ class Tree:
     def _state(self, index: int, z: Array) -> bytes:
         """What of the choices before a group matters for it and for all later ones."""
         return z[self._matters[index]].tobytes()
-
-
-def hanging(setup: Setup) -> list[set[int]]:
-    """The unknowns of earlier groups on which each group hangs."""
-    e = setup.equations
-    columns: list[set[int]] = [set() for _ in range(len(e.rows))]
-    for row, column in zip(*ca.jacobian_sparsity(e.F, e.z).get_triplet(), strict=True):
-        columns[row].add(column)
-    return [
-        {column for row in range(stage.rows.start, stage.rows.stop) for column in columns[row]}
-        - set(range(stage.unknowns.start, len(e.unknowns)))
-        for stage in e.stages
-    ]
 
 
 def _solved(setup: Setup, stage: Stage, z: Array, certify: bool) -> Roots:

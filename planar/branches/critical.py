@@ -18,12 +18,13 @@ import numpy as np
 from planar.assemblies.completeness import Completeness
 from planar.assemblies.isotropic import form
 from planar.assemblies.roots import MOST_PATHS, roots
-from planar.assemblies.tree import hanging, straight
+from planar.assemblies.tree import straight
 from planar.branches.series import NONE, Value, Zeros, zeros
 from planar.branches.solutions import Solutions, Unclaimed
 from planar.equations import Stage
 from planar.pairs import Kind
 from planar.program import length
+from planar.solving.candidates import hanging
 from planar.solving.newton import CLOSED
 from planar.solving.setup import Setup
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.equations import Stage
-from planar.solving.candidates import Candidates
+from planar.solving.candidates import Candidate, Candidates, hanging
 
 Array = np.ndarray
 
@@ -42,6 +42,38 @@ class Failure(NamedTuple):
     groups: int = 0
 
 
+class _Groups:
+    """The candidates of groups, and where there are none: whatever the groups do on which one does not hang, at the
+    same places of those on which it hangs there are none again."""
+
+    def __init__(self, candidates: Candidates):
+        self.candidates = candidates
+        self.worst: Failure | None = None
+        "the last group that could not be assembled"
+        self.hopeless = False
+        "whether one cannot be assembled that hangs on no other"
+        self._hanging: list[list[int]] | None = None
+        self._ends: dict[int, set[bytes]] = {}
+
+    def of(self, stage: Stage, z: Array) -> list[Candidate]:
+        """Those of a group, the unknowns before it in z; none as well where a later one would have none for these."""
+        if self._leads_to_an_end(z, stage.unknowns.start):
+            return []
+        found, nearest = self.candidates.of(stage, z)
+        if not found:
+            if self.worst is None or stage.level > self.worst.stage.level:
+                self.worst = Failure(stage, nearest)
+            self._hanging = self._hanging or [sorted(columns) for columns in hanging(self.candidates.setup)]
+            self._ends.setdefault(stage.level, set()).add(z[self._hanging[stage.level]].tobytes())
+            self.hopeless = not self._hanging[stage.level]
+        return found
+
+    def _leads_to_an_end(self, z: Array, known: int) -> bool:
+        columns = self._hanging or []
+        ends = self._ends.items()
+        return any(columns[level][-1] < known and z[columns[level]].tobytes() in places for level, places in ends)
+
+
 class _Node(NamedTuple):
     """A partial assembly, in the order in which the search takes them up."""
 
@@ -62,9 +94,8 @@ def search(candidates: Candidates, sound: Callable[[Array], bool] | None = None)
     the search only goes on to an end, and says so.
     """
     stages = candidates.equations.stages
-    number = count()
+    number, groups = count(), _Groups(candidates)
     heap = [_Node(0.0, 0, (), next(number), np.zeros(len(candidates.equations.unknowns)), ())]
-    worst: Failure | None = None
     chosen: _Node | None = None
     taken: _Node | None = None
     tied = 0
@@ -85,9 +116,9 @@ def search(candidates: Candidates, sound: Callable[[Array], bool] | None = None)
             if tied and (taken is not None or tied > MOST_TIED):
                 return Assembly((taken or chosen).z, (taken or chosen).ties)
             continue
-        found, nearest = candidates.of(stages[len(node.ranks)], node.z)
-        if not found and (worst is None or stages[len(node.ranks)].level > worst.stage.level):
-            worst = Failure(stages[len(node.ranks)], nearest)
+        found = groups.of(stages[len(node.ranks)], node.z)
+        if groups.hopeless:
+            break
         for rank, each in enumerate(found):
             alike = sum(abs(other.distance - each.distance) <= ALIKE for other in found) > 1
             heapq.heappush(
@@ -102,6 +133,6 @@ def search(candidates: Candidates, sound: Callable[[Array], bool] | None = None)
                 ),
             )
     if chosen is None:
-        assert worst is not None
-        return worst._replace(groups=expansions)
+        assert groups.worst is not None
+        return groups.worst._replace(groups=expansions)
     return Assembly((taken or chosen).z, (taken or chosen).ties if tied else (), expansions >= EXPANSIONS)

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.equations import Stage
+from planar.minors import depends
 from planar.pairs import Kind
 from planar.plane import Vector
 from planar.program import Program, length, placed
@@ -30,6 +31,17 @@ CLEAR = 0.03
 """An assembly whose points lie this near to the sketch on average (lengths of the size) is the one that is meant."""
 
 
+def hanging(setup: Setup) -> list[set[int]]:
+    """The unknowns of earlier groups on which each group hangs."""
+    columns = depends(setup.program)
+    later = len(setup.equations.unknowns) + len(setup.station.u)
+    return [
+        {column for row in range(stage.rows.start, stage.rows.stop) for column in columns[row]}
+        - set(range(stage.unknowns.start, later))
+        for stage in setup.equations.stages
+    ]
+
+
 class Candidate(NamedTuple):
     """One assembly of a group: all unknowns with this group's filled in, and how it lies.
 
@@ -50,6 +62,7 @@ class Candidates:
 
     def __init__(self, setup: Setup):
         mechanism, unit = setup.mechanism, setup.unit
+        self.setup = setup
         self.program, self.u, self.p = setup.program, setup.station.u, setup.station.p
         self.equations, self.pairs, self.column = setup.equations, setup.pairs, setup.column
         self.numbers, first = {}, 0
