@@ -74,7 +74,7 @@ def likenesses(first: Figure, second: Figure) -> Iterator[Likeness]:
     marks = (sorted((graph.degree(node), mark) for node, mark in graph.nodes(data="mark")) for graph in (a, b))
     if next(marks) != next(marks):
         return
-    from networkx.isomorphism import GraphMatcher
+    from networkx.algorithms.isomorphism import GraphMatcher
 
     matcher = GraphMatcher(a, b, node_match=lambda one, other: one["mark"] == other["mark"])
     for found in matcher.isomorphisms_iter():
