@@ -12,7 +12,7 @@ from benchmarks import chain
 from planar import judged
 from planar.called import SIZES, Called, Chained
 from planar.mechanism import Drive, with_inputs
-from planar.program import program
+from planar.program import CACHED, program
 from planar.solving import follow, position, straight
 from planar.solving.candidates import Candidates
 from planar.solving.position import Known, Solver
@@ -181,7 +181,7 @@ def test_kept_positions_are_few(monkeypatch):
     assert sum(len(each) for each in known.ways._kept.values()) <= 21
     for number in range(3):
         planar.solve(mechanism(1.0 + 0.01 * number))
-    assert position._known.cache_info().currsize <= position._known.cache_info().maxsize == 64
+    assert position._known.cache_info().currsize <= position._known.cache_info().maxsize == CACHED
 
 
 def test_mechanisms_of_one_structure_share_all_but_their_numbers():

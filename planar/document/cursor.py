@@ -180,9 +180,8 @@ class Cursor:
             found = self._bare(self.as_number(), kind)
         if not abs(found) < HUGE:
             raise self.refuse(None, "the number is too large")
-        if kind == "length" and 0.0 < abs(found) < TINY:
-            raise self.refuse(None, f"the number is too small; write 0, or {TINY:g} m at least")
-        return found
+        # what is smaller than rounding leaves of any length is none
+        return 0.0 if kind == "length" and abs(found) < TINY else found
 
     def as_number(self) -> float:
         if isinstance(self.value, bool) or not isinstance(self.value, int | float):
@@ -262,7 +261,8 @@ class Cursor:
     def positive(self, kind: str) -> float:
         found = self.as_quantity(kind)
         if found <= 0.0:
-            raise self.refuse(None, f"a {kind} above zero is wanted here, not {self.value!r}")
+            least = f", {TINY:g} m at least," if kind == "length" else ""
+            raise self.refuse(None, f"a {kind} above zero{least} is wanted here, not {self.value!r}")
         return found
 
     # links and points

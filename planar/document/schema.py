@@ -20,12 +20,10 @@ SENSES = ("clockwise", "anticlockwise", "to the left", "to the right", "upwards"
 
 _TEXT: Schema = {"type": "string"}
 _TEXTS: Schema = {"type": "array", "items": _TEXT}
-_NOTHING: Schema = {"exclusiveMinimum": -TINY, "exclusiveMaximum": TINY, "not": {"const": 0}}
 _BOUNDED: Schema = {"type": "number", "exclusiveMinimum": -HUGE, "exclusiveMaximum": HUGE}
-_LENGTH: Schema = {**_BOUNDED, "not": _NOTHING}
 _FROM_ZERO: Schema = {"type": "number", "minimum": 0, "exclusiveMaximum": HUGE}
 _ABOVE_ZERO: Schema = {"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": HUGE}
-_SIZE: Schema = {**_ABOVE_ZERO, "not": _NOTHING}
+_SIZE: Schema = {"type": "number", "minimum": TINY, "exclusiveMaximum": HUGE}
 _NUMBER = r"([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\s*(?![eE][+-]?[0-9])[A-Za-zµμΩ°]"
 """A number and the beginning of its unit."""
 
@@ -179,7 +177,7 @@ def schema() -> dict[str, Any]:
             "text": _TEXT,
             "number": _BOUNDED,
             "quantity": _quantity(_BOUNDED, "[+−-]?", "10.5 rad/s"),
-            "length": _quantity(_LENGTH, "[+−-]?", "50 mm"),
+            "length": _quantity(_BOUNDED, "[+−-]?", "50 mm"),
             "amount": _quantity(_FROM_ZERO, "[+]?", "2 kg"),
             "size": _quantity(_SIZE, "[+]?", "50 mm"),
             "angle": _quantity(_BOUNDED, "[+−-]?", "60 deg"),

@@ -17,6 +17,8 @@ from planar.words import many
 Array = np.ndarray
 
 TINY = float(np.finfo(float).tiny)
+MOST_LOST_OF_SECOND = 0.1
+"""Part of an acceleration that may be wrong."""
 SHORT = 1e-4
 """Sizes: an arm that is shorter is named as a cause of what is lost."""
 
@@ -34,8 +36,9 @@ class Errors(NamedTuple):
 
     @property
     def lost(self) -> Array:
-        """Which samples have too few digits left (samples,)."""
-        return ~(self.greatest <= MOST_LOST)
+        """Which samples have too few digits left (samples,): next to a change point of places and velocities that are
+        known well the accelerations may be known to one."""
+        return ~((np.maximum(self.places, self.first) <= MOST_LOST) & (self.second <= MOST_LOST_OF_SECOND))
 
     @property
     def greatest(self) -> Array:
@@ -63,11 +66,11 @@ class Doubts(NamedTuple):
     def refused(self, setup: Setup, k: int, where: str) -> NoAnswer:
         """What to say of the k-th of them, at a place in words."""
         cause, remedy = self.causes[k]
-        places = float(self.errors.places[k])
-        what = "the rates" if places <= MOST_LOST else "the position"
-        return NoAnswer(
-            Outcome.TOO_INEXACT, f"{where} rounding leaves less than three digits of {what}, as {cause}; {remedy}"
-        )
+        what = "no digit of the accelerations"
+        for part, of in ((self.errors.first, "the rates"), (self.errors.places, "the position")):
+            if not part[k] <= MOST_LOST:
+                what = f"less than three digits of {of}"
+        return NoAnswer(Outcome.TOO_INEXACT, f"{where} rounding leaves {what}, as {cause}; {remedy}")
 
 
 def doubts(setup: Setup, slope: Array, w: Array, y: Array, y1: Array, y2: Array) -> Doubts | None:
