@@ -25,7 +25,7 @@ from planar.motion import State, Unknown
 from planar.solving.position import solve
 from planar.views.centres import remarks
 from tests.command import run
-from tests.draws import draws
+from tests.draws import draws, part
 from tests.known import MODELS, state_of
 from tests.known import found_centres as found
 from tests.linkages import random_linkage
@@ -121,12 +121,12 @@ def lawful(centres: Centres, within: float = EXACT) -> None:
             assert apart < within * 1e-3 / min(length, 1e-3), each
 
 
-@pytest.mark.parametrize("stem", MODELS)
+@pytest.mark.parametrize("stem", part(MODELS, 2, 1))
 def test_every_model_has_all_its_centres_and_they_are_proved(stem):
     lawful(found(stem))
 
 
-@pytest.mark.parametrize("stem", MODELS)
+@pytest.mark.parametrize("stem", part(MODELS, 3))
 def test_they_are_proved_in_other_positions_too(stem):
     state = moved(MODELS[stem], np.random.default_rng(7))
     if state is not None:
@@ -238,7 +238,7 @@ class Again:
         return self.scale.point(*(centre - pair.radius * np.array([-way[1], way[0]])))
 
 
-@pytest.mark.parametrize("stem", MODELS)
+@pytest.mark.parametrize("stem", part(MODELS, 2))
 def test_each_derivation_executed_again_gives_its_point(stem):
     Again(found(stem)).run()
 

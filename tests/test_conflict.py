@@ -13,6 +13,7 @@ from planar.assemblies.completeness import Completeness
 from planar.dimensions import changed, dimensions
 from planar.errors import NoAnswer, Outcome
 from tests import command
+from tests.draws import part
 from tests.test_modes import bars, four_bar
 
 TWO_LOOPS = {"A": [0.0, 0.0], "D": [100.0, 0.0], "G": [200.0, 0.0]}
@@ -254,7 +255,7 @@ def broken(seed: int) -> planar.Mechanism:
     return bars(frame, links | {short: (a, b, length * rng.uniform(0.05, 0.6))}, ("A", angle))
 
 
-@pytest.mark.parametrize("seed", [0, 2, 4, 5, 6, 9, 13, 15, 17, 21, 23])  # the others go together as well
+@pytest.mark.parametrize("seed", part([0, 2, 4, 5, 6, 9, 13, 15, 17, 21, 23], 3))  # the others go together as well
 def test_of_random_linkages_with_a_bar_cut_short_the_conflict_is_irreducible_and_is_mended(seed):
     mechanism = broken(seed)
     assert not planar.modes(mechanism, certify=False)

@@ -14,6 +14,7 @@ from planar.native.kernel import Outside
 from planar.native.listing import MOST_INSTRUCTIONS, Listing, NotPrinted, Turned, without_turning
 from planar.program import structure
 from planar.sweeping.base import base
+from tests.draws import part
 from tests.known import MODELS
 from tests.linkages import random_linkage
 from tests.watchdog import watched
@@ -53,7 +54,7 @@ def repeated(given, designs):
     return given | {"designs": Designs(*(np.repeat(each, designs, axis=1) for each in given["designs"]))}
 
 
-@pytest.mark.parametrize("stem", [stem for stem, mechanism in MODELS.items() if mechanism.inputs])
+@pytest.mark.parametrize("stem", part([stem for stem, mechanism in MODELS.items() if mechanism.inputs], 3))
 def test_a_run_of_a_model_is_the_one_that_casadi_gives(stem):
     mechanism = MODELS[stem]
     try:

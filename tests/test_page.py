@@ -34,6 +34,7 @@ from planar.solving.position import known_of
 from planar.views.columns import columns
 from planar.views.run import written
 from tests import command
+from tests.draws import part
 from tests.known import MODELS
 from tests.pages import in_node, needs_node
 
@@ -115,7 +116,7 @@ def addresses(text: str) -> set[str]:
 # what a page holds
 
 
-@pytest.mark.parametrize("stem", MODELS)
+@pytest.mark.parametrize("stem", part(MODELS, 3, 2))
 def test_the_page_of_every_model_is_one_small_file_that_needs_no_network(stem):
     text = page(MODELS[stem])
     assert len(text.encode()) < LARGEST

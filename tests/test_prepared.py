@@ -6,6 +6,7 @@ import pytest
 import planar
 from planar.errors import BadInput
 from planar.sweeping.designs import liftable
+from tests.draws import part
 from tests.known import MODELS
 from tests.test_answers import four_bar
 
@@ -22,7 +23,7 @@ def agree(found, swept, points):
             np.testing.assert_allclose(told[point], wanted[point][0], atol=near * scale)
 
 
-@pytest.mark.parametrize("stem", RUNNING[::3])
+@pytest.mark.parametrize("stem", part(RUNNING, 6))
 def test_a_run_of_a_model_is_that_of_a_sweep(stem):
     mechanism = MODELS[stem]
     at = mechanism.inputs[0]
