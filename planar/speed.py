@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, replace
 from functools import partial
 from importlib.util import find_spec
 from itertools import count
+from signal import SIGINT, default_int_handler, signal
 from threading import Event, Timer, current_thread, main_thread
 from time import perf_counter
 from typing import Any
@@ -158,7 +159,10 @@ def _sweeps_within(mechanism: Mechanism, along: Range, seconds: float) -> tuple[
 
     bell = Timer(seconds + GIVEN_UP, ring)
     bell.daemon = True
+    before = None
     if current_thread() is main_thread():
+        # in the background a shell has it ignored
+        before = signal(SIGINT, default_int_handler)
         bell.start()
     try:
         for each in _sweeps(mechanism, along, seconds):
@@ -170,6 +174,8 @@ def _sweeps_within(mechanism: Mechanism, along: Range, seconds: float) -> tuple[
         return tuple(found), [f"Sweeps were given up after {seconds + GIVEN_UP:g} s: some design takes so long"]
     finally:
         bell.cancel()
+        if before is not None:
+            signal(SIGINT, before)
     return tuple(found), []
 
 

@@ -188,7 +188,10 @@ def test_an_mp4_without_ffmpeg_says_what_to_install(monkeypatch):
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        ({"suffix": ".avi"}, "an animation is a .gif or a .mp4 file, not '.avi'"),
+        (
+            {"suffix": ".avi"},
+            "a file name that ends in '.avi': an animation can be written to files that end in .gif or .mp4",
+        ),
         ({"fps": 0.0}, "1 to 50 frames a second are wanted, not 0.0"),
         ({"fps": float("nan")}, "1 to 50 frames a second are wanted"),
         ({"frames": 1}, "2 to 1000 frames are wanted, not 1"),

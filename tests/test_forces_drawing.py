@@ -461,7 +461,7 @@ def test_the_space_diagram_of_free_bodies_says_on_which_link_of_a_pin_a_load_act
     drawn = {picture.title: picture for picture in pictures}
     assert "the load at 'B' acts on link 'block B', not on 'rod'" in " ".join(drawn["Space diagram"].notes)
     pushed = {title for title, each in drawn.items() if strokes(each, "force P_B", Arrow)}
-    assert pushed == {"3  block B"}
+    assert pushed == {"3 block B"}
 
 
 def test_many_links_go_on_sheets_no_larger_than_a_page_each_once():
