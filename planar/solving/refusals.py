@@ -157,19 +157,19 @@ def dead_point(setup: Setup, links: Sequence[str]) -> NoAnswer:
 
 def ended(setup: Setup, links: Sequence[str], where: str, ending: Ending) -> NoAnswer:
     """Where a motion of the inputs ends: a dead point, the infinite, or branches that cannot be told apart."""
+    drive = _pairs_of(setup, links, 4)
     if ending is Ending.DEAD_POINT:
         return NoAnswer(
             Outcome.DEAD_POINT,
             f"{_inputs(setup)} cannot go beyond {where}, a dead point: {_links(links)} would lead back from there; "
-            f"stay short of it, go through the whole circuit, or drive {_pairs_of(setup, links, 4)}",
+            f"stay short of it, go through the whole circuit, or drive {drive}",
         )
     if ending is Ending.ENDLESS:
         return NoAnswer(
             Outcome.BRANCH_LOST,
             f"{_inputs(setup)} cannot go beyond {where}: towards there {_links(links)} slide out without an end, as "
-            f"where lines become parallel; stop short of it, or drive {_pairs_of(setup, links, 4)}",
+            f"where lines become parallel; stop short of it, or drive {drive}",
         )
-    drive = _pairs_of(setup, links, 4)
     if ending is Ending.FAR:
         return NoAnswer(
             Outcome.BRANCH_LOST,
