@@ -29,6 +29,7 @@ from tests.test_explain import HOSTILE, hostile
 A4 = (210.0, 297.0)
 POINT = 25.4 / 72.0
 FAR = 1e-6
+TABLES = ("glyf", "GSUB", "GPOS", "GDEF", "BASE", "MATH", "kern")
 
 
 @cache
@@ -244,3 +245,28 @@ def test_a_heading_stays_with_what_it_heads() -> None:
         assert texts[-1] == "text"
         assert texts[0] == "Head"
     assert A4[0] - 2.0 * MARGIN == ROOM
+
+
+def test_embedded_fonts_hold_outlines_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No ligatures and no kerning are read, cut down or written: with them fonts take longer than all else."""
+    from fontTools.subset import Options, Subsetter
+    from fontTools.ttLib import TTFont
+
+    cut: list[set[str]] = []
+    subset = Subsetter.subset
+
+    def counted(self: Subsetter, font: TTFont) -> None:
+        subset(self, font)
+        cut.append({tag for tag in TABLES if tag in font})
+
+    before = list(Options()._drop_tables_default)
+    monkeypatch.setattr(Subsetter, "subset", counted)
+    figures = solution_pages(planar.solve(planar.load("four-bar")))
+    text = pypdfium2.PdfDocument(sheets(figures, ".pdf"))[0].get_textpage().get_text_range()
+    # upright, slanted and bold, of the drawings' family and of the pages'
+    assert 0 < len(cut) <= 6
+    for tables in cut:
+        assert tables == {"glyf"}
+    assert "Given" in text
+    assert "ω" in text
+    assert Options()._drop_tables_default == before

@@ -8,7 +8,7 @@ from io import BytesIO
 from math import hypot
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from planar.drawing.fonts import outlined, quiet, shown
+from planar.drawing.fonts import outlined, outlines_only, quiet, shown
 from planar.drawing.ink import FILLS, INK, POINT, Ink, ready
 from planar.drawing.labels import Placed, placed
 from planar.drawing.lettering import measured, wrapped
@@ -206,7 +206,7 @@ def _book(figures: Sequence[Figure]) -> bytes:
     used = {family for each in figures for family in families_of(each)}
     # where a font cannot be embedded as it is, all are embedded as drawings of their letters
     fonts = {} if outlined(used) else {"pdf.fonttype": 3, "ps.fonttype": 3}
-    with rc_context(fonts), PdfPages(out, metadata=METADATA["pdf"]) as book:
+    with rc_context(fonts), outlines_only(), PdfPages(out, metadata=METADATA["pdf"]) as book:
         for each in figures:
             book.savefig(each)
     return out.getvalue()

@@ -24,6 +24,8 @@ BOOK = "STIXGeneral"
 """The book face that comes along with matplotlib, for printed pages."""
 UNKNOWN = "\N{REPLACEMENT CHARACTER}"
 """Shown for a character that no font has."""
+LAYOUT = ("GSUB", "GPOS", "GDEF", "BASE", "MATH", "kern")
+"""Tables of a font that tell how its letters stand together."""
 LAST_RESORT = "Last Resort"
 """A font that has boxes for everything."""
 JAPANESE = (
@@ -145,6 +147,23 @@ def quiet() -> Iterator[None]:
     finally:
         for log, level in logs:
             log.setLevel(level)
+
+
+@contextmanager
+def outlines_only() -> Iterator[None]:
+    """Fonts embedded in PDF files leave out ligatures, kerning and marks: a PDF places each letter by itself.
+
+    To cut those tables down takes longer than all the rest of embedding. matplotlib hands on no choice of tables, so
+    fontTools' own list of those that no file needs is longer meanwhile.
+    """
+    from fontTools.subset import Options
+
+    kept = Options._drop_tables_default
+    Options._drop_tables_default = [*kept, *LAYOUT]
+    try:
+        yield
+    finally:
+        Options._drop_tables_default = kept
 
 
 def outlined(used: Iterable[str]) -> bool:
