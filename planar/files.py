@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 from planar.document import read
 from planar.errors import BadInput, NotWritten
@@ -23,7 +23,9 @@ MOST_FILES = 10_000
 """Files of a folder that are looked at for one that may be meant."""
 LARGEST = 8 * 1024 * 1024
 """Bytes; a mechanism of ten thousand links takes about two million."""
-OUT_OF_ROOM = {getattr(errno, name) for name in ("ENOSPC", "EDQUOT", "EFBIG", "EIO", "EPIPE") if hasattr(errno, name)}
+OUT_OF_ROOM = {
+    getattr(errno, name) for name in ("ENOSPC", "EDQUOT", "EFBIG", "EIO", "EPIPE", "EBADF") if hasattr(errno, name)
+}
 """What comes of writing, and not of where."""
 NOT_REPLACED = {errno.EACCES, errno.EPERM, errno.EROFS, errno.EBUSY, errno.EXDEV}
 """What comes of a folder that takes no other file, as where one file alone is mounted or may be written."""
@@ -76,10 +78,15 @@ def save(path: Path, content: str | bytes) -> None:
         raise unwritten(str(path), "the file", problem) from None
 
 
-def unwritten(place: str, what: str, problem: Exception) -> BadInput:
+def unwritten(place: str, what: str, problem: Exception, done: str = "written") -> BadInput:
     """That something cannot be written, as an error: NotWritten where its content found no room, else BadInput."""
     kind = NotWritten if getattr(problem, "errno", None) in OUT_OF_ROOM else BadInput
-    return kind(place, f"{what} cannot be written: {getattr(problem, 'strerror', None) or problem}")
+    return kind(place, f"{what} cannot be {done}: {getattr(problem, 'strerror', None) or problem}")
+
+
+def closed_output() -> TextIO:
+    """A stream in place of the output that the shell has closed: to print there is an error, not passed over."""
+    return os.fdopen(os.open(os.devnull, os.O_RDONLY), "w", encoding="utf-8", closefd=False)
 
 
 def abandon(stream: Any) -> None:

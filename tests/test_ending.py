@@ -100,6 +100,26 @@ def test_a_process_says_nothing_after_its_sentence():
     assert (found.returncode, found.stderr) == (CLOSED_PIPE, "")
 
 
+@pytest.mark.skipif(os.name != "posix", reason="the shell closes streams otherwise")
+@pytest.mark.parametrize(
+    ("words", "status"), [("solve four-bar", NOT_WRITTEN), ("--version", NOT_WRITTEN), ("solve there-is-no-such", 2)]
+)
+def test_an_output_that_the_shell_has_closed_is_one_that_cannot_be_written(words, status):
+    shell = ["sh", "-c", f'"$0" -m planar {words} >&-', sys.executable]
+    found = subprocess.run(shell, cwd=ROOT, stderr=subprocess.PIPE, text=True, check=False)
+    assert found.returncode == status
+    assert found.stderr.count("\n") == 1
+    assert ("the output cannot be written: Bad file descriptor" in found.stderr) is (status == NOT_WRITTEN)
+
+
+def test_what_prints_nothing_needs_no_output(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, "stdout", None)
+    with pytest.raises(SystemExit) as ending:
+        main(["plot", "four-bar", "scheme", "-o", str(tmp_path / "a.svg")], prog_name="planar")
+    assert ending.value.code == 0
+    assert (tmp_path / "a.svg").exists()
+
+
 @full
 def test_a_file_without_room_ends_so_too(tmp_path):
     (tmp_path / "m.csv").symlink_to(FULL)
@@ -112,3 +132,22 @@ def test_the_statuses_stand_in_the_help():
     out = io.StringIO()
     ended("--help", stdout=out)
     assert f"{NOT_WRITTEN} where the result cannot be written" in " ".join(out.getvalue().split())
+
+
+def test_a_folder_for_which_there_is_no_room_ends_so_too(tmp_path, monkeypatch):
+    def no_room(self, *_, **__):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "mkdir", no_room)
+    status, said = ended("gallery", "four-bar", "-o", str(tmp_path / "pages"), stdout=io.StringIO())
+    assert (status, said) == (
+        NOT_WRITTEN,
+        f"planar: {tmp_path / 'pages'}: the folder cannot be made: No space left on device\n",
+    )
+
+
+def test_choices_are_listed_on_one_line():
+    status, said = ended("plot", "four-bar", "-o", "a.png", stdout=io.StringIO())
+    assert status == 2
+    assert "\\" not in said
+    assert "scheme, velocity, acceleration" in said

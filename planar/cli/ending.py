@@ -59,6 +59,10 @@ class Commands(click.Group):
 
     def main(self, *args: Any, **more: Any) -> Any:
         """As click's, but that output which cannot be written ends in a status of its own, the last of it too."""
+        if sys.stdout is None:
+            from planar.files import closed_output
+
+            sys.stdout = closed_output()
         try:
             try:
                 return super().main(*args, **more)
@@ -109,7 +113,7 @@ def _ending() -> Iterator[None]:
         told = "stopped by the user before it was done"
         _refuse(f"interrupted: {told}", "interrupted", told, INTERRUPTED)
     except click.UsageError as problem:
-        told = problem.format_message().rstrip(".").replace(". Did", "; did").replace(". (", " (")
+        told = " ".join(problem.format_message().split()).rstrip(".").replace(". Did", "; did").replace(". (", " (")
         if not told.endswith(("?", "?)")):
             told += f"; see `{problem.ctx.command_path if problem.ctx else 'planar'} --help`"
         wrong = str(BadInput("command line", told[0].lower() + told[1:]))

@@ -26,7 +26,7 @@ from planar.cli.shared import (
     spare,
     tell,
 )
-from planar.errors import BadInput
+from planar.errors import BadInput, no_format
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -35,6 +35,9 @@ if TYPE_CHECKING:
     from planar.analysis.published import Comparison
     from planar.motion import Motion, State
     from planar.results import RelativeState
+
+PAGES = (".pdf", ".png")
+"""Files of pages with drawings."""
 
 
 @main.command()
@@ -79,9 +82,15 @@ def explain(
     """The worked solution: vector equations and tables, both polygons step by step, results."""
     from planar.drawing.paper import scales as read
 
+    on_pages = output is not None and output.suffix.lower() in PAGES
+    if output is not None and not on_pages:
+        from planar.views.saved import SUFFIXES
+
+        if output.suffix not in SUFFIXES:
+            raise no_format(output.suffix, "a worked solution", (*SUFFIXES, *PAGES))
     state, comparisons = _solved(model, mode, at, as_json, output)
     given = read(scales)
-    if output is not None and output.suffix.lower() in (".pdf", ".png"):
+    if output is not None and on_pages:
         from planar.drawing.page import sheets, solution_pages
         from planar.files import save
 

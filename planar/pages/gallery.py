@@ -11,7 +11,7 @@ from urllib.parse import quote
 import numpy as np
 
 from planar.errors import BadInput, NoAnswer
-from planar.files import asset, save
+from planar.files import asset, save, unwritten
 from planar.mechanism import Mechanism
 from planar.motion import Motion
 from planar.pages.carried import drawn
@@ -41,7 +41,7 @@ def gallery(
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as problem:
-        raise BadInput(str(folder), f"the folder cannot be made: {problem.strerror}") from None
+        raise unwritten(str(folder), "the folder", problem, "made") from None
     taken, shown, refused = {"index"}, [], []
     for done, (name, mechanism) in enumerate(models, start=1):
         try:

@@ -13,6 +13,7 @@ from planar.errors import no_format
 
 WIDTH = 124
 """Characters, but for what cannot be narrower."""
+SUFFIXES = (".txt", ".html", ".svg")
 
 
 def written(renderable: RenderableType, suffix: str) -> str:
@@ -27,7 +28,7 @@ def written(renderable: RenderableType, suffix: str) -> str:
         ".svg": lambda: _without_fonts(console.export_svg(title="planar", theme=DEFAULT_TERMINAL_THEME)),
     }
     if suffix not in formats:
-        raise no_format(suffix, "tables", formats)
+        raise no_format(suffix, "tables", SUFFIXES)
     return formats[suffix]()
 
 
