@@ -422,7 +422,16 @@ def test_a_pair_that_is_not_told_or_carries_nothing_has_no_curve_but_says_so():
     assert "held more than once" in picture.notes[0]
     shaft = replace(MODELS["slider-crank"], loads=(Load(link="crank", torque=5.0),))
     (idle,) = bearing_pictures(shaft, ["A"])
-    assert (idle.marks, idle.notes) == ((), ("it carries nothing",))
+    assert (idle.marks, idle.title, idle.notes) == ((), "No diagram: A", ("no force or couple is carried here",))
+
+
+def test_pairs_that_carry_nothing_are_named_together_after_the_diagrams_of_the_others():
+    lift = replace(MODELS["scissor-lift"], loads=(Load(point="L1", force=(0.0, -1000.0)),))
+    *drawn, rest = bearing_pictures(lift)
+    assert [each.title.partition(":")[0] for each in drawn] == ["O", "M1", "S"]
+    assert all(each.marks for each in drawn)
+    assert rest.title == "No diagram: L1, R1, M2, L2, R2, M3, L3, foot, top and R3"
+    assert (rest.marks, rest.notes) == ((), ("no force or couple is carried here",))
 
 
 def test_commands_draw_all_three_and_refuse_what_is_for_others(tmp_path):

@@ -13,7 +13,9 @@ import numpy as np
 import pytest
 
 import planar
+from planar.analysis.pencil import acceleration_polygon, velocity_polygon
 from planar.dimensions import changed, dimensions
+from planar.drawing.polygons import polygon_picture
 from planar.pages import gallery, notebook
 from planar.pages.kinds import KINDS, described
 from planar.pages.page import page
@@ -579,10 +581,31 @@ def test_at_a_dead_point_the_page_says_so_and_shows_no_number_and_no_arrow(shown
     assert [each.split()[0] for each in heads] == ["link", "angle", "angular", "angular"]
     assert cells[1:] == ["–", "–"]
     assert "dead point of the input: no velocity" in window.locator("#layers").inner_text()
+    circle = window.locator("#layers .beside figure", has_text="Circle diagram")
+    why = "centres are where two links have one velocity; dead point of the input: no velocity"
+    assert why in circle.locator("figcaption").inner_text()
+    assert circle.locator("svg").is_hidden()
     window.evaluate("page.moveTo(page.data.inputs[0].position)")
     settled(window)
     assert window.locator("#numbers .why").is_hidden()
     assert window.locator("#drawing .layers .arrow").count() > 0
+
+
+def test_letters_of_polygons_are_explained_as_on_paper(shown):
+    mechanism = MODELS["crank-and-slotted-lever"]
+    window = shown(mechanism)
+    for box in window.locator("#layers").get_by_role("checkbox").all():
+        box.check()
+    state = planar.solve(mechanism)
+    for polygon in (velocity_polygon(state), acceleration_polygon(state)):
+        figure = window.locator("#layers .beside figure", has_text=f"{polygon.kind.capitalize()} polygon")
+        told = figure.locator("figcaption").inner_text()
+        # what lies below a slide on the frame has an arrow of its own on a page, and no letter
+        notes = [note for note in polygon_picture(polygon).notes if ": " in note and "the frame" not in note]
+        assert any("a′: the point of lever at A" in note for note in notes)
+        for note in notes:
+            assert note in told
+        assert "a′" in figure.locator("svg").text_content()
 
 
 # undo

@@ -11,6 +11,40 @@ from planar.mechanism import NamedPoint
 GUIDES = ("G", "H", "K", "S", "X")
 """What the fixed point below a slider is called; the first that is no point's own name."""
 PRIME = "′"
+PARTS = "other indices: ends of their parts"
+"""Of accelerations."""
+
+
+def small_letters(points: Iterable[str]) -> dict[str, str]:
+    """The letter of each point's image: small, else the point's own, with stars where another has that too."""
+    found: dict[str, str] = {}
+    taken: set[str] = set()
+    for point in points:
+        letter = point if point.lower() in taken else point.lower()
+        while letter in taken:
+            letter += "*"
+        taken.add(letter)
+        found[point] = letter
+    return found
+
+
+def legend(order: int, below: Mapping[str, tuple[str, str]], frame: str, parts: bool) -> list[str]:
+    """What letters of a polygon stand for that are not those of points in the space diagram, in sentences.
+
+    `below` has for letters, as they are written, a link and the point that theirs lies at; `parts` whether heads of
+    parts of accelerations (order 2) are lettered.
+    """
+    found = []
+    if order == 2:
+        found.append("index 1: accelerations of points" + (f"; {PARTS}" if parts else ""))
+    links: dict[str, list[str]] = {}
+    for letter, (link, _) in below.items():
+        links.setdefault(link, []).append(letter)
+    for link, letters in links.items():
+        at = ", ".join(below[letter][1] for letter in letters)
+        whose = "the frame" if link == frame else link
+        found.append(f"{', '.join(letters)}: the point{'s' * (len(letters) > 1)} of {whose} at {at}")
+    return found
 
 
 class Lettering:
@@ -29,9 +63,7 @@ class Lettering:
         self.places: dict[str, list[Place]] = {}
         self._letters: dict[tuple[str, str], str] = {}
         self._heads: dict[tuple[tuple[str, str], tuple[str, str]], str] = {}
-        self._named: dict[str, str] = {}
-        for name in self.members:
-            self._named[name] = self._free(name)
+        self._named = small_letters(self.members)
 
     def letter(self, place: Place) -> str:
         """The letter of a place."""

@@ -38,6 +38,7 @@ SPOT = 0.45
 """mm: the radius of a mark."""
 SAME = 1e-9
 """A force that varies by less than this part of itself is the same everywhere."""
+NOTHING = "no force or couple is carried here"
 MANY = 4
 """Places at which something is not told, of which all are named."""
 
@@ -57,6 +58,13 @@ class _Load(NamedTuple):
         return f"{self.pair}: {self.sign.plain}, {self.told}"
 
 
+class _Undrawn(NamedTuple):
+    """A pair of which there is no diagram, and why."""
+
+    pair: str
+    why: str
+
+
 def bearing_pictures(what: Forces | Motion | Mechanism, pairs: Sequence[str] | None = None) -> list[Picture]:
     """The loads of pairs (left out: of all in which links touch) over a cycle.
 
@@ -71,10 +79,20 @@ def bearing_pictures(what: Forces | Motion | Mechanism, pairs: Sequence[str] | N
         if name not in of:
             raise BadInput("pair", f"there is no pair {name!r}; pairs are {', '.join(of)}")
     chosen = pairs or [name for name, pair in of.items() if pair.coincident()[1:] or pair.rides()]
-    return [each for name in chosen for each in _pictures(drawn, of[name], found.reactions[name])]
+    diagrams = [each for name in chosen for each in _pictures(drawn, of[name], found.reactions[name])]
+    return [each for each in diagrams if isinstance(each, Picture)] + _undrawn(diagrams)
 
 
-def _pictures(drawn: Loaded, pair: Pair, reaction: Reaction) -> Iterator[Picture]:
+def _undrawn(diagrams: Sequence[Picture | _Undrawn]) -> list[Picture]:
+    """The pairs of which there is no diagram, those without one for the same reason in one line."""
+    pairs: dict[str, dict[str, None]] = {}
+    for each in diagrams:
+        if isinstance(each, _Undrawn):
+            pairs.setdefault(each.why, {})[each.pair] = None
+    return [Picture((), f"No diagram: {listed(list(names))}", (why,)) for why, names in pairs.items()]
+
+
+def _pictures(drawn: Loaded, pair: Pair, reaction: Reaction) -> Iterator[Picture | _Undrawn]:
     mechanism, number = drawn.forces.mechanism, numbered(drawn.forces.mechanism)
     first, second = pair.links
     sense = 1.0
@@ -99,7 +117,7 @@ def _pictures(drawn: Loaded, pair: Pair, reaction: Reaction) -> Iterator[Picture
         yield _polar(drawn, force, _Load(pair.name, Sign("F", index), told, "load", reaction.why))
 
 
-def _polar(drawn: Loaded, force: Array, load: _Load) -> Picture:
+def _polar(drawn: Loaded, force: Array, load: _Load) -> Picture | _Undrawn:
     """The tip of a force (n, 2), to a round scale."""
     long = np.hypot(*force.T)
     if not np.nanmax(long, initial=0.0):
@@ -129,10 +147,9 @@ def _polar(drawn: Loaded, force: Array, load: _Load) -> Picture:
     return Picture(tuple(strokes), load.heading, tuple(notes))
 
 
-def _nothing(load: _Load, values: Array) -> Picture:
-    """No diagram, and why there is none."""
-    told = "it carries nothing" if np.isfinite(values).any() else load.why or "not told at any position"
-    return Picture((), load.heading, (told,))
+def _nothing(load: _Load, values: Array) -> _Undrawn:
+    """Why there is no diagram."""
+    return _Undrawn(load.pair, NOTHING if np.isfinite(values).any() else load.why or "not told at any position")
 
 
 def _equal(low: float, high: float, scale: Scale, name: str, per: float) -> chart.Axis:
@@ -160,7 +177,7 @@ def _marks(drawn: Loaded, force: Array, across: chart.Axis, up: chart.Axis) -> I
             yield Letter(chart.number(place), at, name, 6.5, 0.7)
 
 
-def _over(drawn: Loaded, values: Array, load: _Load) -> Picture:
+def _over(drawn: Loaded, values: Array, load: _Load) -> Picture | _Undrawn:
     """A force along a line's left, or a couple, over the input."""
     if not np.nanmax(np.abs(values), initial=0.0):
         return _nothing(load, values)

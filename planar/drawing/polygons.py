@@ -11,6 +11,7 @@ from math import atan2, hypot
 
 import numpy as np
 
+from planar.analysis.lettering import PRIME, legend
 from planar.analysis.polygons import Meeting, Polygon, Simultaneous, Triangle, Vector
 from planar.analysis.ties import Rates, Slide, rates
 from planar.drawing.paper import Scale, fitting
@@ -31,7 +32,6 @@ PENS = {"velocity": Pen.VELOCITY, "acceleration": Pen.ACCELERATION}
 STILL = {"velocity": "everything is at rest", "acceleration": "nothing is accelerated"}
 TURNING = {"velocity": "no lettered point moves", "acceleration": "no lettered point is accelerated"}
 """Of links that turn about their only points."""
-PRIME = "′"
 SIMPLE = re.compile(f"{LETTER}+{PRIME}*")
 """A letter as textbooks have it, with digits and primes, or a word; any other text is shown as it stands."""
 LOWERED = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
@@ -83,19 +83,11 @@ def _primed(base: str) -> str:
     return base.replace(PRIME * 3, "‴").replace(PRIME * 2, "″")
 
 
-def _legend(polygon: Polygon) -> Iterator[str]:
+def _legend(polygon: Polygon) -> list[str]:
     """What letters stand for that are not those of points in the space diagram."""
-    if polygon.kind == "acceleration":
-        parts = any(letter not in polygon.points for letter in polygon.letters)
-        yield "index 1: accelerations of points" + ("; other indices: ends of their parts" if parts else "")
-    links: dict[str, list[str]] = {}
-    for letter, (link, _) in polygon.below.items():
-        links.setdefault(link, []).append(letter)
-    for link, letters in links.items():
-        bare = ", ".join(_primed(_indexed(polygon, letter)[0]) for letter in letters)
-        at = ", ".join(polygon.below[letter][1] for letter in letters)
-        whose = "the frame" if link == polygon.state.mechanism.frame else link
-        yield f"{bare}: the point{'s' * (len(letters) > 1)} of {whose} at {at}"
+    below = {_primed(_indexed(polygon, letter)[0]): at for letter, at in polygon.below.items()}
+    parts = any(letter not in polygon.points for letter in polygon.letters)
+    return legend(1 if polygon.kind == "velocity" else 2, below, polygon.state.mechanism.frame, parts)
 
 
 def _indexed(polygon: Polygon, letter: str) -> Ends:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import islice
 from typing import Any
 
@@ -10,6 +11,8 @@ import numpy as np
 
 from planar.analysis.centres import extent
 from planar.analysis.centrodes import usual
+from planar.analysis.lettering import PARTS, PRIME, legend, small_letters
+from planar.analysis.phrases import primed
 from planar.analysis.primary import primary
 from planar.analysis.standing import standing
 from planar.analysis.ties import rates
@@ -126,7 +129,7 @@ def carried(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[str
         "numbers": numbered(mechanism),
         "counting": sorted(counting(mechanism)),
         "centred": _centred(state),
-        "rides": [[named[rider], guide] for rider, guide in filter(None, (pair.rides() for pair in mechanism.pairs))],
+        **_lettered(mechanism, named),
         "rolling": list(usual(mechanism)) if len(mechanism.links) > 1 else None,
         "document": document(mechanism, numbers.dimensions),
         "columns": heads(mechanism, solver),
@@ -145,6 +148,29 @@ def carried(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[str
     functions.append(acting[1] if acting else "const balance=null;")
     functions.append(f"const program={{sizes,positions,kinematics,reported,balance,stages:[{stages}]}};")
     return data, "\n".join(functions)
+
+
+def _lettered(mechanism: Mechanism, named: Mapping[tuple[str, str], str]) -> dict[str, Any]:
+    """The letters of polygons: of points, of guides' own points below what slides on them, and what they stand for.
+
+    `rides` has for each slide the point that slides, the link with its guide, and that link's point's letter.
+    """
+    letters = small_letters(each.name for each in named_points(mechanism))
+    taken, rides, below = set(letters.values()), [], {}
+    for rider, guide in filter(None, (pair.rides() for pair in mechanism.pairs)):
+        point = named[rider]
+        own = None
+        if guide != mechanism.frame:
+            own = letters[point] + PRIME
+            while primed(own) in taken:
+                own += PRIME
+            own = primed(own)
+            taken.add(own)
+            below[own] = guide, point
+        rides.append([point, guide, own])
+    kinds = {"velocity": 1, "acceleration": 2}
+    legends = {kind: legend(order, below, mechanism.frame, parts=False) for kind, order in kinds.items()}
+    return {"letters": letters, "rides": rides, "legends": legends | {"parts": PARTS}}
 
 
 def looks(mechanism: Mechanism, numbers: Numbers) -> dict[str, Any]:

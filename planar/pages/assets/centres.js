@@ -105,7 +105,7 @@ const centres = {
   draw(ink, layers) {
     const { page } = layers, state = this.state, all = centresOf(page, standardFrames(page));
     Object.assign(state, { all, places: [] });
-    if (all === null) return `no centres: ${page.undetermined || "the motions are not determined"}`;
+    if (all === null) return page.undetermined || "the motions are not determined";
     const shown = all.filter(({ links }) => state.which.value === "all" || links.includes(state.which.value));
     offer(state.pick, [["", "none"], ...shown.filter(({ at }) => at !== null).map(({ name }) => [name, `I${name}`])]);
     const picked = all.find(({ name, at }) => name === state.pick.value && at !== null) ?? null;
@@ -189,7 +189,8 @@ function within(place, order, most) {
 /** The circle diagram: a place for each link, a chord for each centre. */
 function drawCircle(page, state) {
   const { svg, all, picked, lines } = state;
-  if (!all) { svg.replaceChildren(); state.drawn = ""; return ""; }
+  svg.style.display = all ? "" : "none"; // an empty circle says nothing
+  if (!all) { svg.replaceChildren(); state.drawn = ""; return "no centres, as centres are where two links have one velocity"; }
   const used = new Set(lines.flatMap(({ two }) => two)), kind = (each) => (each === picked ? " picked" : used.has(each) ? " used" : "");
   // it changes only where another centre is picked, or links begin to move as one
   const known = all.filter(({ at: place }) => place !== null), drawn = known.map((each) => each.name + kind(each)).join();

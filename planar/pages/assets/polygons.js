@@ -33,6 +33,7 @@ function drawPolygon(page, svg, rate, state) {
   const fit = polygonFit(page, svg, rate, found, state);
   if (fit === null) return "everything is at rest at the inputs' rates";
   const ink = new Ink(svg, 1), spot = ([x, y]) => [fit.pole[0] + x * fit.px, fit.pole[1] - y * fit.px];
+  let ends = false;
   const drawn = new Set(), name = (a, b) => [a, b].map((v) => v.map((part) => Math.round(part * fit.px * 4)).join()).sort().join("|");
   // each stroke once, whichever links have it
   const once = (a, b) => { const key = name(a, b); if (drawn.has(key)) return false; drawn.add(key); return true; };
@@ -44,6 +45,7 @@ function drawPolygon(page, svg, rate, state) {
         ink.arrow(tail, bend, `arrow part ${rate}`);
         ink.arrow(bend, tip, `arrow part ${rate}`);
         ink.letter(bend, [parts], "letter");
+        ends = true;
       }
     }
     ink.arrow(spot(from), spot(to), `arrow ${absolute ? "" : "relative"} ${rate}`);
@@ -71,7 +73,13 @@ function drawPolygon(page, svg, rate, state) {
     ink.letter(at, text, "letter", { away, key: letters[0] });
   }
   ink.set(state.stood, [0, 0, ...SHEET]);
-  return fit.told;
+  return [fit.told, ...explained(page.data.legends, rate, ends)].join("; ");
+}
+
+/** What letters stand for that are of no point in the drawing; `ends` says whether ends of parts are lettered. */
+function explained(legends, rate, ends) {
+  const [index, ...below] = rate === "acceleration" ? legends[rate] : [null, ...legends[rate]];
+  return [...(index === null ? [] : [index]), ...(ends ? [legends.parts] : []), ...below];
 }
 
 /** The scale and the pole's place: for the whole motion, or those of the position before while the polygon is in the
@@ -112,39 +120,26 @@ function boxOf(xs, ys) {
   return [least(xs), least(ys), most(xs), most(ys)];
 }
 
-/** The letter of each point: small, with a star where another has it. */
-function lettersOf(data) {
-  const given = new Map(), taken = new Set();
-  for (const name of Object.keys(data.points)) {
-    let letter = name.toLowerCase();
-    if (taken.has(letter)) letter = name;
-    while (taken.has(letter)) letter += "*";
-    taken.add(letter);
-    given.set(name, letter);
-  }
-  return given;
-}
-
 /** What a polygon is made of, in m/s or m/s²: {letters, vectors, sides}; null where rates are not determined. */
 function images(page, rate) {
-  const { data } = page, { points, frame, rides } = data;
-  const letter = lettersOf(data), letters = [], vectors = [], sides = [];
+  const { data } = page, { points, frame, rides, letters: letter } = data;
+  const letters = [], vectors = [], sides = [];
   const value = {};
   for (const name of Object.keys(points)) {
     const known = page.point(name)[rate];
     if (known === null) return null;
     value[name] = points[name].links.includes(frame) ? [0, 0] : known;
-    letters.push({ letter: letter.get(name), at: value[name] });
+    letters.push({ letter: letter[name], at: value[name] });
   }
   const members = new Map(data.links.map((link) => [link, []]));
   for (const [name, { links, at }] of Object.entries(points)) {
     links.forEach((link, k) => members.get(link).push({
-      letter: letter.get(name), value: value[name], place: at[k].map((each) => page.size(each)),
+      letter: letter[name], value: value[name], place: at[k].map((each) => page.size(each)),
       joint: links.length > 1, fixed: links.includes(frame),
     }));
   }
   // the guide's own point below each point that slides
-  for (const [name, guide] of rides) {
+  for (const [name, guide, own] of rides) {
     if (guide === frame) {
       vectors.push({ from: [0, 0], to: value[name], absolute: true, normal: null });
       continue;
@@ -152,8 +147,8 @@ function images(page, rate) {
     const { position } = page.point(name), below = page.rates(guide, position)[rate], f = page.frames[guide];
     const [dx, dy] = [position[0] - f.x, position[1] - f.y];
     const place = [f.cos * dx + f.sin * dy, f.cos * dy - f.sin * dx];
-    members.get(guide).push({ letter: `${letter.get(name)}′`, value: below, place, joint: true, fixed: false });
-    letters.push({ letter: `${letter.get(name)}′`, at: below });
+    members.get(guide).push({ letter: own, value: below, place, joint: true, fixed: false });
+    letters.push({ letter: own, at: below });
     vectors.push({ from: below, to: value[name], absolute: false, normal: null });
   }
   for (const link of data.links) {
