@@ -43,10 +43,13 @@ __all__ = [
 
 
 def scheme(state: State, scale: Scales = None) -> Figure:
-    """The kinematic scheme of a position: links numbered, points lettered. Raises BadInput for a scale that is none."""
-    from planar.drawing.scheme import scheme as picture
+    """The kinematic scheme of a position: links numbered, points lettered, crowded parts once more and larger.
 
-    return figure([picture(state, scales(scale, ["length"]).get("length"))])
+    Raises BadInput for a scale that is none.
+    """
+    from planar.drawing.details import scheme_with_details
+
+    return figure(scheme_with_details(state, scales(scale, ["length"]).get("length")))
 
 
 def velocity(state: State, scale: Scales = None) -> Figure:

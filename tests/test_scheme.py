@@ -13,6 +13,8 @@ import planar
 from planar import files
 from planar.drawing import symbols
 from planar.drawing.bodies import bodies, hull
+from planar.drawing.details import AROUND, scheme_with_details
+from planar.drawing.figure import figure
 from planar.drawing.ground import ground_marks
 from planar.drawing.labels import placed
 from planar.drawing.paper import Scale
@@ -691,3 +693,50 @@ def test_a_drawing_whose_pins_would_lie_on_each_other_takes_a_whole_sheet():
     assert scheme(solved("stephenson-valve-gear")).notes == ("Space diagram, 1 cm = 100 mm",)
     # others keep to the paper of a drawing
     assert scheme(solved("walschaerts-valve-gear")).notes == ("Space diagram, 1 cm = 200 mm",)
+
+
+@pytest.mark.parametrize("name", ["stephenson-valve-gear", "walschaerts-valve-gear", "rack-steering"])
+def test_where_symbols_lie_on_each_other_that_part_is_drawn_larger_beside_it(name):
+    state = solved(name)
+    whole, detail = scheme_with_details(state)
+    frame = next(mark for mark in whole.marks if mark.about == detail.title)
+    one, other = detail.title.removeprefix("Detail: ").split(" and ")
+    large, small = (reading(picture.notes[0].removeprefix("Space diagram, ")).per_mm for picture in (detail, whole))
+    a, b = (state.point(point).position / large for point in (one, other))
+    reach = hypot(*symbols.BLOCK) / 2.0 + symbols.PIN
+    assert hypot(*(a - b)) > reach > hypot(*(a - b)) * large / small
+    low, high = np.minimum(a, b) - AROUND, np.maximum(a, b) + AROUND
+    assert detail.window == (pytest.approx(low), pytest.approx(high))
+    corners = np.array(frame.spots)
+    assert corners.min(axis=0) * small == pytest.approx(low * large)
+    assert corners.max(axis=0) * small == pytest.approx(high * large)
+    letters = {mark.text: mark.at for mark in detail.marks if isinstance(mark, Letter)}
+    for point, place in ((one, a), (other, b)):
+        assert letters[point] == pytest.approx(place)
+    for axes in figure([whole, detail]).axes:
+        window = next((patch for patch in axes.patches if patch.get_gid() == "window"), None)
+        assert (window is None) is (axes.get_label() != detail.title)
+        strokes = [
+            each
+            for each in (*axes.lines, *axes.patches)
+            if each is not window and "leader" not in (each.get_gid() or "")
+        ]
+        assert all(each.get_clip_on() is (window is not None) for each in strokes)
+
+
+def test_what_is_clear_has_no_detail_and_a_detail_is_never_the_drawing_again():
+    for name in ("four-bar", "slider-crank", "jansen-leg", "oldham"):
+        assert len(scheme_with_details(solved(name))) == 1
+    short = made(
+        {
+            "frame": "f",
+            "links": {
+                "f": {"points": {"O": [0, 0], "Q": [0, 1]}},
+                "a": {"ends": ["O", "A"], "length": 1},
+                "b": {"ends": ["Q", "B"], "length": 1},
+            },
+            "pairs": [{"turning": "O"}, {"turning": "Q"}],
+            "inputs": [{"pair": "O", "position": 0}, {"pair": "Q", "position": 0}],
+        }
+    )
+    assert len(scheme_with_details(short, Scale("length", 1e-3, "mm"))) == 1

@@ -222,7 +222,7 @@ def cell(picture: Picture) -> _Cell:
         check(mark)
     letters = placed([mark for mark in picture.marks if isinstance(mark, Letter)], picture.marks)
     strokes = [mark for mark in picture.marks if not isinstance(mark, Letter)]
-    corners = [*extent(strokes)] if strokes else []
+    corners = [*(picture.window or extent(strokes))] if strokes else []
     for each in letters:
         corners += [(each.box.left, each.box.bottom), (each.box.right, each.box.top), *(each.leader or ())]
     corners = corners or [(0.0, 0.0)]
@@ -269,11 +269,28 @@ def put(made: Figure, cell: _Cell, corner: Spot) -> None:
     axes.set(xlim=(cell.low[0], cell.high[0]), ylim=(cell.low[1], cell.high[1]), autoscale_on=False)
     for order, mark in enumerate(cell.picture.marks):
         _draw(axes, mark, order)
+    if cell.picture.window is not None:
+        _framed(axes, cell.picture.window)
     _letter(axes, cell.letters, len(cell.picture.marks))
     down = corner[1]
     for line, size in cell.text:
         down -= LEADING * POINT * size
         _write(made, line, (corner[0] + cell.width / 2.0, down), size)
+
+
+def _framed(axes: Axes, window: tuple[Spot, Spot]) -> None:
+    """Show of the strokes what is in a window, and its frame."""
+    from matplotlib.patches import Rectangle
+
+    (left, low), (right, up) = window
+    ink = INK[Pen.CIRCLE]
+    frame = Rectangle((left, low), right - left, up - low, facecolor="none", edgecolor=ink.colour, **_stroke(ink))
+    strokes = [*axes.lines, *axes.patches]
+    axes.add_artist(frame)
+    _named(frame, "window", len(strokes))
+    for each in strokes:
+        each.set(clip_on=True)
+        each.set_clip_path(frame)
 
 
 def _letter(axes: Axes, letters: Sequence[Placed], order: int) -> None:

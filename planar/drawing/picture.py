@@ -155,6 +155,8 @@ class Picture(NamedTuple):
     title: str = ""
     notes: tuple[str, ...] = ()
     "such as the scale: `1 cm = 0.1 m/s`"
+    window: tuple[Spot, Spot] | None = None
+    "lower left and upper right corner of what is shown of the strokes; left out, all"
 
 
 def spot(vector: Iterable[float]) -> Spot:

@@ -26,7 +26,7 @@ from planar.plane import Frame, Vector, direction
 from planar.shapes import Shape
 from planar.units import shown
 
-__all__ = ["body_marks", "ground_marks", "point_letters", "scheme", "space_scale", "standing"]
+__all__ = ["body_marks", "ground_marks", "point_letters", "scheme", "scheme_scale", "space_scale", "standing"]
 
 CROWDED = 2.2 * symbols.PIN
 """mm between pins within which they lie on each other."""
@@ -62,7 +62,7 @@ def scheme(
     fits = space_scale(mechanism, frames, state.shapes)
     if scale is not None and scale.per_mm * FINEST < fits.per_mm:
         raise BadInput("scale", "the drawing would be metres large on paper: choose a smaller one")
-    scale = scale or _uncrowded(fits, mechanism, frames, state.shapes)
+    scale = scale or scheme_scale(state)
     scene = Scene(mechanism, bodies(mechanism, state.shapes), frames, state.shapes, scale, travel or {})
     strokes: list[Mark] = [*fixed(scene), *moving(scene), *_fixed_points(scene)]
     clear = Clearance.of(strokes)
@@ -103,8 +103,10 @@ def space_scale(
     return fitting("length", mechanism.units.length, width, height, (WIDTH, WIDTH))
 
 
-def _uncrowded(fits: Scale, mechanism: Mechanism, frames: Mapping[str, Frame], shapes: Mapping[str, Shape]) -> Scale:
-    """The scale, or where pins would lie on each other the one that fits a whole sheet."""
+def scheme_scale(state: State) -> Scale:
+    """The round scale that fits the paper, or where pins would lie on each other the one that fits a whole sheet."""
+    mechanism, frames, shapes = state.mechanism, standing(state.frames), state.shapes
+    fits = space_scale(mechanism, frames, shapes)
     pins = {mark.name for mark in all_marks(mechanism, shapes) if isinstance(mark, Pin)}
     named = [each.members[0] for each in named_points(mechanism) if each.name in pins]
     places = [frames[link].carry(shapes[link].at(point)) for link, point in named]
