@@ -740,3 +740,21 @@ def test_what_is_clear_has_no_detail_and_a_detail_is_never_the_drawing_again():
         }
     )
     assert len(scheme_with_details(short, Scale("length", 1e-3, "mm"))) == 1
+
+
+def test_pins_however_near_each_other_are_drawn():
+    for apart in (1e-2, 1e-1, 1.0, 10.0):
+        value = {
+            "frame": "f",
+            "links": {
+                "f": {"points": {"O": [0, 0], "Q": [apart, 0]}},
+                "a": {"ends": ["O", "A"], "length": 1000},
+                "b": {"ends": ["Q", "B"], "length": 1000},
+            },
+            "pairs": [{"turning": "O"}, {"turning": "Q"}],
+            "inputs": [{"pair": "O", "position": 0}, {"pair": "Q", "position": 90}],
+        }
+        for scale in (None, "1:1000", "1:1", "5:1"):
+            whole, *details = scheme_with_details(made(value), None if scale is None else reading(scale))
+            assert whole.marks
+            assert all(picture.window is not None for picture in details)

@@ -20,6 +20,8 @@ from planar.words import listed
 
 APART = 24.0
 """mm: the two nearest points of a detail are at the most so far apart, and four tenths of it at the least."""
+LARGEST = 50.0
+"""How much larger than the usual scheme a detail may be."""
 AROUND = 14.0
 """mm of the scheme about the points of a detail."""
 MOST = 3
@@ -33,7 +35,8 @@ def scheme_with_details(state: State, scale: Scale | None = None) -> list[Pictur
 
     Crowded are points whose pins or blocks lie upon each other. Raises BadInput for a scale that is none.
     """
-    chosen = scale or scheme_scale(state)
+    usual = scheme_scale(state)
+    chosen = scale or usual
     whole = scheme(state, chosen)
     points = _symbols(state)
     most = PART * max(
@@ -42,7 +45,8 @@ def scheme_with_details(state: State, scale: Scale | None = None) -> list[Pictur
     frames: list[Mark] = []
     pictures = []
     for names, places, nearest in _clusters(points, chosen):
-        larger = fitting("length", state.mechanism.units.length, nearest, nearest, (APART, APART))
+        apart = min(APART, LARGEST * usual.on_paper(nearest))
+        larger = fitting("length", state.mechanism.units.length, nearest, nearest, (apart, apart))
         by = chosen.per_mm / larger.per_mm
         window = _window(places, larger.per_mm)
         wide = max(b - a for a, b in zip(*window, strict=True)) * larger.per_mm
