@@ -576,6 +576,15 @@ def test_a_command_by_another_name_is_answered_with_the_one_that_does_it(word: s
     assert f"did you mean {meant!r}?" in run(tmp_path, word).refused(2)
 
 
+def test_of_an_argument_that_is_none_of_its_choices_every_choice_is_named_whole(tmp_path: Path) -> None:
+    from planar.cli import main
+
+    (choices,) = (each.type.choices for each in main.commands["plot"].params if each.name == "what")
+    sentence = run(tmp_path, "plot", "four-bar", "schema", "-o", "x.png").refused(2)
+    for choice in choices:
+        assert sentence.count(repr(choice)) == 1
+
+
 def test_a_word_that_is_no_command_is_answered_with_the_commands(tmp_path: Path) -> None:
     sentence = run(tmp_path, "zzz", "four-bar").refused(2)
     for word in ("no such command 'zzz'", "animate", "solve and view", "planar --help"):
@@ -596,6 +605,7 @@ def test_every_other_name_of_a_command_is_of_one_that_there_is_and_is_none_itsel
         (["solve", "four-bar"], ".txt, .html or .svg"),
         (["cycle", "four-bar", "--steps", "2"], ".csv, .json, .npz or .parquet"),
         (["plot", "four-bar", "scheme"], ".png, .svg or .pdf"),
+        (["explain", "four-bar"], ".txt, .html, .svg, .pdf or .png"),
         (["view", "four-bar"], ".html or .htm"),
         (["animate", "four-bar"], ".gif or .mp4"),
     ],

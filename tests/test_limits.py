@@ -532,6 +532,18 @@ def test_a_run_that_starts_where_branches_cross_is_refused_and_says_why():
     assert "'BC' and 'DC' may move in more than one way" in refused.value.reason
     with pytest.raises(BadInput, match="start: branches of the motion cross where the circuit would start"):
         planar.cycle(four_bar(*PARALLELOGRAM, 0.3), 12, start=0.0, circuit=True)
+    assert (
+        planar.cycle(four_bar(*PARALLELOGRAM, 0.3), 12, start=0.0, circuit=True, branches=[1]).outcome is Outcome.SOLVED
+    )
+
+
+def test_a_single_input_between_dead_points_close_by_is_not_one_input_too_many():
+    """OA = 1, QB = 1 and AB = 1e-8 on a frame of sqrt(2): the crank swings by about 1e-8 rad each way."""
+    value = files.to_dict(four_bar(1.0, 1e-8, 1.0, float(np.sqrt(2.0)), np.pi / 4))
+    with pytest.raises(NoAnswer) as refused:
+        planar.cycle(files.from_dict(value), 12)
+    assert refused.value.outcome is Outcome.DEAD_POINT
+    assert "other inputs" not in refused.value.reason
 
 
 # close to a change point

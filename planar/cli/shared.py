@@ -33,7 +33,7 @@ wait for each other longer than they work."""
 def main() -> None:
     """How any planar linkage moves.
 
-    MODEL is a mechanism file (JSON), or the name of a model that comes along.
+    MODEL is a mechanism file (JSON), the name of a model that comes along, or - for what is piped in.
 
     Ends with status 0 when all is done, 1 where the mechanism has no answer, 2 on bad input, 3 where the result cannot
     be written, as on a full disk.
@@ -178,8 +178,11 @@ def drives(mechanism: Mechanism, told: tuple[str, ...]) -> tuple[Drive, ...]:
     return tuple(drives)
 
 
-def show(renderable: Any, output: Path | None) -> None:
-    """Print a table, or write it to a file in the format that its name says."""
+def show(renderable: Any, output: Path | None, others: tuple[str, ...] = ()) -> None:
+    """Print a table, or write it to a file in the format that its name says.
+
+    `others` are the endings of what else the command writes.
+    """
     from rich.console import Console
 
     class Screen(Console):
@@ -196,7 +199,7 @@ def show(renderable: Any, output: Path | None) -> None:
     from planar.files import save
     from planar.views.saved import written
 
-    save(output, written(renderable, output.suffix))
+    save(output, written(renderable, output.suffix, others))
 
 
 def run(

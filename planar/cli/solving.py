@@ -36,6 +36,9 @@ if TYPE_CHECKING:
     from planar.motion import Motion, State
     from planar.results import RelativeState
 
+PAGES = (".pdf", ".png")
+"""Endings of files that take a worked solution on sheets, with its drawings."""
+
 
 @main.command()
 @click.argument("model")
@@ -81,7 +84,7 @@ def explain(
 
     state, comparisons = _solved(model, mode, at, as_json, output)
     given = read(scales)
-    if output is not None and output.suffix.lower() in (".pdf", ".png"):
+    if output is not None and output.suffix.lower() in PAGES:
         from planar.drawing.page import sheets, solution_pages
         from planar.files import save
 
@@ -95,7 +98,7 @@ def explain(
     if as_json:
         click.echo(json.dumps(record(solution, given), ensure_ascii=False, indent=1, allow_nan=False))
         return
-    show(explained(solution, given), output)
+    show(explained(solution, given), output, PAGES)
 
 
 def _solved(

@@ -15,8 +15,8 @@ WIDTH = 124
 """Characters, but for what cannot be narrower."""
 
 
-def written(renderable: RenderableType, suffix: str) -> str:
-    """Tables in the format that a file's suffix names. Raises BadInput."""
+def written(renderable: RenderableType, suffix: str, others: tuple[str, ...] = ()) -> str:
+    """Tables in the format that a file's suffix names. Raises BadInput, which names the `others` that do too."""
     console = _printed(renderable, WIDTH)
     longest = max(map(cell_len, console.export_text(clear=False).splitlines()), default=0)
     if longest > WIDTH:  # a picture would be cut where its width ends
@@ -27,7 +27,7 @@ def written(renderable: RenderableType, suffix: str) -> str:
         ".svg": lambda: _without_fonts(console.export_svg(title="planar", theme=DEFAULT_TERMINAL_THEME)),
     }
     if suffix not in formats:
-        raise no_format(suffix, "tables", formats)
+        raise no_format(suffix, "tables", (*formats, *others))
     return formats[suffix]()
 
 
