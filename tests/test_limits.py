@@ -267,6 +267,17 @@ def test_slides_without_an_end_have_no_limit(face, lift, through, reach):
         planar.cycle(mechanism)
 
 
+def test_a_place_too_far_out_to_be_followed_to_is_reached_as_the_refusal_says():
+    mechanism = wedges(30, 90, 0.0, (0.0, 0.0))
+    with pytest.raises(NoAnswer, match="write the place that is wanted as the input's `position`") as refused:
+        planar.solve(mechanism, {"floor": 1e7})
+    assert "drive" not in refused.value.reason
+    value = files.to_dict(mechanism)
+    value["inputs"][0]["position"] = 1e7
+    there = planar.solve(files.from_dict(value))
+    assert there.pair("lift")["displacement"] == pytest.approx(-1e7 * np.tan(np.radians(30)), rel=1e-12)
+
+
 # many turns
 
 
