@@ -541,7 +541,7 @@ def test_a_run_that_starts_where_branches_cross_is_refused_and_says_why():
         planar.cycle(four_bar(*PARALLELOGRAM, 0.0), 12)
     assert refused.value.outcome is Outcome.CHANGE_POINT
     assert "'BC' and 'DC' may move in more than one way" in refused.value.reason
-    with pytest.raises(BadInput, match="start: branches of the motion .* start; choose .* --branch"):
+    with pytest.raises(BadInput, match=r"start: branches of the motion .* start; choose .* --branch"):
         planar.cycle(four_bar(*PARALLELOGRAM, 0.3), 12, start=0.0, circuit=True)
     assert (
         planar.cycle(four_bar(*PARALLELOGRAM, 0.3), 12, start=0.0, circuit=True, branches=[1]).outcome is Outcome.SOLVED
