@@ -13,12 +13,14 @@ from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from itertools import islice
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any, BinaryIO, TextIO
 
 from planar.document import read
 from planar.errors import BadInput, NotWritten
 from planar.mechanism import Mechanism
 
+PIPED = "-"
+"""What stands for the input of the process in place of a file's name."""
 MOST_FILES = 10_000
 """Files of a folder that are looked at for one that may be meant."""
 LARGEST = 8 * 1024 * 1024
@@ -58,7 +60,12 @@ def dumps(mechanism: Mechanism) -> str:
 
 
 def load(model: str | Path) -> Mechanism:
-    """The mechanism in a file, or the model of that name or id that comes along. Raises BadInput."""
+    """The mechanism in a file, or the model of that name or id that comes along; "-" is what is piped in.
+
+    Raises BadInput.
+    """
+    if str(model) == PIPED:
+        return loads(_piped(), "standard input")
     path = found(model)
     content = bytes_of(path)
     if path.suffix.lower() not in ("", ".json") and not content.lstrip(b"\xef\xbb\xbf \t\r\n").startswith((b"{", b"[")):
@@ -258,8 +265,8 @@ def _missing(path: Path, models: Iterable[str]) -> str:
         return f"there is no such file, and no model of that name; {meant}"
     if not path.parent.is_dir():
         return f"there is no such file: there is no folder {str(path.parent)!r}"
-    there = {each.name.lower(): each.name for each in islice(path.parent.glob("*.json"), MOST_FILES)}
-    near = get_close_matches(name, there, 1, 0.6)
+    there = {each.stem.lower(): each.name for each in islice(path.parent.glob("*.json"), MOST_FILES)}
+    near = get_close_matches(path.stem.lower(), there, 1, 0.6)  # an ending that all have makes none alike
     told = f"; did you mean {str(path.parent / there[near[0]])!r}?" if near else ""
     return f"there is no such file{told or '; name a mechanism file (JSON), or a model that comes along by its name'}"
 
@@ -289,11 +296,27 @@ def bytes_of(path: Path) -> bytes:
     """The content of a file that is no larger than a mechanism may be. Raises BadInput."""
     try:
         with path.open("rb") as file:
-            content = file.read(LARGEST + 1)
+            return _limited(file, str(path))
     except OSError as problem:
         raise BadInput(str(path), f"the file cannot be read: {problem.strerror}") from None
+
+
+def _piped() -> bytes:
+    """What is piped into the process, no longer than a mechanism may be. Raises BadInput."""
+    place = "standard input"
+    try:
+        content = b"" if sys.stdin is None else _limited(sys.stdin.buffer, place)
+    except OSError as problem:
+        raise BadInput(place, f"it cannot be read: {problem.strerror}") from None
+    if not content:
+        raise BadInput(place, "it is empty; pipe a mechanism (JSON) into the command, or name a file")
+    return content
+
+
+def _limited(file: BinaryIO, place: str) -> bytes:
+    content = file.read(LARGEST + 1)
     if len(content) > LARGEST:
-        raise BadInput(str(path), f"the file is larger than the {LARGEST // 2**20} MiB that a mechanism may take")
+        raise BadInput(place, f"the file is larger than the {LARGEST // 2**20} MiB that a mechanism may take")
     return content
 
 

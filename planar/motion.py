@@ -25,6 +25,7 @@ from planar.results import (
     PointState,
     RelativeState,
     quarter_turned,
+    scales,
     third_rate,
     turns_to_least,
     vector_orders,
@@ -221,7 +222,7 @@ class State(Moving):
     def link(self, name: str) -> LinkState:
         """A link by name; its angle between -pi and pi, or with its turns where a pair counts them. Raises Unknown."""
         angle, velocity, acceleration = map(float, orders(self._frame(name).angle))
-        fastest, hardest = self._greatest_of_links
+        fastest, hardest = self.scales_of_links
         sense = _sense(turning(velocity, fastest), velocity * acceleration, abs(velocity) * hardest)
         return LinkState(angle if name in self._counting else wrapped(angle), velocity, acceleration, sense)
 
@@ -233,24 +234,25 @@ class State(Moving):
 
     def _point(self, named: NamedPoint) -> PointState:
         position, velocity, acceleration = (vectors_of(*part) for part in vector_orders(self._carried(named)))
-        fastest, hardest = self._greatest_of_points
+        fastest, hardest = self.scales_of_points
         scale = float(np.hypot(*velocity)) * hardest
         sense = _sense(heading(velocity, fastest), float(velocity @ acceleration), scale)
         return PointState(position, velocity, acceleration, sense)
 
     @cached_property
-    def _greatest_of_points(self) -> tuple[float, float]:
-        """The greatest velocity and acceleration of any point (m/s, m/s^2): rates are at rest beside these."""
-        parts = np.array([vector_orders(self._carried(each)) for each in self._points])
-        speeds = np.hypot(parts[:, :, 0], parts[:, :, 1]).max(axis=0, initial=0.0)
-        return float(speeds[1]), float(speeds[2])
+    def _scales(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        points = [vector_orders(self._carried(each)) for each in self._points]
+        return scales(np.array(points).reshape(-1, 3, 2), np.array([orders(f.angle) for f in self.frames.values()]))
 
-    @cached_property
-    def _greatest_of_links(self) -> tuple[float, float]:
-        """The greatest angular velocity and acceleration of any link; what turns at omega is good for omega^2 too."""
-        parts = np.array([orders(frame.angle) for frame in self.frames.values()])
-        fastest, hardest = np.abs(parts[:, 1:]).max(axis=0, initial=0.0)
-        return float(fastest), float(max(hardest, fastest**2))
+    @property
+    def scales_of_points(self) -> tuple[float, float]:
+        """The greatest velocity and acceleration of points (m/s, m/s^2), beside which others are at rest."""
+        return self._scales[0]
+
+    @property
+    def scales_of_links(self) -> tuple[float, float]:
+        """The greatest angular velocity and acceleration of links (rad/s, rad/s^2), beside which others are at rest."""
+        return self._scales[1]
 
 
 class Course(Protocol):

@@ -144,6 +144,20 @@ def vector_orders(vector: Vector) -> list[tuple[Any, Any]]:
     return list(zip(orders(vector.x), orders(vector.y), strict=True))
 
 
+def scales(points: Array, angles: Array) -> tuple[tuple[float, float], tuple[float, float]]:
+    """The greatest rates, beside which others are at rest: of points (m/s, m/s^2), and of links (rad/s, rad/s^2).
+
+    From the places of points with their rates, (n, 3, 2), and the angles of links with theirs, (n, 3). v among points
+    that are l apart at most is good for an acceleration of v^2 / l and for omega = v / l, and omega for omega^2.
+    """
+    speed, push = np.hypot(points[:, 1:, 0], points[:, 1:, 1]).max(axis=0, initial=0.0)
+    size = np.hypot(*np.ptp(points[:, 0], axis=0)) if len(points) else 0.0
+    turning, swing = np.abs(angles[:, 1:]).max(axis=0, initial=0.0)
+    if size:
+        push, turning = max(push, speed**2 / size), max(turning, speed / size)
+    return (float(speed), float(push)), (float(turning), float(max(swing, turning**2)))
+
+
 def vectors_of(x: Any, y: Any) -> Array:
     """x and y as vectors (..., 2)."""
     return np.stack(np.broadcast_arrays(np.asarray(x, dtype=float), y), axis=-1)

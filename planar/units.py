@@ -105,6 +105,10 @@ class UnitError(ValueError):
     """A text is no quantity, or one of another kind; its text says which and what would do."""
 
 
+class UnknownUnit(UnitError):
+    """A text names no unit at all."""
+
+
 class Unit(NamedTuple):
     """A unit of one kind, `numerator / denominator` of the SI unit."""
 
@@ -216,7 +220,10 @@ def quantity(text: str, kind: str) -> float:
         raise UnitError(f"{text!r} has no unit; write a number, or a text such as {example(kind)!r}")
     if kind == "angular velocity" and written in _RATES:
         raise _unclear(written)
-    found = unit(written)
+    try:
+        found = unit(written)
+    except UnknownUnit as problem:
+        raise UnitError(f"{problem}{_offered(written, kind)}") from None
     if found.kind != kind:
         raise UnitError(
             f"{text!r} is {_article(found.kind)}, but {_article(kind)} is wanted, such as {example(kind)!r}"
@@ -230,6 +237,14 @@ def quantity(text: str, kind: str) -> float:
 def example(kind: str) -> str:
     """A text that is a quantity of this kind."""
     return {"angular velocity": "10.5 rad/s", "length": "50 mm", "angle": "60 deg"}.get(kind, f"2.5 {SI[kind]}")
+
+
+def _offered(written: str, kind: str) -> str:
+    """A clause that offers the unit of this kind that is written most like it, or a quantity as an example."""
+    from difflib import get_close_matches
+
+    near = get_close_matches(written, [name for name, (of, *_) in TABLE.items() if of == kind], 1)
+    return f"; did you mean {near[0]!r}?" if near else f"; write {_article(kind)} as {example(kind)!r}"
 
 
 def shortest(value: float, written: Unit) -> float | str:
@@ -265,7 +280,7 @@ def _looked_up(spelled: str) -> Unit:
     except UnitError:
         raise
     except (pint.PintError, ArithmeticError, AssertionError, LookupError, ValueError, TypeError, AttributeError):
-        raise UnitError(f"{spelled!r} is not a known unit") from None
+        raise UnknownUnit(f"{spelled!r} is not a known unit") from None
     raise UnitError(f"{spelled!r} measures none of the kinds that a mechanism has, such as {', '.join(tuple(SI)[:5])}")
 
 

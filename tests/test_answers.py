@@ -287,6 +287,14 @@ def test_what_there_is_not_is_refused_in_a_sentence():
         planar.dwells(motion, "rocker", within=-1.0)
 
 
+def test_what_slides_without_turning_is_not_said_to_stand_still():
+    motion = planar.cycle(planar.load("scotch-yoke"), 12)
+    for name, sentence in (("yoke", "it does not turn"), ("frame", "it does not turn")):
+        (found,) = planar.answers(motion, name)
+        assert sentence in found.notes
+        assert "it does not move" not in found.notes
+
+
 @pytest.mark.parametrize(
     ("name", "of"),
     [("four-bar", "DC"), ("cardan-gears", "mesh"), ("single-link", "O")],

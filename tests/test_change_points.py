@@ -322,6 +322,15 @@ def test_numbers_after_the_first_are_of_the_change_points_that_are_met_then():
     same_angles(motion.link("DC").angle, expected, 1e-11)
 
 
+def test_a_number_beyond_the_ways_takes_the_last_and_says_so():
+    last = planar.cycle(four_bar(*PARALLELOGRAM, 0.0), 8, branches=[2, 2])
+    motion = planar.cycle(four_bar(*PARALLELOGRAM, 0.0), 8, branches=[3, 3])
+    np.testing.assert_array_equal(motion.link("DC").angle, last.link("DC").angle)
+    assert not any("as asked for" in each for each in motion.remarks)
+    assert sum("the last that there is" in each for each in motion.remarks) == 2
+    assert not any("the last that there is" in each for each in last.remarks)
+
+
 def test_a_rhombus_that_starts_flat_stays_one_or_keeps_its_follower_at_rest():
     for number, phi in ((1, None), (2, np.pi)):
         motion = planar.cycle(four_bar(1, 1, 1, 1, np.pi), 6, np.pi, np.pi + 2.0, branches=[number])

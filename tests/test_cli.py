@@ -558,12 +558,14 @@ from planar.cli import main
 assert "numpy" not in sys.modules
 main(["solve", "four-bar"], standalone_mode=False)
 assert "numpy" in sys.modules
-print(os.environ["OPENBLAS_NUM_THREADS"], file=sys.stderr)
+names = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+print(*(os.environ.get(name) for name in names), file=sys.stderr)
 """
-    environment = {key: value for key, value in os.environ.items() if key != "OPENBLAS_NUM_THREADS"}
-    environment |= {"PYTHONPATH": str(ROOT)} | ({} if said is None else {"OPENBLAS_NUM_THREADS": said})
+    names = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+    environment = {key: value for key, value in os.environ.items() if key not in names}
+    environment |= {"PYTHONPATH": str(ROOT)} | ({} if said is None else dict.fromkeys(names, said))
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=False)
-    assert done.stderr.strip() == (said or "1")
+    assert done.stderr.split() == [said or "1"] * len(names)
 
 
 # commands and files that there are not
@@ -574,6 +576,15 @@ print(os.environ["OPENBLAS_NUM_THREADS"], file=sys.stderr)
 )
 def test_a_command_by_another_name_is_answered_with_the_one_that_does_it(word: str, meant: str, tmp_path: Path) -> None:
     assert f"did you mean {meant!r}?" in run(tmp_path, word).refused(2)
+
+
+def test_of_an_argument_that_is_none_of_its_choices_every_choice_is_named_whole(tmp_path: Path) -> None:
+    from planar.cli import main
+
+    (choices,) = (each.type.choices for each in main.commands["plot"].params if each.name == "what")
+    sentence = run(tmp_path, "plot", "four-bar", "schema", "-o", "x.png").refused(2)
+    for choice in choices:
+        assert sentence.count(repr(choice)) == 1
 
 
 def test_a_word_that_is_no_command_is_answered_with_the_commands(tmp_path: Path) -> None:
@@ -597,6 +608,7 @@ def test_every_other_name_of_a_command_is_of_one_that_there_is_and_is_none_itsel
         (["explain", "four-bar"], ".txt, .html, .svg, .pdf or .png"),
         (["cycle", "four-bar", "--steps", "2"], ".csv, .json, .npz or .parquet"),
         (["plot", "four-bar", "scheme"], ".png, .svg or .pdf"),
+        (["explain", "four-bar"], ".txt, .html, .svg, .pdf or .png"),
         (["view", "four-bar"], ".html or .htm"),
         (["animate", "four-bar"], ".gif or .mp4"),
     ],

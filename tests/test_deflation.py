@@ -7,6 +7,7 @@ import pytest
 
 import planar
 from planar.analysis.mobility import mobility
+from planar.analysis.solution import worked_solution
 from planar.errors import NoAnswer, Outcome
 from planar.minors import _determinant
 from tests.command import run
@@ -71,6 +72,17 @@ def test_pins_in_parallel_slots_leave_a_translation(pins):
         assert state.point(f"G{name}").velocity == pytest.approx([0.0, 0.1], abs=EXACT)
         assert state.point(f"G{name}").acceleration == pytest.approx([0.0, 0.0], abs=EXACT)
     assert any(TO_SECOND_ORDER in remark for remark in state.remarks)
+
+
+@pytest.mark.parametrize("pins", [(0.0, 2.0), (0.0, 1.7, 5.0)])
+def test_what_rounding_leaves_of_the_turning_of_a_body_that_slides_has_no_sense(pins):
+    """Nothing else turns beside it: its size and its speed say what would be turning."""
+    state = planar.solve(jaw(pins))
+    assert state.link("b").sense == "at rest"
+    solution = worked_solution(state)
+    assert [tuple(link)[1:] for link in solution.links] == [(0.0, "at rest", 0.0, "none")]
+    assert all(slide.acceleration == 0.0 for slide in solution.slides)
+    assert all(point.acceleration == 0.0 for point in solution.points)
 
 
 def test_pins_a_little_nearer_than_their_slots_lean_and_farther_do_not_go_together():

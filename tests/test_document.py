@@ -711,7 +711,7 @@ MISTAKES = [
     mistake("", "text", "$", "object", "'text'"),
     mistake("", 5, "$", "object", "number 5"),
     mistake("planar", GONE, "$", "'planar'", "missing"),
-    mistake("planar", 2, "$.planar", "format", "2", "1"),
+    mistake("planar", 2, "$.planar", "format is to be the number 1, not the number 2"),
     mistake("planar", "1", "$.planar", "format", "'1'"),
     mistake("planar", True, "$.planar", "format", "true"),
     mistake("link", {}, "$.link", "unknown key 'link'", "'links'"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 from pathlib import Path
 from typing import Any
@@ -120,6 +121,28 @@ def test_a_path_that_is_not_there_is_answered_with_the_file_beside_it_and_with_n
         assert "no such file" in sentence
         assert "did you mean" not in sentence
     assert "there is no folder 'elsewhere'" in refused("elsewhere/four-bar.json").sentence
+
+
+def test_an_ending_that_all_files_have_makes_no_two_alike(tmp_path: Path) -> None:
+    written(tmp_path, "{}", "slots.json")
+    assert "did you mean" not in refused(tmp_path / "missing.json").sentence
+    assert "slots.json" in refused(tmp_path / "slot.json").sentence
+
+
+def test_a_dash_stands_for_what_is_piped_in(monkeypatch: pytest.MonkeyPatch) -> None:
+    def piped(content: bytes) -> None:
+        monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(content)))
+
+    piped(TEXT.encode())
+    assert planar.load("-").name == CRANK["name"]
+    piped(b"")
+    assert "it is empty" in refused("-").sentence
+    piped(b"[" + b" " * LARGEST)
+    assert "larger than" in refused("-").sentence
+    piped(b"{")
+    assert refused("-").place == "standard input"
+    monkeypatch.setattr("sys.stdin", None)
+    assert "it is empty" in refused("-").sentence
 
 
 def test_a_models_name_in_other_letters_or_with_json_behind_is_answered_with_it() -> None:

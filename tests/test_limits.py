@@ -267,6 +267,17 @@ def test_slides_without_an_end_have_no_limit(face, lift, through, reach):
         planar.cycle(mechanism)
 
 
+def test_a_place_too_far_out_to_be_followed_to_is_reached_as_the_refusal_says():
+    mechanism = wedges(30, 90, 0.0, (0.0, 0.0))
+    with pytest.raises(NoAnswer, match="write the place that is wanted as the input's `position`") as refused:
+        planar.solve(mechanism, {"floor": 1e7})
+    assert "drive" not in refused.value.reason
+    value = files.to_dict(mechanism)
+    value["inputs"][0]["position"] = 1e7
+    there = planar.solve(files.from_dict(value))
+    assert there.pair("lift")["displacement"] == pytest.approx(-1e7 * np.tan(np.radians(30)), rel=1e-12)
+
+
 # many turns
 
 
@@ -530,8 +541,20 @@ def test_a_run_that_starts_where_branches_cross_is_refused_and_says_why():
         planar.cycle(four_bar(*PARALLELOGRAM, 0.0), 12)
     assert refused.value.outcome is Outcome.CHANGE_POINT
     assert "'BC' and 'DC' may move in more than one way" in refused.value.reason
-    with pytest.raises(BadInput, match="start: branches of the motion cross where the circuit would start"):
+    with pytest.raises(BadInput, match=r"start: branches of the motion .* start; choose .* --branch"):
         planar.cycle(four_bar(*PARALLELOGRAM, 0.3), 12, start=0.0, circuit=True)
+    assert (
+        planar.cycle(four_bar(*PARALLELOGRAM, 0.3), 12, start=0.0, circuit=True, branches=[1]).outcome is Outcome.SOLVED
+    )
+
+
+def test_a_single_input_between_dead_points_close_by_is_not_one_input_too_many():
+    """OA = 1, QB = 1 and AB = 1e-8 on a frame of sqrt(2): the crank swings by about 1e-8 rad each way."""
+    value = files.to_dict(four_bar(1.0, 1e-8, 1.0, float(np.sqrt(2.0)), np.pi / 4))
+    with pytest.raises(NoAnswer) as refused:
+        planar.cycle(files.from_dict(value), 12)
+    assert refused.value.outcome is Outcome.DEAD_POINT
+    assert "other inputs" not in refused.value.reason
 
 
 # close to a change point

@@ -100,6 +100,8 @@ MISTAKES = [
     mistake(TEETH, {"teeth": [0, 31]}, ".teeth", "zero"),
     mistake(TEETH, {"teeth": [10**400, 31]}, ".teeth[0]", "too large"),
     mistake(RATIO, {"ratio": 0}, ".ratio", "zero"),
+    mistake(RATIO, {"ratio": 1e-7}, ".ratio", "from 1e-06 to 1e+06"),
+    mistake(RATIO, {"ratio": -2e6}, ".ratio", "from 1e-06 to 1e+06"),
     mistake(RATIO, {"ratio": "-2"}, ".ratio", "number", "'-2'"),
     mistake(RATIO, {"ratio": None}, ".ratio", "number", "null"),
     mistake(RATIO, {"ratio": -inf}, ".ratio", "too large"),

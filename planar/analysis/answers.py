@@ -117,7 +117,7 @@ def _of_point(motion: Motion, steady: Steady, name: str) -> Answers:
 def _no_ends(output: Output) -> tuple[str, ...]:
     """Why an output has no stroke or swing, if it has none."""
     if not output.moves:
-        return ("it does not move",)
+        return ("it does not turn" if output.kind == "angle" else "it does not move",)
     if output.ends() is not None:
         return ()
     if output.gain:

@@ -123,9 +123,7 @@ def _asked(published: Sequence[Published]) -> Iterator[Phrase]:
 
 def _links(state: State) -> Iterator[LinkResult]:
     links = {name: link for name, link in state.links.items() if name != state.mechanism.frame}
-    fastest = max((abs(link.angular_velocity) for link in links.values()), default=0.0)
-    hardest = max((abs(link.angular_acceleration) for link in links.values()), default=0.0)
-    hardest = max(hardest, fastest**2)
+    fastest, hardest = state.scales_of_links
     for name, link in links.items():
         both = (link.angular_velocity, fastest), (link.angular_acceleration, hardest)
         (v, vs), (a, as_) = [(rate if abs(rate) > STILL * most else 0.0, turning(rate, most)) for rate, most in both]
@@ -133,9 +131,8 @@ def _links(state: State) -> Iterator[LinkResult]:
 
 
 def _points(state: State) -> Iterator[PointResult]:
-    points = state.points
-    greatest = [max((float(np.hypot(*point[order])) for point in points.values()), default=0.0) for order in (1, 2)]
-    for name, point in points.items():
+    greatest = state.scales_of_points
+    for name, point in state.points.items():
         both = [(float(np.hypot(*point[order])), heading(point[order], greatest[order - 1])) for order in (1, 2)]
         (v, vs), (a, as_) = [
             (size if size > STILL * most else 0.0, sense) for (size, sense), most in zip(both, greatest, strict=True)
@@ -147,7 +144,12 @@ def _slides(state: State) -> Iterator[SlideResult]:
     for name, pair in motions(state.mechanism).items():
         if pair.drive_kind is Kind.LENGTH:
             report = state.pair(name)
-            yield SlideResult(name, *(float(value or 0.0) for value in list(report.values())[:3]))
+            at, *rates = (float(value or 0.0) for value in list(report.values())[:3])
+            told = (
+                rate if abs(rate) > STILL * most else 0.0
+                for rate, most in zip(rates, state.scales_of_points, strict=True)
+            )
+            yield SlideResult(name, at, *told)
 
 
 def _rubbing(state: State) -> Iterator[Phrase]:

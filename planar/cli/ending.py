@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 import warnings
 from collections.abc import Iterator, Mapping
@@ -114,6 +115,7 @@ def _ending() -> Iterator[None]:
         _refuse(f"interrupted: {told}", "interrupted", told, INTERRUPTED)
     except click.UsageError as problem:
         told = " ".join(problem.format_message().split()).rstrip(".").replace(". Did", "; did").replace(". (", " (")
+        told = re.sub(r" for '\{[^}]*\}'", "", told)  # click names an argument by its choices, and then lists them
         if not told.endswith(("?", "?)")):
             told += f"; see `{problem.ctx.command_path if problem.ctx else 'planar'} --help`"
         wrong = str(BadInput("command line", told[0].lower() + told[1:]))

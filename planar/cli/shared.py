@@ -33,7 +33,7 @@ wait for each other longer than they work."""
 def main() -> None:
     """How any planar linkage moves.
 
-    MODEL is a mechanism file (JSON), or the name of a model that comes along.
+    MODEL is a mechanism file (JSON), the name of a model that comes along, or - for what is piped in.
 
     Ends with status 0 when all is done, 1 where the mechanism has no answer, 2 on bad input, 3 where the result cannot
     be written, as on a full disk.

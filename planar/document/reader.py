@@ -49,7 +49,7 @@ def read(value: Any) -> Mechanism:
     top.only_json()
     top.only(*TOP)
     if top["planar"].value != FORMAT or isinstance(top["planar"].value, bool):
-        raise top.refuse("planar", f"this is format {called(top['planar'].value)}; planar reads format {FORMAT}")
+        raise top.refuse("planar", f"the format is to be the number {FORMAT}, not {called(top['planar'].value)}")
     units = _units(top)
     top = replace(top, whole=Whole(units, "", {}))
     frame = top["frame"].as_text()

@@ -149,7 +149,9 @@ class Wheels(Pair):
         if not all(sizes):
             raise entry.refuse(by, "zero is no size of a wheel")
         if not 1.0 / STEEPEST <= abs(sizes[0] / (sizes[1] if len(sizes) > 1 else 1.0)) <= STEEPEST:
-            raise entry.refuse(by, f"a ratio beyond {STEEPEST:g} is none that wheels have")
+            raise entry.refuse(
+                by, f"wheels have a ratio from {1.0 / STEEPEST:g} to {STEEPEST:g} (its sign is free); take one between"
+            )
         return by, sizes
 
     @classmethod

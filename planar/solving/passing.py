@@ -37,8 +37,9 @@ def crossed(setup: Setup, met: Met) -> str:
     at = listed([setup.told(g.pair, u) for g, u, w in zip(setup.mechanism.inputs, met.u, met.way, strict=True) if w])
     if ways == 1 and not more:
         return f"at {at} there is one more motion to first order, but only this one goes on"
+    asked = "the last that there is" if met.passed.beyond else "as asked for"
     if met.passed.starts:
-        number = f"this motion starts there by number {met.passed.went + 1}, as asked for"
+        number = f"this motion starts there by number {met.passed.went + 1}, {asked}"
         return f"at {at} {more}{many(max(ways, 2), 'branch', 'branches')} of the motion cross; {number}"
-    on = "this one goes on smoothly" if met.passed.went == 0 else "another one was taken, as asked for"
+    on = "this one goes on smoothly" if met.passed.went == 0 else f"another one was taken, {asked}"
     return f"at {at} {more}{many(max(ways, 2), 'branch', 'branches')} of the motion cross; {on}"

@@ -102,8 +102,8 @@ class Ranged:
         work = self.budget(0.0)
         walk = self.walk(follow(self.solver, self.p, self.found.z, self.u, self._at(first)), first, work=work)
         if walk.here.clear < LEAST and not walk.leaves:
-            told = "branches of the motion cross where the circuit would start; choose one by branches, or start it"
-            raise BadInput("start", told + " elsewhere")
+            told = "branches of the motion cross where the circuit would start; choose one by its number (`branches`,"
+            raise BadInput("start", told + " --branch), or start it elsewhere")
         whole = circuit(self.solver, walk)
         turn = np.inf if self.slides else 2.0 * pi
         spacing = min(max(abs(each.ends[1] - each.ends[0]) for each in whole.stretches), turn) / steps
@@ -183,8 +183,11 @@ class Ranged:
         if high.position - low.position < LEAST:
             self.solver.state(self.found.z)  # says why nothing goes on from a dead point or a change point
             at = self.solver.told(self.pair, here)
-            told = f"the input at {self.pair!r} cannot move from {at} while the other inputs stand still"
-            raise NoAnswer(Outcome.TOO_MANY_INPUTS, told)
+            if len(self.u) > 1:
+                told = f"the input at {self.pair!r} cannot move from {at} while the other inputs stand still"
+                raise NoAnswer(Outcome.TOO_MANY_INPUTS, told)
+            told = f"the input at {self.pair!r} can all but not move from {at}, as its motion ends close by both ways"
+            raise NoAnswer(Outcome.DEAD_POINT, f"{told}; change a dimension, or drive another pair")
         # from within to the limits: from a limit two branches lead inwards
         grid = np.linspace(low.position, high.position, steps + 1)
         inner = grid[1:-1]

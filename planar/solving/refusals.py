@@ -174,7 +174,8 @@ def ended(setup: Setup, links: Sequence[str], where: str, ending: Ending) -> NoA
         return NoAnswer(
             Outcome.BRANCH_LOST,
             f"this assembly can be followed only to {where}: there {_links(links)} are out by millions of times the "
-            f"mechanism's size; stop short of it, or drive {drive}",
+            f"mechanism's size; stop short of it, or write the place that is wanted as the input's `position` in the "
+            "file",
         )
     if ending is Ending.SPENT:
         return NoAnswer(

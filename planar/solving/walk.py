@@ -50,6 +50,8 @@ class Passed(NamedTuple):
     crossing: Crossing
     went: int
     starts: bool = False
+    beyond: bool = False
+    """Whether a higher number was asked for than there are ways, so that it took the last."""
 
     @property
     def switches(self) -> bool:
@@ -157,12 +159,13 @@ class Walk:
         if not (self.branches and self.here.clear < AT):
             return
         found = starting(self.curve, self.here.y)
-        went = min(self.branches[0], len(found.ways)) - 1 if found else 0
+        number = self.branches[0]
+        went = min(number, len(found.ways)) - 1 if found else 0
         out = found and beside(self.curve, found.ways[went], found.lost)
         if found is not None and out is not None:
             del self.branches[0]
             self.here, self._out_of = out.middle, out
-            self.passed.append(Passed(found, went, True))
+            self.passed.append(Passed(found, went, True, number > len(found.ways)))
 
     @property
     def end(self) -> tuple[Array, Ending]:
@@ -202,14 +205,14 @@ class Walk:
         found = self._crossing(here)
         if found is None:
             return
-        went, onwards = self._taken(found, here)
+        went, onwards, beyond = self._taken(found, here)
         inwards, outwards = self._sided(found, 0, here), self._sided(found, went, onwards)
         if inwards is None or outwards is None:
             return
         if float(inwards.middle.tangent @ (here.y - inwards.before.y)) < 0.0:
             yield between(here, inwards.before)
             here = inwards.before
-        self.passed.append(Passed(found, went))
+        self.passed.append(Passed(found, went, beyond=beyond))
         yield inwards.arc(here, inwards.middle)
         yield outwards.arc(outwards.middle, outwards.after)
         self.here = outwards.after
@@ -235,12 +238,13 @@ class Walk:
         way = found.ways[index]
         return beside(self.curve, way if way.tangent @ towards.tangent >= 0.0 else way.turned(), found.lost)
 
-    def _taken(self, found: Crossing, here: Point) -> tuple[int, Point]:
-        """The way to go on by, and a point in whose sense: smoothly, or as asked for."""
+    def _taken(self, found: Crossing, here: Point) -> tuple[int, Point, bool]:
+        """The way to go on by, and a point in whose sense: smoothly, or as asked for; and whether it is but the last,
+        as there are not so many."""
         number = self.branches.pop(0) if self.branches else 1
         options = outgoing(found, here)
         index, tangent = options[min(number, len(options)) - 1]
-        return index, found.ways[index]._replace(tangent=tangent)
+        return index, found.ways[index]._replace(tangent=tangent), number > len(options)
 
     def _note(self, after: Point) -> None:
         """How near the walk comes to change points of neighbouring linkages."""
