@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from functools import lru_cache
 from typing import NamedTuple
 
 import casadi as ca
@@ -12,7 +13,7 @@ import numpy as np
 from planar.elimination import stack
 from planar.equations import Row
 from planar.pairs import Kind
-from planar.program import Program
+from planar.program import CACHED, Program
 
 Array = np.ndarray
 
@@ -28,13 +29,14 @@ class Block(NamedTuple):
     rank: int
 
 
-def depends(program: Program) -> list[set[int]]:
+@lru_cache(maxsize=CACHED)
+def depends(program: Program) -> tuple[frozenset[int], ...]:
     """For every constraint the entries of (z, u) on which it depends."""
     e = program.equations
-    found: list[set[int]] = [set() for _ in e.rows]
+    columns: list[set[int]] = [set() for _ in e.rows]
     for row, column in zip(*ca.jacobian_sparsity(e.F, ca.vertcat(e.z, e.u)).get_triplet(), strict=True):
-        found[row].add(column)
-    return found
+        columns[row].add(column)
+    return tuple(map(frozenset, columns))
 
 
 def with_minors(program: Program, blocks: Mapping[int, Block]) -> Program:

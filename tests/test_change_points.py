@@ -355,3 +355,15 @@ def test_a_start_on_a_change_point_says_which_number_goes_which_way():
             act(four_bar(*PARALLELOGRAM, 0.0))
         assert refused.value.outcome is Outcome.CHANGE_POINT
         assert "1 moves 'DC' by 1, 2 moves 'DC' by -3 rad for each rad of the input" in refused.value.reason
+
+
+def test_a_run_in_time_from_a_change_point_is_refused_as_the_position_is_and_goes_on_by_a_number():
+    mechanism = four_bar(*PARALLELOGRAM, 0.0)
+    with pytest.raises(NoAnswer) as at_rest:
+        planar.solve(mechanism)
+    with pytest.raises(NoAnswer) as in_time:
+        planar.cycle(mechanism, 10, duration=0.1)
+    assert in_time.value.outcome is Outcome.CHANGE_POINT
+    assert in_time.value.reason == at_rest.value.reason
+    assert "`branches` (--branch)" in in_time.value.reason
+    assert planar.cycle(mechanism, 10, duration=0.1, branches=[2]).outcome is Outcome.SOLVED

@@ -9,6 +9,7 @@ import pytest
 import planar
 from planar import files
 from planar.errors import BadInput, NoAnswer, Outcome
+from planar.solving import rows as motion_rows
 from planar.solving.branch import Branch
 from planar.solving.position import Solver
 from tests.test_cli import run
@@ -606,3 +607,20 @@ def test_a_run_is_not_written_over_its_own_mechanism(tmp_path):
     sentence = run(tmp_path, "cycle", "m.json", "-o", "./m.json").refused(2)
     assert "own file" in sentence
     assert file.read_bytes() == before
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_row_whose_rates_break_a_constraint_has_none_and_is_named(monkeypatch, order):
+    real = motion_rows.rates
+
+    def spoiled(*given):
+        rated = real(*given)
+        rated.parts[order][3] *= 1.01
+        return rated
+
+    monkeypatch.setattr(motion_rows, "rates", spoiled)
+    motion = planar.cycle(four_bar(*ROCKER, 0.8), 12, jerk=True)
+    assert np.flatnonzero(np.isnan(motion.link("BC").angular_velocity)).tolist() == [3]
+    assert np.isfinite(motion.link("BC").angle).all()
+    (remark,) = [each for each in motion.remarks if "no rates are given" in each]
+    assert f"at A = {motion.inputs['A'].position[3]:.6g} rad" in remark

@@ -2,6 +2,7 @@
 
 from math import cos, pi, sin, sqrt
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -10,6 +11,8 @@ from planar.analysis.mobility import mobility
 from planar.analysis.solution import worked_solution
 from planar.errors import NoAnswer, Outcome
 from planar.minors import _determinant
+from planar.solving.candidates import hanging
+from planar.solving.position import known_of
 from tests.command import run
 from tests.pages import in_node, needs_node
 
@@ -274,3 +277,10 @@ def test_determinants_without_division():
         found = float(ca.Function("det", [symbol], [_determinant(symbol)])(matrix))
         # what rounding leaves of sums of products of so many terms
         assert found == pytest.approx(float(np.linalg.det(matrix)), rel=1e-9)
+
+
+def test_on_what_constraints_depend_is_worked_out_once_for_a_structure(monkeypatch):
+    setup = known_of(planar.load("watt-six-bar")).solver
+    before, calls = hanging(setup), []
+    monkeypatch.setattr(ca, "jacobian_sparsity", lambda *given: calls.append(given))
+    assert hanging(setup) == before and not calls

@@ -31,13 +31,12 @@ CLEAR = 0.03
 """An assembly whose points lie this near to the sketch on average (lengths of the size) is the one that is meant."""
 
 
-def hanging(setup: Setup) -> list[set[int]]:
+def hanging(setup: Setup) -> list[frozenset[int]]:
     """The unknowns of earlier groups on which each group hangs."""
     columns = depends(setup.program)
     later = len(setup.equations.unknowns) + len(setup.station.u)
     return [
-        {column for row in range(stage.rows.start, stage.rows.stop) for column in columns[row]}
-        - set(range(stage.unknowns.start, later))
+        frozenset().union(*columns[stage.rows]).difference(range(stage.unknowns.start, later))
         for stage in setup.equations.stages
     ]
 

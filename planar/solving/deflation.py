@@ -105,6 +105,6 @@ def _block(setup: Setup, stage: Stage, z: Array, with_earlier: bool) -> Block | 
     return Block(tuple(rows), tuple(many), setup.by[rows], sizes, rank)
 
 
-def _columns(columns_of: Sequence[set[int]], stage: Stage) -> set[int]:
+def _columns(columns_of: Sequence[frozenset[int]], stage: Stage) -> set[int]:
     """The columns that a group's constraints depend on."""
     return set().union(*columns_of[stage.rows])

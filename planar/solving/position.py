@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from planar.algebra import Jet
-from planar.errors import Ending, NoAnswer
+from planar.errors import Ending, NoAnswer, Outcome
 from planar.mechanism import Drive, Mechanism, with_inputs
 from planar.motion import State
 from planar.plane import Frame
@@ -284,3 +284,13 @@ def known_of(mechanism: Mechanism) -> Known:
     except TypeError:  # made in Python, of lists
         return Known(mechanism)
     return _known(mechanism)
+
+
+def stopped_at_start(solver: Solver, z: Array, problem: NoAnswer) -> NoAnswer:
+    """What to say of a run that did not leave its first position: if that is a change point, which ways lead on."""
+    if problem.outcome is Outcome.BRANCH_LOST:
+        try:
+            solver.state(z)
+        except NoAnswer as singular:
+            return singular
+    return problem

@@ -18,7 +18,7 @@ from planar.solving.curve import Curve
 from planar.solving.follow import Run, Trip, follow, run
 from planar.solving.freedom import moved_by
 from planar.solving.pieces import Local, met, onwards
-from planar.solving.position import known_of
+from planar.solving.position import known_of, stopped_at_start
 from planar.solving.rates import Given
 from planar.solving.rows import Rows, joined, motion, reversed_, rows, shortened, spliced
 from planar.solving.straight import Told, course
@@ -157,12 +157,7 @@ class Ranged:
 
     def _problem(self, found: Run, problem: NoAnswer) -> NoAnswer:
         """What to say of a run that stopped: of one that did not start, if it is a change point that it stands on."""
-        if len(found.z) < 2 and problem.outcome is Outcome.BRANCH_LOST:
-            try:
-                self.solver.state(self.found.z)
-            except NoAnswer as told:
-                return told
-        return problem
+        return stopped_at_start(self.solver, self.found.z, problem) if len(found.z) < 2 else problem
 
     def _from_here(self, grid: Array) -> Run:
         here = self.u[self.index]

@@ -18,7 +18,7 @@ from planar.solving.follow import Run, followed, run
 from planar.solving.limits import STILL, Outputs, outputs
 from planar.solving.passing import crossed
 from planar.solving.pieces import SEAM, Met
-from planar.solving.position import known_of
+from planar.solving.position import known_of, stopped_at_start
 from planar.solving.rates import Given, rates
 from planar.solving.rows import Rows, motion, rows
 
@@ -46,6 +46,10 @@ class Timed:
         given = self.given(time)
         known = None if self.third else (given.u1, given.u2)
         found = run(self.solver, self.solver.station.p, self.found.z, given.u, self.branches, known)
+        if found.stopped is not None and len(found.z) < 2:
+            problem = stopped_at_start(self.solver, self.found.z, found.stopped)
+            if problem is not found.stopped:
+                raise problem
         told = rows(found, given).stopped(found.stopped)
         last = self._dead(found, given, time)
         time = time[: len(found.z)]
