@@ -557,3 +557,18 @@ def test_of_very_many_names_that_there_are_a_few_are_listed():
     with pytest.raises(planar.BadInput) as refused:
         planar.from_dict({"planar": 1, "frame": "Q", "links": links, "pairs": []})
     assert refused.value.sentence.endswith("l10, l11 and 38 more")
+
+
+def test_what_would_mend_it_is_looked_for_once_and_only_where_somebody_asks(monkeypatch):
+    looked, search_for_one = [], remedy.remedy
+    monkeypatch.setattr(remedy, "remedy", lambda *given: looked.append(given) or search_for_one(*given))
+    apart = files.from_dict(four_bar(theta=150))
+    assert not planar.modes(apart, certify=False)
+    assert len(planar.circuits(apart)) == 1
+    assert not looked
+    with pytest.raises(NoAnswer) as told:
+        planar.solve(apart)
+    with pytest.raises(NoAnswer) as again:
+        planar.solve(apart)
+    assert "it would go together with" in told.value.reason == again.value.reason
+    assert len(looked) == 1
