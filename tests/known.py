@@ -6,6 +6,7 @@ from planar.analysis.centres import Centres, centres
 from planar.files import models
 from planar.motion import State
 from planar.solving.position import solve
+from tests.draws import part
 
 MODELS = {file.stem: mechanism for file, mechanism in models()}
 """Every model's mechanism, by the stem of its file."""
@@ -21,3 +22,15 @@ def state_of(stem: str) -> State:
 def found_centres(stem: str) -> Centres:
     """The instantaneous centres of that position."""
     return centres(state_of(stem))
+
+
+def some_models(one_in: int, first: int = 0) -> list[str]:
+    """One in so many of the models, and of pair types that these have not the first models that have them."""
+    chosen = part(MODELS, one_in, first)
+    kinds = {type(pair) for stem in chosen for pair in MODELS[stem].pairs}
+    for stem, mechanism in MODELS.items():
+        more = {type(pair) for pair in mechanism.pairs} - kinds
+        if more:
+            chosen.append(stem)
+            kinds |= more
+    return chosen

@@ -14,7 +14,9 @@ from planar.pairs.base import plain
 from planar.pairs.line import Line
 from planar.plane import Vector
 from planar.solving import follow, walk
+from planar.solving.period import Period
 from planar.solving.position import Solver
+from tests.watchdog import watched
 
 SURE = 1e-7
 """What is not told is better than this."""
@@ -281,6 +283,12 @@ def test_a_crank_far_round_is_followed_over_whole_turns_at_once(lengths, monkeyp
     assert sum(asked) < 5000
     at_once = planar.solve(planar.from_dict(four_bar(*lengths, 1e6, motion.point("B").position[0])))
     assert off_closed_form(lengths, 1e6, at_once.point("B").velocity) <= 20.0 * np.finfo(float).eps * 1e6
+
+
+def test_turns_without_change_points_are_not_gone_through_one_by_one():
+    period = Period((), np.array([0.0, 2.0 * np.pi]), (), ())
+    with watched(20):
+        assert list(period.met(None, 1e15)) == []
 
 
 def test_a_far_motion_that_ends_or_does_not_come_back_says_so(monkeypatch):

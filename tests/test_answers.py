@@ -14,9 +14,10 @@ from planar.errors import BadInput
 from planar.mechanism import Drive, motions, with_inputs
 from planar.motion import Unknown
 from planar.views.answers import record, tables
+from tests.draws import part
 from tests.test_extremes import slider_crank, turn_apart
 
-SEEDS = range(8)
+SEEDS = part(range(8), 2)
 
 
 def four_bar(a, b, c, d, velocity=3.0, position=1.0):

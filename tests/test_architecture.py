@@ -3,6 +3,7 @@
 import ast
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import networkx as nx
@@ -99,10 +100,16 @@ def room(path: Path) -> str:
     return parts[0]
 
 
+@cache
+def parsed(path: Path) -> ast.Module:
+    return ast.parse(path.read_text())
+
+
+@cache
 def imports(path: Path) -> list[tuple[str, ...]]:
     """Every module that a file imports, lazily or not."""
     found = []
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(parsed(path)):
         if isinstance(node, ast.Import):
             found += [tuple(alias.name.split(".")) for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
@@ -117,12 +124,12 @@ def level(name: str) -> int:
     return next(index for index, rooms in enumerate(FLOORS) if name in rooms)
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
-def test_no_import_goes_up_or_along(path):
-    here = room(path)
-    for module in imports(path):
-        if module[0] == "planar" and len(module) > 1 and module[1] != here:
-            assert level(module[1]) < level(here), f"{here} imports {'.'.join(module)}"
+def test_no_import_goes_up_or_along():
+    for path in FILES:
+        here = room(path)
+        for module in imports(path):
+            if module[0] == "planar" and len(module) > 1 and module[1] != here:
+                assert level(module[1]) < level(here), f"{path}: {here} imports {'.'.join(module)}"
 
 
 def test_there_are_no_circles_inside_a_room():
@@ -133,23 +140,25 @@ def test_there_are_no_circles_inside_a_room():
     assert [sorted(part) for part in nx.strongly_connected_components(graph) if len(part) > 1] == []
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
-def test_libraries_stay_in_their_rooms(path):
-    for module in imports(path):
-        if module[0] != "planar" and module[0] not in sys.stdlib_module_names:
-            assert room(path) in LIBRARIES[module[0]], f"{room(path)} imports {module[0]}"
+def test_libraries_stay_in_their_rooms():
+    for path in FILES:
+        for module in imports(path):
+            if module[0] != "planar" and module[0] not in sys.stdlib_module_names:
+                assert room(path) in LIBRARIES[module[0]], f"{path}: {room(path)} imports {module[0]}"
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
-def test_no_pair_type_is_named_outside_the_pairs(path):
-    if room(path) == "pairs":
-        return
-    tree = ast.parse(path.read_text())
+def test_no_pair_type_is_named_outside_the_pairs():
     names = {kind.__name__ for kind in pair_types().values()}
-    said = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
-    texts = {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)}
-    assert not said & names
-    assert not texts & set(pair_types())
+    for path in FILES:
+        if room(path) == "pairs":
+            continue
+        tree = parsed(path)
+        said = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+        texts = {
+            node.value for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)
+        }
+        assert not said & names, path
+        assert not texts & set(pair_types()), path
 
 
 def test_only_the_files_room_opens_mechanism_files():
@@ -157,20 +166,20 @@ def test_only_the_files_room_opens_mechanism_files():
     for path in FILES:
         called = {
             node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
-            for node in ast.walk(ast.parse(path.read_text()))
+            for node in ast.walk(parsed(path))
             if isinstance(node, ast.Call)
         }
         if called & opening:
-            assert room(path) == "files"
+            assert room(path) == "files", path
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
-def test_files_are_small_and_say_their_job_first(path):
-    tree = ast.parse(path.read_text())
-    text = ast.get_docstring(tree)
-    assert text
-    assert len(text.splitlines()[0]) < 130
-    assert len(path.read_text().splitlines()) <= 420
+def test_files_are_small_and_say_their_job_first():
+    for path in FILES:
+        tree = parsed(path)
+        text = ast.get_docstring(tree)
+        assert text, path
+        assert len(text.splitlines()[0]) < 130, path
+        assert len(path.read_text().splitlines()) <= 420, path
 
 
 def loaded_by(code: str) -> set[str]:

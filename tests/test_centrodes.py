@@ -17,8 +17,7 @@ from planar.errors import BadInput
 from planar.mechanism import Drive, with_inputs
 from planar.motion import Unknown
 from tests import command
-from tests.draws import part
-from tests.known import MODELS
+from tests.known import MODELS, some_models
 
 RANGES = {
     "davis-steering": (-0.05, 0.05),
@@ -43,7 +42,7 @@ def distances(places, centre):
     return np.hypot(*(places - np.asarray(centre)).T)
 
 
-@pytest.mark.parametrize("model", part(MODELS, 2))
+@pytest.mark.parametrize("model", some_models(4))
 def test_both_curves_touch_in_the_pole_and_run_through_it_at_one_velocity(model):
     found = centrodes(run(model), *usual(MODELS[model]))
     if found.reason:

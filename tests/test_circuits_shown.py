@@ -20,6 +20,7 @@ from planar.drawing.lettering import signed
 from planar.files import models
 from planar.words import ranged
 from tests import command
+from tests.draws import part
 from tests.fonts import own_fonts  # noqa: F401
 from tests.test_diagrams import boxes
 
@@ -313,7 +314,7 @@ LARGE = ("ten-link", "chain-42", "walschaerts-valve-gear")
 """Models whose assemblies take longer to count than a remark is worth."""
 
 
-@pytest.mark.parametrize("file", [file.stem for file, _ in models() if file.stem not in LARGE])
+@pytest.mark.parametrize("file", part([file.stem for file, _ in models() if file.stem not in LARGE], 2))
 def test_the_remark_of_which_assembly_agrees_with_the_list(file):
     given = planar.load(file)
     told = [each for each in numbered(given).remarks if each not in given.remarks]

@@ -12,7 +12,7 @@ from planar.analysis.relative import quarter, relative
 from planar.errors import BadInput
 from planar.mechanism import Drive, with_inputs
 from planar.motion import Unknown
-from tests.known import MODELS, state_of
+from tests.known import MODELS, some_models, state_of
 
 
 def driven(mechanism, velocity, acceleration, **positions):
@@ -30,7 +30,7 @@ def velocity_and_acceleration(found, at):
     )
 
 
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", some_models(2))
 def test_euler_savary_agrees_with_velocity_and_acceleration_for_random_points_of_every_link(model):
     state = state_of(model)
     rng = np.random.default_rng(1)

@@ -21,8 +21,7 @@ from planar.drawing.paper import given
 from planar.errors import PlanarError
 from planar.views.explained import explained, record
 from tests.command import run
-from tests.draws import part
-from tests.known import MODELS, state_of
+from tests.known import some_models, state_of
 from tests.linkages import random_linkage
 
 ROOT = Path(__file__).parent.parent
@@ -278,7 +277,7 @@ def test_the_double_butterfly_has_equations_instead_of_a_pencil_order() -> None:
 # every model
 
 
-@pytest.mark.parametrize("model", part(MODELS, 2))
+@pytest.mark.parametrize("model", some_models(3))
 def test_every_model_is_explained(model: str) -> None:
     """Every link and moving point is told of, numbers in sentences are the state's, and the text is clean."""
     solution = solved(model)

@@ -54,7 +54,7 @@ def repeated(given, designs):
     return given | {"designs": Designs(*(np.repeat(each, designs, axis=1) for each in given["designs"]))}
 
 
-@pytest.mark.parametrize("stem", part([stem for stem, mechanism in MODELS.items() if mechanism.inputs], 3))
+@pytest.mark.parametrize("stem", part([stem for stem, mechanism in MODELS.items() if mechanism.inputs], 6))
 def test_a_run_of_a_model_is_the_one_that_casadi_gives(stem):
     mechanism = MODELS[stem]
     try:

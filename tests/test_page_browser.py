@@ -7,6 +7,7 @@ import io
 import json
 from dataclasses import replace
 from html import escape
+from itertools import product
 from xml.etree import ElementTree
 
 import numpy as np
@@ -451,15 +452,19 @@ def test_the_motion_is_saved_as_a_table(shown, tmp_path):
 # how it looks
 
 
-@pytest.mark.parametrize("screen", SCREENS)
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_nothing_is_wider_than_the_screen(screen, scheme, shown):
-    for stem in ("000-P2", "excavator-arm"):
-        window = shown(MODELS[stem], screen, scheme)
-        for box in window.locator("#layers").get_by_role("checkbox").all():
-            box.check()
+@pytest.mark.parametrize("screens", [["phone"], ["desk", "projector"]], ids=" ".join)
+@pytest.mark.parametrize("stem", ["000-P2", "excavator-arm"])
+def test_nothing_is_wider_than_the_screen(stem, screens, shown):
+    window = shown(MODELS[stem], screens[0])
+    for box in window.locator("#layers").get_by_role("checkbox").all():
+        box.check()
+    for screen, scheme in product(screens, ("light", "dark")):
+        width, height = SCREENS[screen]
+        window.set_viewport_size({"width": width, "height": height})
+        window.emulate_media(color_scheme=scheme)
         settled(window)
-        assert window.evaluate("document.documentElement.scrollWidth") <= SCREENS[screen][0]
+        assert window.evaluate("[innerWidth, innerHeight]") == [width, height]
+        assert window.evaluate("document.documentElement.scrollWidth") <= width
         dark = window.evaluate("getComputedStyle(document.body).backgroundColor")
         assert (sum(json.loads(f"[{dark[4:-1]}]")) < 380) == (scheme == "dark")
 

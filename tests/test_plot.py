@@ -33,7 +33,7 @@ def texts(figure):
     return [(text.get_text(), text.get_window_extent(renderer)) for text in found if text.get_text().strip()]
 
 
-@pytest.mark.parametrize(("model", "what"), part(sorted(CELLS, key=lambda cell: cell[1]), 2))
+@pytest.mark.parametrize(("model", "what"), part(sorted(CELLS, key=lambda cell: cell[1]), 4))
 def test_texts_lie_on_the_sheet_and_apart_and_axes_have_units(model, what):
     figure = drawn(model, what)
     width, height = figure.get_size_inches() * figure.dpi

@@ -23,7 +23,7 @@ def agree(found, swept, points):
             np.testing.assert_allclose(told[point], wanted[point][0], atol=near * scale)
 
 
-@pytest.mark.parametrize("stem", part(RUNNING, 6))
+@pytest.mark.parametrize("stem", part(RUNNING, 12))
 def test_a_run_of_a_model_is_that_of_a_sweep(stem):
     mechanism = MODELS[stem]
     at = mechanism.inputs[0]

@@ -15,6 +15,7 @@ from planar.solving.assemble import Failure, search
 from planar.solving.candidates import Candidates
 from planar.solving.setup import Setup
 from tests.command import run
+from tests.draws import part
 from tests.test_cli import written
 
 DEG = np.pi / 180
@@ -217,7 +218,7 @@ def diagonal(a, d, theta):
 STATIONS = [(a, d, theta) for a, d in ((50, 100), (70, 100), (50, 130)) for theta in (120, 150, 180, -140)]
 
 
-@pytest.mark.parametrize(("a", "d", "theta"), [each for each in STATIONS if diagonal(*each) > 123])
+@pytest.mark.parametrize(("a", "d", "theta"), part([each for each in STATIONS if diagonal(*each) > 123], 3))
 def test_bars_that_are_too_short_are_told_the_gap_and_the_length_that_just_reaches(a, d, theta):
     given = four_bar(a, 66, 56, d, theta)
     problem = refused(given)
@@ -557,3 +558,18 @@ def test_of_very_many_names_that_there_are_a_few_are_listed():
     with pytest.raises(planar.BadInput) as refused:
         planar.from_dict({"planar": 1, "frame": "Q", "links": links, "pairs": []})
     assert refused.value.sentence.endswith("l10, l11 and 38 more")
+
+
+def test_what_would_mend_it_is_looked_for_once_and_only_where_somebody_asks(monkeypatch):
+    looked, search_for_one = [], remedy.remedy
+    monkeypatch.setattr(remedy, "remedy", lambda *given: looked.append(given) or search_for_one(*given))
+    apart = files.from_dict(four_bar(theta=150))
+    assert not planar.modes(apart, certify=False)
+    assert len(planar.circuits(apart)) == 1
+    assert not looked
+    with pytest.raises(NoAnswer) as told:
+        planar.solve(apart)
+    with pytest.raises(NoAnswer) as again:
+        planar.solve(apart)
+    assert "it would go together with" in told.value.reason == again.value.reason
+    assert len(looked) == 1

@@ -29,6 +29,7 @@ from planar.views.fitted import plain_table
 from planar.views.saved import written
 from planar.views.table import direction, kept, paragraphs
 from tests.command import FROM_OUTSIDE, ROOT, run
+from tests.draws import part
 
 WIDTHS = (40, 60, 80, 100, 200)
 WIDE = 500
@@ -90,7 +91,7 @@ def words(text: str) -> Counter[str]:
     return Counter(word.rstrip(",") for word in text.split() if word.strip("─"))
 
 
-@pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
+@pytest.mark.parametrize("command", part(COMMANDS, 2), ids=" ".join)
 def test_every_word_and_number_of_a_wide_screen_stands_whole_on_a_narrow_one(
     command: tuple[str, ...], folder: Path
 ) -> None:

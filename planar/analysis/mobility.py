@@ -9,6 +9,7 @@ import numpy as np
 from planar.errors import NoAnswer
 from planar.graph import farthest_first
 from planar.mechanism import Mechanism
+from planar.solving.assemble import Assembly, Failure
 from planar.solving.constraints import Constraints, joined, motion_from, null_space, rank
 from planar.solving.dependence import smallest_sets
 from planar.solving.position import Solver
@@ -70,14 +71,17 @@ def measured(constraints: Constraints, w: Array) -> Mobility:
 
 def standing(setup: Solver, constraints: Constraints) -> Array:
     """A closed position w of a mechanism, the one of its inputs if they determine one. Raises NoAnswer."""
+    nearest: Assembly | Failure | NoAnswer
     try:
-        z = setup.assembly().z
-    except NoAnswer:
-        found = joined(constraints)
-        if found is None:
-            raise
-        return found
-    return setup.program.positions(z, setup.station.u, setup.station.p).full().ravel()
+        nearest = setup.nearest()
+    except NoAnswer as problem:
+        nearest = problem
+    if isinstance(nearest, Assembly):
+        return setup.program.positions(nearest.z, setup.station.u, setup.station.p).full().ravel()
+    found = joined(constraints)
+    if found is None:
+        raise setup.unassembled(nearest) if isinstance(nearest, Failure) else nearest
+    return found
 
 
 def _why(count: int, here: int, finite: int, sets: tuple[tuple[str, ...], ...], everywhere: bool) -> list[str]:

@@ -55,6 +55,8 @@ class Period(NamedTuple):
     def met(self, curve: Curve, last: float) -> Iterator[Met]:
         """The change points passed up to a place of the inputs."""
         yield from self.started
+        if not self.passed:
+            return  # however many turns there are
         for times in range(int((last + SEAM) / self.length) + 1):
             by = times * self.length * curve.way
             for each in self.passed:

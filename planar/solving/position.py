@@ -76,12 +76,16 @@ class Solver(Setup):
 
     def assembly(self) -> Assembly:
         """The assembly nearest to the sketch. Raises NoAnswer."""
+        found = self.nearest()
+        if isinstance(found, Failure):
+            raise self.unassembled(found)
+        return found
+
+    def nearest(self) -> Assembly | Failure:
+        """The assembly nearest to the sketch, or where it fails. Raises NoAnswer where the inputs leave links free."""
         if any(stage.free for stage in self.equations.stages):
             raise refusals.free(self)
-        found = search(Candidates(self), self._is_sound)
-        if isinstance(found, Failure):
-            raise self._unassembled(found)
-        return found
+        return search(Candidates(self), self._is_sound)
 
     def remarks(self, found: Assembly) -> tuple[str, ...]:
         """What there is to say of an assembly."""
@@ -110,7 +114,8 @@ class Solver(Setup):
         found = deflated(self, [stage for stage in self.equations.stages if weak[stage.level]], z)
         return found and (self.solved_by(found[0]), found[1])
 
-    def _unassembled(self, failure: Failure) -> NoAnswer:
+    def unassembled(self, failure: Failure) -> NoAnswer:
+        """Why it cannot be assembled, and what would mend that, which takes about as long to find as an assembly."""
         found = strengths(self, slope_at(self, failure.z, self.station.u))
         for stage in self.equations.stages[: failure.stage.level]:
             # a group that could stand anywhere was put somewhere, and what comes after it need not fit there
@@ -244,17 +249,25 @@ class Known:
     def assembly(self) -> Assembly:
         """The assembly nearest to the sketch. Raises NoAnswer."""
         found = self._start[1]
-        if isinstance(found, NoAnswer):
-            raise found.with_traceback(None)
-        return found
+        if isinstance(found, Assembly):
+            return found
+        raise self._refusal.with_traceback(None)
 
     @cached_property
-    def _start(self) -> tuple[Solver, Assembly | NoAnswer]:
+    def _refusal(self) -> NoAnswer:
+        """Why there is no assembly: looked for only where somebody asks."""
+        found = self._start[1]
+        return found if isinstance(found, NoAnswer) else self._bare.unassembled(found)
+
+    @cached_property
+    def _start(self) -> tuple[Solver, Assembly | Failure | NoAnswer]:
         solver = self._bare
         try:
-            found = solver.assembly()
+            found = solver.nearest()
         except NoAnswer as problem:
             return solver, problem
+        if isinstance(found, Failure):
+            return solver, found
         regular = None if surely_determined(solver, found.z) else solver.regular(found.z)
         if regular is not None:
             solver, found = regular[0], found._replace(z=regular[1])
