@@ -563,7 +563,7 @@ def test_of_very_many_names_that_there_are_a_few_are_listed():
 def test_what_would_mend_it_is_looked_for_once_and_only_where_somebody_asks(monkeypatch):
     looked, search_for_one = [], remedy.remedy
     monkeypatch.setattr(remedy, "remedy", lambda *given: looked.append(given) or search_for_one(*given))
-    apart = files.from_dict(four_bar(theta=150))
+    apart = files.from_dict(four_bar(theta=150) | {"name": "looked for once"})  # solved by no other test
     assert not planar.modes(apart, certify=False)
     assert len(planar.circuits(apart)) == 1
     assert not looked

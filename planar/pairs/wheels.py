@@ -38,7 +38,13 @@ class Wheels(Pair):
         "carrier": described("name"),
         "radii": {**several("length", 2, 2), "items": {**described("length"), **NONZERO}},
         "teeth": {**several("number", 2, 2), "items": {**described("number"), **NONZERO, "type": "integer"}},
-        "ratio": {**described("number"), **NONZERO},
+        "ratio": {
+            **described("number"),
+            "anyOf": [
+                {"minimum": 1.0 / STEEPEST, "maximum": STEEPEST},
+                {"minimum": -STEEPEST, "maximum": -1.0 / STEEPEST},
+            ],
+        },
         "mesh": {
             "type": "object",
             "additionalProperties": described("angle"),
