@@ -9,10 +9,10 @@ import numpy as np
 import planar
 from benchmarks.entry import Array, Entry
 from benchmarks.swept import Swept
-from planar.dimensions import changed, dimensions
-from planar.mechanism import Mechanism
-from planar.motion import Motion
-from planar.solving.follow import run
+from planar.model.dimensions import changed, dimensions
+from planar.model.mechanism import Mechanism
+from planar.results.motion import Motion
+from planar.solving.continuation.path import run
 from planar.solving.position import Solver
 
 BACKENDS = {"native": 10**9, "casadi": 200}

@@ -69,20 +69,20 @@ def _process(structure: str, folder: str) -> dict[str, float]:
 def spent(structure: str) -> dict[str, float]:
     """Seconds of each step in this process, which has the structure's equations."""
     import planar
-    from planar.mechanism import named_points
-    from planar.native import compiled
-    from planar.native.backend import layout
-    from planar.native.march import KINDS, NAME
-    from planar.program import program
-    from planar.program import structure as of
+    from planar.batch.march.llvm_designs import KINDS, NAME
+    from planar.batch.march.llvm_runner import layout
+    from planar.codegen import llvm_compile
+    from planar.equations.functions import program
+    from planar.equations.functions import structure as of
+    from planar.model.mechanism import named_points
 
     document, point = STRUCTURES[structure]()
     mechanism = planar.from_dict(document)
     links = next(tuple(link for link, _ in each.members) for each in named_points(mechanism) if each.name == point)[:1]
     known = program(mechanism)
-    compiled._processor()
+    llvm_compile._processor()
     told: dict[str, float] = {}
-    making = compiled._made
+    making = llvm_compile._made
 
     def made(text: str) -> bytes:
         start = perf_counter()
@@ -90,12 +90,12 @@ def spent(structure: str) -> dict[str, float]:
         told["compiling"] = perf_counter() - start
         return found
 
-    compiled._made = made
+    llvm_compile._made = made
     start = perf_counter()
     text = layout(known, of(mechanism), links, True).text
     told["printing"] = perf_counter() - start
     start = perf_counter()
-    compiled.compiled(text, NAME, *KINDS)
+    llvm_compile.compiled(text, NAME, *KINDS)
     told["reading"] = perf_counter() - start - told.get("compiling", 0.0)
     return told
 

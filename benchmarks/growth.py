@@ -13,9 +13,9 @@ from benchmarks import chain
 from benchmarks.comparison import error
 from benchmarks.timing import best
 from benchmarks.ways.trial import CRANK
-from planar.equations import build
-from planar.program import Program, structure
-from planar.solving.follow import run
+from planar.equations.constraint_equations import build
+from planar.equations.functions import Program, structure
+from planar.solving.continuation.path import run
 from planar.solving.position import Solver
 
 Array = np.ndarray

@@ -18,8 +18,8 @@ from rich.progress import Progress
 from rich.table import Table
 
 from benchmarks.timing import best
-from planar.assemblies.completeness import Completeness
-from planar.assemblies.roots import roots
+from planar.assemblies.block_roots import roots
+from planar.assemblies.polynomial.completeness import Completeness
 from tests.inversions import group, listed, missed, structures
 
 CHUNK = 50

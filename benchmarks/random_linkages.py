@@ -18,7 +18,7 @@ from rich.progress import Progress
 from rich.table import Table
 
 import planar
-from planar.motion import State
+from planar.results.motion import State
 from tests.linkages import Built, determinate, random_linkage
 
 BLUR = 0.01

@@ -3,38 +3,43 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from planar.foundation.notebook_display import Displayable
+
 if TYPE_CHECKING:
     from planar import plot
-    from planar.analysis.advantage import Advantage, advantage
-    from planar.analysis.advantage_over import AdvantageOver, advantage_over
-    from planar.analysis.answers import Answers, answers
-    from planar.analysis.area import Area, area
-    from planar.analysis.by_centres import velocity_by_centres
-    from planar.analysis.centres import Centre, Centres, centres
-    from planar.analysis.centrodes import Centrodes, centrodes
-    from planar.analysis.curvature import Curvature, curvature
-    from planar.analysis.dwells import Dwell, dwells
-    from planar.analysis.extremes import Extremes, Stroke, Swing, extremes, greatest, stroke, swing
-    from planar.analysis.harmonics import harmonics
-    from planar.analysis.inspection import Inspection, inspect
-    from planar.analysis.mobility import Mobility, mobility
-    from planar.analysis.output import Extreme
-    from planar.analysis.time_ratio import TimeRatio, time_ratio
-    from planar.analysis.transmission import Transmission, transmission
-    from planar.analysis.two_directions import centre_of
+    from planar.analysis.centres.centres import Centre, Centres, centres
+    from planar.analysis.centres.centrodes import Centrodes, centrodes
+    from planar.analysis.centres.curvature import Curvature, curvature
+    from planar.analysis.centres.two_directions import centre_of
+    from planar.analysis.centres.velocities import velocity_by_centres
+    from planar.analysis.identity.inspection import Inspection, inspect
+    from planar.analysis.identity.mobility import Mobility, mobility
+    from planar.analysis.motion.answers import Answers, answers
+    from planar.analysis.motion.coupler_area import Area, area
+    from planar.analysis.motion.dwells import Dwell, dwells
+    from planar.analysis.motion.extremes import Extremes, Stroke, Swing, extremes, greatest, stroke, swing
+    from planar.analysis.motion.harmonics import harmonics
+    from planar.analysis.motion.mechanical_advantage import Advantage, advantage
+    from planar.analysis.motion.mechanical_advantage_over_motion import AdvantageOver, advantage_over
+    from planar.analysis.motion.output import Extreme
+    from planar.analysis.motion.time_ratio import TimeRatio, time_ratio
+    from planar.analysis.motion.transmission_angle import Transmission, transmission
+    from planar.assemblies.circuits.circuits import Branch, Circuit, Circuits, circuits
     from planar.assemblies.conflict import Conflict, conflict
     from planar.assemblies.modes import Mode, Modes, modes
-    from planar.branches.circuits import Branch, Circuit, Circuits, circuits
+    from planar.batch.mechanisms.results import Each, Swept
+    from planar.batch.prepared import prepared
+    from planar.batch.results import Sweep
+    from planar.batch.sweep import sweep
+    from planar.batch.sweep_mechanisms import sweep_each
+    from planar.document.files import dumps, from_dict, load, loads, to_dict
     from planar.document.schema import schema
     from planar.dynamics.flywheel import Flywheel, flywheel
     from planar.dynamics.forces import Forces, forces
-    from planar.dynamics.simulated import Simulation, simulate
-    from planar.dynamics.told import Reaction
-    from planar.errors import BadInput, NoAnswer, Outcome, PlanarError
-    from planar.files import dumps, from_dict, load, loads, to_dict
-    from planar.grouped.each import sweep_each
-    from planar.grouped.result import Each, Swept
-    from planar.mechanism import (
+    from planar.dynamics.reactions import Reaction
+    from planar.dynamics.simulation import Simulation, simulate
+    from planar.foundation.errors import BadInput, NoAnswer, Outcome, PlanarError
+    from planar.model.mechanism import (
         Along,
         At,
         Course,
@@ -48,107 +53,104 @@ if TYPE_CHECKING:
         Point,
         Spring,
     )
-    from planar.motion import Motion, State
-    from planar.pages.shown import view
-    from planar.pins import pinned
+    from planar.model.pin_linkage import pinned
+    from planar.pages.view import view
+    from planar.reports.files.xarray_dataset import dataset
+    from planar.results.motion import Motion, State
     from planar.solving.cycle import cycle
     from planar.solving.position import solve
-    from planar.sweeping.prepared import prepared
-    from planar.sweeping.result import Sweep
-    from planar.sweeping.sweep import sweep
-    from planar.views.dataset import dataset
 
 __version__ = "0.8.1"
 
 _ROOMS = {
-    "Advantage": "analysis.advantage",
-    "AdvantageOver": "analysis.advantage_over",
-    "Along": "mechanism",
-    "Answers": "analysis.answers",
-    "Area": "analysis.area",
-    "At": "mechanism",
-    "BadInput": "errors",
-    "Branch": "branches.circuits",
-    "Centre": "analysis.centres",
-    "Centres": "analysis.centres",
-    "Centrodes": "analysis.centrodes",
-    "Circuit": "branches.circuits",
-    "Circuits": "branches.circuits",
+    "Advantage": "analysis.motion.mechanical_advantage",
+    "AdvantageOver": "analysis.motion.mechanical_advantage_over_motion",
+    "Along": "model.mechanism",
+    "Answers": "analysis.motion.answers",
+    "Area": "analysis.motion.coupler_area",
+    "At": "model.mechanism",
+    "BadInput": "foundation.errors",
+    "Branch": "assemblies.circuits.circuits",
+    "Centre": "analysis.centres.centres",
+    "Centres": "analysis.centres.centres",
+    "Centrodes": "analysis.centres.centrodes",
+    "Circuit": "assemblies.circuits.circuits",
+    "Circuits": "assemblies.circuits.circuits",
     "Conflict": "assemblies.conflict",
-    "Course": "mechanism",
-    "Curvature": "analysis.curvature",
-    "Distances": "mechanism",
-    "Drive": "mechanism",
-    "Dwell": "analysis.dwells",
-    "Each": "grouped.result",
-    "Extreme": "analysis.output",
-    "Extremes": "analysis.extremes",
+    "Course": "model.mechanism",
+    "Curvature": "analysis.centres.curvature",
+    "Distances": "model.mechanism",
+    "Drive": "model.mechanism",
+    "Dwell": "analysis.motion.dwells",
+    "Each": "batch.mechanisms.results",
+    "Extreme": "analysis.motion.output",
+    "Extremes": "analysis.motion.extremes",
     "Flywheel": "dynamics.flywheel",
     "Forces": "dynamics.forces",
-    "Input": "mechanism",
-    "Inspection": "analysis.inspection",
-    "Link": "mechanism",
-    "Load": "mechanism",
-    "Mass": "mechanism",
-    "Mechanism": "mechanism",
-    "Mobility": "analysis.mobility",
+    "Input": "model.mechanism",
+    "Inspection": "analysis.identity.inspection",
+    "Link": "model.mechanism",
+    "Load": "model.mechanism",
+    "Mass": "model.mechanism",
+    "Mechanism": "model.mechanism",
+    "Mobility": "analysis.identity.mobility",
     "Mode": "assemblies.modes",
     "Modes": "assemblies.modes",
-    "Motion": "motion",
-    "NoAnswer": "errors",
-    "Outcome": "errors",
-    "PlanarError": "errors",
-    "Point": "mechanism",
-    "Reaction": "dynamics.told",
-    "Simulation": "dynamics.simulated",
-    "Spring": "mechanism",
-    "State": "motion",
-    "Stroke": "analysis.extremes",
-    "Sweep": "sweeping.result",
-    "Swept": "grouped.result",
-    "Swing": "analysis.extremes",
-    "TimeRatio": "analysis.time_ratio",
-    "Transmission": "analysis.transmission",
-    "advantage": "analysis.advantage",
-    "advantage_over": "analysis.advantage_over",
-    "answers": "analysis.answers",
-    "area": "analysis.area",
-    "centre_of": "analysis.two_directions",
-    "centres": "analysis.centres",
-    "centrodes": "analysis.centrodes",
-    "circuits": "branches.circuits",
+    "Motion": "results.motion",
+    "NoAnswer": "foundation.errors",
+    "Outcome": "foundation.errors",
+    "PlanarError": "foundation.errors",
+    "Point": "model.mechanism",
+    "Reaction": "dynamics.reactions",
+    "Simulation": "dynamics.simulation",
+    "Spring": "model.mechanism",
+    "State": "results.motion",
+    "Stroke": "analysis.motion.extremes",
+    "Sweep": "batch.results",
+    "Swept": "batch.mechanisms.results",
+    "Swing": "analysis.motion.extremes",
+    "TimeRatio": "analysis.motion.time_ratio",
+    "Transmission": "analysis.motion.transmission_angle",
+    "advantage": "analysis.motion.mechanical_advantage",
+    "advantage_over": "analysis.motion.mechanical_advantage_over_motion",
+    "answers": "analysis.motion.answers",
+    "area": "analysis.motion.coupler_area",
+    "centre_of": "analysis.centres.two_directions",
+    "centres": "analysis.centres.centres",
+    "centrodes": "analysis.centres.centrodes",
+    "circuits": "assemblies.circuits.circuits",
     "conflict": "assemblies.conflict",
-    "curvature": "analysis.curvature",
+    "curvature": "analysis.centres.curvature",
     "cycle": "solving.cycle",
-    "dataset": "views.dataset",
-    "dumps": "files",
-    "dwells": "analysis.dwells",
-    "extremes": "analysis.extremes",
+    "dataset": "reports.files.xarray_dataset",
+    "dumps": "document.files",
+    "dwells": "analysis.motion.dwells",
+    "extremes": "analysis.motion.extremes",
     "flywheel": "dynamics.flywheel",
     "forces": "dynamics.forces",
-    "from_dict": "files",
-    "greatest": "analysis.extremes",
-    "harmonics": "analysis.harmonics",
-    "inspect": "analysis.inspection",
-    "load": "files",
-    "loads": "files",
-    "mobility": "analysis.mobility",
+    "from_dict": "document.files",
+    "greatest": "analysis.motion.extremes",
+    "harmonics": "analysis.motion.harmonics",
+    "inspect": "analysis.identity.inspection",
+    "load": "document.files",
+    "loads": "document.files",
+    "mobility": "analysis.identity.mobility",
     "modes": "assemblies.modes",
-    "pinned": "pins",
+    "pinned": "model.pin_linkage",
     "plot": "plot",
-    "prepared": "sweeping.prepared",
+    "prepared": "batch.prepared",
     "schema": "document.schema",
-    "simulate": "dynamics.simulated",
+    "simulate": "dynamics.simulation",
     "solve": "solving.position",
-    "stroke": "analysis.extremes",
-    "sweep": "sweeping.sweep",
-    "sweep_each": "grouped.each",
-    "swing": "analysis.extremes",
-    "time_ratio": "analysis.time_ratio",
-    "to_dict": "files",
-    "transmission": "analysis.transmission",
-    "velocity_by_centres": "analysis.by_centres",
-    "view": "pages.shown",
+    "stroke": "analysis.motion.extremes",
+    "sweep": "batch.sweep",
+    "sweep_each": "batch.sweep_mechanisms",
+    "swing": "analysis.motion.extremes",
+    "time_ratio": "analysis.motion.time_ratio",
+    "to_dict": "document.files",
+    "transmission": "analysis.motion.transmission_angle",
+    "velocity_by_centres": "analysis.centres.velocities",
+    "view": "pages.view",
 }
 """Where each public name lives: it is loaded when it is first used."""
 
@@ -242,6 +244,14 @@ __all__ = [
     "velocity_by_centres",
     "view",
 ]
+
+
+def _present(result: Any) -> str | None:
+    """The page of a result, for notebooks; loaded only where something is shown."""
+    return import_module("planar.pages.view").framed(result)
+
+
+Displayable.presenter = _present
 
 
 def __getattr__(name: str) -> Any:

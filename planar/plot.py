@@ -6,20 +6,20 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from planar.drawing.figure import figure, on_sheets, saved
-from planar.drawing.paper import scales
-from planar.files import save as write
+from planar.document.files import save as write
+from planar.drawing.output.matplotlib_figure import figure, on_sheets, saved
+from planar.drawing.paper.scales import scales
 
 # what only some drawings need is imported where they are made: that takes longer than to draw
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from planar.assemblies.circuits.circuits import Circuits
     from planar.assemblies.modes import Modes
-    from planar.branches.circuits import Circuits
-    from planar.drawing.panels import Scales
+    from planar.drawing.polygons.panels import Scales
     from planar.dynamics.forces import Forces
-    from planar.mechanism import Mechanism
-    from planar.motion import Motion, State
+    from planar.model.mechanism import Mechanism
+    from planar.results.motion import Motion, State
 
 __all__ = [
     "acceleration",
@@ -47,21 +47,21 @@ def scheme(state: State, scale: Scales = None) -> Figure:
 
     Raises BadInput for a scale that is none.
     """
-    from planar.drawing.details import scheme_with_details
+    from planar.drawing.scheme.details import scheme_with_details
 
     return figure(scheme_with_details(state, scales(scale, ["length"]).get("length")))
 
 
 def velocity(state: State, scale: Scales = None) -> Figure:
     """The space diagram and the velocity polygon of a position, each to its scale."""
-    from planar.drawing.panels import panels
+    from planar.drawing.polygons.panels import panels
 
     return figure(panels(state, scale, 2), state.mechanism.name)
 
 
 def acceleration(state: State, scale: Scales = None) -> Figure:
     """The space diagram, the velocity polygon and the acceleration polygon of a position, each to its scale."""
-    from planar.drawing.panels import panels
+    from planar.drawing.polygons.panels import panels
 
     return figure(panels(state, scale, 3), state.mechanism.name)
 
@@ -76,9 +76,9 @@ def centres(
     extent (left out: twice) are drawn in their places, arrows lead to the others. Raises BadInput for a link that
     there is not, a scale that is none, and a reach below 1.
     """
-    from planar.analysis.centres import centres as all_centres
-    from planar.drawing.centres import REACH, centres_picture, chosen
-    from planar.drawing.circle import circle_picture
+    from planar.analysis.centres.centres import centres as all_centres
+    from planar.drawing.centres.centres import REACH, centres_picture, chosen
+    from planar.drawing.centres.circle_diagram import circle_picture
 
     found = all_centres(state)
     shown = chosen(found, links)
@@ -93,14 +93,14 @@ def positions(
     motion: Motion | Mechanism, count: int = 12, points: Sequence[str] | None = None, scale: Scales = None
 ) -> Figure:
     """The mechanism in `count` + 1 positions, its joints lettered A0, A1, ...; TDC and BDC where a slider has them."""
-    from planar.drawing.positions import positions as picture
+    from planar.drawing.diagrams.positions import positions as picture
 
     return figure([picture(motion, count, points, scales(scale, ["length"]).get("length"))])
 
 
 def loci(motion: Motion | Mechanism, points: Sequence[str] | None = None, scale: Scales = None) -> Figure:
     """The paths of points (left out: of those that no link on the frame carries)."""
-    from planar.drawing.positions import loci as picture
+    from planar.drawing.diagrams.positions import loci as picture
 
     return figure([picture(motion, points, scales(scale, ["length"]).get("length"))])
 
@@ -112,7 +112,7 @@ def centrodes(
 
     Without a `link` those of the first coupler. Raises BadInput for a link that is not there, or a scale that is none.
     """
-    from planar.drawing.centrodes import centrodes_picture
+    from planar.drawing.centres.centrodes import centrodes_picture
 
     return figure([centrodes_picture(motion, link, other, scales(scale, ["length"]).get("length"))])
 
@@ -124,7 +124,7 @@ def modes(assemblies: Modes | Mechanism, scale: Scales = None) -> list[Figure]:
     """
     from planar.assemblies.modes import Modes
     from planar.assemblies.modes import modes as all_modes
-    from planar.drawing.assemblies import sheets_of
+    from planar.drawing.scheme.assemblies import sheets_of
 
     found = assemblies if isinstance(assemblies, Modes) else all_modes(assemblies)
     return [figure(*sheet) for sheet in sheets_of(found, scales(scale, ["length"]).get("length"))]
@@ -137,11 +137,11 @@ def circuits(found: Circuits | Mechanism, of: str | None = None, assemblies: Mod
     `assemblies` are marked, left out those at the mechanism's inputs. Raises BadInput for an output that is not there,
     and NoAnswer where no circuit was found.
     """
+    from planar.assemblies.circuits.circuit_of_assembly import located
+    from planar.assemblies.circuits.circuits import Circuits
+    from planar.assemblies.circuits.circuits import circuits as all_circuits
     from planar.assemblies.modes import modes as all_modes
-    from planar.branches.circuits import Circuits
-    from planar.branches.circuits import circuits as all_circuits
-    from planar.branches.located import located
-    from planar.drawing.circuits import circuits_figures
+    from planar.drawing.circuits.diagram import circuits_figures
 
     of_all = found if isinstance(found, Circuits) else all_circuits(found)
     here = all_modes(of_all.mechanism, certify=False) if assemblies is None else assemblies
@@ -154,7 +154,7 @@ def forces(found: Forces | State, scale: Scales = None) -> list[Figure]:
     One scale of length and one of force, such as "1 cm = 500 N", hold for all. What equilibrium does not tell is named
     and not drawn. Raises BadInput for forces over a motion and scales that are none, and what `planar.forces` raises.
     """
-    from planar.drawing.free_bodies import free_bodies
+    from planar.drawing.forces.free_bodies import free_bodies
     from planar.dynamics.forces import Forces
     from planar.dynamics.forces import forces as all_forces
 
@@ -168,7 +168,7 @@ def torque(found: Forces | Motion | Mechanism, of: str | None = None, fluctuatio
     out: 0.02). Forces over a motion are drawn as they are. Raises BadInput for an input that there is not, and a
     coefficient that is none.
     """
-    from planar.drawing.torque import torque_picture
+    from planar.drawing.forces.torque import torque_picture
     from planar.dynamics.flywheel import FLUCTUATION
 
     return figure([torque_picture(found, of, FLUCTUATION if fluctuation is None else fluctuation)])
@@ -180,8 +180,8 @@ def bearings(found: Forces | Motion | Mechanism, pairs: Sequence[str] | None = N
     Polar load diagrams in the frame's axes; of a sliding pair the force across its line and the couple over the input.
     Raises BadInput for a pair that there is not.
     """
-    from planar.drawing.bearings import bearing_pictures
-    from planar.mechanism import Mechanism
+    from planar.drawing.forces.bearing_loads import bearing_pictures
+    from planar.model.mechanism import Mechanism
 
     mechanism = found if isinstance(found, Mechanism) else found.mechanism
     return on_sheets(bearing_pictures(found, pairs), f"{mechanism.name}: loads of the pairs")
@@ -198,14 +198,14 @@ def diagrams(
     (Machine Elements, 1.3.6 (iii)). Where the file gives no speed, rates are per radian (or metre) of the input.
     Raises BadInput for a name that is not there, NoAnswer where there is no motion.
     """
-    from planar.drawing.diagrams import diagrams as drawn
+    from planar.drawing.diagrams.kinematic_diagrams import diagrams as drawn
 
     return drawn(motion, of, chords, width)
 
 
 def solution(state: State, scale: Scales = None) -> list[Figure]:
     """The worked solution of a position on pages of A4."""
-    from planar.drawing.page import solution_pages
+    from planar.drawing.output.solution_pages import solution_pages
 
     return solution_pages(state, scales=scales(scale))
 
@@ -216,7 +216,7 @@ def two_directions(state: State, link: str, points: Sequence[str] | None = None,
     `points` left out: the two joints of the link that lie farthest apart. Raises BadInput for a link or points that
     there are not, a link at rest, and a scale that is none.
     """
-    from planar.drawing.directions import directions_picture
+    from planar.drawing.centres.two_directions import directions_picture
 
     given = scales(scale)
     return figure([directions_picture(state, link, points, given.get("length"), given.get("velocity"))])
@@ -232,7 +232,7 @@ def animate(
 
     Raises BadInput for another kind of file, and where what writes it is not installed.
     """
-    from planar.drawing.animation import animate as moving
+    from planar.drawing.output.animation import animate as moving
 
     path = Path(file)
     write(path, moving(motion, path.suffix, points, progress))
@@ -247,6 +247,6 @@ def save(figures: Figure | Sequence[Figure], file: str | Path) -> None:
     if not isinstance(figures, Sequence):
         write(path, saved(figures, path.suffix))
         return
-    from planar.drawing.page import sheets
+    from planar.drawing.output.solution_pages import sheets
 
     write(path, sheets(figures, path.suffix))

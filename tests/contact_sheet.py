@@ -9,8 +9,8 @@ from pathlib import Path
 from PIL import Image, ImageDraw
 
 from planar import plot
-from planar.drawing.figure import saved
-from planar.files import model_files
+from planar.document.files import model_files
+from planar.drawing.output.matplotlib_figure import saved
 from tests.known import MODELS as MODELS_OF
 from tests.known import state_of
 

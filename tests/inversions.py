@@ -9,12 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar import files
-from planar.assemblies.completeness import Roots
-from planar.program import length
-from planar.solving.candidates import SAME, closing_of
+from planar.assemblies.polynomial.completeness import Roots
+from planar.document import files
+from planar.equations.functions import length
+from planar.solving.assembly.block_assemblies import SAME, closing_of
 from planar.solving.newton import newton
-from planar.solving.setup import Setup
+from planar.solving.prepared_mechanism import Setup
 from tests.linkages import Builder, Built, _joints
 
 Joints = tuple[tuple[str, str], ...]

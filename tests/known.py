@@ -2,9 +2,9 @@
 
 from functools import cache
 
-from planar.analysis.centres import Centres, centres
-from planar.files import models
-from planar.motion import State
+from planar.analysis.centres.centres import Centres, centres
+from planar.document.files import models
+from planar.results.motion import State
 from planar.solving.position import solve
 from tests.draws import part
 

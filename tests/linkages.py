@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from planar.mechanism import Mechanism
-from planar.pairs import Pair, pair_types
-from planar.plane import Frame, Vector, direction, frame_at
-from planar.shapes import shape
-from planar.solving.freedom import strengths
+from planar.foundation.geometry import Frame, Vector, direction, frame_at
+from planar.model.link_shapes import shape
+from planar.model.mechanism import Mechanism
+from planar.model.pairs import Pair, pair_types
 from planar.solving.position import Solver
+from planar.solving.rates.regularity import strengths
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 import planar
-from planar import files
-from planar.mechanism import Mechanism
+from planar.document import files
+from planar.model.mechanism import Mechanism
 
 TURN = 2.0 * np.pi
 ALMOST = 1e-3

@@ -9,9 +9,9 @@ import numpy as np
 import planar
 from benchmarks.linkages import Linkage
 from benchmarks.ways.trial import CRANK, Array, Trial
-from planar.mechanism import Drive, with_inputs
-from planar.motion import Motion, State
-from planar.solving.follow import follow, run
+from planar.model.mechanism import Drive, with_inputs
+from planar.results.motion import Motion, State
+from planar.solving.continuation.path import follow, run
 from planar.solving.position import Solver, solve
 
 

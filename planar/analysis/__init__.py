@@ -1,1 +1,1 @@
-"""Questions about solved positions, one file each."""
+"""Questions about solved positions and motions."""

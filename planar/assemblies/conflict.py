@@ -7,19 +7,19 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from math import hypot
 
-from planar.assemblies.completeness import Completeness
-from planar.assemblies.joining import Joining, Member
+from planar.assemblies.joint_feasibility import Joining, Member
 from planar.assemblies.modes import modes
-from planar.errors import NoAnswer
-from planar.graph import farthest_first
-from planar.mechanism import Drive, Mechanism, with_inputs
-from planar.pairs import Kind, Pair
-from planar.plane import Vector
-from planar.solving.assemble import Failure, search
-from planar.solving.candidates import Candidates
+from planar.assemblies.polynomial.completeness import Completeness
+from planar.foundation.errors import NoAnswer
+from planar.foundation.geometry import Vector
+from planar.model.link_graph import farthest_first
+from planar.model.mechanism import Drive, Mechanism, with_inputs
+from planar.model.pairs import Kind, Pair
+from planar.model.wording import quoted
+from planar.solving.assembly.block_assemblies import Candidates
+from planar.solving.assembly.nearest_assembly import Failure, search
+from planar.solving.diagnosis.remedy import Change, mending, moving
 from planar.solving.position import Solver, known_of
-from planar.solving.remedy import Change, mending, moving
-from planar.words import quoted
 
 MARGIN = 1e-9
 """By so much more a side of a ring is called too long: part of the others together."""

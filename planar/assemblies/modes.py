@@ -12,18 +12,18 @@ from typing import Any, NamedTuple, overload
 
 import numpy as np
 
-from planar.assemblies.completeness import Completeness
-from planar.assemblies.tree import WORST, Path, Tree
-from planar.errors import NoAnswer, Outcome
-from planar.mechanism import Drive, Mechanism, NamedPoint, named_points, with_inputs
-from planar.motion import State
-from planar.plane import Frame
-from planar.program import length, placed
-from planar.shapes import Shape
-from planar.shown import Shown
-from planar.solving import refusals
+from planar.assemblies.polynomial.completeness import Completeness
+from planar.assemblies.search_tree import WORST, Path, Tree
+from planar.equations.functions import length, placed
+from planar.foundation.errors import NoAnswer, Outcome
+from planar.foundation.geometry import Frame
+from planar.foundation.notebook_display import Displayable
+from planar.model.link_shapes import Shape
+from planar.model.mechanism import Drive, Mechanism, NamedPoint, named_points, with_inputs
+from planar.model.wording import listed, many
+from planar.results.motion import State
+from planar.solving.diagnosis import refusals
 from planar.solving.position import Solver, known_of, solve
-from planar.words import listed, many
 
 Array = np.ndarray
 
@@ -70,7 +70,7 @@ class Group(NamedTuple):
     "for how many of the choices before it"
 
 
-class Modes(Shown, Sequence["Mode"]):
+class Modes(Displayable, Sequence["Mode"]):
     """All assemblies in a fixed order, which does not depend on the sketch: group after group of links.
 
     The list is made as it is read. It has a length where that can be told by solving a few thousand groups, those that

@@ -1,9 +1,28 @@
 """The command line: words to calls."""
 
-from planar.cli import analysing, assembling, circling, describing, drawing, loading, showing, solving
-from planar.cli.shared import main
+from planar.cli import (
+    centres_harmonics,
+    circuits,
+    forces_simulate,
+    inspect_models_schema_bench,
+    modes,
+    plot_animate,
+    solve_cycle_explain,
+    view_gallery,
+)
+from planar.cli.options import main
 
 for _command in main.commands.values():
     _command.short_help = _command.help  # of one sentence: the list of commands has it whole
 
-__all__ = ["analysing", "assembling", "circling", "describing", "drawing", "loading", "main", "showing", "solving"]
+__all__ = [
+    "centres_harmonics",
+    "circuits",
+    "forces_simulate",
+    "inspect_models_schema_bench",
+    "main",
+    "modes",
+    "plot_animate",
+    "solve_cycle_explain",
+    "view_gallery",
+]

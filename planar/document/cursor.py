@@ -11,10 +11,10 @@ from math import isnan
 from typing import Any
 
 from planar.document.schema import FORBIDDEN
-from planar.errors import BadInput, listed, unshown
-from planar.mechanism import HUGE, MOST_COUNTED, TINY, Units
-from planar.shapes import Link, shape
-from planar.units import UnitError, example, quantity, unit
+from planar.foundation.errors import BadInput, listed, unshown
+from planar.foundation.units import UnitError, example, quantity, unit
+from planar.model.link_shapes import Link, shape
+from planar.model.mechanism import HUGE, MOST_COUNTED, TINY, Units
 
 # control characters, what turns the order of letters, halves of characters
 _UNSHOWN = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from planar.document.applied import read_applied
 from planar.document.cursor import Cursor, Whole, called, did_you_mean, offered
-from planar.document.named import motion, point_named, point_names
+from planar.document.loads import read_applied
+from planar.document.names import motion, point_named, point_names
 from planar.document.schema import (
     ALONG,
     DISTANCES,
@@ -22,7 +22,9 @@ from planar.document.schema import (
     TOP,
     UNITS,
 )
-from planar.mechanism import (
+from planar.foundation.units import UnitError, unit
+from planar.model.link_shapes import Unplaced, shape
+from planar.model.mechanism import (
     QUANTITIES,
     Along,
     At,
@@ -38,9 +40,7 @@ from planar.mechanism import (
     misfits,
     motions,
 )
-from planar.pairs import Kind, Pair, pair_types
-from planar.shapes import Unplaced, shape
-from planar.units import UnitError, unit
+from planar.model.pairs import Kind, Pair, pair_types
 
 
 def read(value: Any) -> Mechanism:
@@ -75,7 +75,7 @@ def read(value: Any) -> Mechanism:
     inputs = _inputs(full, motions(bare))
     driven = replace(bare, inputs=inputs)
     if any(given.law is not None for given in inputs):
-        from planar.document.laws import jumps
+        from planar.document.input_laws import jumps
 
         driven = replace(driven, remarks=(*bare.remarks, *jumps(inputs, motions(bare))))
     points = point_names(driven)
@@ -280,7 +280,7 @@ def _inputs(top: Cursor, known: Mapping[str, Pair]) -> tuple[Input, ...]:
             cursor.quantity("acceleration", pair.driven()[2], 0.0),
         )
         if cursor.has("law"):
-            from planar.document.laws import read_law  # few mechanisms run by laws
+            from planar.document.input_laws import read_law  # few mechanisms run by laws
 
             given = given._replace(law=read_law(cursor["law"], given, pair.driven()))
         found[pair.name] = given

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from planar.laws import MOST, MOTIONS, Piece
-from planar.mechanism import HUGE, QUANTITIES, TINY
-from planar.pairs import Pair, pair_types
-from planar.pairs.base import Schema, described, several
-from planar.units import LONGEST
+from planar.foundation.units import LONGEST
+from planar.model.input_laws import MOST, MOTIONS, Piece
+from planar.model.mechanism import HUGE, QUANTITIES, TINY
+from planar.model.pairs import Pair, pair_types
+from planar.model.pairs.base import Schema, described, several
 
 FORMAT = 1
 FORBIDDEN = ".:,"

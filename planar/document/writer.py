@@ -5,13 +5,22 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from planar.document.applied import write_applied
-from planar.document.laws import write_law
+from planar.document.input_laws import write_law
+from planar.document.loads import write_applied
 from planar.document.schema import DRIVE, FORMAT
-from planar.mechanism import QUANTITIES, Drive, Input, Link, Mechanism, Published, entries, motions
-from planar.pairs import Quantity
-from planar.shapes import Along, At, Place
-from planar.units import SI, Unit, shortest, unit
+from planar.foundation.units import SI, Unit, shortest, unit
+from planar.model.link_shapes import Along, At, Place
+from planar.model.mechanism import (
+    QUANTITIES,
+    Drive,
+    Input,
+    Link,
+    Mechanism,
+    Published,
+    entries,
+    motions,
+)
+from planar.model.pairs import Quantity
 
 
 def write(mechanism: Mechanism) -> dict[str, Any]:

@@ -8,8 +8,8 @@ from math import isclose, pi
 import numpy as np
 
 from planar.dynamics.forces import Forces
-from planar.errors import BadInput
-from planar.motion import Motion
+from planar.foundation.errors import BadInput
+from planar.results.motion import Motion
 
 Array = np.ndarray
 

@@ -9,19 +9,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.dynamics.acting import Acting, Field, Speeds, acting, power, speeds
-from planar.dynamics.balance import Balancing, balancing
-from planar.dynamics.checked import check
-from planar.dynamics.courses import factors
-from planar.dynamics.free_bodies import left_open
-from planar.dynamics.reactions import Reactions
-from planar.dynamics.told import ROUNDED, Reaction, efforts, reaction
-from planar.dynamics.unit_rates import alone, refuse_surplus, slides
-from planar.errors import BadInput, NoAnswer, Outcome
-from planar.mechanism import Mechanism
-from planar.motion import Motion, State
-from planar.shown import Shown
-from planar.words import quoted
+from planar.dynamics.external_actions import Acting, Field, Speeds, acting, power, speeds
+from planar.dynamics.free_body_check import left_open
+from planar.dynamics.load_validation import check
+from planar.dynamics.load_variation import factors
+from planar.dynamics.multipliers import Reactions
+from planar.dynamics.reactions import ROUNDED, Reaction, efforts, reaction
+from planar.dynamics.virtual_velocities import alone, refuse_surplus, slides
+from planar.dynamics.virtual_work import Balancing, balancing
+from planar.foundation.errors import BadInput, NoAnswer, Outcome
+from planar.foundation.notebook_display import Displayable
+from planar.model.mechanism import Mechanism
+from planar.model.wording import quoted
+from planar.results.motion import Motion, State
 
 Array = np.ndarray
 
@@ -42,7 +42,7 @@ class Proof(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Forces(Shown):
+class Forces(Displayable):
     """The forces at a position, or over a motion (then every array has a first axis for its n positions).
 
     `inputs["O"]` is what that input supplies: a torque (N m) at a pair whose motion is an angle, a force (N) at one

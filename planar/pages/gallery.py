@@ -10,18 +10,26 @@ from urllib.parse import quote
 
 import numpy as np
 
-from planar.errors import BadInput, NoAnswer
-from planar.files import asset, save, unwritten
-from planar.mechanism import Mechanism
-from planar.motion import Motion
-from planar.pages.carried import drawn
-from planar.pages.kinds import KINDS, described
+from planar.document.files import asset, save, unwritten
+from planar.foundation.errors import BadInput, NoAnswer
+from planar.model.mechanism import Mechanism
+from planar.pages.gallery_kinds import KINDS, described
 from planar.pages.page import filled, page, told
+from planar.pages.page_data import drawn
+from planar.results.motion import Motion
 from planar.solving.cycle import cycle
 from planar.solving.position import known_of
 
-SCRIPTS = ("bodies.js", "symbols.js", "ground.js", "springs.js", "letters.js", "drawing.js", "gallery.js")
-STYLES = ("page.css", "stage.css", "gallery.css", "print.css")
+SCRIPTS = (
+    "stage/bodies.js",
+    "stage/symbols.js",
+    "stage/ground.js",
+    "stage/springs.js",
+    "stage/letters.js",
+    "stage/drawing.js",
+    "gallery.js",
+)
+STYLES = ("page.css", "stage/stage.css", "gallery.css", "print.css")
 """The drawing as pages have it, and what moves many of them."""
 
 STEPS = 36

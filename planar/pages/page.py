@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planar.files import asset
-from planar.mechanism import Mechanism
-from planar.pages.carried import carried
+from planar.document.files import asset
+from planar.model.mechanism import Mechanism
 from planar.pages.notebook import packed
-from planar.pages.still import still
+from planar.pages.page_data import carried
+from planar.pages.still_picture import still
 
 
 class Window(NamedTuple):
@@ -24,44 +24,44 @@ class Window(NamedTuple):
 
 
 STYLES = (
-    "still.css",
+    "stage/still.css",
     "uplot/uPlot.min.css",
     "page.css",
-    "stage.css",
-    "layers.css",
-    "dimensions.css",
+    "stage/stage.css",
+    "layers/layers.css",
+    "controls/dimensions.css",
     "print.css",
 )
 SCRIPTS = (
     "uplot/uPlot.iife.min.js",
-    "singular.js",
-    "solver.js",
+    "solve/singular.js",
+    "solve/linkage.js",
     "page.js",
-    "course.js",
-    "bodies.js",
-    "symbols.js",
-    "ground.js",
-    "springs.js",
-    "letters.js",
-    "poses.js",
-    "drawing.js",
-    "dragging.js",
-    "controls.js",
-    "layers_ink.js",
-    "layers_points.js",
-    "polygons.js",
-    "centres.js",
-    "layers_centrodes.js",
-    "forces.js",
-    "layers_forces.js",
-    "forces_table.js",
-    "numbers.js",
-    "charts.js",
-    "layers.js",
-    "dimensions.js",
-    "assemblies.js",
-    "undo.js",
-    "saving.js",
+    "solve/course.js",
+    "stage/bodies.js",
+    "stage/symbols.js",
+    "stage/ground.js",
+    "stage/springs.js",
+    "stage/letters.js",
+    "solve/poses.js",
+    "stage/drawing.js",
+    "controls/dragging.js",
+    "controls/controls.js",
+    "layers/ink.js",
+    "layers/points.js",
+    "layers/polygons.js",
+    "layers/centres.js",
+    "layers/centrodes.js",
+    "solve/forces.js",
+    "layers/forces.js",
+    "controls/forces_table.js",
+    "controls/numbers.js",
+    "controls/charts.js",
+    "layers/layers.js",
+    "controls/dimensions.js",
+    "controls/assemblies.js",
+    "controls/undo.js",
+    "controls/saving.js",
 )
 
 
@@ -88,7 +88,7 @@ def page(
     if library is not None:
         key, carrying = packed(styles, scripts)
         carrying = json.dumps(carrying) if library else "null"
-        styles = asset("still.css")
+        styles = asset("stage/still.css")
         scripts, start = asset("shared.js"), f"shareScripts({json.dumps(key)}, {carrying}, () => {{\n{start}\n}});"
     parts = {
         "title": escape(mechanism.name),

@@ -1,1 +1,1 @@
-"""From equations to positions, velocities and accelerations that have passed the gate."""
+"""From equations to positions, velocities and accelerations that have passed the checks."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from numbers import Integral, Real
 
-from planar.errors import BadInput
-from planar.mechanism import MOST_COUNTED, Mechanism
-from planar.motion import Motion
-from planar.solving.ranged import Progress, Ranged
-from planar.solving.timed import Timed
+from planar.foundation.errors import BadInput
+from planar.model.mechanism import MOST_COUNTED, Mechanism
+from planar.results.motion import Motion
+from planar.solving.runs.range_run import Progress, Ranged
+from planar.solving.runs.time_run import Timed
 
 MOST_STEPS = 10**5
 """A run of so many positions of forty links takes some hundred megabytes."""

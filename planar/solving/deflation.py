@@ -14,10 +14,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from planar.equations import Stage
-from planar.minors import Block, depends, with_minors
-from planar.program import Program
-from planar.solving.setup import Setup
+from planar.equations.constraint_equations import Stage
+from planar.equations.functions import Program
+from planar.equations.minors import Block, depends, with_minors
+from planar.solving.prepared_mechanism import Setup
 
 Array = np.ndarray
 

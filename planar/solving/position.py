@@ -9,18 +9,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from planar.algebra import Jet
-from planar.errors import Ending, NoAnswer, Outcome
-from planar.mechanism import Drive, Mechanism, with_inputs
-from planar.motion import State
-from planar.plane import Frame
-from planar.program import CACHED, Rates, length, placed, program
-from planar.solving import refusals
-from planar.solving.accuracy import doubts
-from planar.solving.assemble import Assembly, Failure, search
-from planar.solving.candidates import Candidates
-from planar.solving.follow import Local, followed
-from planar.solving.freedom import (
+from planar.equations.functions import CACHED, Rates, length, placed, program
+from planar.foundation.errors import Ending, NoAnswer, Outcome
+from planar.foundation.geometry import Frame
+from planar.foundation.jets import Jet
+from planar.model.mechanism import Drive, Mechanism, with_inputs
+from planar.results.motion import State
+from planar.solving.assembly.block_assemblies import Candidates
+from planar.solving.assembly.nearest_assembly import Assembly, Failure, search
+from planar.solving.continuation.fast_path import Ways, sound, surely_determined
+from planar.solving.continuation.path import Local, followed
+from planar.solving.diagnosis import refusals
+from planar.solving.lazy_frames import laid
+from planar.solving.prepared_mechanism import Setup
+from planar.solving.rates.accuracy import doubts
+from planar.solving.rates.regularity import (
     SINGULAR,
     Crossing,
     always_weak,
@@ -30,12 +33,9 @@ from planar.solving.freedom import (
     slope_at,
     strengths,
 )
-from planar.solving.placing import laid
-from planar.solving.setup import Setup
-from planar.solving.straight import Ways, sound, surely_determined
 
 if TYPE_CHECKING:
-    from planar.solving.crossing import Passing
+    from planar.solving.continuation.singular_rates import Passing
 
 Array = np.ndarray
 
@@ -64,7 +64,7 @@ def solve(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = 
     way = followed(here, here.station.p, found.z, here.station.u, there.station.u * scale)
     told = known.remarks
     if way.met or way.missed:
-        from planar.solving.passing import on_the_way
+        from planar.solving.continuation.change_point_remarks import on_the_way
 
         told = (*told, *on_the_way(here, way.met, way.missed))
     by = (here.scale / there.scale)[list(here.equations.unknowns)]
@@ -91,7 +91,7 @@ class Solver(Setup):
         """What there is to say of an assembly."""
         if not (found.ties or found.stopped or self.deflated):
             return self.mechanism.remarks
-        from planar.solving.remarks import remarks  # only where there is something to say
+        from planar.solving.assembly.sketch_remarks import remarks  # only where there is something to say
 
         return (*self.mechanism.remarks, *remarks(self, Candidates(self), found))
 
@@ -153,7 +153,7 @@ class Solver(Setup):
                 return regular[0].state(regular[1], remarks)
             if not isinstance(problem, Crossing):
                 raise
-            from planar.solving.crossing import passing  # few positions are of this kind
+            from planar.solving.continuation.singular_rates import passing  # few positions are of this kind
 
             through = passing(self, z)
             state = through and self._passed(through, remarks)
@@ -197,7 +197,7 @@ class Solver(Setup):
 
         Raises NoAnswer where the inputs do not run along the way on which it was followed.
         """
-        from planar.solving.rates import Given, rates
+        from planar.solving.rates.sample_rates import Given, rates
 
         s = self.station
         residual = float(self.open_along(z[None], s.u[None])[0])

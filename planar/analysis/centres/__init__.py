@@ -1,0 +1,1 @@
+"""Instantaneous centres, centrodes, and what they show."""

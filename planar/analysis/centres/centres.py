@@ -1,0 +1,267 @@
+"""All instantaneous centres of a position, each with its derivation, and proved by another route."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from planar.analysis.centres.branch_rates import branches
+from planar.analysis.centres.kennedy import WORST, Construction, Found, Through, Two, unit
+from planar.analysis.centres.null_space_check import AS_ONE, Proof, as_one, proved, ways
+from planar.analysis.centres.pair_centres import primary
+from planar.analysis.rate_equations import Rates
+from planar.analysis.rate_equations import rates as rates_of
+from planar.analysis.rate_ratios import EXACT, Moved, motions_of
+from planar.analysis.vector_chains import Walks
+from planar.foundation.notebook_display import Displayable
+from planar.model.link_graph import numbered, parting
+from planar.model.mechanism import Mechanism, named_points
+from planar.results.motion import State, Unknown
+from planar.solving.rest_position import standing
+
+Array = np.ndarray
+WORST_IN_CROSSING = 1e-9
+"""Where motions cross positions are exact to the root of rounding only: lines that close to one another are one."""
+CROSSING = 1e-6
+"""As INFINITE, where motions cross."""
+INFINITE = 1e-9
+"""A centre whose w is this small beside x and y, in the mechanism's size, cannot be told from one at infinity."""
+
+
+@dataclass(frozen=True)
+class Centre:
+    """The instantaneous centre of two links: where both have the same velocity.
+
+    `homogeneous` (3,) is (x, y, w) of length one, in metres in the frame's axes: the point (x/w, y/w), or for w = 0
+    the direction (x, y) in which it lies at infinity; None where the two links move as one, or it is not determined.
+    """
+
+    links: tuple[str, str]
+    name: str
+    "I24, of the links' numbers"
+    order: int
+    "the how manieth it was found as; what was not found comes last"
+    how: str
+    "`pair`, `Kennedy`, `ratio`, `equations`, `as one` or `open`"
+    homogeneous: Array | None
+    derivation: str
+    lines: tuple[Line, ...] = ()
+
+    @property
+    def position(self) -> Array | None:
+        """(2,), m; None at infinity, and where it is not determined."""
+        if self.homogeneous is None or self.homogeneous[2] == 0.0:
+            return None
+        return self.homogeneous[:2] / self.homogeneous[2]
+
+    @property
+    def direction(self) -> Array | None:
+        """The unit vector (2,) towards a centre at infinity, else None."""
+        if self.homogeneous is None or self.homogeneous[2] != 0.0:
+            return None
+        return self.homogeneous[:2]
+
+
+class Line(NamedTuple):
+    """A line of centres on which a centre was found: through two other centres by name, or the normal of a pair."""
+
+    centres: tuple[str, ...] = ()
+    pair: str = ""
+
+
+@dataclass(frozen=True)
+class Centres(Displayable):
+    """All n(n-1)/2 centres of a position, by two link names in any order."""
+
+    state: State
+    numbers: Mapping[str, str]
+    "of the links, as textbooks count them: the frame is last"
+    all: tuple[Centre, ...]
+    "in the order in which they were found"
+    proof: Proof
+    as_one: tuple[tuple[str, ...], ...]
+    "links that move as one in this position, in groups; at rest are those in one with the frame"
+    branches: tuple[Mapping[str, Array], ...] = ()
+    "at a change point, for each branch that crosses there, where the open centres by name lie on it: homogeneous (3,)"
+
+    @cached_property
+    def _by_links(self) -> dict[Two, Centre]:
+        return {frozenset(centre.links): centre for centre in self.all}
+
+    def __repr__(self) -> str:
+        return f"<{len(self)} instantaneous centres of {self.state!r}>"
+
+    def __getitem__(self, links: tuple[str, str]) -> Centre:
+        two = frozenset(links)
+        if two in self._by_links:
+            return self._by_links[two]
+        raise Unknown(f"there are no links {' and '.join(map(repr, links))}; links are {', '.join(self.numbers)}")
+
+    def __iter__(self) -> Iterator[Centre]:
+        return iter(self.all)
+
+    def __len__(self) -> int:
+        return len(self.all)
+
+
+def centres(position: State | Mechanism) -> Centres:
+    """Every instantaneous centre of a position, from positions alone: Kennedy's theorem on what the pairs show.
+
+    Where no two lines are known, one centre is taken from the linear equations round the loops, and lines serve again;
+    where the mechanism can move in several ways it is that of the inputs' given rates. Of a mechanism only the
+    position is assembled, so that it may stand where `solve` finds no velocities: on a dead point of its inputs or on
+    a change point. Raises NoAnswer where it cannot be assembled.
+    """
+    found = _Search(standing(position) if isinstance(position, Mechanism) else position)
+    found.run()
+    return found.told()
+
+
+def extent(state: State) -> tuple[Array, float]:
+    """The middle (2,) of all points, and the greater side of the rectangle that holds them (m)."""
+    points = np.array([point.position for point in state.points.values()]).reshape(-1, 2)
+    low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else (np.zeros(2), np.zeros(2))
+    return 0.5 * (low + high), float((high - low).max()) or 1.0
+
+
+class _Search:
+    """The centres of one position while they are found."""
+
+    def __init__(self, state: State):
+        self.state = state
+        self.numbers = numbered(state.mechanism)
+        self.links = sorted(self.numbers, key=lambda link: int(self.numbers[link]))
+        self.middle, self.size = extent(state)
+        rates: Rates = rates_of(state)
+        named = {member: each.name for each in named_points(state.mechanism) for member in each.members}
+        self.walks = Walks(rates, named, self.size)
+        self.ways = ways(state, self.middle, self.size)
+        worst = WORST if self.ways.count <= 1 else WORST_IN_CROSSING
+        self.construction = Construction(self.links, primary(rates, self.middle, self.size), worst)
+        self.by_equations: dict[Two, str] = {}
+        self.as_one: set[Two] = set()
+        self.why_open = ""
+
+    @property
+    def found(self) -> dict[Two, Found]:
+        """By two links, in the order in which they were found."""
+        return self.construction.found
+
+    def run(self) -> None:
+        """All of them, as far as they are determined."""
+        self.construction.run()
+        moved: Moved | None = None
+        while left := self._left():
+            moved = moved or motions_of(self.walks.rates, self.walks, self.middle, self.size)
+            further = moved.links is None and self.ways.count == 1
+            if further:
+                moved = Moved({link: each[0] for link, each in self.ways.links.items()}, "", EXACT)
+            if moved.links is None:
+                self.why_open = moved.why
+                return
+            opens = self._opens()
+            place = {link: index for index, link in enumerate(self.links)}
+            two = max(left, key=lambda two: opens[tuple(place[link] for link in two)])
+            a, b = two
+            relative = moved.links[b] - moved.links[a]
+            length = float(np.linalg.norm(relative))
+            if length <= AS_ONE:
+                self.as_one.add(two)
+                continue
+            nearly = self.construction.lines(two) > 1
+            told = "the lines known are one, or nearly" if nearly else "no two lines are known"
+            self.by_equations[two] = f"{told}, and to first order more could move" if further else told
+            self.construction.add(two, Found(unit(relative), moved.error / length))
+            self.construction.run()
+
+    def _left(self) -> list[Two]:
+        every = map(frozenset, combinations(self.links, 2))
+        return [two for two in every if two not in self.found and two not in self.as_one]
+
+    def _opens(self) -> Array:
+        """How many open centres would have two lines if that of two links were known, (links, links)."""
+        place = {link: index for index, link in enumerate(self.links)}
+        known = np.zeros((len(self.links), len(self.links)), dtype=int)
+        for two in self.found:
+            a, b = (place[link] for link in two)
+            known[a, b] = known[b, a] = 1
+        one_line = (known == 0) & (known @ known > 0)
+        np.fill_diagonal(one_line, False)
+        opened = one_line.astype(int) @ known
+        return opened + opened.T
+
+    def told(self) -> Centres:
+        """The centres in metres, with names and derivations, and their proof."""
+        listed = [self._centre(two, order, one) for order, (two, one) in enumerate(self.found.items(), start=1)]
+        rest = [frozenset(two) for two in combinations(self.links, 2) if frozenset(two) not in self.found]
+        listed += [self._without(two, order) for order, two in enumerate(rest, start=len(listed) + 1)]
+        proof = proved({two: one.at for two, one in self.found.items()}, self.links, self.ways)
+        groups = as_one(self.links, self.ways)
+        return Centres(self.state, self.numbers, tuple(listed), proof, groups, self._branches(listed))
+
+    def _branches(self, listed: Sequence[Centre]) -> tuple[dict[str, Array], ...]:
+        """Where the open centres lie on each branch of a change point; links that move as one on it have none."""
+        left = [each for each in listed if each.how == "open"]
+        if not left or self.ways.count <= len(self.state.mechanism.inputs):
+            return ()
+        found = []
+        for motions in branches(self.state, self.middle, self.size):
+            relatives = {each.name: motions[each.links[1]] - motions[each.links[0]] for each in left}
+            moving = {name: each for name, each in relatives.items() if np.linalg.norm(each) > AS_ONE}
+            found.append(
+                {name: self._in_metres(each / np.linalg.norm(each), CROSSING) for name, each in moving.items()}
+            )
+        return tuple(found)
+
+    def _in_metres(self, at: Array, infinite: float = INFINITE) -> Array:
+        """A homogeneous point in sizes about the middle as one in metres, at infinity what cannot be told from it."""
+        x, y, w = at
+        if abs(w) <= infinite * np.hypot(x, y):
+            return unit(np.array([x, y, 0.0]))
+        return unit(np.array([self.size * x + w * self.middle[0], self.size * y + w * self.middle[1], w]))
+
+    def _named(self, two: Two) -> tuple[tuple[str, str], str]:
+        links = tuple(sorted(two, key=lambda link: int(self.numbers[link])))
+        first, second = (self.numbers[link] for link in links)
+        return links, f"I{first}{parting(self.numbers)}{second}"
+
+    def _name(self, a: str, b: str) -> str:
+        return self._named(frozenset((a, b)))[1]
+
+    def _centre(self, two: Two, order: int, one: Found) -> Centre:
+        links, name = self._named(two)
+        at = self._in_metres(one.at)
+        lines = tuple(self._line(through, links) for through in one.lines)
+        if one.pair:
+            how, told = (
+                "pair",
+                f"{name} at infinity, square to the motion at {one.pair}" if at[2] == 0.0 else f"{name} at {one.pair}",
+            )
+        elif two in self.by_equations:
+            how, told = "equations", f"{name} by the equations round the loops: {self.by_equations[two]}"
+        elif one.ratio:
+            how, told = "ratio", f"{name} on {_said(lines[0])}, in the ratio of {one.ratio}"
+        else:
+            how, told = "Kennedy", f"{name} = {_said(lines[0])} × {_said(lines[1])}"
+        return Centre(links, name, order, how, at, told, lines)
+
+    def _line(self, through: Through, links: Sequence[str]) -> Line:
+        if through.pair:
+            return Line(pair=through.pair)
+        return Line(tuple(self._name(link, through.link) for link in links))
+
+    def _without(self, two: Two, order: int) -> Centre:
+        links, name = self._named(two)
+        if two in self.as_one:
+            told = f"{name}: {links[0]} and {links[1]} move as one here, so every point is their centre"
+            return Centre(links, name, order, "as one", None, told)
+        return Centre(links, name, order, "open", None, f"{name} is not determined: {self.why_open}")
+
+
+def _said(line: Line) -> str:
+    return " ".join(line.centres) if line.centres else f"the normal at {line.pair}"

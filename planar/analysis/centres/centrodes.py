@@ -1,0 +1,287 @@
+"""Fixed and moving centrode of two links: the paths of their instantaneous centre in each of them, over a motion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from planar.analysis.interpolated_run import Steady
+from planar.analysis.relative_motion import Relative, relative
+from planar.foundation.errors import BadInput
+from planar.foundation.geometry import Frame, Vector, frame_at
+from planar.foundation.jets import Jet
+from planar.model.link_graph import numbered
+from planar.model.mechanism import Mechanism, motions
+from planar.model.pairs import Kind
+from planar.results.motion import Motion
+
+Array = np.ndarray
+
+INFINITE = 1e-9
+"""A pole whose w is this small beside x and y, in the mechanism's size, cannot be told from one at infinity."""
+AS_ONE = 1e-9
+"""Links that move this little against each other, beside the greatest motion, move as one."""
+STANDS = 1e-8
+"""Part of the size: a pole that stays within it stands still."""
+LOOSE = 1e-5
+"""At a limit there is one motion: another singular value below this part of the greatest is of a second one."""
+WITHIN = 8
+"""Parts of a step at whose ends it is looked whether the pole passes through infinity."""
+
+
+class Centrode(NamedTuple):
+    """The path of a pole in the axes of a link, and its rate per unit of the input (m, rad): each (n, 3), homogeneous.
+
+    (x, y, w) is in metres, of length one when measured in the mechanism's size about its middle, and steady from row
+    to row: w changes its sign only where the pole passes through infinity. NaN where the links move as one, or their
+    motion is not determined; the rate is NaN at the limits of a range too.
+    """
+
+    inputs: Array
+    "positions of the input that runs (n,)"
+    homogeneous: Array
+    rate: Array
+
+    @property
+    def position(self) -> Array:
+        """(n, 2), m; NaN at infinity, and where the pole is not determined."""
+        return self.homogeneous[:, :2] / self._w
+
+    @property
+    def velocity(self) -> Array:
+        """Of the pole along the path, per unit of the input: (n, 2), m/rad or m/m; NaN where there is none."""
+        return (self.rate[:, :2] - self.position * self.rate[:, 2:]) / self._w
+
+    @property
+    def _w(self) -> Array:
+        w = self.homogeneous[:, 2:]
+        return np.where(w == 0.0, np.nan, w)
+
+    def curve(self, rows: Array, parts: int = 1) -> Array:
+        """The path through some rows (k,), each step in so many parts: ((k - 1) parts + 1, 3), homogeneous.
+
+        Between two rows it is the cubic that has their rates, through infinity as well: wrong by the fourth power of
+        the step. Beside a limit, where all goes as the root of the way to it, a parabola of that root.
+        """
+        if len(rows) < 2:
+            return self.homogeneous[rows]
+        s = np.linspace(0.0, 1.0, parts, endpoint=False)
+        inner = self._between(rows[:-1], rows[1:], s)
+        return np.concatenate([inner.reshape(-1, 3), self.homogeneous[rows[-1:]]])
+
+    def _between(self, first: Array, last: Array, s: Array) -> Array:
+        """Steps from first rows to last ones (k,) at parts s of each: (k, parts, 3)."""
+        step = (self.inputs[last] - self.inputs[first])[:, None, None]
+        a, b = self.homogeneous[first][:, None], self.homogeneous[last][:, None]
+        da, db = step * self.rate[first][:, None], step * self.rate[last][:, None]
+        known_a, known_b = np.isfinite(da), np.isfinite(db)
+        s = s[None, :, None]
+        cubic = a + s * da + s**2 * (3.0 * (b - a) - 2.0 * da - db) + s**3 * (2.0 * (a - b) + da + db)
+        to_limit = _beside(b, a, -2.0 * da, 1.0 - s)
+        from_limit = _beside(a, b, 2.0 * db, s)
+        straight = a + s * (b - a)
+        one = np.where(known_a, to_limit, np.where(known_b, from_limit, straight))
+        return np.where(known_a & known_b, cubic, one)
+
+
+def _beside(limit: Array, inner: Array, slope: Array, s: Array) -> Array:
+    """A parabola from a limit (s = 0) to an inner row (s = 1), where it has a slope."""
+    bend = slope - (inner - limit)
+    return limit + s * (inner - limit - bend) + s**2 * bend
+
+
+@dataclass(frozen=True)
+class Centrodes:
+    """The centrodes of a link against another over a motion of n positions: they roll on each other without slipping.
+
+    `fixed` is in the axes of `other`, `moving` in those of `link`; at every position both touch in the pole. `arcs`
+    are the rows of their pieces, which end where the pole passes through infinity. `reason` says why there are no
+    curves: the links turn about one point, only slide, or move as one.
+    """
+
+    link: str
+    other: str
+    pair: str
+    "of the input that runs"
+    fixed: Centrode
+    moving: Centrode
+    arcs: tuple[Array, ...]
+    motion: Relative
+    "of the link in the axes of the other, at every position"
+    reason: str
+
+    def placed(self, row: int, points: Array | None = None) -> Array:
+        """The moving centrode, or other points of the link's axes, where they are at a position: (n, 2), m.
+
+        In the axes of the other link.
+        """
+        points = self.moving.position if points is None else points
+        here = Relative(*(part[row] for part in self.motion))
+        return here.carried(points)
+
+    @property
+    def known(self) -> Array:
+        """The rows at which the pole is determined, be it at infinity."""
+        return np.flatnonzero(np.isfinite(self.fixed.homogeneous[:, 2]))
+
+
+def centrodes(motion: Motion, link: str, other: str | None = None) -> Centrodes:
+    """The fixed and the moving centrode of a link against another (left out: the frame), from the motion's rates.
+
+    The input's speed does not matter; where it is zero in the file, a unit rate takes its place. At the limits of a
+    range, where rates are not determined, the pole is that of the motion that the constraints leave. Raises Unknown
+    for a link that is not there.
+    """
+    frame = motion.mechanism.frame
+    other = frame if other is None else other
+    relative(motion.frames, link, other)  # refuses what there is not
+    steady = Steady(motion)
+    moved = replace(steady.samples, frames=_with_limits(steady))
+    size = steady.solver.unit
+    scale = {name: _scale(moved, name, size) for name in (frame, other, link)}
+    greatest = np.max(
+        [_scaled(_motion(moved, name, frame).fixed_pole[0], scale[frame])[1] for name in moved.frames if name != frame],
+        axis=0,
+    )
+    found = _motion(moved, link, other)
+    paths = {
+        name: _path(pole, scale[name], AS_ONE * greatest)
+        for name, pole in ((other, found.fixed_pole), (link, found.moving_pole))
+    }
+    signs = _signs(paths[other][0])
+    fixed, moving = (
+        Centrode(steady.positions, signs * at @ scale[name].T, signs * rate @ scale[name].T / steady.rate)
+        for name, (at, rate) in paths.items()
+    )
+    reason = _reason(fixed, greatest, link, other, size)
+    return Centrodes(link, other, steady.pair, fixed, moving, () if reason else _arcs(fixed), found, reason)
+
+
+def usual(mechanism: Mechanism) -> tuple[str, str]:
+    """Two links whose centrodes say most: the first coupler and the frame, else the first two moving links.
+
+    A coupler is no link that is pinned to the frame or slides on it; best one that no pair at all joins to it. Raises
+    BadInput where nothing moves.
+    """
+    frame = mechanism.frame
+    moving = [link for link in numbered(mechanism) if link != frame]
+    if not moving:
+        raise BadInput(mechanism.name, "the mechanism has no moving link, so there are no centrodes")
+    on_frame = [pair for pair in motions(mechanism).values() if frame in pair.links]
+    pinned = {link for pair in on_frame if pair.lower and pair.drive_kind is Kind.ANGLE for link in pair.links}
+    guided = {link for pair in on_frame if pair.lower for link in pair.links}
+    joined = {link for pair in on_frame for link in pair.links}
+    for out in (joined, guided, pinned):
+        free = [link for link in moving if link not in out]
+        if free:
+            return free[0], frame
+    return (moving[1], moving[0]) if len(moving) > 1 else (moving[0], frame)
+
+
+def _motion(moved: Motion, link: str, other: str) -> Relative:
+    """The motion of a link against another, with a row for every position."""
+    found, many = relative(moved.frames, link, other), len(moved)
+    return Relative(
+        *(
+            np.broadcast_to(part, (many, *part.shape[part.ndim - whole :]))
+            for part, whole in zip(found, (1, 1, 1, 0, 0, 0), strict=True)
+        )
+    )
+
+
+def _scale(moved: Motion, link: str, size: float) -> Array:
+    """What puts homogeneous points measured in the size, about the mechanism's middle, into a link's axes (3, 3), m."""
+    places = np.mean([moved.point(name).position for name in moved.point_names], axis=0)
+    local = moved.frames[link].local(Vector(*places.T))
+    x, y = (np.mean(part.parts[0] if isinstance(part, Jet) else part) for part in local)
+    return np.array([[size, 0.0, x], [0.0, size, y], [0.0, 0.0, 1.0]])
+
+
+def _scaled(poles: Array, scale: Array) -> tuple[Array, Array]:
+    """Poles in the mechanism's size, and their lengths (n, 1)."""
+    poles = poles @ np.linalg.inv(scale).T
+    return poles, np.linalg.norm(poles, axis=1, keepdims=True)
+
+
+def _path(pole: tuple[Array, Array], scale: Array, least: Array) -> tuple[Array, Array]:
+    """Poles (n, 3) of length one with their rates, in the mechanism's size; NaN where there is no more motion than the
+    least (n, 1)."""
+    at, length = _scaled(pole[0], scale)
+    rate, _ = _scaled(pole[1], scale)
+    length = np.where(length > least, length, np.nan)
+    at, rate = at / length, rate / length
+    rate -= at * (at * rate).sum(axis=1, keepdims=True)
+    at[np.abs(at[:, 2]) <= INFINITE, 2] = 0.0
+    return at, rate
+
+
+def _signs(poles: Array) -> Array:
+    """The signs (n, 1) with which poles go on steadily: where the links rest in passing, all of a twist turns round."""
+    signs = np.ones(len(poles))
+    known = np.flatnonzero(np.isfinite(poles[:, 2]))
+    if len(known):
+        along = (poles[known[1:]] * poles[known[:-1]]).sum(axis=1)
+        signs[known] = np.cumprod(np.append(1.0, np.where(along < 0.0, -1.0, 1.0)))
+    return signs[:, None]
+
+
+def _arcs(fixed: Centrode) -> tuple[Array, ...]:
+    """The rows of the pieces of a curve, cut where w vanishes at a row or between two."""
+    known = np.flatnonzero(np.isfinite(fixed.homogeneous[:, 2]))
+    w = fixed.curve(known, WITHIN)[:, 2]
+    senses = np.sign(w[np.arange(len(known) - 1)[:, None] * WITHIN + np.arange(WITHIN + 1)])
+    cuts = np.flatnonzero(senses.min(axis=1) != senses.max(axis=1)) + 1
+    pieces = np.split(known, cuts)
+    return tuple(piece for piece in pieces if np.all(fixed.homogeneous[piece, 2] != 0.0))
+
+
+def _reason(fixed: Centrode, greatest: Array, link: str, other: str, size: float) -> str:
+    """Why there are no curves, if there are none."""
+    poles = fixed.homogeneous[np.isfinite(fixed.homogeneous[:, 2])]
+    if not len(poles):
+        if np.isfinite(greatest).any():
+            return f"{link} and {other} move as one, so that every point is their centre"
+        return "the motion is not determined at any position"
+    finite = poles[poles[:, 2] != 0.0]
+    if not len(finite):
+        return f"{link} only slides against {other}: their centre is always at infinity"
+    if len(finite) == len(poles) and np.ptp(finite[:, :2] / finite[:, 2:], axis=0).max() <= STANDS * size:
+        return f"{link} turns against {other} about one point, which is their centre always"
+    return ""
+
+
+def _with_limits(steady: Steady) -> Mapping[str, Frame]:
+    """The frames of a motion's samples, with first rates at limits too, of any size: those of the one motion there."""
+    solver, program = steady.solver, steady.solver.program
+    running = [given.pair for given in solver.mechanism.inputs].index(steady.pair)
+    by = solver.unit if solver.named[steady.pair].drive_kind is Kind.LENGTH else 1.0
+    rates = {}
+    for row in np.flatnonzero(~steady.known):
+        z, u = steady.z[row], solver.station.u.copy()
+        u[running] = steady.positions[row] / by
+        slopes, drives = program.slopes(z[None], u[None], solver.station.p)
+        _, values, ways = np.linalg.svd(np.hstack([slopes[0], drives[0][:, running : running + 1]]))
+        if len(values) < len(z) or values[len(z) - 1] <= LOOSE * values[0]:
+            continue  # branches cross, or there is more than one motion
+        y1 = np.concatenate([ways[-1][:-1], np.zeros_like(u)])
+        y1[len(z) + running] = ways[-1][-1]
+        still_ = np.zeros_like(y1)
+        rates[row] = program.kinematics(np.concatenate([z, u]), y1, still_, solver.station.p).w1 * solver.scale
+    return {link: _directed(link, frame, rates, solver.column) for link, frame in steady.samples.frames.items()}
+
+
+def _directed(link: str, frame: Frame, rates: Mapping[int, Array], column: Mapping[tuple[str, str], int]) -> Frame:
+    """A frame with other first rates in some rows."""
+    if frame.fixed or not rates:
+        return frame
+    parts = []
+    for part in ("x", "y", "angle"):
+        position, rate, second = getattr(frame, part).parts
+        rate = np.array(rate)
+        for row, w1 in rates.items():
+            rate[row] = w1[column[link, part]]
+        parts.append(Jet(position, rate, second))
+    return frame_at(*parts)

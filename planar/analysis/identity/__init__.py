@@ -1,0 +1,1 @@
+"""What a mechanism is: its mobility, its names, what acts on it."""

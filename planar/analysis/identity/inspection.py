@@ -1,0 +1,201 @@
+"""What a mechanism is, in the words of textbooks: its links, pairs, chain, mobility, motions and names."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+
+from planar.analysis.identity.load_descriptions import Action, actions
+from planar.analysis.identity.mechanism_names import names
+from planar.analysis.identity.mobility import Mobility, gruebler, mobility
+from planar.dynamics.load_attachment import choices
+from planar.equations.functions import shapes, size
+from planar.foundation.errors import BadInput, NoAnswer, Outcome, PlanarError
+from planar.model.link_graph import detached, numbered, pair_words
+from planar.model.mechanism import Input, Mechanism, entries
+from planar.model.pairs import Kind
+from planar.model.wording import listed, many
+from planar.results.motion import Motion
+from planar.solving.cycle import cycle
+from planar.solving.position import solve
+
+ORDERS = ("single", "unary", "binary", "ternary", "quaternary", "quinary")
+STEPS = 120
+"""Positions of a run that tells how links move."""
+STILL = 1e-9
+"""rad, or part of the size: what moves less stands still."""
+
+
+@dataclass(frozen=True)
+class LinkWords:
+    """A link: its number, how many pairs it has in a word, and how it moves over the range of the inputs."""
+
+    number: str
+    order: str
+    motion: str
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """See `inspect`. `mobility` is None where the mechanism cannot be assembled; `open_reason` then says why.
+
+    `pairs`: of every type the pairs by the numbers of their links, as ("turning", ("O-1", "1-2")); `lower` and `higher`
+    how many; `is_mechanism` and `is_linkage` with the reasons. `actions` are its loads, springs and masses; `remarks`
+    say of which of them another link might have been meant.
+    """
+
+    name: str
+    names: tuple[str, ...]
+    links: dict[str, LinkWords]
+    pairs: tuple[tuple[str, tuple[str, ...]], ...]
+    lower: int
+    higher: int
+    closed: bool
+    gruebler: int
+    mobility: Mobility | None
+    open_reason: str
+    is_mechanism: bool
+    mechanism_reason: str
+    is_linkage: bool
+    linkage_reason: str
+    actions: tuple[Action, ...]
+    remarks: tuple[str, ...]
+
+
+def inspect(mechanism: Mechanism) -> Inspection:
+    """Everything that can be said of a mechanism before its motion is asked for."""
+    try:
+        found, trouble = mobility(mechanism), ""
+    except NoAnswer as problem:
+        found, trouble = None, str(problem)
+    orders = Counter(link for group in entries(mechanism) for link in {link for pair in group for link in pair.links})
+    number = numbered(mechanism)
+    moving = _motions(mechanism)
+    links = {
+        link: LinkWords(number[link], _order(orders[link]), moving[link])
+        for link in sorted(number, key=lambda link: int(number[link]))
+    }
+    lower = sum(pair.lower for pair in mechanism.pairs)
+    higher = len(mechanism.pairs) - lower
+    closed = all(orders[link.name] > 1 for link in mechanism.links)
+    is_mechanism, why = _is_mechanism(mechanism, found, trouble)
+    words = pair_words(mechanism)
+    return Inspection(
+        name=mechanism.name,
+        names=names(mechanism),
+        links=links,
+        pairs=words,
+        lower=lower,
+        higher=higher,
+        closed=closed,
+        gruebler=gruebler(mechanism),
+        mobility=found,
+        open_reason=trouble,
+        is_mechanism=is_mechanism,
+        mechanism_reason=why,
+        is_linkage=is_mechanism and not higher,
+        linkage_reason=_linkage_reason(is_mechanism, higher),
+        actions=actions(mechanism),
+        remarks=choices(mechanism),
+    )
+
+
+def _order(pairs: int) -> str:
+    return ORDERS[pairs] if pairs < len(ORDERS) else f"of {pairs} pairs"
+
+
+def _linkage_reason(is_mechanism: bool, higher: int) -> str:
+    if not is_mechanism:
+        return "it is no mechanism"
+    return f"it has {many(higher, 'higher pair')}" if higher else "all its pairs are lower"
+
+
+def _is_mechanism(mechanism: Mechanism, found: Mobility | None, trouble: str) -> tuple[bool, str]:
+    """One link fixed, as many driving links as freedoms, and the rest moving in a definite way."""
+    if found is None:
+        return False, trouble
+    if detached(mechanism):
+        return False, f"nothing joins {listed([repr(link) for link in detached(mechanism)])} to the frame"
+    given = len(mechanism.inputs)
+    if given != found.finite or not given:
+        moves = f"it moves in {many(found.finite, 'way')}" if found.finite else "nothing moves: it is a structure"
+        return False, f"it has {many(given, 'driving link')}, and {moves}"
+    told = f"one link is fixed, {many(given, 'link')} driven, and the rest follows definitely"
+    try:
+        solve(mechanism)
+    except NoAnswer as problem:
+        passing = problem.outcome in (Outcome.DEAD_POINT, Outcome.CHANGE_POINT, Outcome.CANNOT_BE_ASSEMBLED)
+        return passing, f"{told}; but here: {problem.reason}" if passing else str(problem)
+    return True, told
+
+
+def _motions(mechanism: Mechanism) -> dict[str, str]:
+    """How each link moves while the inputs run through their ranges, one after the other."""
+    runs: list[Motion] = []
+    for given in mechanism.inputs:
+        try:
+            runs.append(_run(mechanism, given))
+        except PlanarError:
+            return {link.name: "fixed" if link.name == mechanism.frame else "unknown" for link in mechanism.links}
+    return {link.name: _motion(mechanism, link.name, runs) for link in mechanism.links}
+
+
+def _same_place(run: Motion) -> bool:
+    """Whether everything that slides is at the end where it was at the start."""
+    return all(abs(float(np.ptp(jet.parts[0][[0, -1]]))) < 1e-6 for own in run.own.values() for jet in own)
+
+
+def _run(mechanism: Mechanism, given: Input) -> Motion:
+    """One input through its range; a slide without limits a few sizes to either side."""
+    try:
+        return cycle(mechanism, STEPS, pair=given.pair)
+    except BadInput:
+        far = 2.0 * size(mechanism, shapes(mechanism))
+        return cycle(mechanism, STEPS, given.position - far, given.position + far, given.pair)
+
+
+def _motion(mechanism: Mechanism, link: str, runs: list[Motion]) -> str:
+    if link == mechanism.frame:
+        return "fixed"
+    if not runs:
+        return "unknown"
+    swing = max(float(np.ptp(run.link(link).angle)) for run in runs)
+    places = [np.stack([_parts(run, link, axis) for axis in "xy"]) for run in runs]
+    size = max(float(np.abs(place).max()) for place in places) or 1.0
+    strays = max(float(np.ptp(place, axis=1).max()) for place in places) > STILL * size
+    if swing <= STILL:
+        return "translates" if strays else "stands still"
+    if not _pinned(mechanism, link):
+        return "general plane motion"
+    if any(_turns(run, link) for run in runs):
+        return "turns fully"
+    return "rocks" if all(run.outcome is Outcome.SOLVED for run in runs) else "turns or rocks"
+
+
+def _parts(run: Motion, link: str, axis: str) -> np.ndarray:
+    jet = getattr(run.frames[link], axis)
+    return np.broadcast_to(jet.parts[0], (len(run),))
+
+
+def _pinned(mechanism: Mechanism, link: str) -> bool:
+    """Whether a pin holds the link to the frame."""
+    return any(
+        pair.lower and pair.drive_kind is Kind.ANGLE and mechanism.frame in pin and link in pin
+        for group in entries(mechanism)
+        for pair in group[:1]
+        for pin in [{end for each in group for end in each.links}]
+    )
+
+
+def _turns(run: Motion, link: str) -> bool:
+    """Whether a link goes right round: over a whole cycle of the input it comes out turned, or it turns far enough."""
+    angle = run.link(link).angle
+    if float(np.ptp(angle)) >= 2.0 * np.pi - STILL:
+        return True
+    cyclic = any(
+        not run.slides(name) and abs(float(np.ptp(given.position)) - 2.0 * np.pi) < STILL
+        for name, given in run.inputs.items()
+    )
+    return cyclic and _same_place(run) and run.outcome is Outcome.SOLVED and abs(float(angle[-1] - angle[0])) > 1e-6

@@ -1,0 +1,113 @@
+"""How many ways a mechanism can move: by count, here, and in general; and where pairs hold more than they need to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planar.foundation.errors import NoAnswer
+from planar.model.link_graph import farthest_first
+from planar.model.mechanism import Mechanism
+from planar.model.wording import listed, many
+from planar.solving.assembly.nearest_assembly import Assembly, Failure
+from planar.solving.diagnosis.redundancy import smallest_sets
+from planar.solving.full_constraints import Constraints, joined, motion_from, null_space, rank
+from planar.solving.position import Solver
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Mobility:
+    """The three mobilities of a mechanism, inputs left aside.
+
+    `gruebler`: 3 (links - 1) less what the pairs hold, by count (Gruebler, Kutzbach); `instantaneous`: by the rank of
+    the constraints in this position; `finite`: the dimension of the motion that leads away from it. `surplus`
+    constraints of the motion follow from the others; each of `redundant` is a smallest set of pairs of which one
+    constraint is superfluous. `why` says in sentences where the three differ.
+    """
+
+    gruebler: int
+    instantaneous: int
+    finite: int
+    surplus: int
+    redundant: tuple[tuple[str, ...], ...]
+    why: tuple[str, ...]
+
+
+def mobility(mechanism: Mechanism) -> Mobility:
+    """The mobility of a mechanism in the position of its file. Raises NoAnswer where it cannot be assembled."""
+    setup = Solver(mechanism)
+    constraints = Constraints(setup)
+    return measured(constraints, standing(setup, constraints))
+
+
+def gruebler(mechanism: Mechanism) -> int:
+    """3 (links - 1) less what the pairs hold: three for each link that moves, none for what is held twice.
+
+    M. Gruebler 1883, K. Kutzbach 1929; two for a lower pair in the plane, one for a higher one.
+    """
+    return 3 * (len(mechanism.links) - 1) - sum(pair.holds() for pair in mechanism.pairs)
+
+
+def measured(constraints: Constraints, w: Array) -> Mobility:
+    """The mobility at a position w (coordinates,)."""
+    mechanism = constraints.setup.mechanism
+    count = gruebler(mechanism)
+    slope = constraints.slope(w)
+    here = w.size - rank(slope)
+    finite, place = here, w
+    if here != count:
+        finite, place = motion_from(constraints, w)
+    left = null_space(constraints.slope(place).T)
+    surplus = max(0, finite - count)
+    everywhere = finite < null_space(constraints.slope(place)).shape[1]
+    sets: tuple[tuple[str, ...], ...] = ()
+    if surplus and left.shape[1] == surplus:
+        sets = smallest_sets(left, constraints.pair_of_row, lambda name: farthest_first(mechanism, name))
+    return Mobility(count, here, finite, surplus, sets, tuple(_why(count, here, finite, sets, everywhere)))
+
+
+def standing(setup: Solver, constraints: Constraints) -> Array:
+    """A closed position w of a mechanism, the one of its inputs if they determine one. Raises NoAnswer."""
+    nearest: Assembly | Failure | NoAnswer
+    try:
+        nearest = setup.nearest()
+    except NoAnswer as problem:
+        nearest = problem
+    if isinstance(nearest, Assembly):
+        return setup.program.positions(nearest.z, setup.station.u, setup.station.p).full().ravel()
+    found = joined(constraints)
+    if found is None:
+        raise setup.unassembled(nearest) if isinstance(nearest, Failure) else nearest
+    return found
+
+
+def _why(count: int, here: int, finite: int, sets: tuple[tuple[str, ...], ...], everywhere: bool) -> list[str]:
+    told = []
+    if here > finite and finite and everywhere:
+        told.append(
+            f"in every position of the motion the pairs allow {many(here - finite, 'more way')}, but to first order "
+            f"only: to second order they hold it, so that a little play lets it move far"
+        )
+    elif here > finite:
+        what = "nothing moves on from here" if finite == 0 else "branches of the motion cross here, or it turns back"
+        told.append(
+            f"in this position the pairs allow {many(here - finite, 'more way')}, but to first order only: {what}"
+        )
+    if finite > count:
+        follows = "follows" if finite - count == 1 else "follow"
+        told.append(
+            f"{many(finite - count, 'constraint')} of the pairs {follows} from the others, so the links move in "
+            f"{many(finite, 'way')} where the count gives {count}"
+        )
+        told += [
+            f"of the pairs {listed([repr(name) for name in each])} one holds what the others hold" for each in sets
+        ]
+    if finite < count:
+        told.append(
+            f"the count gives {count}, but from here the links move in {many(finite, 'way')}: their dimensions only "
+            f"just allow this position, or some of them hold others fast while the rest is freer"
+        )
+    return told

@@ -1,0 +1,238 @@
+"""A run between its samples: its states at any position of the input that runs, at a steady rate of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from math import pi
+
+import numpy as np
+
+from planar.foundation.errors import BadInput, NoAnswer
+from planar.foundation.geometry import Frame, frame_at
+from planar.foundation.jets import Jet
+from planar.model.mechanism import Drive, with_inputs
+from planar.model.pairs import Kind
+from planar.results.motion import Motion, Moving, State
+from planar.solving.continuation.path import followed
+from planar.solving.position import Solver
+
+Array = np.ndarray
+
+SAME = 1e-9
+"""rad, or part of the size: a motion that comes so near to where it started is closed."""
+SEAM = 1e-12
+"""rad: so near to the end of a turn a position is at its start."""
+
+
+class Steady:
+    """A motion between its samples: states at any position of its running input, which runs steadily.
+
+    Its `rate` is the file's velocity, without acceleration; where the file's velocity is zero it is 1 rad/s or 1 m/s,
+    so that rates are per unit of the input. Of a motion there and back it is the way there; raises BadInput for a run
+    in time and for a circuit, whose input is more than once at a position.
+    """
+
+    def __init__(self, motion: Motion):
+        motion = _one_way(motion)
+        ranges = {name: float(np.ptp(given.position)) for name, given in motion.inputs.items()}
+        self.pair = max(ranges, key=ranges.__getitem__)
+        given = next(each for each in motion.mechanism.inputs if each.pair == self.pair)
+        self.rate = given.velocity or 1.0
+        self.mechanism = with_inputs(motion.mechanism, (Drive(self.pair, None, self.rate, 0.0),))
+        self.solver = Solver(self.mechanism)
+        self._which = [each.pair for each in self.mechanism.inputs].index(self.pair)
+        self._scale = self.solver.unit if self.solver.named[self.pair].drive_kind is Kind.LENGTH else 1.0
+        self.positions: Array = motion.inputs[self.pair].position
+        self.first, self.last = float(self.positions.min()), float(self.positions.max())
+        self.z = self._unknowns(motion)
+        self.samples = self._sampled(motion, given.velocity, given.acceleration)
+        self.known = self._determined()
+        course = motion.course
+        self._singular = np.zeros(len(self.positions), dtype=bool)
+        self._singular[[row for row in course.singular if row < len(motion)] if course is not None else []] = True
+        self._forks = () if course is None else course.forks
+        self.closed = self._closes()
+        self._states: dict[float, State] = {}
+
+    @property
+    def period(self) -> float:
+        """How far the input runs (rad or m)."""
+        return self.last - self.first
+
+    @property
+    def pin(self) -> str | None:
+        """The frame's point about which the driving crank turns, as `link.point`, if there is one."""
+        pair = self.solver.named[self.pair]
+        on = [f"{link}.{point}" for link, point in pair.coincident() if link == self.mechanism.frame]
+        return on[0] if on and pair.drive_kind is Kind.ANGLE else None
+
+    def at(self, position: float) -> State:
+        """The state at a position of the running input, on this motion's branch. Raises NoAnswer."""
+        if position not in self._states:
+            index = int(np.argmin(np.where(self._sound(position), np.abs(self.positions - position), np.inf)))
+            there = self._solver(position)
+            start = there.station.u.copy()
+            start[self._which] = self.positions[index] / self._scale
+            way = followed(there, there.station.p, self.z[index], start, there.station.u)
+            z, local = way.z[-1], way.local.get(1)
+            self._states[position] = there.state(z) if local is None else there.on_branch(z, local)
+        return self._states[position]
+
+    def _sound(self, position: float) -> Array:
+        """Which samples lead to a position on this motion's branch (samples,).
+
+        Not those on change points, from which several ways lead on, nor those beyond one where another way was taken.
+        """
+        sound = self.known & ~self._singular
+        for fork in self._forks:
+            sound &= (self.positions - fork) * (position - fork) >= 0.0
+        return sound
+
+    def tabled(self, measure: Callable[[Moving], Array]) -> tuple[Array, Array]:
+        """Positions in order, and what is measured there (positions, ...), of states that have rates.
+
+        Besides the samples there are some just beyond open ends of the range, or nearer and nearer to its limits; what
+        is closed goes on over its seam.
+        """
+        order = np.argsort(self.positions, kind="stable")
+        order = order[self.known[order]]
+        where, what = self.positions[order], np.asarray(measure(self.samples))[order]
+        if self.closed and len(where):
+            if where[-1] - where[0] > self.period - SAME:  # both ends are one position
+                where, what = where[:-1], what[:-1]
+            return np.concatenate([where, where[:2] + self.period]), np.concatenate([what, what[:2]])
+        for position in self._beside() if len(where) else ():
+            try:
+                beside = np.asarray(measure(self.at(position)))[None]
+            except NoAnswer:
+                continue  # the motion does not go on so far
+            index = int(np.searchsorted(where, position))
+            where, what = np.insert(where, index, position), np.insert(what, index, beside, axis=0)
+        return where, what
+
+    def limited(self) -> tuple[tuple[float, float], ...]:
+        """The ends of an open range that are limits, where no rate is determined, each with the way inwards."""
+        if self.closed:
+            return ()
+        ends = ((self.first, 1.0), (self.last, -1.0))
+        return tuple((end, way) for end, way in ends if not self.known[self.positions == end].any())
+
+    def _beside(self) -> Iterator[float]:
+        step = self.period / max(len(self.positions) - 1, 1)
+        limits = dict(self.limited())
+        for end, way in ((self.first, 1.0), (self.last, -1.0)):
+            if end in limits:
+                yield from (end + way * step * by for by in (0.1, 1e-2, 1e-3, 1e-4))
+            elif step:
+                yield end - way * step * 0.01
+
+    def within(self, position: float) -> float | None:
+        """The position in the range of the motion, over a closed one the same place of the turn; None outside."""
+        if self.closed:
+            return max(position - self.period * ((position - self.first + SEAM) // self.period), self.first)
+        inside = self.first - SAME <= position <= self.last + SAME
+        return min(max(position, self.first), self.last) if inside else None
+
+    def _solver(self, position: float) -> Solver:
+        return Solver(with_inputs(self.mechanism, (Drive(self.pair, position),)))
+
+    def _determined(self) -> Array:
+        """Which samples have rates (samples,)."""
+        jets = [each for f in self.samples.frames.values() if not f.fixed for each in (f.x, f.y, f.angle)]
+        jets += [jet for own in self.samples.own.values() for jet in own]
+        parts = [np.broadcast_to(part, len(self.positions)) for jet in jets for part in jet.parts]
+        return np.isfinite(parts).all(axis=0) if parts else np.ones(len(self.positions), dtype=bool)
+
+    def _unknowns(self, motion: Motion) -> Array:
+        """The unknowns at every sample (samples, unknowns), from the frames."""
+        solver, many = self.solver, len(motion)
+        values: dict[tuple[str, str], Array] = {}
+        for link, frame in motion.frames.items():
+            if not frame.fixed:
+                values |= {(link, part): getattr(frame, part).parts[0] for part in ("x", "y", "angle")}
+        for name, own in motion.own.items():
+            parts = solver.pairs[name].coordinates
+            values |= {(name, part): jet.parts[0] for (part, _), jet in zip(parts, own, strict=True)}
+        coordinates = solver.equations.coordinates
+        w = np.array([np.broadcast_to(values[c.owner, c.part], many) for c in coordinates]).reshape(-1, many)
+        return (w / solver.scale[:, None])[list(solver.equations.unknowns)].T
+
+    def _sampled(self, motion: Motion, velocity: float, acceleration: float) -> Motion:
+        """The samples at the steady rate."""
+        if velocity and not acceleration:
+            return motion
+        if not velocity:
+            return self._restarted(motion)
+
+        def steady(jet: Jet) -> Jet:
+            # d2x/dt2 = x'' v^2 + x' a, of which the second part is the input's acceleration
+            position, rate, second = jet.parts
+            return Jet(position, rate, second - rate * (acceleration / velocity))
+
+        frames = {
+            link: frame if frame.fixed else frame_at(*(steady(each) for each in (frame.x, frame.y, frame.angle)))
+            for link, frame in motion.frames.items()
+        }
+        own = {name: tuple(map(steady, jets)) for name, jets in motion.own.items()}
+        return replace(motion, mechanism=self.mechanism, frames=frames, own=own)
+
+    def _restarted(self, motion: Motion) -> Motion:
+        """The samples of a motion whose input stands still in the file, with rates."""
+        states = []
+        for position, z in zip(self.positions.tolist(), self.z, strict=True):
+            try:
+                here = Solver(with_inputs(self.mechanism, (Drive(self.pair, position),)))
+                states.append(here.state(z))
+            except NoAnswer:
+                states.append(None)
+
+        def stacked(jets: list[Jet | None], before: Jet) -> Jet:
+            rates = [[np.nan if jet is None else jet.parts[k] for jet in jets] for k in (1, 2)]
+            return Jet(before.parts[0], *(np.array(rate) for rate in rates))
+
+        def frame(link: str, before: Frame) -> Frame:
+            if before.fixed:
+                return before
+            parts = ("x", "y", "angle")
+            return frame_at(
+                *(
+                    stacked([s and getattr(s.frames[link], part) for s in states], getattr(before, part))
+                    for part in parts
+                )
+            )
+
+        frames = {link: frame(link, before) for link, before in motion.frames.items()}
+        own = {
+            name: tuple(stacked([s and s.own[name][k] for s in states], jet) for k, jet in enumerate(jets))
+            for name, jets in motion.own.items()
+        }
+        return replace(motion, mechanism=self.mechanism, frames=frames, own=own)
+
+    def _closes(self) -> bool:
+        """Whether the motion comes back to where it started after whole turns of the input."""
+        turns = self.period / (2.0 * pi)
+        if self.solver.named[self.pair].drive_kind is Kind.LENGTH or turns < 0.5 or abs(turns - round(turns)) > SAME:
+            return False
+        unit = self.solver.unit
+        for frame in self.samples.frames.values():
+            if not frame.fixed:
+                gaps = [(each.parts[0][-1] - each.parts[0][0]) / unit for each in (frame.x, frame.y)]
+                gaps += [each.parts[0][-1] - each.parts[0][0] for each in (frame.cos, frame.sin)]
+                if max(map(abs, gaps)) > SAME:
+                    return False
+        slides = [jet.parts[0] for own in self.samples.own.values() for jet in own]
+        return all(abs(each[-1] - each[0]) <= SAME * unit for each in slides)
+
+
+def _one_way(motion: Motion) -> Motion:
+    """The motion, or its way there if it comes back."""
+    if motion.time is not None:
+        raise BadInput("motion", "this is asked of the range of one input; the motion is a run in time")
+    ways = [np.diff(given.position) for given in motion.inputs.values()]
+    if not any((way > 0.0).any() and (way < 0.0).any() for way in ways):
+        return motion
+    middle = (len(motion) - 1) // 2
+    if all(np.array_equal(given.position, given.position[::-1]) for given in motion.inputs.values()):
+        return motion.until(middle)
+    raise BadInput("motion", "this is asked of one range of the input; a circuit goes through its dead points")

@@ -1,0 +1,1 @@
+"""Questions about a whole motion: strokes, dwells, harmonics, time ratios."""

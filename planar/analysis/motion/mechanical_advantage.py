@@ -1,0 +1,204 @@
+"""The mechanical advantage: what an ideal mechanism exerts for what an input supplies, by power and by centres."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from planar.analysis.centres.centres import Centres, centres, extent
+from planar.analysis.centres.velocities import LinkByCentres, links_by_centres
+from planar.analysis.rate_equations import Rate, Rates, rates
+from planar.dynamics.virtual_velocities import alone, slides
+from planar.foundation.errors import BadInput, NoAnswer
+from planar.model.mechanism import Input, motions
+from planar.model.wording import STILL, listed
+from planar.results.motion import State, Unknown
+
+Array = np.ndarray
+THIN = 1e-3
+"""Centres that lie closer together than this, homogeneous and of length one, tell the line through them badly."""
+Motion = Callable[[str], Array]
+"""Of a link by name: w times its pole (x, y, 1) against the frame, (3,), rad/s and m."""
+
+
+class Advantage(NamedTuple):
+    """Output force (or torque) for each unit of an input's torque (or force), without friction, inertia and weight.
+
+    It is the input's rate by the output's. Of a point the force is the one along its motion as the input moves in its
+    positive sense; of a link and a pair it has a sign, that of the output's motion in its own positive sense.
+    `by_power` is from the rates that the constraints give, `by_centres` from the instantaneous centres. Both are None
+    where the output is at rest, the second also where centres do not tell; `why` then says so.
+    """
+
+    output: str
+    input: str
+    by_power: float | None
+    by_centres: float | None
+    measure: str
+    "its unit: `1/m` of a force for a torque, `m` of a torque for a force, `1` of like for like"
+    through: tuple[str, ...]
+    "the names of the centres that the second was read from"
+    why: str
+
+
+def advantage(state: State, output: str, input: str | None = None) -> Advantage:  # noqa: A002
+    """The mechanical advantage of a point, a link or a pair (in this order, by name) over an input.
+
+    With the input alone moving at unit rate; `input` may be left out where there is one. Raises Unknown where there is
+    no such output or input, BadInput where an input has to be named, NoAnswer where none can move alone.
+    """
+    return _Advantages(state, _driven(state, input)).of(output)
+
+
+def advantages(state: State, outputs: Sequence[str] | None = None) -> dict[str, dict[str, Advantage]]:
+    """The advantages of outputs over every input, by output and input; left out, of all that is loaded.
+
+    Raises as `advantage` does.
+    """
+    if outputs is None:
+        named = (name for load in state.mechanism.loads for name in (load.point, load.link))
+        outputs = [name for name in named if name is not None]
+    ways = [_Advantages(state, given.pair) for given in state.mechanism.inputs] if outputs else []
+    return {output: {each.input: each.of(output) for each in ways} for output in dict.fromkeys(outputs)}
+
+
+class _Advantages:
+    """Those over one input."""
+
+    def __init__(self, state: State, name: str):
+        self.input = name
+        self.state = alone(state, name)
+        self.force = slides(state.mechanism, name)
+        self.middle, self.size = extent(state)
+        points, links = self.state.points.values(), self.state.links.values()
+        fastest = max((float(np.hypot(*each.velocity)) for each in points), default=0.0)
+        turning = max((abs(each.angular_velocity) for each in links), default=0.0)
+        self.greatest = max(fastest / self.size, turning)
+
+    @cached_property
+    def found(self) -> tuple[Centres, Mapping[str, LinkByCentres]]:
+        """The centres, and the motion of every link by them. Raises NoAnswer."""
+        everything = centres(self.state)
+        return everything, links_by_centres(everything)
+
+    def of(self, output: str) -> Advantage:
+        """The advantage of an output."""
+        rate, length, links, read = self._output(output)
+        measure = {(True, False): "1/m", (False, True): "m"}.get((length, self.force), "1")
+        if abs(rate) <= STILL * self.greatest * (self.size if length else 1.0):
+            what = "force" if length else "torque"
+            told = f"{output} is at rest here however {self.input} moves, so that no {what} at it is too great"
+            return Advantage(output, self.input, None, None, measure, (), told)
+        by_power = 1.0 / rate
+        try:
+            other, through = self._by_centres(links, read)
+        except NoAnswer as problem:
+            return Advantage(output, self.input, by_power, None, measure, (), f"not by centres: {problem.reason}")
+        if other == 0.0:
+            told = f"not by centres: by them {output} is at rest here"
+            return Advantage(output, self.input, by_power, None, measure, through, told)
+        return Advantage(output, self.input, by_power, 1.0 / other, measure, through, "")
+
+    def _output(self, name: str) -> tuple[float, bool, tuple[str, ...], Callable[[Motion], float]]:
+        """An output's rate, whether it is of a length, the links it is read from, and how from their motions."""
+        state, frame = self.state, self.state.mechanism.frame
+        if name in state._point_names:
+            place, velocity, *_ = state.point(name)
+            speed = float(np.hypot(*velocity))
+            carrying = [link for link, _ in state._named(name).members]
+            link = frame if frame in carrying else carrying[0]
+            return speed, True, (link,), lambda motion: float(np.hypot(*_carried(motion(link), place)))
+        if name in state.frames:
+            turns = state.link(name).angular_velocity
+            return turns, False, (name,), lambda motion: float(motion(name)[2])
+        named = motions(state.mechanism)
+        if name in named:
+            pair = named[name]
+            watched = replace(state, mechanism=replace(state.mechanism, inputs=(Input(name, 0.0),)))
+            found = rates(watched)
+            slopes = next(tie for tie in found.ties if tie.given).slopes
+            rate = sum(slope * found.value(each) for each, slope in slopes.items())
+            links = tuple(dict.fromkeys((*pair.links, *(each.owner for each in slopes if each.turns))))
+            return rate, slides(state.mechanism, name), links, lambda motion: _read(found, slopes, motion)
+        raise Unknown(
+            f"there is no point, link or pair {name!r}; points are {', '.join(state.point_names)}, "
+            f"links {', '.join(state.frames)}, pairs {', '.join(named)}"
+        )
+
+    def _by_centres(self, links: tuple[str, ...], read: Callable[[Motion], float]) -> tuple[float, tuple[str, ...]]:
+        """An output's rate by centres, and the names of those that it was read from."""
+        frame = self.state.mechanism.frame
+        found = {link: self._across(link) for link in links if link != frame}
+        through = dict.fromkeys(name for each in found.values() for name in each.by)
+        at_rest = np.zeros(3)
+        return read(lambda link: found[link].motion if link in found else at_rest), tuple(through)
+
+    def _across(self, link: str) -> LinkByCentres:
+        """A link's motion from that of the link which the input drives against the frame, at once where that tells.
+
+        Of links i and o against the frame f, w_o / w_i = |I_if I_io| / |I_of I_io| with its sign; in homogeneous
+        coordinates m_o x I_io = m_i x I_io with m_o along I_of, so that centres at infinity are no special case.
+        Else from link to link, each time through the best conditioned three centres.
+        """
+        everything, by_centres = self.found
+        frame = self.state.mechanism.frame
+        ends = motions(self.state.mechanism)[self.input].links
+        driven = next((end for end in ends if frame in ends and end != frame), None)
+        if driven is None or link == driven:
+            return by_centres[link]
+        own, between = (self._scaled(everything[link, end].homogeneous) for end in (frame, driven))
+        if own is None or between is None:
+            return by_centres[link]
+        line = np.cross(own, between)
+        if float(np.linalg.norm(line)) <= THIN:
+            return by_centres[link]
+        x, y, w = by_centres[driven].motion
+        known = np.cross([(x - w * self.middle[0]) / self.size, (y - w * self.middle[1]) / self.size, w], between)
+        x, y, w = own * float(line @ known / (line @ line))
+        motion = np.array([self.size * x + w * self.middle[0], self.size * y + w * self.middle[1], w])
+        by = tuple(everything[two].name for two in ((driven, frame), (driven, link), (link, frame)))
+        return LinkByCentres(motion, by)
+
+    def _scaled(self, at: Array | None) -> Array | None:
+        """A homogeneous point (3,) in lengths of the mechanism's size about its middle, of length one."""
+        if at is None:
+            return None
+        x, y, w = at
+        found = np.array([(x - w * self.middle[0]) / self.size, (y - w * self.middle[1]) / self.size, w])
+        return found / np.linalg.norm(found)
+
+
+def _driven(state: State, name: str | None) -> str:
+    """The input that is meant."""
+    names = [given.pair for given in state.mechanism.inputs]
+    if name is None and len(names) == 1:
+        return names[0]
+    if name is None:
+        raise BadInput("input", f"an advantage is over one input; name it: the inputs are at {listed(names)}")
+    if name not in names:
+        raise Unknown(f"there is no input at {name!r}; the inputs are at {listed(names)}")
+    return name
+
+
+def _carried(motion: Array, place: Array) -> Array:
+    """The velocity (2,) (m/s) of a place (2,) (m) of a link."""
+    x, y, turns = motion
+    return np.array([y - turns * place[1], turns * place[0] - x])
+
+
+def _read(found: Rates, slopes: Mapping[Rate, float], motion: Motion) -> float:
+    """A pair's rate from the motions of its links: from how they turn, and from how the one slides on the other."""
+    rate = sum(slope * float(motion(each.owner)[2]) for each, slope in slopes.items() if each.turns)
+    own = {each: slope for each, slope in slopes.items() if not each.turns}
+    for slide in found.slides:
+        if own.keys().isdisjoint(slide.rates):
+            continue
+        place = found.at(slide.rider, slide.point)
+        apart = _carried(motion(slide.rider), place) - _carried(motion(slide.guide), place)
+        along = np.linalg.lstsq(np.stack(slide.ways, axis=1), apart, rcond=None)[0]
+        rate += sum(own.get(each, 0.0) * float(part) for each, part in zip(slide.rates, along, strict=True))
+    return rate

@@ -1,0 +1,291 @@
+"""The transmission angle: how squarely the rest of a mechanism drives an output link."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from planar.analysis.interpolated_run import Steady
+from planar.analysis.motion.output import Extreme
+from planar.analysis.motion.zeros import ROUND_OFF, peaks, summit
+from planar.foundation.errors import BadInput, NoAnswer
+from planar.foundation.jets import Jet
+from planar.model.mechanism import motions
+from planar.model.pairs import Kind, Pair
+from planar.model.wording import listed
+from planar.results.motion import Motion, Moving, State, Unknown
+from planar.solving.full_constraints import SINGULAR, STEP, Constraints
+from planar.solving.prepared_mechanism import Setup
+
+Array = np.ndarray
+OPEN = 1e-7
+"""Of a unit load: what is left of it by all multipliers, where the position is a limit and nothing balances it."""
+FAINT = 1e-7
+"""A force below this part of the greatest on the output, or a moment below this part at an arm of the size, is none."""
+SOUND = 1e6
+"""Multipliers of a unit load that are less are far from a limit."""
+CHUNK = 64
+"""Positions whose slopes are found at once."""
+
+
+class Transmission(NamedTuple):
+    """The transmission angle (rad, 0 to pi/2) of an output link: at a position, or (n,) at every one of a motion.
+
+    It is NaN at a limit of a part of the mechanism at which the forces on the output are not determined. `pair` is the
+    output's pair with the frame, `through` names the pairs at which it is driven. `least` is where over a
+    motion the angle is least, and how great it is there; None of a position.
+    """
+
+    link: str
+    pair: str
+    through: tuple[str, ...]
+    angle: float | Array
+    least: Extreme | None = None
+
+
+def transmission(moving: State | Motion, output: str) -> Transmission:
+    """The transmission angle of a link that turns about a fixed pin or slides on the frame: a link, or that pair.
+
+    All inputs hold still, the output alone is loaded, by a torque if it turns and by a force along its way if it
+    slides, and all links are weightless: which force F do the other moving links exert on it? The angle is that between
+    F and the line from the fixed pin to the pin (or the point of a slide) where F acts, or, if it slides, between F and
+    the perpendicular to its way. At 90 degrees all of F does work, at 0 nothing does: there the input is at a limit.
+    In a four-bar it is the angle between coupler and follower, in a slider-crank the rod's with the perpendicular.
+
+    F is that of the multipliers of all pairs' constraints, nothing eliminated. The least over a motion is solved for:
+    where the derivative of a polynomial through exact values of cos^2 is zero, good to about 1e-8 of the input.
+
+    Raises Unknown for another name; BadInput where the link is not so joined to the frame, nothing but the input itself
+    drives it, a turning link is driven at several places or by a couple, so that no one line of force acts on a pin,
+    or where constraints hold twice, so that the forces are not determined.
+    """
+    driven = _Driven(moving, output)
+    through, angle = driven.angles(moving)
+    least = _least(moving, driven, through, angle) if isinstance(moving, Motion) else None
+    return Transmission(driven.link, driven.pair.name, through, float(angle[0]) if least is None else angle, least)
+
+
+def _least(motion: Motion, driven: _Driven, through: tuple[str, ...], angle: Array) -> Extreme:
+    """Where over a motion the angle is least, and how great it is."""
+    steady = Steady(motion)
+
+    def exact(position: float) -> float:
+        return float(driven.angles(steady.at(position), through)[1][0])
+
+    order = np.argsort(steady.positions, kind="stable")
+    positions, angle = steady.positions[order], angle[order]
+    sampled = Extreme(float(positions[np.nanargmin(angle)]), float(np.nanmin(angle)))
+    ends = [0] if steady.closed else [0, -1]
+    found = [Extreme(float(positions[k]), float(angle[k])) for k in ends if np.isfinite(angle[k])] or [sampled]
+    if steady.closed:  # on over its seam
+        positions = np.concatenate([positions[:-1], positions[:2] + steady.period])
+        angle = np.concatenate([angle[:-1], angle[:2]])
+    squares = np.nan_to_num(np.cos(angle) ** 2)  # where it is not determined nothing is looked for
+    most = float(squares.max())
+    for low, high in peaks(positions, squares) if np.ptp(squares) > ROUND_OFF else ():
+        around = squares[(positions >= low) & (positions <= high)]
+        if 2.0 * around.max() - around.min() < most:  # its top is not so far above its samples
+            continue
+        try:
+            at = summit(lambda at: float(np.cos(exact(at)) ** 2), low, high)
+            place, value = steady.within(at), exact(at)
+        except NoAnswer:
+            continue  # the motion branches there
+        if place is not None:
+            found.append(Extreme(place, value))
+    least = min(each.value for each in found)
+    first = min(each for each in found if each.value <= least + ROUND_OFF)
+    return first if least <= sampled.value + ROUND_OFF else sampled
+
+
+class _Driven:
+    """An output link with the constraints that other moving links put on it."""
+
+    def __init__(self, moving: Moving, output: str):
+        mechanism = moving.mechanism
+        self.link, self.pair = _joined(moving, output)
+        if not mechanism.inputs:
+            raise BadInput("inputs", "the mechanism has no input, and nothing is transmitted")
+        self.setup = Setup(mechanism)
+        self.constraints = Constraints(self.setup)
+        self.inputs = tuple(given.pair for given in mechanism.inputs)
+        self.columns = [self.setup.column[self.link, part] for part in ("x", "y", "angle")]
+        self.slides = self.pair.drive_kind is Kind.LENGTH
+        rows = [self.setup.pairs[name] for name in self.constraints.pair_of_row]
+        rows += [self.setup.named[name] for name in self.inputs]
+        self.rows = {pair.name: [k for k, row in enumerate(rows) if row.name == pair.name] for pair in rows}
+        self.by = {pair.name: pair for pair in rows if self._drives(pair)}
+        self.way = self._way(moving) if self.slides else np.zeros(2)
+
+    def _drives(self, pair: Pair) -> bool:
+        """Whether a pair may pass a force from another moving link."""
+        others = [body for body in pair.bodies if body not in (self.link, self.setup.mechanism.frame)]
+        return self.link in pair.bodies and bool(others) and pair.entry_name() != self.pair.entry_name()
+
+    def angles(self, moving: Moving, through: tuple[str, ...] | None = None) -> tuple[tuple[str, ...], Array]:
+        """The pairs that drive the output, if they are not told, and the angle (n,); 0 at a limit."""
+        wrenches, stuck = self._wrenches(moving)
+        names = self._through(wrenches) if through is None else through
+        force = np.sum([wrenches[name] for name in names], axis=0)
+        along = self.way if self.slides else self._lever(moving, names, force)
+        cross = np.abs(along[0] * force[1] - along[1] * force[0])
+        dot = np.abs(along[0] * force[0] + along[1] * force[1])
+        angle = np.arctan2(dot, cross) if self.slides else np.arctan2(cross, dot)
+        return names, np.where(stuck, 0.0, angle)
+
+    def _wrenches(self, moving: Moving) -> tuple[dict[str, Array], Array]:
+        """Of every pair that may drive the output, force and moment about the link's origin over the size, (3, n).
+
+        The greatest of a position is 1, as only directions are asked for. NaN where they are not determined because
+        the position is a limit; second which positions (n,) are limits at which no forces balance the load.
+        """
+        w = self._coordinates(moving)
+        load = np.zeros(len(self.setup.column))
+        load[self.columns] = (*self.way, 0.0) if self.slides else (0.0, 0.0, 1.0)
+        found: list[Array] = []
+        stuck = np.zeros(w.shape[1], dtype=bool)
+        for start in range(0, w.shape[1], CHUNK):
+            chunk = slice(start, start + CHUNK)
+            slopes = self._slopes(w[:, chunk])
+            multipliers, stuck[chunk] = self._multipliers(slopes, load)
+            parts = [
+                np.einsum("nrc,nr->cn", slopes[:, self.rows[name]][:, :, self.columns], multipliers[:, self.rows[name]])
+                for name in self.by
+            ]
+            found.append(np.array(parts).reshape(len(self.by), 3, len(slopes)))
+        every = np.concatenate(found, axis=2)
+        greatest = np.abs(every).max(axis=(0, 1), initial=0.0)
+        if not (greatest > FAINT).any() and not stuck.all():
+            told = f"no other moving link drives {self.link}: its transmission angle is that of a link the rest drives"
+            raise BadInput(self.link, told)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return dict(zip(self.by, every / greatest, strict=True)), stuck
+
+    def _multipliers(self, slopes: Array, load: Array) -> tuple[Array, Array]:
+        """Multipliers (n, rows) that balance a load (coordinates,) on slopes (n, rows, coordinates); which do not.
+
+        NaN where nothing does, and where the position is a limit and they are not the only ones.
+        """
+        many, rows, columns = slopes.shape
+        found, stuck, sound = np.zeros((many, rows)), np.zeros(many, dtype=bool), np.zeros(many, dtype=bool)
+        if rows == columns:
+            try:
+                loads = np.broadcast_to(-load[:, None], (many, columns, 1))
+                found = np.linalg.solve(slopes.transpose(0, 2, 1), loads)[..., 0]
+                sound = np.abs(found).max(axis=1) < SOUND
+            except np.linalg.LinAlgError:
+                pass  # one of them is exactly at a limit
+        if not sound.all():
+            found[~sound], stuck[~sound] = self._least_multipliers(slopes[~sound], load)
+        return found, stuck
+
+    def _least_multipliers(self, slopes: Array, load: Array) -> tuple[Array, Array]:
+        """See `_multipliers`; where constraints may hold twice, or a position is a limit."""
+        sides, columns = slopes.transpose(0, 2, 1), slopes.shape[2]
+        u, s, vt = np.linalg.svd(sides, full_matrices=False)
+        held = s > SINGULAR * s[:, :1]
+        gain = np.where(held, 1.0 / np.where(held, s, 1.0), 0.0)
+        inverse = (vt.transpose(0, 2, 1) * gain[:, None]) @ u.transpose(0, 2, 1)
+        found = -inverse @ load
+        stuck = np.abs(np.einsum("nrc,nr->nc", slopes, found) + load).max(axis=1) > OPEN
+        found[stuck] = np.nan
+        mine = [row for name in self.by for row in self.rows[name]]
+        free = np.eye(slopes.shape[1]) - inverse @ sides
+        acting = slopes[:, mine][:, :, self.columns].transpose(0, 2, 1) @ free[:, mine]
+        loose = np.abs(acting).max(axis=(1, 2), initial=0.0) > OPEN
+        if (loose & (held.sum(axis=1) == columns)).any():
+            told = f"constraints hold twice, so that the forces on {self.link} are not determined without elasticity"
+            raise BadInput(self.link, f"{told}; leave out the link that holds nothing new")
+        found[loose] = np.nan
+        return found, stuck
+
+    def _through(self, wrenches: dict[str, Array]) -> tuple[str, ...]:
+        """The pairs that drive the output; all that may where every position is a limit."""
+        known = {name: np.abs(wrench[:, ~np.isnan(wrench[0])]) for name, wrench in wrenches.items()}
+        driving = tuple(name for name, wrench in known.items() if wrench.max(initial=0.0) > FAINT)
+        return driving or tuple(wrenches)
+
+    def _lever(self, moving: Moving, names: tuple[str, ...], force: Array) -> Array:
+        """From the fixed pin to the point at which the force acts, (2, n). Raises BadInput where there is none."""
+        places = {self._place(self.by[name]) for name in names}
+        place = places.pop()
+        if places or place is None:
+            told = (
+                f"{self.link} is driven at {listed(names)}, not at one pin" if places else f"wheels drive {self.link}"
+            )
+            raise BadInput(self.link, f"{told}, so that no one line of force with one pin tells a transmission angle")
+        at, pin = _at(moving, *place), _at(moving, *self._pin())
+        frame = moving.frames[self.link]
+        arm = at - np.array([np.atleast_1d(_now(frame.x)), np.atleast_1d(_now(frame.y))])
+        couple = np.abs(force[2] - (arm[0] * force[1] - arm[1] * force[0]) / self.setup.unit)
+        if np.max(couple[~np.isnan(couple)], initial=0.0) > FAINT:
+            told = f"at {listed(names)} a couple drives {self.link} beside a force"
+            raise BadInput(self.link, f"{told}, so that no line of force through one pin tells a transmission angle")
+        lever = at - pin
+        if np.hypot(*lever).max() <= FAINT * self.setup.unit:
+            raise BadInput(self.link, f"{self.link} is driven at its fixed pin, about which no force turns it")
+        return lever
+
+    def _place(self, pair: Pair) -> tuple[str, str] | None:
+        """The (link, point) where a pair's force acts: of the output if it can be."""
+        at = [member for member in pair.coincident() if member[0] == self.link]
+        rides = pair.rides()
+        return at[0] if at else rides and rides[0]
+
+    def _pin(self) -> tuple[str, str]:
+        return next(member for member in self.pair.coincident() if member[0] == self.setup.mechanism.frame)
+
+    def _way(self, moving: Moving) -> Array:
+        """The unit direction (2,) in which the output slides on the frame: how its place goes with the displacement."""
+        slope = self._slopes(self._coordinates(moving)[:, :1])[0]
+        own = self.setup.column[self.pair.name, self.pair.coordinates[0][0]]
+        way = slope[self.rows[self.pair.name][:2], own]
+        return way / np.hypot(*way)
+
+    def _coordinates(self, moving: Moving) -> Array:
+        """w (coordinates, n), lengths in sizes."""
+        parts = {(link, of): getattr(frame, of) for link, frame in moving.frames.items() for of in ("x", "y", "angle")}
+        for name, own in moving.own.items():
+            parts |= {(name, of): each for (of, _), each in zip(self.setup.pairs[name].coordinates, own, strict=True)}
+        values = [_now(parts[each.owner, each.part]) for each in self.constraints.coordinates]
+        return np.stack(np.broadcast_arrays(*map(np.atleast_1d, values))) / self.setup.scale[:, None]
+
+    def _slopes(self, w: Array) -> Array:
+        """The slopes of all constraints and drives (n, rows, coordinates), by the complex step."""
+        many = w.shape[1]
+        nudged = np.repeat(w[:, :, None].astype(complex), w.shape[0], axis=2) + 1j * STEP * np.eye(w.shape[0])[:, None]
+        flat = nudged.reshape(w.shape[0], -1)
+        gaps = np.broadcast_to(self.constraints.gaps(flat), (len(self.constraints.pair_of_row), flat.shape[1]))
+        rows = np.concatenate([gaps, self.constraints.drives(self.inputs, flat)])
+        return (np.imag(rows) / STEP).reshape(len(rows), many, w.shape[0]).transpose(1, 0, 2)
+
+
+def _joined(moving: Moving, output: str) -> tuple[str, Pair]:
+    """The output link, and the pair at which it turns or slides on the frame. Raises Unknown, BadInput."""
+    frame, named = moving.mechanism.frame, motions(moving.mechanism)
+    if output in named:
+        candidates = [named[output]]
+    elif output in moving.frames:
+        candidates = [pair for pair in named.values() if output in pair.links]
+    else:
+        told = f"pairs are {', '.join(named)}, links {', '.join(moving.frames)}"
+        raise Unknown(f"there is no pair and no link {output!r}; {told}")
+    for pair in candidates:
+        others = [link for link in pair.links if link != frame]
+        pinned = pair.drive_kind is Kind.ANGLE and bool(pair.coincident())
+        if len(others) == 1 and pair.lower and pair.holds() == 2 and (pinned or pair.rides() is not None):
+            return others[0], pair
+    told = "is told of a link that turns about a fixed pin or slides on the frame"
+    raise BadInput(output, f"a transmission angle {told}, and {output!r} is no such link or pair")
+
+
+def _now(value: object) -> Array:
+    """The value of a jet, or of a plain number."""
+    return np.asarray(value.parts[0] if isinstance(value, Jet) else value, dtype=float)
+
+
+def _at(moving: Moving, link: str, point: str) -> Array:
+    """Where a point of a link is (2, n)."""
+    place = moving.frames[link].carry(moving.shapes[link].at(point))
+    return np.stack(np.broadcast_arrays(*(np.atleast_1d(_now(each)) for each in place)))

@@ -1,0 +1,1 @@
+"""Velocity and acceleration polygons as data, and how they are constructed."""

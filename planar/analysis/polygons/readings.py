@@ -1,0 +1,128 @@
+"""What is read off a polygon: how fast links turn, how fast points move and things slide, with senses in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from planar.analysis.polygons.notation import NONE, Notation
+from planar.analysis.polygons.polygon import Meeting, Part, Simultaneous, Turn, Vector
+from planar.analysis.rich_text import Fraction, Name, Phrase, Quantity, Symbol
+from planar.model.mechanism import motions
+from planar.model.wording import heading
+
+MOTION = "line of motion"
+
+
+@dataclass(frozen=True)
+class Readings:
+    """Sentences about what one polygon shows."""
+
+    notation: Notation
+
+    def turn(self, turn: Turn) -> Phrase:
+        """ω_BC = bc/BC = 0.340/0.066 = 5.15 rad/s, clockwise."""
+        order = self.notation.order
+        symbol = Symbol("ω" if order == 1 else "α", turn.link)
+        still = turn.sense == "at rest"
+        value = Quantity(0.0 if still else abs(turn.value), ("rad/s", "rad/s^2")[order - 1])
+        sense = "" if still else f", {turn.sense}"
+        if not turn.vector[0]:
+            source = self._source(turn.by)
+            if still:
+                how = "does not turn" if order == 1 or not self._turns(turn.link) else "turns at a uniform rate"
+                return (f"{source} {turn.by}: ", symbol, f" = 0: {turn.link} {how}")
+            return (f"{source} {turn.by}: ", symbol, " = ", value, sense)
+        chord: Phrase = (self.notation.chord(*turn.vector),)
+        if still:
+            how = "neither gains nor loses speed here" if order == 2 and self._turns(turn.link) else "does not turn"
+            return (symbol, " = ", Fraction(chord, (Name(turn.line),)), f" = 0: {turn.link} {how}")
+        told = self.notation.number
+        numbers = Fraction((told(turn.magnitude, self.notation.polygon.kind),), (told(turn.length, "length"),))
+        return (symbol, " = ", Fraction(chord, (Name(turn.line),)), " = ", numbers, " = ", value, sense)
+
+    def _source(self, pair: str) -> str:
+        """By what a link's turning is known: an input on the frame gives it, one between moving links helps to it."""
+        state = self.notation.polygon.state
+        if pair not in state.inputs:
+            return "By the pair"
+        return (
+            "Given at the input" if state.mechanism.frame in motions(state.mechanism)[pair].links else "With the input"
+        )
+
+    def _turns(self, link: str) -> bool:
+        return self.notation.polygon.state.link(link).sense != "at rest"
+
+    def point(self, meeting: Meeting) -> Iterator[Phrase]:
+        """v_C = dc = 0.400 m/s, with the sense, of every point on the way; of sliders also whether they speed up."""
+        vectors = [vector for side in meeting.sides for vector in side.vectors]
+        points = self.notation.polygon.points
+        passed = dict.fromkeys(points[vector.head] for vector in vectors if vector.head in points)
+        for point in (*(each for each in passed if each != meeting.point), meeting.point):
+            slid = any(v.part is Part.SLIDING and v.of == point and v.line.startswith(MOTION) for v in vectors)
+            yield from self.of_point(point, slid)
+
+    def of_point(self, point: str, slider: bool = False) -> Iterator[Phrase]:
+        """The velocity or the acceleration of a point of the mechanism, from the pole."""
+        notation = self.notation
+        state = notation.polygon.state
+        if point not in state.point_names or point not in notation.letters:
+            return
+        letter = notation.letters[point]
+        if letter in notation.poles:
+            return
+        root = notation.root(letter)
+        value = notation.polygon.letters[letter]
+        size = notation.size(value)
+        symbol = Symbol("v" if notation.order == 1 else "a", point)
+        chord = notation.chord(root, letter)
+        told = (symbol, " = ", chord, " = ", notation.quantity(size))
+        if not size:
+            yield (*told, ": it is at rest" if notation.order == 1 else ": its velocity does not change")
+            return
+        yield (*told, f", {heading(value)}", *(self._hurries(point, value) if slider else ()))
+
+    def _hurries(self, point: str, value: np.ndarray) -> Phrase:
+        """Whether a slider's acceleration is in the direction of its velocity."""
+        if self.notation.order == 1:
+            return ()
+        velocity = self.notation.polygon.state.point(point).velocity
+        sense = self.notation.polygon.state.point(point).sense
+        if sense == "at rest":
+            moving = any(given.velocity for given in self.notation.polygon.state.inputs.values())
+            return ("; at rest for an instant only: it turns back here" if moving else "; it starts from rest",)
+        if float(velocity @ value) > 0.0:
+            return ("; in the direction of ", Symbol("v", point), ": the slider speeds up")
+        return ("; against ", Symbol("v", point), ": the slider slows down")
+
+    def slides(self, meeting: Meeting) -> Iterator[Phrase]:
+        """How fast something slides along a line that moves."""
+        for side in meeting.sides:
+            for vector in side.vectors:
+                if vector.part is Part.SLIDING and vector.line.startswith("line on"):
+                    yield self._slide(vector)
+
+    def _slide(self, vector: Vector) -> Phrase:
+        chord = self.notation.chord(vector.tail, vector.head)
+        size = self.notation.size(vector.value)
+        what = "sliding along the " if self.notation.order == 1 else "acceleration along the "
+        words = (what, *self.notation.line(vector))
+        symbol = self.notation.symbol(vector.of, vector.against, vector.part)
+        sense = f", {heading(vector.value)}" if size else ""
+        return (symbol, " = ", chord, " = ", self.notation.quantity(size), f"{sense}: ", *words)
+
+    def together(self, stage: Simultaneous) -> Iterator[Phrase]:
+        """The rates and the points that simultaneous equations give."""
+        order = self.notation.order
+        scale = max((abs(each.value) for each in stage.unknowns if each.turns), default=0.0)
+        for each in stage.unknowns:
+            link = each.name.partition("_")[2]
+            if each.turns and link in self.notation.polygon.state.links:
+                value = each.value if abs(each.value) > NONE * scale else 0.0
+                sense = "" if not value else ", anticlockwise" if value > 0.0 else ", clockwise"
+                unit = ("rad/s", "rad/s^2")[order - 1]
+                yield (Symbol("ω" if order == 1 else "α", link), " = ", Quantity(abs(value), unit), sense)
+        for letter in stage.letters:
+            yield from self.of_point(self.notation.polygon.points.get(letter, ""))

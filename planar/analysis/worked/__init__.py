@@ -1,0 +1,1 @@
+"""The worked solution of a position, in sentences and formulas."""

@@ -1,0 +1,157 @@
+"""What is given for a position, as a chapter states it: links with their lengths, pairs, inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from math import atan2
+
+import numpy as np
+
+from planar.analysis.rate_equations import Slide, rates
+from planar.analysis.rich_text import Phrase, Quantity, listed
+from planar.foundation.units import own, unit
+from planar.model.mechanism import Along, At, Distances, Link, Mechanism, Units, entries, motions
+from planar.model.pairs import Kind, Pair
+from planar.model.wording import amount, turning
+from planar.results.motion import State
+from planar.results.records import InputState
+
+
+def given(state: State) -> Iterator[Phrase]:
+    """Links with their lengths, pairs, and inputs with their rates."""
+    mechanism = state.mechanism
+    for link in mechanism.links:
+        yield from _link(mechanism, link)
+    pairs: dict[str, list[Pair]] = {}
+    for group in entries(mechanism):
+        pairs.setdefault(type(group[0]).keyword, []).append(group[0])
+    for kind, group in pairs.items():
+        many = "s" * (len(group) > 1)
+        yield (f"{kind.capitalize()} pair{many}: ", *_pairs(group, state), ".")
+    named = motions(mechanism)
+    for pair, driven in state.inputs.items():
+        yield _input(mechanism, named[pair], driven)
+
+
+def _pairs(group: Sequence[Pair], state: State) -> Phrase:
+    said: list[Phrase] = []
+    slides = {slide.name: slide for slide in rates(state).slides}
+    for pair in group:
+        rides = pair.rides()
+        sizes = pair.sizes_told(lambda value: _amount(value, "length", state.mechanism.units))
+        more = f"; {sizes}" if sizes else ""
+        if rides is not None:
+            (rider, point), guide = rides
+            line = _guide(state, slides[pair.name]) if guide == state.mechanism.frame else ""
+            said.append((f"{pair.name} ({point} of {rider} on {guide}{line}{more})",))
+        elif pair.coincident():
+            said.append((pair.entry_name(),))
+        else:
+            said.append((f"{pair.name} ({' and '.join(pair.links)}{more})",))
+    return listed(said)
+
+
+def _guide(state: State, slide: Slide) -> str:
+    """Where a fixed line is: its direction, and the point of it that is nearest to the origin."""
+    if slide.line is None:
+        return ""
+    units, way = state.mechanism.units, slide.line[0]
+    place = rates(state).at(slide.rider, slide.point)
+    foot = place - (place @ way) * way
+    foot[np.abs(foot) <= 1e-9 * (np.hypot(*place) or 1.0)] = 0.0
+    way = np.where(np.abs(way) <= 1e-12, 0.0, way)
+    angle = _amount(atan2(way[1], way[0]), "angle", units)
+    x, y = (_minus(unit(units.length).from_si(float(each))) for each in foot)
+    return f", along a line at {angle} through ({x}, {y}) {units.length}"
+
+
+def _amount(value: float, kind: str, units: Units) -> str:
+    return amount(value, kind, units).replace("-", "−", 1) if value < 0.0 else amount(value, kind, units)
+
+
+def _link(mechanism: Mechanism, link: Link) -> Iterator[Phrase]:
+    """What is known of a link's shape: AB = 50 mm; E on BC, BE = 40 mm."""
+    units = mechanism.units
+    told: list[str] = []
+    if link.ends is not None and link.length is not None:
+        told.append(f"{_line(*link.ends)} = {_amount(float(link.length), 'length', units)}")
+    size = unit(units.length)
+    placed = [point for point in link.points if isinstance(point.place, At)]
+    if placed and (link.name == mechanism.frame or len(link.names) > 1):
+        spots = [
+            f"{point.name} ({', '.join(_minus(size.from_si(float(each))) for each in point.place)})" for point in placed
+        ]
+        told.append(f"{', '.join(spots)} {units.length}")
+    for point in link.points:
+        place = point.place
+        if isinstance(place, Along):
+            way = f"{_line(place.start, place.towards)}"
+            back = " produced back" if float(place.distance) < 0.0 else ""
+            whole = link.length if link.ends and {place.start, place.towards} == set(link.ends) else None
+            if whole is not None and not float(place.angle) and float(place.distance) > float(whole) * (1.0 + 1e-9):
+                back = " produced"
+            turned = _amount(float(place.angle), "angle", units) if float(place.angle) else ""
+            where = f", at {turned} from {way}{back}" if turned else f" on {way}{back}"
+            away = _amount(abs(float(place.distance)), "length", units)
+            told.append(f"{point.name}{where}, {_line(place.start, point.name)} = {away}")
+        elif isinstance(place, Distances):
+            lengths = [
+                f"{_line(end, point.name)} = {_amount(float(each), 'length', units)}"
+                for end, each in ((place.first, place.from_first), (place.second, place.from_second))
+            ]
+            side = "left" if place.left else "right"
+            told.append(f"{point.name}: {', '.join(lengths)}, to the {side} from {place.first} to {place.second}")
+    if told:
+        what = "Fixed link" if link.name == mechanism.frame else "Link"
+        yield (f"{what} {link.name}: {'; '.join(told)}.",)
+
+
+def _minus(value: float) -> str:
+    return f"{value + 0.0:.6g}".replace("-", "−")
+
+
+def _line(p: str, q: str) -> str:
+    return p + q if max(len(p), len(q)) <= 2 else f"{p}-{q}"
+
+
+def _input(mechanism: Mechanism, pair: Pair, driven: InputState) -> Phrase:
+    """An input with its rates and their senses."""
+    position, velocity, acceleration = driven
+    at = _amount(position, "length" if pair.drive_kind is Kind.LENGTH else "angle", mechanism.units)
+    first, second = pair.links
+    if pair.drive_kind is Kind.LENGTH:
+        return (f"Input at {pair.name}: {at}; ", *_shifts(second, first, velocity, acceleration, mechanism.units), ".")
+    moves = second if first == mechanism.frame else first if second == mechanism.frame else f"{second} against {first}"
+    if not velocity and not acceleration:
+        return (f"Input at {pair.name}: {at}; {moves} is held.",)
+    uniformly = "uniformly " if velocity and not acceleration else ""
+    found: Phrase = (f"Input at {pair.name}: {at}; {moves} turns {uniformly}", *_turns(velocity))
+    if acceleration:
+        how = "speeds up" if velocity * acceleration > 0.0 else "slows down" if velocity else "begins to turn"
+        found = (
+            *found,
+            f" and {how} at ",
+            Quantity(abs(acceleration), "rad/s^2"),
+            "" if velocity else f" {turning(acceleration)}",
+        )
+    return (*found, ".")
+
+
+def _shifts(second: str, first: str, velocity: float, acceleration: float, units: Units) -> Phrase:
+    if not velocity and not acceleration:
+        return (f"{second} is held on {first}",)
+    found: Phrase = (f"{second} slides on {first} at ", _told(velocity, "velocity", units), " along the line")
+    if not acceleration:
+        return (*found, ", uniformly")
+    return (*found, ", with an acceleration of ", _told(acceleration, "acceleration", units))
+
+
+def _told(value: float, kind: str, units: Units) -> Quantity:
+    name, of = own(kind, units)
+    return Quantity(value, name, by=of.from_si(1.0))
+
+
+def _turns(velocity: float) -> Phrase:
+    if not velocity:
+        return ("not yet",)
+    return (f"{turning(velocity)} at ", Quantity(abs(velocity), "rad/s"))

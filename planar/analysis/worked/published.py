@@ -1,0 +1,126 @@
+"""Solved values beside those that a book prints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from planar.model.mechanism import Drive, Published
+from planar.model.wording import heading, listed, turning
+from planar.results.motion import State
+from planar.solving.position import solve
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One published quantity: its solved value (SI), its sense, and what comes of laying the two side by side.
+
+    `apart` is (printed - solved) / solved, None where nothing is printed or the solved value is zero.
+    """
+
+    published: Published
+    solved: float
+    sense: str
+    apart: float | None
+    verdict: str
+
+    @property
+    def about(self) -> str:
+        """What the value is of, in words."""
+        item = self.published
+        text = f"{item.component + ' of ' if item.component else ''}{item.quantity} of {item.of}"
+        text += f" relative to {item.relative_to}" if item.relative_to else ""
+        changed = [drive.pair for drive in item.inputs]
+        return f"{text} (other input at {listed(changed)})" if changed else text
+
+    def record(self) -> dict[str, Any]:
+        """It as a JSON value (SI)."""
+        return {
+            "symbol": self.published.symbol,
+            "quantity": self.published.quantity,
+            "of": self.published.of,
+            "solved": self.solved,
+            "published": self.published.value,
+            "verdict": self.verdict,
+            "slip": self.published.slip,
+        }
+
+
+def compare(state: State) -> tuple[Comparison, ...]:
+    """Every quantity that the mechanism's file says was published, with its solved value."""
+    known: dict[tuple[Drive, ...], State] = {(): state}
+
+    def at(drives: tuple[Drive, ...]) -> State:
+        if drives not in known:
+            known[drives] = solve(state.mechanism, drives)
+        return known[drives]
+
+    return tuple(_compared(item, at(item.inputs), at(item.start)) for item in state.mechanism.published)
+
+
+def _compared(item: Published, state: State, start: State) -> Comparison:
+    value = _value(item, state, start)
+    solved, sense = (value, _turn(item, value)) if isinstance(value, float) else _told(item, value)
+    if item.value is None:
+        return Comparison(item, solved, sense, None, "not printed")
+    printed = item.value if item.component is not None else abs(item.value)
+    reference = solved if item.component is not None else abs(solved)
+    apart = (printed - reference) / reference if reference else None
+    if item.slip is not None:
+        verdict = "slip in the book"
+    elif abs(printed - reference) > item.tolerance * abs(reference):
+        verdict = "differs"
+    elif item.sense is not None and item.sense not in sense.split(", "):
+        verdict = "sense differs"
+    else:
+        verdict = "agrees"
+    return Comparison(item, solved, sense, apart, verdict)
+
+
+def _turn(item: Published, value: float) -> str:
+    return turning(value) if item.quantity.startswith("angular") else ""
+
+
+def _told(item: Published, value: np.ndarray) -> tuple[float, str]:
+    """The magnitude of a vector, or its component where one is asked for, with its sense."""
+    if item.component is not None:
+        return float(value["xy".index(item.component)]), heading(value)
+    return float(np.hypot(*value)), heading(value)
+
+
+def _value(item: Published, state: State, start: State) -> float | np.ndarray:
+    if item.quantity in ("angular velocity", "angular acceleration"):
+        return _angular(item, state)
+    of_pair = {
+        "rubbing speed": "rubbing_speed",
+        "displacement": "displacement",
+        "sliding velocity": "velocity",
+        "sliding acceleration": "acceleration",
+    }
+    if item.quantity in of_pair:
+        return float(state.pair(item.of)[of_pair[item.quantity]] or 0.0)
+    if item.quantity == "input torque":
+        from planar.dynamics.forces import forces  # few examples have loads
+
+        return float(forces(state).inputs[item.of])
+    if item.relative_to is not None:
+        relative = state.relative(item.of, item.relative_to)
+        return {
+            "position": relative.position,
+            "velocity": relative.velocity,
+            "acceleration": relative.acceleration,
+            "centripetal acceleration": relative.centripetal,
+            "tangential acceleration": relative.tangential,
+            "Coriolis acceleration": relative.coriolis,
+        }[item.quantity]
+    point = state.point(item.of)
+    if item.quantity == "position":
+        return point.position - start.point(item.of).position if item.start else point.position
+    return {"velocity": point.velocity, "acceleration": point.acceleration}[item.quantity]
+
+
+def _angular(item: Published, state: State) -> float:
+    link = state.link(item.of)
+    return link.angular_velocity if item.quantity == "angular velocity" else link.angular_acceleration

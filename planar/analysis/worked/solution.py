@@ -1,0 +1,175 @@
+"""A position worked out as a chapter does: what is given and asked, both polygons step by step, the results."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from planar.analysis.polygons.construction import acceleration_polygon, velocity_polygon
+from planar.analysis.polygons.polygon import Polygon
+from planar.analysis.rich_text import Phrase, Quantity, Symbol, joined, number
+from planar.analysis.worked.givens import given
+from planar.analysis.worked.published import Comparison
+from planar.analysis.worked.sections import Section, sections
+from planar.foundation.units import own
+from planar.model.mechanism import QUANTITIES, Published, motions
+from planar.model.pairs import Kind
+from planar.model.wording import STILL, heading, turning
+from planar.model.wording import listed as words_listed
+from planar.results.motion import State
+
+WANTED = ("velocity", "acceleration", "angular velocity", "angular acceleration")
+"""Kinds of quantity that are read off the polygons."""
+
+
+class Worked(NamedTuple):
+    """One polygon, worked out: `kind` is velocity or acceleration."""
+
+    kind: str
+    polygon: Polygon
+    sections: tuple[Section, ...]
+
+
+class LinkResult(NamedTuple):
+    """How a link turns (rad/s, rad/s^2), anticlockwise positive, with senses in words."""
+
+    link: str
+    velocity: float
+    velocity_sense: str
+    acceleration: float
+    acceleration_sense: str
+
+
+class PointResult(NamedTuple):
+    """How a point moves: magnitudes (m/s, m/s^2) with senses in words."""
+
+    point: str
+    velocity: float
+    velocity_sense: str
+    acceleration: float
+    acceleration_sense: str
+
+
+class SlideResult(NamedTuple):
+    """How something slides: displacement (m), and its rates along the line (m/s, m/s^2), signed."""
+
+    pair: str
+    displacement: float
+    velocity: float
+    acceleration: float
+
+
+@dataclass(frozen=True)
+class Solution:
+    """A worked solution of one position."""
+
+    state: State
+    given: tuple[Phrase, ...]
+    asked: tuple[Phrase, ...]
+    velocity: Worked
+    acceleration: Worked
+    links: tuple[LinkResult, ...]
+    points: tuple[PointResult, ...]
+    slides: tuple[SlideResult, ...]
+    rubbing: tuple[Phrase, ...] = ()
+    "the speeds at which pins rub, where their radii are given"
+    comparisons: tuple[Comparison, ...] = ()
+    "of its published values"
+
+    @property
+    def halves(self) -> tuple[Worked, Worked]:
+        """Velocity, then acceleration."""
+        return self.velocity, self.acceleration
+
+
+def worked_solution(state: State, comparisons: Sequence[Comparison] = ()) -> Solution:
+    """The worked solution of a solved position; `comparisons` lay its published values beside the solved ones."""
+    halves = [
+        Worked(each.kind, each, sections(each)) for each in (velocity_polygon(state), acceleration_polygon(state))
+    ]
+    return Solution(
+        state,
+        tuple(given(state)),
+        tuple(_asked(state.mechanism.published)),
+        *halves,
+        tuple(_links(state)),
+        tuple(_points(state)),
+        tuple(_slides(state)),
+        tuple(_rubbing(state)),
+        tuple(comparisons),
+    )
+
+
+def _asked(published: Sequence[Published]) -> Iterator[Phrase]:
+    """What the book asks for, else all that there is."""
+    found: dict[str, list[str]] = {}
+    wanted = [item for item in published if QUANTITIES[item.quantity] in WANTED]
+    for item in sorted(wanted, key=lambda item: item.relative_to is not None):
+        of = item.of + (f" relative to {item.relative_to}" if item.relative_to else "")
+        names = found.setdefault(item.quantity, [])
+        if of not in names:
+            names.append(of)
+    if not found:
+        yield (
+            "The angular velocities and accelerations of all links, the velocities and accelerations of all points.",
+        )
+        return
+    for quantity, names in found.items():
+        yield (f"The {quantity} of {words_listed(names)}.",)
+
+
+def _links(state: State) -> Iterator[LinkResult]:
+    links = {name: link for name, link in state.links.items() if name != state.mechanism.frame}
+    fastest, hardest = state.scales_of_links
+    for name, link in links.items():
+        both = (link.angular_velocity, fastest), (link.angular_acceleration, hardest)
+        (v, vs), (a, as_) = [(rate if abs(rate) > STILL * most else 0.0, turning(rate, most)) for rate, most in both]
+        yield LinkResult(name, v, vs, a, as_ if a else "none")
+
+
+def _points(state: State) -> Iterator[PointResult]:
+    greatest = state.scales_of_points
+    for name, point in state.points.items():
+        both = [(float(np.hypot(*point[order])), heading(point[order], greatest[order - 1])) for order in (1, 2)]
+        (v, vs), (a, as_) = [
+            (size if size > STILL * most else 0.0, sense) for (size, sense), most in zip(both, greatest, strict=True)
+        ]
+        yield PointResult(name, v, vs, a, as_ if a else "none")
+
+
+def _slides(state: State) -> Iterator[SlideResult]:
+    for name, pair in motions(state.mechanism).items():
+        if pair.drive_kind is Kind.LENGTH:
+            report = state.pair(name)
+            at, *rates = (float(value or 0.0) for value in list(report.values())[:3])
+            told = (
+                rate if abs(rate) > STILL * most else 0.0
+                for rate, most in zip(rates, state.scales_of_points, strict=True)
+            )
+            yield SlideResult(name, at, *told)
+
+
+def _rubbing(state: State) -> Iterator[Phrase]:
+    """How fast pins rub: the difference of two angular velocities times the radius."""
+    measure, of = own("velocity", state.mechanism.units)
+    by = of.from_si(1.0)
+    for name, pair in motions(state.mechanism).items():
+        speed = state.pair(name).get("rubbing_speed")
+        if speed is None:
+            continue
+        first, second = (state.link(link).angular_velocity for link in pair.links)
+        apart = abs(second - first)
+        frame = state.mechanism.frame
+        between = [(Symbol("ω", link),) for link in pair.links[::-1] if link != frame]
+        radius = speed / apart if apart > 1e-12 * (abs(first) + abs(second)) else 0.0
+        told = f" × r = {number(apart)} × {number(radius * by)} = " if radius else " × r = "
+        brackets = ("(", ")") if len(between) > 1 else ("", "")
+        yield (
+            f"At {name}: {brackets[0]}",
+            *joined(between, " − "),
+            f"{brackets[1]}{told}",
+            Quantity(speed, measure, by=by),
+        )

@@ -1,0 +1,228 @@
+"""The search for all circuits: assemblies between dead points listed, each followed, and both compared."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import islice, pairwise
+from math import pi, remainder
+from typing import NamedTuple
+
+import numpy as np
+
+from planar.assemblies.circuits.dead_points import CROSS, ROUNDING, Critical, critical
+from planar.assemblies.circuits.traced_circuit import Traced, traced
+from planar.assemblies.modes import Mode, Modes
+from planar.assemblies.polynomial.completeness import Completeness
+from planar.model.mechanism import Drive, Mechanism, with_inputs
+from planar.model.pairs import Kind
+from planar.model.wording import many
+from planar.solving.diagnosis import refusals
+from planar.solving.position import Solver, known_of
+
+Array = np.ndarray
+
+TURN = 2.0 * pi
+MOST = 256
+"""Assemblies at one position of the input up to which circuits are looked for."""
+ROUNDS = 4
+"""How often dead points that only circuits showed part the input's range anew."""
+TRIED = 12
+"""Positions of the input at which assemblies are listed where dead points may be missing."""
+NEAR = 1e-6
+"""rad or sizes: a dead point that a circuit comes to is one that was found before if it is as near to it as this."""
+SAME = 1e-5
+"""rad or sizes: unknowns of one assembly, reached along a curve or listed, differ by less."""
+WITHIN = 0.4631
+"""Where in an interval assemblies are listed: not in the middle, where symmetric linkages have special positions."""
+
+
+class Place(NamedTuple):
+    """A part of the input's range between two dead points (rad, m), and the assemblies somewhere in it."""
+
+    low: float
+    high: float
+    solver: Solver
+    modes: tuple[Mode, ...]
+    whole: bool
+    complete: bool
+
+    @property
+    def position(self) -> float:
+        """Where the assemblies are listed."""
+        return self.low + WITHIN * (self.high - self.low)
+
+    @property
+    def unknowns(self) -> Array:
+        """Of every assembly (assemblies, unknowns), rad and m."""
+        by = self.solver.scale[list(self.solver.equations.unknowns)]
+        return np.array([mode.z * by for mode in self.modes]).reshape(len(self.modes), len(by))
+
+
+class Interval(NamedTuple):
+    """A part of the input's range (rad or m) without a dead point inside, and how many assemblies there are in it;
+    None where they are too many to be counted, or not known to be as many all over it."""
+
+    low: float
+    high: float
+    assemblies: int | None
+
+
+class Found(NamedTuple):
+    """Circuits, each with the assembly from which it was followed; see `circuits.Circuits`."""
+
+    circuits: tuple[tuple[Traced, Mode], ...]
+    critical: tuple[float, ...]
+    intervals: tuple[Interval, ...]
+    complete: Completeness
+    said: tuple[str, ...]
+
+
+def same(solver: Solver, one: Array, others: Array) -> Array:
+    """Which of others (others, unknowns) are the same assembly as one, rad and m, whole turns aside."""
+    e = solver.equations
+    columns = list(e.unknowns)
+    lengths = np.array([e.coordinates[column].kind is Kind.LENGTH for column in columns], dtype=bool)
+    gaps = (others - one) / solver.scale[columns]
+    return np.all(np.where(lengths, np.abs(gaps), np.abs(np.exp(1j * gaps) - 1.0)) < SAME, axis=1)
+
+
+class Search:
+    """The circuits of one mechanism, looked for. Raises NoAnswer where inputs leave links free whatever their sizes."""
+
+    def __init__(self, mechanism: Mechanism, pair: str):
+        self.mechanism, self.pair = mechanism, pair
+        names = [given.pair for given in mechanism.inputs]
+        self.index = names.index(pair)
+        self.still = tuple(Drive(name, None, 0.0, 0.0) for name in names if name != pair)
+        self.solver = known_of(with_inputs(mechanism, self.still)).solver
+        if any(stage.free for stage in self.solver.equations.stages):
+            raise refusals.free(self.solver)
+        self.slides = self.solver.slides(pair)
+
+    def found(self) -> Found:
+        """All that are found, once circuits show no dead point that was not known."""
+        known = critical(self.solver, self.index)
+        doubts = list(known.open)
+        cuts = self._distinct((*known.positions, *known.crossings))
+        file = self.solver.mechanism.inputs[self.index].position
+        low, high = known.span
+        tried = [file, *(low + (high - low) / TRIED * (np.arange(TRIED) + WITHIN))] if known.open else []
+        for _ in range(ROUNDS):
+            places = [self._place(low, high) for low, high in self._parts(known, cuts)]
+            more = [self._place(at, at) for at in tried]
+            circuits, differing = self._followed([*places, *more])
+            fresh = self._fresh(cuts, circuits)
+            if not fresh:
+                break
+            cuts = self._distinct((*cuts, *fresh))
+            if not known.open:
+                doubts.append("circuits have dead points that were not found before")
+        met = [*known.crossings, *(at for each, _ in circuits for at in each.dead)]
+        # where links that come first have a dead point, none of the whole linkage need be
+        kept = [at for at in cuts if any(self._near(at, other) for other in met)]
+        intervals = tuple(self._counted(low, high, places) for low, high in self._parts(known, kept))
+        if any(place.whole for place in places) and any(each.assemblies is None for each in intervals):
+            doubts.append("the number of assemblies changes where no dead point was found")
+        doubts += differing + self._apart(places, circuits)
+        return Found(tuple(circuits), tuple(kept), intervals, *self._said(kept, doubts))
+
+    def _counted(self, low: float, high: float, places: Sequence[Place]) -> Interval:
+        """A part of the input's range, and how many assemblies there are all over it."""
+        gone = (place.position - low if self.slides else (place.position - low) % TURN for place in places)
+        inside = [place for place, at in zip(places, gone, strict=True) if 0.0 < at < high - low]
+        counts = {len(place.modes) if place.whole else None for place in inside}
+        return Interval(low, high, counts.pop() if len(counts) == 1 else None)
+
+    def _parts(self, known: Critical, cuts: Sequence[float]) -> Iterator[tuple[float, float]]:
+        """The input's range, cut."""
+        if self.slides:
+            yield from pairwise([known.span[0], *cuts, known.span[1]])
+        elif not cuts:
+            yield 0.0, TURN
+        else:
+            yield from pairwise([*cuts, cuts[0] + TURN])
+
+    def _place(self, low: float, high: float) -> Place:
+        bare = Place(low, high, self.solver, (), False, False)
+        moved = (*self.still, Drive(self.pair, bare.position))
+        solver = self.solver.moved(with_inputs(self.mechanism, moved))
+        modes = Modes(solver, self.mechanism, moved, False)
+        listing = tuple(islice(modes, MOST + 1))
+        whole = len(listing) <= MOST
+        return Place(low, high, solver, listing[:MOST], whole, modes.complete is not Completeness.NOT)
+
+    def _followed(self, places: Sequence[Place]) -> tuple[list[tuple[Traced, Mode]], list[str]]:
+        """Every assembly that lies on no circuit yet, followed; and where the circuits differ from what is listed."""
+        unknowns = [place.unknowns for place in places]
+        taken = [np.zeros(len(place.modes), dtype=int) for place in places]
+        circuits: list[tuple[Traced, Mode]] = []
+        strange, between = 0, False
+        for place, own in zip(places, taken, strict=True):
+            for number, mode in enumerate(place.modes):
+                if own[number] or mode.double:  # from where branches meet none is followed
+                    continue
+                each = traced(place.solver, self.index, mode.z)
+                if not each.branches:
+                    continue
+                circuits.append((each, mode))
+                passed = set()
+                for k, other in enumerate(places):
+                    for branch, at in each.at(other.position):
+                        passed.add(branch)
+                        here = same(other.solver, at, unknowns[k])
+                        taken[k] += here
+                        strange += not here.any()
+                between |= len(passed) < len(each.branches)
+        twice = sum(int(np.sum(count > 1)) for count in taken)
+        missed = sum(int(np.sum(count == 0)) for count in taken)
+        differing = []
+        if strange:
+            differing.append("circuits run through assemblies that are not listed")
+        if between:
+            differing.append("some branches lie between dead points that are one to rounding")
+        if twice or missed:
+            differing.append("some assemblies lie on more than one circuit, or on none")
+        return circuits, differing
+
+    def _fresh(self, cuts: Sequence[float], circuits: Sequence[tuple[Traced, Mode]]) -> list[float]:
+        """Dead points of circuits that are at none of these positions of the input."""
+        found: list[float] = []
+        for at in (at for each, _ in circuits for at in each.dead):
+            if not any(self._near(at, other) for other in (*cuts, *found)):
+                found.append(at)
+        return found
+
+    def _distinct(self, positions: Sequence[float]) -> list[float]:
+        """Positions of the input in their order; what rounding makes of one is one."""
+        found: list[float] = []
+        for at in sorted(positions if self.slides else (at % TURN for at in positions)):
+            if not any(self._near(at, other, ROUNDING) for other in found):
+                found.append(at)
+        return found
+
+    def _near(self, one: float, other: float, within: float = NEAR) -> bool:
+        """Whether two positions of the input are one; `within` in rad or sizes."""
+        return (
+            abs(one - other) < within * self.solver.unit if self.slides else abs(remainder(one - other, TURN)) < within
+        )
+
+    def _apart(self, places: Sequence[Place], circuits: Sequence[tuple[Traced, Mode]]) -> list[str]:
+        """What of the lists, and of following, leaves it open whether these are all."""
+        doubts = []
+        if not all(place.whole for place in places):
+            doubts.append(f"there are positions with more than {MOST} assemblies")
+        if not all(place.complete for place in places):
+            doubts.append("lists of assemblies are not known to be complete")
+        if any(each.crossed for each, _ in circuits):
+            doubts.append(CROSS)
+        if any(not each.closed and not each.lost for each, _ in circuits):
+            doubts.append("slides run out without an end, and may come back from there")
+        lost = dict.fromkeys(each.lost for each, _ in circuits if each.lost)
+        return doubts + [f"one was lost: {why}" for why in lost][:1]
+
+    def _said(self, kept: Sequence[float], doubts: Sequence[str]) -> tuple[Completeness, tuple[str, ...]]:
+        if doubts:
+            return Completeness.NOT, (f"the number of circuits is not claimed: {'; '.join(dict.fromkeys(doubts))}",)
+        where = f"dead points at {many(len(kept), 'position', 'positions')} of the input" if kept else "no dead points"
+        told = f"{where}, found over its whole range as all zeros of a function that is known to rounding"
+        return Completeness.NUMERICALLY, (told, "every assembly between them lies on one circuit, and on one only")

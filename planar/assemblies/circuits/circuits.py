@@ -1,0 +1,136 @@
+"""All circuits of a mechanism while one input runs, with their branches, and whether these are all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import pi
+from typing import overload
+
+import numpy as np
+
+from planar.assemblies.circuits.circuit_search import Interval, Search, same
+from planar.assemblies.circuits.traced_circuit import Branch, Traced
+from planar.assemblies.modes import Mode
+from planar.foundation.notebook_display import Displayable
+from planar.model.mechanism import Drive, Mechanism, running_input, with_inputs
+from planar.results.motion import Motion
+from planar.solving.cycle import cycle
+from planar.solving.position import known_of
+
+Array = np.ndarray
+
+TURN = 2.0 * pi
+WITHIN = 1e-6
+"""Of a branch that does not close: its very ends may be dead points, from which two branches lead."""
+SAME = 1e-12
+"""rad: what rounding leaves of a turn."""
+
+
+def circuits(mechanism: Mechanism, pair: str | None = None) -> Circuits:
+    """All circuits of a mechanism while one input runs, the others standing still.
+
+    A circuit is a connected curve of positions, a branch a part of it without a dead point (T. Chase, J. Mirth,
+    J. Mech. Des. 115, 1993). `pair` names the input that runs, where there are several.
+
+    Raises BadInput where there is no such input, NoAnswer where the inputs leave links free whatever the dimensions.
+    """
+    return Circuits(mechanism, mechanism.inputs[running_input(mechanism, pair)].pair)
+
+
+@dataclass(frozen=True, eq=False)
+class Circuit:
+    """A connected curve of positions, and its branches in the order in which it runs through them.
+
+    `closed`: False where it runs out without end, or was lost; `mechanism`: the same mechanism, its sketch and input on
+    this circuit.
+    """
+
+    number: int
+    branches: tuple[Branch, ...]
+    closed: bool
+    mechanism: Mechanism = field(repr=False)
+    pair: str
+    curve: Traced = field(repr=False)
+
+    @cached_property
+    def motion(self) -> Motion:
+        """The positions all round it, or over the branch from which it was followed where it does not close."""
+        if self.closed:
+            return cycle(self.mechanism, pair=self.pair, circuit=True)
+        home = self.branches[self.curve.home]
+        room = WITHIN * (home.high - home.low)
+        return cycle(self.mechanism, start=home.low + room, stop=home.high - room, pair=self.pair)
+
+    @cached_property
+    def branch(self) -> Array:
+        """The number of the branch on which each row of `motion` lies (rows,); of a dead point the one that it ends."""
+        if not self.closed:
+            return np.full(len(self.motion), self.curve.home + 1)
+        ways = np.sign(np.diff(self.motion.inputs[self.pair].position))
+        passed = np.cumsum(ways[1:] != ways[:-1])
+        return np.concatenate([[0, 0], passed])[: len(self.motion)] % len(self.branches) + 1
+
+
+class Circuits(Displayable, Sequence[Circuit]):
+    """All circuits, in an order that does not depend on the sketch: by the lowest input, then by the assemblies there.
+
+    `critical`: positions of the input (rad from 0 to 2 pi, or m) at which assemblies meet: dead points, and where
+    branches cross; `intervals`: the input's range cut there; `complete`: whether the number of circuits is claimed;
+    `said`: how they were found, and what is not claimed.
+    """
+
+    def __init__(self, mechanism: Mechanism, pair: str):
+        found = Search(mechanism, pair).found()
+        self.mechanism, self.pair = mechanism, pair
+        self.critical, self.complete, self.said = found.critical, found.complete, found.said
+        self.intervals: tuple[Interval, ...] = found.intervals
+        self._found = tuple(self._circuit(number, *each) for number, each in enumerate(found.circuits, start=1))
+
+    def _circuit(self, number: int, curve: Traced, mode: Mode) -> Circuit:
+        at = next(given.position for given in mode.mechanism.inputs if given.pair == self.pair)
+        moved = with_inputs(self.mechanism, (Drive(self.pair, at),))
+        kept = replace(moved, sketch=mode.mechanism.sketch, published=())
+        return Circuit(number, tuple(curve.told()), curve.closed, kept, self.pair, curve)
+
+    @overload
+    def __getitem__(self, index: int) -> Circuit: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[Circuit]: ...
+    def __getitem__(self, index: int | slice) -> Circuit | Sequence[Circuit]:
+        return self._found[index]
+
+    def __len__(self) -> int:
+        return len(self._found)
+
+    def __repr__(self) -> str:
+        return f"<{len(self)} circuits of {self.mechanism.name!r} over {self.pair}, {self.complete.value}>"
+
+    @cached_property
+    def assembles(self) -> tuple[tuple[float, float], ...]:
+        """The intervals of the input within which the linkage goes together; a whole turn is (0, 2 pi)."""
+        found: list[tuple[float, float]] = []
+        for low, high, assemblies in self.intervals:
+            if assemblies == 0:
+                continue
+            joined = bool(found) and found[-1][1] == low
+            found.append((found.pop()[0] if joined else low, high))
+        if not found or known_of(self.mechanism).solver.slides(self.pair):
+            return tuple(found)
+        if sum(high - low for low, high in found) >= TURN - SAME:
+            return ((0.0, TURN),)
+        if found[-1][1] >= found[0][0] + TURN - SAME:  # a turn ends where it starts
+            found = [*found[1:-1], (found[-1][0], found[0][1] + TURN)]
+        return tuple(found)
+
+    def of(self, mode: Mode) -> tuple[Circuit, Branch] | None:
+        """The circuit and the branch on which an assembly lies, at any position of the input."""
+        solver = known_of(mode.mechanism).solver
+        unknowns = mode.z * solver.scale[list(solver.equations.unknowns)]
+        position = next(given.position for given in mode.mechanism.inputs if given.pair == self.pair)
+        for each in self._found:
+            for number, at in each.curve.at(position):
+                if same(solver, at, unknowns[None]).all():
+                    return each, each.branches[number]
+        return None

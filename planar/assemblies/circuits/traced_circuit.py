@@ -1,0 +1,175 @@
+"""One circuit followed as a curve, from an assembly of it: its branches, and where on them an assembly lies."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import ceil, pi
+from typing import NamedTuple
+
+import numpy as np
+
+from planar.foundation.errors import NoAnswer
+from planar.solving.continuation.path_pieces import Piece, onwards, pieces
+from planar.solving.continuation.period import PIECES
+from planar.solving.continuation.predictor_corrector import OUT, Walk
+from planar.solving.continuation.solution_curve import Curve
+from planar.solving.position import Solver
+from planar.solving.runs.closed_circuit import circuit
+
+Array = np.ndarray
+
+TURN = 2.0 * pi
+
+
+class Branch(NamedTuple):
+    """A part of a circuit on which the input goes one way.
+
+    `number`: within its circuit, from 1; `low`, `high`: where the input turns back (rad or m), low of an input that
+    turns within one turn, high = low + 2 pi turns where it goes all round; `turns`: turns of the input after which the
+    linkage is back, 0 where the branch has ends; `ends`: what stands at low and at high.
+    """
+
+    number: int
+    low: float
+    high: float
+    turns: int
+    ends: tuple[str, str]
+
+
+class Leg(NamedTuple):
+    """A part of a branch that was followed in one go: its pieces, and the way and place of its curve's input."""
+
+    curve: Curve
+    pieces: tuple[Piece, ...]
+    first: float
+    way: float
+
+    def position(self, place: float) -> float:
+        """Of the input (rad, sizes), where it is so far on the way."""
+        return self.first + self.way * place
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """The positions of the input from which and to which the leg was followed."""
+        return self.position(self.pieces[0].start), self.position(self.pieces[-1].stop)
+
+    def at(self, position: float, turns: bool) -> Iterator[Array]:
+        """The unknowns wherever the input is at a position, or whole turns from it."""
+        for piece in self.pieces:
+            low, high = sorted((self.position(piece.start), self.position(piece.stop)))
+            # of two pieces that share an end only the one that starts there counts
+            place = position + TURN * ceil((low - position) / TURN) if turns else position
+            while low <= place < high:
+                yield piece.at(self.curve, self.way * (place - self.first))[0]
+                if not turns:
+                    break
+                place += TURN
+
+
+class Traced(NamedTuple):
+    """A circuit's legs by branch, in the order in which it runs through them; whether it closes, and why not."""
+
+    solver: Solver
+    branches: tuple[tuple[Leg, ...], ...]
+    home: int
+    "the branch of the assembly from which it was followed, on which the input goes up"
+    rests: tuple[float, ...]
+    "where the input rests on the curve (rad, sizes)"
+    crossed: bool
+    "whether it was followed through a change point, where branches cross"
+    closed: bool
+    lost: str
+    turns: bool
+    "whether the input comes back after a turn"
+
+    @property
+    def scale(self) -> float:
+        """What positions of the input on the curve are multiplied by: rad and m outside."""
+        return 1.0 if self.turns else self.solver.unit
+
+    @property
+    def dead(self) -> tuple[float, ...]:
+        """The input's positions at its dead points (rad, m)."""
+        return tuple(each * self.scale for each in self.rests)
+
+    def at(self, position: float) -> Iterator[tuple[int, Array]]:
+        """Every assembly with the input at a position (rad, m): the branch (from 0), and the unknowns (rad, m)."""
+        by = self.solver.scale[list(self.solver.equations.unknowns)]
+        for number, legs in enumerate(self.branches):
+            for leg in legs:
+                for z in leg.at(position / self.scale, self.turns):
+                    yield number, z * by
+
+    def told(self) -> Iterator[Branch]:
+        """The branches in numbers."""
+        last, scale = len(self.branches) - 1, self.scale
+        for index, legs in enumerate(self.branches):
+            # legs of one branch follow each other but for whole turns
+            gone = sum(abs(leg.ends[1] - leg.ends[0]) for leg in legs)
+            low = min(legs[0].ends)
+            if self.closed:
+                ends = ("dead point", "dead point") if self.rests else ("", "")
+            else:
+                out = "lost" if self.lost else "without end"
+                ends = (out if index == 0 else "dead point", out if index == last else "dead point")
+            up = (index - self.home) % 2 == 0
+            turns = round(gone / TURN) if self.closed and not self.rests else 0
+            if self.turns:
+                low = 0.0 if turns else low % TURN
+            yield Branch(index + 1, low * scale, (low + gone) * scale, turns, ends if up else ends[::-1])
+
+
+def traced(solver: Solver, index: int, z: Array) -> Traced:
+    """The circuit of an assembly with unknowns z at the solver's inputs, of which one runs."""
+    turns = not solver.slides(solver.mechanism.inputs[index].pair)
+    walk = _walk(solver, index, z, 1.0)
+    first = float(solver.station.u[index])
+    try:
+        whole = circuit(solver, walk)
+    except NoAnswer as problem:
+        return _open(solver, index, z, problem.reason.split(";")[0])
+    legs = [Leg(walk.curve, stretch.pieces, first, 1.0) for stretch in whole.stretches]
+    rests = tuple(leg.ends[1] for leg in (legs if whole.from_dead else legs[:-1]))
+    if len(legs) == 1 or whole.from_dead:
+        branches = [(leg,) for leg in legs]
+    else:  # the last comes back to where the first has started
+        branches = [(legs[-1], legs[0]), *((leg,) for leg in legs[1:-1])]
+    return Traced(solver, tuple(branches), 0, rests, bool(walk.passed), True, "", turns)
+
+
+def _open(solver: Solver, index: int, z: Array, reason: str) -> Traced:
+    """A circuit that is not found to close, followed both ways as far as it goes."""
+    turns = not solver.slides(solver.mechanism.inputs[index].pair)
+    first = float(solver.station.u[index])
+    sides: list[list[Leg]] = []
+    rests: list[float] = []
+    lost, crossed = "", False
+    for way in (-1.0, 1.0):
+        walk = _walk(solver, index, z, way)
+        found: list[list[Piece]] = [[]]
+        out = False
+        for piece in pieces(walk):
+            if piece.first == piece.last:
+                continue
+            found[-1].append(piece)
+            if piece.dead is not None:
+                rests.append(first + way * piece.stop)
+                found.append([])
+            out = not turns and abs(piece.stop) > OUT
+            if out or sum(map(len, found)) > PIECES:
+                break
+        crossed |= bool(walk.passed)
+        if not (out or walk.limit is not None):
+            lost = reason
+        sides.append([Leg(walk.curve, tuple(each), first, way) for each in found if each])
+    back, ahead = sides
+    home = (*back[:1], *ahead[:1])  # none where no way on is found at all
+    branches = [*((leg,) for leg in back[:0:-1]), home, *((leg,) for leg in ahead[1:])] if home else []
+    return Traced(solver, tuple(branches), max(len(back) - 1, 0), tuple(rests), crossed, False, lost, turns)
+
+
+def _walk(solver: Solver, index: int, z: Array, way: float) -> Walk:
+    axis = np.zeros_like(solver.station.u)
+    axis[index] = way
+    curve = Curve(solver, solver.station.p, solver.station.u, axis)
+    return Walk(curve, onwards(curve, np.append(z, 0.0), []))

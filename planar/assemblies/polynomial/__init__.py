@@ -1,0 +1,1 @@
+"""Blocks as polynomial systems: all their roots, and whether these are all."""

@@ -1,0 +1,264 @@
+"""Solutions of a group's polynomials certified: by Krawczyk's operator in ball arithmetic, outward rounded.
+
+The dimensions are the floats that they are; their cosines, sines and sums are enclosed. Each solution gets a box in
+which there is one, and one only (R. Krawczyk, Computing 4, 1969; S. M. Rump, Verification methods, Acta Numerica 19,
+2010, sec. 13), boxes apart from each other. The group is its own mirror image under X <-> conjugate of Y: a solution
+whose mirror image lies in its own box is its own mirror image, so an assembly; one whose box and its image are apart is
+none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from planar.assemblies.polynomial.isotropic_form import Form
+from planar.codegen.generic_evaluation import computed
+
+Array = np.ndarray
+
+BITS = 128
+RADII = (1e-7, 1e-9, 1e-11, 1e-13)
+"""Half widths of boxes that are tried, the widest first."""
+
+
+class Certificate(NamedTuple):
+    """Of every solution: whether a box of its own is proved to hold it, and that it is real at a finite place.
+
+    `decided`: whether it is proved that it is so, or that it is not.
+    """
+
+    proved: Array
+    real: Array
+    decided: Array
+
+
+def certified(form: Form, given: Sequence[Array], V: Array) -> Certificate:
+    """What is proved of solutions V (solutions, 2 many) of a group at (z, u, p)."""
+    from flint import ctx
+
+    before, ctx.prec = ctx.prec, BITS
+    try:
+        return _certified(_Balls(form, given), V)
+    except ZeroDivisionError:  # rows of X that may depend on each other
+        none = np.zeros(len(V), dtype=bool)
+        return Certificate(none, none, none)
+    finally:
+        ctx.prec = before
+
+
+def _certified(balls: _Balls, V: Array) -> Certificate:
+    count, m = len(V), V.shape[1] // 2
+    proved, real, decided = (np.zeros(count, dtype=bool) for _ in range(3))
+    x, y = balls.reduced(V[:, :m], V[:, m:])
+    w = np.concatenate([x, y], axis=1)
+    half = np.full(count, np.inf)
+    inside: list[Any] = [None] * count
+    for k in range(count):
+        found = balls.proved(w[k])
+        if found is not None:
+            proved[k], (half[k], inside[k]) = True, found
+    # the greatest difference of any entry: with a factor of two to spare nothing is left to rounding
+    apart = np.abs(w[:, None] - w[None]).max(axis=2, initial=0.0)
+    np.fill_diagonal(apart, np.inf)
+    safe = np.where(np.isfinite(half), half, 0.0)
+    for k in np.flatnonzero(proved):
+        others = proved & (apart[k] <= 4.0 * (safe[k] + safe))
+        if others.any():
+            proved[k] = False
+    n = w.shape[1] // 2
+    for k in np.flatnonzero(proved):
+        image = np.concatenate([w[k, n:], w[k, :n]]).conj()
+        gap = float(np.abs(image - w[k]).max())
+        if gap > 4.0 * half[k]:
+            decided[k] = True
+        elif balls.is_own_image(w[k], half[k], inside[k]) and balls.is_finite(inside[k]):
+            real[k] = decided[k] = True
+    return Certificate(proved, real, decided)
+
+
+def able() -> bool:
+    """Whether there is a library for ball arithmetic (the extra `modes`)."""
+    try:
+        import flint  # noqa: F401
+    except ImportError:
+        return False
+    return True
+
+
+def regular(slope: ca.Function, given: Sequence[Array]) -> bool:
+    """Whether it is proved that linear equations, of a square slope as a function of (z, u, p), have one solution."""
+    from flint import arb_mat, ctx
+
+    before, ctx.prec = ctx.prec, BITS
+    try:
+        return not arb_mat(_evaluated(slope, given)[0]).det().contains(0)
+    finally:
+        ctx.prec = before
+
+
+class _Balls:
+    """The polynomials of a group as balls, and what is left of them once the rows linear in X, and in Y, are solved.
+
+    Then X = P x and Y = conj(P) y, where x are some entries of X; they are measured so that c x = 1, conj(c) y = 1.
+    """
+
+    def __init__(self, form: Form, given: Sequence[Array]):
+        from flint import acb, acb_mat
+
+        self.acb, self.mat, self.form = acb, acb_mat, form
+        alpha = _factors(form.real, given)
+        loops = self._sums(form.combined, alpha)
+        for row in loops:
+            for k in form.known:
+                row[k] = row[k] * 2
+        self.single = self._sums(form.single.astype(complex), alpha)
+        A = np.array([[complex(each.mid()) for each in row] for row in loops]).reshape(-1, form.many)
+        self.pivots = _pivots(A)
+        self.free = [k for k in range(form.many) if k not in self.pivots]
+        size = len(self.free)
+        self.P = [[acb(0)] * size for _ in range(form.many)]
+        for n, k in enumerate(self.free):
+            self.P[k][n] = acb(1)
+        if loops:
+            left = acb_mat([[row[k] for k in self.pivots] for row in loops])
+            right = acb_mat([[-row[k] for k in self.free] for row in loops])
+            for k, row in zip(self.pivots, left.solve(right).tolist(), strict=True):
+                self.P[k] = row
+        rng = np.random.default_rng(11)
+        self.c = rng.normal(size=size) + 1j * rng.normal(size=size)
+        self.c_balls = [acb(each.real, each.imag) for each in self.c]
+        self.products = [tuple(int(each) for each in row) for row in form.products]
+
+    def _sums(self, combined: Array, alpha: list[list[Any]]) -> list[list[Any]]:
+        found = []
+        for row in combined:
+            whole = [self.acb(0)] * self.form.many
+            for factor, terms in zip(row, alpha, strict=True):
+                if factor:
+                    ball = self.acb(factor.real, factor.imag)
+                    whole = [one + ball * term for one, term in zip(whole, terms, strict=True)]
+            found.append(whole)
+        return found
+
+    def reduced(self, X: Array, Y: Array) -> tuple[Array, Array]:
+        """x and y of solutions, measured."""
+        x, y = X[:, self.free], Y[:, self.free]
+        return x / (x @ self.c)[:, None], y / (y @ self.c.conj())[:, None]
+
+    def _whole(self, w: Sequence[Any]) -> tuple[list[Any], list[Any]]:
+        """X and Y as balls."""
+        n = len(self.free)
+        X = self.mat(self.P) * self.mat([[each] for each in w[:n]])
+        Y = self.mat(self.P).conjugate() * self.mat([[each] for each in w[n:]])
+        return X.entries(), Y.entries()
+
+    def _at(self, w: Sequence[Any], slopes: bool) -> tuple[list[Any], list[list[Any]]]:
+        """The equations at w, and their slope."""
+        n = len(self.free)
+        X, Y = self._whole(w)
+        P, conj = self.P, [[each.conjugate() for each in row] for row in self.P]
+        left, slope = [], []
+        for i, j, k, l in self.products:  # noqa: E741
+            left.append(X[i] * Y[j] - X[k] * Y[l])
+            if slopes:
+                row = [P[i][q] * Y[j] - P[k][q] * Y[l] for q in range(n)]
+                slope.append(row + [conj[j][q] * X[i] - conj[l][q] * X[k] for q in range(n)])
+        for terms in self.single:
+            one = sum((a * x for a, x in zip(terms, X, strict=True)), self.acb(0))
+            other = sum((a.conjugate() * y for a, y in zip(terms, Y, strict=True)), self.acb(0))
+            left.append(one * Y[0] + X[0] * other)
+            if slopes:
+                a = [sum((t * P[r][q] for r, t in enumerate(terms)), self.acb(0)) for q in range(n)]
+                b = [each.conjugate() for each in a]
+                row = [a[q] * Y[0] + P[0][q] * other for q in range(n)]
+                slope.append(row + [conj[0][q] * one + b[q] * X[0] for q in range(n)])
+        none = [self.acb(0)] * n
+        c = self.c_balls
+        left.append(sum((a * x for a, x in zip(c, w[:n], strict=True)), self.acb(-1)))
+        left.append(sum((a.conjugate() * y for a, y in zip(c, w[n:], strict=True)), self.acb(-1)))
+        if slopes:
+            slope += [c + none, none + [each.conjugate() for each in c]]
+        return left, slope
+
+    def proved(self, w: Array) -> tuple[float, list[Any]] | None:
+        """The half width of a box about w that holds one solution and no other, and a narrow box of it within."""
+        middle = [self.acb(each.real, each.imag) for each in w]
+        left, slope = self._at(middle, True)
+        there = np.array([[complex(each.mid()) for each in row] for row in slope])
+        try:
+            inverse = np.linalg.inv(there)
+        except np.linalg.LinAlgError:
+            return None
+        if not np.all(np.isfinite(inverse)):
+            return None
+        near = self.mat([[self.acb(each.real, each.imag) for each in row] for row in inverse])
+        step = near * self.mat([[each] for each in left])
+        one = self.mat(len(w), len(w), [1 if i == j else 0 for i in range(len(w)) for j in range(len(w))])
+        for half in RADII:
+            box = self._box(w, half)
+            wide = one - near * self.mat(self._at(box, True)[1])
+            about = self.mat([[each] for each in self._box(np.zeros(len(w)), half)])
+            moved = (wide * about - step).entries()
+            if all(_within(each, half) for each in moved):
+                return half, [at + each for at, each in zip(middle, moved, strict=True)]
+        return None
+
+    def _box(self, w: Array, half: float) -> list[Any]:
+        from flint import arb
+
+        return [self.acb(arb(each.real, half), arb(each.imag, half)) for each in w.astype(complex)]
+
+    def is_own_image(self, w: Array, half: float, inside: Sequence[Any]) -> bool:
+        """Whether the mirror image of the solution lies in the box of which it is the only one."""
+        n = len(self.free)
+        image = [each.conjugate() for each in (*inside[n:], *inside[:n])]
+        middle = [self.acb(each.real, each.imag) for each in w]
+        return all(_within(each - at, half) for each, at in zip(image, middle, strict=True))
+
+    def is_finite(self, inside: Sequence[Any]) -> bool:
+        """Whether the solution is at a finite place."""
+        X, Y = self._whole(inside)
+        return not (X[0].contains(0) or Y[0].contains(0))
+
+
+def _within(ball: Any, half: float) -> bool:
+    """Whether a ball lies inside of a square about nothing."""
+    return bool(ball.real.abs_upper() < half) and bool(ball.imag.abs_upper() < half)
+
+
+def _pivots(rows: Array) -> list[int]:
+    """Columns, one for each row, that are as independent as can be had: the longest of what is left each time."""
+    left, found = rows.copy(), []
+    for _ in range(len(rows)):
+        sizes = np.linalg.norm(left, axis=0)
+        sizes[found] = -1.0
+        best = int(np.argmax(sizes))
+        found.append(best)
+        way = left[:, best] / max(sizes[best], 1e-300)
+        left = left - np.outer(way, way.conj() @ left)
+    return sorted(found)
+
+
+def _factors(function: ca.Function, given: Sequence[Array]) -> list[list[Any]]:
+    """What a function of real and imaginary parts gives, computed in balls: (rows, columns)."""
+    from flint import acb
+
+    parts = _evaluated(function, given)
+    return [[acb(*both) for both in zip(*rows, strict=True)] for rows in zip(*parts, strict=True)]
+
+
+def _evaluated(function: ca.Function, given: Sequence[Array]) -> list[list[list[Any]]]:
+    """The results of a function of dense matrices, computed in balls from floats: each (rows, columns)."""
+    from flint import arb
+
+    inputs = [[arb(float(each)) for each in values] for values in given]
+    found = computed(function, inputs, arb)
+    sizes = [function.size_out(k) for k in range(function.n_out())]
+    return [
+        [[values[r + rows * c] for c in range(columns)] for r in range(rows)]
+        for values, (rows, columns) in zip(found, sizes, strict=True)
+    ]

@@ -1,0 +1,309 @@
+"""The tree of assemblies: the groups of links one after the other, each with what the choices before leave it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from planar.assemblies.polynomial.completeness import Completeness, Roots
+from planar.equations.constraint_equations import Stage
+from planar.equations.functions import POLISHED, length
+from planar.model.pairs import Kind
+from planar.solving.assembly.block_assemblies import MEETING, hanging
+from planar.solving.newton import CLOSED
+from planar.solving.prepared_mechanism import Setup
+
+Array = np.ndarray
+
+WORST = (Completeness.PROVED, Completeness.NUMERICALLY, Completeness.NOT)
+"""From the best to the worst."""
+SAME, NEAR_DOUBLE = 1e-6, 1e-4
+"""How near to a root unknowns are that root, and one where two meet, which rounding puts farther off."""
+REGULAR = 1e-9
+"""A linear group whose slope is weaker than this part of itself has no single assembly."""
+VANISHES = 1e-12
+"""What is rounding in a slope."""
+
+
+class Path(NamedTuple):
+    """One assembly of all groups: which root of each (from 0), the unknowns, and what is known of those roots."""
+
+    choices: tuple[int, ...]
+    z: Array
+    certified: bool
+    double: bool
+
+
+class _Counting:
+    """A group on the way of counting: the root that is next, and how many assemblies there are with those before."""
+
+    def __init__(self, index: int, key: bytes, real: Array):
+        self.index, self.key, self.real = index, key, real
+        self.rank = self.total = 0
+        self.stuck = False
+
+
+class Tree:
+    """The assemblies of a mechanism at its inputs, group after group; nothing is solved before it is asked for.
+
+    A group that hangs on the same choices before it is solved once.
+    """
+
+    def __init__(self, setup: Setup, certify: bool):
+        self.setup, self.certify = setup, certify
+        self.stages = setup.equations.stages
+        touched = hanging(setup)
+        self._hangs_on = [np.array(sorted(columns), dtype=int) for columns in touched]
+        # what is chosen before a group and matters for it or for a later one
+        self._matters: list[Array] = []
+        later: set[int] = set()
+        for stage, columns in zip(reversed(self.stages), reversed(touched), strict=True):
+            later = {column for column in later | columns if column < stage.unknowns.start}
+            self._matters.append(np.array(sorted(later), dtype=int))
+        self._matters.reverse()
+        self._solved: list[dict[bytes, Roots]] = [{} for _ in self.stages]
+        self._dead: list[set[bytes]] = [set() for _ in self.stages]
+        self._counted: list[dict[bytes, int]] = [{} for _ in self.stages]
+
+    def roots(self, index: int, z: Array) -> Roots:
+        """The assemblies of one group, the unknowns of those before it in z (unknowns,)."""
+        key = z[self._hangs_on[index]].tobytes()
+        known = self._solved[index]
+        if key not in known:
+            known[key] = _solved(self.setup, self.stages[index], z, self.certify)
+        return known[key]
+
+    def solved(self, index: int) -> tuple[Roots, ...]:
+        """What has been found of one group so far, once for each of the places of those before it."""
+        return tuple(self._solved[index].values())
+
+    @property
+    def complete(self) -> Completeness:
+        """How surely what has been solved of the groups is all: of a curve only one place is taken further."""
+        found = [self.solved(index) for index in range(len(self.stages))]
+        if any(each.curve for of in found[:-1] for each in of):
+            return Completeness.NOT
+        return max((each.complete for of in found for each in of), key=WORST.index, default=Completeness.PROVED)
+
+    def moving(self) -> Sequence[str]:
+        """Where there is no assembly: links with a curve of them, of which another place might go on to one.
+
+        None of them where some group never goes together that does not hang on any such curve.
+        """
+        moving: list[str] = []
+        hanging: set[int] = set()
+        for index, stage in enumerate(self.stages):
+            if not self._hangs_on[index].size:  # the list may have ended before it came to this one
+                self.roots(index, np.zeros(len(self.setup.equations.unknowns)))
+            found = self.solved(index)
+            if any(each.curve for each in found):
+                moving += stage.links
+            elif not hanging.intersection(self._hangs_on[index].tolist()):
+                if found and not any(len(each.real) for each in found):
+                    return ()
+                continue
+            hanging.update(range(stage.unknowns.start, stage.unknowns.stop))
+        return moving
+
+    def paths(self) -> Iterator[Path]:
+        """All assemblies: of the first group the first, and with it those of the next in order, and so on."""
+        z = np.zeros(len(self.setup.equations.unknowns))
+        if not self.stages:
+            yield Path((), z, True, False)
+            return
+        # of every group on the way: its roots, the one that is next, and whether an earlier one led to an end
+        way: list[list] = [[self.roots(0, z), 0, False]]
+        while way:
+            found, rank, led = way[-1]
+            depth = len(way) - 1
+            if rank == len(found.real):
+                way.pop()
+                if not led:
+                    self._dead[depth].add(self._state(depth, z))
+                elif way:
+                    way[-1][2] = True
+                continue
+            way[-1][1] += 1
+            z[self.stages[depth].unknowns] = found.real[rank]
+            if depth + 1 == len(self.stages):
+                way[-1][2] = True
+                yield self._path(way, z)
+            elif self._state(depth + 1, z) not in self._dead[depth + 1]:
+                way.append([self.roots(depth + 1, z), 0, False])
+
+    def _path(self, way: list[list], z: Array) -> Path:
+        ranks = [(found, rank - 1) for found, rank, _ in way]
+        return Path(
+            tuple(rank for _, rank in ranks),
+            z.copy(),
+            all(bool(found.certified[rank]) for found, rank in ranks),
+            any(bool(found.double[rank]) for found, rank in ranks),
+        )
+
+    def towards(self, target: Array) -> Path | None:
+        """The assembly with given unknowns (unknowns,); None where it is none of these."""
+        z = np.zeros_like(target)
+        way: list[list] = []
+        for index, stage in enumerate(self.stages):
+            found = self.roots(index, z)
+            if not len(found.real):
+                return None
+            own = [self.setup.equations.coordinates[column] for column in self.setup.equations.unknowns[stage.unknowns]]
+            angles = np.array([c.kind is not Kind.LENGTH for c in own], dtype=bool)
+            gaps = found.real - target[stage.unknowns]
+            gaps = np.where(angles, np.abs(np.exp(1j * gaps) - 1.0), np.abs(gaps)).max(axis=1, initial=0.0)
+            rank = int(np.argmin(gaps))
+            if gaps[rank] > (NEAR_DOUBLE if found.double[rank] else SAME):
+                return None
+            z[stage.unknowns] = found.real[rank]
+            way.append([found, rank + 1, True])
+        return self._path(way, z)
+
+    def before(self, path: Path, most: int) -> int | None:
+        """How many assemblies stand before one in order; None where telling takes more than so many dyads solved."""
+        z, found, room = np.zeros_like(path.z), 0, [most]
+        for depth, rank in enumerate(path.choices):
+            real = self.roots(depth, z).real
+            for other in range(rank):
+                z[self.stages[depth].unknowns] = real[other]
+                many = self._count(depth + 1, z, room)
+                if many is None:
+                    return None
+                found += many
+            z[self.stages[depth].unknowns] = real[rank]
+        return found
+
+    def count(self, most: int) -> int | None:
+        """How many assemblies there are, without listing those of groups that do not hang on each other.
+
+        None where that takes more than so many dyads solved, or what larger groups are in dyads.
+        """
+        return self._count(0, np.zeros(len(self.setup.equations.unknowns)), [most])
+
+    def _count(self, first: int, z: Array, room: list[int]) -> int | None:
+        """How many assemblies the groups from one on have; `room` runs down as groups are solved."""
+        z = z.copy()
+        way: list[_Counting] = []
+        many = self._counting(first, z, way, room)
+        while way:
+            here = way[-1]
+            if many is not None:
+                here.total += many
+            elif here.stuck:
+                return None
+            if here.rank == len(here.real):
+                self._counted[here.index][here.key] = many = here.total
+                way.pop()
+                continue
+            z[self.stages[here.index].unknowns] = here.real[here.rank]
+            here.rank += 1
+            many = self._counting(here.index + 1, z, way, room)
+        return many
+
+    def _counting(self, index: int, z: Array, way: list[_Counting], room: list[int]) -> int | None:
+        """How many the groups from one on have if that is known, else the group is put on the way to be counted."""
+        if index == len(self.stages):
+            return 1
+        key = self._state(index, z)
+        if key not in self._counted[index]:
+            room[0] -= max(1, length(self.stages[index].unknowns) ** 3 // 8)
+            if room[0] >= 0:
+                way.append(_Counting(index, key, self.roots(index, z).real))
+            elif way:
+                way[-1].stuck = True
+            return None
+        return self._counted[index][key]
+
+    def _state(self, index: int, z: Array) -> bytes:
+        """What of the choices before a group matters for it and for all later ones."""
+        return z[self._matters[index]].tobytes()
+
+
+def _solved(setup: Setup, stage: Stage, z: Array, certify: bool) -> Roots:
+    """One group: nothing to choose, one linear solution, two in closed form, or a larger group."""
+    if not length(stage.unknowns):
+        left, _ = setup.program.closed(stage)(z, setup.station.u, setup.station.p)
+        stands = int(np.abs(left).max(initial=0.0) <= CLOSED)
+        return _known(np.zeros((stands, 0)), stands, "it stands with the others")
+    known = _linear(setup, stage, z) or _dyad(setup, stage, z)
+    if known is not None and not certify:
+        return known
+    # positions of dyads alone are told without what larger groups need
+    from planar.assemblies.block_roots import roots
+
+    found = roots(setup, stage, z, certify)
+    return found if known is None else _ordered(known, found)
+
+
+def _ordered(known: Roots, found: Roots) -> Roots:
+    """What has been found and certified, in the order of what was known before, which stays as the group moves."""
+    if len(known.real) != len(found.real) or found.complete is Completeness.NOT:
+        return known
+    gaps = np.abs(np.exp(1j * known.real[:, None, :]) - np.exp(1j * found.real[None, :, :])).sum(axis=2)
+    order = gaps.argmin(axis=1) if len(known.real) else np.zeros(0, dtype=int)
+    if sorted(order) != list(range(len(order))):
+        return known
+    return found._replace(real=found.real[order], double=found.double[order], certified=found.certified[order])
+
+
+def _known(real: Array, expected: int, said: str) -> Roots:
+    """What follows from the form of the equations; that it is so in these numbers only rounding stands for."""
+    none = np.zeros(len(real), dtype=bool)
+    return Roots(real, none, none, expected, expected, Completeness.NUMERICALLY, False, said)
+
+
+def straight(setup: Setup, stage: Stage, z: Array) -> bool:
+    """Whether the slope of a group does not depend on its own unknowns, those before it given in z (unknowns,)."""
+    rng, closing, many = np.random.default_rng(0), _closing(setup, stage, z), length(stage.unknowns)
+    slope = closing(np.zeros(many))[1]
+    others = (closing(rng.uniform(0.5, 2.0, many))[1] for _ in range(2))
+    return all(np.abs(other - slope).max(initial=0.0) <= VANISHES for other in others)
+
+
+def _closing(setup: Setup, stage: Stage, z: Array) -> Callable[[Array], tuple[Array, Array]]:
+    """What a group leaves open (rows,) and its slope (rows, unknowns) at its own unknowns."""
+
+    def closing(own: Array) -> tuple[Array, Array]:
+        whole = z.copy()
+        whole[stage.unknowns] = own
+        left, slope = setup.program.closed(stage)(whole, setup.station.u, setup.station.p)
+        return left[0], slope.T
+
+    return closing
+
+
+def _linear(setup: Setup, stage: Stage, z: Array) -> Roots | None:
+    """The one assembly of a group whose constraints are linear in its unknowns; None where they are not."""
+    e, many = setup.equations, length(stage.unknowns)
+    rows = e.rows[stage.rows]
+    if len(rows) != many or (many > 1 and any(row.kind is Kind.ANGLE for row in rows)):
+        return None
+
+    closing = _closing(setup, stage, z)
+    at = np.zeros(many)
+    left, slope = closing(at)
+    if not straight(setup, stage, z):
+        return None
+    values = np.linalg.svd(slope, compute_uv=False)
+    turns = any(row.kind is Kind.ANGLE for row in rows) and abs(abs(slope[0, 0]) - 1.0) > VANISHES
+    if values[-1] < REGULAR * max(1.0, values[0]) or turns:
+        return None
+    for _ in range(POLISHED):
+        at = at - np.linalg.solve(slope, left)
+        left, _ = closing(at)
+    if np.abs(left).max() > CLOSED:
+        return None
+    return _known(at[None], 1, "its equations are linear")
+
+
+def _dyad(setup: Setup, stage: Stage, z: Array) -> Roots | None:
+    """The two assemblies of a group with a closed form, always in the same order; None where they all but meet."""
+    form = setup.program.assemblies(stage)
+    if form is None:
+        return None
+    both, left, bend = form(z, setup.station.u, setup.station.p)
+    if bend < MEETING and left <= CLOSED:
+        return _known(np.array(both), 2, "in closed form")
+    return _known(np.zeros((0, 2)), 2, "in closed form") if bend > 2.0 - MEETING else None

@@ -1,0 +1,1 @@
+"""All designs of a block through the same steps, by numpy or by machine code."""

@@ -1,0 +1,47 @@
+"""What a sweep has found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from planar.foundation.errors import Outcome
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """Every design at every step: SI, arrays with an entry for each design first.
+
+    `position`, `velocity` and `acceleration` map the points' names to arrays (designs, steps + 1, 2); the two latter
+    are None where no rates were asked for. NaN where a position is refused; rates also on a dead point itself, where
+    none is determined. Written to a store they are read when they are indexed, which raises BadInput where a block of
+    it is missing or damaged.
+    `status` (designs, steps + 1): 0 is solved, any other number k is `outcomes[k]`.
+    `input`: positions of the input that runs, (steps + 1,), or (designs, steps + 1) where they differ.
+    `general`: how many positions the general path solved, one design after the other. `said`: what there is to say.
+    """
+
+    points: tuple[str, ...]
+    designs: Mapping[str, Array]
+    position: Mapping[str, Any]
+    velocity: Mapping[str, Any] | None
+    acceleration: Mapping[str, Any] | None
+    status: Any
+    input: Array
+    general: int
+    said: tuple[str, ...]
+    outcomes: tuple[Outcome, ...] = tuple(Outcome)
+
+    def __len__(self) -> int:
+        """How many designs there are."""
+        return len(self.status)
+
+    @property
+    def whole(self) -> Array:
+        """The designs (designs,) that were solved at every step."""
+        return np.all(np.asarray(self.status[:]) == 0, axis=1)

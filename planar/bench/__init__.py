@@ -1,0 +1,1 @@
+"""How fast this machine solves a mechanism, and what bounds it."""

@@ -1,0 +1,178 @@
+"""How every command ends: one sentence and an exit status, whatever went wrong."""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+import warnings
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, nullcontext
+from types import MappingProxyType
+from typing import Any, NoReturn
+
+import click
+
+from planar.foundation.errors import BadInput, MissingGlyphs, NoAnswer, NotWritten, listed
+
+NO_ANSWER, BAD_INPUT, NOT_WRITTEN, INTERRUPTED = 1, 2, 3, 130
+"""Exit statuses; 0 is done, 130 what shells give for an interrupt from the keyboard."""
+CLOSED_PIPE = 128 + 13
+"""What a shell tells of programs that the closing of their pipe ends (SIGPIPE is signal 13), as by `| head`."""
+
+
+SYNONYMS = {
+    "advantage": "forces",
+    "analyse": "solve",
+    "analyze": "solve",
+    "animation": "animate",
+    "assemblies": "modes",
+    "branches": "circuits",
+    "check": "inspect",
+    "dof": "inspect",
+    "draw": "plot",
+    "dynamics": "simulate",
+    "export": "cycle",
+    "info": "inspect",
+    "kinematics": "solve",
+    "list": "models",
+    "mobility": "inspect",
+    "motion": "cycle",
+    "move": "cycle",
+    "names": "inspect",
+    "open": "view",
+    "page": "view",
+    "poles": "centres",
+    "position": "solve",
+    "reactions": "forces",
+    "run": "cycle",
+    "show": "view",
+    "statics": "forces",
+    "steps": "explain",
+    "validate": "inspect",
+    "velocity": "solve",
+}
+"""Commands by other words for what they do."""
+
+
+class Commands(click.Group):
+    """Every command ends with the same sentences and exit statuses."""
+
+    def main(self, *args: Any, **more: Any) -> Any:
+        """As click's, but that output which cannot be written ends in a status of its own, the last of it too."""
+        if sys.stdout is None:
+            from planar.document.files import closed_output
+
+            sys.stdout = closed_output()
+        try:
+            try:
+                return super().main(*args, **more)
+            finally:
+                if sys.stdout is not None:
+                    sys.stdout.flush()
+        except OSError as problem:
+            _lost(problem)
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        for stream in (sys.stdout, sys.stderr):
+            if hasattr(stream, "reconfigure"):
+                stream.reconfigure(errors="backslashreplace")  # what the screen's alphabet lacks
+        with _ending() if args else nullcontext():  # without any words click shows the help
+            return super().parse_args(ctx, args)
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        name = args[0]
+        if not name.startswith("-") and self.get_command(ctx, name) is None:
+            from difflib import get_close_matches
+
+            near = get_close_matches(name.lower(), self.commands, 1) or [SYNONYMS.get(name.lower(), "")]
+            if near[0]:
+                ctx.fail(f"no such command {name!r}; did you mean {near[0]!r}?")
+            ctx.fail(f"no such command {name!r}; commands are {listed(sorted(self.commands), None)}")
+        return super().resolve_command(ctx, args)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        with _ending(), _missing_glyphs_named():
+            return super().invoke(ctx)
+
+
+@contextmanager
+def _ending() -> Iterator[None]:
+    try:
+        yield
+    except OSError as problem:
+        _lost(problem)
+    except NotWritten as problem:
+        _refuse(str(problem), "not written", str(problem), NOT_WRITTEN)
+    except BadInput as problem:
+        _refuse(str(problem), "bad input", str(problem), BAD_INPUT)
+    except NoAnswer as problem:
+        _refuse(str(problem), problem.outcome.value, problem.reason, NO_ANSWER, problem.more)
+    except KeyboardInterrupt:
+        told = "stopped by the user before it was done"
+        _refuse(f"interrupted: {told}", "interrupted", told, INTERRUPTED)
+    except click.UsageError as problem:
+        told = " ".join(problem.format_message().split()).rstrip(".").replace(". Did", "; did").replace(". (", " (")
+        told = re.sub(r" for '\{[^}]*\}'", "", told)  # click names an argument by its choices, and then lists them
+        if not told.endswith(("?", "?)")):
+            told += f"; see `{problem.ctx.command_path if problem.ctx else 'planar'} --help`"
+        wrong = str(BadInput("command line", told[0].lower() + told[1:]))
+        _refuse(wrong, "bad input", wrong, BAD_INPUT)
+
+
+@contextmanager
+def _missing_glyphs_named() -> Iterator[None]:
+    """What no font can show is named in one line, however many texts have it; other warnings go their way."""
+    found: set[str] = set()
+    before = warnings.showwarning
+
+    def collect(message: Warning | str, *rest: Any) -> None:
+        if isinstance(message, MissingGlyphs):
+            found.update(message.characters)
+        else:
+            before(message, *rest)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", MissingGlyphs)
+        warnings.showwarning = collect
+        yield
+    if found:
+        click.echo(f"planar: {MissingGlyphs(found)}", err=True)
+
+
+def _refuse(
+    sentence: str, outcome: str, reason: str, status: int, more: Mapping[str, Any] = MappingProxyType({})
+) -> None:
+    if "--json" in sys.argv:
+        try:
+            click.echo(json.dumps({"outcome": outcome, "reason": reason, **more}, ensure_ascii=False))
+        except OSError as problem:
+            _lost(problem)
+    _say(sentence)
+    sys.exit(status)
+
+
+def _lost(problem: OSError) -> NoReturn:
+    """End where what is printed cannot be written, quietly where nobody reads it any more."""
+    from planar.document.files import OUT_OF_ROOM, abandon
+
+    if problem.errno not in OUT_OF_ROOM:
+        raise problem
+    abandon(sys.stdout)
+    if isinstance(problem, BrokenPipeError):
+        sys.exit(CLOSED_PIPE)
+    _say(f"the output cannot be written: {problem.strerror}")
+    sys.exit(NOT_WRITTEN)
+
+
+def _say(sentence: str) -> None:
+    """One line on stderr, if that takes it."""
+    shown = "".join(each if each.isprintable() else repr(each)[1:-1] for each in sentence)
+    try:
+        click.echo(f"planar: {shown}", err=True)
+    except OSError:
+        from planar.document.files import abandon
+
+        abandon(sys.stderr)

@@ -1,0 +1,81 @@
+"""The commands that say what there is: a mechanism, the models, the schema, the solver's speed."""
+
+from __future__ import annotations
+
+import json
+
+import click
+
+from planar.cli.options import as_json, busy, main, show
+
+
+@main.command()
+@click.argument("model")
+@as_json
+def inspect(model: str, as_json: bool) -> None:
+    """What it is: links, pairs, chain, mobility, motions, names."""
+    from planar.analysis.identity.inspection import inspect as inspected
+    from planar.document.files import load
+
+    mechanism = load(model)
+    with busy(mechanism.name):
+        found = inspected(mechanism)
+    if as_json:
+        from dataclasses import asdict
+
+        click.echo(json.dumps(asdict(found), ensure_ascii=False))
+        return
+    from planar.reports.tables.inspection import inspection
+
+    show(inspection(found), None)
+
+
+@main.command()
+def schema() -> None:
+    """The JSON schema of mechanism files, which editors can use."""
+    from planar.document.schema import schema as published
+
+    click.echo(json.dumps(published(), ensure_ascii=False, indent=2))
+
+
+@main.command()
+@as_json
+def models(as_json: bool) -> None:
+    """The models that come along."""
+    from planar.document.files import models as known
+
+    rows = [(file.stem, [name for name in m.ids if name != file.stem], m.about or m.name) for file, m in known()]
+    if as_json:
+        click.echo(json.dumps([{"model": n, "ids": ids, "about": about} for n, ids, about in rows], ensure_ascii=False))
+        return
+    from planar.reports.tables_of_numbers import models as table
+
+    show(table((name, ", ".join(ids), about) for name, ids, about in rows), None)
+
+
+@main.command()
+@click.argument("model", required=False)
+@click.option(
+    "--seconds",
+    type=click.FloatRange(0.0, 1e4),
+    default=3.0,
+    show_default=True,
+    help="About how long the sweeps of a mechanism are timed.",
+)
+@as_json
+def bench(model: str | None, seconds: float, as_json: bool) -> None:
+    """How fast it is solved on this machine: one position, a run, many designs, and what bounds it."""
+    from planar.bench.benchmark import measure
+    from planar.document.files import load
+
+    mechanisms = [load(name) for name in ([model] if model else ["four-bar", "slider-crank", "double-butterfly"])]
+    speeds = []
+    for mechanism in mechanisms:
+        with busy(mechanism.name):
+            speeds.append(measure(mechanism, seconds=seconds))
+    if as_json:
+        click.echo(json.dumps([speed.record() for speed in speeds], ensure_ascii=False))
+        return
+    from planar.reports.tables.benchmark import table
+
+    show(table(speeds), None)

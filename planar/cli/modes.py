@@ -1,0 +1,85 @@
+"""The command that lists every assembly."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from planar.cli.options import as_json, busy, drives, main, output, running, show, spare
+from planar.foundation.errors import BadInput
+
+if TYPE_CHECKING:
+    from planar.assemblies.modes import Modes
+    from planar.foundation.errors import NoAnswer
+
+
+@main.command()
+@click.argument("model")
+@as_json
+@click.option(
+    "--at",
+    "at",
+    multiple=True,
+    metavar="PAIR=POSITION",
+    help="The assemblies with an input there: A=75deg, stroke=20mm, or a number in the file's units.",
+)
+@click.option(
+    "--limit", type=click.IntRange(1), default=64, show_default=True, metavar="N", help="Most that are listed."
+)
+@click.option("--point", "points", multiple=True, metavar="NAME", help="A point whose place is printed.")
+@click.option("--certify/--no-certify", default=True, help="Prove every assembly by intervals, or leave it.")
+@click.option("--circuits", "circled", is_flag=True, help="Also the circuit and the branch on which each lies.")
+@running
+@output("Write the tables to a .txt, .svg or .html file.")
+def modes(
+    model: str,
+    as_json: bool,
+    at: tuple[str, ...],
+    limit: int,
+    points: tuple[str, ...],
+    certify: bool,
+    circled: bool,
+    pair: str | None,
+    output: Path | None,
+) -> None:
+    """Every assembly at the given inputs, and whether these are all."""
+    from planar.assemblies.circuits.circuits import circuits
+    from planar.assemblies.modes import modes as assemblies
+    from planar.document.files import load
+    from planar.reports.tables.modes import record, table
+
+    if as_json and output is not None:
+        raise BadInput("-o", "tables go to a file or SI values are printed with --json; give one of the two")
+    if pair is not None and not circled:
+        raise BadInput("--input", "without --circuits no input runs")
+    mechanism = load(model)
+    spare(model, output)
+    with busy(f"{mechanism.name}: assemblies"):
+        found = assemblies(mechanism, drives(mechanism, at), certify=certify)
+        if not found:
+            raise _refused(found, as_json, output)
+        on = circuits(found.mechanism, pair) if circled else None
+        told = record(found, limit, on) if as_json else table(found, limit, points, on)
+    if as_json:
+        click.echo(json.dumps(told, ensure_ascii=False, indent=1, allow_nan=False))
+        return
+    show(told, output)
+
+
+def _refused(found: Modes, as_json: bool, output: Path | None) -> NoAnswer:
+    """The refusal to be raised, once it has been told why no assembly was found."""
+    from planar.assemblies.circuits.circuits import circuits
+    from planar.assemblies.conflict import conflict
+    from planar.reports.tables.conflict import conflict_record, conflict_table
+
+    problem, why = found.refusal(), conflict(found.mechanism)
+    if why is not None:
+        runs = [circuits(why.mechanism, pair) for pair in why.inputs]
+        if as_json:
+            problem.more = {"conflict": conflict_record(why, runs)}
+        else:
+            show(conflict_table(why, runs), output)
+    return problem

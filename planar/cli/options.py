@@ -1,0 +1,261 @@
+"""What several commands have in common: their options, where inputs are moved to, how results are shown."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from planar import __version__
+from planar.cli.exit_status import NO_ANSWER, Commands
+from planar.foundation.errors import BadInput, Outcome
+
+if TYPE_CHECKING:
+    from planar.model.mechanism import Drive, Mechanism
+    from planar.reports.columns import Told
+    from planar.results.motion import Motion
+
+
+ONE_THREAD = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+"""Set before numpy is loaded, unless the user did: matrices are small, and on a busy machine threads that share one
+wait for each other longer than they work."""
+
+
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, message="planar %(version)s")
+def main() -> None:
+    """How any planar linkage moves.
+
+    MODEL is a mechanism file (JSON), the name of a model that comes along, or - for what is piped in.
+
+    Ends with status 0 when all is done, 1 where the mechanism has no answer, 2 on bad input, 3 where the result cannot
+    be written, as on a full disk.
+    """
+    for limit in ONE_THREAD:
+        os.environ.setdefault(limit, "1")
+
+
+as_json = click.option("--json", "as_json", is_flag=True, help="Print machine-readable SI values.")
+
+
+at = click.option(
+    "--at",
+    "at",
+    multiple=True,
+    metavar="PAIR=POSITION",
+    help="Move an input there first, along its branch: A=75deg, stroke=20mm, or a number in the file's units.",
+)
+
+
+scaled = click.option(
+    "--scale",
+    "scales",
+    multiple=True,
+    metavar="SCALE",
+    help='Of what is drawn: "1 cm = 100 mm", "1:5", "1 cm = 0.1 m/s", "1 cm = 500 N"; left out, round ones that fit.',
+)
+
+
+moded = click.option(
+    "--mode",
+    "mode",
+    type=click.IntRange(1),
+    metavar="N",
+    help="The assembly of this number in `planar modes`, and not the one nearest to the sketch.",
+)
+
+
+def loaded(model: str, mode: int | None) -> Mechanism:
+    """The mechanism of a file, the assembly chosen that `--mode` names, else with the number of the sketch's own."""
+    from planar.assemblies.selection import chosen, numbered
+    from planar.document.files import load
+
+    mechanism = load(model)
+    if mode is None:
+        return numbered(mechanism)
+    with busy(f"{mechanism.name}: assemblies"):
+        return chosen(mechanism, mode)
+
+
+running = click.option("--input", "pair", metavar="PAIR", help="The input that runs, where there are several.")
+
+
+def ranged(command: Any) -> Any:
+    """The options of a run: which input runs, from where to where."""
+    for option in (
+        click.option("--to", "stop", metavar="POSITION", help="Where it stops; left out, a turn on, or to its limits."),
+        click.option("--from", "start", metavar="POSITION", help="Where the range starts: 30deg, 20mm, a bare number."),
+        running,
+    ):
+        command = option(command)
+    return command
+
+
+def cycled(command: Any) -> Any:
+    """The options of a whole motion, all of which `run` takes."""
+    for option in (
+        click.option(
+            "--duration",
+            metavar="TIME",
+            help="Run in time so long, every input by its law or at constant acceleration.",
+        ),
+        click.option(
+            "--branch",
+            "branches",
+            multiple=True,
+            type=click.IntRange(1),
+            metavar="N",
+            help="The way taken where branches of the motion cross: 1 smoothly, 2 the next; for each change point.",
+        ),
+        click.option("--circuit", is_flag=True, help="Go through dead points, all round the circuit of this assembly."),
+        click.option("--there-and-back", is_flag=True, help="Come back through the range by the same positions."),
+    ):
+        command = option(command)
+    return stepped(ranged(command))
+
+
+stepped = click.option(
+    "--steps", default=360, show_default=True, metavar="N", help="Parts that the motion is divided into."
+)
+
+
+def output(help: str, required: bool = False) -> Callable[[Any], Any]:  # noqa: A002
+    """The option that names a file to write."""
+    kind = click.Path(dir_okay=False, path_type=Path)
+    return click.option("-o", "output", type=kind, metavar="FILE", help=help, required=required)
+
+
+def spare(model: str, output: Path | None) -> None:
+    """Refuse to write over the mechanism's own file."""
+    if output is not None and output.exists() and Path(model).exists() and output.samefile(model):
+        raise BadInput("-o", "this is the mechanism's own file, which would be lost; name another")
+
+
+def busy(doing: str) -> AbstractContextManager[Any]:
+    """A sign on a terminal that work is under way."""
+    if not sys.stderr.isatty():
+        return nullcontext()
+    from rich.console import Console
+
+    return Console(stderr=True, markup=False).status(doing)
+
+
+@contextmanager
+def advancing(doing: str, gone: bool = False) -> Iterator[Callable[[float, float], None] | None]:
+    """A bar on a terminal that shows how much of a long work is done; it may be gone when that is."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import Progress
+
+    with Progress(console=Console(stderr=True, markup=False), transient=gone) as bar:
+        task = bar.add_task(doing.replace("[", r"\["), total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+def drives(mechanism: Mechanism, told: tuple[str, ...]) -> tuple[Drive, ...]:
+    """The inputs that `--at` moves."""
+    if not told:
+        return ()
+    from planar.document import read_drive
+
+    drives = []
+    for text in told:
+        pair, equals, position = text.partition("=")
+        if not equals:
+            raise BadInput("--at", f"{text!r} is not of the form PAIR=POSITION, such as A=75deg")
+        drives.append(read_drive(mechanism, pair.strip(), position.strip()))
+        if drives[-1].pair in (drive.pair for drive in drives[:-1]):
+            raise BadInput("--at", f"the input at {drives[-1].pair!r} is moved twice; say once where to")
+    return tuple(drives)
+
+
+def show(renderable: Any, output: Path | None) -> None:
+    """Print a table, or write it to a file in the format that its name says."""
+    from rich.console import Console
+
+    class Screen(Console):
+        def on_broken_pipe(self) -> None:
+            raise BrokenPipeError(errno.EPIPE, os.strerror(errno.EPIPE))  # which every command ends alike
+
+    if output is None:
+        console = Screen(markup=False, emoji=False, highlight=False)  # a name is text, whatever it looks like
+        if not console.is_terminal and not os.environ.get("COLUMNS", "").isdecimal():
+            # a file or another program has no width: lines are not to be broken for it
+            console.width = 140
+        console.print(renderable, crop=False)
+        return
+    from planar.document.files import save
+    from planar.reports.files.table_files import written
+
+    save(output, written(renderable, output.suffix))
+
+
+def run(
+    mechanism: Mechanism,
+    steps: int,
+    pair: str | None,
+    start: str | None,
+    stop: str | None,
+    duration: str | None = None,
+    **more: Any,
+) -> Motion:
+    """The run of an input over the range that the options give; `more` goes to `planar.cycle` as it is."""
+    from planar.document import read_time
+    from planar.solving.cycle import cycle
+
+    names = [given.pair for given in mechanism.inputs]
+    of = pair if pair is not None or len(names) != 1 else names[0]
+    ends = [_position(mechanism, of, text, option) for option, text in (("--from", start), ("--to", stop))]
+    time = None if duration is None else read_time(duration, "--duration")
+    return cycle(mechanism, steps, ends[0], ends[1], pair, duration=time, **more)
+
+
+def tell(
+    motion: Motion,
+    as_json: bool,
+    output: Path | None,
+    shown: Callable[[], Iterable[Any]],
+    more: Iterable[Told] = (),
+    said: Mapping[str, Any] | None = None,
+) -> None:
+    """A whole motion, with what `more` is told and `said` of it: as JSON, or as tables, and in a file that is named.
+
+    Ends with a sentence and a status where the motion did not come to its end.
+    """
+    from planar.reports.files.run_files import record, written
+
+    if as_json:
+        click.echo(json.dumps(record(motion, more, said or {}), ensure_ascii=False, allow_nan=False))
+    else:
+        if output is not None:
+            from planar.document.files import save
+
+            save(output, written(motion, output.suffix, more, said or {}))
+        for each in shown():
+            show(each, None)
+    if motion.outcome is not Outcome.SOLVED:
+        click.echo(f"planar: {motion.outcome.value}: {motion.reason}", err=True)
+        sys.exit(NO_ANSWER)
+
+
+def _position(mechanism: Mechanism, pair: str | None, text: str | None, option: str) -> float | None:
+    """An end of a run's range."""
+    from planar.document import read_drive
+
+    if text is None:
+        return None
+    if pair is None:
+        raise BadInput(option, "there are several inputs; name the one that runs with --input")
+    try:
+        return read_drive(mechanism, pair, text).position
+    except BadInput as problem:
+        raise BadInput(option, problem.sentence) from None

@@ -1,0 +1,177 @@
+"""The commands that draw."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+from click.core import ParameterSource
+
+from planar.cli.options import (
+    advancing,
+    at,
+    busy,
+    drives,
+    loaded,
+    main,
+    moded,
+    output,
+    ranged,
+    run,
+    scaled,
+    spare,
+)
+from planar.foundation.errors import BadInput
+
+if TYPE_CHECKING:
+    from planar.model.mechanism import Mechanism
+    from planar.results.motion import Motion
+
+POSITION = ("scheme", "velocity", "acceleration", "centres", "forces")
+ASSEMBLIES = ("modes",)
+BRANCHES = ("circuits",)
+MOTION = ("positions", "loci", "centrodes", "diagrams", "torque", "bearings")
+SMOOTH = 360
+"""Steps of a run that is drawn."""
+
+
+@main.command()
+@click.argument("model")
+@click.argument("what", type=click.Choice((*POSITION, *MOTION, *ASSEMBLIES, *BRANCHES)))
+@output("Write the drawing to a .png, .svg or .pdf file.", required=True)
+@scaled
+@at
+@click.option(
+    "--point", "points", multiple=True, metavar="NAME", help="A point to be lettered, or whose path is drawn."
+)
+@click.option(
+    "--of", "of", metavar="NAME", help="Diagrams, or circuits, of this slide, point or link; torque of this input."
+)
+@click.option(
+    "--link",
+    "links",
+    multiple=True,
+    metavar="NAME",
+    help="Centres of this link, of several those between them; centrodes of the first in the axes of the second.",
+)
+@click.option("--pair", "pairs", multiple=True, metavar="NAME", help="A pair whose bearing load is drawn.")
+@click.option(
+    "--fluctuation",
+    type=float,
+    metavar="C",
+    help="The flywheel's coefficient of fluctuation of speed, (greatest - least) / mean; 0.02 where left out.",
+)
+@click.option("--steps", default=12, show_default=True, metavar="N", help="Positions, or chords of the diagrams.")
+@click.option("--chords", is_flag=True, help="Diagrams with graphical differentiation beside the curves.")
+@ranged
+@moded
+def plot(
+    model: str,
+    what: str,
+    output: Path,
+    scales: tuple[str, ...],
+    at: tuple[str, ...],
+    points: tuple[str, ...],
+    of: str | None,
+    links: tuple[str, ...],
+    pairs: tuple[str, ...],
+    fluctuation: float | None,
+    steps: int,
+    chords: bool,
+    pair: str | None,
+    start: str | None,
+    stop: str | None,
+    mode: int | None,
+) -> None:
+    """A drawing to scale: scheme, polygons, free bodies of a position; loci, diagrams, loads of a run; circuits."""
+    from planar import plot as drawn
+    from planar.solving.position import solve
+
+    steps_told = click.get_current_context().get_parameter_source("steps") is ParameterSource.COMMANDLINE
+    for option, told, kinds in (
+        ("--point", points, ("positions", "loci")),
+        ("--of", of, ("diagrams", "torque", *BRANCHES)),
+        ("--pair", pairs, ("bearings",)),
+        ("--fluctuation", fluctuation is not None, ("torque",)),
+        ("--link", links, ("centres", "centrodes")),
+        ("--chords", chords, ("diagrams",)),
+        ("--steps", steps_told, ("positions", "diagrams") if chords else ("positions",)),
+        ("--scale", scales, (*POSITION, "positions", "loci", "centrodes", *ASSEMBLIES)),
+        ("--mode", mode is not None, (*POSITION, *MOTION)),
+    ):
+        if told and what not in kinds:
+            raise BadInput(option, f"this is for {' and '.join(kinds)}; {what} would not heed it")
+    mechanism = loaded(model, mode)
+    spare(model, output)
+    with busy(f"{mechanism.name}: {what}"):
+        _refuse_range(what, pair, start, stop)
+        if what in (*ASSEMBLIES, *BRANCHES):
+            from planar.assemblies.circuits.circuits import circuits
+            from planar.assemblies.modes import modes
+
+            every = what in ASSEMBLIES
+            here = modes(mechanism, drives(mechanism, at), certify=every)
+            sheets = drawn.modes(here, scales) if every else drawn.circuits(circuits(here.mechanism, pair), of, here)
+            drawn.save(sheets, output)
+            return
+        if what in POSITION:
+            state = solve(mechanism, drives(mechanism, at))
+            figure = drawn.centres(state, scales, links) if what == "centres" else getattr(drawn, what)(state, scales)
+        else:
+            if at:
+                raise BadInput("--at", f"{what} are of a run; say where it starts with --from")
+            moving = _run(mechanism, pair, start, stop)
+            if len(links) > 2:
+                raise BadInput(
+                    "--link", "centrodes are of two links; name one, or one and the link that it is seen from"
+                )
+            figure = {
+                "positions": lambda: drawn.positions(moving, steps, points or None, scales),
+                "loci": lambda: drawn.loci(moving, points or None, scales),
+                "centrodes": lambda: drawn.centrodes(moving, *links, scale=scales),
+                "diagrams": lambda: drawn.diagrams(moving, of, steps if chords else None),
+                "torque": lambda: drawn.torque(moving, of, fluctuation),
+                "bearings": lambda: drawn.bearings(moving, pairs or None),
+            }[what]()
+        drawn.save(figure, output)
+
+
+def _refuse_range(what: str, pair: str | None, start: str | None, stop: str | None) -> None:
+    """Raise BadInput for a range that a drawing would not heed."""
+    if what in BRANCHES and (start or stop):
+        raise BadInput("--from", f"{what} are of the whole range of an input")
+    if (pair or start or stop) and what in (*POSITION, *ASSEMBLIES):
+        told = f"{what} are" if what in ASSEMBLIES else f"a {what} is"
+        raise BadInput("--input", f"{told} of one position; move an input there with --at")
+
+
+@main.command()
+@click.argument("model")
+@output("Write the moving picture to a .gif or .mp4 file.", required=True)
+@click.option("--point", "points", multiple=True, metavar="NAME", help="A point whose path is drawn as it moves.")
+@ranged
+@moded
+def animate(
+    model: str,
+    output: Path,
+    points: tuple[str, ...],
+    pair: str | None,
+    start: str | None,
+    stop: str | None,
+    mode: int | None,
+) -> None:
+    """The mechanism in motion, to and fro or round and round."""
+    from planar import plot as drawn
+
+    mechanism = loaded(model, mode)
+    spare(model, output)
+    with advancing(mechanism.name) as progress:
+        drawn.animate(_run(mechanism, pair, start, stop), output, points or None, progress)
+
+
+def _run(mechanism: Mechanism, pair: str | None, start: str | None, stop: str | None) -> Mechanism | Motion:
+    """The run that the options ask for; without any the mechanism, whose drawings start where a slide's stroke does."""
+    if pair is None and start is None and stop is None and len(mechanism.inputs) == 1:
+        return mechanism
+    return run(mechanism, SMOOTH, pair, start, stop)

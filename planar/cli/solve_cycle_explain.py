@@ -1,0 +1,203 @@
+"""The commands that solve a position or a motion."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from planar.cli.options import (
+    advancing,
+    as_json,
+    at,
+    busy,
+    cycled,
+    drives,
+    loaded,
+    main,
+    moded,
+    output,
+    run,
+    scaled,
+    show,
+    spare,
+    tell,
+)
+from planar.foundation.errors import BadInput, no_format
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from planar.analysis.motion.answers import Answers
+    from planar.analysis.worked.published import Comparison
+    from planar.results.motion import Motion, State
+    from planar.results.records import RelativeState
+
+PAGES = (".pdf", ".png")
+"""Files of pages with drawings."""
+
+
+@main.command()
+@click.argument("model")
+@as_json
+@at
+@moded
+@click.option(
+    "--relative",
+    "relative",
+    multiple=True,
+    metavar="POINT,POINT[,LINK]",
+    help="Also how the first point moves against the second, in parts, in the axes of a link that carries the second.",
+)
+@output("Write the tables to a .txt, .svg or .html file.")
+def solve(
+    model: str, as_json: bool, at: tuple[str, ...], mode: int | None, relative: tuple[str, ...], output: Path | None
+) -> None:
+    """This position: mobility, all positions, velocities, accelerations, rubbing speeds."""
+    state, comparisons = _solved(model, mode, at, as_json, output)
+    relatives = {text: _relative(state, text) for text in relative}
+    if as_json:
+        from planar.reports.files.json_values import record
+
+        click.echo(json.dumps(record(state, comparisons, relatives), ensure_ascii=False, indent=1, allow_nan=False))
+        return
+    from planar.reports.tables_of_numbers import solution
+
+    show(solution(state, comparisons, relatives), output)
+
+
+@main.command()
+@click.argument("model")
+@as_json
+@at
+@moded
+@scaled
+@output("Write the text to a .txt, .svg or .html file, or pages with drawings to scale to a .pdf or .png file.")
+def explain(
+    model: str, as_json: bool, at: tuple[str, ...], mode: int | None, scales: tuple[str, ...], output: Path | None
+) -> None:
+    """The worked solution: vector equations and tables, both polygons step by step, results."""
+    from planar.drawing.paper.scales import scales as read
+
+    on_pages = output is not None and output.suffix.lower() in PAGES
+    if output is not None and not on_pages:
+        from planar.reports.files.table_files import SUFFIXES
+
+        if output.suffix not in SUFFIXES:
+            raise no_format(output.suffix, "a worked solution", (*SUFFIXES, *PAGES))
+    state, comparisons = _solved(model, mode, at, as_json, output)
+    given = read(scales)
+    if output is not None and on_pages:
+        from planar.document.files import save
+        from planar.drawing.output.solution_pages import sheets, solution_pages
+
+        with busy(state.mechanism.name):
+            save(output, sheets(solution_pages(state, comparisons, given), output.suffix))
+        return
+    from planar.analysis.worked.solution import worked_solution
+    from planar.reports.tables.worked_solution import explained, record
+
+    solution = worked_solution(state, comparisons)
+    if as_json:
+        click.echo(json.dumps(record(solution, given), ensure_ascii=False, indent=1, allow_nan=False))
+        return
+    show(explained(solution, given), output)
+
+
+def _solved(
+    model: str, mode: int | None, at: tuple[str, ...], as_json: bool, output: Path | None
+) -> tuple[State, tuple[Comparison, ...]]:
+    """A model's position, moved to where `--at` says, with its published values unless it was moved."""
+    from planar.analysis.worked.published import compare
+    from planar.solving.position import solve
+
+    if as_json and output is not None:
+        raise BadInput("-o", "tables go to a file or SI values are printed with --json; give one of the two")
+    mechanism = loaded(model, mode)
+    spare(model, output)
+    moved = drives(mechanism, at)
+    state = solve(mechanism, moved)
+    return state, () if moved else compare(state)
+
+
+@main.command()
+@click.argument("model")
+@as_json
+@cycled
+@moded
+@click.option("--jerk", is_flag=True, help="Third rates as well.")
+@click.option(
+    "--of",
+    "asked",
+    multiple=True,
+    metavar="NAME",
+    help="Also what is asked of a pair, link or point: stroke or swing, greatest speed, time ratio, dwells, area, ...",
+)
+@output("Write positions, velocities and accelerations to a .csv, .json, .npz or .parquet file.")
+def cycle(
+    model: str,
+    as_json: bool,
+    mode: int | None,
+    jerk: bool,
+    asked: tuple[str, ...],
+    output: Path | None,
+    steps: int,
+    **course: Any,
+) -> None:
+    """The whole motion: position to position through the range of an input, or in time by the inputs' laws."""
+    if as_json and output is not None:
+        raise BadInput("-o", "a run goes to a file or is printed with --json; give one of the two")
+    mechanism = loaded(model, mode)
+    spare(model, output)
+    if output is not None:
+        from planar.reports.files.run_files import writable
+
+        writable(output.suffix)
+    with advancing(f"{mechanism.name}: {steps} steps", gone=True) as progress:
+        motion = run(mechanism, steps, **course, jerk=jerk, progress=progress)
+        if not as_json:
+            motion.limits  # noqa: B018 - solved for while the sign is up
+        told = {name: _answers(motion, name) for name in asked}
+
+    def shown() -> Iterator[RenderableType]:
+        from planar.reports.tables.motion import ran
+
+        yield ran(motion)
+        if told:
+            from planar.reports.tables.answers import tables
+
+            yield tables(motion, told)
+
+    said = {}
+    if told:
+        from planar.reports.tables.answers import record
+
+        said = {"answers": record(told)}
+    tell(motion, as_json, output, shown, said=said)
+
+
+def _answers(motion: Motion, name: str) -> tuple[Answers, ...]:
+    """What `--of` asks for."""
+    from planar.analysis.motion.answers import answers
+    from planar.results.motion import Unknown
+
+    try:
+        return answers(motion, name)
+    except Unknown as problem:
+        raise BadInput("--of", str(problem)) from None
+
+
+def _relative(state: State, text: str) -> RelativeState:
+    """The relative motion that `--relative` asks for."""
+    from planar.results.motion import Unknown
+
+    names = [name.strip() for name in text.split(",")]
+    if len(names) not in (2, 3):
+        raise BadInput("--relative", f"{text!r} is not of the form POINT,POINT or POINT,POINT,LINK, such as C,B")
+    try:
+        return state.relative(*names)
+    except Unknown as problem:
+        raise BadInput("--relative", str(problem)) from None

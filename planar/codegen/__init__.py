@@ -1,0 +1,1 @@
+"""Casadi functions as instruction lists, printed for other machines."""

@@ -1,0 +1,1 @@
+"""Instantaneous centres and centrodes drawn."""

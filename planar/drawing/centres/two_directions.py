@@ -1,0 +1,236 @@
+"""The centre of one link from the directions of two of its points' velocities, as a textbook constructs it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from planar.drawing.paper import scales
+from planar.drawing.paper.boxes import Box
+from planar.drawing.paper.lines_on_paper import NOTHING, Ray
+from planar.drawing.paper.picture import (
+    Arrow,
+    Circle,
+    Fill,
+    Letter,
+    Line,
+    Mark,
+    Pen,
+    Picture,
+    extent,
+    spot,
+)
+from planar.drawing.paper.scales import Scale
+from planar.drawing.scheme.scheme import scheme, space_scale, standing
+from planar.foundation.errors import BadInput
+from planar.foundation.units import length_of_rates, own
+from planar.model.mechanism import named_points
+from planar.results.motion import State
+from planar.results.records import PointState
+
+Array = np.ndarray
+REACH = 2.5
+"""Of the mechanism's greater extent: how far from its middle C is still drawn in its place."""
+ARROW = 30.0
+"""mm: the length of the longer velocity at the most."""
+ROOM = 170.0, 130.0
+"""mm that the mechanism and C take at the most."""
+RING, EDGE, OVER = 0.9, 10.0, 3.0
+"""mm: the mark of C; from all else to the end of lines that lead to it outside; how far lines go on beyond spots."""
+
+
+class Found(NamedTuple):
+    """The centre (m), how it was found, and whether the line through the arrows' heads served; None at infinity."""
+
+    at: Array | None
+    how: str
+    "with {C} for its letter"
+    by_heads: bool = False
+
+
+def directions_picture(
+    state: State,
+    link: str,
+    points: Sequence[str] | None = None,
+    scale: Scale | None = None,
+    speeds: Scale | None = None,
+) -> Picture:
+    """The construction of the centre C of a link against the frame from two of its points, on the scheme.
+
+    Where the velocities differ in direction C is where the lines square to them meet; where they are parallel it is on
+    the line through both points, which the line through the arrows' heads cuts. `points` left out: the two joints of
+    the link that lie farthest apart. Strokes are `about` "velocity A", "normal A", "heads" and "centre". C is
+    lettered I where a point has that name.
+
+    Raises BadInput for a link or points that there are not, and for a link that is at rest.
+    """
+    names = tuple(points) if points else _farthest(state, link)
+    one, other = (_carried(state, link, name) for name in _two(names))
+    found = meeting(one, other)
+    return _Sheet(state, names, (one, other), found, scale, speeds).picture()
+
+
+def meeting(one: PointState, other: PointState) -> Found:
+    """Where the centre of the link of two points lies, from their places and velocities."""
+    fastest = max(np.hypot(*one.velocity), np.hypot(*other.velocity))
+    apart = other.position - one.position
+    for point in (one, other):
+        if np.hypot(*point.velocity) <= NOTHING * fastest:
+            return Found(point.position, "{C} is the point that is at rest")
+    (ax, ay), (bx, by) = one.velocity, other.velocity
+    sine = (ax * by - ay * bx) / np.hypot(ax, ay) / np.hypot(bx, by)
+    if abs(sine) > 1e-7:
+        # C = A + s (-v_Ay, v_Ax), square to v_B seen from B
+        s = (apart @ other.velocity) / (-ay * bx + ax * by)
+        return Found(one.position + s * np.array([-ay, ax]), "{C}: where the lines square to both velocities meet")
+    way = one.velocity / np.hypot(ax, ay)
+    first, second = float(way @ one.velocity), float(way @ other.velocity)
+    if abs(first - second) <= 1e-7 * fastest:
+        return Found(None, "Equal velocities: {C} at infinity, square to them; the link does not turn")
+    return Found(
+        one.position + first / (first - second) * apart,
+        "Parallel velocities: {C} on the line through both points, where the line through the arrows' heads cuts it",
+        True,
+    )
+
+
+def _two(names: Sequence[str]) -> Sequence[str]:
+    if len(names) != 2 or names[0] == names[1]:
+        raise BadInput("points", "the construction needs two different points of the link")
+    return names
+
+
+def _carried(state: State, link: str, name: str) -> PointState:
+    """A point, if the link carries it. Raises BadInput."""
+    known = _points(state, link)
+    if name not in known:
+        raise BadInput(name, f"{link} has no point of this name; its points are {', '.join(known) or 'none'}")
+    return known[name]
+
+
+def _points(state: State, link: str) -> dict[str, PointState]:
+    if link not in state.frames:
+        raise BadInput(link, f"there is no link of this name; links are {', '.join(state.frames)}")
+    named = [each for each in named_points(state.mechanism) if any(owner == link for owner, _ in each.members)]
+    return {each.name: state.point(each.name) for each in named}
+
+
+def _farthest(state: State, link: str) -> tuple[str, str]:
+    """The two joints of a link that lie farthest apart, else any two points."""
+    known = _points(state, link)
+    joints = [each.name for each in named_points(state.mechanism) if each.name in known and len(each.members) > 1]
+    among = joints if len(joints) > 1 else list(known)
+    pairs = [(a, b) for k, a in enumerate(among) for b in among[k + 1 :]]
+    if not pairs:
+        raise BadInput(link, "the construction needs a link with two points")
+    return max(pairs, key=lambda two: float(np.hypot(*(known[two[0]].position - known[two[1]].position))))
+
+
+class _Sheet:
+    """The marks of one construction."""
+
+    def __init__(
+        self,
+        state: State,
+        names: tuple[str, ...],
+        points: tuple[PointState, PointState],
+        found: Found,
+        scale: Scale | None,
+        speeds: Scale | None,
+    ):
+        self.names, self.points, self.found, self.units = names, points, found, state.mechanism.units
+        self.letter = "C" if "C" not in state.point_names else "I"
+        fastest = max(float(np.hypot(*point.velocity)) for point in points)
+        if fastest == 0.0:
+            raise BadInput(names[0], f"{names[0]} and {names[1]} are at rest: no direction is known")
+        whole = space_scale(state.mechanism, standing(state.frames), state.shapes)
+        low, high = (np.array(each) * whole.per_mm for each in extent(scheme(state, whole, False, False).marks))
+        size, middle = float((high - low).max()), (low + high) / 2.0
+        near = found.at is not None and np.abs(found.at - middle).max() <= REACH * size / 2.0
+        both = np.array([low, high, *([found.at] if near else [])])
+        self.scale = scale or scales.fitting("length", whole.unit, *map(float, np.ptp(both, axis=0)), ROOM)
+        self.speeds = speeds or scales.fitting(
+            "velocity", own("velocity", state.mechanism.units)[0], fastest, fastest, (ARROW, ARROW)
+        )
+        self.plain = scheme(state, self.scale, numbers=False)
+        self.spots = [point.position / self.scale.per_mm for point in points]
+        self.heads = [at + v.velocity / self.speeds.per_mm for at, v in zip(self.spots, points, strict=True)]
+        self.at = found.at / self.scale.per_mm if near else None
+        corners = np.array([*extent(self.plain.marks), *self.heads, *([self.at] if near else [])])
+        self.window = Box(*map(float, (*(corners.min(axis=0) - EDGE), *(corners.max(axis=0) + EDGE))))
+
+    def picture(self) -> Picture:
+        """Lines below the scheme, arrows and C above."""
+        marks: list[Mark] = [*self._lines(), *self.plain.marks]
+        for name, at, tip in zip(self.names, self.spots, self.heads, strict=True):
+            if np.hypot(*(tip - at)) > 1e-6:
+                marks.append(Arrow(spot(at), spot(tip), Pen.VELOCITY, f"velocity {name}"))
+                marks.append(
+                    Letter(
+                        f"$v_{{{name}}}$" if _simple(name) else f"v {name}",
+                        spot(tip),
+                        f"velocity {name}",
+                        9.0,
+                        0.8,
+                        math=_simple(name),
+                    )
+                )
+        if self.at is not None:
+            marks.append(Circle(spot(self.at), RING, Pen.CENTRE, "centre", Fill.PAPER))
+            marks.append(Letter(self.letter, spot(self.at), "centre", 9.0, RING + 0.7))
+        return Picture(
+            tuple(marks),
+            "Instantaneous centre from two directions",
+            (str(self.scale), str(self.speeds), *self._notes()),
+        )
+
+    def _lines(self) -> Iterator[Mark]:
+        """The normals at both points, to C or as far as the sheet goes, and the line through heads where it serves."""
+        end = self.found.at if self.found.at is None else self.found.at / self.scale.per_mm
+        for name, at, tip in zip(self.names, self.spots, self.heads, strict=True):
+            along = tip - at if np.hypot(*(tip - at)) > 1e-6 else None
+            if along is None:
+                continue
+            normal = np.array([-along[1], along[0]]) / np.hypot(*along)
+            yield from self._stroke(f"normal {name}", at, normal if end is None else end - at, end)
+            if self.at is not None and np.hypot(*(self.at - at)) > 8.0:
+                text = f"$r_{{{name}}}$" if _simple(name) else f"r {name}"
+                yield Letter(text, spot((at + self.at) / 2.0), f"radius {name}", 9.0, 0.8, math=_simple(name))
+        if self.found.by_heads:
+            yield from self._stroke("heads", self.heads[0], end - self.heads[0], end, self.heads[1])
+
+    def _stroke(
+        self, about: str, start: Array, way: Array, end: Array | None, also: Array | None = None
+    ) -> Iterator[Line]:
+        """A line from a spot to C, if it is on the sheet, else to the sheet's edge; through another spot as well."""
+        length = float(np.hypot(*way))
+        if length <= 1e-9:
+            return
+        ray = Ray(start, way / length, about, frozenset())
+        low, high = ray.inside(self.window) or (0.0, 0.0)
+        parts = [0.0, *([ray.part(also)] if also is not None else [])]
+        parts += [np.inf] if end is None else [ray.part(end)]
+        ends = max(low, min(parts) - OVER), min(high, max(parts) + OVER)
+        if ends[0] < ends[1]:
+            yield Line(tuple(spot(ray.at(part)) for part in ends), Pen.CENTRE_LINE, about)
+
+    def _notes(self) -> Iterator[str]:
+        """How C was found, and the angular velocity from each point."""
+        yield self.found.how.format(C=self.letter)
+        if self.found.at is None:
+            return
+        length, of = length_of_rates(self.units.length)
+        for name, point in zip(self.names, self.points, strict=True):
+            radius, speed = (float(np.hypot(*each)) for each in (point.position - self.found.at, point.velocity))
+            if radius > 0.0 and speed > 0.0:
+                v, r = speed * of.from_si(1.0), radius * of.from_si(1.0)
+                yield f"ω = v / r at {name}: {v:.4g} {length}/s / {r:.4g} {length} = {speed / radius:.4g} rad/s"
+        if self.at is None:
+            yield f"{self.letter} lies outside, where the lines lead"
+
+
+def _simple(name: str) -> bool:
+    """Whether a name can stand as an index in a formula."""
+    return name.isalnum()

@@ -1,0 +1,1 @@
+"""Curves of a run: displacement, velocity, acceleration, loci, positions."""

@@ -1,0 +1,1 @@
+"""Free bodies, force polygons, torque and bearing loads drawn."""

@@ -1,0 +1,1 @@
+"""Letters and texts: their fonts, sizes and places."""

@@ -1,0 +1,1 @@
+"""Strokes on paper, in millimetres."""

@@ -1,0 +1,123 @@
+"""Scales of drawings: round ones that fit the paper, or given ones, and how they are said."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import floor, isfinite, log10
+
+from planar.foundation.errors import BadInput
+from planar.foundation.units import UnitError, coherent, quantity, unit
+
+WIDTH, HEIGHT = 150.0, 110.0
+"""mm on paper that one drawing takes at the most, unless its scale is given."""
+ROUND = (1.0, 2.0, 5.0, 10.0)
+"""First digits of a scale that a ruler reads easily."""
+PLAIN = (1.0, 2.0, 5.0)
+DEGREES = (1.0, 2.0, 3.0, 4.5, 6.0, 9.0, 1.5)
+"""First digits of the step between two numbers of an axis."""
+THOUSANDS = (("G", 1e9), ("M", 1e6), ("k", 1e3))
+LARGE, SMALL = 10.0, 0.01
+"""A force or a couple is said in the next larger unit from so many of these on, below so many in thousandths."""
+SYMBOLS = {"length": "μₗ", "velocity": "μᵥ", "acceleration": "μₐ"}
+"""Of the calculating scales of a space diagram and its polygons."""
+
+
+@dataclass(frozen=True)
+class Scale:
+    """So much of a quantity (SI) to a millimetre on paper; `unit` is the one in which it is said, such as mm or m/s."""
+
+    kind: str
+    per_mm: float
+    unit: str
+
+    def on_paper(self, value: float) -> float:
+        """Millimetres on paper for a value (SI)."""
+        return value / self.per_mm
+
+    def __str__(self) -> str:
+        """As chapters write it: 1 cm = 100 mm."""
+        value, written = unit(self.unit).from_si(10.0 * self.per_mm), self.unit
+        if written == "mm" and value >= 1000.0:
+            value, written = value / 1000.0, "m"
+        told = f"1 cm = {value:.6g} {raised(written)}"
+        return f"{told} (1:1)" if self.kind == "length" and self.per_mm == 1e-3 else told
+
+    @property
+    def mu(self) -> str:
+        """The calculating scale, in SI units to a millimetre, of inches in these: μₗ = 0.01 m/mm."""
+        name, of = coherent(self.unit)
+        name = raised(name)
+        return f"{SYMBOLS[self.kind]} = {of.from_si(self.per_mm):.4g} {f'({name})' if '/' in name else name}/mm"
+
+
+def fitting(kind: str, written: str, width: float, height: float, room: tuple[float, float] = (WIDTH, HEIGHT)) -> Scale:
+    """The roundest largest scale at which `width` x `height` (SI) fits the room (mm); `written` is the unit said."""
+    most = max(width / room[0], height / room[1])
+    size = unit(written)
+    per_cm = size.from_si(10.0 * most)
+    if not isfinite(per_cm) or per_cm <= 0.0:
+        return Scale(kind, size.to_si(1.0) / 10.0, written)
+    power = 10.0 ** floor(log10(per_cm))
+    # a hair of slack, so that what fits exactly fits
+    first = next(digit for digit in ROUND if digit * power >= per_cm * (1.0 - 1e-9))
+    return Scale(kind, size.to_si(first * power) / 10.0, written)
+
+
+def round_step(least: float, firsts: Sequence[float] = PLAIN) -> float:
+    """The smallest step of the form first * 10^k that is not below the least."""
+    power = 10.0 ** (floor(log10(least)) - 1)
+    steps = sorted(first * power * more for first in firsts for more in (1.0, 10.0, 100.0))
+    return next(step for step in steps if step >= least * (1.0 - 1e-9))
+
+
+def prefixed(value: float) -> tuple[str, float]:
+    """The prefix of the unit in which so much force (N) or couple (N m) is said, and how many SI units that has."""
+    small = ("m", 1e-3) if 0.0 < abs(value) < SMALL else ("", 1.0)
+    return next((each for each in THOUSANDS if abs(value) >= LARGE * each[1]), small)
+
+
+def said(value: float, measure: str) -> str:
+    """A force (N) or a couple (N m) with its unit: 46.65 kN."""
+    prefix, by = prefixed(value)
+    return f"{value / by:.4g} {prefix}{measure}".replace("-", "−")
+
+
+def raised(written: str) -> str:
+    """A unit as it is printed: m/s²."""
+    return written.replace("^2", "²")
+
+
+def given(text: str) -> Scale:
+    """A scale as a reader writes it: "1 cm = 0.1 m/s", of lengths also "1:5" or "2:1". Raises BadInput."""
+    ratio = re.fullmatch(r"\s*([0-9.]+)\s*:\s*([0-9.]+)\s*", text)
+    try:
+        if ratio is not None:
+            paper, real = (float(part) for part in ratio.groups())
+            kind, per_mm, written = "length", 1e-3 * real / paper, "mm"
+        else:
+            left, equals, right = text.partition("=")
+            if not equals:
+                raise UnitError(f'{text!r} is not of the form "1 cm = 100 mm", "1 cm = 0.1 m/s" or "1:5"')
+            written = re.sub(r"^[\s0-9.eE+-]+", "", right).strip()
+            kind = unit(written).kind
+            per_mm = quantity(right.strip(), kind) / (1e3 * quantity(left.strip(), "length"))
+    except (UnitError, ZeroDivisionError, ValueError) as problem:
+        raise BadInput("scale", f"{problem}") from None
+    if not 0.0 < per_mm < 1e12:
+        raise BadInput("scale", f"{text!r} is no scale that could be drawn")
+    return Scale(kind, per_mm, written)
+
+
+def scales(texts: str | Sequence[str] | None, kinds: Sequence[str] = tuple(SYMBOLS)) -> dict[str, Scale]:
+    """Scales as a reader writes them, by the kind of quantity that each measures. Raises BadInput for other kinds."""
+    found: dict[str, Scale] = {}
+    for text in [texts] if isinstance(texts, str) else texts or ():
+        scale = given(text)
+        if scale.kind not in kinds:
+            raise BadInput("scale", f"this drawing has a scale of {' and of '.join(kinds)}, not of {scale.kind}")
+        if scale.kind in found:
+            raise BadInput("scale", f"two scales of {scale.kind} are given; one is wanted")
+        found[scale.kind] = scale
+    return found

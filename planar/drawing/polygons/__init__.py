@@ -1,0 +1,1 @@
+"""Velocity and acceleration polygons drawn."""

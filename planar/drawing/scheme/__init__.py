@@ -1,0 +1,1 @@
+"""The space diagram: links, pairs, supports, springs, as a textbook draws them."""

@@ -1,0 +1,115 @@
+"""Parts of a scheme in which symbols lie upon each other, drawn once more beside it and larger."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from itertools import combinations
+from math import hypot
+
+from planar.drawing.labels.placement import SAME
+from planar.drawing.paper.picture import Letter, Line, Mark, Pen, Picture, Spot, extent, spot
+from planar.drawing.paper.scales import Scale, fitting
+from planar.drawing.scheme import symbols
+from planar.drawing.scheme.link_bodies import all_marks
+from planar.drawing.scheme.scheme import CROWDED, scheme, scheme_scale, standing
+from planar.foundation.geometry import Vector
+from planar.model.mechanism import named_points
+from planar.model.pairs.symbols import Block, Pin
+from planar.model.wording import listed
+from planar.results.motion import State
+
+APART = 24.0
+"""mm: the two nearest points of a detail are at the most so far apart, and four tenths of it at the least."""
+LARGEST = 50.0
+"""How much larger than the usual scheme a detail may be."""
+AROUND = 14.0
+"""mm of the scheme about the points of a detail."""
+MOST = 3
+"""Details of a drawing, the most crowded ones."""
+PART = 0.5
+"""Of the mechanism that a detail may show: a larger one would be the drawing again."""
+
+
+def scheme_with_details(state: State, scale: Scale | None = None) -> list[Picture]:
+    """The scheme of a position, and each part of it that is crowded at its scale, framed there, at a larger one.
+
+    Crowded are points whose pins or blocks lie upon each other. Raises BadInput for a scale that is none.
+    """
+    usual = scheme_scale(state)
+    chosen = scale or usual
+    whole = scheme(state, chosen)
+    points = _symbols(state)
+    most = PART * max(
+        (max(each) - min(each) for each in zip(*(at for at, _ in points.values()), strict=True)), default=0.0
+    )
+    frames: list[Mark] = []
+    pictures = []
+    for names, places, nearest in _clusters(points, chosen):
+        apart = min(APART, LARGEST * usual.on_paper(nearest))
+        larger = fitting("length", state.mechanism.units.length, nearest, nearest, (apart, apart))
+        by = chosen.per_mm / larger.per_mm
+        window = _window(places, larger.per_mm)
+        wide = max(b - a for a, b in zip(*window, strict=True)) * larger.per_mm
+        if by <= 1.0 or wide > most or len(pictures) == MOST:
+            continue
+        title = f"Detail: {listed(names)}"
+        (left, low_), (right, up) = (spot(Vector(*corner) * (1.0 / by)) for corner in window)
+        frames.append(Line(((left, low_), (right, low_), (right, up), (left, up)), Pen.CIRCLE, title, closed=True))
+        marks = tuple(mark for mark in scheme(state, larger).marks if _meets(mark, window))
+        pictures.append(Picture(marks, title, (str(larger),), window))
+    return [whole._replace(marks=(*whole.marks, *frames)), *pictures]
+
+
+def _symbols(state: State) -> dict[str, tuple[Vector, float]]:
+    """The place (m) of every pin and block by its point's name, and how far its symbol reaches (mm)."""
+    frames, found = standing(state.frames), {}
+    marks = all_marks(state.mechanism, state.shapes)
+    pins = {mark.name for mark in marks if isinstance(mark, Pin)}
+    blocks = {mark.name for mark in marks if isinstance(mark, Block)}
+    riders = {pair.rides()[0] for pair in state.mechanism.pairs if pair.name in blocks and pair.rides()}
+    for each in named_points(state.mechanism):
+        block = not riders.isdisjoint(each.members)
+        if block or each.name in pins:
+            link, point = each.members[0]
+            reach = hypot(*symbols.BLOCK) / 2.0 if block else CROWDED / 2.0
+            found[each.name] = frames[link].carry(state.shapes[link].at(point)), reach
+    return found
+
+
+def _clusters(
+    points: Mapping[str, tuple[Vector, float]], scale: Scale
+) -> Iterator[tuple[list[str], list[Vector], float]]:
+    """Points whose symbols lie upon each other: their names, their places (m), and how far the nearest two are (m)."""
+    near: dict[tuple[str, str], float] = {}
+    for (one, (a, reach)), (other, (b, far)) in combinations(points.items(), 2):
+        apart = hypot(*(a - b))
+        if SAME < scale.on_paper(apart) < reach + far:
+            near[one, other] = apart
+    left = set(near)
+    for first in sorted(near, key=lambda pair: near[pair]):
+        if first not in left:
+            continue
+        group = set(first)
+        while more := {pair for pair in left if not group.isdisjoint(pair)}:
+            group.update(*more)
+            left -= more
+        names = [name for name in points if name in group]
+        yield names, [points[name][0] for name in names], near[first]
+
+
+def _window(places: list[Vector], per_mm: float) -> tuple[Spot, Spot]:
+    """The corners of what is shown of a scheme with so many metres to a millimetre."""
+    xs, ys = zip(*places, strict=True)
+    return (
+        (min(xs) / per_mm - AROUND, min(ys) / per_mm - AROUND),
+        (max(xs) / per_mm + AROUND, max(ys) / per_mm + AROUND),
+    )
+
+
+def _meets(mark: Mark, window: tuple[Spot, Spot]) -> bool:
+    """Whether a mark is to be seen in a window; letters by their spots, rates of inputs only in the whole drawing."""
+    if isinstance(mark, Letter) and mark.about.startswith("input "):
+        return False
+    (left, low), (right, up) = window
+    (a, b), (c, d) = extent([mark])
+    return a <= right and c >= left and b <= up and d >= low

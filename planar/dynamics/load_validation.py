@@ -1,0 +1,105 @@
+"""What is made in Python to act on a mechanism, held against it; what a file has is checked at its place there."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator
+from math import isfinite
+
+from planar.dynamics.load_attachment import attachments
+from planar.foundation.errors import BadInput
+from planar.model.loads import Load, Mass, Spring
+from planar.model.mechanism import Mechanism, motions, named_points
+
+Wrong = Iterator[str]
+
+
+def check(mechanism: Mechanism) -> None:
+    """Refuse loads, springs and masses that are none of this mechanism's. Raises BadInput."""
+    known = _Known(mechanism)
+    of = (("loads", mechanism.loads, known.load), ("springs", mechanism.springs, known.spring))
+    for name, each, problems in (*of, ("masses", mechanism.masses, known.mass)):
+        for index, item in enumerate(each):
+            for sentence in problems(item):
+                raise BadInput(f"{name}[{index}]", sentence)
+    if not all(map(isfinite, mechanism.gravity)):
+        raise BadInput("gravity", "gravity is two finite numbers")
+
+
+def refuse_unloaded(mechanism: Mechanism) -> None:
+    """Raise BadInput where a mechanism has no loads, springs or masses, so that there are no forces to be shown."""
+    if not (mechanism.loads or mechanism.springs or mechanism.masses):
+        raise BadInput("$.loads", _how_to_load(mechanism))
+
+
+def _how_to_load(mechanism: Mechanism) -> str:
+    """That nothing acts on a mechanism, and how what acts is written, with names of its own."""
+    frame = mechanism.frame
+    moving = [each.name for each in named_points(mechanism) if frame not in (link for link, _ in each.members)]
+    links = [link.name for link in mechanism.links if link.name != frame]
+    load = {"point": moving[-1], "force": [-100, 0]} if moving else {"link": links[-1], "torque": 10} if links else {}
+    mass = {"link": links[-1], "mass": 2, "at": [0, 0]} if links else {}
+    example = json.dumps({"loads": [load], "masses": [mass]}, ensure_ascii=False)[1:-1] if links else '"loads": []'
+    return (
+        "the mechanism has no loads, springs or masses; write forces (N) at points or torques (N m) on links, "
+        f"and masses (kg), as {example} in its file"
+    )
+
+
+class _Known:
+    """The names of one mechanism."""
+
+    def __init__(self, mechanism: Mechanism):
+        self.names = {
+            "point": tuple(attachments(mechanism)),
+            "link": tuple(link.name for link in mechanism.links),
+            "pair": tuple(motions(mechanism)),
+            "input": tuple(given.pair for given in mechanism.inputs),
+        }
+        self.own = {link.name: link.names for link in mechanism.links}
+
+    def load(self, load: Load) -> Wrong:
+        """What is wrong with a load."""
+        parts = ((load.point, load.force), (load.link, load.torque), (load.pair, load.effort))
+        if any((on is None) != (what is None) for on, what in parts):
+            yield "a force acts at a point, a torque on a link, an effort at a pair; one of the two is left out"
+        if all(on is None for on, _ in parts):
+            yield "a load is a force at a point, or a torque on a link, or an effort at a pair"
+        yield from self._unknown(point=load.point, link=load.link, pair=load.pair)
+        yield from self._unknown(link=load.axes)
+        yield from _infinite((*(load.force or ()), load.torque or 0.0, load.effort or 0.0))
+        if load.varies is not None:
+            course = load.varies
+            yield from self._unknown(input=course.input)
+            if len(course.at) < 2 or len(course.at) != len(course.factors) or list(course.at) != sorted(course.at):
+                yield "a load varies over two places or more that rise, with a factor for each"
+            yield from _infinite((*course.at, *course.factors))
+
+    def spring(self, spring: Spring) -> Wrong:
+        """What is wrong with a spring."""
+        if (spring.points is None) == (spring.links is None):
+            yield "a spring stands between two points, or turns between two links"
+        for end in spring.ends:
+            yield from self._unknown(**{"link" if spring.turns else "point": end})
+        yield from _infinite((spring.stiffness, spring.free, spring.damping))
+        if min(spring.stiffness, spring.damping) < 0.0:
+            yield "stiffness and damping are zero or more"
+
+    def mass(self, mass: Mass) -> Wrong:
+        """What is wrong with a mass."""
+        yield from self._unknown(link=mass.link)
+        if isinstance(mass.at, str) and mass.at not in self.own[mass.link]:
+            yield f"link {mass.link!r} has no point {mass.at!r}"
+        yield from _infinite((mass.mass, mass.inertia, *(() if isinstance(mass.at, str) else mass.at)))
+        if min(mass.mass, mass.inertia) < 0.0:
+            yield "mass and inertia are zero or more"
+
+    def _unknown(self, **named: str | None) -> Wrong:
+        for what, name in named.items():
+            if name is not None and name not in self.names[what]:
+                yield f"there is no {what} {name!r}; {what}s are {', '.join(self.names[what])}"
+
+
+def _infinite(values: Iterable[float]) -> Wrong:
+    if not all(map(isfinite, values)):
+        yield "loads, springs and masses are finite numbers"

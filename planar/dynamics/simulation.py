@@ -1,0 +1,309 @@
+"""A mechanism let go: its motion in time under loads, weights and springs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from numbers import Integral, Real
+from typing import Any
+
+import numpy as np
+
+from planar.dynamics.equations_of_motion import Accelerations
+from planar.dynamics.external_actions import Field
+from planar.dynamics.lagrangian import work
+from planar.dynamics.load_validation import check
+from planar.equations.functions import size
+from planar.foundation.errors import BadInput, NoAnswer, Outcome
+from planar.foundation.geometry import Frame, frame_at
+from planar.foundation.jets import Jet
+from planar.model.mechanism import Input, Mechanism
+from planar.model.wording import listed
+from planar.results.motion import Motion, State
+from planar.results.records import InputMotion
+from planar.solving.position import Solver, solve
+
+Array = np.ndarray
+
+RELATIVE = 1e-12
+"""What a step may be off, of sizes and turns and of the rates that are reached."""
+LONGEST, MOST_STEPS = 1e4, 10**5
+STEADY = 1e-12
+"""Energies that change by less than this part of the greatest do not change."""
+LEAST, MOST_TINY = 1e-10, 20
+"""Of the time: so many steps in a row that are shorter than this get nowhere."""
+WEAK, KEPT, MEMORY, SMOOTH = 5e-3, 6, 200, 1e-5
+"""A weakest constraint beside the strongest as near a change point; from how many of the steps before, and of how many,
+the motion goes on beyond, and by how much these may miss."""
+BENT = 1e-8
+"""What is brought back onto the constraints by more than this is bent: near a change point these are weak."""
+FIRM = 1e-5
+"""Nearer to a change point accelerations are no more told by the constraints."""
+Tick = Callable[[float], None]
+"""Told how much of the time is done, from 0 to 1."""
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation:
+    """A motion in time, and its energies at every row (n,), J.
+
+    `work` is what loads, dampers and driven inputs have put in since the start, so that kinetic + potential - work
+    stays what it was: `balance` is how far it does not, of the greatest of the three.
+    """
+
+    motion: Motion
+    kinetic: Array
+    potential: Array
+    work: Array
+    driven: tuple[str, ...]
+
+    @property
+    def balance(self) -> float:
+        """How well energy is kept: the greatest change of what should not change, beside what goes to and fro.
+
+        Where nothing goes to and fro, beside the greatest of the energies.
+        """
+        whole = self.kinetic + self.potential - self.work
+        swing = max(float(np.ptp(each)) for each in (self.kinetic, self.potential, self.work))
+        most = max(float(np.abs(each).max()) for each in (self.kinetic, self.potential, self.work))
+        beside = swing if swing > STEADY * most else most
+        return float(np.ptp(whole)) / beside if beside else 0.0
+
+
+def simulate(
+    mechanism: Mechanism,
+    duration: float,
+    steps: int = 360,
+    driven: Sequence[str] = (),
+    *,
+    moving: bool = False,
+    tick: Tick | None = None,
+) -> Simulation:
+    """The motion of a mechanism that is let go at the file's position, for a duration (s), in so many steps.
+
+    Inputs that have a law keep to it, the others only say where the motion starts; `driven` names others that are to
+    keep to their laws, or to the file's velocity and acceleration. From rest, or `moving` with the file's velocities.
+    Accelerations come from masses, loads, weights, springs and dampers; they are integrated by the method of order 8 of
+    Dormand and Prince (E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 1993, II.5), and
+    after every step the position is brought back onto the constraints.
+
+    A motion that cannot go on says so in its `outcome` and `reason`. Raises BadInput for a duration or names that are
+    none, NoAnswer where there is no position to start from, or something can move that has no mass.
+    """
+    if isinstance(duration, bool) or not isinstance(duration, Real) or not 0.0 < duration <= LONGEST:
+        raise BadInput("duration", f"a time above zero up to {LONGEST:g} s is wanted, not {duration!r:.40}")
+    if isinstance(steps, bool) or not isinstance(steps, Integral) or not 1 <= steps <= MOST_STEPS:
+        raise BadInput("steps", f"a whole number of steps from 1 to {MOST_STEPS} is wanted, not {steps!r:.40}")
+    names = [given.pair for given in mechanism.inputs]
+    for pair in driven:
+        if pair not in names:
+            raise BadInput(
+                "driven", f"there is no input at {pair!r} to be driven; the inputs are at {', '.join(names)}"
+            )
+    kept = [given.pair for given in mechanism.inputs if given.law is not None or given.pair in driven]
+    check(mechanism)
+    started = (
+        mechanism if moving else replace(mechanism, inputs=tuple(_resting(each, kept) for each in mechanism.inputs))
+    )
+    return _Run(solve(started), kept, duration, steps).done(tick)
+
+
+def _resting(given: Input, kept: Sequence[str]) -> Input:
+    """An input as it starts: from rest where it is let go, at its law's own rates where it is driven."""
+    if given.pair not in kept:
+        return given._replace(velocity=0.0, acceleration=0.0, law=None)
+    if given.law is None:
+        return given
+    _, velocity, acceleration, _ = given.law.at(np.zeros(1), given.position, given.velocity)[:, 0]
+    return given._replace(velocity=float(velocity), acceleration=float(acceleration))
+
+
+def _only_to(time: float, why: str) -> str:
+    return f"the motion can be told only to {time:.6g} s{why}"
+
+
+class _Run:
+    """One motion from a solved position."""
+
+    def __init__(self, start: State, kept: Sequence[str], duration: float, steps: int):
+        self.start, self.mechanism, self.kept = start, start.mechanism, tuple(kept)
+        self.work = work(self.mechanism)
+        q, q1, _ = (each[0] for each in self.work.coordinates(start))
+        unit = size(self.mechanism, self.work.shapes)
+        self.law = Accelerations(self.work, kept, unit, self.work.wound(q))
+        self.many = len(q)
+        q, q1 = self.law.closed(0.0, q, q1)
+        self.first = np.concatenate([q, q1, [0.0]])
+        self.time = np.linspace(0.0, duration, steps + 1)
+
+    def done(self, tick: Tick | None) -> Simulation:
+        rows, outcome, reason = self._integrated(tick)
+        time = self.time[: len(rows)]
+        q, q1 = rows[:, : self.many], rows[:, self.many : 2 * self.many]
+        q2 = np.array([self._accelerations(*each) for each in zip(time, q, q1, strict=True)])
+        energies = np.array([self.law.energy(*each) for each in zip(time, q, q1, strict=True)])
+        motion = replace(self._motion(time, q, q1, q2), outcome=outcome, reason=reason)
+        return Simulation(motion, energies[:, 0], energies[:, 1], rows[:, -1], self.kept)
+
+    def _accelerations(self, time: float, q: Array, q1: Array) -> Array:
+        """Those of a row; not a number where nothing tells them."""
+        try:
+            pushed = self.law.of(time, q, q1)
+        except NoAnswer:
+            return np.full(self.many, np.nan)
+        return pushed.q2 if pushed.firm > FIRM else np.full(self.many, np.nan)
+
+    def _integrated(self, tick: Tick | None) -> tuple[Array, Outcome, str]:
+        """The rows at all times that were reached, and why not all of them were."""
+        rows = [self.first]
+        if not np.all(np.isfinite(self.law.of(0.0, *self._parts(self.first)).q2)):
+            return np.array(rows), Outcome.BRANCH_LOST, _only_to(0.0, self._why(0.0, self.first))
+        try:
+            stopped = self._fill(rows, tick)
+        except NoAnswer as massless:
+            told = _only_to(float(self.time[len(rows) - 1]), f": beyond, {massless.reason}")
+            return np.array(rows), massless.outcome, told
+        return np.array(rows), Outcome.BRANCH_LOST if stopped else Outcome.SOLVED, stopped
+
+    def _fill(self, rows: list[Array], tick: Tick | None) -> str:
+        """Add the rows after the first, as far as they can be told; why not all of them."""
+        last = float(self.time[-1])
+        solver, good, tiny = self._integrator(0.0, self.first), [], 0
+        while solver.status == "running":
+            failed = False
+            try:
+                solver.step()
+            except FloatingPointError:
+                failed = True
+            firm = self.law.of(solver.t, *self._parts(solver.y)).firm
+            y = self._back(solver.t, solver.y)
+            failed = failed or self._moved(solver.y, y) > BENT
+            tiny = tiny + 1 if (solver.step_size or 0.0) < LEAST * last else 0
+            if failed or solver.status == "failed" or tiny > MOST_TINY:
+                over = self._over(good, solver.t) if firm < WEAK else None
+                if over is None:
+                    return _only_to(solver.t, self._why(solver.t, solver.y))
+                at, inner = over
+                self._reach(rows, at, inner)
+                solver, good, tiny = self._integrator(at, self._back(at, inner(at))), [], 0
+                continue
+            self._reach(rows, solver.t, solver.dense_output())
+            solver.y, solver.f = y, self._rate(solver.t, y)
+            if firm > WEAK:
+                good = [*good[-MEMORY:], (solver.t, y)]
+            if tick is not None:
+                tick(solver.t / last)
+        return ""
+
+    def _reach(self, rows: list[Array], end: float, inner: Callable[..., Array]) -> None:
+        """Add the rows up to a time, on the constraints; with rates as they come where constraints would bend them."""
+        while len(rows) < len(self.time) and self.time[len(rows)] <= end:
+            time = float(self.time[len(rows)])
+            y = np.asarray(inner(time))
+            back = self._back(time, y)
+            if self._moved(y, back) > BENT:
+                back[self.many :] = y[self.many :]
+            rows.append(back)
+
+    def _moved(self, y: Array, back: Array) -> float:
+        """How far coordinates and rates are moved, of sizes and turns and of the rates."""
+        scale = np.concatenate([self.law.scale, np.maximum(np.abs(y[self.many : -1]), self.law.scale)])
+        return float(np.abs((back - y)[:-1] / scale).max(initial=0.0))
+
+    def _integrator(self, time: float, y: Array) -> Any:
+        from scipy.integrate import DOP853  # slow to load, and only needed here
+
+        last, n = float(self.time[-1]), self.many
+        scales = np.concatenate([self.law.scale, self.law.scale / last, [1.0]])
+        fastest = max(float(np.abs(self.first[n : 2 * n] / self.law.scale).max(initial=0.0)) * last, 1.0)
+        scales[n : 2 * n] *= fastest
+        scales[-1] = max(float(np.abs(self.law.energy(0.0, *self._parts(self.first))).max()), 1e-9)
+        return DOP853(self._rate, time, y, last, rtol=RELATIVE, atol=RELATIVE * scales)
+
+    def _why(self, time: float, y: Array) -> str:
+        pushed = self.law.of(time, *self._parts(y))
+        if pushed.firm < WEAK:
+            driven = f"a dead point of what is driven at {listed(self.kept)}, or " if self.kept else ""
+            return f", near {driven}a change point, where branches of the motion cross"
+        if not np.all(np.isfinite(pushed.q2)):
+            return ", where the ends of a spring or damper meet, so that it has no direction"
+        return ", where accelerations grow without end"
+
+    def _over(self, good: Sequence[tuple[float, Array]], stalled: float) -> tuple[float, Callable[..., Array]] | None:
+        """Half as far beyond a change point as the last good step is before it, and the polynomial to there.
+
+        There constraints do not tell accelerations, but the motion is smooth. None where it is not, as where an input
+        jams, or where too few steps are known.
+        """
+        from scipy.interpolate import KroghInterpolator
+
+        chosen: list[tuple[float, Array]] = []
+        for time, y in reversed(good):
+            # about so far from one another as from what they tell
+            if not chosen or chosen[-1][0] - time >= 0.5 * (stalled - good[-1][0]):
+                chosen.append((time, y))
+        if len(chosen) < KEPT:
+            return None
+        chosen = chosen[KEPT - 1 :: -1]
+        at = [time for time, _ in chosen for _ in range(2)]
+        inner = KroghInterpolator(at, [each for time, y in chosen for each in (y, self._rate(time, y))])
+        beyond = stalled + 0.5 * (stalled - good[-1][0])
+        found = np.asarray(inner(beyond))
+        if beyond > self.time[-1] or not np.all(np.isfinite(found)):
+            return None
+        back = self._back(beyond, found)
+        return (
+            (beyond, inner)
+            if self._moved(found, back) < SMOOTH and self.law.of(beyond, *self._parts(back)).firm > 0.1 * WEAK
+            else None
+        )
+
+    def _parts(self, y: Array) -> tuple[Array, Array]:
+        return y[: self.many], y[self.many : -1]
+
+    def _rate(self, time: float, y: Array) -> Array:
+        q, q1 = self._parts(y)
+        found = self.law.of(time, q, q1)
+        if not np.all(np.isfinite(found.q2)):
+            raise FloatingPointError  # with no number the integrator would never end
+        return np.concatenate([q1, found.q2, [found.power]])
+
+    def _back(self, time: float, y: Array) -> Array:
+        """The nearest position and rates that the constraints allow."""
+        return np.concatenate([*self.law.closed(time, *self._parts(y)), y[-1:]])
+
+    def _motion(self, time: Array, *orders: Array) -> Motion:
+        """The rows as a motion like any other."""
+        at = {
+            link: [Jet(*(order[:, k + j] for order in orders)) for j in range(3)]
+            for link, k in self.work.column.items()
+        }
+        frames: dict[str, Frame] = {
+            name: frame_at(*at[name]) if name in at else frame for name, frame in self.start.frames.items()
+        }
+        own = {
+            name: tuple(Jet(*(order[:, k] for order in orders)) for k in range(part.start, part.stop))
+            for name, part in self.work.own.items()
+        }
+        inputs = {}
+        for given in self.mechanism.inputs:
+            pair = self.work.named[given.pair]
+            numbers = pair.measure([self.work.shapes[link] for link in pair.bodies])
+            drive = pair.drive([frames[link] for link in pair.bodies], numbers, own.get(pair.name, ()))
+            inputs[given.pair] = InputMotion(*drive.parts[:3])
+        motion = Motion(
+            mechanism=self.mechanism,
+            inputs=inputs,
+            outcome=Outcome.SOLVED,
+            reason="",
+            residual=0.0,
+            remarks=self.start.remarks,
+            frames=frames,
+            own=own,
+            shapes=self.start.shapes,
+            time=time,
+        )
+        u = np.array([each.position for each in inputs.values()]).reshape(len(inputs), len(time))
+        still = {name: [each.parts[0] for each in values] for name, values in own.items()}
+        gaps = Solver(self.mechanism).gate.gaps(Field(motion, self.work.shapes).frames, still, u)
+        return replace(motion, residual=float(np.max(gaps, initial=0.0)))

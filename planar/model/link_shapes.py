@@ -1,0 +1,176 @@
+"""Where the points of a link lie in its own axes, from what a drawing states about them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from planar.foundation.geometry import Vector, direction
+from planar.foundation.jets import Scalar, sqrt
+
+
+class At(NamedTuple):
+    """A point by its coordinates (m) in the axes in which the link was drawn."""
+
+    x: Scalar
+    y: Scalar
+
+
+class Along(NamedTuple):
+    """A point at a signed distance (m) from `start` on the way to `towards`, that way turned by `angle` (rad)."""
+
+    start: str
+    towards: str
+    distance: Scalar
+    angle: Scalar = 0.0
+
+
+class Distances(NamedTuple):
+    """A point by its distances (m) from two points, to the left of the way from the first to the second, or right."""
+
+    first: str
+    second: str
+    from_first: Scalar
+    from_second: Scalar
+    left: bool = True
+
+
+Place = At | Along | Distances
+Spot = str | tuple[Scalar, Scalar]
+"""A point of a link by name, or by coordinates in the axes in which the link was drawn."""
+
+
+class Point(NamedTuple):
+    """A named point of a link."""
+
+    name: str
+    place: Place
+
+
+@dataclass(frozen=True)
+class Link:
+    """A rigid link: its named points, and how its own axes lie.
+
+    `ends` with `length` (m) put the first end at the origin and the second on the x-axis;
+    `axis` (p, q) puts the x-axis along p to q of points drawn by coordinates.
+    """
+
+    name: str
+    points: tuple[Point, ...] = ()
+    ends: tuple[str, str] | None = None
+    length: Scalar | None = None
+    axis: tuple[str, str] | None = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of all its points, ends first."""
+        return (self.ends or ()) + tuple(point.name for point in self.points)
+
+
+class Unplaced(Exception):
+    """A point cannot be placed; `point` names it (None: the axis), the text says why."""
+
+    def __init__(self, point: str | None, why: str):
+        super().__init__(why)
+        self.point = point
+
+
+@dataclass(frozen=True)
+class Shape:
+    """The points of one link in the link's own axes (m)."""
+
+    points: Mapping[str, Vector]
+    origin: Vector
+    axis: Vector
+    """cos and sin of the link's x-axis in the axes in which it was drawn."""
+
+    def at(self, point: Spot) -> Vector:
+        """A point by name, or by coordinates in the axes in which the link was drawn."""
+        if isinstance(point, str):
+            return self.points[point]
+        return (Vector(*point) - self.origin).turned(Vector(self.axis.x, -self.axis.y))
+
+
+def shape(link: Link) -> Shape:
+    """Place every point of a link.
+
+    Raises Unplaced where a point rests on itself, on a missing point, or on a triangle that does not close.
+    """
+    drawn: dict[str, Vector] = {}
+    if link.ends is not None:
+        drawn[link.ends[0]] = Vector(0.0, 0.0)
+        drawn[link.ends[1]] = Vector(link.length, 0.0)
+    places = {point.name: point.place for point in link.points}
+    for name in places:
+        if name not in drawn:
+            _place(name, places, drawn)
+    if link.axis is None:
+        return Shape(drawn, Vector(0.0, 0.0), Vector(1.0, 0.0))
+    origin, towards = (drawn[name] for name in link.axis)
+    way = towards - origin
+    length = sqrt(way.dot(way))
+    if isinstance(length, float) and length == 0.0:
+        raise Unplaced(None, f"points {link.axis[0]!r} and {link.axis[1]!r} coincide, so they give no axis")
+    axis = Vector(way.x / length, way.y / length)
+    back = Vector(axis.x, -axis.y)
+    return Shape({name: (p - origin).turned(back) for name, p in drawn.items()}, origin, axis)
+
+
+def _place(name: str, places: Mapping[str, Place], drawn: dict[str, Vector]) -> None:
+    """Place a point after those that it rests on; a chain of them may be as long as it likes."""
+    way = {name: None}
+    while way:
+        name = next(reversed(way))
+        if name not in places:
+            raise Unplaced([*way][-2], f"there is no point {name!r} on this link")
+        place = places[name]
+        open_ones = [other for other in _rests_on(place) if other not in drawn]
+        if not open_ones:
+            drawn[name] = _placed(name, place, drawn)
+            del way[name]
+            continue
+        if open_ones[0] in way:
+            circle = " on ".join((*way, open_ones[0]))
+            raise Unplaced(name, f"point {name!r} rests on itself: {circle}")
+        way[open_ones[0]] = None
+
+
+def _rests_on(place: Place) -> tuple[str, ...]:
+    if isinstance(place, At):
+        return ()
+    return (place.start, place.towards) if isinstance(place, Along) else (place.first, place.second)
+
+
+def _placed(name: str, place: Place, drawn: Mapping[str, Vector]) -> Vector:
+    if isinstance(place, At):
+        return Vector(place.x, place.y)
+    base, other = _rests_on(place)
+    p, q = drawn[base], drawn[other]
+    way = q - p
+    length = sqrt(way.dot(way))
+    if isinstance(length, float) and length == 0.0:
+        raise Unplaced(name, f"points {base!r} and {other!r} coincide, so they give no direction")
+    unit = Vector(way.x / length, way.y / length)
+    if isinstance(place, Along):
+        return p + unit.turned(direction(place.angle)) * place.distance
+    return p + _apex(name, place, length).turned(unit)
+
+
+def _apex(name: str, place: Distances, base: Scalar) -> Vector:
+    """The apex of a triangle on the x-axis from its three sides (law of cosines)."""
+    a, b = place.from_first, place.from_second
+    if isinstance(a + b + base, float):
+        longest = max(a, b, base)
+        if 2.0 * longest - (a + b + base) > 1e-12 * longest:
+            raise Unplaced(
+                name,
+                f"the triangle {place.first}-{place.second}-{name} does not close: sides "
+                f"{base:.6g}, {a:.6g} and {b:.6g} m (no side may exceed the sum of the others)",
+            )
+    along = (a * a - b * b + base * base) / (2.0 * base)
+    height = a * a - along * along
+    if isinstance(height, float):
+        height = max(height, 0.0)  # a flat triangle, but for rounding
+    root = sqrt(height)
+    return Vector(along, root if place.left else -root)

@@ -1,0 +1,328 @@
+"""A mechanism as immutable data, in SI units: links, pairs, inputs, what acts on it, sketch, what was published."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from math import isfinite
+from numbers import Real
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from planar.foundation.errors import BadInput, listed, unshown
+from planar.foundation.notebook_display import Displayable
+from planar.foundation.units import unit
+from planar.model.link_shapes import Along, At, Distances, Link, Place, Point, Shape
+from planar.model.loads import Course, Load, Mass, Spring
+from planar.model.pairs.base import Pair
+
+if TYPE_CHECKING:
+    from planar.model.input_laws import Law
+
+__all__ = [
+    "QUANTITIES",
+    "Along",
+    "At",
+    "Course",
+    "Distances",
+    "Drive",
+    "Input",
+    "Link",
+    "Load",
+    "Mass",
+    "Mechanism",
+    "NamedPoint",
+    "Place",
+    "Point",
+    "Published",
+    "Spring",
+    "Units",
+    "check",
+    "counting",
+    "entries",
+    "misfits",
+    "motions",
+    "named_points",
+    "running_input",
+    "unlawful",
+    "with_inputs",
+]
+
+
+QUANTITIES = {
+    "position": "length",
+    "velocity": "velocity",
+    "acceleration": "acceleration",
+    "centripetal acceleration": "acceleration",
+    "tangential acceleration": "acceleration",
+    "Coriolis acceleration": "acceleration",
+    "angular velocity": "angular velocity",
+    "angular acceleration": "angular acceleration",
+    "rubbing speed": "velocity",
+    "displacement": "length",
+    "sliding velocity": "velocity",
+    "sliding acceleration": "acceleration",
+    "input torque": "torque",
+}
+"""What a published value may be of, and what it is measured in."""
+
+
+HUGE = 10**100
+"""SI; beyond it squares, and squares of squares, overflow."""
+TINY = 1e-100
+"""SI; a number that is not 0 is no smaller, or its square is none."""
+FARTHEST = 1e4
+"""rad or m: to where a position is followed step by step."""
+MOST_COUNTED = 1e12
+"""rad: how far an angle may count; beyond it rounding leaves less than three digits of where it points."""
+
+
+class Input(NamedTuple):
+    """A relative motion that is given: at a turning pair an angle, at a sliding pair a distance (rad or m, per s).
+
+    With a law it moves in time: from `position` on, and where the law goes on at a speed, from `velocity`.
+    """
+
+    pair: str
+    position: float
+    velocity: float = 0.0
+    acceleration: float = 0.0
+    law: Law | None = None
+
+
+class Drive(NamedTuple):
+    """What an input is changed to for one published quantity; None leaves it as it is."""
+
+    pair: str
+    position: float | None = None
+    velocity: float | None = None
+    acceleration: float | None = None
+
+
+class Published(NamedTuple):
+    """A value that a book prints for a quantity of this mechanism (SI), or None where it prints none.
+
+    `tolerance` is the part of the exact value by which a drawing may be off; `slip` says why a printed value
+    is wrong; `inputs` are changed inputs, and `start` those of the position that a displacement is measured from.
+    """
+
+    symbol: str
+    quantity: str
+    of: str
+    value: float | None = None
+    tolerance: float = 0.02
+    relative_to: str | None = None
+    component: str | None = None
+    sense: str | None = None
+    case: str | None = None
+    note: str | None = None
+    slip: str | None = None
+    inputs: tuple[Drive, ...] = ()
+    start: tuple[Drive, ...] = ()
+
+
+class Units(NamedTuple):
+    """The units in which a mechanism's file is written and its positions are printed."""
+
+    length: str = "m"
+    angle: str = "rad"
+
+
+@dataclass(frozen=True)
+class Mechanism(Displayable):
+    """Links joined by pairs, one of them the frame.
+
+    `pairs` are binary: a pin of n links is n - 1 of them. `gravity` is an acceleration (m/s^2). `remarks` are what the
+    reader of the file has to say.
+    """
+
+    name: str
+    frame: str
+    links: tuple[Link, ...]
+    pairs: tuple[Pair, ...]
+    inputs: tuple[Input, ...] = ()
+    loads: tuple[Load, ...] = ()
+    springs: tuple[Spring, ...] = ()
+    masses: tuple[Mass, ...] = ()
+    gravity: tuple[float, float] = (0.0, 0.0)
+    sketch: tuple[tuple[str, float, float], ...] = ()
+    units: Units = field(default_factory=Units)
+    ids: tuple[str, ...] = ()
+    about: str | None = None
+    source: str | None = None
+    geometry: str | None = None
+    notes: tuple[str, ...] = ()
+    published: tuple[Published, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        driven = f", driven at {', '.join(given.pair for given in self.inputs)}" if self.inputs else ""
+        return f"<Mechanism {self.name!r}: {len(self.links)} links, {len(self.pairs)} pairs{driven}>"
+
+    def __hash__(self) -> int:
+        found = self.__dict__.get("_hash")
+        if found is None:
+            found = hash(tuple(getattr(self, each.name) for each in fields(self)))
+            object.__setattr__(self, "_hash", found)
+        return found
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without the hash, which another process would not share."""
+        return {name: value for name, value in self.__dict__.items() if name != "_hash"}
+
+
+class NamedPoint(NamedTuple):
+    """A point under the name that results give it, and the (link, point) that lie there."""
+
+    name: str
+    members: tuple[tuple[str, str], ...]
+
+
+def with_inputs(mechanism: Mechanism, drives: tuple[Drive, ...]) -> Mechanism:
+    """The same mechanism with some of its inputs changed; their laws start from there.
+
+    Raises BadInput where it has no such input.
+    """
+    if not drives:
+        return mechanism
+    for drive in drives:
+        for value in drive[1:]:
+            if value is not None and (isinstance(value, bool) or not isinstance(value, Real) or not isfinite(value)):
+                raise BadInput(drive.pair, f"an input moves to a finite number (rad or m), not {value!r:.60}")
+            if value is not None and abs(value) > MOST_COUNTED:
+                raise BadInput(drive.pair, f"an input moves to {MOST_COUNTED:g} rad or m at most")
+    changes = {drive.pair: drive for drive in drives}
+    for pair in changes.keys() - {given.pair for given in mechanism.inputs}:
+        known = ", ".join(given.pair for given in mechanism.inputs) or "none"
+        raise BadInput(pair, f"there is no input at {pair!r}; the inputs are at {known}")
+
+    def changed(given: Input) -> Input:
+        drive = changes.get(given.pair)
+        if drive is None:
+            return given
+        found = given._replace(**{key: new for key, new in drive._asdict().items() if new is not None})
+        return found._replace(law=given.law and given.law.started(found.position, found.velocity))
+
+    return replace(mechanism, inputs=tuple(changed(given) for given in mechanism.inputs))
+
+
+def running_input(mechanism: Mechanism, pair: str | None) -> int:
+    """Which of the inputs runs while the others stand still; `pair` names it where there are several.
+
+    Raises BadInput where there is no such input, or several of which none is named.
+    """
+    names = [given.pair for given in mechanism.inputs]
+    if not names:
+        raise BadInput("inputs", "the mechanism has no input that could run")
+    if pair is None and len(names) > 1:
+        raise BadInput("inputs", f"there are several inputs, {', '.join(names)}; name the one that runs")
+    if pair is not None and pair not in names:
+        raise BadInput(pair, f"there is no input at {pair!r}; inputs are at {listed(names)}")
+    return 0 if pair is None else names.index(pair)
+
+
+def check(mechanism: Mechanism) -> None:
+    """Refuse a mechanism made in Python that names what it does not have. Raises BadInput.
+
+    What comes from a file has been checked at its place there.
+    """
+    points = {link.name: set(link.names) for link in mechanism.links}
+    names = (*points, *(name for link in mechanism.links for name in link.names), *(p.name for p in mechanism.pairs))
+    for name in names:
+        if unshown(name):
+            raise BadInput(name, f"the name {name!r} holds a character that cannot be shown")
+    if mechanism.frame not in points:
+        raise BadInput("frame", f"there is no link {mechanism.frame!r} to be the frame; links are {listed(points)}")
+    for pair in mechanism.pairs:
+        for link in pair.bodies:
+            if link not in points:
+                raise BadInput(pair.name, f"there is no link {link!r}; links are {listed(points)}")
+        rides = pair.rides()
+        for link, point in (*pair.coincident(), *((rides[0],) if rides else ())):
+            if point not in points[link]:
+                raise BadInput(
+                    pair.name, f"link {link!r} has no point {point!r}; its points are {listed(sorted(points[link]))}"
+                )
+    named = motions(mechanism)
+    for given in mechanism.inputs:
+        if given.pair not in named:
+            raise BadInput(given.pair, f"there is no pair {given.pair!r} to be driven; pairs are {listed(named)}")
+    wrong = unlawful(mechanism)
+    if wrong:
+        raise BadInput(*wrong)
+
+
+def unlawful(mechanism: Mechanism) -> tuple[str, str] | None:
+    """The place of the first law that cannot be, and a sentence why."""
+    for given in mechanism.inputs:
+        wrong = given.law and given.law.problem()
+        if wrong:
+            return f"{given.pair}.law{wrong[0]}", wrong[1]
+    return None
+
+
+def misfits(pairs: Sequence[Pair], shapes: Mapping[str, Shape], units: Units) -> Iterator[tuple[Pair, str]]:
+    """Pairs that do not go with the others, each with a sentence."""
+    for pair in pairs:
+        wrong = pair.misfit(pairs, shapes, lambda value: f"{unit(units.length).from_si(value):.6g} {units.length}")
+        if wrong is not None:
+            yield pair, wrong
+
+
+def counting(mechanism: Mechanism) -> frozenset[str]:
+    """The links whose angles count turns."""
+    return frozenset(link for pair in mechanism.pairs if pair.counts_turns for link in pair.bodies)
+
+
+def entries(mechanism: Mechanism) -> tuple[tuple[Pair, ...], ...]:
+    """The pairs grouped as a file's entries have them: a pin of n links is one entry of n - 1 pairs."""
+    grouped: dict[str, list[Pair]] = {}
+    for pair in mechanism.pairs:
+        grouped.setdefault(pair.entry_name(), []).append(pair)
+    return tuple(tuple(group) for group in grouped.values())
+
+
+def motions(mechanism: Mechanism) -> Mapping[str, Pair]:
+    """Every relative motion that has a name: each pair, and at a pin of n links each two of them."""
+    return {pair.name: pair for group in entries(mechanism) for pair in type(group[0]).motions(group)}
+
+
+def named_points(mechanism: Mechanism) -> tuple[NamedPoint, ...]:
+    """Every point under its result name.
+
+    Points that a pair keeps together stand once under the pair's name; any other under its own name where that
+    is unique, else as `link.point`.
+    """
+    together: dict[tuple[str, str], str] = {}
+    for pair in mechanism.pairs:
+        for member in pair.coincident():
+            together[member] = pair.entry_name()
+    carried = dict.fromkeys((link.name, point) for link in mechanism.links for point in link.names)
+    names = set(together.values())
+    alone = Counter(point for link, point in carried if (link, point) not in together)
+    grouped: dict[str, list[tuple[str, str]]] = {}
+    for link, point in carried:
+        own = point if alone[point] == 1 and point not in names else f"{link}.{point}"
+        grouped.setdefault(together.get((link, point), own), []).append((link, point))
+    return tuple(NamedPoint(name, tuple(members)) for name, members in grouped.items())
+
+
+def unjoined(mechanism: Mechanism) -> dict[str, tuple[str, ...]]:
+    """The points that several links carry under one name though no pair keeps them together there: a link of each.
+
+    Of those alone that are an end of a link, or on a link without ends that one pair at most joins: a name may stand
+    twice by chance.
+    """
+    found: dict[str, dict[str, str]] = {}
+    for each in named_points(mechanism):
+        for link, point in each.members:
+            found.setdefault(point, {}).setdefault(each.name, link)
+    joints = Counter(link for pair in mechanism.pairs for link in pair.links)
+    loose = [link for link in mechanism.links if link.ends is None and joints[link.name] < 2]
+    likely = {(link.name, end) for link in mechanism.links for end in link.ends or ()}
+    likely |= {(link.name, point) for link in loose for point in link.names}
+    return {
+        point: tuple(links.values())
+        for point, links in found.items()
+        if len(links) > 1 and any((link, point) in likely for link in links.values())
+    }

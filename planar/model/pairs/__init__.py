@@ -1,0 +1,25 @@
+"""The pair types, found by looking in this folder: a new type is a new file."""
+
+import json
+from functools import cache
+from importlib import import_module
+from inspect import isabstract
+from pkgutil import iter_modules
+
+from planar.model.pairs.base import Entry, Kind, Pair, Quantity, Rewritten, Sample
+
+__all__ = ["Entry", "Kind", "Pair", "Quantity", "Rewritten", "Sample", "joining", "pair_types"]
+
+
+@cache
+def pair_types() -> dict[str, type[Pair]]:
+    """Every pair type by its keyword."""
+    modules = [import_module(f"{__name__}.{found.name}") for found in iter_modules(__path__)]
+    types = (value for module in modules for value in vars(module).values() if isinstance(value, type))
+    return {kind.keyword: kind for kind in types if issubclass(kind, Pair) and not isabstract(kind)}
+
+
+def joining(point: str) -> str:
+    """The entry of a file, as JSON, that joins all links which carry a point of this name."""
+    entry = next(filter(None, (kind.joining(point) for kind in pair_types().values())))
+    return json.dumps(entry, ensure_ascii=False)

@@ -1,0 +1,324 @@
+"""What a pair type says of itself: its data, its residual, its drive, how it is written, a sample of it."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, ClassVar, NamedTuple, Protocol, Self
+
+from planar.foundation.geometry import Frame, Vector
+from planar.foundation.jets import Scalar
+from planar.model.link_shapes import Shape
+from planar.model.pairs.symbols import Mark
+
+Told = Callable[[float], str]
+"""Says an SI number in the units of a file."""
+
+
+class Kind(Enum):
+    """What a number or an equation measures, and so how it scales and closes."""
+
+    LENGTH = "length"
+    ANGLE = "angle"
+    """An angle that closes modulo a whole turn."""
+    TURNS = "turns"
+    """An angle in which whole turns count."""
+    PURE = "pure"
+
+
+@dataclass(frozen=True)
+class Pair(ABC):
+    """Two links joined so that some relative motions are prevented.
+
+    A pair type is one file of this folder. Its `residual` is written with + - * alone, so the same lines
+    serve floats, arrays, symbols and jets; Jacobian, velocity, acceleration and reactions are derived from it.
+    Its formulas take a frame, or a shape, for each of its `bodies`.
+    """
+
+    name: str
+    links: tuple[str, str]
+    """The two links that it joins."""
+
+    keyword: ClassVar[str]
+    """The key that marks the type in a mechanism file."""
+    members: ClassVar[Mapping[str, Schema]]
+    """The other keys of its entry, each with what JSON Schema says of its value."""
+    required: ClassVar[tuple[str, ...]] = ()
+    """Those of the keys that cannot be left out."""
+    rule: ClassVar[Schema] = {}
+    """What JSON Schema says of the keys together."""
+    lower: ClassVar[bool]
+    """Whether the links touch along a surface; higher pairs touch at a point or along a line."""
+    at_a_distance: ClassVar[bool] = False
+    """Whether something runs between the two links, which do not touch themselves."""
+    touching: ClassVar[str] = ""
+    """What to know of a contact that is open, see `apart`."""
+    counts_turns: ClassVar[bool] = False
+    """Whether the angles of its bodies count whole turns."""
+    constrains: ClassVar[tuple[Kind, ...]]
+    """What each entry of the residual measures."""
+    coordinates: ClassVar[tuple[tuple[str, Kind], ...]] = ()
+    """Coordinates of its own that the residual needs beside the two frames."""
+    measures: ClassVar[tuple[Kind, ...]]
+    """What each number that `measure` takes from the two shapes is."""
+    reports: ClassVar[Mapping[str, str]]
+    """The names of its results, in order, and the kind of quantity that each is."""
+    drive_kind: ClassVar[Kind]
+    """Whether its input is an angle or a length."""
+    ties_angles: ClassVar[bool] = False
+    """Whether it ties angles alone: what holds it are couples, whatever forces they come from (see `contact`)."""
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """The links whose frames its formulas need: the two that it joins, and those that they are seen from."""
+        return self.links
+
+    @abstractmethod
+    def measure(self, shapes: Sequence[Shape]) -> Sequence[Scalar]:
+        """The numbers of the bodies that the residual needs (m, rad)."""
+
+    @abstractmethod
+    def residual(self, frames: Sequence[Frame], numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Sequence[Scalar]:
+        """Zero where the pair is closed, an entry per constraint."""
+
+    @abstractmethod
+    def drive(self, frames: Sequence[Frame], numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Scalar:
+        """The relative motion that an input here prescribes (rad or m)."""
+
+    @abstractmethod
+    def report(self, position: Scalar, rate: Scalar, second: Scalar) -> dict[str, Scalar | None]:
+        """Its results by name, from its drive and the drive's derivatives (SI), numbers or arrays."""
+
+    def coincident(self) -> tuple[tuple[str, str], ...]:
+        """The (link, point) that lie on one another in this pair, so that they bear its name."""
+        return ()
+
+    def rides(self) -> tuple[tuple[str, str], str] | None:
+        """((link, point), link): a point of one link that moves along a line of another, if it does."""
+        return None
+
+    def effort(self, frames: Mapping[str, Frame], shapes: Mapping[str, Shape]) -> Effort:
+        """How an effort of its drive acts."""
+        return Effort(self.links[1], self.links[0])
+
+    def contact(
+        self, frames: Mapping[str, Frame], shapes: Mapping[str, Shape], beside: Sequence[Pair]
+    ) -> Contact | None:
+        """Where its teeth touch, beside all pairs of its mechanism; None without teeth, or where that is not known."""
+        return None
+
+    def marks(self, shapes: Mapping[str, Shape], beside: Sequence[Pair]) -> tuple[Mark, ...]:
+        """How it is drawn, beside all pairs of its mechanism; nothing where its sizes cannot be known."""
+        return ()
+
+    def sizes_told(self, length: Told) -> str:
+        """What else defines it, in words for a reader; empty where its links and points say all."""
+        return ""
+
+    def ahead(self, drive: float) -> bool:
+        """Whether this is the assembly that an author means who says nothing (a slide ahead of `through`)."""
+        return True
+
+    @classmethod
+    def holds(cls) -> int:
+        """How many of the three relative motions of two links it prevents."""
+        return len(cls.constrains) - len(cls.coordinates)
+
+    @classmethod
+    def driven(cls) -> tuple[str, str, str]:
+        """The kinds of quantity of an input's position, velocity and acceleration."""
+        if cls.drive_kind is Kind.LENGTH:
+            return "length", "velocity", "acceleration"
+        return "angle", "angular velocity", "angular acceleration"
+
+    def misfit(self, beside: Sequence[Pair], shapes: Mapping[str, Shape], length: Told) -> str | None:
+        """What is wrong with it beside all pairs of its mechanism, as a sentence."""
+        return None
+
+    def apart(self, numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Scalar:
+        """The gap (m) at a contact that other pairs have to keep closed."""
+        return 0.0
+
+    @classmethod
+    def rewrite(cls, entry: Entry) -> Rewritten | None:
+        """A short form of the entry in full; None where it is no short form."""
+        return None
+
+    @classmethod
+    def joining(cls, point: str) -> dict[str, Any] | None:
+        """The entry by which this type joins all links that carry a point of this name; None for one that does not."""
+        return None
+
+    @classmethod
+    @abstractmethod
+    def read(cls, entry: Entry) -> tuple[Self, ...]:
+        """The pairs that one entry of a file describes."""
+
+    @classmethod
+    @abstractmethod
+    def write(cls, group: Sequence[Self], quantity: Quantity) -> dict[str, Any]:
+        """The entry that describes the pairs which one entry was read into."""
+
+    def entry_name(self) -> str:
+        """The name of the file's entry that this pair comes from."""
+        return self.name
+
+    @classmethod
+    def motions(cls, group: Sequence[Self]) -> tuple[Self, ...]:
+        """Every relative motion of an entry's links that has a name, as pairs."""
+        return tuple(group)
+
+    @classmethod
+    @abstractmethod
+    def samples(cls) -> tuple[Sample, ...]:
+        """Small closed configurations, in general position, on which every law is tried."""
+
+
+class Effort(NamedTuple):
+    """How what drives a pair acts: on one link, and the opposite on another, in the positive sense of the drive.
+
+    A couple, or a force at a place along a way (of length one), in the world's axes.
+    """
+
+    on: str
+    against: str
+    at: Vector | None = None
+    way: Vector | None = None
+
+
+class Contact(NamedTuple):
+    """Where teeth of two links press on one another, in the world's axes.
+
+    They touch at the pitch point `at`; of the force on the second link the part along `way` drives, and `slope` times
+    that part, whatever its sense, pushes it off along `apart` (both of length one): the slope is the tangent of the
+    pressure angle.
+    """
+
+    at: Vector
+    way: Vector
+    apart: Vector
+    slope: float
+
+
+class Rewritten(NamedTuple):
+    """A short entry in full, the links that it brings, and the entry of the pair that is to join these.
+
+    Where the file has an entry of that type and name already, the links are added to it instead.
+    """
+
+    entry: dict[str, Any]
+    links: dict[str, Any]
+    joined_by: dict[str, Any]
+
+
+class Sample(NamedTuple):
+    """A pair closed between its bodies, which are called a, b, c, with everything that its formulas need."""
+
+    pair: Pair
+    shapes: tuple[Shape, ...]
+    frames: tuple[Frame, ...]
+    own: tuple[float, ...]
+    entry: dict[str, Any]
+    """The pair as a file has it."""
+    beside: tuple[dict[str, Any], ...] = ()
+    """Entries of other pairs without which it would be refused."""
+
+
+def plain(**points: Vector) -> Shape:
+    """A link of a sample, with these points in its own axes."""
+    return Shape(points, Vector(0.0, 0.0), Vector(1.0, 0.0))
+
+
+Schema = Mapping[str, Any]
+"""What JSON Schema says of a value."""
+
+
+def described(name: str) -> Schema:
+    """The schema of a kind of value that several entries have, such as "length" or "point"."""
+    return {"$ref": f"#/$defs/{name}"}
+
+
+def several(item: str, least: int, most: int | None = None) -> Schema:
+    """The schema of a list of so many values of one kind."""
+    return {"type": "array", "items": described(item), "minItems": least} | ({"maxItems": most} if most else {})
+
+
+class Quantity(Protocol):
+    """Writes an SI number in the units of a file."""
+
+    def __call__(self, value: float, kind: str) -> float | str: ...
+
+
+class Entry(Protocol):
+    """An object of a mechanism file under a reader that knows its place and units."""
+
+    @property
+    def frame(self) -> str:
+        """The link that is the mechanism's frame."""
+
+    def has(self, key: str) -> bool:
+        """Whether the object has this key."""
+
+    def number(self, key: str) -> float:
+        """A number without a unit."""
+
+    def only(self, *keys: str) -> None:
+        """Refuse any key but these."""
+
+    def name(self, key: str) -> str:
+        """A new name."""
+
+    def quantity(self, key: str, kind: str, default: float | None = None) -> float:
+        """A number in SI; `default` where the key is left out."""
+
+    def names(self, key: str, count: int) -> tuple[str, ...]:
+        """So many names."""
+
+    def links(self, key: str) -> tuple[str, ...]:
+        """Two or more different links of the mechanism."""
+
+    def two_links(self, key: str) -> tuple[str, str]:
+        """Two different links of the mechanism."""
+
+    def quantities(self, key: str, kind: str, count: int) -> tuple[float, ...]:
+        """So many numbers in SI."""
+
+    def counts(self, key: str, count: int) -> tuple[float, ...]:
+        """So many whole numbers."""
+
+    def turned(self, key: str) -> float:
+        """An angle (rad) that may count turns, not so many that nothing is left of the angle."""
+
+    def flag(self, key: str) -> bool:
+        """True or false; false where the key is left out."""
+
+    def carriers(self, point: str) -> tuple[str, ...]:
+        """All links that carry a point of this name, the frame first."""
+
+    def point(self, key: str, link: str) -> str:
+        """A point that the link carries."""
+
+    def carried(self, point: str, link: str, key: str) -> None:
+        """Refuse, at the key, a point that the link does not carry."""
+
+    def place(self, key: str, link: str) -> str | tuple[float, float]:
+        """A point of the link by name, or by coordinates."""
+
+    def fields(self) -> Mapping[str, Any]:
+        """The members of the object."""
+
+    def link(self, key: str) -> str:
+        """A link of the mechanism."""
+
+    def distinct(
+        self, key: str, link: str, first: str | tuple[float, float], second: str | tuple[float, float]
+    ) -> None:
+        """Refuse, at the key, two places of a link that coincide."""
+
+    def inside(self, key: str) -> Entry:
+        """The object under this key."""
+
+    def refuse(self, key: str | None, sentence: str) -> Exception:
+        """The error that says this of the place."""

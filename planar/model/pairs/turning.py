@@ -1,0 +1,168 @@
+"""The turning pair: a point of one link stays on a point of the other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any, ClassVar, Self
+
+from planar.foundation.geometry import Frame, Vector, frame_at
+from planar.foundation.jets import Scalar
+from planar.model.link_shapes import Shape
+from planar.model.pairs.base import (
+    Effort,
+    Entry,
+    Kind,
+    Pair,
+    Quantity,
+    Sample,
+    Schema,
+    described,
+    plain,
+    several,
+)
+from planar.model.pairs.symbols import Mark, Pin
+
+
+@dataclass(frozen=True)
+class Turning(Pair):
+    """A pin through `points` of the two links; a pin of n links is n - 1 of these, all from its first link."""
+
+    points: tuple[str, str]
+    pin: str
+    radius: float | None = None
+
+    keyword: ClassVar[str] = "turning"
+    members: ClassVar[Mapping[str, Schema]] = {
+        "links": several("name", 2) | {"uniqueItems": True},
+        "points": several("name", 2),
+        "pin_radius": described("size"),
+        "pin_diameter": described("size"),
+    }
+    rule: ClassVar[Schema] = {"not": {"required": ["pin_radius", "pin_diameter"]}}
+    lower: ClassVar[bool] = True
+    constrains: ClassVar[tuple[Kind, ...]] = (Kind.LENGTH, Kind.LENGTH)
+    measures: ClassVar[tuple[Kind, ...]] = (Kind.LENGTH,) * 4
+    reports: ClassVar[Mapping[str, str]] = {
+        "relative_angle": "angle",
+        "relative_angular_velocity": "angular velocity",
+        "relative_angular_acceleration": "angular acceleration",
+        "rubbing_speed": "velocity",
+    }
+    drive_kind: ClassVar[Kind] = Kind.ANGLE
+
+    def measure(self, shapes: Sequence[Shape]) -> Sequence[Scalar]:
+        first, second = shapes
+        return (*first.at(self.points[0]), *second.at(self.points[1]))
+
+    def residual(self, frames: Sequence[Frame], numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Sequence[Scalar]:
+        first, second = frames
+        return second.carry(Vector(*numbers[2:])) - first.carry(Vector(*numbers[:2]))
+
+    def drive(self, frames: Sequence[Frame], numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Scalar:
+        """The angle of the second link against the first; at a pin on the frame, of the other link."""
+        first, second = frames
+        return first.angle - second.angle if second.fixed else second.angle - first.angle
+
+    def effort(self, frames: Mapping[str, Frame], shapes: Mapping[str, Shape]) -> Effort:
+        first, second = self.links
+        return Effort(first, second) if frames[second].fixed else Effort(second, first)
+
+    def report(self, position: Scalar, rate: Scalar, second: Scalar) -> dict[str, Scalar | None]:
+        rubbing = None if self.radius is None else abs(rate) * self.radius
+        return dict(zip(self.reports, (position, rate, second, rubbing), strict=True))
+
+    def coincident(self) -> tuple[tuple[str, str], ...]:
+        return tuple(zip(self.links, self.points, strict=True))
+
+    def marks(self, shapes: Mapping[str, Shape], beside: Sequence[Pair]) -> tuple[Mark, ...]:
+        places = tuple(shapes[link].at(point) for link, point in self.coincident())
+        return (Pin(self.pin, self.links, places),)
+
+    def entry_name(self) -> str:
+        return self.pin
+
+    @classmethod
+    def motions(cls, group: Sequence[Self]) -> tuple[Self, ...]:
+        """Of a pin of n links all n(n-1)/2 relative motions, named in the order of the links."""
+        if len(group) == 1:
+            return tuple(group)
+        ends = [(group[0].links[0], group[0].points[0])] + [(pair.links[1], pair.points[1]) for pair in group]
+        return cls._between(group[0].pin, ends, list(combinations(range(len(ends)), 2)), group[0].radius)
+
+    @classmethod
+    def _between(
+        cls, pin: str, ends: Sequence[tuple[str, str]], which: Sequence[tuple[int, int]], radius: float | None
+    ) -> tuple[Self, ...]:
+        """Turning pairs between chosen ends (link, point) of one pin."""
+        return tuple(
+            cls(
+                pin if len(ends) == 2 else f"{pin}:{ends[i][0]},{ends[j][0]}",
+                (ends[i][0], ends[j][0]),
+                (ends[i][1], ends[j][1]),
+                pin,
+                radius,
+            )
+            for i, j in which
+        )
+
+    @classmethod
+    def joining(cls, point: str) -> dict[str, Any]:
+        return {cls.keyword: point}
+
+    @classmethod
+    def read(cls, entry: Entry) -> tuple[Self, ...]:
+        entry.only(cls.keyword, *cls.members)
+        pin = entry.name("turning")
+        if entry.has("links"):
+            links = entry.links("links")
+        else:
+            links = entry.carriers(pin)
+            if len(links) < 2:
+                told = f"only link {links[0]!r} carries" if links else "no link carries"
+                raise entry.refuse(
+                    "turning", f"a turning pair needs two links, but {told} a point {pin!r}; name its 'links'"
+                )
+        points = entry.names("points", len(links)) if entry.has("points") else (pin,) * len(links)
+        for index, (link, point) in enumerate(zip(links, points, strict=True)):
+            entry.carried(point, link, f"points[{index}]" if entry.has("points") else "turning")
+        if entry.has("pin_radius") and entry.has("pin_diameter"):
+            raise entry.refuse("pin_diameter", "give either 'pin_radius' or 'pin_diameter', not both")
+        radius = None
+        if entry.has("pin_radius"):
+            radius = entry.quantity("pin_radius", "length")
+        elif entry.has("pin_diameter"):
+            radius = entry.quantity("pin_diameter", "length") / 2.0
+        if radius is not None and radius <= 0.0:
+            raise entry.refuse(
+                "pin_radius" if entry.has("pin_radius") else "pin_diameter", "a pin must have a size above zero"
+            )
+        ends = list(zip(links, points, strict=True))
+        return cls._between(pin, ends, [(0, k) for k in range(1, len(ends))], radius)
+
+    @classmethod
+    def write(cls, group: Sequence[Self], quantity: Quantity) -> dict[str, Any]:
+        ends = [group[0].coincident()[0]] + [pair.coincident()[1] for pair in group]
+        entry: dict[str, Any] = {"turning": group[0].pin, "links": [link for link, _ in ends]}
+        if any(point != group[0].pin for _, point in ends):
+            entry["points"] = [point for _, point in ends]
+        if group[0].radius is not None:
+            entry["pin_radius"] = quantity(group[0].radius, "length")
+        return entry
+
+    @classmethod
+    def samples(cls) -> tuple[Sample, ...]:
+        def sample(first: Vector, second: Vector, frames: tuple[Frame, Frame], radius: float | None) -> Sample:
+            shapes = plain(P=first), plain(P=second)
+            pair = cls("P", ("a", "b"), ("P", "P"), "P", radius)
+            entry: dict[str, Any] = {"turning": "P", "links": ["a", "b"]}
+            if radius is not None:
+                entry["pin_radius"] = radius
+            meet = frames[0].carry(first) - frames[1].turn(second)
+            return Sample(pair, shapes, (frames[0], frame_at(meet.x, meet.y, frames[1].angle)), (), entry)
+
+        return (
+            sample(Vector(0.3, -0.2), Vector(-0.5, 0.4), (frame_at(0.1, 0.7, 0.6), frame_at(0.0, 0.0, -1.9)), 0.02),
+            sample(Vector(1.3, 0.0), Vector(0.0, 0.0), (frame_at(-2.0, 0.4, 2.8), frame_at(0.0, 0.0, 4.0)), None),
+        )

@@ -1,0 +1,212 @@
+"""Linkages of bars that are pinned together, given by the places of their pins."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import fields
+from functools import cached_property, lru_cache
+from math import atan2, hypot, isfinite
+from numbers import Integral, Real
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from planar.foundation.errors import BadInput
+from planar.model.link_shapes import At, Link, Point
+from planar.model.mechanism import FARTHEST, Input, Mechanism, Units
+from planar.model.pairs import Kind, Pair, pair_types
+
+FRAME = "frame"
+
+
+def pinned(
+    places: Any,
+    bars: Any,
+    frame: Sequence[int],
+    crank: int = 0,
+    *,
+    velocity: float = 1.0,
+    acceleration: float = 0.0,
+    name: str = "",
+) -> Mechanism:
+    """The linkage of bars between pins at `places` (pins, 2), in m, which are its sketch too.
+
+    `bars` are pairs of pin numbers (an array, or lists), or longer lists for a link with more pins; `frame` are the
+    pins on the frame. Bar number `crank` is driven where it is pinned to the frame, from where it stands, with this
+    angular velocity and acceleration (rad/s, rad/s^2). Pins are called P0, P1, ..., bars bar0, bar1, ..., the fixed
+    link frame. A bar's own x-axis goes from its first pin to its second.
+
+    Raises BadInput, with the place among the arguments, for pins that are not there or stand alone, bars of no length,
+    a crank that is not pinned to the frame at one point.
+    """
+    at, lists = _places(places), _lists(bars)
+    numbers = at.tolist()
+    fixed = tuple(dict.fromkeys(_pin(pin, f"frame[{k}]", len(at)) for k, pin in enumerate(frame)))
+    if not fixed:
+        raise BadInput("frame", "no pin is on the frame")
+    if isinstance(crank, bool) or not isinstance(crank, Integral) or not 0 <= crank < len(lists):
+        raise BadInput("crank", f"the number of a bar is wanted, of which there are {len(lists)}, not {crank!r:.40}")
+    for key, rate in (("velocity", velocity), ("acceleration", acceleration)):
+        if isinstance(rate, bool) or not isinstance(rate, Real) or not isfinite(rate):
+            raise BadInput(key, f"a finite number is wanted, not {rate!r:.40}")
+    flat = [pin for bar in lists for pin in bar]
+    held = {*flat, *fixed}
+    plain = set(map(type, flat)) == {int} and min(flat) >= 0 and max(flat) < len(at) and all(len(b) == 2 for b in lists)
+    if not plain or len(set(map(tuple, numbers))) < len(numbers):
+        for k, bar in enumerate(lists):
+            _checked(k, bar, numbers)
+    for pin in range(len(at)):
+        if pin not in held:
+            raise BadInput(f"places[{pin}]", f"pin {pin} is on no bar, and not on the frame")
+    on = [pin for pin in lists[crank] if pin in fixed]
+    if len(on) != 1:
+        told = "is not pinned to the frame" if not on else "is pinned to the frame twice, so it cannot turn"
+        raise BadInput("crank", f"bar {crank} {told}")
+    return Pinned.laid_out(name, Laid(at, numbers, lists, fixed, int(crank), float(velocity), float(acceleration)))
+
+
+class Laid(NamedTuple):
+    """A pinned linkage as numbers: places (pins, 2), also as lists; the pins of every bar; those on the frame."""
+
+    at: np.ndarray
+    numbers: list[list[float]]
+    bars: list[list[int]]
+    fixed: tuple[int, ...]
+    crank: int
+    velocity: float
+    acceleration: float
+
+    @property
+    def position(self) -> float:
+        """The angle of the crank (rad)."""
+        (ax, ay), (bx, by) = (self.numbers[pin] for pin in self.bars[self.crank][:2])
+        return atan2(by - ay, bx - ax)
+
+
+class Pinned(Mechanism):
+    """A mechanism whose links, pairs, input and sketch are made of `laid` when they are first asked for."""
+
+    laid: Laid | None = None
+
+    @classmethod
+    def laid_out(cls, name: str, laid: Laid) -> Pinned:
+        """The mechanism of a linkage that has been checked."""
+        own = object.__new__(cls)
+        own.__dict__.update(name=name, frame=FRAME, units=_UNITS, laid=laid)
+        return own
+
+    def __reduce__(self) -> Any:
+        if self.laid is not None:
+            return Pinned.laid_out, (self.name, self.laid)
+        return Mechanism, tuple([getattr(self, each.name) for each in fields(Mechanism)])
+
+    @cached_property
+    def links(self) -> tuple[Link, ...]:  # type: ignore[override]
+        """The frame, then the bars."""
+        laid = self._laid
+        frame = Link(FRAME, tuple([Point(f"P{pin}", At(*laid.numbers[pin])) for pin in laid.fixed]))
+        return (frame, *[_link(f"bar{k}", bar, laid.numbers) for k, bar in enumerate(laid.bars)])
+
+    @cached_property
+    def pairs(self) -> tuple[Pair, ...]:  # type: ignore[override]
+        """The pins, one after the other."""
+        of, found = joined(), []
+        for pin, held in enumerate(self._holding):
+            point, first = f"P{pin}", held[0]
+            for other in held[1:]:
+                name = point if len(held) == 2 else f"{point}:{first},{other}"
+                found.append(of(name, (first, other), (point, point), point))
+        return tuple(found)
+
+    @cached_property
+    def inputs(self) -> tuple[Input, ...]:  # type: ignore[override]
+        """The crank's."""
+        laid = self._laid
+        (pin,) = (pin for pin in laid.bars[laid.crank] if pin in laid.fixed)
+        name = f"P{pin}" if len(self._holding[pin]) == 2 else f"P{pin}:{FRAME},bar{laid.crank}"
+        return (Input(name, laid.position, laid.velocity, laid.acceleration),)
+
+    @cached_property
+    def sketch(self) -> tuple[tuple[str, float, float], ...]:  # type: ignore[override]
+        """Where the pins are that move."""
+        laid = self._laid
+        fixed = set(laid.fixed)
+        return tuple([(f"P{pin}", *at) for pin, at in enumerate(laid.numbers) if pin not in fixed])
+
+    @cached_property
+    def _holding(self) -> list[list[str]]:
+        """The links on every pin, the frame first."""
+        laid = self._laid
+        holding: list[list[str]] = [[] for _ in laid.numbers]
+        for pin in laid.fixed:
+            holding[pin].append(FRAME)
+        for k, bar in enumerate(laid.bars):
+            for pin in bar:
+                holding[pin].append(f"bar{k}")
+        return holding
+
+    @property
+    def _laid(self) -> Laid:
+        assert self.laid is not None
+        return self.laid
+
+
+_UNITS = Units()
+
+
+def _places(places: Any) -> np.ndarray:
+    """The places as an array of its own."""
+    try:
+        at = np.array(places, dtype=float)
+    except (TypeError, ValueError):
+        raise BadInput("places", "an array (pins, 2) of numbers (m) is wanted") from None
+    if at.ndim != 2 or at.shape[1] != 2 or len(at) < 2:
+        raise BadInput("places", "an array (pins, 2) is wanted, of two pins at least")
+    if not np.abs(at).max() <= FARTHEST:
+        k = int(np.argmin(np.all(np.abs(at) <= FARTHEST, axis=1)))
+        raise BadInput(f"places[{k}]", f"numbers up to {FARTHEST:g} m are wanted, not {at[k].tolist()}")
+    at.flags.writeable = False
+    return at
+
+
+def _lists(bars: Any) -> list[list[int]]:
+    """The pins of every bar."""
+    try:
+        return bars.tolist() if hasattr(bars, "tolist") else [list(bar) for bar in bars]
+    except TypeError:
+        raise BadInput("bars", "lists of pin numbers are wanted, one for each bar") from None
+
+
+def _pin(pin: Any, place: str, many: int) -> int:
+    if isinstance(pin, bool) or not isinstance(pin, Integral) or not 0 <= pin < many:
+        raise BadInput(place, f"the number of a pin is wanted, of which there are {many}, not {pin!r:.40}")
+    return int(pin)
+
+
+def _checked(number: int, bar: list[int], at: Sequence[Sequence[float]]) -> None:
+    """Refuse a bar that is none; its pins become whole numbers of Python's own."""
+    bar[:] = [_pin(pin, f"bars[{number}][{k}]", len(at)) for k, pin in enumerate(bar)]
+    if len(bar) < 2 or len(set(bar)) < len(bar):
+        raise BadInput(f"bars[{number}]", "two pins or more are wanted, each once")
+    if at[bar[0]] == at[bar[1]]:
+        raise BadInput(f"bars[{number}]", f"pins {bar[0]} and {bar[1]} are at one place, so the bar has no length")
+
+
+def _link(own: str, bar: Sequence[int], at: Sequence[Sequence[float]]) -> Link:
+    """One bar, its own axes along its first two pins."""
+    (ax, ay), (bx, by) = at[bar[0]], at[bar[1]]
+    dx, dy = bx - ax, by - ay
+    length = hypot(dx, dy)
+    c, s = dx / length, dy / length
+    points = []
+    for pin in bar[2:]:
+        x, y = at[pin][0] - ax, at[pin][1] - ay
+        points.append(Point(f"P{pin}", At(c * x + s * y, c * y - s * x)))
+    return Link(own, tuple(points), (f"P{bar[0]}", f"P{bar[1]}"), length)
+
+
+@lru_cache
+def joined() -> type[Pair]:
+    """The pair that keeps a point of one link on a point of another."""
+    two = (Kind.LENGTH, Kind.LENGTH)
+    return next(each for each in pair_types().values() if each.constrains == two and not each.coordinates)

@@ -1,1 +1,0 @@
-"""Casadi's programs printed for other machines."""

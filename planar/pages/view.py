@@ -1,0 +1,135 @@
+"""A mechanism, a position or a motion as a page: written to a file, opened in the browser, or shown in a notebook."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from tempfile import mkdtemp
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from planar.document.files import save
+from planar.foundation.errors import BadInput, NoAnswer
+from planar.foundation.geometry import frame_at
+from planar.foundation.jets import Jet, Scalar
+from planar.foundation.notebook_display import Displayable
+from planar.model.mechanism import Drive, Mechanism, with_inputs
+from planar.pages.notebook import carries, output
+from planar.pages.page import Window, page
+from planar.pages.still_picture import still
+from planar.reports.files.html import html
+from planar.results.motion import Motion, State
+from planar.solving.position import known_of
+
+LISTED = 12
+"""Assemblies of the table that a notebook shows."""
+
+
+def view(shown: Mechanism | State | Motion, path: str | Path | None = None) -> Path:
+    """Write the page of a mechanism, of a position, or of a motion, which keeps its range.
+
+    Without a path it is written to a folder of its own and opened in the browser. Gives the file's path. Raises
+    NoAnswer where the mechanism has no position to start from, BadInput where the file cannot be written.
+    """
+    if not isinstance(shown, Mechanism | State | Motion):
+        raise BadInput("view", f"a Mechanism, a State or a Motion is wanted, not {type(shown).__name__}")
+    text = page_of(shown)
+    if path is not None:
+        save(Path(path), text)
+        return Path(path)
+    from webbrowser import open_new_tab  # only where one is opened
+
+    made = Path(mkdtemp(prefix="planar-")) / "page.html"
+    save(made, text)
+    open_new_tab(made.as_uri())
+    return made
+
+
+class Subject(NamedTuple):
+    """What a page is of: a mechanism at its inputs, the unknowns of an assembly, and a range."""
+
+    mechanism: Mechanism
+    z: np.ndarray | None = None
+    window: Window | None = None
+
+
+def page_of(shown: Mechanism | State | Motion) -> str:
+    """The text of the page of a mechanism, a position or a motion."""
+    return page(*_subject(shown))
+
+
+def _subject(shown: Mechanism | State | Motion) -> Subject:
+    if isinstance(shown, Mechanism):
+        return Subject(shown)
+    if isinstance(shown, State):
+        return Subject(shown.mechanism, _unknowns(shown, shown.mechanism))
+    ends = {name: given.position for name, given in shown.inputs.items()}
+    # of inputs that run in time together the one that goes farthest runs on the page
+    pair = max(ends, key=lambda name: float(np.ptp(ends[name])))
+    window = Window(list(ends).index(pair), float(ends[pair].min()), float(ends[pair].max()))
+    row = _start(shown, pair)
+    there = with_inputs(shown.mechanism, tuple(Drive(name, float(at[row])) for name, at in ends.items()))
+    return Subject(there, _unknowns(shown, there, row), window if window.low < window.high else None)
+
+
+def _start(motion: Motion, pair: str) -> int:
+    """The row nearest to the file's position, among those that are no dead points."""
+    rates = [
+        np.broadcast_to(frame.angle.parts[1], (len(motion),)) for frame in motion.frames.values() if not frame.fixed
+    ]
+    lost = ~np.isfinite(rates).all(axis=0)
+    filed = next(given.position for given in motion.mechanism.inputs if given.pair == pair)
+    return int(np.argmin(np.abs(motion.inputs[pair].position - filed) + np.where(lost & ~lost.all(), np.inf, 0.0)))
+
+
+def framed(shown: Displayable) -> str | None:
+    """What a notebook shows of a mechanism or a result: tables of a result, a still picture, the page over it.
+
+    None where there is nothing of these, so that the text is shown.
+    """
+    moving, layers, table = _presented(shown)
+    try:
+        subject = _subject(moving)
+        picture = still(subject.mechanism, subject.z)
+        text = page(*subject, layers=layers, library=carries())
+    except (BadInput, NoAnswer):
+        return table or None
+    return output(subject.mechanism.name, table, picture, text)
+
+
+def _presented(shown: Any) -> tuple[Mechanism | State | Motion, tuple[str, ...], str]:
+    """Of what the page is, its layers, and the tables above it."""
+    from planar.analysis.centres.centres import Centres
+    from planar.assemblies.circuits.circuits import Circuits
+    from planar.assemblies.modes import Modes, modes
+    from planar.dynamics.forces import Forces
+    from planar.reports.tables import centres, circuits, forces, forces_over_motion
+    from planar.reports.tables import modes as assemblies
+
+    if isinstance(shown, Forces):
+        over = isinstance(shown.moving, Motion)
+        return (
+            shown.moving,
+            ("paths", "forces"),
+            html(forces_over_motion.tables(shown) if over else forces.tables(shown, {})),
+        )
+    if isinstance(shown, Centres):
+        return shown.state, ("centres",), html(centres.table(shown))
+    if isinstance(shown, Modes):
+        return shown.mechanism, ("paths",), html(assemblies.table(shown, LISTED))
+    if isinstance(shown, Circuits):
+        return shown.mechanism, ("paths",), html(circuits.table(shown, modes(shown.mechanism, certify=False)))
+    return shown, ("paths",), ""
+
+
+def _unknowns(shown: State | Motion, mechanism: Mechanism, row: int = 0) -> np.ndarray:
+    """The unknowns of a position, or of a row of a motion, in the equations of its mechanism."""
+
+    def number(value: Scalar) -> float:
+        rows = np.ravel(value.parts[0] if isinstance(value, Jet) else value)
+        return float(rows[row if rows.size > 1 else 0])  # what stands still has one for all
+
+    solver = known_of(mechanism).solver
+    frames = {name: frame_at(*map(number, (frame.x, frame.y, frame.angle))) for name, frame in shown.frames.items()}
+    own = {name: tuple(map(number, values)) for name, values in shown.own.items()}
+    return solver.coordinates(frames, own)[list(solver.equations.unknowns)]

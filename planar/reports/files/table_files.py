@@ -1,0 +1,46 @@
+"""Tables as plain text, SVG or HTML."""
+
+from __future__ import annotations
+
+import io
+import re
+
+from rich.cells import cell_len
+from rich.console import Console, RenderableType
+from rich.terminal_theme import DEFAULT_TERMINAL_THEME
+
+from planar.foundation.errors import no_format
+
+WIDTH = 124
+"""Characters, but for what cannot be narrower."""
+SUFFIXES = (".txt", ".html", ".svg")
+
+
+def written(renderable: RenderableType, suffix: str) -> str:
+    """Tables in the format that a file's suffix names. Raises BadInput."""
+    console = _printed(renderable, WIDTH)
+    longest = max(map(cell_len, console.export_text(clear=False).splitlines()), default=0)
+    if longest > WIDTH:  # a picture would be cut where its width ends
+        console = _printed(renderable, longest)
+    formats = {
+        ".txt": console.export_text,
+        ".html": lambda: console.export_html(theme=DEFAULT_TERMINAL_THEME),
+        ".svg": lambda: _without_fonts(console.export_svg(title="planar", theme=DEFAULT_TERMINAL_THEME)),
+    }
+    if suffix not in formats:
+        raise no_format(suffix, "tables", SUFFIXES)
+    return formats[suffix]()
+
+
+def _printed(renderable: RenderableType, width: int) -> Console:
+    """A console on which it stands."""
+    console = Console(
+        record=True, width=width, file=io.StringIO(), force_terminal=True, markup=False, emoji=False, highlight=False
+    )
+    console.print(renderable, crop=False)
+    return console
+
+
+def _without_fonts(svg: str) -> str:
+    """The picture without fonts from the network: the viewer's own monospaced one serves."""
+    return re.sub(r"@font-face\s*\{[^}]*\}|<!--.*?-->", "", svg, flags=re.DOTALL)

@@ -1,0 +1,83 @@
+"""A run of positions as an xarray Dataset."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from planar.foundation.errors import BadInput
+from planar.foundation.units import SI
+from planar.reports.columns import Told, about, told
+from planar.results.motion import Motion
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Array = np.ndarray
+Variable = tuple[tuple[str, ...], Array, dict[str, str]]
+"""Dimensions, values and attributes, as xarray takes them."""
+
+
+def dataset(motion: Motion) -> xr.Dataset:
+    """The motion as an xarray Dataset in SI, each variable with `units` and `long_name`.
+
+    Along `row`, with the inputs' positions and the time, where there is one, as coordinates:
+
+    - `input_A_velocity` and `input_A_acceleration` of every input A, with the coordinate `input_A_position`;
+    - `point_position`, `point_velocity`, `point_acceleration` (point, row, axis), axes "x" and "y" of the frame;
+    - `link_angle`, `link_angular_velocity`, `link_angular_acceleration` (link, row);
+    - `pair_...` (pair, row) of all that pairs report; NaN also where a pair has no such quantity;
+    - `point_jerk` and `link_angular_jerk` where the motion was made with them.
+
+    `dataset(motion).link_angle.sel(link="DC").plot(x="input_A_position")` draws a diagram. Attributes are `mechanism`,
+    `outcome` and `reason`. Raises BadInput where xarray is not installed.
+    """
+    try:
+        import xarray as xr
+    except ImportError:
+        raise BadInput("xarray", "a Dataset needs xarray: pip install 'planar[xarray]'") from None
+    groups: dict[str, list[Told]] = {"inputs": [], "points": [], "links": [], "pairs": []}
+    for thing in told(motion):
+        groups[thing.group].append(thing)
+    coordinates: dict[str, Any] = {
+        "row": ("row", np.arange(len(motion)), {"long_name": "row"}),
+        "axis": ["x", "y"],
+    }
+    coordinates |= {group[:-1]: [each.name for each in groups[group]] for group in ("points", "links", "pairs")}
+    if motion.time is not None:
+        coordinates["time"] = (("row",), motion.time, _told("time", "time"))
+    variables = {
+        name: variable for group in ("points", "links", "pairs") for name, variable in _together(groups[group]).items()
+    }
+    for each in groups["inputs"]:
+        for what, values in each.values.items():
+            into = coordinates if what == "position" else variables
+            attributes = _told(each.kinds[what], f"input {each.name} {what}")
+            into[f"input_{each.name}_{what}"] = (("row",), values, attributes)
+    return xr.Dataset(variables, coordinates, about(motion))
+
+
+def _together(things: list[Told]) -> dict[str, Variable]:
+    """Of things of one group every quantity as one array, things first."""
+    found: dict[str, dict[int, Array]] = defaultdict(dict)
+    kinds: dict[str, str] = {}
+    for index, thing in enumerate(things):
+        for what, values in thing.values.items():
+            if values is not None:
+                found[what][index], kinds[what] = values, thing.kinds[what]
+    variables = {}
+    for what, those in found.items():
+        one = things[0].group[:-1]
+        shape = next(iter(those.values())).shape
+        whole = np.full((len(things), *shape), np.nan)
+        for index, values in those.items():
+            whole[index] = values
+        dimensions = (one, "row", "axis")[: whole.ndim]
+        variables[f"{one}_{what}"] = (dimensions, whole, _told(kinds[what], what.replace("_", " ")))
+    return variables
+
+
+def _told(kind: str, name: str) -> dict[str, str]:
+    return {"units": SI[kind], "long_name": name}

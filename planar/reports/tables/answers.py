@@ -1,0 +1,137 @@
+"""What designers ask of a motion, as tables for a terminal, and as JSON values."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from math import isfinite
+from typing import Any
+
+import numpy as np
+from rich.console import Group, RenderableType
+from rich.text import Text
+
+from planar.analysis.motion.answers import Answers
+from planar.analysis.motion.output import Axis, Extreme
+from planar.foundation.units import length_of_rates, unit
+from planar.model.mechanism import Units
+from planar.model.wording import amount
+from planar.reports.tables.mechanical_advantage import MEASURES
+from planar.reports.tables_of_numbers import DIGITS, plain_table
+from planar.results.motion import Motion
+
+Row = tuple[str, str, str, str]
+
+
+def tables(motion: Motion, asked: Mapping[str, Sequence[Answers]]) -> RenderableType:
+    """A table for every pair, link and point asked for: what is told, how much, and where it is."""
+    parts: list[RenderableType] = []
+    for each in (one for group in asked.values() for one in group):
+        units = motion.mechanism.units
+        position = _Position(motion.slides(each.input), units)
+        table = plain_table(
+            f"Answers of {each.what} {each.of}", "what", "value", f"at {each.input}", "", left=(0, 1, 2, 3)
+        )
+        for row in (*_ranges(each, units, position), *_rates(each, units, position), *_uses(each, units, position)):
+            table.add_row(*row)
+        parts += [Text(), table, *(Text(f"- {note}") for note in each.notes)]
+    return Group(*parts)
+
+
+class _Position:
+    """Says positions of the running input in the units of the file."""
+
+    def __init__(self, slides: bool, units: Units):
+        self.kind, self.units = "length" if slides else "angle", units
+
+    def __call__(self, *positions: float) -> str:
+        name = self.units.length if self.kind == "length" else self.units.angle
+        told = [f"{unit(name).from_si(each) + 0.0:.6g}" for each in positions]
+        return f"{' to '.join(told)} {name}"
+
+
+def _ranges(each: Answers, units: Units, position: _Position) -> Iterator[Row]:
+    """Stroke, swing, extreme positions, time ratio, dwells."""
+    kind = "length" if each.length else "angle"
+    if each.stroke is not None:
+        yield "stroke", amount(each.stroke.length, "length", units), "", ""
+        for word, end in (("TDC", each.stroke.top), ("BDC", each.stroke.bottom)):
+            yield f"  {word}", amount(end.value, "length", units), position(end.input), ""
+    if each.swing is not None:
+        yield "swing", amount(each.swing.angle, "angle", units), "", ""
+        for word, end in (("least", each.swing.least), ("greatest", each.swing.greatest)):
+            yield f"  {word} angle", amount(end.value, "angle", units), position(end.input), ""
+    for one in each.extremes:
+        for word, end, turns in (("least", one.least, one.turning[0]), ("greatest", one.greatest, one.turning[1])):
+            told = "" if turns or not one.length else "an end of the range"
+            yield f"{word} {one.axis}", amount(end.value, "length", units), position(end.input), told
+    if each.time_ratio is not None:
+        ratio = each.time_ratio
+        yield "time ratio", f"{ratio.ratio:.{DIGITS}g}", "", ""
+        for word, way in (("to the greatest", ratio.out), ("to the least", ratio.back)):
+            took = "" if each.per_unit else f"{way.time:.{DIGITS}g} s"
+            yield f"  {word}", position(way.travel), position(way.start.input, way.stop.input), took
+    for axis, dwell in each.dwells:
+        near = f"within {amount(dwell.within, kind, units)} of {amount(dwell.at.value, kind, units)}"
+        yield f"dwell{_of(axis)}", position(dwell.travel), position(dwell.start, dwell.stop), near
+
+
+def _rates(each: Answers, units: Units, position: _Position) -> Iterator[Row]:
+    name, length = length_of_rates(units.length)
+    what, per = (name if each.length else "rad"), (name if position.kind == "length" else "rad")
+    by = length.from_si(1.0) if each.length else 1.0
+    measures = (f"{what}/{per}", f"{what}/{per}²") if each.per_unit else (f"{what}/s", f"{what}/s²")
+    scales = (by / length.from_si(1.0) ** order if each.per_unit and per == name else by for order in (1, 2))
+    for word, found, measure, scale in zip(
+        ("velocity", "acceleration"), (each.velocity, each.acceleration), measures, scales, strict=True
+    ):
+        if found is not None and np.isfinite(found.value):
+            yield f"greatest {word}", f"{found.value * scale:.{DIGITS}g} {measure}", position(found.input), ""
+        elif found is not None:
+            told = "beyond all bounds" if found.value > 0.0 else "not determined"
+            yield f"greatest {word}", told, position(found.input), ""
+
+
+def _uses(each: Answers, units: Units, position: _Position) -> Iterator[Row]:
+    """Area, transmission angle, mechanical advantage."""
+    if each.area is not None:
+        scale = unit(units.length).from_si(1.0) ** 2
+        value = each.area.value * scale if abs(each.area.value) > each.area.error else 0.0
+        yield "area of its curve", f"{value:.{DIGITS}g} {units.length}²", "", "anticlockwise positive"
+    if each.transmission is not None and each.transmission.least is not None:
+        least = each.transmission.least
+        through = f"driven at {' and '.join(each.transmission.through)}"
+        yield "least transmission angle", amount(least.value, "angle", units), position(least.input), through
+    if each.advantage is not None:
+        found = each.advantage
+        measure = MEASURES[found.measure]
+        told = f"{found.least.value:.{DIGITS}g}" + (f" {measure}" if measure else "")
+        yield "least mechanical advantage", told, position(found.least.input), ""
+        for place in found.infinite:
+            yield "  beyond all bounds", "", position(place), ""
+
+
+def _of(axis: Axis | None) -> str:
+    return "" if axis is None else f" of {axis}"
+
+
+def record(asked: Mapping[str, Iterable[Answers]]) -> dict[str, Any]:
+    """All of it as a JSON value in SI: by name, then by what bears it; what is infinite or not determined is null."""
+    return {name: {each.what: _record(each) for each in group} for name, group in asked.items()}
+
+
+def _record(each: Answers) -> dict[str, Any]:
+    found = {name: _plain(getattr(each, name)) for name in each.__dataclass_fields__ if name not in ("of", "what")}
+    found["extremes"] = {str(one.axis): _plain(one) for one in each.extremes}
+    found["dwells"] = [{"axis": axis} | _plain(dwell) for axis, dwell in each.dwells]
+    return {name: value for name, value in found.items() if value not in (None, {}, [])} | {"notes": list(each.notes)}
+
+
+def _plain(value: Any) -> Any:
+    """A value that JSON has: of a named tuple an object."""
+    if isinstance(value, Extreme) or hasattr(value, "_asdict"):
+        return {name: _plain(part) for name, part in value._asdict().items()}
+    if isinstance(value, np.ndarray | list | tuple):
+        return [_plain(part) for part in (value.tolist() if isinstance(value, np.ndarray) else value)]
+    if isinstance(value, float):
+        return value if isfinite(value) else None
+    return value

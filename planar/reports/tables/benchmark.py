@@ -1,0 +1,70 @@
+"""How fast mechanisms are solved, as tables for a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from rich.console import Group, RenderableType
+from rich.text import Text
+
+from planar.bench.benchmark import STEPS, TURN, Speed
+from planar.reports.tables_of_numbers import paragraphs, plain_table
+
+CALLS = ("solve, new position", "cycle, a position")
+
+
+def table(measured: Iterable[Speed]) -> RenderableType:
+    """One position and one run of each, then its sweeps, then what bounds them."""
+    measured = tuple(measured)
+    headings = (
+        "mechanism",
+        "links",
+        "unknowns",
+        "equations",
+        "assembly",
+        "solve, another position",
+        "cycle, a position",
+    )
+    first = plain_table(None, *headings)
+    for each in measured:
+        times = (each.equations, each.assembly, each.solve, each.cycle)
+        first.add_row(each.name, str(each.links), str(each.unknowns), *map(time, times))
+    note = f"cycle: {TURN} steps; cycle and solve have velocities and accelerations; equations once for a structure"
+    parts: list[RenderableType] = [first, Text(note, style="italic")]
+    for each in measured:
+        parts += [Text(), *_swept(each)]
+    return Group(*parts)
+
+
+def _swept(speed: Speed) -> list[RenderableType]:
+    """The sweeps of one mechanism, and what there is to say of it."""
+    said = paragraphs(("-", f"{sentence}.") for sentence in speed.bounds)
+    if not speed.sweeps:
+        return [Text(speed.name, style="bold"), said]
+    headings = ("backend", "a position", "with rates", "designs", "refused", "general path", "first call", "compiling")
+    within = f"{100.0 * speed.sweeps[0].within:g} %"
+    found = plain_table(f"{speed.name}: sweeps of designs whose lengths are within {within}, {STEPS} steps", *headings)
+    for backend in dict.fromkeys(each.backend for each in speed.sweeps):
+        both = {each.rates: each for each in speed.sweeps if each.backend == backend}
+        most = both[True]
+        found.add_row(
+            backend,
+            time(both[False].seconds if False in both else None),
+            time(most.seconds),
+            str(most.designs),
+            str(most.refused),
+            f"{100.0 * most.general / (most.designs * (STEPS + 1)):.3g} %",
+            f"+ {time(most.first)}",
+            time(most.compiling),
+        )
+    return [found, said]
+
+
+def time(seconds: float | None) -> str:
+    """In the unit that fits."""
+    if seconds is None:
+        return "-"
+    for size, name in ((1.0, "s"), (1e-3, "ms"), (1e-6, "us")):
+        if seconds >= size:
+            return f"{seconds / size:.3g} {name}"
+    return f"{seconds / 1e-9:.3g} ns"

@@ -1,0 +1,223 @@
+"""Results as tables for a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from planar.analysis.worked.published import Comparison
+from planar.foundation.units import Unit, shown, unit
+from planar.model.mechanism import QUANTITIES, Units, motions
+from planar.model.pairs import Pair
+from planar.model.wording import amount, listed
+from planar.reports.fitted_table import FittedTable, plain_table
+from planar.results.motion import RelativeState, State
+
+DIGITS = 6
+"""Significant digits printed; `--json` has all of them."""
+SIZE = "of the mechanism's size"
+ROUND_OFF = 1e-10
+"""Of what it is told beside: a proof that leaves less is as good as numbers are."""
+ROUNDING = 1e-12
+"""What is less than this part of what it is told beside is printed as 0."""
+
+
+def solution(
+    state: State, comparisons: Iterable[Comparison], relatives: Mapping[str, RelativeState] | None = None
+) -> RenderableType:
+    """A solved position: links, points, pairs, relative motions, and the published values beside the solved ones."""
+    parts: list[RenderableType] = [_heading(state), Text(), _links(state), _points(state), _pairs(state)]
+    parts += [_relative(text, each, state) for text, each in (relatives or {}).items()]
+    comparisons = tuple(comparisons)
+    if comparisons:
+        parts.append(published(comparisons, state.mechanism.units))
+    notes = [*state.remarks, *state.mechanism.notes]
+    if notes:
+        parts += [Text(), Text("Notes", style="bold"), paragraphs(("-", note) for note in notes)]
+    return Group(*parts)
+
+
+def published(comparisons: Iterable[Comparison], units: Units) -> RenderableType:
+    """Solved values beside those that a book prints."""
+    headings = ("", "quantity", ("solved", "printed", "unit"), ("off", ""))
+    table = plain_table("Published values", *headings, left=(0, 1, 4, 6))
+    reasons: list[tuple[str, str]] = []
+    for each in comparisons:
+        item = each.published
+        measure, of = shown(QUANTITIES[item.quantity], units)
+        off = "" if each.apart is None else f"{round(100.0 * each.apart, 1) + 0.0:+.1f} %"
+        style = {"differs": "bold red", "sense differs": "bold red", "slip in the book": "yellow"}.get(each.verdict, "")
+        printed = "-" if item.value is None else f"{of.from_si(item.value):.6g}"
+        solved = number(of.from_si(each.solved))
+        table.add_row(item.symbol, each.about, solved, printed, measure, off, Text(each.verdict, style))
+        why = item.slip or item.note
+        if why:
+            reasons.append((item.symbol, why))
+    return Group(table, paragraphs(reasons))
+
+
+def paragraphs(rows: Iterable[tuple[str, str]]) -> Table:
+    """Paragraphs with what they are about before them."""
+    grid = Table.grid(padding=(0, 1))
+    for _ in range(3):
+        grid.add_column(overflow="fold")
+    for about, text in rows:
+        grid.add_row("", Text(about), Text(text))
+    return grid
+
+
+def models(rows: Iterable[tuple[str, str, str]]) -> RenderableType:
+    """The models that come along: name, other ids, what each is."""
+    table = plain_table(None, "model", "also", "what it is", left=(0, 1, 2))
+    for row in rows:
+        table.add_row(*row)
+    return table
+
+
+def _heading(state: State) -> RenderableType:
+    mechanism = state.mechanism
+    lines = [Text(mechanism.name, style="bold")]
+    if mechanism.source:
+        lines.append(Text(mechanism.source, style="italic"))
+    named = motions(mechanism)
+    inputs = [
+        f"{name} = {amount(given.position, named[name].drive_kind.value, mechanism.units)}"
+        for name, given in state.inputs.items()
+    ]
+    at = f"at {listed(inputs)}" if inputs else "without inputs"
+    lines.append(Text(f"{at}; mobility {state.mobility}; every pair closes {kept(state.residual, SIZE)}"))
+    return Group(*lines)
+
+
+def heading(name: str, kind: str, units: Units) -> str:
+    """The heading of a column: its name and the unit in which its kind of quantity is shown."""
+    return f"{name}, {shown(kind, units)[0]}"
+
+
+def _links(state: State) -> FittedTable:
+    units = state.mechanism.units
+    table = plain_table(
+        "Links",
+        "link",
+        heading("angle", "angle", units),
+        heading("ang. velocity", "angular velocity", units),
+        (heading("ang. acceleration", "angular acceleration", units), "sense"),
+    )
+    angle = unit(units.angle)
+    for name, link in state.links.items():
+        if name != state.mechanism.frame:
+            table.add_row(
+                name,
+                number(angle.from_si(link.angle)),
+                number(link.angular_velocity),
+                number(link.angular_acceleration),
+                link.sense,
+            )
+    return table
+
+
+def _points(state: State) -> FittedTable:
+    units = state.mechanism.units
+    at = heading("at", "angle", units)
+    table = plain_table(
+        "Points",
+        "point",
+        tuple(heading(axis, "length", units) for axis in "xy"),
+        (heading("velocity", "velocity", units), at),
+        (heading("acceleration", "acceleration", units), at),
+        "sense",
+    )
+    length, velocity, acceleration = (shown(kind, units)[1] for kind in ("length", "velocity", "acceleration"))
+    points = state.points
+    scale = max((float(np.hypot(*point.position)) for point in points.values()), default=1.0) or 1.0
+    for name, point in points.items():
+        placed = (number(length.from_si(float(each) if abs(each) > 1e-13 * scale else 0.0)) for each in point.position)
+        table.add_row(
+            name,
+            *placed,
+            *_arrow(point.velocity, velocity, units),
+            *_arrow(point.acceleration, acceleration, units),
+            point.sense,
+        )
+    return table
+
+
+def _arrow(vector: np.ndarray, of: Unit, units: Units) -> tuple[str, str]:
+    """A vector's magnitude and direction; without a direction where it is nothing."""
+    size = float(np.hypot(*vector))
+    way = number(unit(units.angle).from_si(direction(vector))) if size > 1e-14 else ""
+    return number(of.from_si(size)), way
+
+
+def _pairs(state: State) -> RenderableType:
+    kinds: dict[type[Pair], list[Pair]] = {}
+    for pair in motions(state.mechanism).values():
+        kinds.setdefault(type(pair), []).append(pair)
+    tables, units = [], state.mechanism.units
+    for kind, pairs in kinds.items():
+        titles = [
+            heading(name.replace("_", " ").replace("angular", "ang."), of, units) for name, of in kind.reports.items()
+        ]
+        table = plain_table(f"{kind.keyword.capitalize()} pairs", "pair", "links", *titles, left=(0, 1), keys=2)
+        for pair in pairs:
+            report = state.pair(pair.name)
+            values = [_reported(report[name], of, units) for name, of in kind.reports.items()]
+            table.add_row(pair.name, " - ".join(pair.links), *values)
+        tables.append(table)
+    return Group(*tables)
+
+
+def _relative(text: str, relative: RelativeState, state: State) -> RenderableType:
+    """How one point moves against another, part by part."""
+    point, other = text.split(",")[:2]
+    units = state.mechanism.units
+    title = f"{point.strip()} against {other.strip()}, in the axes of {relative.axes}"
+    at = heading("at", "angle", units)
+    table = plain_table(title, "part", ("magnitude", "unit", at), ("x", "y"), left=(0, 2))
+    parts = {
+        "velocity": ("velocity", relative.velocity),
+        "  by rotation": ("velocity", relative.rotation),
+        "  by sliding": ("velocity", relative.sliding),
+        "acceleration": ("acceleration", relative.acceleration),
+        "  centripetal": ("acceleration", relative.centripetal),
+        "  tangential": ("acceleration", relative.tangential),
+        "  Coriolis": ("acceleration", relative.coriolis),
+        "  by sliding ": ("acceleration", relative.sliding_acceleration),
+    }
+    for name, (kind, part) in parts.items():
+        measure, of = shown(kind, units)
+        size, way = _arrow(part, of, units)
+        table.add_row(name, size, measure, way, *(number(of.from_si(float(each))) for each in part))
+    return table
+
+
+def _reported(value: float | None, kind: str, units: Units) -> str:
+    return "-" if value is None else number(shown(kind, units)[1].from_si(value))
+
+
+def direction(vector: np.ndarray) -> float:
+    """The direction of a vector (rad), above -pi up to pi; what rounding leaves of a part is none."""
+    least = ROUNDING * float(np.hypot(*vector))
+    x, y = (float(part) if abs(part) > least else 0.0 for part in vector)
+    return float(np.arctan2(y, x))
+
+
+def kept(value: float, of: str = "") -> str:
+    """How well something holds that leaves `value` of another thing open: exactly, to round-off, or but for that."""
+    beside = f"{value:.1e} {of}".rstrip()
+    return "exactly" if value == 0.0 else f"to round-off ({beside})" if value < ROUND_OFF else f"but for {beside}"
+
+
+def number(value: float) -> str:
+    return "0" if abs(value) < 1e-14 else f"{value:#.{DIGITS}g}".rstrip(".")
+
+
+def counted(value: float | None, beside: float = 0.0) -> str:
+    """A number, nothing where it is only what rounding leaves of another beside it; a dash where there is none."""
+    if value is None or not np.isfinite(value):
+        return "-"
+    return f"{value:#.{DIGITS}g}".rstrip(".") if abs(value) > ROUNDING * abs(beside) else "0"

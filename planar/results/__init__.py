@@ -1,0 +1,1 @@
+"""Solved positions and motions: arrays with names."""

@@ -1,0 +1,1 @@
+"""From the sketch to the assembly nearest to it."""

@@ -1,0 +1,1 @@
+"""Is a position closed, and is it on the branch that it started on?"""

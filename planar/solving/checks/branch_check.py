@@ -1,0 +1,108 @@
+"""The second part of the gate: can two positions of a run lie on one branch, and on no other?"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planar.equations.functions import Program
+
+Array = np.ndarray
+
+
+CLOSE = 1.5
+"""How many times shorter than the distances from singular positions at its two ends a step must be."""
+NOTHING = 1e-6
+"""A least singular value that is zero: on the singular position itself it is what rounding left."""
+NUDGE = 1e-6
+"""The part of a step over which the change of a slope is taken."""
+
+
+class Branch:
+    """Judges the steps of runs of one program, with one set of numbers p.
+
+    Two positions lie on one branch if every unknown has moved as its rates allow, and if no group can have been
+    singular between. A slope stays regular until it has changed by its least singular value (Weyl), so least value
+    over rate of change is a distance in which nothing happens: a step must be shorter than those at its two ends
+    together. So a change point, where branches cross, is not passed within a step, whichever sign the determinant has
+    beyond it and however the rates there agree.
+    """
+
+    def __init__(self, program: Program, p: Array):
+        self.program, self.p = program, p
+
+    def along(self, z: Array, u: Array) -> Array:
+        """For each step of a run, z (samples, unknowns) and u (samples, inputs), whether it keeps to the branch."""
+        slopes, drives = self.program.slopes(z, u, self.p)
+        gains = cancelling(slopes, drives)
+        way = np.diff(u, axis=0)
+        before, after = ((gain @ way[:, :, None])[..., 0] for gain in (gains[:-1], gains[1:]))
+        smooth = np.all(allowed(np.diff(z, axis=0), before, after), axis=1)
+        smooth &= self._onwards(before, after, way)
+        first = self._safe(z[:-1], u[:-1], slopes[:-1], before, way)
+        second = self._safe(z[1:], u[1:], slopes[1:], after, way)
+        return smooth & np.all(first + second > CLOSE, axis=1)
+
+    def _onwards(self, before: Array, after: Array, way: Array) -> Array:
+        """For each step whether every group goes on as it came (steps,): less than a right angle between the tangents.
+
+        Beside a limit both ends of a step may be closed, and any move allowed by rates that grow beyond all bounds
+        there; but on the branch that comes back from the limit they have the other sign.
+        """
+        both, straight = before * after, np.sum(way * way, axis=1)
+        turns = [np.sum(both[:, stage.unknowns], axis=1) for stage in self.program.equations.stages]
+        return np.all([turn + straight >= 0.0 for turn in turns], axis=0) if turns else np.ones(len(way), dtype=bool)
+
+    def _safe(self, z: Array, u: Array, slopes: Array, rates: Array, way: Array) -> Array:
+        """How far each group is from where it could be singular (samples, stages), in steps of rates and way."""
+        pace = np.maximum(np.max(np.abs(np.hstack([rates, way])), axis=1, initial=0.0), 1e-300)[:, None]
+        nudge = NUDGE / np.maximum(pace, NUDGE)
+        moved, _ = self.program.slopes(z + nudge * rates, u + nudge * way, self.p)
+        distances = np.full((len(z), len(self.program.equations.stages)), np.inf)
+        for index, stage in enumerate(self.program.equations.stages):
+            here, there = (each[:, stage.rows, stage.unknowns] for each in (slopes, moved))
+            if here.size:
+                # columns of one size, so that a small link counts as much as a large one
+                sizes = np.maximum(np.linalg.norm(here, axis=1, keepdims=True), 1e-300)
+                change = np.linalg.norm((there - here) / sizes, axis=(1, 2)) / nudge[:, 0]
+                least = _least(here / sizes)
+                # on the singular position itself rates are rounding, and say nothing of how it changes
+                distances[:, index] = np.where(least < NOTHING, 0.0, least / np.maximum(change, 1e-300))
+        return np.nan_to_num(distances, nan=0.0, posinf=np.inf)
+
+
+def cancelling(slopes: Array, known: Array) -> Array:
+    """The rates of the unknowns that cancel what known rates open; slopes (..., rows, unknowns), known (..., rows, k).
+
+    Where a square slope is singular, NaN: no rate is allowed there.
+    """
+    if slopes.shape[-1] != slopes.shape[-2]:
+        return -np.linalg.pinv(slopes, rcond=1e-12) @ known
+    try:
+        return -np.linalg.solve(slopes, known)
+    except np.linalg.LinAlgError:
+        if slopes.ndim > 2:
+            return np.stack([cancelling(slope, each) for slope, each in zip(slopes, known, strict=True)])
+        return np.full((slopes.shape[-1], known.shape[-1]), np.nan)
+
+
+def _least(slopes: Array) -> Array:
+    """The least singular value of each slope (steps, rows, unknowns), rows >= unknowns."""
+    if slopes.shape[1:] == (2, 2):
+        # of two by two in closed form: the two have the determinant as product and the norm as sum of squares
+        det = np.abs(slopes[:, 0, 0] * slopes[:, 1, 1] - slopes[:, 0, 1] * slopes[:, 1, 0])
+        norm = np.sum(slopes * slopes, axis=(1, 2))
+        greatest = np.sqrt(0.5 * (norm + np.sqrt(np.maximum(norm * norm - 4.0 * det * det, 0.0))))
+        return det / np.maximum(greatest, 1e-300)
+    if slopes.shape[1] < slopes.shape[2]:
+        return np.zeros(len(slopes))
+    return np.linalg.svd(slopes, compute_uv=False)[:, -1]
+
+
+def allowed(move: Array, before: Array, after: Array) -> Array:
+    """Whether a move is one that the rates at its two ends allow, each as a move over the whole step.
+
+    A smooth move differs from the mean of the two by no more than they differ from one another, with room for the
+    curvature between (a quarter of the greater) and a floor of round-off for what hardly moves.
+    """
+    room = np.abs(after - before) + 0.25 * np.maximum(np.abs(before), np.abs(after)) + 1e-9
+    return np.abs(move - 0.5 * (before + after)) <= room

@@ -1,0 +1,174 @@
+"""The first part of the gate that every answer passes, whichever way it was found: is everything closed?
+
+It knows nothing of elimination, casadi or Newton: it runs the pairs' own formulas on plain numbers. The second part,
+since the residual of a flipped linkage is zero too, is `branch`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from planar.equations.acceptance import CARRIED
+from planar.foundation.geometry import Frame, terms_of
+from planar.foundation.jets import Jet, terms
+from planar.model.link_shapes import Shape
+from planar.model.mechanism import Mechanism, motions
+from planar.model.pairs import Kind, Pair
+
+Array = np.ndarray
+TOUCHING = 1e-6
+"""Sizes: dimensions in files are rounded, so a contact that guides keep closed may be open by as much."""
+EPS = float(np.finfo(float).eps)
+SURELY_KEPT = 1e-7
+"""Relative errors by round-off that are surely below this are neither looked for nor told."""
+MOST_LOST = 1e-3
+"""Angles (rad) and rates that may have greater relative errors are no answer: less than three digits are sure."""
+SHORT_ARM = EPS / (SURELY_KEPT * 1e-2**2)
+"""Sizes: where no link has a shorter arm and no group is nearer than 1e-2 to being singular, which backends keep clear
+of, rounding surely takes no more than that."""
+
+
+class Gate:
+    """The constraints of one mechanism (SI, lengths judged in units of its size)."""
+
+    def __init__(
+        self, mechanism: Mechanism, shapes: Mapping[str, Shape], unit: float, named: Mapping[str, Pair] | None = None
+    ):
+        self.mechanism, self.unit = mechanism, unit
+        self.motions = motions(mechanism) if named is None else named
+        self.numbers = {
+            pair.name: pair.measure([shapes[link] for link in pair.bodies])
+            for pair in (*mechanism.pairs, *(self.motions[given.pair] for given in mechanism.inputs))
+        }
+        self.names = [pair.name for pair in mechanism.pairs for _ in pair.constrains]
+        self.names += [given.pair for given in mechanism.inputs]
+        """The pair of every constraint, the inputs' last."""
+        reach = max(
+            (abs(value) for pair in mechanism.pairs for value in _lengths(pair, self.numbers[pair.name])), default=0.0
+        )
+        # an entry of a residual is a sum of a few terms as long as the mechanism reaches, after one step of rounding
+        # for each link on the way round a loop
+        self.tolerance = 16.0 * EPS * (4 + len(mechanism.links)) * max(1.0, reach / unit)
+
+    def moved(self, mechanism: Mechanism) -> Gate:
+        """The same for a mechanism that differs from this one in its inputs' numbers alone."""
+        there = object.__new__(Gate)
+        there.__dict__.update(self.__dict__)
+        there.mechanism = mechanism
+        return there
+
+    def gaps(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Array]], u: Array | None = None) -> Array:
+        """How far every constraint is open (constraints, ...): lengths of the size, or rad; see `names`.
+
+        Frames with cos and sin made from their angles, floats or arrays alike. `u` (inputs, ...) are the positions
+        of the inputs, else the mechanism's own. What is not a number counts as infinitely open.
+        """
+        gaps = [_gap(left, kind, self.unit) for kind, left in self._closures(frames, own, u)]
+        if not gaps:
+            return np.zeros((0, 1))
+        # the round-off of an angle, and of where its cos and sin put things, grows with the turns that it counts
+        counted = [np.abs(frame.angle) for frame in frames.values()]
+        counted += [np.abs(length) / self.unit for lengths in own.values() for length in lengths]
+        many = np.fmax.reduce(np.broadcast_arrays(2.0 * np.pi, *counted)) / (2.0 * np.pi)
+        many = np.where(np.isfinite(many), many, 1.0)
+        return np.nan_to_num(np.array(np.broadcast_arrays(*gaps)) / many, nan=np.inf, posinf=np.inf)
+
+    def apart(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Jet]]) -> tuple[str, float] | None:
+        """The first contact that guides have to keep closed and do not: its pair and the gap (m).
+
+        No gap but a rate of it: the contact is closed in passing only.
+        """
+        for pair in self.mechanism.pairs:
+            gap = pair.apart(self.numbers[pair.name], own[pair.name])
+            if not isinstance(gap, Jet):
+                continue
+            for order, part in enumerate(gap.parts):
+                scale = self.unit * (self._greatest(frames, own, order) if order else 1.0)
+                if np.nanmax(np.abs(part) / scale, initial=0.0) > TOUCHING:
+                    return pair.name, float(np.max(np.abs(gap.parts[0])))
+        return None
+
+    def rate_gaps(
+        self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Jet]], inputs: Sequence[Jet] | None = None
+    ) -> list[tuple[Array, str]]:
+        """How far velocities, then accelerations, break the worst constraint, as a part of its own terms; its pair.
+
+        Of jets of arrays, an array. `inputs` are the inputs with their rates, else the mechanism's own.
+        """
+        u = [Jet(*given[1:4]) for given in self.mechanism.inputs] if inputs is None else inputs
+        sizes = {
+            name: frame if frame.fixed else terms_of(*(terms(part) for part in (frame.x, frame.y, frame.angle)))
+            for name, frame in frames.items()
+        }
+        own_sizes = {name: [terms(each) for each in values] for name, values in own.items()}
+        given = [terms(each) for each in u]
+        both = zip(self._closures(frames, own, u), self._closures(sizes, own_sizes, given), strict=True)
+        closures = [(kind, left, whole) for (kind, left), (_, whole) in both if isinstance(left, Jet)]
+        found = []
+        for order in (1, 2):
+            # a velocity counts as one in an arc of the size: what turning leaves there but for rounding is none
+            speeds = [
+                (whole.parts[k] / self.unit) ** (order / k)
+                for kind, _, whole in closures
+                if kind is Kind.LENGTH
+                for k in range(1, order + 1)
+            ]
+            carried = CARRIED * np.maximum.reduce(np.broadcast_arrays(np.zeros(1), *speeds))
+            gaps = [
+                np.abs(left.parts[order]) / _scale(whole.parts[order], carried * self._by(kind))
+                for kind, left, whole in closures
+            ]
+            if not gaps:
+                found.append((np.zeros(1), ""))
+                continue
+            part = np.nan_to_num(np.array(np.broadcast_arrays(*gaps)), nan=np.inf)
+            worst = int(np.argmax(part.reshape(len(closures), -1).max(axis=1)))
+            found.append((part.max(axis=0), self.names[worst]))
+        return found
+
+    def _greatest(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Jet]], order: int) -> Array:
+        """The greatest rate of an order (lengths of the size), what a velocity makes of itself in an arc included.
+
+        A velocity along a line counts as one in an arc of the size: what turning leaves there but for rounding is none.
+        """
+        rates = [np.zeros(1)]
+        for frame in frames.values():
+            if not frame.fixed:
+                for value, size in ((frame.angle, 1.0), (frame.x, self.unit), (frame.y, self.unit)):
+                    rates += [(np.abs(value.parts[k]) / size) ** (order / k) for k in range(1, order + 1)]
+        rates += [np.abs(jet.parts[order]) / self.unit for each in own.values() for jet in each]
+        greatest = np.maximum.reduce(np.broadcast_arrays(*rates))
+        return np.where(greatest == 0.0, 1.0, greatest)
+
+    def _by(self, kind: Kind) -> float:
+        return self.unit if kind is Kind.LENGTH else 1.0
+
+    def _closures(self, frames, own, u=None):  # noqa: ANN001, ANN202 - floats, arrays or jets alike
+        """(kind, what is left open) of every constraint, then of every input."""
+        for pair in self.mechanism.pairs:
+            left = pair.residual([frames[link] for link in pair.bodies], self.numbers[pair.name], own[pair.name])
+            yield from zip(pair.constrains, left, strict=True)
+        for index, given in enumerate(self.mechanism.inputs):
+            pair = self.motions[given.pair]
+            drive = pair.drive([frames[link] for link in pair.bodies], self.numbers[pair.name], own.get(pair.name, ()))
+            yield pair.drive_kind, drive - (given.position if u is None else u[index])
+
+
+def _scale(whole: Array, carried: Array) -> Array:
+    """What a row that should vanish is divided by; one where nothing moves."""
+    scale = whole + carried
+    return np.where(scale == 0.0, 1.0, scale)
+
+
+def _lengths(pair: Pair, numbers: Sequence[float]) -> list[float]:
+    return [value for value, kind in zip(numbers, pair.measures, strict=True) if kind is Kind.LENGTH]
+
+
+def _gap(left: Array, kind: Kind, unit: float) -> Array:
+    if kind is Kind.LENGTH:
+        return np.abs(left) / unit
+    if kind is Kind.ANGLE:
+        return np.abs(np.arctan2(np.sin(left), np.cos(left)))
+    return np.abs(left)

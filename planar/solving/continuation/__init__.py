@@ -1,0 +1,1 @@
+"""Along the curve of positions: predictor and corrector, turning points, bifurcations."""

@@ -1,1 +1,0 @@
-"""Solved mechanisms as people see them."""

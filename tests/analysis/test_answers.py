@@ -1,0 +1,375 @@
+"""What designers ask of a motion, against closed forms, against fine samples, and by construction."""
+
+import json
+from itertools import pairwise
+from math import acos, asin, atan2, cos, hypot, inf, pi, radians, sin, sqrt
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import planar
+from planar.cli import main
+from planar.foundation.errors import BadInput
+from planar.model.mechanism import Drive, motions, with_inputs
+from planar.reports.tables.answers import record, tables
+from planar.results.motion import Unknown
+from tests.analysis.test_extremes import slider_crank, turn_apart
+from tests.draws import part
+
+SEEDS = part(range(8), 2)
+
+
+def four_bar(a, b, c, d, velocity=3.0, position=1.0):
+    """A crank a, a coupler b with a point P, a rocker c and a frame d along x (m), the open assembly."""
+    pin, size = np.array([a * cos(position), a * sin(position)]), None
+    far = hypot(d - pin[0], -pin[1])
+    size = atan2(-pin[1], d - pin[0]) + acos((b * b + far * far - c * c) / (2.0 * b * far))
+    joint = pin + b * np.array([cos(size), sin(size)])
+    return planar.from_dict(
+        {
+            "planar": 1,
+            "name": "Four-bar",
+            "frame": "frame",
+            "links": {
+                "frame": {"points": {"A": [0, 0], "D": [d, 0]}},
+                "AB": {"ends": ["A", "B"], "length": a},
+                "BC": {
+                    "ends": ["B", "C"],
+                    "length": b,
+                    "points": {"P": {"along": ["B", "C"], "distance": b, "angle": 0.7}},
+                },
+                "DC": {"ends": ["D", "C"], "length": c},
+            },
+            "pairs": [{"turning": "A"}, {"turning": "B"}, {"turning": "C"}, {"turning": "D"}],
+            "inputs": [{"pair": "A", "position": position, "velocity": velocity}],
+            "sketch": {"B": list(map(float, pin)), "C": list(map(float, joint))},
+        }
+    )
+
+
+def crank_rocker(seed):
+    """Lengths of a random four-bar whose crank turns and whose rocker swings (Grashof, the crank shortest)."""
+    rng = np.random.default_rng(seed)
+    while True:
+        a, b, c, d = (float(x) for x in rng.uniform(0.1, 1.0, 4))
+        if min(b, c, d) > 1.1 * a and a + max(b, c, d) < 0.95 * (a + b + c + d - a - max(b, c, d)):
+            return a, b, c, d
+
+
+def by_cosines(one, two, opposite):
+    """The angle between two sides of a triangle."""
+    return acos((one * one + two * two - opposite * opposite) / (2.0 * one * two))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_crank_rocker_swings_and_returns_as_the_law_of_cosines_says(seed):
+    a, b, c, d = crank_rocker(seed)
+    motion = planar.cycle(four_bar(a, b, c, d, velocity=-2.0 if seed % 2 else 3.0), 24)
+    outer, inner = by_cosines(c, d, a + b), by_cosines(c, d, b - a)  # at D, from the frame
+    for name in ("DC", "D"):
+        found = planar.swing(motion, name)
+        assert found.least.value == pytest.approx(pi - outer, abs=1e-11)
+        assert found.greatest.value == pytest.approx(pi - inner, abs=1e-11)
+        assert found.angle == pytest.approx(outer - inner, abs=1e-11)
+        # crank and coupler are in line, stretched and folded
+        assert turn_apart(found.least.input, by_cosines(a + b, d, c)) < 1e-9
+        assert turn_apart(found.greatest.input, pi + by_cosines(b - a, d, c)) < 1e-9
+    off = by_cosines(a + b, d, c) - by_cosines(b - a, d, c)
+    ratio = planar.time_ratio(motion, "DC")
+    assert ratio.ratio == pytest.approx((pi + abs(off)) / (pi - abs(off)), rel=1e-9)
+    assert ratio.out.travel + ratio.back.travel == pytest.approx(2.0 * pi, abs=1e-12)
+    assert ratio.out.travel == pytest.approx(pi - off if seed % 2 == 0 else pi + off, abs=1e-9)
+    assert ratio.out.time == pytest.approx(ratio.out.travel / (2.0 if seed % 2 else 3.0), rel=1e-12)
+    assert planar.swing(motion, "AB") is None  # it turns right round
+    assert planar.time_ratio(motion, "AB") is None
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_an_offset_slider_cranks_stroke_and_time_ratio_are_the_closed_forms(seed):
+    rng = np.random.default_rng(100 + seed)
+    a, b = float(rng.uniform(0.1, 0.5)), float(rng.uniform(0.7, 2.0))
+    e = float(rng.uniform(-0.9, 0.9)) * (b - a)
+    motion = planar.cycle(slider_crank(a, b, e), 24)
+    assert planar.stroke(motion, "stroke").length == pytest.approx(
+        sqrt((a + b) ** 2 - e**2) - sqrt((b - a) ** 2 - e**2), rel=1e-10
+    )
+    off = abs(asin(e / (b - a)) - asin(e / (a + b)))
+    assert planar.time_ratio(motion, "stroke").ratio == pytest.approx((pi + off) / (pi - off), rel=1e-9)
+    of_point = planar.time_ratio(motion, "B", "x")
+    assert of_point.ratio == pytest.approx((pi + off) / (pi - off), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "of", "part"),
+    [
+        ("004-QR", "stroke", 0.1 / 0.25),
+        ("004-QR", "CD", 0.1 / 0.25),
+        ("crank-and-slotted-lever", "ram", 60 / 120),
+        ("whitworth", "guide", 40 / 100),
+    ],
+)
+def test_whitworths_and_the_slotted_levers_time_ratios_are_the_textbooks(name, of, part):
+    # cos(alpha / 2) = OA / OC of the lever, OC / OA of Whitworth's: (360 - alpha) / alpha
+    alpha = 2.0 * acos(part)
+    found = planar.time_ratio(planar.cycle(planar.load(name)), of)
+    assert found.ratio == pytest.approx((2.0 * pi - alpha) / alpha, rel=1e-12)
+    assert min(found.out.travel, found.back.travel) == pytest.approx(alpha, abs=1e-12)
+
+
+def test_the_shapers_lever_swings_twice_the_angle_of_its_tangent():
+    assert planar.swing(planar.cycle(planar.load("004-QR")), "CD").angle == pytest.approx(2.0 * asin(0.4), abs=1e-12)
+
+
+def test_a_swing_does_not_jump_where_an_angle_passes_half_a_turn():
+    mechanism = planar.to_dict(four_bar(0.2, 0.6, 0.5, 0.7))
+    mechanism["links"]["DC"]["ends"] = ["C", "D"]  # the rocker's own angle now passes -180 degrees or not
+    found = planar.swing(planar.cycle(planar.from_dict(mechanism), 24), "DC")
+    assert found.angle == pytest.approx(by_cosines(0.5, 0.7, 0.8) - by_cosines(0.5, 0.7, 0.4), abs=1e-11)
+
+
+def test_a_slide_has_no_swing_and_no_return_without_a_whole_turn():
+    motion = planar.cycle(planar.load("004-QR"), 40, 0.0, 3.0)
+    assert planar.swing(motion, "stroke") is None
+    assert planar.time_ratio(motion, "stroke") is None
+    assert planar.swing(planar.cycle(planar.load("four-bar"), 40), "DC") is None
+
+
+def test_extreme_positions_of_a_crank_pin_are_those_of_its_circle():
+    motion = planar.cycle(four_bar(0.2, 0.6, 0.5, 0.7), 10)
+    for axis, way in (("x", 0.0), ("y", pi / 2.0), (0.9, 0.9)):
+        found = planar.extremes(motion, "B", axis)
+        assert found.greatest.value == pytest.approx(0.2, abs=1e-14)
+        assert found.least.value == pytest.approx(-0.2, abs=1e-14)
+        assert turn_apart(found.greatest.input, way) < 1e-12
+        assert turn_apart(found.least.input, way + pi) < 1e-12
+        assert found.turning == (True, True)
+
+
+def test_over_a_part_of_a_turn_a_point_may_be_extreme_at_its_ends():
+    motion = planar.cycle(four_bar(0.2, 0.6, 0.5, 0.7), 10, 0.3, 2.0)
+    found = planar.extremes(motion, "B", "y")
+    assert found.turning == (False, True)
+    assert found.least.input == pytest.approx(0.3, abs=1e-12)
+    assert found.least.value == pytest.approx(0.2 * sin(0.3), abs=1e-14)
+
+
+@pytest.mark.parametrize("steps", [4, 7, 12])
+def test_coarse_samples_miss_no_extreme_of_a_coupler_curve(steps):
+    fine = planar.cycle(planar.load("hoeken-straight-line"), 720)
+    motion = planar.cycle(planar.load("hoeken-straight-line"), steps)
+    for axis, column in (("x", 0), ("y", 1)):
+        values = fine.point("P").position[:, column]
+        found = planar.extremes(motion, "P", axis)
+        assert found.least.value <= values.min() + 1e-12
+        assert found.greatest.value >= values.max() - 1e-12
+        assert found.least.value == pytest.approx(values.min(), abs=1e-5)
+        assert found.greatest.value == pytest.approx(values.max(), abs=1e-5)
+
+
+def test_the_greatest_rate_of_a_link_is_what_fine_samples_come_to():
+    mechanism = planar.load("crank-rocker")
+    fine, motion = planar.cycle(mechanism, 3600).link("rocker"), planar.cycle(mechanism, 24)
+    found = planar.greatest(motion, "rocker")
+    assert found.value == pytest.approx(np.abs(fine.angular_velocity).max(), rel=1e-5)
+    assert found.value >= np.abs(fine.angular_velocity).max() * (1.0 - 1e-12)
+    assert abs(planar.solve(mechanism, {"A0": found.input}).link("rocker").angular_acceleration) < 1e-9
+    hardest = planar.greatest(motion, "rocker", "acceleration")
+    assert hardest.value == pytest.approx(np.abs(fine.angular_acceleration).max(), rel=1e-5)
+
+
+@pytest.mark.parametrize("part", [0.01, 0.03])
+@pytest.mark.parametrize("start", [None, -0.1, 0.0])
+def test_a_scotch_yoke_dwells_as_long_as_its_cosine_does(part, start):
+    # x = r cos A: within w of r over 2 acos(1 - w / r)
+    motion = planar.cycle(planar.load("scotch-yoke"), 24, start, None if start is None else start + 2.0 * pi)
+    found = planar.dwells(motion, "stroke", within=part * 0.15, least=0.0)
+    wide = 2.0 * acos(1.0 - 2.0 * part)
+    assert len(found) == 2
+    assert {round(each.at.value, 9) for each in found} == {0.075, -0.075}
+    for each in found:
+        assert each.travel == pytest.approx(wide, abs=1e-11)
+        assert turn_apart(each.start, (0.0 if each.at.value > 0.0 else pi) - 0.5 * wide) < 1e-11
+        assert each.stop == pytest.approx(each.start + each.travel, abs=1e-14)
+        assert each.time == pytest.approx(wide / (10.0 * pi), rel=1e-11)
+    assert planar.dwells(motion, "stroke", within=part * 0.15, least=wide + 0.01) == ()
+
+
+def test_by_default_harmonic_motion_is_no_dwell_and_a_hypocycloids_is():
+    assert planar.dwells(planar.cycle(planar.load("scotch-yoke"), 24), "stroke") == ()
+    mechanism = planar.load("hypocycloid-dwell")
+    (found,) = planar.dwells(planar.cycle(mechanism, 48), "stroke")
+    assert found.within == pytest.approx(0.002, rel=1e-9)
+    for end in (found.start, found.stop):
+        at = planar.solve(mechanism, {"O": end}).pair("stroke")["displacement"]
+        assert abs(at - found.at.value) == pytest.approx(found.within, rel=1e-9)
+    assert turn_apart(0.5 * (found.start + found.stop), pi) < 1e-9
+    assert found.travel > radians(60.0)
+
+
+def test_a_dwell_may_be_cut_by_the_range_and_ripples_make_one_dwell():
+    short = planar.cycle(planar.load("scotch-yoke"), 24, -0.05, 1.0)
+    (found,) = planar.dwells(short, "stroke", within=0.0015, least=0.0)
+    assert (found.start, found.stop) == (pytest.approx(-0.05), pytest.approx(acos(1.0 - 0.02), abs=1e-11))
+    line = planar.cycle(planar.load("hoeken-straight-line"), 48)
+    wide = planar.dwells(line, "P", within=0.002, axis="y")
+    spans = sorted((each.start, each.stop) for each in wide)
+    assert all(one[1] <= other[0] for one, other in pairwise(spans))
+    assert max(each.travel for each in wide) > radians(130.0)
+
+
+def test_a_crank_pins_and_a_planets_curve_have_the_areas_of_circle_and_ellipse():
+    motion = planar.cycle(four_bar(0.2, 0.6, 0.5, 0.7), 12)
+    found = planar.area(motion, "B")
+    assert found.value == pytest.approx(pi * 0.04, rel=1e-14)
+    assert found.error <= 1e-10 * found.value
+    # Cardan's wheel turns as fast backwards: semi-axes 50 + d and 50 - d; a point of its rim runs along a diameter
+    cardan = planar.cycle(planar.load("cardan-gears"), 12)
+    assert planar.area(cardan, "E").value == pytest.approx(pi * 0.08 * 0.02, rel=1e-13)
+    assert planar.area(cardan, "T").value == 0.0
+    assert planar.area(cardan, "N").value == 0.0
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_area_of_a_coupler_curve_is_half_the_integral_of_x_dy_less_y_dx(seed):
+    mechanism = four_bar(*crank_rocker(seed), velocity=1.0)
+    fine = planar.cycle(mechanism, 720).point("P")
+    x, y = fine.position[:-1].T
+    u, v = fine.velocity[:-1].T
+    whole = float(np.sum(x * v - y * u)) * pi / 720.0
+    found = planar.area(planar.cycle(mechanism, 10), "P")
+    assert found.value == pytest.approx(whole, abs=1e-11)
+    back = planar.area(planar.cycle(mechanism, 10, 1.0, 1.0 - 2.0 * pi), "P")
+    assert back.value == pytest.approx(-whole, abs=1e-11)
+
+
+def test_an_open_curve_has_no_area():
+    for motion in (planar.cycle(planar.load("crank-rocker"), 10, 0.0, 3.0), planar.cycle(planar.load("four-bar"), 10)):
+        with pytest.raises(BadInput, match="does not come back"):
+            planar.area(motion, "B")
+
+
+@pytest.mark.parametrize("output", ["stroke", "CD", "D"])
+def test_the_advantage_over_a_motion_is_that_of_every_position(output):
+    mechanism = planar.load("004-QR")
+    motion = planar.cycle(mechanism, 12)
+    found = planar.advantage_over(motion, output)
+    for row in (0, 3, 8):
+        state = planar.solve(mechanism, {"O": motion.inputs["O"].position[row]})
+        assert found.values[row] == pytest.approx(planar.advantage(state, output).by_power, rel=1e-9)
+        assert found.measure == planar.advantage(state, output).measure
+    ends = [asin(0.4) + pi, 2.0 * pi - asin(0.4)]
+    assert found.infinite == pytest.approx(ends, abs=1e-11)
+    assert found.least.value <= np.abs(found.values).min()
+
+
+def test_an_advantage_is_infinite_at_a_sample_on_an_end_and_without_rates_not_told():
+    motion = planar.cycle(planar.load("000-P5"), 4, 0.0, 2.0 * pi)
+    found = planar.advantage_over(motion, "stroke")
+    assert list(np.isinf(found.values)) == [True, False, True, False, True]
+    between = planar.advantage_over(planar.cycle(planar.load("four-bar"), 24), "DC")
+    assert np.isnan(between.values[[0, -1]]).all()
+    assert np.isfinite(between.values[1:-1]).all()
+    assert between.least.value == 0.0  # towards a limit the output is ever faster
+
+
+def test_what_there_is_not_is_refused_in_a_sentence():
+    motion = planar.cycle(planar.load("crank-rocker"), 12)
+    for ask in (planar.swing, planar.time_ratio, planar.dwells, planar.advantage_over, planar.answers, planar.greatest):
+        with pytest.raises(Unknown, match="there is no"):
+            ask(motion, "nothing")
+    with pytest.raises(Unknown, match="there is no point"):
+        planar.extremes(motion, "nothing")
+    with pytest.raises(BadInput, match="'x', 'y' or a direction"):
+        planar.extremes(motion, "A", "z")
+    with pytest.raises(BadInput, match="direction"):
+        planar.extremes(motion, "A", inf)
+    with pytest.raises(BadInput, match="not negative"):
+        planar.dwells(motion, "rocker", within=-1.0)
+
+
+def test_what_slides_without_turning_is_not_said_to_stand_still():
+    motion = planar.cycle(planar.load("scotch-yoke"), 12)
+    for name, sentence in (("yoke", "it does not turn"), ("frame", "it does not turn")):
+        (found,) = planar.answers(motion, name)
+        assert sentence in found.notes
+        assert "it does not move" not in found.notes
+
+
+@pytest.mark.parametrize(
+    ("name", "of"),
+    [("four-bar", "DC"), ("cardan-gears", "mesh"), ("single-link", "O")],
+)
+def test_the_answers_of_a_name_are_told_in_a_table_and_as_json(name, of):
+    motion = planar.cycle(planar.load(name), 24)
+    asked = {of: planar.answers(motion, of)} if of in {*motion.pairs, *motion.links} else {}
+    value = json.loads(json.dumps(record(asked), allow_nan=False))
+    assert value.keys() == asked.keys()
+    assert tables(motion, asked)
+
+
+def test_a_pin_is_asked_of_as_pair_and_as_point():
+    motion = planar.cycle(planar.load("crank-rocker"), 24)
+    pair, point = planar.answers(motion, "B")
+    assert (pair.what, point.what) == ("pair", "point")
+    assert pair.swing.angle == planar.swing(motion, "B").angle
+    assert point.extremes[0].greatest == planar.extremes(motion, "B").greatest
+    rates = np.abs(planar.cycle(planar.load("crank-rocker"), 720).pair("B")["relative_angular_velocity"])
+    assert pair.velocity.value == pytest.approx(rates.max(), rel=1e-5)  # of the joint's motion, not of its point's
+
+
+def test_an_input_at_rest_is_told_per_unit():
+    mechanism = with_inputs(planar.load("crank-rocker"), (Drive("A0", None, 0.0, 0.0),))
+    (found,) = planar.answers(planar.cycle(mechanism, 24), "rocker")
+    assert found.per_unit
+    assert found.velocity.value == pytest.approx(1.0 / found.advantage.least.value, rel=1e-12)
+
+
+def test_the_command_prints_answers_beside_the_run():
+    told = CliRunner().invoke(main, ["cycle", "004-QR", "--steps", "24", "--of", "CD"])
+    assert told.exit_code == 0, told.output
+    assert "Answers of link CD" in told.output
+    assert "1.70995" in told.output
+    assert "47.1564 deg" in told.output
+    value = json.loads(
+        CliRunner().invoke(main, ["cycle", "004-QR", "--steps", "24", "--json", "--of", "stroke"]).output
+    )
+    assert value["answers"]["stroke"]["pair"]["stroke"]["length"] == pytest.approx(0.4, rel=1e-9)
+    assert value["answers"]["stroke"]["pair"]["time_ratio"]["ratio"] == pytest.approx(1.7099527817, rel=1e-9)
+    refused = CliRunner().invoke(main, ["cycle", "004-QR", "--steps", "24", "--of", "nothing"])
+    assert refused.exit_code == 2
+    assert "--of" in refused.output
+
+
+@pytest.mark.parametrize(
+    "model", ["four-bar", "hart-inversor", "triple-rocker", "watt-parallel-motion", "jansen-leg", "crank-rocker"]
+)
+def test_an_angle_of_one_thing_is_told_one_way(model):
+    """A pair on the frame turns as its link does; both start between -180 and 180 degrees, as a position has them."""
+    motion = planar.cycle(planar.load(model), 24)
+    state = planar.solve(motion.mechanism)
+    compared = 0
+    for name, pair in motions(motion.mechanism).items():
+        told = next(iter(motion.pair(name).values()))
+        here = next(iter(state.pair(name).values()))
+        if name in motion.inputs:
+            assert told == pytest.approx(motion.inputs[name].position, abs=1e-9)
+            assert here == pytest.approx(state.inputs[name].position, abs=1e-9)
+        elif pair.links[0] == motion.mechanism.frame and pair.keyword == "turning":
+            assert abs(told[0]) <= pi
+            assert here == pytest.approx(state.link(pair.links[1]).angle, abs=1e-9)
+            assert told == pytest.approx(motion.link(pair.links[1]).angle, abs=1e-9)
+            by_pair, by_link = planar.swing(motion, name), planar.swing(motion, pair.links[1])
+            assert (by_pair is None) == (by_link is None)
+            if by_pair is not None:
+                for one, other in zip(by_pair[1:3], by_link[1:3], strict=True):
+                    assert one.value == pytest.approx(other.value, abs=1e-7)
+            wide = [planar.dwells(motion, each, within=0.2, least=0.0) for each in (name, pair.links[1])]
+            assert [each.at.value for each in wide[0]] == pytest.approx([each.at.value for each in wide[1]], abs=1e-7)
+            if by_pair is not None:
+                assert abs(by_pair.least.value) <= pi + 1e-6
+                low, high = by_pair.least.value - 1e-7, by_pair.greatest.value + 1e-7
+                ends = [each.value for each in motion.limits if each.kind == "stroke end" and each.of == name]
+                assert all(low <= each <= high for each in (*ends, *(each.at.value for each in wide[0])))
+            compared += 1
+    assert compared

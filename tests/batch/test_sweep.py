@@ -1,0 +1,347 @@
+"""Sweeps: every design as its own cycle and the closed forms have it, refused where it must be, kept in stores."""
+
+import sys
+from importlib.machinery import ModuleSpec
+from types import ModuleType
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import planar
+from planar.batch.design_arrays import lifted, one
+from planar.batch.march import choice, numpy_backend
+from planar.batch.march.backend import NotMarched
+from planar.batch.march.checks import Branches, Closed
+from planar.batch.march.design_functions import Columns
+from planar.batch.reference_design import base
+from planar.document import files
+from planar.foundation.errors import BadInput, NoAnswer, Outcome
+from planar.model.dimensions import dimensions
+from planar.solving.position import Solver
+from tests.draws import draws, part
+from tests.known import MODELS
+from tests.linkages import random_linkage
+from tests.solving.test_cycle import (
+    PARALLELOGRAM,
+    ROCKER,
+    TRIPLE,
+    TURN,
+    four_bar,
+    rates,
+    rocker,
+    slider_crank,
+)
+
+ORDERS = ("position", "velocity", "acceleration")
+
+
+def around(mechanism, spread, many=5, seed=0):
+    """Random designs: every length that is not zero, and the inputs' rates, changed by so much."""
+    rng = np.random.default_rng(seed)
+    own = {each.name: each.value for each in dimensions(mechanism, frozenset(link.name for link in mechanism.links))}
+    own |= {f"{each.pair}.velocity": each.velocity for each in mechanism.inputs}
+    own |= {f"{each.pair}.acceleration": each.acceleration for each in mechanism.inputs}
+    return {name: value * (1 + spread * rng.uniform(-1, 1, many)) for name, value in own.items() if value}
+
+
+def cycles(mechanism, designs, result, steps, pair=None, start=None, stop=None):
+    """Every design's status, rows and rates are those of its own cycle; returns how far they are off at most."""
+    worst = 0.0
+    for k in range(len(result)):
+        changed, inputs = lifted(mechanism, one(designs, k)), np.atleast_2d(result.input)
+        row = inputs[k] if len(inputs) > 1 else inputs[0]
+        ends = (start, stop) if start is None and stop is None else (row[0], row[-1])
+        name = pair or changed.inputs[0].pair
+        if start is None and stop is None and not Solver(changed).slides(name):
+            ends = row[0], row[-1]
+        try:
+            motion = planar.cycle(changed, steps, *ends, pair)
+        except NoAnswer as problem:
+            assert {result.outcomes[code] for code in result.status[k]} == {problem.outcome}
+            assert all(
+                np.all(np.isnan(getattr(result, order)[point][k])) for order in ORDERS for point in result.points
+            )
+            continue
+        many = int(np.sum(result.status[k] == 0))
+        stopped = motion.outcome is not Outcome.SOLVED
+        assert many == len(motion) - stopped
+        assert {result.outcomes[code] for code in result.status[k, many:]} == ({motion.outcome} if stopped else set())
+        np.testing.assert_allclose(row[:many], motion.inputs[name].position[:many], atol=1e-9)
+        for point in result.points:
+            for order in ORDERS:
+                found, wanted = getattr(result, order)[point][k], getattr(motion.point(point), order)[:many]
+                assert np.all(np.isnan(found[many:]))
+                np.testing.assert_array_equal(np.isnan(found[:many]), np.isnan(wanted))
+                scale = max(1e-3, np.nanmax(np.abs(wanted), initial=0.0))
+                worst = max(worst, np.nanmax(np.abs(found[:many] - wanted), initial=0.0) / scale)
+    return worst
+
+
+# as the cycle of every design
+
+
+SAME = {
+    "four-bar": (four_bar(*ROCKER, 0.8), 0.05, 0),
+    "other assembly": (four_bar(*ROCKER, 0.8, -1), 0.05, 0),
+    "slider-crank": (slider_crank(), 0.05, 0),
+    "quick return": (MODELS["004-QR"], 0.03, 0),
+    "six-bar": (MODELS["stephenson-1-six-bar"], 0.02, 0),
+    "six-bar of four unknowns at once": (MODELS["double-butterfly"], 0.01, 0),
+    "ten links": (MODELS["ten-link"], 0.01, 0),
+    "gears": (MODELS["geared-five-bar"], 0.01, 0),
+    "wheels that count turns": (MODELS["002-E3.6a"], 0.01, 0),
+    "parallel cranks": (MODELS["three-parallel-cranks"], 0.0, None),
+    "through change points": (four_bar(*PARALLELOGRAM, 0.8), 0.0, None),
+    "stops": (four_bar(*TRIPLE, 1.2), 0.05, None),
+    "slides": (MODELS["elliptical-trammel"], 0.05, None),
+}
+
+
+@pytest.mark.parametrize("name", part(SAME, 2))
+def test_every_design_is_the_cycle_of_the_mechanism_so_changed(name):
+    mechanism, spread, general = SAME[name]
+    designs = around(mechanism, spread, 4)
+    result = planar.sweep(mechanism, designs, 48, pair=mechanism.inputs[0].pair)
+    # beside a change point the last digits of a position are lost in the rates
+    allowed = 1e-8 if name == "through change points" else 1e-10
+    assert cycles(mechanism, designs, result, 48, mechanism.inputs[0].pair) < allowed
+    assert general is None or result.general == general
+    assert (result.general > 0 or not result.whole.all()) == bool(result.said)
+
+
+def test_one_of_several_inputs_runs_and_the_others_stand_where_each_design_has_them():
+    mechanism = MODELS["planetary-differential"]
+    names = [each.pair for each in mechanism.inputs]
+    assert len(names) > 1
+    designs = {f"{names[1]}.position": np.linspace(0.1, 0.9, 4), f"{names[1]}.velocity": 7.0}
+    result = planar.sweep(mechanism, designs, 24, pair=names[0])
+    assert cycles(mechanism, {k: np.broadcast_to(v, 4) for k, v in designs.items()}, result, 24, names[0]) < 1e-12
+    with pytest.raises(BadInput, match="name the one that runs"):
+        planar.sweep(mechanism, designs, 24)
+
+
+@settings(max_examples=draws(6), deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(st.integers(0, 10**6), st.integers(1, 6), st.sampled_from([0.0, 0.3]))
+def test_random_linkages_of_dimensions_changed_by_a_hundredth(seed, links, higher):
+    mechanism = files.from_dict(random_linkage(seed, links, higher=higher).value)
+    pair = mechanism.inputs[0].pair
+    here = mechanism.inputs[0].position
+    designs = around(mechanism, 0.01, 3, seed)
+    result = planar.sweep(mechanism, designs, 10, pair=pair, start=here, stop=here + 0.2)
+    assert cycles(mechanism, designs, result, 10, pair, here, here + 0.2) < 1e-7
+
+
+@pytest.mark.parametrize(("start", "stop"), [(1.5, None), (-0.4, 0.9), (2.0, 0.3), (None, 1.9)])
+def test_a_range_is_that_of_the_cycle(start, stop):
+    mechanism, designs = four_bar(*ROCKER, 0.8), {"BC.length": np.array([0.85, 0.9, 0.95])}
+    result = planar.sweep(mechanism, designs, 30, start=start, stop=stop)
+    for k in range(3):
+        motion = planar.cycle(lifted(mechanism, one(designs, k)), 30, 0.8 if start is None else start, stop)
+        np.testing.assert_allclose(result.input, motion.inputs["A"].position, atol=1e-14)
+        np.testing.assert_allclose(result.acceleration["E"][k], motion.point("E").acceleration, atol=1e-11)
+
+
+# closed forms
+
+
+def test_four_bars_at_every_position_against_the_closed_form():
+    rng = np.random.default_rng(1)
+    a, b, c, d = (x * (1 + 0.1 * rng.uniform(-1, 1, 30)) for x in ROCKER)
+    theta = 0.8 + np.linspace(0, TURN, 61)[None]
+    omega, alpha = rng.uniform(1, 3, 30), rng.uniform(-2, 2, 30)
+    designs = {"AB.length": a, "BC.length": b, "DC.length": c, "AD.D.x": d, "A.velocity": omega}
+    result = planar.sweep(four_bar(*ROCKER, 0.8), designs | {"A.acceleration": alpha}, 60, ["C", "AB.B", "D"])
+    a, b, c, d, omega, alpha = (each[:, None] for each in (a, b, c, d, omega, alpha))
+    r = np.hypot(d - a * np.cos(theta), a * np.sin(theta))
+    back = np.arctan2(a * np.sin(theta), a * np.cos(theta) - d)
+    phi = back - np.arccos((c * c + r * r - b * b) / (2 * c * r))
+    beta = np.angle(d + c * np.exp(1j * phi) - a * np.exp(1j * theta))
+    _, phi1, _, phi2 = rates(a, b, c, theta, beta, phi, omega, alpha)
+    arm = c * np.exp(1j * phi)
+    wanted = d + arm, 1j * phi1 * arm, (1j * phi2 - phi1**2) * arm
+    for order, value in zip(ORDERS, wanted, strict=True):
+        found = getattr(result, order)["C"]
+        np.testing.assert_allclose(found[..., 0] + 1j * found[..., 1], value, atol=1e-11)
+    assert result.points == ("C", "B", "D")
+    np.testing.assert_allclose(result.position["B"][..., 0], a * np.cos(theta), atol=1e-14)
+    np.testing.assert_array_equal(result.position["D"][:, :, 0], np.repeat(d, 61, axis=1))
+    assert not result.velocity["D"].any()
+    assert result.whole.all()
+
+
+def test_designs_that_cannot_turn_are_refused_exactly_where_they_must_be():
+    rng, steps, first = np.random.default_rng(0), 60, 0.8
+    a, b, c, d = rng.uniform(0.2, 1.5, (4, 500))
+    designs = {"AB.length": a, "BC.length": b, "DC.length": c, "AD.D.x": d}
+    result = planar.sweep(four_bar(*ROCKER, first), designs, steps, "C", rates=False)
+    theta = first + np.linspace(0, TURN, steps + 1)
+    far = np.sqrt(a * a + d * d - 2 * a * d * np.cos(theta)[:, None]).T
+    closes = np.logical_and.accumulate((far <= (b + c)[:, None]) & (far >= abs(b - c)[:, None]), axis=1)
+    # between two rows the diagonal may be longest, at half a turn, or shortest, at a whole one
+    for place, extreme in ((np.pi, a + d), (TURN, abs(a - d))):
+        broken = (extreme > b + c) | (extreme < abs(b - c))
+        closes &= ~(broken[:, None] & (theta > place))
+    np.testing.assert_array_equal(result.status == 0, closes)
+    codes = {result.outcomes[code] for code in np.unique(result.status)}
+    assert codes == {Outcome.SOLVED, Outcome.DEAD_POINT, Outcome.CANNOT_BE_ASSEMBLED}
+    assert np.array_equal(np.isnan(result.position["C"][..., 0]), ~closes)
+    assert result.velocity is None
+    assert result.acceleration is None
+    assert 100 < result.whole.sum() < 400
+    assert any("dead point" in told for told in result.said)
+    # the assembly nearest to the sketch
+    sketch = np.array([each[1:] for each in four_bar(*ROCKER, first).sketch])[0]
+    for k in np.flatnonzero(closes[:, 0])[:200]:
+        ends = [rocker(a[k], b[k], c[k], d[k], first, closed) for closed in (1, -1)]
+        places = [(d[k] + c[k] * np.cos(phi), c[k] * np.sin(phi)) for phi in ends]
+        nearest = min(places, key=lambda at: np.hypot(*(at - sketch)))
+        np.testing.assert_allclose(result.position["C"][k, 0], nearest, atol=1e-7)
+
+
+def test_a_flipped_linkage_is_closed_and_does_not_pass():
+    mechanism = four_bar(*ROCKER, 0.8)
+    solver, flipped = Solver(mechanism), Solver(four_bar(*ROCKER, 0.8, -1))
+    z, other = (each.assembly().z for each in (solver, flipped))
+    p = np.repeat(solver.station.p[:, None], 2, axis=1)
+    branches = Branches(Columns(solver.program, p), p)
+    u = solver.station.u
+    near = planar.solving.continuation.path.follow(solver, solver.station.p, z, u, u + 0.02)
+    before = branches.here(np.stack([z, z]), np.stack([u, u]))
+    after = branches.here(np.stack([near, other]), np.stack([u + 0.02, u + 0.02]))
+    assert branches.kept(before, after, None)[0].tolist() == [True, False]
+
+
+def test_what_is_open_by_the_pairs_own_formulas_does_not_pass():
+    solver = Solver(four_bar(*ROCKER, 0.8))
+    p, z = np.repeat(solver.station.p[:, None], 3, axis=1), np.repeat(solver.assembly().z[:, None], 3, axis=1)
+    u = np.repeat(solver.station.u[:, None], 3, axis=1)
+    z[0, 1] += 1e-9
+    p[-1, 2] += 1e-9
+    w = solver.program.positions(z, u, p).full()
+    left = Closed(solver.gate, solver.mechanism, solver.program, p).left(w, u)
+    assert (left <= solver.tolerance).tolist() == [True, False, False]
+
+
+def backend(monkeypatch, march):
+    """Puts a march in the place of the native backend."""
+    module = ModuleType("a_backend")
+    module.__spec__, module.march = ModuleSpec("a_backend", None), march
+    monkeypatch.setitem(sys.modules, "a_backend", module)
+    monkeypatch.setitem(choice.BACKENDS, "native", "a_backend")
+
+
+@pytest.mark.parametrize("rates", [True, False])
+def test_what_a_backend_does_not_let_pass_is_solved_all_the_same_and_counted(monkeypatch, rates):
+    mechanism, designs = four_bar(*ROCKER, 0.8), {"BC.length": np.linspace(0.85, 0.95, 6)}
+    wanted = planar.sweep(mechanism, designs, 30, "E", rates=rates)
+
+    def march(task, out):
+        good = numpy_backend.march(task, out)
+        out[7:, :, 1] = np.nan
+        out[:, :, 2] = np.nan
+        good[1], good[2] = 7, 0
+        return good
+
+    backend(monkeypatch, march)
+    found = planar.sweep(mechanism, designs, 30, "E", rates=rates)
+    assert found.general == 24 + 31
+    assert found.said == ("2 of 6 designs went to the general path, which solved 55 positions",)
+    np.testing.assert_allclose(found.position["E"], wanted.position["E"], atol=1e-13)
+    if rates:
+        np.testing.assert_allclose(found.acceleration["E"], wanted.acceleration["E"], atol=1e-11)
+    assert found.whole.all()
+
+
+def test_a_structure_that_a_backend_cannot_do_is_done_by_the_next(monkeypatch):
+    def march(task, out):
+        raise NotMarched("not this one")
+
+    backend(monkeypatch, march)
+    for name in ("native", "auto"):
+        assert planar.sweep(four_bar(*ROCKER, 0.8), {"BC.length": [0.9]}, 30, backend=name).general == 0
+
+
+# what may be asked for, and how it is said
+
+
+def test_designs_in_blocks_are_the_designs_together():
+    mechanism, designs = four_bar(*TRIPLE, 1.2), around(four_bar(*TRIPLE, 1.2), 0.05, 7)
+    told = []
+    parts = planar.sweep(mechanism, designs, 20, "E", block=3, progress=lambda *done: told.append(done))
+    whole = planar.sweep(mechanism, designs, 20, "E")
+    np.testing.assert_allclose(parts.acceleration["E"], whole.acceleration["E"], rtol=1e-9)
+    np.testing.assert_array_equal(parts.status, whole.status)
+    assert parts.said == whole.said
+    assert told == [(3, 7), (6, 7), (7, 7)]
+    assert len(parts) == 7
+
+
+def test_positions_of_the_input_stand_in_one_row_where_all_designs_share_them():
+    mechanism = four_bar(*ROCKER, 0.8)
+    shared = planar.sweep(mechanism, {"BC.length": [0.9, 0.95]}, 4, "C")
+    np.testing.assert_allclose(shared.input, 0.8 + np.linspace(0, TURN, 5))
+    own = planar.sweep(mechanism, {"A.position": [0.7, 0.8, 0.9]}, 4, "C", block=2)
+    np.testing.assert_allclose(own.input, np.array([[0.7], [0.8], [0.9]]) + np.linspace(0, TURN, 5))
+
+
+def test_points_left_out_are_all_that_move():
+    assert planar.sweep(four_bar(*ROCKER, 0.8), {"BC.length": 0.9}, 4).points == ("B", "C", "E")
+
+
+WRONG = [
+    ({"BC.lenght": [1.0]}, {}, "did you mean 'BC.length'"),
+    ({"nothing": [1.0]}, {}, "no such dimension or input; there are"),
+    ({"BC.length": [1.0, 2.0], "AB.length": [1.0, 2.0, 3.0]}, {}, "3 numbers, but 2 of 'BC.length'"),
+    ({"BC.length": [[1.0]]}, {}, "one row of numbers"),
+    ({"BC.length": [1.0, np.nan]}, {}, "not finite"),
+    ({"BC.length": ["long"]}, {}, "numbers .* are wanted"),
+    ({"BC.length": []}, {}, "there is no design"),
+    ({}, {}, "name what the designs differ in"),
+    ({"A.position": [1e9]}, {}, "at most"),
+    ({"BC.length": 0.9}, {"points": ["c"]}, "did you mean 'C'"),
+    ({"BC.length": 0.9}, {"points": "none such"}, "points are"),
+    ({"BC.length": 0.9}, {"steps": 0}, "whole number of steps"),
+    ({"BC.length": 0.9}, {"block": 0}, "whole number of designs"),
+    ({"BC.length": 0.9}, {"start": "now"}, "a number up to"),
+    ({"BC.length": 0.9}, {"pair": "Z"}, "no input at 'Z'"),
+    ({"BC.length": 0.9}, {"backend": "fortran"}, "choose from auto, native, casadi"),
+    ({"BC.length": 0.9}, {"store": "results.csv"}, "ends in .zarr or .parquet"),
+    ({"BC.length": np.ones(10**6)}, {"steps": 10**5}, "too much for memory"),
+]
+
+
+@pytest.mark.parametrize(("designs", "more", "told"), WRONG)
+def test_bad_input_is_one_clear_sentence(designs, more, told):
+    with pytest.raises(BadInput, match=told):
+        planar.sweep(four_bar(*ROCKER, 0.8), designs, **more)
+
+
+def test_a_design_that_is_no_linkage_at_all_is_refused_and_the_others_are_not():
+    value = files.to_dict(four_bar(*ROCKER, 0.8))
+    value["links"]["BC"]["points"] = {"E": {"distances": {"B": 0.5, "C": 0.6}, "left_of": ["B", "C"]}}
+    mechanism = files.from_dict(value)
+    result = planar.sweep(mechanism, {"BC.E.B": [0.5, 0.1, 0.55]}, 12)
+    assert [result.outcomes[code] for code in result.status[:, 0]] == [
+        Outcome.SOLVED,
+        Outcome.CANNOT_BE_ASSEMBLED,
+        Outcome.SOLVED,
+    ]
+    assert "does not close" in " ".join(result.said)
+
+
+def test_wheels_that_do_not_mesh_are_refused_design_by_design():
+    mechanism = MODELS["sun-and-planet"]
+    name, value = next(
+        (each.name, each.value)
+        for each in dimensions(mechanism, frozenset(link.name for link in mechanism.links))
+        if abs(each.value - 0.6) < 1e-9
+    )
+    result = planar.sweep(mechanism, {name: np.array([1.0, 1.01]) * value}, 12)
+    assert (result.status[:, 0] == 0).tolist() == [True, False]
+
+
+def test_what_a_base_has_in_common_is_made_once():
+    mechanism = four_bar(*ROCKER, 0.8)
+    assert base(mechanism, None) is base(four_bar(*ROCKER, 0.8), None)

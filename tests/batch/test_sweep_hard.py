@@ -1,0 +1,144 @@
+"""Sweeps where it is easy to be wrong: dead points between two steps, wheels that turn far, assemblies far from a
+sketch."""
+
+import numpy as np
+import pytest
+
+import planar
+from planar.batch.design_arrays import lifted, one
+from planar.foundation.errors import BadInput, Outcome
+from planar.model.dimensions import dimensions
+from tests.draws import part
+from tests.linkages import random_linkage
+
+
+def joint(B, D, b, c, side=1.0):
+    """The pin b from B and c from D."""
+    way = D - B
+    far = np.hypot(*way)
+    along = (far * far + b * b - c * c) / (2.0 * far)
+    across = side * np.sqrt(max(b * b - along * along, 0.0))
+    return B + way / far * along + np.array([-way[1], way[0]]) / far * across
+
+
+def four_bar(a, b, c, d, theta, side=1.0, ratio=None):
+    """A four-bar, its crank driven, or by a wheel so many times slower."""
+    B, D = a * np.array([np.cos(theta), np.sin(theta)]), np.array([d, 0.0])
+    value = {
+        "planar": 1,
+        "name": "Four-bar",
+        "frame": "F",
+        "links": {
+            "F": {"points": {"A": [0, 0], "D": [d, 0], "O": [-1, 0]}},
+            "AB": {"ends": ["A", "B"], "length": a},
+            "BC": {"ends": ["B", "C"], "length": b},
+            "DC": {"ends": ["D", "C"], "length": c},
+        },
+        "pairs": [{"turning": name} for name in "ABCD"],
+        "inputs": [{"pair": "A", "position": theta, "velocity": 1.0}],
+        "sketch": {"C": joint(B, D, b, c, side).tolist()},
+    }
+    if ratio is not None:
+        value["links"]["W"] = {"ends": ["O", "P"], "length": 0.4}
+        value["pairs"] += [
+            {"turning": "O"},
+            {"gear": "g", "links": ["W", "AB"], "ratio": ratio, "mesh": {"W": 0.0, "AB": theta}},
+        ]
+        value["inputs"] = [{"pair": "O", "position": 0.0, "velocity": 1.0}]
+        value["sketch"]["P"] = [-0.6, 0.0]
+    return planar.from_dict(value)
+
+
+def chain(rng, cells):
+    """A crank and dyads from pin to pin, built closed."""
+    theta, r = rng.uniform(-3.0, 3.0), rng.uniform(0.2, 1.0)
+    pin = r * np.array([np.cos(theta), np.sin(theta)])
+    links = {"F": {"points": {"A": [0, 0]}}, "L0": {"ends": ["A", "P0"], "length": float(r)}}
+    pairs, sketch = [{"turning": "A"}, {"turning": "P0"}], {"P0": pin.tolist()}
+    for k in range(1, cells + 1):
+        pivot, after = rng.uniform(-1.5, 1.5, 2), rng.uniform(-1.5, 1.5, 2)
+        links["F"]["points"][f"G{k}"] = pivot.tolist()
+        links[f"C{k}"] = {"ends": [f"P{k - 1}", f"P{k}"], "length": float(np.hypot(*(after - pin)))}
+        links[f"R{k}"] = {"ends": [f"G{k}", f"P{k}"], "length": float(np.hypot(*(after - pivot)))}
+        pairs += [{"turning": f"P{k}"}, {"turning": f"G{k}"}]
+        sketch[f"P{k}"], pin = after.tolist(), after
+    top = {"planar": 1, "name": "Chain", "frame": "F", "links": links, "pairs": pairs, "sketch": sketch}
+    return planar.from_dict(top | {"inputs": [{"pair": "A", "position": float(theta), "velocity": 1.0}]})
+
+
+def around(mechanism, spread, many, rng):
+    lengths = dimensions(mechanism, frozenset(link.name for link in mechanism.links))
+    return {each.name: each.value * (1.0 + spread * rng.uniform(-1.0, 1.0, many)) for each in lengths if each.value}
+
+
+def agrees(mechanism, designs, steps, **more):
+    """Whether a sweep is, design by design, what `planar.cycle` finds."""
+    swept = planar.sweep(mechanism, designs, steps, **more)
+    for index in range(len(swept)):
+        row = np.atleast_2d(swept.input)[index if np.ndim(swept.input) == 2 else 0]
+        try:
+            motion = planar.cycle(lifted(mechanism, one(designs, index)), steps, float(row[0]), float(row[-1]))
+        except planar.NoAnswer as problem:
+            assert {swept.outcomes[code] for code in swept.status[index]} == {problem.outcome}
+            continue
+        solved = len(motion) - (motion.outcome is not Outcome.SOLVED)
+        assert np.count_nonzero(swept.status[index] == 0) == solved
+        for point in swept.points:
+            wanted = motion.point(point).position[:solved]
+            np.testing.assert_allclose(swept.position[point][index][:solved], wanted, atol=1e-9)
+            assert np.isnan(swept.position[point][index][solved:]).all()
+
+
+@pytest.mark.parametrize("backend", ["native", "casadi"])
+@pytest.mark.parametrize("steps", [20, 100])
+def test_a_dead_point_between_the_first_two_positions_is_seen(backend, steps):
+    rng, turn = np.random.default_rng(steps), 2.0 * np.pi / steps
+    for _ in range(3):
+        a, b, d = rng.uniform(0.3, 0.8), rng.uniform(0.5, 1.5), 1.5
+        c = b + (d - a) + 10.0 ** rng.uniform(-6.0, -2.5)  # the crank cannot pass the frame's line, by so little
+        mechanism = four_bar(a, b, c, d, -0.9 * turn, -1.0)
+        agrees(mechanism, {"A.position": rng.uniform(-1.0, 0.0, 6) * turn}, steps, points="C", backend=backend)
+
+
+@pytest.mark.parametrize("ratio", [13, -13, 6.5, 3])
+def test_a_wheel_may_turn_far_in_a_step_of_the_input(ratio):
+    mechanism = four_bar(0.5, 0.6, 0.7, 1.3, 0.9, ratio=ratio)
+    lengths = 0.5 * (1.0 + 0.02 * np.random.default_rng(0).uniform(-1.0, 1.0, 3))
+    for steps in (13, 26):
+        agrees(mechanism, {"AB.length": lengths}, steps, points="C")
+        ready = planar.prepared(mechanism, steps, "C")
+        swept = planar.sweep(mechanism, {"AB.length": lengths}, steps, "C", backend="casadi")
+        for index, length in enumerate(lengths):
+            np.testing.assert_array_equal(ready({"AB.length": length}).status, swept.status[index])
+
+
+@pytest.mark.parametrize("seed", part(range(6), 2))
+def test_of_dyads_in_a_row_the_assembly_nearest_to_the_sketch_is_taken(seed):
+    rng = np.random.default_rng(seed)
+    mechanism = chain(rng, 1 + seed % 4)
+    designs = around(mechanism, (0.003, 0.03, 0.1)[seed % 3], 12, rng)
+    agrees(mechanism, designs, (14, 25, 50)[seed % 3], points=f"P{1 + seed % 4}")
+
+
+def test_groups_of_three_unknowns_are_swept():
+    mechanism = planar.from_dict(random_linkage(156960, 5, 0.0, 0.3).value)
+    drive = next(each for each in mechanism.inputs if each.pair == "T1")
+    designs = around(mechanism, 0.01, 4, np.random.default_rng(0))
+    found = planar.sweep(mechanism, designs, 3, pair="T1", start=drive.position, stop=drive.position + 0.3)
+    same = planar.sweep(
+        mechanism, designs, 3, pair="T1", start=drive.position, stop=drive.position + 0.3, backend="casadi"
+    )
+    np.testing.assert_array_equal(found.status, same.status)
+
+
+def test_what_is_known_of_one_run_is_not_another_runs():
+    ready = planar.prepared(four_bar(0.3, 0.8, 0.7, 1.0, 0.5), 60, "C")
+    found = ready()
+    with pytest.raises(ValueError, match="read-only"):
+        found.status[3] = 7
+    with pytest.raises(BadInput, match="one number"):
+        ready({"AB.length": [0.3, 0.31]})
+    first = found.position["C"].copy()
+    ready({"AB.length": 0.31})
+    np.testing.assert_array_equal(found.position["C"], first)
+    np.testing.assert_array_equal(ready().position["C"], first)

@@ -1,0 +1,374 @@
+"""Sweeps over mechanisms of any structure: as each mechanism's own cycle and closed forms have it, refused alike."""
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import planar
+from benchmarks import chain
+from planar.batch.mechanisms import partition
+from planar.batch.mechanisms.block_type import GROUNDED, Joint, Signature
+from planar.batch.mechanisms.partition import Unparted, parted
+from planar.batch.mechanisms.solved_block_type import kind
+from planar.codegen import block_formula, instructions
+from planar.document import files
+from planar.foundation.errors import BadInput, NoAnswer, Outcome
+from planar.model.pairs import pair_types
+from planar.solving.position import Solver
+from tests.known import MODELS
+from tests.linkages import random_linkage
+from tests.solving.test_cycle import ROCKER, TURN, four_bar, rocker, slider_crank
+
+ORDERS = ("position", "velocity", "acceleration")
+BACKENDS = ("native", "casadi")
+
+
+def as_cycle(mechanism, found, steps, outcomes, allowed=1e-9):
+    """Whether a mechanism's status, rows and rates are those of its own cycle."""
+    pair = mechanism.inputs[0].pair
+    still = tuple(each._replace(velocity=0.0, acceleration=0.0) for each in mechanism.inputs[1:])
+    mechanism = replace(mechanism, inputs=(mechanism.inputs[0], *still))
+    start = mechanism.inputs[0].position
+    ends = (None, None) if Solver(mechanism).slides(pair) else (start, start + TURN)
+    try:
+        motion = planar.cycle(mechanism, steps, *ends, pair)
+    except (NoAnswer, BadInput) as problem:
+        outcome = getattr(problem, "outcome", Outcome.CANNOT_BE_ASSEMBLED)
+        assert {outcomes[code] for code in found.status} == {outcome}
+        assert all(np.all(np.isnan(getattr(found, order)[point])) for order in ORDERS for point in found.position)
+        return
+    many = int(np.sum(found.status == 0))
+    assert many in (len(motion), len(motion) - 1)
+    assert (many == steps + 1) or outcomes[found.status[-1]] is motion.outcome
+    for order in ORDERS:
+        for name, values in getattr(found, order).items():
+            wanted = getattr(motion.point(name), order)
+            scale = max(1.0, float(np.nanmax(np.abs(wanted), initial=0.0)))
+            np.testing.assert_allclose(values[:many], wanted[:many], atol=allowed * scale, rtol=0.0)
+            assert np.all(np.isnan(values[many:]))
+
+
+def triads(many):
+    """A crank, then plates on three bars each, of which one is driven and two swing; one of these drives the next."""
+    places, bars, fixed, drive = [(0, 0), (0.25, 0.0)], [[0, 1]], [0], 1
+    for k in range(many):
+        at, first = np.array(places[drive]), len(places)
+        p = at + np.array([0.9, 0.05 * (-1) ** k])
+        q, r = p + np.array([0.1, 0.25]), p + np.array([0.7, 0.1])
+        places += [p, q, r, q - np.array([0.0, 1.1]), r + np.array([0.1, -1.3]), q + np.array([0.0, 0.03 * (-1) ** k])]
+        fixed += [first + 3, first + 4]
+        bars += [
+            [drive, first],
+            [first, first + 1, first + 2],
+            [first + 3, first + 1, first + 5],
+            [first + 4, first + 2],
+        ]
+        drive = first + 5
+    return planar.pinned(np.array(places), bars, fixed, velocity=3.0, acceleration=-2.0)
+
+
+def dyads(seed, pins):
+    """Random pins, each held by two earlier ones; some of these linkages cannot turn all round."""
+    rng = np.random.default_rng(seed)
+    places, bars = [(0.0, 0.0), (1.0, 0.1), (0.1, 0.25)], [[0, 2]]
+    while len(places) < pins:
+        a, b = rng.choice(len(places), 2, replace=False)
+        way = np.subtract(places[b], places[a])
+        p = places[a] + rng.uniform(0.3, 0.7) * way + rng.uniform(0.7, 1.2) * np.array([-way[1], way[0]])
+        if {a, b} != {0, 1}:
+            places.append(tuple(p + rng.uniform(-0.3, 0.3, 2)))
+            bars += [[int(a), len(places) - 1], [len(places) - 1, int(b)]]
+    return planar.pinned(np.array(places), bars, [0, 1], velocity=2.0, acceleration=1.0)
+
+
+# as the cycle of every mechanism
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_mixed_mechanisms_are_the_cycles_of_each(backend):
+    mechanisms = [
+        four_bar(*ROCKER, 0.8),
+        four_bar(*ROCKER, 0.8, -1),
+        MODELS["slider-crank"],
+        MODELS["004-QR"],
+        MODELS["watt-six-bar"],
+        MODELS["double-butterfly"],
+        MODELS["stephenson-1-six-bar"],
+        triads(2),
+        MODELS["002-E3.4"],
+    ]
+    result = planar.sweep_each(mechanisms, 60, backend=backend)
+    assert result.general == 0
+    assert result.said == ()
+    assert result.whole.all()
+    for mechanism, found in zip(mechanisms, result, strict=True):
+        as_cycle(mechanism, found, 60, result.outcomes)
+
+
+@pytest.mark.parametrize(
+    ("seed", "links", "higher"), [*((s, 1 + s % 5, 0.0) for s in range(8)), (9, 3, 0.5), (10, 4, 0.5)]
+)
+def test_random_linkages_of_every_pair_type(seed, links, higher):
+    mechanism = files.from_dict(random_linkage(seed, links, higher=higher).value)
+    result = planar.sweep_each([mechanism], 20, pair=mechanism.inputs[0].pair)
+    as_cycle(mechanism, result[0], 20, result.outcomes, 1e-7)
+
+
+def test_many_random_dyads_end_where_their_cycles_end():
+    mechanisms = [dyads(seed, 4 + seed % 4) for seed in range(14)]
+    result = planar.sweep_each(mechanisms, 40)
+    assert result.sent <= 4
+    ends = {result.outcomes[each.status[-1]] for each in result}
+    assert ends == {Outcome.SOLVED, Outcome.DEAD_POINT}
+    stopped = [each for each in result if each.status.any() and not each.general]
+    assert stopped
+    assert all("come to a dead point" in each.reason for each in stopped)
+    for mechanism, found in zip(mechanisms, result, strict=True):
+        as_cycle(mechanism, found, 40, result.outcomes, 1e-8)
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_pins_read_as_arrays_and_links_read_one_by_one_are_the_same(backend):
+    laid = [dyads(seed, 9) for seed in range(6)]
+    plain = [replace(each) for each in laid]
+    assert plain[0].laid is None
+    one, two = (planar.sweep_each(each, 50, backend=backend) for each in (laid, plain))
+    for own, other in zip(one, two, strict=True):
+        np.testing.assert_array_equal(own.status, other.status)
+        for order in ORDERS:
+            assert list(getattr(own, order)) == [f"P{k}" for k in range(2, 9)]
+            for name, values in getattr(own, order).items():
+                np.testing.assert_allclose(values, getattr(other, order)[name], rtol=1e-9, atol=1e-9)
+
+
+def test_the_order_in_which_bars_are_given_does_not_matter():
+    """A pin of many links is written from its first link; the dyad that places it may be of two others."""
+    for seed in range(5):
+        mechanism = dyads(seed, 9)
+        laid = mechanism.laid
+        turned = [laid.bars[0], *(bar[::-1] for bar in laid.bars[:0:-1])]
+        other = planar.pinned(laid.at, turned, laid.fixed, velocity=2.0, acceleration=1.0)
+        result = planar.sweep_each([mechanism, other, replace(other)], 50)
+        assert result.general == 0
+        for found in result[1:]:
+            np.testing.assert_array_equal(found.status, result[0].status)
+            for name, values in found.velocity.items():
+                np.testing.assert_allclose(values, result[0].velocity[name], rtol=1e-9, atol=1e-9)
+
+
+# closed forms
+
+
+@pytest.mark.parametrize(("links", "backend"), [(4, "native"), (42, "native"), (22, "casadi")])
+def test_rows_of_four_bars_against_the_closed_form(links, backend):
+    result = planar.sweep_each([planar.from_dict(chain.document(links))], 100, backend=backend)
+    assert result.general == 0
+    last, cells = (links - 2) // 2, chain.cells(links)
+    theta = result[0].input
+    assert theta[-1] - theta[0] == pytest.approx(TURN)
+    angle, velocity, acceleration = chain.motion(np, links, theta)
+    arm = cells[-1].c * np.exp(1j * angle)
+    wanted = sum(cell.g for cell in cells) + arm, 1j * velocity * arm, (1j * acceleration - velocity**2) * arm
+    for order, value in zip(ORDERS, wanted, strict=True):
+        found = getattr(result[0], order)[f"C{last}"] @ [1, 1j]
+        np.testing.assert_allclose(found, value, atol=1e-11 * np.max(np.abs(value)))
+
+
+def test_four_bars_that_cannot_turn_are_refused_exactly_where_they_must_be():
+    rng, steps, first = np.random.default_rng(0), 60, 0.8
+    a, b, c, d = rng.uniform(0.2, 1.5, (4, 300))
+    b_at = a * np.exp(1j * first)
+    far = np.abs(d - b_at)
+    there = (far < b + c) & (far > abs(b - c))
+    a, b, c, d = (each[there] for each in (a, b, c, d))
+    phi = np.array([rocker(*each, first, 1 - 2 * (k % 2)) for k, each in enumerate(zip(a, b, c, d, strict=True))])
+    pins = np.stack([0.0 * a, d + 0j, a * np.exp(1j * first), d + c * np.exp(1j * phi)], axis=1)
+    places = np.stack([pins.real, pins.imag], axis=2)
+    result = planar.sweep_each([planar.pinned(each, [[0, 2], [2, 3], [1, 3]], [0, 1]) for each in places], steps, "P3")
+    theta = first + np.linspace(0, TURN, steps + 1)
+    far = np.sqrt(a * a + d * d - 2 * a * d * np.cos(theta)[:, None]).T
+    closes = np.logical_and.accumulate((far <= (b + c)[:, None]) & (far >= abs(b - c)[:, None]), axis=1)
+    # between two rows the diagonal may be longest, at half a turn, or shortest, at a whole one
+    for place, extreme in ((np.pi, a + d), (TURN, abs(a - d))):
+        broken = (extreme > b + c) | (extreme < abs(b - c))
+        closes &= ~(broken[:, None] & (theta > place))
+    status = np.stack([each.status for each in result])
+    np.testing.assert_array_equal(status == 0, closes)
+    found = np.stack([each.position["P3"] for each in result]) @ [1, 1j]
+    np.testing.assert_array_equal(np.isnan(found), ~closes)
+    np.testing.assert_allclose(np.abs(found - d[:, None])[closes], np.broadcast_to(c[:, None], closes.shape)[closes])
+    apart = np.abs(found - a[:, None] * np.exp(1j * theta))
+    np.testing.assert_allclose(apart[closes], np.broadcast_to(b[:, None], closes.shape)[closes])
+    assert 0.2 * len(a) < result.whole.sum() < 0.8 * len(a)
+    assert result.sent < 0.1 * len(a)
+    # each on the side of its diagonal on which it was drawn
+    side = np.sign(((found - a[:, None] * np.exp(1j * theta)) / (d[:, None] - a[:, None] * np.exp(1j * theta))).imag)
+    assert np.all((side == side[:, :1]) | ~closes)
+
+
+@pytest.mark.parametrize("steps", [1, 5, 37])
+def test_few_steps_are_as_good_as_many(steps):
+    mechanism = triads(1)
+    fine, coarse = planar.sweep_each([mechanism], 37 * 5), planar.sweep_each([mechanism], steps)
+    every = 37 * 5 // steps
+    for order in ORDERS:
+        for name, values in getattr(coarse[0], order).items():
+            np.testing.assert_allclose(values, getattr(fine[0], order)[name][::every], atol=1e-11)
+
+
+# what falls to the general path, and what is refused
+
+
+def test_what_the_general_path_does_is_counted_and_said():
+    unsketched = replace(four_bar(*ROCKER, 0.8), sketch=())
+    mechanisms = [four_bar(*ROCKER, 0.8), MODELS["geared-five-bar"], unsketched, MODELS["elliptical-trammel"]]
+    mechanisms.append(slider_crank())
+    result = planar.sweep_each(mechanisms, 12)
+    assert [each.general for each in result] == [False, True, True, True, True]
+    assert (result.general, result.sent) == (4 * 13, 4)
+    assert "4 of 5 mechanisms" in result.said[0]
+    for mechanism, found in zip(mechanisms, result, strict=True):
+        as_cycle(mechanism, found, 12, result.outcomes)
+
+
+def test_formulas_too_long_to_be_compiled_are_left_to_the_general_path(monkeypatch):
+    mechanisms = [MODELS["watt-six-bar"], MODELS["double-butterfly"]]  # dyads, and four unknowns at once
+    longest = 500
+    monkeypatch.setattr(instructions, "MOST_INSTRUCTIONS", longest)
+    monkeypatch.setattr(partition, "_KINDS", {})
+    kind.cache_clear()
+    result = planar.sweep_each(mechanisms, 12)
+    kind.cache_clear()
+    assert [each.general for each in result] == [False, True]
+    for mechanism, found in zip(mechanisms, result, strict=True):
+        as_cycle(mechanism, found, 12, result.outcomes)
+
+
+def test_what_cannot_be_assembled_says_so_and_spoils_nothing():
+    broken = four_bar(0.3, 0.2, 0.2, 1.0, 0.8)
+    result = planar.sweep_each([four_bar(*ROCKER, 0.8), broken], 12, rates=False)
+    assert {result.outcomes[code] for code in result[1].status} == {Outcome.CANNOT_BE_ASSEMBLED}
+    assert "cannot" in result[1].reason
+    assert result.whole.tolist() == [True, False]
+    assert result[0].velocity is None
+    assert np.all(np.isnan(result[1].position["C"]))
+
+
+def test_a_sketch_between_two_assemblies_is_left_to_the_search_of_the_whole():
+    mechanism = four_bar(*ROCKER, 0.8)
+    found = planar.solve(mechanism), planar.solve(four_bar(*ROCKER, 0.8, -1))
+    between = 0.5 * sum(state.point("C").position for state in found)
+    beside = between + 1e-12 * (found[0].point("C").position - between)
+    mechanism = replace(mechanism, sketch=(("C", *beside),))
+    assert planar.sweep_each([mechanism], 6)[0].general
+
+
+BAD = {
+    "no mechanism": (lambda: planar.sweep_each([four_bar(*ROCKER, 0.8), "four-bar"]), "mechanism is wanted"),
+    "no input": (lambda: planar.sweep_each([replace(four_bar(*ROCKER, 0.8), inputs=())]), "no input"),
+    "several": (lambda: planar.sweep_each([MODELS["planetary-differential"]]), "name the one that runs"),
+    "another": (lambda: planar.sweep_each([four_bar(*ROCKER, 0.8)], pair="Q"), "no input at 'Q'"),
+    "point": (lambda: planar.sweep_each([four_bar(*ROCKER, 0.8)], 6, "Z"), "no mechanism has a point 'Z'"),
+    "steps": (lambda: planar.sweep_each([four_bar(*ROCKER, 0.8)], 0), "whole number"),
+    "backend": (lambda: planar.sweep_each([four_bar(*ROCKER, 0.8)], 6, backend="fast"), "no backend"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_what_cannot_be_asked_is_refused(name):
+    ask, told = BAD[name]
+    with pytest.raises(BadInput, match=told):
+        ask()
+
+
+def test_elsewhere_in_parts_and_with_points_of_some(monkeypatch):
+    from planar.batch import sweep_mechanisms as each
+
+    monkeypatch.setattr(each, "TOGETHER", 3)
+    mechanisms = [dyads(seed, 5 + seed % 3) for seed in range(4)] + [four_bar(*ROCKER, 0.8)] * 4
+    seen = []
+    with ThreadPoolExecutor(2) as pool:
+        found = planar.sweep_each(mechanisms, 20, ["P3", "C"], executor=pool, progress=lambda *of: seen.append(of))
+    wanted = planar.sweep_each(mechanisms, 20, ["P3", "C"])
+    assert [list(one.position) for one in found] == [["P3"]] * 4 + [["C"]] * 4
+    assert seen == [(3, 8), (6, 8), (8, 8)]
+    for one, other in zip(found, wanted, strict=True):
+        for name, values in one.acceleration.items():
+            np.testing.assert_array_equal(values, other.acceleration[name])
+    assert len(found[2:5]) == 3
+    assert planar.sweep_each([]).whole.tolist() == []
+
+
+# groups
+
+
+def test_a_mechanism_is_parted_into_links_that_follow_one_after_the_other():
+    for mechanism, sizes in (
+        (planar.from_dict(chain.document(42)), [1] + [2] * 20),
+        (triads(3), [1, 4, 4, 4]),
+        (MODELS["double-butterfly"], [1, 6]),
+    ):
+        own = parted(mechanism)
+        assert [len(group.inner) for group in own.groups] == sizes
+        assert sorted(own.place_of.values())[0] == 0
+        known = {0, 1}
+        for group in own.groups:
+            inner = set(group.places[len(group.places) - len(group.inner) :])
+            assert set(group.places) <= known | inner
+            assert not known & inner
+            known |= inner
+    assert len({id(group.kind) for group in parted(planar.from_dict(chain.document(42))).groups}) <= 4
+    with pytest.raises(Unparted, match=r"held more than once|free"):
+        parted(MODELS["three-parallel-cranks"])
+
+
+DYADS = ("TTT", "TTS", "TST", "STS", "SST", "TSS")
+
+
+@pytest.mark.parametrize("joints", DYADS)
+def test_every_dyad_is_in_closed_form(joints):
+    types = {"T": pair_types()["turning"], "S": pair_types()["sliding"]}
+    bodies = ((0, -1), (0, 1), (1, -2))
+    signature = Signature(2, 2, tuple(Joint(types[t], of, False) for t, of in zip(joints, bodies, strict=True)))
+    assert kind(signature).direct == (joints.count("S") < 3)
+    assert kind(signature) is kind(signature)
+
+
+def test_machine_code_tells_the_extremes_of_what_numpy_tells(monkeypatch):
+    """What the quick look of machine code lets pass, and what not, as by all that it leaves out."""
+    crank = kind(Signature(1, 0, (Joint(pair_types()["turning"], (GROUNDED, 0), True),)))
+    dyad = kind(Signature(2, 2, tuple(Joint(pair_types()["turning"], of, False) for of in ((0, -1), (1, -2), (0, 1)))))
+    assert crank.direct
+    rng = np.random.default_rng(3)
+    turn = np.linspace(0.0, 2.0, 24)
+    state = np.zeros((4, 4, 24))
+    state[0, 2] = 1.0
+    state[1, 2], state[1, 3] = np.cos(turn), np.sin(turn)
+    index = np.array([[1, 0, 2, 3]] * 2)
+    p = np.array([[0.0, 0.0, 0.4, 0.0, 0.0, 0.0, 1.0, 0.1, 0.9, 0.0, length, 0.0, 1.0] for length in (0.8, 0.02)])
+    p += 1e-3 * rng.uniform(size=p.shape) * (np.arange(13) < 12)
+    # pairs of a kind read (inner link, given link)
+    gives = tuple((slot, row) for slot in (2, 3) for row in range(4))
+    formula = dyad.run(False)
+    for one in (0, 1):
+        both = state.copy(), state.copy()
+        plain = block_formula.walked(
+            formula, block_formula.Walk(gives, 13, 4, 2), both[0], index[:1], p[one : one + 1], False
+        )
+        quick = block_formula.walked(
+            formula, block_formula.Walk(gives, 13, 4, 2, True), both[1], index[:1], p[one : one + 1], True
+        )
+        np.testing.assert_allclose(both[0], both[1], atol=1e-12)
+        left, clear = plain[0]
+        bend = np.abs(clear[2:] - 2 * clear[1:-1] + clear[:-2])
+        fast = np.abs(np.diff(both[0][2:, 2:], axis=2))
+        wanted = [left.max(), clear.min(), bend.max(), fast.max()]
+        if one:  # too short to reach: what is no number stays so
+            assert np.isnan(left).any()
+            assert np.isnan(quick[0, 0]) or quick[1, 0] < 0.0
+        else:
+            assert wanted[1] > 0.0
+            np.testing.assert_allclose(quick[1:, 0], wanted[1:], rtol=1e-9, atol=1e-12)
+            assert quick[0, 0] < 1e-14

@@ -1,0 +1,221 @@
+"""What LLVM is told equals what casadi computes: runs of many designs against runs of one."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import planar
+from planar.batch.march import llvm_designs, llvm_runner
+from planar.batch.march.kernel import Outside
+from planar.batch.march.llvm_runner import Designs, layout, run
+from planar.batch.reference_design import base
+from planar.codegen import instructions, llvm_compile
+from planar.codegen.instructions import (
+    MOST_INSTRUCTIONS,
+    Listing,
+    NotPrinted,
+    Turned,
+    without_turning,
+)
+from planar.equations.functions import structure
+from planar.foundation.errors import BadInput, Outcome
+from planar.model.mechanism import named_points
+from tests.draws import part
+from tests.known import MODELS
+from tests.linkages import random_linkage
+from tests.watchdog import watched
+
+PART = slice(30, 331)
+"""Rows of a cycle of 360 steps that are away from its limits."""
+
+
+def arguments(motion, points):
+    """A run of a motion's rows as what the backend takes, for one design."""
+    course = motion.course
+    solver, found = course.ranged.solver, course.found
+    named = {each.name: each.members[0] for each in named_points(motion.mechanism)}
+    members = [named[point] for point in points]
+    u = found.given.u[PART]
+    places = [solver.shapes[link].at(name) for link, name in members]
+    return {
+        "program": solver.program,
+        "mechanism": motion.mechanism,
+        "designs": Designs(
+            solver.station.p[:, None],
+            np.array([[part / solver.unit] for place in places for part in (place.x, place.y)]),
+            found.z[PART][0][:, None],
+            u[0][:, None],
+            solver.station.u1[:, None],
+            solver.station.u2[:, None],
+        ),
+        "gone": u - u[0],
+        "links": [link for link, _ in members],
+        "rates": True,
+        "tolerance": solver.tolerance,
+    }
+
+
+def repeated(given, designs):
+    """The same design so many times."""
+    return given | {"designs": Designs(*(np.repeat(each, designs, axis=1) for each in given["designs"]))}
+
+
+@pytest.mark.parametrize("stem", part([stem for stem, mechanism in MODELS.items() if mechanism.inputs], 6))
+def test_a_run_of_a_model_is_the_one_that_casadi_gives(stem):
+    mechanism = MODELS[stem]
+    try:
+        motion = planar.cycle(mechanism, pair=mechanism.inputs[0].pair)
+    except BadInput:  # a slide without limits
+        at = mechanism.inputs[0].position
+        motion = planar.cycle(mechanism, start=at, stop=at + 0.1, pair=mechanism.inputs[0].pair)
+    assert motion.outcome is Outcome.SOLVED
+    points = motion.point_names[-3:]
+    given = repeated(arguments(motion, points), 3)
+    if not given["program"].square:
+        with pytest.raises(NotPrinted, match="more than once"):
+            run(**given)
+        return
+    out, good = run(**given)
+    assert out.shape == (len(given["gone"]), 6 * len(points), 3)
+    np.testing.assert_array_equal(out, np.repeat(out[:, :, :1], 3, axis=2))
+    # what is near a change point, or moves too far in a step, is left to the general path; a step condemns that before
+    first = int(good[0])
+    near = [row - PART.start for row in motion.course.singular if row >= PART.start]
+    assert first == len(out) or min(near, default=0) <= first + 2
+    unit = motion.course.ranged.solver.unit
+    for order, what in enumerate(("position", "velocity", "acceleration")):
+        for k, point in enumerate(points):
+            wanted = getattr(motion.point(point), what)[PART][:first]
+            told = unit * out[:first, 2 * (len(points) * order + k) : 2 * (len(points) * order + k) + 2, 0]
+            scale = max(float(np.abs(wanted).max(initial=0.0)), unit)
+            np.testing.assert_allclose(told, wanted, rtol=0, atol=(1e-12, 1e-9, 2e-7)[order] * scale)
+
+
+def test_cos_and_sin_of_sums_are_put_together_from_the_angles_own():
+    made_of = Listing()
+    a, b, c = (made_of.add("input", data=("z", k)) for k in range(3))
+    turned = [Turned(*(made_of.add("input", data=(part, k)) for part in ("zc", "zs"))) for k in range(2)]
+    inside = made_of.add("sub", made_of.add("add", a, made_of.add("mul", made_of.const(2.0), b)), c)
+    wanted = [made_of.add("cos", inside), made_of.add("sin", inside)]
+    made, numbers = without_turning(made_of, wanted, {a: turned[0], b: turned[1]})
+    values = {
+        ("zc", 0): np.cos(0.3),
+        ("zs", 0): np.sin(0.3),
+        ("zc", 1): np.cos(1.1),
+        ("zs", 1): np.sin(1.1),
+        ("z", 2): 0.7,
+    }
+    with_angles = {
+        "cos": np.cos,
+        "sin": np.sin,
+        "neg": np.negative,
+        "add": np.add,
+        "sub": np.subtract,
+        "mul": np.multiply,
+    }
+    found = []
+    for value in made.values:
+        if value.what == "input":
+            found.append(values.get(value.data, np.nan))  # the angles' own values stand nowhere
+        elif value.what == "const":
+            found.append(value.data)
+        else:
+            found.append(with_angles[value.what](*(found[k] for k in value.of)))
+    angle = 0.3 + 2 * 1.1 - 0.7
+    np.testing.assert_allclose([found[k] for k in numbers], [np.cos(angle), np.sin(angle)], atol=1e-15)
+
+
+def test_what_is_not_a_number_is_not_good():
+    motion = planar.cycle(MODELS["crank-rocker"])
+    given = repeated(arguments(motion, motion.point_names[-1:]), 2)
+    given["designs"].p[0, 1] = np.nan
+    _, good = run(**given)
+    assert good.tolist() == [len(given["gone"]), 0]
+
+
+# how much is printed
+
+
+IDLE = planar.load(Path(__file__).parents[1] / "data" / "idle-slide.json")
+"""Six links: the slide of S4 places links L2 and L3 and does not turn them, but stands in the equations that do."""
+
+
+def all_points(mechanism, rates):
+    """The function that a sweep of the first input runs for all points that move."""
+    common = base(mechanism, mechanism.inputs[0].pair)
+    links = tuple(common.member(name)[0] for name in common.wanted(None))
+    return layout(common.program, structure(common.mechanism), links, rates)
+
+
+@pytest.mark.parametrize("rates", [False, True])
+@pytest.mark.parametrize("seed", [None, 406027, 406063, 406117, 406230, 406299, 407086])
+def test_what_is_printed_ends(seed, rates):
+    mechanism = IDLE if seed is None else planar.from_dict(random_linkage(seed, 6).value)
+    with watched(10):
+        assert all_points(mechanism, rates).text.count("\n") < MOST_INSTRUCTIONS / 3
+
+
+def test_a_slide_that_turns_nothing_leaves_a_sweep_as_the_cycle():
+    with watched(10):
+        motion = planar.cycle(IDLE, 10, -0.07, 0.03)
+        found = planar.sweep(IDLE, {"S7.velocity": [1.9]}, 10, start=-0.07, stop=0.03, backend="native")
+    assert found.whole.all()
+    assert found.general == 0
+    for point in found.points:
+        for order in ("position", "velocity", "acceleration"):
+            wanted = getattr(motion.point(point), order)
+            np.testing.assert_allclose(getattr(found, order)[point][0], wanted, atol=1e-11 * (1 + np.abs(wanted).max()))
+
+
+def test_what_is_wanted_before_it_is_known_is_not_printed(monkeypatch):
+    def written(self):
+        raise Outside(("z", 0))
+
+    monkeypatch.setattr(llvm_designs._March, "written", written)
+    with watched(10), pytest.raises(NotPrinted, match="a later one"):
+        llvm_designs.march(llvm_runner.printed(base(IDLE, None).program, structure(IDLE)), ("L2",), False, 16)
+
+
+def test_what_cancels_is_nothing():
+    made = Listing()
+    value = made.add("mul", *(made.add("input", data=("p", k)) for k in range(2)))
+    less = made.add("neg", value)
+    assert [made.number(made.add("add", *both)) for both in ((value, less), (less, value))] == [0.0, 0.0]
+
+
+def test_a_longer_function_is_left_to_casadi_and_printed_once_in_vain(monkeypatch):
+    mechanism, tried, really = MODELS["stephenson-1-six-bar"], [], llvm_designs.march
+
+    def printing(*given):
+        tried.append(given)
+        return really(*given)
+
+    at, pair = mechanism.inputs[0].position, mechanism.inputs[0].pair
+    designs, run_ = {f"{pair}.velocity": np.linspace(1, 2, 6)}, {"start": at, "stop": at + 0.1, "pair": pair}
+    wanted = planar.sweep(mechanism, designs, 5, backend="casadi", **run_)
+    monkeypatch.setattr(instructions, "MOST_INSTRUCTIONS", 100)
+    monkeypatch.setattr(llvm_runner, "march", printing)
+    llvm_runner._layout.cache_clear()
+    found = planar.sweep(mechanism, designs, 5, backend="native", block=2, **run_)
+    llvm_runner._layout.cache_clear()
+    assert len({given[1:] for given in tried}) == len(tried) > 0
+    assert (found.general, found.whole.all()) == (0, True)
+    for point in found.points:
+        np.testing.assert_array_equal(found.acceleration[point], wanted.acceleration[point])
+
+
+def test_a_long_text_is_compiled_briefly(monkeypatch):
+    plan = all_points(MODELS["crank-rocker"], True)
+    usual, asked, really = llvm_compile.fingerprint(plan.text), [], llvm_compile._machine
+
+    def machine(code):
+        asked.append(code)
+        return really(code)
+
+    monkeypatch.setattr(llvm_compile, "_machine", machine)
+    llvm_compile._made(plan.text)
+    monkeypatch.setattr(llvm_compile, "LONG", plan.text.count("\n") - 1)
+    llvm_compile._made(plan.text)
+    assert asked == [llvm_compile.CODE, llvm_compile.BRIEF]
+    assert llvm_compile.fingerprint(plan.text) != usual

@@ -1,0 +1,168 @@
+"""The published schema and the reader agree: what the schema refuses the reader refuses, and mostly the other way."""
+
+import json
+import subprocess
+import sys
+from copy import deepcopy
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from jsonschema import Draft202012Validator
+from jsonschema.exceptions import best_match
+
+import planar
+from planar.document.files import model_files
+from planar.document.schema import schema
+from planar.foundation.errors import BadInput
+from planar.model.pairs import pair_types
+from tests.document import test_document as document
+from tests.draws import draws
+from tests.model import test_wheel_pairs as wheels
+
+VALIDATOR = Draft202012Validator(schema())
+MODELS = {file.stem: json.loads(file.read_text(encoding="utf-8")) for file in model_files()}
+SAMPLES = [pytest.param(sample, id=key) for key, kind in pair_types().items() for sample in kind.samples()]
+BAD = [
+    *(pytest.param(document.mistaken(*row.values[:3]), id=row.id) for row in document.MISTAKES),
+    *(pytest.param(wheels.mistaken(row.values[0]), id=row.id) for row in wheels.MISTAKES),
+    *(pytest.param(value, id=place) for value, place, _ in wheels.INPUTS),
+]
+UNSAID = {
+    "a name that is not there": ["there is no ", " has no point ", "carries a point ", " is neither of the wheels "],
+    "a name that is there already": [" already", "there is a pair "],
+    "a pair of another kind, or without an input": ["what acts between the links of pair ", " has no input"],
+    "names that must differ, or agree": [
+        *("the line needs two different points", "the way must be between ", "rests on itself"),
+        *("is one of the wheels", "several points are called "),
+    ],
+    "a word that is no unit": [" is not a unit", " is not a known unit", "turns or radians"],
+    "a unit of the wrong kind": [" is wanted, such as ", "a bare rate "],
+    "numbers that do not fit one another": [
+        *("does not close", " coincide", " apart", "not pinned to ", "internal"),
+        *("as many factors as places", "the places rise", "the places do not differ"),
+    ],
+    "what no JSON file holds": ["this is not a number"],
+    "a character that is not printable": [" holds a character that cannot be shown"],
+}
+"""What a JSON Schema cannot say, and the words by which the reader's sentences about it are known."""
+TOO_LARGE = "1e999 m"
+"""A schema bounds numbers, but not those in texts."""
+
+searching = settings(
+    deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.filter_too_much]
+)
+
+
+def refusal(value):
+    """The sentence in which the reader refuses a value; None if it reads."""
+    try:
+        planar.from_dict(value)
+    except BadInput as problem:
+        return problem.sentence
+    return None
+
+
+def wrong(value):
+    """What the schema has against a value; None if nothing."""
+    problem = best_match(VALIDATOR.iter_errors(value))
+    return problem and f"{problem.json_path}: {problem.message[:500]}"
+
+
+def test_the_command_prints_the_schema():
+    command = [sys.executable, "-m", "planar", "schema"]
+    ended = subprocess.run(command, capture_output=True, check=True, encoding="utf-8")
+    assert ended.stderr == ""
+    printed = json.loads(ended.stdout)
+    assert printed == schema()
+    Draft202012Validator.check_schema(printed)
+    assert printed["$schema"] == Draft202012Validator.META_SCHEMA["$id"]
+
+
+def test_every_reference_of_the_schema_leads_somewhere_and_every_definition_is_used():
+    text = json.dumps(schema())
+    for name in schema()["$defs"]:
+        assert f'"#/$defs/{name}"' in text
+    assert text.count('"$ref"') == sum(text.count(f'"#/$defs/{name}"') for name in schema()["$defs"])
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_a_model_is_valid_as_it_is_written_and_as_it_is_written_back(name):
+    assert wrong(MODELS[name]) is None
+    assert wrong(planar.to_dict(planar.from_dict(MODELS[name]))) is None
+
+
+@pytest.mark.parametrize("name", document.EXAMPLES)
+def test_an_example_is_valid(name):
+    assert wrong(document.base(name)) is None
+
+
+@pytest.mark.parametrize("sample", SAMPLES)
+def test_a_sample_of_every_pair_type_is_valid(sample):
+    links = {name: {"points": dict(shape.points)} for name, shape in zip("abc", sample.shapes, strict=False)}
+    value = {"planar": 1, "frame": "a", "links": json.loads(json.dumps(links)), "pairs": [sample.entry, *sample.beside]}
+    if "c" in links:
+        value["frame"] = "c"
+    assert refusal(value) is None
+    assert wrong(value) is None
+
+
+@pytest.mark.parametrize("value", BAD)
+def test_a_mistake_that_a_schema_can_say_is_refused_by_it(value):
+    sentence = refusal(value)
+    assert sentence is not None
+    if wrong(value) is None:
+        known = any(words in sentence for each in UNSAID.values() for words in each)
+        assert known or ("too large" in sentence and TOO_LARGE in json.dumps(value)), sentence
+
+
+def test_of_all_that_a_schema_cannot_say_there_are_examples():
+    passed = [refusal(*row.values) for row in BAD if wrong(*row.values) is None]
+    for words in (words for each in UNSAID.values() for words in each):
+        assert any(words in sentence for sentence in passed), words
+
+
+# whatever is written
+
+
+@settings(searching, max_examples=draws(40))
+@given(document.documents())
+def test_any_mechanism_is_valid_as_it_is_written_and_as_it_is_written_back(value):
+    assert wrong(value) is None
+    assert wrong(planar.to_dict(planar.from_dict(value))) is None
+
+
+@settings(searching, max_examples=draws(200))
+@given(st.sampled_from([*MODELS.values(), *map(document.base, document.EXAMPLES)]), st.integers(1, 2), st.data())
+def test_what_the_schema_refuses_the_reader_refuses(value, times, data):
+    value = deepcopy(value)
+    if data.draw(st.booleans()):
+        value.pop("published", None)  # long, and so most changes would fall on it
+    for _ in range(times):
+        if document.places(value):
+            document.mutilated(value, data.draw)
+    if refusal(value) is None:
+        assert wrong(value) is None
+
+
+SPELT = st.builds(
+    "".join,
+    st.tuples(
+        st.sampled_from(["", " ", "\t", "\u00a0"]),
+        st.sampled_from(["", "+", "-", "−", "+-"]),
+        st.sampled_from(["5", "05", "5.", ".5", "5.5", "5e3", "5E-3", "5.e+3", "0", "5e", ".", "٥"]),
+        st.sampled_from(["", " ", "  ", "\u2009"]),
+        st.sampled_from(["", "mm", "µm", "μm", "m", "°", "deg", "rad/s", "°/s", "1/s", "e3", "N m/N", "m^1", "²"]),
+        st.sampled_from(["", " "]),
+    ),
+)
+
+
+@settings(searching, max_examples=draws(100))
+@given(SPELT, st.sampled_from([("links", "AB", "length"), ("inputs", 0, "position"), ("inputs", 0, "velocity")]))
+def test_a_quantity_that_the_reader_reads_is_one_of_the_schema(text, path):
+    value = document.put(document.base(), list(path), text)
+    if refusal(value) is None:
+        assert wrong(value) is None
+    elif "has no unit" in refusal(value):
+        assert wrong(value)

@@ -1,0 +1,225 @@
+"""The floors of the house: no import goes up or round, libraries stay in their rooms, pair types in their files."""
+
+import ast
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Iterable
+from pathlib import Path
+
+import networkx as nx
+import pytest
+
+import planar
+from planar.model.pairs import pair_types
+
+ROOT = Path(planar.__file__).parent
+FLOORS = (
+    {"foundation"},
+    {"model"},
+    {"equations", "results", "document"},
+    {"solving", "codegen"},
+    {"dynamics", "batch", "assemblies"},
+    {"analysis", "bench"},
+    {"drawing", "reports"},
+    {"pages", "plot"},
+    {"cli"},
+    {"__main__"},
+)
+"""The rooms, ground floor first. `planar/__init__.py` names what is in them all, and loads none of it by itself."""
+LIBRARIES = {
+    "numpy": {
+        "analysis",
+        "assemblies",
+        "batch",
+        "bench",
+        "codegen",
+        "drawing",
+        "dynamics",
+        "equations",
+        "foundation",
+        "model",
+        "pages",
+        "reports",
+        "results",
+        "solving",
+    },
+    "casadi": {"assemblies", "batch", "codegen", "dynamics", "equations", "pages"},
+    "networkx": {"model"},
+    "flint": {"assemblies"},
+    "llvmlite": {"codegen"},
+    "scipy": {"dynamics", "model"},
+    "pint": {"foundation"},
+    "rich": {"cli", "reports"},
+    "matplotlib": {"drawing", "plot"},
+    "fontTools": {"drawing"},
+    "PIL": {"drawing"},
+    "imageio_ffmpeg": {"drawing"},
+    "click": {"cli"},
+    "pyarrow": {"batch", "reports"},
+    "zarr": {"batch"},
+    "xarray": {"reports"},
+}
+MOST_FILES, MOST_LINES, LONGEST_FUNCTION, MOST_PARAMETERS = 16, 400, 60, 8
+FILES = sorted(ROOT.rglob("*.py"))
+NAMES = {".".join(path.relative_to(ROOT.parent).with_suffix("").parts): path for path in FILES}
+
+
+def room(path: Path) -> str:
+    """The folder under `planar` that a file is in, or its own name."""
+    return path.relative_to(ROOT).with_suffix("").parts[0]
+
+
+def imports(path: Path) -> set[str]:
+    """Every module that a file imports, lazily, or by a text with its name: files of planar, or other packages."""
+    modules = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            modules |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import"
+            modules |= {f"{node.module}.{alias.name}" for alias in node.names}
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            modules |= {node.value} & set(NAMES)
+    return {module_of(name) for name in modules}
+
+
+def module_of(name: str) -> str:
+    """The file that an imported name is from, as a module, if it is one of planar's."""
+    for known in (name, f"{name}.__init__", (head := name.rpartition(".")[0]), f"{head}.__init__"):
+        if known in NAMES:
+            return known
+    return name
+
+
+def arrows() -> list[tuple[str, str]]:
+    """Who imports whom within planar, as modules; the list of public names in `planar/__init__.py` left out."""
+    top = f"{planar.__name__}.__init__"
+    whole = [(name, module) for name, path in NAMES.items() if name != top for module in imports(path)]
+    return [(name, module) for name, module in whole if module in NAMES and module not in (name, top)]
+
+
+def circles(pairs: Iterable[tuple[str, str]]) -> list[list[str]]:
+    graph = nx.DiGraph((one, other) for one, other in pairs if one != other)
+    return [sorted(part) for part in nx.strongly_connected_components(graph) if len(part) > 1]
+
+
+def test_no_import_goes_up_or_along():
+    floor = {name: level for level, rooms in enumerate(FLOORS) for name in rooms}
+    up = [
+        f"{one} imports {other}"
+        for one, other in arrows()
+        if room(NAMES[one]) != room(NAMES[other]) and floor[room(NAMES[other])] >= floor[room(NAMES[one])]
+    ]
+    assert up == []
+    assert set(floor) == {room(path) for path in FILES} - {"__init__"}
+
+
+def test_files_import_one_another_in_no_circle():
+    assert circles(arrows()) == []
+
+
+@pytest.mark.parametrize("name", sorted({room(path) for path in FILES if path.parent != ROOT}))
+def test_inside_a_room_no_arrow_goes_up(name):
+    """A folder inside a room is one thing there, like a file beside it: they, too, stand one above the other."""
+
+    def part(module: str) -> str:
+        return NAMES[module].relative_to(ROOT / name).with_suffix("").parts[0]
+
+    within = [(one, other) for one, other in arrows() if room(NAMES[one]) == room(NAMES[other]) == name]
+    assert circles((part(one), part(other)) for one, other in within) == []
+
+
+def test_no_folder_has_too_many_files():
+    many = Counter(
+        path.parent.relative_to(ROOT) for path in ROOT.rglob("*") if path.is_file() and path.suffix != ".pyc"
+    )
+    assert {str(folder): count for folder, count in many.items() if count > MOST_FILES} == {}
+
+
+def test_libraries_stay_in_their_rooms():
+    for path in FILES:
+        for module in imports(path):
+            library = module.split(".")[0]
+            if library != "planar" and library not in sys.stdlib_module_names:
+                assert room(path) in LIBRARIES[library], f"{room(path)} imports {library}"
+
+
+def test_no_pair_type_is_named_outside_the_pairs():
+    for path in FILES:
+        if path.parent == ROOT / "model" / "pairs":
+            continue
+        tree = ast.parse(path.read_text())
+        names = {kind.__name__ for kind in pair_types().values()}
+        said = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+        texts = {
+            node.value for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)
+        }
+        assert not said & names
+        assert not texts & set(pair_types())
+
+
+def test_only_the_files_room_opens_mechanism_files():
+    opening = {"open", "read_text", "read_bytes", "write_text", "write_bytes"}
+    for path in FILES:
+        called = {
+            node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+            for node in ast.walk(ast.parse(path.read_text()))
+            if isinstance(node, ast.Call)
+        }
+        if called & opening:
+            assert path == ROOT / "document" / "files.py"
+
+
+def test_files_are_small_and_say_their_job_first():
+    for path in FILES:
+        tree = ast.parse(path.read_text())
+        text = ast.get_docstring(tree)
+        assert text
+        assert len(text.splitlines()[0]) < 130
+        assert len(path.read_text().splitlines()) <= MOST_LINES
+
+
+def test_functions_are_short_and_take_few_arguments():
+    """What is longer, or takes more, says why in a comment beside its first line: `# long: ...` or `# many: ...`."""
+    for path in FILES:
+        lines = path.read_text().splitlines()
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                said = " ".join(lines[node.lineno - 2 : node.body[0].lineno])
+                given = node.args
+                many = len([*given.posonlyargs, *given.args, *given.kwonlyargs]) - (
+                    bool(given.args) and given.args[0].arg in ("self", "cls")
+                )
+                assert node.end_lineno - node.lineno < LONGEST_FUNCTION or "# long: " in said, f"{path}:{node.lineno}"
+                assert many <= MOST_PARAMETERS or "# many: " in said, f"{path}:{node.lineno}"
+
+
+def loaded_by(code: str) -> set[str]:
+    run = [sys.executable, "-c", f"{code}\nimport sys; print(*sys.modules)"]
+    return set(subprocess.run(run, check=True, capture_output=True, text=True).stdout.split())
+
+
+def test_solving_loads_neither_scipy_nor_networkx_nor_what_only_pictures_need():
+    loaded = loaded_by("import planar; planar.solve(planar.load('000-P1'))")
+    assert not loaded & {"scipy", "networkx", "rich", "click", "pint", "matplotlib"}
+    assert "casadi" in loaded
+
+
+def test_drawing_loads_only_what_it_draws_with():
+    loaded = loaded_by("import planar; planar.plot.acceleration(planar.solve(planar.load('000-P1')))")
+    assert "matplotlib.figure" in loaded
+    assert not loaded & {"scipy", "networkx", "rich", "click", "matplotlib.pyplot", "matplotlib.backends.backend_pdf"}
+    assert not loaded & {"planar.assemblies.circuits.circuits", "planar.assemblies.modes", "planar.dynamics.forces"}
+
+
+def test_importing_planar_loads_no_library_at_all():
+    assert not loaded_by("import planar") & set(LIBRARIES)
+
+
+def test_public_names_are_all_there():
+    assert set(planar.__all__) == set(dir(planar))
+    for name in planar.__all__:
+        assert getattr(planar, name).__doc__
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = planar.nothing

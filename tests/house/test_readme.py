@@ -1,0 +1,167 @@
+"""README's commands and snippets, run as a reader would."""
+
+import json
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from PIL import Image, ImageChops, ImageStat
+
+import planar
+from tests import command
+from tests.draws import SEARCH
+
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def blocks(kind: str) -> list[str]:
+    return re.findall(rf"```{kind}\n(.*?)```", README, re.DOTALL)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    name, text = re.search(r"<!-- file: (\S+) -->\n```json\n(.*?)```", README, re.DOTALL).groups()
+    (tmp_path / name).write_text(text, encoding="utf-8")
+    return tmp_path
+
+
+COMMANDS = [
+    shlex.split(line, comments=True)
+    for text in blocks("sh")
+    for line in text.splitlines()
+    if line.startswith("planar ")
+]
+
+
+@pytest.mark.parametrize("words", COMMANDS, ids=" ".join)
+def test_commands_of_the_tour_run(words, folder):
+    # the start of a process takes longer than most commands: each one's first form has it only where one searches
+    first = SEARCH and next(each for each in COMMANDS if each[1] == words[1]) == words
+    done = (command.process if first else command.run)(folder, *words[1:])
+    done.done()
+    if "-o" in words:
+        assert (folder / words[words.index("-o") + 1]).stat().st_size > 1000
+    else:
+        assert len(done.out) > 100
+
+
+def test_the_tour_runs_as_it_stands_once_the_environment_is_activated(folder):
+    """In a shell that has no `planar`, in an environment where the set-up's own command put it."""
+    (line,) = re.search(r"<!-- activate -->\n```sh\n(.*?)```", README, re.DOTALL).groups()
+    assert README.index(line) < README.index("\nplanar ")
+    made = folder / re.search(r"-m venv (\S+)", README).group(1)
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", made], check=True)
+    script = made / "bin" / "planar"
+    entry = "import sys; from planar.cli import main; sys.exit(main())"
+    script.write_text(f"#!/bin/sh\nexec '{sys.executable}' -c '{entry}' \"$@\"\n", encoding="utf-8")
+    script.chmod(0o755)
+    elsewhere = [each for each in os.get_exec_path() if not (Path(each) / "planar").exists()]
+    done = subprocess.run(
+        [shutil.which("sh"), "-ec", f"{line}\n{shlex.join(COMMANDS[0])}"],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        env=os.environ | {"PATH": os.pathsep.join(elsewhere), "PYTHONPATH": str(ROOT)},
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "Press" in done.stdout
+
+
+def test_the_python_snippet_runs(folder):
+    (snippet,) = blocks("python")
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONWARNINGS": "error"}
+    done = subprocess.run(
+        [sys.executable, "-c", snippet], cwd=folder, capture_output=True, text=True, env=environment, check=False
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_entries_of_pairs_that_it_shows_are_such():
+    from jsonschema import Draft202012Validator
+
+    whole = planar.schema()
+    check = Draft202012Validator({"$ref": "#/$defs/pair", "$defs": whole["$defs"]})
+    shown = [json.loads(text) for text in re.findall(r"`(\{.*?\})` \|", README)]
+    assert len(shown) >= 4
+    for entry in shown:
+        check.validate(entry)
+
+
+def test_what_acts_is_written_as_it_shows(folder):
+    """Every entry of loads, springs and masses, and how a load varies, put into its own mechanism file."""
+    told = README[README.index("- **Loads**") : README.index("- **Units**")].replace("\n ", "")
+    value = json.loads((folder / "press.json").read_text(encoding="utf-8"))
+    kinds = dict(zip(("loads", "springs", "masses"), told.split("\n- **"), strict=True))
+    for kind, text in kinds.items():
+        value[kind] = [json.loads(entry) for entry in re.findall(r"`(\{.*?\})`", text)]
+    value["loads"][0] |= json.loads("{" + re.search(r'`("varies": .*?)`', told).group(1) + "}")
+    value["loads"][0] |= {"axes": "BD"}
+    value |= json.loads("{" + re.search(r'`("gravity": .*?)`', told).group(1) + "}")
+    mechanism = planar.from_dict(value)
+    assert [len(getattr(mechanism, kind)) for kind in kinds] == [3, 2, 1]
+    assert planar.forces(planar.solve(mechanism)).proof.equilibrium < 1e-10
+
+
+def test_the_readme_names_every_room():
+    rooms = {path.relative_to(ROOT / "planar").with_suffix("").parts[0] for path in (ROOT / "planar").rglob("*.py")}
+    rooms -= {"__init__", "__main__"}
+    table = README.split("## How it works")[1]
+    small = {"errors", "algebra", "roots", "plane", "words", "files", "cli"}
+    assert all(re.search(rf"\b{room}\b", table) for room in rooms - small)
+
+
+def test_the_first_screen_has_a_sentence_a_picture_and_two_commands():
+    first = README.splitlines()[:24]
+    assert any(re.fullmatch(r"!\[.+\]\(\.pictures/four-bar\.png\)", line) for line in first)
+    assert sum(line == "```sh" for line in first) == 2
+
+
+def test_the_picture_is_what_the_tool_makes_now(tmp_path):
+    command.run(tmp_path, "plot", "002-E3.1", "acceleration", "-o", "now.png").done()
+    now, shown = (Image.open(path).convert("L") for path in (tmp_path / "now.png", ROOT / ".pictures/four-bar.png"))
+    assert now.size == pytest.approx(shown.size, rel=0.02)
+    apart = ImageChops.difference(now, shown.resize(now.size))
+    assert ImageStat.Stat(apart).mean[0] < 2.0  # of 255: other versions of the library smooth otherwise
+
+
+def test_the_checks_run_exactly_the_readmes_test_command():
+    script = (ROOT / ".ci" / "run").read_text()
+    assert "README.md" in script
+    assert "pip install" not in script
+    shell = shutil.which("bash")
+    found = subprocess.run(
+        [shell, "-c", re.search(r"command=\$\((.*)\)\n", script).group(1)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
+    assert found.strip() == next(text for text in blocks("sh") if "pytest" in text).strip()
+
+
+def test_the_wheel_brings_the_models_and_works_from_another_folder(tmp_path):
+    """Built once, unpacked into an empty folder, and run from there with the libraries of this environment alone."""
+    build = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "-o", str(tmp_path / "wheel"), str(ROOT)]
+    done = subprocess.run(build, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    (wheel,) = (tmp_path / "wheel").glob("*.whl")
+    place = tmp_path / "site"
+    shutil.unpack_archive(wheel, place, "zip")
+    code = "import planar, json; print(json.dumps([planar.__file__, planar.solve(planar.load('000-P1')).mobility]))"
+    environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"} | {"PYTHONPATH": str(place)}
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, env=environment, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    file, mobility = json.loads(done.stdout)
+    assert Path(file).is_relative_to(place)
+    assert mobility == 1
+    names = {path.stem for path in (place / "planar" / "models").rglob("*.json")}
+    assert names == {path.stem for path in (ROOT / "models").rglob("*.json")}

@@ -1,0 +1,314 @@
+"""Gears, belts, chains, racks and slots that an author got wrong, and where their angles count turns."""
+
+import copy
+import json
+from math import inf, nan, radians
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import planar
+from planar.cli import main
+from planar.foundation.errors import BadInput, NoAnswer, Outcome
+
+WHEELS = {
+    "planar": 1,
+    "units": {"length": "mm", "angle": "deg"},
+    "frame": "frame",
+    "links": {
+        "frame": {"points": {"O": [0, 0], "Q": [80, 0], "R": [40, 60]}},
+        "a": {"ends": ["O", "A"], "length": 20},
+        "b": {"ends": ["Q", "B"], "length": 20},
+        "c": {"ends": ["R", "C"], "length": 10},
+    },
+    "pairs": [{"turning": "O"}, {"turning": "Q"}, {"turning": "R"}],
+    "inputs": [{"pair": "O", "position": 20, "velocity": "1 rad/s"}, {"pair": "R", "position": 0}],
+}
+PINION = {
+    "planar": 1,
+    "units": {"length": "mm", "angle": "deg"},
+    "frame": "frame",
+    "links": {"frame": {"points": {"O": [0, 0], "P": [50, 0]}}, "w": {"ends": ["C", "T"], "length": 20}},
+    "pairs": [{"slot": "s", "links": ["frame", "w"], "line": {"through": [0, 20]}, "point": "C"}],
+    "inputs": [{"pair": "s", "position": 30, "velocity": 1}],
+}
+GEAR = {"gear": "g", "links": ["a", "b"], "radii": [30, 50]}
+TEETH = {"gear": "g", "links": ["a", "b"], "teeth": [30, 50]}
+RATIO = {"gear": "g", "links": ["a", "b"], "ratio": -2}
+BELT = {"belt": "g", "links": ["a", "b"], "radii": [30, 40]}
+CHAIN = {"chain": "g", "links": ["a", "b"], "teeth": [15, 45]}
+RACK = {"rack": "r", "links": ["frame", "w"], "line": {"through": "O"}, "point": "C", "radius": 20}
+SLOT = {"slot": "t", "links": ["frame", "w"], "line": {"through": "O"}, "point": "C"}
+GONE = object()
+
+
+def wheels(*entries, inputs=None):
+    value = copy.deepcopy(WHEELS)
+    value["pairs"] += entries
+    return value if inputs is None else value | {"inputs": inputs}
+
+
+def pinion(entry, **changes):
+    value = copy.deepcopy(PINION) | changes
+    value["pairs"].append(entry)
+    return value
+
+
+def driven(pair, position, **rates):
+    return {"pair": pair, "position": position, **rates}
+
+
+def mistake(entry, change, place, *words):
+    """What is changed in an entry; the place to be named (from the entry on), and words that must stand."""
+    entry = {key: value for key, value in (entry | change).items() if value is not GONE}
+    told = {key: "gone" if value is GONE else value for key, value in change.items()}
+    return pytest.param(entry, place, words, id=f"{next(iter(entry))} {json.dumps(told)}")
+
+
+MISTAKES = [
+    mistake(GEAR, {"gear": "O"}, "", "'O'", "$.pairs[0]", "another name"),
+    mistake(GEAR, {"links": ["a"]}, ".links", "two links"),
+    mistake(GEAR, {"links": ["a", "a"]}, ".links", "'a'", "twice"),
+    mistake(GEAR, {"links": ["a", "b", "c"]}, ".links", "two links", "3"),
+    mistake(GEAR, {"links": ["a", "z"]}, ".links[1]", "no link 'z'"),
+    mistake(GEAR, {"links": ["frame", "b"]}, "", "'frame'", "third link", "'carrier'"),
+    mistake(GEAR, {"carrier": "a"}, ".carrier", "'a'", "third link"),
+    mistake(GEAR, {"carrier": "z"}, ".carrier", "no link 'z'"),
+    mistake(GEAR, {"carrier": ["frame"]}, ".carrier", "text", "a list"),
+    mistake(GEAR, {"carrier": "c"}, "", "'a'", "not pinned to 'c'"),
+    mistake(GEAR, {"radii": [30]}, ".radii", "2 numbers", "1"),
+    mistake(GEAR, {"radii": [30, 40]}, "", "70 mm", "80 mm"),
+    mistake(GEAR, {"radii": [0, 50]}, ".radii", "zero"),
+    mistake(GEAR, {"radii": [-30, -50]}, ".radii", "both", "internal"),
+    mistake(GEAR, {"radii": [30, -30]}, ".radii", "larger"),
+    mistake(GEAR, {"radii": [inf, 50]}, ".radii[0]", "too large"),
+    mistake(GEAR, {"radii": [nan, 50]}, ".radii[0]", "not a number"),
+    mistake(GEAR, {"radii": ["30 deg", 50]}, ".radii[0]", "length is wanted"),
+    mistake(GEAR, {"radii": [True, 50]}, ".radii[0]", "true"),
+    mistake(GEAR, {"teeth": [20, 31]}, "", "one of", "radii and teeth"),
+    mistake(GEAR, {"radii": GONE}, "", "one of", "'radii', 'teeth' and 'ratio'"),
+    mistake(GEAR, {"ratii": [1, 2]}, ".ratii", "did you mean"),
+    mistake(GEAR, {"crossed": True}, ".crossed", "unknown key"),
+    mistake(GEAR, {"mesh": {"a": 0}}, ".mesh", "'b'", "missing"),
+    mistake(GEAR, {"mesh": {"a": 0, "frame": 0}}, ".mesh.frame", "'frame'"),
+    mistake(GEAR, {"mesh": [0, 0]}, ".mesh", "object", "a list"),
+    mistake(GEAR, {"mesh": {"a": "5 mm", "b": 0}}, ".mesh.a", "angle is wanted"),
+    mistake(GEAR, {"mesh": {"a": inf, "b": 0}}, ".mesh.a", "too large"),
+    mistake(TEETH, {"teeth": [20.5, 31]}, ".teeth[0]", "whole number", "20.5"),
+    mistake(TEETH, {"teeth": ["20", 31]}, ".teeth[0]", "whole number", "'20'"),
+    mistake(TEETH, {"teeth": [0, 31]}, ".teeth", "zero"),
+    mistake(TEETH, {"teeth": [10**400, 31]}, ".teeth[0]", "too large"),
+    mistake(RATIO, {"ratio": 0}, ".ratio", "zero"),
+    mistake(RATIO, {"ratio": 1e-7}, ".ratio", "from 1e-06 to 1e+06"),
+    mistake(RATIO, {"ratio": -2e6}, ".ratio", "from 1e-06 to 1e+06"),
+    mistake(RATIO, {"ratio": "-2"}, ".ratio", "number", "'-2'"),
+    mistake(RATIO, {"ratio": None}, ".ratio", "number", "null"),
+    mistake(RATIO, {"ratio": -inf}, ".ratio", "too large"),
+    mistake(BELT, {"radii": [30, -40]}, ".radii", "above zero"),
+    mistake(BELT, {"radii": [200, 50]}, "", "80 mm", "150 mm", "open"),
+    mistake(BELT, {"radii": [30, 50], "crossed": True}, "", "80 mm", "crossed"),
+    mistake(BELT, {"crossed": "yes"}, ".crossed", "true or false", "'yes'"),
+    mistake(BELT, {"radii": GONE, "ratio": -2, "crossed": True}, ".crossed", "sign of 'ratio'"),
+    mistake(CHAIN, {"teeth": [15, -45]}, ".teeth", "above zero"),
+    mistake(RACK, {"radius": 0}, ".radius", "zero"),
+    mistake(RACK, {"radius": inf}, ".radius", "too large"),
+    mistake(RACK, {"radius": "20 deg"}, ".radius", "length is wanted"),
+    mistake(RACK, {"radius": GONE}, "", "'radius'", "missing"),
+    mistake(RACK, {"point": "X"}, ".point", "'w'", "no point 'X'"),
+    mistake(RACK, {"links": ["w", "frame"]}, ".line.through", "'w'", "no point 'O'"),
+    mistake(RACK, {"line": {"through": "O", "to": "P", "angle": 3}}, ".line.angle", "not both"),
+    mistake(RACK, {"mesh": {"displacement": 0}}, ".mesh", "'angle'", "missing"),
+    mistake(RACK, {"mesh": {"displacement": "3 deg", "angle": 0}}, ".mesh.displacement", "length is wanted"),
+    mistake(RACK, {"carrier": "frame"}, ".carrier", "unknown key"),
+    mistake(RACK, {"teeth": 20}, ".teeth", "unknown key"),
+    mistake(SLOT, {"point": "P"}, ".point", "'w'", "no point 'P'"),
+    mistake(SLOT, {"line": GONE}, "", "'line'", "missing"),
+    mistake(SLOT, {"line": {"through": "C"}}, ".line.through", "'frame'", "no point 'C'"),
+    mistake(SLOT, {"block": "C"}, ".block", "unknown key"),
+    mistake(SLOT, {"turn": 90}, ".turn", "unknown key"),
+]
+
+
+def mistaken(entry):
+    """A mechanism with this entry."""
+    return pinion(entry) if {"rack", "slot"} & entry.keys() else wheels(entry)
+
+
+@pytest.mark.parametrize(("entry", "place", "words"), MISTAKES)
+def test_a_mistake_is_named_with_its_place(entry, place, words, tmp_path):
+    value = mistaken(entry)
+    with pytest.raises(BadInput) as problem:
+        planar.from_dict(value)
+    assert problem.value.place == f"$.pairs[{len(value['pairs']) - 1}]{place}"
+    for word in words:
+        assert word in problem.value.sentence
+    file = tmp_path / "wrong.json"
+    file.write_text(json.dumps(value), encoding="utf-8")
+    ended = CliRunner().invoke(main, ["solve", str(file)])
+    assert ended.exit_code == 2
+    assert ended.output.count("\n") == 1
+
+
+INPUTS = [
+    (wheels(GEAR, inputs=[driven("g", "30 mm")]), "$.inputs[0].position", "angle is wanted"),
+    (wheels(GEAR, inputs=[driven("g", 30, velocity=5)]), "$.inputs[0].velocity", "unclear"),
+    (pinion(RACK, inputs=[driven("r", "30 deg")]), "$.inputs[0].position", "length is wanted"),
+    (pinion(RACK, inputs=[driven("r", 30, velocity="1 rad/s")]), "$.inputs[0].velocity", "velocity is wanted"),
+]
+
+
+@pytest.mark.parametrize(("value", "place", "words"), INPUTS)
+def test_an_input_has_the_units_of_its_pair(value, place, words):
+    with pytest.raises(BadInput, match=words) as problem:
+        planar.from_dict(value)
+    assert problem.value.place == place
+
+
+def between(first, second, ratio, name, **more):
+    return {"gear": name, "links": [first, second], "ratio": ratio, **more}
+
+
+def ring(*ratios, **more):
+    """Three wheels, each geared to the next."""
+    pairs = (between(a, b, r, f"{a}{b}") for (a, b), r in zip(("ab", "bc", "ca"), ratios, strict=True))
+    first, second, third = pairs
+    return wheels(first, second | more, third, inputs=WHEELS["inputs"][:1])
+
+
+def tied(*entries):
+    """The third wheel tied to the first, which alone is driven."""
+    return wheels(*entries, between("a", "c", -1, "ac"), inputs=WHEELS["inputs"][:1])
+
+
+@pytest.mark.parametrize(
+    ("value", "outcome", "words"),
+    [
+        (ring(-1, -1, -1), Outcome.CANNOT_BE_ASSEMBLED, ["'ca'", "40 deg"]),
+        (ring(-2, -1, 0.5, mesh={"b": 0, "c": 10}), Outcome.CANNOT_BE_ASSEMBLED, ["'ca'", "5 deg"]),
+        (tied(RATIO, RATIO | {"gear": "h", "ratio": -2.1}), Outcome.CANNOT_BE_ASSEMBLED, ["'h'", "2 deg"]),
+        (tied(RATIO, BELT | {"belt": "h"}), Outcome.CANNOT_BE_ASSEMBLED, ["'h'"]),
+        (wheels(RATIO, inputs=[driven("O", 20), driven("R", 0), driven("Q", 30)]), Outcome.TOO_MANY_INPUTS, ["'Q'"]),
+        (wheels(RATIO, inputs=[driven("R", 0)]), Outcome.TOO_FEW_INPUTS, ["'a'", "'b'", "'g'"]),
+        (pinion(RACK | {"radius": 19.99}), Outcome.CANNOT_BE_ASSEMBLED, ["'r'", "0.01 mm from touching", "guides"]),
+        (pinion(RACK | {"radius": -20}), Outcome.CANNOT_BE_ASSEMBLED, ["'r'", "40 mm from touching"]),
+        (pinion(RACK, pairs=[], inputs=[driven("r", 30)]), Outcome.TOO_FEW_INPUTS, ["'w'", "1 way"]),
+    ],
+)
+def test_what_has_no_answer_is_told(value, outcome, words):
+    with pytest.raises(NoAnswer) as problem:
+        planar.solve(planar.from_dict(value))
+    assert problem.value.outcome is outcome
+    for word in words:
+        assert word in problem.value.reason
+
+
+def test_a_closed_ring_of_gears_that_agree_turns():
+    state = planar.solve(planar.from_dict(ring(-3, -1, 1 / 3)))
+    assert state.mobility == 1
+    assert [state.link(name).angular_velocity for name in "abc"] == pytest.approx([1, -3, 3], rel=1e-14)
+
+
+@pytest.mark.parametrize("degrees", [20, 400, 3679.2, -100_000])
+def test_an_input_may_be_at_a_gear_or_many_turns_on(degrees):
+    at_wheel = planar.solve(planar.from_dict(wheels(GEAR)), {"O": radians(degrees)})
+    assert at_wheel.link("b").angle == pytest.approx(radians(degrees) * -30 / 50, rel=1e-14)
+    given = [driven("g", degrees * -30 / 50, velocity="-0.6 rad/s"), driven("R", 0)]
+    at_gear = planar.solve(planar.from_dict(wheels(GEAR, inputs=given)))
+    assert at_gear.link("a").angle == pytest.approx(radians(degrees), rel=1e-14)
+    assert at_gear.link("a").angular_velocity == pytest.approx(1, rel=1e-14)
+
+
+def test_a_train_may_go_from_one_carrier_to_the_next():
+    """The second carrier hangs on the first; each gear obeys its ratio against its own."""
+    value = {
+        "planar": 1,
+        "frame": "f",
+        "links": {
+            "f": {"points": {"O": [0, 0]}},
+            "arm": {"ends": ["O", "P"], "length": 0.06},
+            "second arm": {"ends": ["P", "R"], "length": 0.05},
+            "v": {"points": {"P": [0, 0]}},
+            "w": {"points": {"R": [0, 0]}},
+        },
+        "pairs": [
+            {"turning": "O"},
+            {"turning": "P", "links": ["v", "arm", "second arm"]},
+            {"turning": "R"},
+            {"gear": "g", "links": ["f", "v"], "carrier": "arm", "radii": [0.04, 0.02]},
+            {"gear": "h", "links": ["v", "w"], "carrier": "second arm", "radii": [0.02, 0.03]},
+        ],
+        "inputs": [driven("O", 0.9, velocity=1), driven("P:arm,second arm", 0.3, velocity=2, acceleration=5)],
+    }
+    state = planar.solve(planar.from_dict(value))
+    assert state.mobility == 2
+    turning = np.array([state.link(name)[:3] for name in ("arm", "second arm", "v", "w")])
+    np.testing.assert_allclose(turning[2] - turning[0], -2 * (0 - turning[0]), atol=1e-13)
+    np.testing.assert_allclose(turning[3] - turning[1], -2 / 3 * (turning[2] - turning[1]), atol=1e-13)
+
+
+@pytest.mark.parametrize("degrees", [100, 150, 200, 460, 820])
+@pytest.mark.parametrize("ratio", [0.5, -2.122])
+def test_a_gear_on_a_crank_that_a_linkage_turns_counts_its_turns(degrees, ratio):
+    """A drag link turns a second crank fully round; the wheel geared to it goes on from turn to turn."""
+    value = {
+        "planar": 1,
+        "units": {"length": "mm", "angle": "deg"},
+        "frame": "f",
+        "links": {
+            "f": {"points": {"A": [0, 0], "D": [20, 0], "W": [200, 0]}},
+            "AB": {"ends": ["A", "B"], "length": 60},
+            "BC": {"ends": ["B", "C"], "length": 50},
+            "DC": {"ends": ["D", "C"], "length": 60},
+            "w": {"ends": ["W", "X"], "length": 20},
+        },
+        "pairs": [
+            *({"turning": name} for name in "ABCDW"),
+            {"gear": "g", "links": ["DC", "w"], "ratio": ratio},
+        ],
+        "inputs": [driven("A", 100, velocity="1 rad/s")],
+        "sketch": {"C": [-37, 17]},
+    }
+    mechanism = planar.from_dict(value)
+    start, there = (planar.solve(mechanism, {"A": radians(at)}) for at in (100, degrees))
+    crank = there.link("DC").angle - start.link("DC").angle
+    assert there.link("w").angle == pytest.approx(ratio * there.link("DC").angle, rel=1e-13)
+    assert round(crank / (2 * np.pi)) == round((degrees - 100) / 360)
+    if degrees == 820:
+        assert crank == pytest.approx(4 * np.pi, abs=1e-12)
+
+
+CONTRACT = {
+    "planar": 1,
+    "name": "Andrew variable-stroke engine",
+    "units": {"length": "mm", "angle": "deg"},
+    "frame": "frame",
+    "links": {
+        "frame": {"points": {"O": [0, 0], "Q": [-158, 0]}},
+        "OA": {"ends": ["O", "A"], "length": 90},
+        "QB": {"ends": ["Q", "B"], "length": 45},
+        "AC": {"ends": ["A", "C"], "length": 185},
+        "BC": {"ends": ["B", "C"], "length": 185},
+        "CD": {"ends": ["C", "D"], "length": 240},
+    },
+    "pairs": [
+        *({"turning": name} for name in "OQABC"),
+        {"gear": "wheels", "links": ["OA", "QB"], "ratio": -2.122, "mesh": {"OA": 79.2, "QB": 208.1}},
+        {"sliding": "stroke", "on": "frame", "block": "D", "line": {"through": [0, 232], "angle": 0}},
+    ],
+    "inputs": [{"pair": "O", "position": 79.2, "velocity": "100 rpm"}],
+    "loads": [{"point": "D", "force": [-3000, 0]}],
+    "sketch": {"C": [-154, 159], "D": [74, 232]},
+}
+
+
+def test_the_geared_example_balances_power_as_a_difference_of_positions_says():
+    """Torque times speed of the crank is load times speed of the slider, that taken from two positions."""
+    mechanism = planar.from_dict(CONTRACT)
+    state = planar.solve(mechanism)
+    crank, step = mechanism.inputs[0].position, 1e-4
+    ahead, behind = (planar.solve(mechanism, {"O": crank + way * step}).point("D").position[0] for way in (1, -1))
+    # central difference: truncation of about step^2, so eight digits
+    assert planar.forces(state).inputs["O"] == pytest.approx(3000 * (ahead - behind) / (2 * step), rel=1e-6)
+    assert state.link("QB").angle == pytest.approx(np.radians(208.1), rel=1e-12)
+    assert state.link("QB").angular_velocity == pytest.approx(-2.122 * 100 * np.pi / 30, rel=1e-12)

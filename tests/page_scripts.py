@@ -1,0 +1,79 @@
+"""Pages as tests need them: in Node, without a browser, or in Chromium; what is missing is said in one place."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from planar.document.files import asset
+from planar.pages.page import told
+from planar.pages.page_data import carried
+
+NODE = shutil.which("node") or shutil.which("nodejs")
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+LOGIC = ("solve/singular.js", "solve/linkage.js", "page.js", "controls/dimensions.js", "controls/saving.js")
+"""The scripts of a page that need no document."""
+
+_carried = cache(carried)
+needs_node = pytest.mark.skipif(NODE is None, reason="there is no Node to run the page's scripts in")
+
+
+def in_node(mechanisms: dict[str, Any], act: str, *more: str) -> dict[str, Any]:
+    """What the asynchronous `act(page, name)` returns for the page of each mechanism, with `more` scripts."""
+    shared = "\n".join(asset(name) for name in (*LOGIC, *more))
+    runs = []
+    for name, mechanism in mechanisms.items():
+        data, functions = _carried(mechanism)
+        runs.append(
+            f"await (async () => {{ {functions}\n const page = new Page(JSON.parse({told(told(data))}), program);\n"
+            f" found[{told(name)}] = await act(page, {told(name)}); }})();"
+        )
+    text = (
+        f"{shared}\nasync function act(page, name) {{ {act} }}\n"
+        f"(async () => {{ const found = {{}};\n{''.join(runs)}\nprocess.stdout.write(JSON.stringify(found)); }})();"
+    )
+    done = subprocess.run([NODE, "-"], input=text, capture_output=True, text=True, check=False, timeout=100)
+    assert done.returncode == 0, done.stderr[-2000:]
+    return json.loads(done.stdout)
+
+
+@cache
+def chromium() -> str:
+    """The browser's program; the test is skipped where there is none, or no Playwright to drive it."""
+    pytest.importorskip("playwright.sync_api", reason="there is no Playwright to drive a browser")
+    for name in BROWSERS:
+        found = shutil.which(name)
+        if found:
+            return found
+    return pytest.skip("there is no Chromium: apt-get install chromium")
+
+
+@contextmanager
+def browser():
+    """A running browser."""
+    program = chromium()
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        running = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        try:
+            yield running
+        finally:
+            running.close()
+
+
+def opened(context: Any, path: Path) -> tuple[Any, list[str]]:
+    """A page in a window, and a list that takes what goes wrong in it."""
+    window, wrong = context.new_page(), []
+    window.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
+    window.on("pageerror", lambda problem: wrong.append(str(problem)))
+    window.on("request", lambda request: wrong.append(request.url) if request.url.startswith("http") else None)
+    window.goto(path.as_uri())
+    return window, wrong

@@ -1,0 +1,575 @@
+"""Every way in which a mechanism has no answer, by the library and by the real command; and that the advice helps."""
+
+import copy
+import json
+import re
+
+import numpy as np
+import pytest
+
+import planar
+from planar.document import files
+from planar.foundation.errors import NoAnswer, Outcome
+from planar.solving.assembly.block_assemblies import Candidates
+from planar.solving.assembly.nearest_assembly import Failure, search
+from planar.solving.diagnosis import remedy
+from planar.solving.prepared_mechanism import Setup
+from tests.cli.test_commands import written
+from tests.command import run
+from tests.draws import part
+
+DEG = np.pi / 180
+
+
+def value(links, pairs, inputs, sketch=None, unit="mm"):
+    given = [
+        {"pair": pair, "position": position, "velocity": "1 m/s" if pair == "s" else "1 rad/s"}
+        for pair, position in inputs
+    ]
+    return copy.deepcopy(
+        {
+            "planar": 1,
+            "units": {"length": unit, "angle": "deg"},
+            "frame": "f",
+            "links": links,
+            "pairs": pairs,
+            "inputs": given,
+            "sketch": sketch or {},
+        }
+    )
+
+
+def pins(names):
+    return [{"turning": name} for name in names]
+
+
+def four_bar(a=50, b=66, c=56, d=100, theta=60, sketch=None, pair="A"):
+    links = {
+        "f": {"points": {"A": [0, 0], "D": [d, 0]}},
+        "AB": {"ends": ["A", "B"], "length": a},
+        "BC": {"ends": ["B", "C"], "length": b},
+        "DC": {"ends": ["D", "C"], "length": c},
+    }
+    return value(links, pins("ABCD"), [(pair, theta)], sketch or {"C": [80, 50]})
+
+
+def slider_crank(r=50, rod=120, offset=0, theta=60, drive="O"):
+    links = {
+        "f": {"points": {"O": [0, 0]}},
+        "crank": {"ends": ["O", "A"], "length": r},
+        "rod": {"ends": ["A", "B"], "length": rod},
+    }
+    slide = {"sliding": "s", "on": "f", "block": "B", "line": {"through": [0, offset]}}
+    return value(links, [*pins("OA"), slide], [(drive, theta)], {"B": [150, offset]})
+
+
+def six_bar(last=60):
+    """A dyad hung on the rocker's pin of a four-bar."""
+    links = {
+        "f": {"points": {"A": [0, 0], "D": [100, 0], "G": [200, 0]}},
+        "AB": {"ends": ["A", "B"], "length": 50},
+        "BC": {"ends": ["B", "C"], "length": 66},
+        "DC": {"ends": ["D", "C"], "length": 56},
+        "CF": {"ends": ["C", "F"], "length": 30},
+        "GF": {"ends": ["G", "F"], "length": last},
+    }
+    return value(links, pins("ABCDFG"), [("A", 60)], {"C": [80, 50], "F": [130, 50]})
+
+
+def refused(given, drives=()):
+    with pytest.raises(NoAnswer) as caught:
+        planar.solve(files.from_dict(given), drives)
+    return caught.value
+
+
+def solved(given):
+    return planar.solve(files.from_dict(given))
+
+
+BESIDE = {
+    "f": {"points": {"A": [0, 0], "D": [100, 0], "U": [0, -300], "V": [100, -300]}},
+    "AB": {"ends": ["A", "B"], "length": 30},
+    "BC": {"ends": ["B", "C"], "length": 90},
+    "DC": {"ends": ["D", "C"], "length": 70},
+    "p": {"ends": ["U", "P"], "length": 80},
+    "q": {"ends": ["V", "P"], "length": 90},
+}
+BRACED = float(np.degrees(np.arccos((80**2 + 100**2 - 90**2) / (2 * 80 * 100))))
+"""The angle of p in its triangle."""
+
+
+def beside(*inputs):
+    """A four-bar, and on the same frame a triangle that nothing can move."""
+    return value(BESIDE, pins("ABCDUVP"), inputs, {"C": [90, 70], "P": [50, -230]})
+
+
+def twins(*inputs):
+    """Two four-bars on one frame."""
+    links = {name: BESIDE[name] for name in ("f", "AB", "BC", "DC")} | {
+        "p": {"ends": ["U", "P"], "length": 30},
+        "r": {"ends": ["P", "R"], "length": 90},
+        "q": {"ends": ["V", "R"], "length": 70},
+    }
+    return value(links, pins("ABCDUVPR"), inputs, {"C": [90, 70], "R": [90, -230]})
+
+
+def wheels(ratio, *inputs):
+    """Three wheels geared in a ring, and a fourth that nothing drives."""
+    links = {"f": {"points": {"O": [0, 0], "P": [50, 0], "Q": [25, 40], "W": [100, 0]}}}
+    links |= {name: {"ends": [at, name], "length": 10} for name, at in zip("abcw", "OPQW", strict=True)}
+    gears = zip(("ab", "bc", "ca"), (-0.5, -2.0, ratio), strict=True)
+    return value(
+        links,
+        [*pins("OPQW"), *({"gear": name, "links": list(name), "ratio": each} for name, each in gears)],
+        inputs,
+    )
+
+
+PARALLELOGRAM = four_bar(50, 100, 50, 100, 180, {"C": [50, 0]})
+LIMIT = float(np.degrees(np.arccos((50**2 + 100**2 - 122**2) / (2 * 50 * 100))))
+"""Where BC and DC of the first four-bar stretch into one line."""
+
+CASES = {
+    "cannot be assembled": (four_bar(theta=150), ["A = 150 deg", "'BC' and 'DC'", "pair '", "BC.length"]),
+    "dead point": (four_bar(theta=LIMIT), [f"A = {LIMIT:.6g} deg", "'A'", "'BC' and 'DC'", "drive 'B' or 'C' or 'D'"]),
+    "change point": (PARALLELOGRAM, ["A = 180 deg", "2 freedoms for 1 input", "'BC' and 'DC'", "a further input"]),
+    "too few inputs": (twins(("A", 50)), ["1 input", "'p', 'r' and 'q'", "1 way", "'U' or 'V' or 'P' or 'R'"]),
+    "too many inputs": (beside(("A", 50), ("U", 60)), ["'A' and 'U'", "the input at 'U' cannot move", "leave it out"]),
+    "too inexact": (
+        four_bar(a=44, b=1e-11, c=56, theta=0, sketch={"C": [44, 0]}),
+        ["A = 0 deg", "link 'BC' has an arm of 1e-13", "lengthen link 'BC'"],
+    ),
+    "input jammed": (beside(("U", 60)), ["'U'", "'f' and 'p' fast", "'AB', 'BC' and 'DC'", "drive 'A' or 'B'"]),
+}
+
+
+@pytest.mark.parametrize("outcome", CASES)
+def test_the_command_ends_with_1_and_says_outcome_and_reason(outcome, tmp_path):
+    given, words = CASES[outcome]
+    problem = refused(given)
+    assert problem.outcome == outcome
+    for word in words:
+        assert word in problem.reason
+    ended = run(tmp_path, "solve", written(tmp_path, given), "--json")
+    assert ended.refused(1) == f"{outcome}: {problem.reason}"
+    assert json.loads(ended.out) == {"outcome": outcome, "reason": problem.reason}
+
+
+def test_a_dead_point_on_the_way_by_the_command(tmp_path):
+    name = written(tmp_path, four_bar())
+    ended = run(tmp_path, "solve", name, "--json", "--at", "A=140")
+    told = json.loads(ended.out)
+    assert ended.refused(1) == f"dead point: {told['reason']}"
+    assert told["outcome"] == "dead point"
+    for word in (f"beyond A = {LIMIT:.6g} deg", "links 'BC' and 'DC'", "drive 'B' or 'C' or 'D'"):
+        assert word in told["reason"]
+    assert refused(four_bar(), {"A": 140 * DEG}).reason == told["reason"]
+
+
+def test_a_slide_that_goes_out_without_an_end_is_lost_there():
+    """A pin on the line x = 1 m in the slot of a lever about the origin stands at y = tan(angle)."""
+    value = {
+        "planar": 1,
+        "frame": "frame",
+        "units": {"angle": "deg"},
+        "links": {
+            "frame": {"points": {"O": [0, 0]}},
+            "lever": {"points": {"O": [0, 0]}},
+            "rod": {"points": {"P": [0, 0]}},
+        },
+        "pairs": [
+            {"turning": "O"},
+            {"sliding": "rail", "links": ["frame", "rod"], "line": {"through": [1, 0], "angle": 90}, "point": "P"},
+            {"sliding": "slot", "on": "lever", "block": "P", "line": {"through": "O"}},
+        ],
+        "inputs": [{"pair": "O", "position": 20, "velocity": "1 rad/s"}],
+    }
+    problem = refused(value, {"O": 100.0 * DEG})
+    assert problem.outcome is Outcome.BRANCH_LOST
+    for word in ("beyond O = 90 deg", "without an end", "drive 'rail'"):
+        assert word in problem.reason
+
+
+def test_every_outcome_is_provoked_here():
+    assert {*CASES, "solved", "branch lost"} == {str(outcome) for outcome in Outcome}
+
+
+# cannot be assembled: the gap, and the dimension offered
+
+
+OFFER = re.compile(r"it would go together with (\S+) = (\S+) mm instead of (\S+) mm")
+
+
+def with_length(given, name, length):
+    changed = copy.deepcopy(given)
+    link, what = name.split(".", 1)
+    if what == "length":
+        changed["links"][link]["length"] = length
+    else:
+        point, axis = what.split(".")
+        changed["links"][link]["points"][point]["xy".index(axis)] = length
+    return changed
+
+
+def diagonal(a, d, theta):
+    return float(np.hypot(d - a * np.cos(theta * DEG), a * np.sin(theta * DEG)))
+
+
+STATIONS = [(a, d, theta) for a, d in ((50, 100), (70, 100), (50, 130)) for theta in (120, 150, 180, -140)]
+
+
+@pytest.mark.parametrize(("a", "d", "theta"), part([each for each in STATIONS if diagonal(*each) > 123], 3))
+def test_bars_that_are_too_short_are_told_the_gap_and_the_length_that_just_reaches(a, d, theta):
+    given = four_bar(a, 66, 56, d, theta)
+    problem = refused(given)
+    assert problem.outcome is Outcome.CANNOT_BE_ASSEMBLED
+    far = diagonal(a, d, theta)
+    assert f"stays open by {far - 122:.6g} mm" in problem.reason
+    name, new, old = OFFER.search(problem.reason).groups()
+    longer = {"BC.length": (66, far - 56), "DC.length": (56, far - 66)}
+    if name in longer:
+        was, just = longer[name]
+        assert float(old) == was
+        # printed with five digits, beyond the value that just reaches
+        assert just <= float(new) <= just * (1 + 2e-4)
+    check_offer(given, problem.reason)
+
+
+@pytest.mark.parametrize(("b", "c"), [(200, 56), (66, 230)])
+def test_a_bar_that_is_too_long_is_told_how_short_it_would_have_to_be(b, c):
+    given = four_bar(50, b, c, 100, 60)
+    problem = refused(given)
+    far = diagonal(50, 100, 60)
+    assert f"stays open by {abs(b - c) - far:.6g} mm" in problem.reason
+    check_offer(given, problem.reason)
+
+
+def check_offer(given, reason, other=None):
+    """What is offered goes together as printed, and a change that is less by a thousandth does not."""
+    name, new, old = OFFER.search(reason).groups()
+    new, old = float(new), float(old)
+    try:
+        solved(with_length(given, name, new))
+    except NoAnswer as problem:
+        # stretched to its limit it stands on a dead point, or flat on a change point, but it stands
+        assert problem.outcome in (Outcome.DEAD_POINT, Outcome.CHANGE_POINT)
+    less = with_length(given, name, new - 1e-3 * (new - old))
+    if other is not None:
+        # a chain may go together with less from another assembly of what comes before
+        assert np.hypot(*(solved(less).point("C").position - other)) > 0.01
+    else:
+        assert refused(less).outcome is Outcome.CANNOT_BE_ASSEMBLED
+
+
+@pytest.mark.parametrize("offset", [100, -90])
+def test_a_rod_that_does_not_reach_its_line_is_told_so(offset):
+    given = slider_crank(50, 60, offset, -60 if offset > 0 else 60)
+    problem = refused(given)
+    assert problem.outcome is Outcome.CANNOT_BE_ASSEMBLED
+    gap = abs(offset) + 50 * np.sin(60 * DEG) - 60
+    assert f"{gap:.6g} mm" in problem.reason
+    assert "'rod'" in problem.reason
+    check_offer(given, problem.reason)
+
+
+@pytest.mark.parametrize("last", [15, 300])
+def test_a_six_bar_whose_second_dyad_does_not_reach(last):
+    given = six_bar(last)
+    reason = refused(given).reason
+    at = planar.solve(files.from_dict(four_bar())).point("C").position * 1e3
+    far = float(np.hypot(*(at - [200, 0])))
+    gap = far - (30 + last) if last < 100 else last - 30 - far
+    assert f"by {gap:.6g} mm" in reason
+    assert "'CF' and 'GF'" in reason
+    name, new, _ = OFFER.search(reason).groups()
+    if last == 300:
+        assert name == "CF.length"
+        assert float(new) == pytest.approx(300 - far, rel=1e-4)
+    check_offer(given, reason, at / 1e3 if last == 300 else None)
+
+
+def test_where_no_single_length_helps_none_is_offered():
+    """A truss with two bars too many, of lengths that no one change reconciles."""
+    links = {"f": {"points": {"A": [0, 0], "B": [100, 0], "D": [200, 0], "E": [300, 0]}}}
+    links |= {f"b{at}": {"ends": [at, "C"], "length": far} for at, far in zip("ABDE", (100, 90, 50, 400), strict=True)}
+    problem = refused(value(links, pins("ABCDE"), [], {"C": [60, 80]}))
+    assert problem.outcome is Outcome.CANNOT_BE_ASSEMBLED
+    assert "it would go together" not in problem.reason
+    assert "change the input or a dimension of" in problem.reason
+
+
+def test_a_remedy_is_looked_for_as_long_as_an_assembly_and_no_longer(monkeypatch):
+    """Groups solved are counted: those of the search, and as many again at most."""
+    given = six_bar(15)
+    solved = []
+    real = Candidates.of
+    monkeypatch.setattr(Candidates, "of", lambda *each, **more: solved.append(1) or real(*each, **more))
+    assert isinstance(search(Candidates(Setup(files.from_dict(given)))), Failure)
+    searched = len(solved)
+    for least, words in ((0, "looked for only as long as for an assembly"), (remedy.LEAST_EFFORT, "would go together")):
+        monkeypatch.setattr(remedy, "LEAST_EFFORT", least)
+        solved.clear()
+        assert words in refused(given | {"name": f"least {least}"}).reason
+        assert len(solved) <= searched + max(least, searched)
+
+
+# dead points and change points
+
+
+@pytest.mark.parametrize(("theta", "x"), [(0, 170), (180, 70)])
+def test_a_piston_cannot_move_its_crank_out_of_the_dead_centres(theta, x):
+    problem = refused(slider_crank(theta=x, drive="s"))
+    assert problem.outcome is Outcome.DEAD_POINT
+    assert f"s = {x} mm" in problem.reason
+    assert "'s'" in problem.reason
+    assert "'crank'" in problem.reason
+    drive = re.search(r"drive '(\w+)'", problem.reason).group(1)
+    assert drive in "OAB"
+    state = solved(slider_crank(theta=theta))
+    assert state.point("B").position[0] == pytest.approx(x / 1e3)
+    assert state.point("B").velocity[0] == pytest.approx(0.0, abs=1e-15)
+
+
+def test_after_driving_what_is_advised_the_dead_point_is_no_more():
+    problem = refused(four_bar(theta=LIMIT))
+    offered = re.findall(r"'(\w)'", problem.reason.split("drive ")[1])
+    assert offered == ["B", "C", "D"]
+    # stretched: C on the way from D to B, 56 from D
+    b = 50 * np.exp(1j * LIMIT * DEG)
+    angle = float(np.degrees(np.angle(b - 100)))
+    c = 100 + 56 * np.exp(1j * angle * DEG)
+    given = four_bar(theta=angle, pair="D", sketch={"C": [c.real, c.imag], "B": [b.real, b.imag]})
+    state = solved(given)
+    assert state.link("AB").angle == pytest.approx(LIMIT * DEG, abs=1e-7)
+    assert state.link("AB").angular_velocity == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("theta", [0, 180])
+def test_a_further_input_leads_over_a_change_point(theta):
+    given = four_bar(50, 100, 50, 100, theta, {"C": [100 + 50 * np.cos(theta * DEG), 0]})
+    assert refused(given).outcome is Outcome.CHANGE_POINT
+    given["inputs"].append({"pair": "D", "position": theta, "velocity": "1 rad/s"})
+    state = solved(given)
+    assert state.link("BC").angular_velocity == pytest.approx(0.0, abs=1e-12)
+
+
+# too few, too many
+
+
+@pytest.mark.parametrize(
+    ("inputs", "ways", "free"),
+    [
+        ([], "2 ways", ["AB", "BC", "DC", "p", "r", "q"]),
+        ([("A", 50)], "1 way", ["p", "r", "q"]),
+        ([("U", 50)], "1 way", ["AB", "BC", "DC"]),
+    ],
+)
+def test_too_few_inputs_name_what_stays_free_and_a_pair_that_helps(inputs, ways, free):
+    problem = refused(twins(*inputs))
+    assert problem.outcome is Outcome.TOO_FEW_INPUTS
+    assert f"can still move in {ways}" in problem.reason
+    told, advice = problem.reason.split("; give an input at ")
+    assert set(re.findall(r"'(\w+)'", told)) == set(free)
+    offered = re.findall(r"'(\w)'", advice)
+    if inputs:
+        position = {"U": 50, "V": 100, "P": 10, "A": 50, "B": 10, "D": 100}
+        assert solved(twins(*inputs, (offered[0], position[offered[0]]))).mobility == 2
+
+
+def test_of_three_inputs_two_conflict_and_are_named():
+    problem = refused(twins(("A", 50), ("D", 100), ("U", 50)))
+    assert problem.outcome is Outcome.TOO_MANY_INPUTS
+    assert "those at 'A' and 'D' move one another; leave one of them out" in problem.reason
+    for kept in ("A", "D"):
+        assert solved(twins((kept, 50 if kept == "A" else 100), ("U", 50))).mobility == 2
+
+
+def test_two_conflicts_are_both_named():
+    problem = refused(twins(("A", 50), ("D", 100), ("U", 50), ("V", 100)))
+    assert problem.outcome is Outcome.TOO_MANY_INPUTS
+    assert "those at 'A' and 'D' move one another" in problem.reason
+    assert "those at 'U' and 'V' move one another" in problem.reason
+    assert "leave one of each out" in problem.reason
+
+
+def test_inputs_whose_positions_agree_but_not_their_velocities():
+    angle = float(np.degrees(solved(twins(("A", 50), ("U", 50))).link("DC").angle))
+    problem = refused(twins(("A", 50), ("D", angle), ("U", 50)))
+    assert problem.outcome is Outcome.TOO_MANY_INPUTS
+    assert "the velocities" in problem.reason
+    assert "'A' and 'D' move one another" in problem.reason
+    assert "mobility is 2" in problem.reason
+
+
+def test_surplus_inputs_that_agree_are_no_error():
+    alone = solved(twins(("A", 50), ("U", 50)))
+    link = alone.link("DC")
+    given = twins(("A", 50), ("U", 50))
+    second = {
+        "position": link.angle,
+        "velocity": link.angular_velocity,
+        "acceleration": link.angular_acceleration,
+    }
+    units = {"position": "rad", "velocity": "rad/s", "acceleration": "rad/s^2"}
+    given["inputs"].append({"pair": "D"} | {what: f"{number!r} {units[what]}" for what, number in second.items()})
+    both = solved(given)
+    assert both.mobility == 2
+    for name, each in alone.links.items():
+        assert both.link(name).angular_velocity == pytest.approx(each.angular_velocity, abs=1e-12)
+
+
+def test_an_input_that_cannot_move_is_accepted_at_rest_in_its_place():
+    given = beside(("A", 50), ("U", BRACED))
+    assert refused(given).outcome is Outcome.TOO_MANY_INPUTS
+    assert "'U' cannot move" in refused(given).reason
+    del given["inputs"][1]["velocity"]
+    assert solved(given).mobility == 1
+
+
+# input jammed
+
+
+@pytest.mark.parametrize(
+    ("given", "fast", "free"),
+    [
+        (beside(("U", 60)), {"f", "p"}, {"AB", "BC", "DC"}),
+        (beside(("U", BRACED)), {"f", "p"}, {"AB", "BC", "DC"}),
+        (beside(("P", 20)), {"p", "q"}, {"AB", "BC", "DC"}),
+        (wheels(-1.0, ("O", 0)), {"f", "a"}, {"w"}),
+        (wheels(-1.0, ("P", 30)), {"f", "b"}, {"w"}),
+    ],
+    ids=["a braced triangle", "in its place", "between its bars", "a ring of gears", "its second wheel"],
+)
+def test_an_input_at_what_is_held_fast_is_told_what_to_drive_instead(given, fast, free):
+    mechanism = files.from_dict(given)
+    assert planar.mobility(mechanism).gruebler == len(mechanism.inputs) == 1
+    problem = refused(given)
+    assert problem.outcome is Outcome.INPUT_JAMMED
+    (pair,) = (each["pair"] for each in given["inputs"])
+    parts = re.fullmatch(
+        r"the input at '(\w)' cannot move: the pairs hold links (.*) fast, while links? (.*) (?:is|are) free; "
+        r"drive (.*) instead",
+        problem.reason,
+    )
+    assert parts.group(1) == pair
+    assert [set(re.findall(r"'(\w+)'", parts.group(k))) for k in (2, 3)] == [fast, free]
+    offered = re.findall(r"'(\w)'", parts.group(4))
+    assert offered
+    for other in offered:
+        followed = copy.deepcopy(given)
+        position = {"A": 50, "B": -20, "C": 60, "D": 100, "W": 5}[other]
+        followed["inputs"] = [{"pair": other, "position": position, "velocity": "1 rad/s"}]
+        state = solved(followed)
+        assert state.mobility == 1
+        assert state.pair(other)["relative_angular_velocity"] == pytest.approx(1.0, abs=1e-12)
+
+
+def test_a_ring_of_gears_that_closes_is_not_jammed():
+    assert solved(wheels(1.0, ("O", 20), ("W", 5))).link("b").angular_velocity == pytest.approx(-0.5)
+
+
+# pairs that were forgotten
+
+
+@pytest.mark.parametrize("point", "BD")
+def test_a_pin_that_was_forgotten_is_named_with_the_links_that_it_would_join_and_mends_it(point):
+    whole = four_bar()
+    part = whole | {"pairs": [pair for pair in whole["pairs"] if pair["turning"] != point]}
+    with pytest.raises(NoAnswer) as refused:
+        planar.solve(planar.from_dict(part))
+    links = " and ".join(repr(name) for name, link in whole["links"].items() if point in str(link))
+    assert f"no pair joins links {links} at {point!r}" in refused.value.reason
+    advice = json.loads(re.search(r"add ({.*?}) to the pairs", refused.value.reason)[1])
+    assert planar.solve(planar.from_dict(part | {"pairs": [*part["pairs"], advice]})).mobility == 1
+
+
+@pytest.mark.parametrize(("point", "place"), [("A", "$.inputs[0].pair"), ("C", "$.sketch.C")])
+def test_a_pin_that_was_forgotten_is_named_where_the_file_counts_on_it(point, place):
+    whole = four_bar()
+    with pytest.raises(planar.BadInput) as refused:
+        planar.from_dict(whole | {"pairs": [pair for pair in whole["pairs"] if pair["turning"] != point]})
+    assert refused.value.place == place
+    assert f'add {{"turning": "{point}"}} to the pairs' in refused.value.sentence
+
+
+def test_a_guide_that_was_forgotten_leaves_a_link_that_hangs_by_one_pair():
+    whole = slider_crank()
+    with pytest.raises(NoAnswer) as refused:
+        planar.solve(planar.from_dict(whole | {"pairs": whole["pairs"][:2], "sketch": {}}))
+    assert "link 'rod' hangs at 'A' alone: add the pair that joins it to the rest" in refused.value.reason
+
+
+def test_names_that_stand_twice_by_chance_are_no_forgotten_pins():
+    whole = four_bar()
+    for name in ("AB", "BC", "DC"):
+        whole["links"][name]["points"] = {"G": [10, 0]}
+    whole["pairs"] = [pair for pair in whole["pairs"] if pair["turning"] != "D"]
+    with pytest.raises(NoAnswer) as refused:
+        planar.solve(planar.from_dict(whole))
+    assert "'G'" not in refused.value.reason
+
+
+# very many names
+
+
+def test_of_very_many_links_a_sentence_names_a_few_and_counts_the_rest_and_a_program_gets_all(tmp_path):
+    """An arm of 400 links: 399 of them are free."""
+    many = 400
+    links = {"f": {"points": {"P0": [0, 0]}}}
+    links |= {f"link number {k}": {"ends": [f"P{k}", f"P{k + 1}"], "length": 1} for k in range(many)}
+    arm = value(links, pins([f"P{k}" for k in range(many)]), [("P0", 10)])
+    with pytest.raises(NoAnswer) as refused:
+        planar.solve(planar.from_dict(arm))
+    assert len(str(refused.value)) < 1400
+    assert "and 387 more can still move" in refused.value.reason
+    assert refused.value.more["links"] == [f"link number {k}" for k in range(1, many)]
+    told = json.loads(run(tmp_path, "solve", written(tmp_path, arm), "--json").out)
+    assert len(told["links"]) == many - 1
+
+
+def test_whatever_the_reason_is_made_of_it_is_bounded_and_one_line():
+    for text in ("x" * 10**6, "a\nb\x1b[31m" * 10**4):
+        problem = NoAnswer(Outcome.DEAD_POINT, text)
+        assert len(problem.reason) < 3000
+        assert str(problem).isprintable()
+
+
+# what is not there
+
+
+@pytest.mark.parametrize(
+    ("key", "wrong", "offers"),
+    [
+        ("pairs", [{"turning": "A", "links": ["f", "4"]}], "links are f, AB, BC and DC"),
+        ("pairs", [{"turning": "A", "links": ["f", "AB"], "points": ["Z", "A"]}], "its points are A and D"),
+        ("frame", "4", "links are f, AB, BC and DC"),
+        ("inputs", [{"pair": "Q4", "position": 1}], "pairs are A, B, C and D"),
+        ("sketch", {"Q4": [1, 2]}, "points are A, D, B and C"),
+    ],
+)
+def test_what_is_not_there_is_answered_with_what_there_is(key, wrong, offers):
+    with pytest.raises(planar.BadInput) as refused:
+        planar.from_dict(four_bar() | {key: wrong})
+    assert offers in refused.value.sentence
+
+
+def test_of_very_many_names_that_there_are_a_few_are_listed():
+    links = {f"l{k}": {"points": {"P": [0, 0]}} for k in range(50)}
+    with pytest.raises(planar.BadInput) as refused:
+        planar.from_dict({"planar": 1, "frame": "Q", "links": links, "pairs": []})
+    assert refused.value.sentence.endswith("l10, l11 and 38 more")
+
+
+def test_what_would_mend_it_is_looked_for_once_and_only_where_somebody_asks(monkeypatch):
+    looked, search_for_one = [], remedy.remedy
+    monkeypatch.setattr(remedy, "remedy", lambda *given: looked.append(given) or search_for_one(*given))
+    apart = files.from_dict(four_bar(theta=150) | {"name": "looked for once"})  # solved by no other test
+    assert not planar.modes(apart, certify=False)
+    assert len(planar.circuits(apart)) == 1
+    assert not looked
+    with pytest.raises(NoAnswer) as told:
+        planar.solve(apart)
+    with pytest.raises(NoAnswer) as again:
+        planar.solve(apart)
+    assert "it would go together with" in told.value.reason == again.value.reason
+    assert len(looked) == 1
