@@ -9,11 +9,11 @@ import numpy as np
 import planar
 from benchmarks.entry import Array, Entry
 from benchmarks.swept import Swept
-from planar.model.dimensions import changed, dimensions
+from planar.model.dimensions import change_dimension, dimensions
 from planar.model.mechanism import Mechanism
 from planar.results.motion import Motion
-from planar.solving.continuation.path import run
-from planar.solving.position import Solver
+from planar.solving.continuation.path import follow_samples
+from planar.solving.position import PositionSolver
 
 BACKENDS = {"native": 10**9, "casadi": 200}
 """The backends of `planar.sweep`, and to how many designs each is put."""
@@ -54,22 +54,22 @@ def backends(mechanism: Mechanism, swept: Swept) -> list[str]:
 def turns(swept: Swept, steps: int) -> list[Entry]:
     """The file's own design over a turn: a run through the gate, and `planar.cycle`, which has rates and limits too."""
     mechanism = planar.from_dict(swept.document())
-    solver = Solver(mechanism)
-    z, p = solver.assembly().z, solver.station.p
+    solver = PositionSolver(mechanism)
+    z, p = solver.find_assembly().z, solver.inputs.p
     start = mechanism.inputs[0].position
     u = (start + 2.0 * np.pi * np.linspace(0.0, 1.0, steps + 1))[:, None]
     link = next(each.name for each in mechanism.links if swept.point in each.names and each.name != mechanism.frame)
     columns = [solver.column[link, part] for part in ("x", "y", "angle")]
-    at = solver.shapes[link].at(swept.point)
+    at = solver.shapes[link].position(swept.point)
 
     def read(found: Array) -> Array:
-        x, y, angle = solver.program.positions(found.T, u.T, p).full()[columns]
+        x, y, angle = solver.functions.coordinate_function(found.T, u.T, p).full()[columns]
         c, s = np.cos(angle), np.sin(angle)
         return np.stack([x * solver.unit + c * at.x - s * at.y, y * solver.unit + s * at.x + c * at.y])[..., None]
 
     one, all_steps = np.arange(1), np.arange(steps + 1)
     return [
-        Entry("planar, a run through the gate", False, one, all_steps, lambda: run(solver, p, z, u).z, read),
+        Entry("planar, a run through the gate", False, one, all_steps, lambda: follow_samples(solver, p, z, u).z, read),
         *(_prepared(mechanism, swept, steps, rates) for rates in (False, True)),
         Entry(
             "planar.cycle, from the sketch",
@@ -117,7 +117,7 @@ def _cycled(mechanism: Mechanism, swept: Swept, d: Array, steps: int) -> Entry:
         each = mechanism
         for dimension, value in zip(swept.dimensions, values, strict=True):
             held = next(one for one in _all(each) if one.name == dimension.name)
-            each = changed(each, held, float(value))
+            each = change_dimension(each, held, float(value))
         remade.append(each)
     return Entry(
         "planar.cycle, design by design",

@@ -69,20 +69,20 @@ def _process(structure: str, folder: str) -> dict[str, float]:
 def spent(structure: str) -> dict[str, float]:
     """Seconds of each step in this process, which has the structure's equations."""
     import planar
-    from planar.batch.march.llvm_designs import KINDS, NAME
-    from planar.batch.march.llvm_runner import layout
+    from planar.batch.march.llvm_designs import ARGUMENT_TYPES, FUNCTION_NAME
+    from planar.batch.march.llvm_runner import designs_kernel
     from planar.codegen import llvm_compile
-    from planar.equations.functions import program
-    from planar.equations.functions import structure as of
+    from planar.equations.functions import equation_functions
+    from planar.equations.functions import equation_structure as of
     from planar.model.mechanism import named_points
 
     document, point = STRUCTURES[structure]()
     mechanism = planar.from_dict(document)
     links = next(tuple(link for link, _ in each.members) for each in named_points(mechanism) if each.name == point)[:1]
-    known = program(mechanism)
+    known = equation_functions(mechanism)
     llvm_compile._processor()
     told: dict[str, float] = {}
-    making = llvm_compile._made
+    making = llvm_compile._compile_object
 
     def made(text: str) -> bytes:
         start = perf_counter()
@@ -90,12 +90,12 @@ def spent(structure: str) -> dict[str, float]:
         told["compiling"] = perf_counter() - start
         return found
 
-    llvm_compile._made = made
+    llvm_compile._compile_object = made
     start = perf_counter()
-    text = layout(known, of(mechanism), links, True).text
+    text = designs_kernel(known, of(mechanism), links, True).ir
     told["printing"] = perf_counter() - start
     start = perf_counter()
-    llvm_compile.compiled(text, NAME, *KINDS)
+    llvm_compile.compile_function(text, FUNCTION_NAME, *ARGUMENT_TYPES)
     told["reading"] = perf_counter() - start - told.get("compiling", 0.0)
     return told
 

@@ -13,10 +13,10 @@ from benchmarks import chain
 from benchmarks.comparison import error
 from benchmarks.timing import best
 from benchmarks.ways.trial import CRANK
-from planar.equations.constraint_equations import build
-from planar.equations.functions import Program, structure
-from planar.solving.continuation.path import run
-from planar.solving.position import Solver
+from planar.equations.constraint_equations import build_equations
+from planar.equations.functions import EquationFunctions, equation_structure
+from planar.solving.continuation.path import follow_samples
+from planar.solving.position import PositionSolver
 
 Array = np.ndarray
 
@@ -66,13 +66,13 @@ def grow_far(links: int, whole: bool) -> Far:
 
     mechanism = planar.from_dict(chain.document(links))
     done()
-    equations = build(structure(mechanism))
+    equations = build_equations(equation_structure(mechanism))
     done()
     if whole:
-        _ = Program(equations).advance
+        _ = EquationFunctions(equations).newton_function
         done()
-        solver = Solver(mechanism)
-        z = solver.assembly().z
+        solver = PositionSolver(mechanism)
+        z = solver.find_assembly().z
         done()
         solver.state(z)
         done()
@@ -83,23 +83,23 @@ def grow_far(links: int, whole: bool) -> Far:
 def grow(links: int) -> Growth:
     """Time a row of four-bars."""
     mechanism = planar.from_dict(chain.document(links))
-    solver = Solver(mechanism)
-    z, u, p = solver.assembly().z, CRANK[:, None], solver.station.p
+    solver = PositionSolver(mechanism)
+    z, u, p = solver.find_assembly().z, CRANK[:, None], solver.inputs.p
     steps = len(u) - 1
-    equations = build(structure(mechanism))
+    equations = build_equations(equation_structure(mechanism))
     times = best(
         {
-            "equations": lambda: build(structure(mechanism)),
-            "program": lambda: Program(equations).advance,
-            "assembly": solver.assembly,
+            "equations": lambda: build_equations(equation_structure(mechanism)),
+            "program": lambda: EquationFunctions(equations).newton_function,
+            "assembly": solver.find_assembly,
             "position": lambda: solver.state(z),
-            "run": lambda: run(solver, p, z, u),
+            "run": lambda: follow_samples(solver, p, z, u),
         }
     )
     exact = np.array(chain.motion(np, links, CRANK.astype(np.longdouble)))[..., None]
     rocker = chain.last_rocker(links)
     column = solver.column[rocker, "angle"]
-    found = solver.program.positions(run(solver, p, z, u).z.T, u.T, p).full()[column]
+    found = solver.functions.coordinate_function(follow_samples(solver, p, z, u).z.T, u.T, p).full()[column]
     state = solver.state(z).link(rocker)
     rates = np.array([state.angle, state.angular_velocity, state.angular_acceleration])
     return Growth(

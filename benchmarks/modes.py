@@ -18,7 +18,7 @@ from rich.progress import Progress
 from rich.table import Table
 
 from benchmarks.timing import best
-from planar.assemblies.block_roots import roots
+from planar.assemblies.block_roots import block_roots
 from planar.assemblies.polynomial.completeness import Completeness
 from tests.inversions import group, listed, missed, structures
 
@@ -48,7 +48,7 @@ def judged(seed: int) -> Judged:
     joints = structures(links, count)[int(rng.integers(count))]
     built = group(joints, rng)
     setup = built.setup
-    found = roots(setup, setup.equations.stages[0], np.zeros(len(built.z)))
+    found = block_roots(setup, setup.equations.blocks[0], np.zeros(len(built.z)))
     failed = "" if listed(setup, found, built.z) else "as built is not listed"
     if not failed and missed(setup, found, rng, STARTS):
         failed = "a start found one more"
@@ -70,12 +70,12 @@ def times() -> Table:
         for joints in structures(links, count)[:3]:
             built = group(joints, np.random.default_rng(1))
             setup, z = built.setup, np.zeros(len(built.z))
-            stage = setup.equations.stages[0]
+            stage = setup.equations.blocks[0]
             start = perf_counter()
-            found = roots(setup, stage, z)
+            found = block_roots(setup, stage, z)
             first = perf_counter() - start
             took = best(
-                {certify: lambda c=certify, s=setup, g=stage, z=z: roots(s, g, z, c) for certify in (False, True)}
+                {certify: lambda c=certify, s=setup, g=stage, z=z: block_roots(s, g, z, c) for certify in (False, True)}
             )
             row = (f"{1e3 * each:.1f} ms" for each in (first, took[False], took[True]))
             table.add_row(name, str(found.expected), *row, found.complete.value)

@@ -56,20 +56,24 @@ def _as_built(state: State, built: Built) -> dict[str, np.ndarray]:
     for link in state.mechanism.links:
         for point in link.names:
             frame = built.frames[link.name]
-            found[f"{link.name}.{point}"] = np.array(frame.carry(state.shapes[link.name].at(point)), dtype=float)
+            found[f"{link.name}.{point}"] = np.array(
+                frame.to_world(state.shapes[link.name].position(point)), dtype=float
+            )
     names = state.point_names
     return found | {name: found[_member(state, name)] for name in names}
 
 
 def _member(state: State, name: str) -> str:
-    link, point = state._named(name).members[0]
+    link, point = state._find_point(name).members[0]
     return f"{link}.{point}"
 
 
 def _is_closed(state: State) -> bool:
     """Whether every pin is where both its links have it, by their frames alone; nothing of the solver is asked."""
     for pair in state.mechanism.pairs:
-        places = [state.frames[link].carry(state.shapes[link].at(point)) for link, point in pair.coincident()]
+        places = [
+            state.frames[link].to_world(state.shapes[link].position(point)) for link, point in pair.coincident_points()
+        ]
         for first, second in pairwise(places):
             gap = first - second
             if abs(_value(gap.x)) + abs(_value(gap.y)) > 1e-12 * 10:

@@ -248,7 +248,7 @@ __all__ = [
 
 def _present(result: Any) -> str | None:
     """The page of a result, for notebooks; loaded only where something is shown."""
-    return import_module("planar.pages.view").framed(result)
+    return import_module("planar.pages.view").notebook_html(result)
 
 
 Displayable.presenter = _present

@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from planar.document.files import save as write
-from planar.drawing.output.matplotlib_figure import figure, on_sheets, saved
-from planar.drawing.paper.scales import scales
+from planar.document.files import save_file as write
+from planar.drawing.output.matplotlib_figure import draw_on_sheets, draw_pictures, encode_figure
+from planar.drawing.paper.scales import parse_scales
 
 # what only some drawings need is imported where they are made: that takes longer than to draw
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from planar.assemblies.circuits.circuits import Circuits
     from planar.assemblies.modes import Modes
-    from planar.drawing.polygons.panels import Scales
+    from planar.drawing.polygons.panels import ScaleTexts
     from planar.dynamics.forces import Forces
     from planar.model.mechanism import Mechanism
     from planar.results.motion import Motion, State
@@ -42,32 +42,32 @@ __all__ = [
 ]
 
 
-def scheme(state: State, scale: Scales = None) -> Figure:
+def scheme(state: State, scale: ScaleTexts = None) -> Figure:
     """The kinematic scheme of a position: links numbered, points lettered, crowded parts once more and larger.
 
     Raises BadInput for a scale that is none.
     """
     from planar.drawing.scheme.details import scheme_with_details
 
-    return figure(scheme_with_details(state, scales(scale, ["length"]).get("length")))
+    return draw_pictures(scheme_with_details(state, parse_scales(scale, ["length"]).get("length")))
 
 
-def velocity(state: State, scale: Scales = None) -> Figure:
+def velocity(state: State, scale: ScaleTexts = None) -> Figure:
     """The space diagram and the velocity polygon of a position, each to its scale."""
-    from planar.drawing.polygons.panels import panels
+    from planar.drawing.polygons.panels import polygon_panels
 
-    return figure(panels(state, scale, 2), state.mechanism.name)
+    return draw_pictures(polygon_panels(state, scale, 2), state.mechanism.name)
 
 
-def acceleration(state: State, scale: Scales = None) -> Figure:
+def acceleration(state: State, scale: ScaleTexts = None) -> Figure:
     """The space diagram, the velocity polygon and the acceleration polygon of a position, each to its scale."""
-    from planar.drawing.polygons.panels import panels
+    from planar.drawing.polygons.panels import polygon_panels
 
-    return figure(panels(state, scale, 3), state.mechanism.name)
+    return draw_pictures(polygon_panels(state, scale, 3), state.mechanism.name)
 
 
 def centres(
-    state: State, scale: Scales = None, links: str | Sequence[str] | None = None, reach: float | None = None
+    state: State, scale: ScaleTexts = None, links: str | Sequence[str] | None = None, reach: float | None = None
 ) -> Figure:
     """The scheme of a position with its instantaneous centres, and beside it the circle diagram.
 
@@ -77,36 +77,38 @@ def centres(
     there is not, a scale that is none, and a reach below 1.
     """
     from planar.analysis.centres.centres import centres as all_centres
-    from planar.drawing.centres.centres import REACH, centres_picture, chosen
+    from planar.drawing.centres.centres import DEFAULT_REACH, centres_picture, choose_centres
     from planar.drawing.centres.circle_diagram import circle_picture
 
     found = all_centres(state)
-    shown = chosen(found, links)
+    shown = choose_centres(found, links)
     pictures = [
-        centres_picture(found, shown, scales(scale, ["length"]).get("length"), REACH if reach is None else reach),
+        centres_picture(
+            found, shown, parse_scales(scale, ["length"]).get("length"), DEFAULT_REACH if reach is None else reach
+        ),
         circle_picture(found, shown),
     ]
-    return figure(pictures, state.mechanism.name)
+    return draw_pictures(pictures, state.mechanism.name)
 
 
 def positions(
-    motion: Motion | Mechanism, count: int = 12, points: Sequence[str] | None = None, scale: Scales = None
+    motion: Motion | Mechanism, count: int = 12, points: Sequence[str] | None = None, scale: ScaleTexts = None
 ) -> Figure:
     """The mechanism in `count` + 1 positions, its joints lettered A0, A1, ...; TDC and BDC where a slider has them."""
     from planar.drawing.diagrams.positions import positions as picture
 
-    return figure([picture(motion, count, points, scales(scale, ["length"]).get("length"))])
+    return draw_pictures([picture(motion, count, points, parse_scales(scale, ["length"]).get("length"))])
 
 
-def loci(motion: Motion | Mechanism, points: Sequence[str] | None = None, scale: Scales = None) -> Figure:
+def loci(motion: Motion | Mechanism, points: Sequence[str] | None = None, scale: ScaleTexts = None) -> Figure:
     """The paths of points (left out: of those that no link on the frame carries)."""
     from planar.drawing.diagrams.positions import loci as picture
 
-    return figure([picture(motion, points, scales(scale, ["length"]).get("length"))])
+    return draw_pictures([picture(motion, points, parse_scales(scale, ["length"]).get("length"))])
 
 
 def centrodes(
-    motion: Motion | Mechanism, link: str | None = None, other: str | None = None, scale: Scales = None
+    motion: Motion | Mechanism, link: str | None = None, other: str | None = None, scale: ScaleTexts = None
 ) -> Figure:
     """The fixed and the moving centrode of a link against another (left out: the frame), touching in their pole.
 
@@ -114,20 +116,20 @@ def centrodes(
     """
     from planar.drawing.centres.centrodes import centrodes_picture
 
-    return figure([centrodes_picture(motion, link, other, scales(scale, ["length"]).get("length"))])
+    return draw_pictures([centrodes_picture(motion, link, other, parse_scales(scale, ["length"]).get("length"))])
 
 
-def modes(assemblies: Modes | Mechanism, scale: Scales = None) -> list[Figure]:
+def modes(assemblies: Modes | Mechanism, scale: ScaleTexts = None) -> list[Figure]:
     """Every assembly drawn small, numbered, to one scale, the sketch's own marked: sheets of 20, 96 at the most.
 
     Raises BadInput for a scale that is none, and NoAnswer where there is no assembly.
     """
     from planar.assemblies.modes import Modes
     from planar.assemblies.modes import modes as all_modes
-    from planar.drawing.scheme.assemblies import sheets_of
+    from planar.drawing.scheme.assemblies import assembly_sheets
 
     found = assemblies if isinstance(assemblies, Modes) else all_modes(assemblies)
-    return [figure(*sheet) for sheet in sheets_of(found, scales(scale, ["length"]).get("length"))]
+    return [draw_pictures(*sheet) for sheet in assembly_sheets(found, parse_scales(scale, ["length"]).get("length"))]
 
 
 def circuits(found: Circuits | Mechanism, of: str | None = None, assemblies: Modes | None = None) -> list[Figure]:
@@ -137,18 +139,18 @@ def circuits(found: Circuits | Mechanism, of: str | None = None, assemblies: Mod
     `assemblies` are marked, left out those at the mechanism's inputs. Raises BadInput for an output that is not there,
     and NoAnswer where no circuit was found.
     """
-    from planar.assemblies.circuits.circuit_of_assembly import located
+    from planar.assemblies.circuits.circuit_of_assembly import locate_assemblies
     from planar.assemblies.circuits.circuits import Circuits
     from planar.assemblies.circuits.circuits import circuits as all_circuits
     from planar.assemblies.modes import modes as all_modes
-    from planar.drawing.circuits.diagram import circuits_figures
+    from planar.drawing.circuits.diagram import circuit_figures
 
     of_all = found if isinstance(found, Circuits) else all_circuits(found)
     here = all_modes(of_all.mechanism, certify=False) if assemblies is None else assemblies
-    return circuits_figures(of_all, located(of_all, here), of)
+    return circuit_figures(of_all, locate_assemblies(of_all, here), of)
 
 
-def forces(found: Forces | State, scale: Scales = None) -> list[Figure]:
+def forces(found: Forces | State, scale: ScaleTexts = None) -> list[Figure]:
     """Every moving link as a free body with all that acts on it, and its force polygon, on sheets of A4 on its side.
 
     One scale of length and one of force, such as "1 cm = 500 N", hold for all. What equilibrium does not tell is named
@@ -158,7 +160,7 @@ def forces(found: Forces | State, scale: Scales = None) -> list[Figure]:
     from planar.dynamics.forces import Forces
     from planar.dynamics.forces import forces as all_forces
 
-    return on_sheets(*free_bodies(found if isinstance(found, Forces) else all_forces(found), scale))
+    return draw_on_sheets(*free_bodies(found if isinstance(found, Forces) else all_forces(found), scale))
 
 
 def torque(found: Forces | Motion | Mechanism, of: str | None = None, fluctuation: float | None = None) -> Figure:
@@ -169,9 +171,9 @@ def torque(found: Forces | Motion | Mechanism, of: str | None = None, fluctuatio
     coefficient that is none.
     """
     from planar.drawing.forces.torque import torque_picture
-    from planar.dynamics.flywheel import FLUCTUATION
+    from planar.dynamics.flywheel import DEFAULT_FLUCTUATION
 
-    return figure([torque_picture(found, of, FLUCTUATION if fluctuation is None else fluctuation)])
+    return draw_pictures([torque_picture(found, of, DEFAULT_FLUCTUATION if fluctuation is None else fluctuation)])
 
 
 def bearings(found: Forces | Motion | Mechanism, pairs: Sequence[str] | None = None) -> list[Figure]:
@@ -184,7 +186,7 @@ def bearings(found: Forces | Motion | Mechanism, pairs: Sequence[str] | None = N
     from planar.model.mechanism import Mechanism
 
     mechanism = found if isinstance(found, Mechanism) else found.mechanism
-    return on_sheets(bearing_pictures(found, pairs), f"{mechanism.name}: loads of the pairs")
+    return draw_on_sheets(bearing_pictures(found, pairs), f"{mechanism.name}: loads of the pairs")
 
 
 def diagrams(
@@ -203,14 +205,14 @@ def diagrams(
     return drawn(motion, of, chords, width)
 
 
-def solution(state: State, scale: Scales = None) -> list[Figure]:
+def solution(state: State, scale: ScaleTexts = None) -> list[Figure]:
     """The worked solution of a position on pages of A4."""
     from planar.drawing.output.solution_pages import solution_pages
 
-    return solution_pages(state, scales=scales(scale))
+    return solution_pages(state, scales=parse_scales(scale))
 
 
-def two_directions(state: State, link: str, points: Sequence[str] | None = None, scale: Scales = None) -> Figure:
+def two_directions(state: State, link: str, points: Sequence[str] | None = None, scale: ScaleTexts = None) -> Figure:
     """The construction of a link's centre C from the directions of two of its points' velocities (r, v, and ω = v / r).
 
     `points` left out: the two joints of the link that lie farthest apart. Raises BadInput for a link or points that
@@ -218,8 +220,8 @@ def two_directions(state: State, link: str, points: Sequence[str] | None = None,
     """
     from planar.drawing.centres.two_directions import directions_picture
 
-    given = scales(scale)
-    return figure([directions_picture(state, link, points, given.get("length"), given.get("velocity"))])
+    given = parse_scales(scale)
+    return draw_pictures([directions_picture(state, link, points, given.get("length"), given.get("velocity"))])
 
 
 def animate(
@@ -245,8 +247,8 @@ def save(figures: Figure | Sequence[Figure], file: str | Path) -> None:
     """
     path = Path(file)
     if not isinstance(figures, Sequence):
-        write(path, saved(figures, path.suffix))
+        write(path, encode_figure(figures, path.suffix))
         return
-    from planar.drawing.output.solution_pages import sheets
+    from planar.drawing.output.solution_pages import encode_sheets
 
-    write(path, sheets(figures, path.suffix))
+    write(path, encode_sheets(figures, path.suffix))

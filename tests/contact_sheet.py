@@ -10,7 +10,7 @@ from PIL import Image, ImageDraw
 
 from planar import plot
 from planar.document.files import model_files
-from planar.drawing.output.matplotlib_figure import saved
+from planar.drawing.output.matplotlib_figure import encode_figure
 from tests.known import MODELS as MODELS_OF
 from tests.known import state_of
 
@@ -41,7 +41,7 @@ def drawn(model: str, what: str):
 
 def small(cell: tuple[str, str]) -> bytes:
     """A drawing as the bytes of a small picture."""
-    picture = Image.open(io.BytesIO(saved(drawn(*cell), ".png"))).convert("RGB")
+    picture = Image.open(io.BytesIO(encode_figure(drawn(*cell), ".png"))).convert("RGB")
     picture.thumbnail(CELL, Image.Resampling.LANCZOS)
     small_one = io.BytesIO()
     picture.save(small_one, "png")

@@ -9,12 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.assemblies.polynomial.completeness import Roots
+from planar.assemblies.polynomial.completeness import BlockRoots
 from planar.document import files
-from planar.equations.functions import length
-from planar.solving.assembly.block_assemblies import SAME, closing_of
-from planar.solving.newton import newton
-from planar.solving.prepared_mechanism import Setup
+from planar.equations.functions import slice_length
+from planar.solving.assembly.block_assemblies import SAME_ASSEMBLY_TOLERANCE, block_residual_function
+from planar.solving.newton import damped_newton
+from planar.solving.prepared_mechanism import PreparedMechanism
 from tests.linkages import Builder, Built, _joints
 
 Joints = tuple[tuple[str, str], ...]
@@ -24,7 +24,7 @@ class Group(NamedTuple):
     """A linkage as it was built, made ready, and its unknowns there; its only group is the first."""
 
     built: Built
-    setup: Setup
+    setup: PreparedMechanism
     z: np.ndarray
 
 
@@ -52,10 +52,10 @@ def triangles(joints: Joints) -> bool:
     return any(all(frozenset(two) in joined for two in combinations(three, 2)) for three in combinations(links, 3))
 
 
-def one_group(setup: Setup, unknowns: int) -> bool:
+def one_group(setup: PreparedMechanism, unknowns: int) -> bool:
     """Whether all that is unknown is in one group."""
-    stages = setup.equations.stages
-    return len(stages) == 1 and length(stages[0].unknowns) == unknowns
+    stages = setup.equations.blocks
+    return len(stages) == 1 and slice_length(stages[0].unknowns) == unknowns
 
 
 def group(joints: Joints, rng: np.random.Generator, sliding: Collection[int] = ()) -> Group:
@@ -67,39 +67,41 @@ def group(joints: Joints, rng: np.random.Generator, sliding: Collection[int] = (
     for k, joint in enumerate(joints):
         (builder.sliding if k in sliding else builder.turning)(*joint)
     built = builder.built()
-    setup = Setup(files.from_dict(built.value))
+    setup = PreparedMechanism(files.from_dict(built.value))
     return Group(built, setup, unknowns_of(setup, built))
 
 
-def unknowns_of(setup: Setup, built: Built) -> np.ndarray:
+def unknowns_of(setup: PreparedMechanism, built: Built) -> np.ndarray:
     """The unknowns at the place where a linkage was built (scaled)."""
-    own = {pair.name: own_of(setup, built, pair) for pair in setup.mechanism.pairs if pair.coordinates}
+    own = {pair.name: own_of(setup, built, pair) for pair in setup.mechanism.pairs if pair.coordinate_kinds}
     frames = {name: frame for name, frame in built.frames.items() if name != "frame"}
     return setup.coordinates(frames, own)[list(setup.equations.unknowns)]
 
 
-def own_of(setup: Setup, built: Built, pair) -> list[float]:
+def own_of(setup: PreparedMechanism, built: Built, pair) -> list[float]:
     """A pair's own coordinates, which enter its residual linearly, where the linkage was built."""
     frames = [built.frames[link] for link in pair.bodies]
     numbers = pair.measure([setup.shapes[link] for link in pair.bodies])
-    count = len(pair.coordinates)
+    count = len(pair.coordinate_kinds)
     still = np.array(pair.residual(frames, numbers, [0.0] * count))
     slopes = [np.array(pair.residual(frames, numbers, list(unit))) - still for unit in np.eye(count)]
     return np.linalg.lstsq(np.array(slopes).T, -still, rcond=None)[0].tolist()
 
 
-def listed(setup: Setup, found: Roots, unknowns: np.ndarray) -> bool:
+def listed(setup: PreparedMechanism, found: BlockRoots, unknowns: np.ndarray) -> bool:
     """Whether an assembly of the first group is one of those that were found."""
     e = setup.equations
-    angles = np.array([e.coordinates[c].kind.value != "length" for c in e.unknowns[e.stages[0].unknowns]])
+    angles = np.array([e.coordinates[c].kind.value != "length" for c in e.unknowns[e.blocks[0].unknowns]])
     turned = np.abs(np.exp(1j * found.real) - np.exp(1j * unknowns))
-    return bool(np.any(np.all(np.where(angles, turned, np.abs(found.real - unknowns)) < SAME, axis=1)))
+    return bool(
+        np.any(np.all(np.where(angles, turned, np.abs(found.real - unknowns)) < SAME_ASSEMBLY_TOLERANCE, axis=1))
+    )
 
 
-def missed(setup: Setup, found: Roots, rng: np.random.Generator, starts: int) -> list[np.ndarray]:
+def missed(setup: PreparedMechanism, found: BlockRoots, rng: np.random.Generator, starts: int) -> list[np.ndarray]:
     """Assemblies of the first group that random starts lead to and that are not listed."""
-    stage = setup.equations.stages[0]
+    stage = setup.equations.blocks[0]
     z = np.zeros(len(setup.equations.unknowns))
-    closing = closing_of(setup.program, stage, z, setup.station.u, setup.station.p)
-    ended = newton(closing, rng.uniform(-np.pi, np.pi, (starts, length(stage.unknowns))))
-    return [each for each in ended.unknowns[ended.closed] if not listed(setup, found, each)]
+    closing = block_residual_function(setup.functions, stage, z, setup.inputs.u, setup.inputs.p)
+    ended = damped_newton(closing, rng.uniform(-np.pi, np.pi, (starts, slice_length(stage.unknowns))))
+    return [each for each in ended.unknowns[ended.converged] if not listed(setup, found, each)]

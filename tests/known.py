@@ -3,12 +3,12 @@
 from functools import cache
 
 from planar.analysis.centres.centres import Centres, centres
-from planar.document.files import models
+from planar.document.files import load_models
 from planar.results.motion import State
 from planar.solving.position import solve
 from tests.draws import part
 
-MODELS = {file.stem: mechanism for file, mechanism in models()}
+MODELS = {file.stem: mechanism for file, mechanism in load_models()}
 """Every model's mechanism, by the stem of its file."""
 
 

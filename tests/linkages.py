@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from planar.foundation.geometry import Frame, Vector, direction, frame_at
-from planar.model.link_shapes import shape
+from planar.model.link_shapes import link_shape
 from planar.model.mechanism import Mechanism
 from planar.model.pairs import Pair, pair_types
-from planar.solving.position import Solver
-from planar.solving.rates.regularity import strengths
+from planar.solving.position import PositionSolver
+from planar.solving.rates.regularity import regularity
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Builder:
         name = f"T{len(self.pairs)}"
         at = self._somewhere(first, second)
         for link in (first, second):
-            self.links[link]["points"][name] = list(self.frames[link].local(at))
+            self.links[link]["points"][name] = list(self.frames[link].to_local(at))
         self.pairs.append({"turning": name, "links": [first, second]})
         self.sketch[name] = list(at)
         return name
@@ -76,7 +76,7 @@ class Builder:
         rack = self.pairs[-1]
         rack |= {"radius": radius, "mesh": {"displacement": slide, "angle": turn}}
         # a guide along the pitch line keeps the centre at its distance
-        local = list(self.frames[first].local(at))
+        local = list(self.frames[first].to_local(at))
         guide = {"through": local, "angle": rack["line"]["angle"]}
         self.pairs.append({"slot": f"{name}guide", "links": [first, second], "line": guide, "point": name})
         return name
@@ -86,8 +86,8 @@ class Builder:
         angle, slide = float(self.rng.uniform(-np.pi, np.pi)), float(self.rng.uniform(-0.8, 0.8))
         way = direction(angle)
         through = at - way * slide - Vector(-way.y, way.x) * off
-        self.links[first]["points"][f"{name}t"] = list(self.frames[first].local(through))
-        self.links[second]["points"][name] = list(self.frames[second].local(at))
+        self.links[first]["points"][f"{name}t"] = list(self.frames[first].to_local(through))
+        self.links[second]["points"][name] = list(self.frames[second].to_local(at))
         line = {"through": f"{name}t", "angle": angle - self.frames[first].angle}
         self.pairs.append({keyword: name, "links": [first, second], "line": line, "point": name})
         return slide
@@ -115,7 +115,7 @@ class Builder:
 
     def higher(self, first: str, second: str) -> int:
         """Any pair that prevents one motion only, with what it needs beside it; how many motions they prevent."""
-        kinds = [keyword for keyword, kind in pair_types().items() if kind.holds() == 1]
+        kinds = [keyword for keyword, kind in pair_types().items() if kind.prevented_motion_count() == 1]
         if len(self.frames) < 3:
             kinds = [keyword for keyword in kinds if len(pair_types()[keyword].samples()[0].frames) == 2]
         before = len(self.pairs)
@@ -128,8 +128,8 @@ class Builder:
             position = -angle if second == "frame" else angle
         else:
             entry = next(each for each in self.pairs if each.get("sliding") == pair)
-            through = self.frames[first].carry(Vector(*self.links[first]["points"][f"{pair}t"]))
-            at = self.frames[second].carry(Vector(*self.links[second]["points"][pair]))
+            through = self.frames[first].to_world(Vector(*self.links[first]["points"][f"{pair}t"]))
+            at = self.frames[second].to_world(Vector(*self.links[second]["points"][pair]))
             position = (at - through).dot(direction(self.frames[first].angle + entry["line"]["angle"]))
         self.inputs.append({"pair": pair, "position": position, "velocity": velocity, "acceleration": acceleration})
 
@@ -205,11 +205,11 @@ def _joints(rng: np.random.Generator, placed: list[str], new: list[str]) -> list
             return [joint if rng.random() < 0.7 else joint[::-1] for joint in ordered]
 
 
-def conditioning(solver: Solver, z: np.ndarray) -> float:
+def conditioning(solver: PositionSolver, z: np.ndarray) -> float:
     """The least singular value of any group at a position, as the solver judges it."""
-    y = np.concatenate([z, solver.station.u])
-    slope = solver.program.kinematics(y, 0.0 * y, 0.0 * y, solver.station.p).slope
-    return float(strengths(solver, slope).min(initial=1.0))
+    y = np.concatenate([z, solver.inputs.u])
+    slope = solver.functions.kinematics(y, 0.0 * y, 0.0 * y, solver.inputs.p).jacobian
+    return float(regularity(solver, slope).min(initial=1.0))
 
 
 def determinate(mechanism: Mechanism, built: Built) -> bool:
@@ -217,12 +217,12 @@ def determinate(mechanism: Mechanism, built: Built) -> bool:
 
     By the rank of all constraints in all coordinates, nothing eliminated; each column by the complex step.
     """
-    shapes = {link.name: shape(link) for link in mechanism.links}
+    shapes = {link.name: link_shape(link) for link in mechanism.links}
     moving = [name for name in built.frames if name != mechanism.frame]
     numbers = {pair.name: pair.measure([shapes[link] for link in pair.bodies]) for pair in mechanism.pairs}
     pairs = {pair.name: pair for pair in mechanism.pairs}
     place = np.array([part for name in moving for part in _frame(built, name)], dtype=complex)
-    own = [(pair.name, k) for pair in mechanism.pairs for k in range(len(pair.coordinates))]
+    own = [(pair.name, k) for pair in mechanism.pairs for k in range(len(pair.coordinate_kinds))]
     place = np.concatenate([place, *(_own(built, pair, numbers[pair.name]) for pair in mechanism.pairs)])
 
     def left(at: np.ndarray) -> np.ndarray:
@@ -237,7 +237,7 @@ def determinate(mechanism: Mechanism, built: Built) -> bool:
             found += pair.residual(ends, numbers[pair.name], slides[pair.name])
         for given in mechanism.inputs:
             pair = pairs[given.pair]
-            found.append(pair.drive([frames[link] for link in pair.bodies], (), slides[pair.name]))
+            found.append(pair.input_position([frames[link] for link in pair.bodies], (), slides[pair.name]))
         return np.array(found)
 
     step = 1e-30
@@ -253,7 +253,7 @@ def _frame(built: Built, name: str) -> tuple[float, float, float]:
 def _own(built: Built, pair: Pair, numbers: Sequence[float]) -> np.ndarray:
     """The pair's own coordinates where the linkage was built: they enter its residual linearly."""
     frames = [built.frames[link] for link in pair.bodies]
-    count = len(pair.coordinates)
+    count = len(pair.coordinate_kinds)
     still = np.array(pair.residual(frames, numbers, [0.0] * count))
     slopes = [np.array(pair.residual(frames, numbers, list(unit))) - still for unit in np.eye(count)]
     return np.linalg.lstsq(np.array(slopes).T, -still, rcond=None)[0] if count else np.zeros(0)

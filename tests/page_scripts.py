@@ -12,28 +12,30 @@ from typing import Any
 
 import pytest
 
-from planar.document.files import asset
-from planar.pages.page import told
-from planar.pages.page_data import carried
+from planar.document.files import read_asset
+from planar.pages.page import script_safe_json
+from planar.pages.page_data import page_data
 
 NODE = shutil.which("node") or shutil.which("nodejs")
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 LOGIC = ("solve/singular.js", "solve/linkage.js", "page.js", "controls/dimensions.js", "controls/saving.js")
 """The scripts of a page that need no document."""
 
-_carried = cache(carried)
+_carried = cache(page_data)
 needs_node = pytest.mark.skipif(NODE is None, reason="there is no Node to run the page's scripts in")
 
 
 def in_node(mechanisms: dict[str, Any], act: str, *more: str) -> dict[str, Any]:
     """What the asynchronous `act(page, name)` returns for the page of each mechanism, with `more` scripts."""
-    shared = "\n".join(asset(name) for name in (*LOGIC, *more))
+    shared = "\n".join(read_asset(name) for name in (*LOGIC, *more))
     runs = []
     for name, mechanism in mechanisms.items():
         data, functions = _carried(mechanism)
         runs.append(
-            f"await (async () => {{ {functions}\n const page = new Page(JSON.parse({told(told(data))}), program);\n"
-            f" found[{told(name)}] = await act(page, {told(name)}); }})();"
+            "await (async () => "
+            f"{{ {functions}\n"
+            f" const page = new Page(JSON.parse({script_safe_json(script_safe_json(data))}), program);\n"
+            f" found[{script_safe_json(name)}] = await act(page, {script_safe_json(name)}); }})();"
         )
     text = (
         f"{shared}\nasync function act(page, name) {{ {act} }}\n"

@@ -44,7 +44,7 @@ def bodies(document: dict[str, Any]) -> Bodies:
     state = planar.solve(mechanism)
     frame = document["frame"]
     links = {link.name: link for link in mechanism.links}
-    local = {name: {p: _two(state.shapes[name].at(p)) for p in link.names} for name, link in links.items()}
+    local = {name: {p: _two(state.shapes[name].position(p)) for p in link.names} for name, link in links.items()}
     places = {name: _place(state, name, local[name]) for name in links if name != frame}
     holders = {
         pin: [name for name in links if pin in local[name]] for entry in document["pairs"] for pin in entry.values()

@@ -9,10 +9,10 @@ import numpy as np
 import planar
 from benchmarks.linkages import Linkage
 from benchmarks.ways.trial import CRANK, Array, Trial
-from planar.model.mechanism import Drive, with_inputs
+from planar.model.mechanism import Drive, replace_inputs
 from planar.results.motion import Motion, State
-from planar.solving.continuation.path import follow, run
-from planar.solving.position import Solver, solve
+from planar.solving.continuation.path import follow_samples, follow_to
+from planar.solving.position import PositionSolver, solve
 
 
 class Turn:
@@ -20,10 +20,10 @@ class Turn:
 
     def __init__(self, linkage: Linkage):
         self.mechanism = planar.from_dict(linkage.document())
-        self.solver = Solver(self.mechanism)
-        self.start = self.solver.assembly().z
+        self.solver = PositionSolver(self.mechanism)
+        self.start = self.solver.find_assembly().z
         self.u = CRANK[:, None]
-        self.numbers = self.solver.station.p
+        self.numbers = self.solver.inputs.p
         self._columns = [self.solver.column[name] for name in linkage.answers]
         self._scale = [1.0 if part == "angle" else self.solver.unit for _, part in linkage.answers]
 
@@ -32,48 +32,48 @@ class Turn:
         z = np.empty((len(self.u), self.start.size))
         z[0] = self.start
         for index in range(1, len(self.u)):
-            z[index] = follow(self.solver, self.numbers, z[index - 1], self.u[index - 1], self.u[index])
+            z[index] = follow_to(self.solver, self.numbers, z[index - 1], self.u[index - 1], self.u[index])
         return z
 
     def gated(self) -> Array:
         """z by one call of the run's program, then both parts of the gate for all samples."""
-        return run(self.solver, self.numbers, self.start, self.u).z
+        return follow_samples(self.solver, self.numbers, self.start, self.u).z
 
     def bare(self) -> Array:
         """z by one call of the run's program alone."""
-        found = self.solver.program.run(self.start, self.u[1:], self.numbers)
+        found = self.solver.functions.run_samples(self.start, self.u[1:], self.numbers)
         return np.vstack([self.start, found])
 
     def rates(self, z: Array) -> tuple[Array, Array, Array]:
         """z with its first and second rates: two calls of the program and two small systems a sample, ungated."""
-        station, kinematics = self.solver.station, self.solver.program.kinematics
+        station, kinematics = self.solver.inputs, self.solver.functions.kinematics
         still, z1, z2 = np.zeros_like(self.start), np.empty_like(z), np.empty_like(z)
         for index, (at, u) in enumerate(zip(z, self.u, strict=True)):
             y, y2 = np.concatenate([at, u]), np.concatenate([still, station.u2])
             rest = kinematics(y, np.concatenate([still, station.u1]), y2, station.p)
-            z1[index] = -np.linalg.solve(rest.slope, rest.F1)
+            z1[index] = -np.linalg.solve(rest.jacobian, rest.F1)
             moving = kinematics(y, np.concatenate([z1[index], station.u1]), y2, station.p)
-            z2[index] = -np.linalg.solve(rest.slope, moving.F2)
+            z2[index] = -np.linalg.solve(rest.jacobian, moving.F2)
         return z, z1, z2
 
-    def stations(self) -> list[tuple[Solver, Array]]:
+    def stations(self) -> list[tuple[PositionSolver, Array]]:
         """A solver for every sample, with the unknowns there."""
         pair = self.mechanism.inputs[0].pair
-        moved = (with_inputs(self.mechanism, (Drive(pair, position=float(u[0])),)) for u in self.u)
-        return [(Solver(mechanism), z) for mechanism, z in zip(moved, self.gated(), strict=True)]
+        moved = (replace_inputs(self.mechanism, (Drive(pair, position=float(u[0])),)) for u in self.u)
+        return [(PositionSolver(mechanism), z) for mechanism, z in zip(moved, self.gated(), strict=True)]
 
     def answers(self, z: Array) -> Array:
         """The linkage's answers (1, samples, 2) at z."""
-        w = self.solver.program.positions(z.T, self.u.T, self.numbers).full()
+        w = self.solver.functions.coordinate_function(z.T, self.u.T, self.numbers).full()
         return (w[self._columns].T * self._scale)[None]
 
     def answers_with_rates(self, found: tuple[Array, Array, Array]) -> Array:
         """The linkage's answers (3, samples, 2) at z with its rates."""
-        station = self.solver.station
+        station = self.solver.inputs
         answers = np.empty((3, len(self.u), 2))
         for index, (z, z1, z2, u) in enumerate(zip(*found, self.u, strict=True)):
             y1, y2 = np.concatenate([z1, station.u1]), np.concatenate([z2, station.u2])
-            motion = self.solver.program.kinematics(np.concatenate([z, u]), y1, y2, station.p)
+            motion = self.solver.functions.kinematics(np.concatenate([z, u]), y1, y2, station.p)
             for order, w in enumerate((motion.w, motion.w1, motion.w2)):
                 answers[order, index] = w[self._columns] * self._scale
         return answers

@@ -11,21 +11,21 @@ import numpy as np
 from planar.foundation.errors import BadInput, NoAnswer
 from planar.foundation.geometry import Frame, frame_at
 from planar.foundation.jets import Jet
-from planar.model.mechanism import Drive, with_inputs
-from planar.model.pairs import Kind
-from planar.results.motion import Motion, Moving, State
-from planar.solving.continuation.path import followed
-from planar.solving.position import Solver
+from planar.model.mechanism import Drive, replace_inputs
+from planar.model.pairs import MeasureKind
+from planar.results.motion import KinematicResult, Motion, State
+from planar.solving.continuation.path import follow_straight
+from planar.solving.position import PositionSolver
 
 Array = np.ndarray
 
-SAME = 1e-9
+CLOSED_TOLERANCE = 1e-9
 """rad, or part of the size: a motion that comes so near to where it started is closed."""
-SEAM = 1e-12
+SEAM_TOLERANCE = 1e-12
 """rad: so near to the end of a turn a position is at its start."""
 
 
-class Steady:
+class InterpolatedRun:
     """A motion between its samples: states at any position of its running input, which runs steadily.
 
     Its `rate` is the file's velocity, without acceleration; where the file's velocity is zero it is 1 rad/s or 1 m/s,
@@ -34,110 +34,112 @@ class Steady:
     """
 
     def __init__(self, motion: Motion):
-        motion = _one_way(motion)
+        motion = _forward_part(motion)
         ranges = {name: float(np.ptp(given.position)) for name, given in motion.inputs.items()}
         self.pair = max(ranges, key=ranges.__getitem__)
         given = next(each for each in motion.mechanism.inputs if each.pair == self.pair)
         self.rate = given.velocity or 1.0
-        self.mechanism = with_inputs(motion.mechanism, (Drive(self.pair, None, self.rate, 0.0),))
-        self.solver = Solver(self.mechanism)
-        self._which = [each.pair for each in self.mechanism.inputs].index(self.pair)
-        self._scale = self.solver.unit if self.solver.named[self.pair].drive_kind is Kind.LENGTH else 1.0
+        self.mechanism = replace_inputs(motion.mechanism, (Drive(self.pair, None, self.rate, 0.0),))
+        self.solver = PositionSolver(self.mechanism)
+        self._running_index = [each.pair for each in self.mechanism.inputs].index(self.pair)
+        self._input_scale = (
+            self.solver.unit if self.solver.relative_motions[self.pair].input_kind is MeasureKind.LENGTH else 1.0
+        )
         self.positions: Array = motion.inputs[self.pair].position
-        self.first, self.last = float(self.positions.min()), float(self.positions.max())
+        self.lowest, self.highest = float(self.positions.min()), float(self.positions.max())
         self.z = self._unknowns(motion)
-        self.samples = self._sampled(motion, given.velocity, given.acceleration)
-        self.known = self._determined()
+        self.samples = self._samples_at_rate(motion, given.velocity, given.acceleration)
+        self.has_rates = self._find_rates()
         course = motion.course
         self._singular = np.zeros(len(self.positions), dtype=bool)
-        self._singular[[row for row in course.singular if row < len(motion)] if course is not None else []] = True
-        self._forks = () if course is None else course.forks
-        self.closed = self._closes()
+        self._singular[[row for row in course.singular_rows if row < len(motion)] if course is not None else []] = True
+        self._change_points = () if course is None else course.fork_positions
+        self.closed = self._is_closed()
         self._states: dict[float, State] = {}
 
     @property
     def period(self) -> float:
         """How far the input runs (rad or m)."""
-        return self.last - self.first
+        return self.highest - self.lowest
 
     @property
     def pin(self) -> str | None:
         """The frame's point about which the driving crank turns, as `link.point`, if there is one."""
-        pair = self.solver.named[self.pair]
-        on = [f"{link}.{point}" for link, point in pair.coincident() if link == self.mechanism.frame]
-        return on[0] if on and pair.drive_kind is Kind.ANGLE else None
+        pair = self.solver.relative_motions[self.pair]
+        on = [f"{link}.{point}" for link, point in pair.coincident_points() if link == self.mechanism.frame]
+        return on[0] if on and pair.input_kind is MeasureKind.ANGLE else None
 
-    def at(self, position: float) -> State:
+    def state_at(self, position: float) -> State:
         """The state at a position of the running input, on this motion's branch. Raises NoAnswer."""
         if position not in self._states:
-            index = int(np.argmin(np.where(self._sound(position), np.abs(self.positions - position), np.inf)))
-            there = self._solver(position)
-            start = there.station.u.copy()
-            start[self._which] = self.positions[index] / self._scale
-            way = followed(there, there.station.p, self.z[index], start, there.station.u)
-            z, local = way.z[-1], way.local.get(1)
-            self._states[position] = there.state(z) if local is None else there.on_branch(z, local)
+            index = int(np.argmin(np.where(self._is_on_branch(position), np.abs(self.positions - position), np.inf)))
+            there = self._solver_at(position)
+            start = there.inputs.u.copy()
+            start[self._running_index] = self.positions[index] / self._input_scale
+            way = follow_straight(there, there.inputs.p, self.z[index], start, there.inputs.u)
+            z, local = way.z[-1], way.branch_rates.get(1)
+            self._states[position] = there.state(z) if local is None else there.state_on_branch(z, local)
         return self._states[position]
 
-    def _sound(self, position: float) -> Array:
+    def _is_on_branch(self, position: float) -> Array:
         """Which samples lead to a position on this motion's branch (samples,).
 
         Not those on change points, from which several ways lead on, nor those beyond one where another way was taken.
         """
-        sound = self.known & ~self._singular
-        for fork in self._forks:
+        sound = self.has_rates & ~self._singular
+        for fork in self._change_points:
             sound &= (self.positions - fork) * (position - fork) >= 0.0
         return sound
 
-    def tabled(self, measure: Callable[[Moving], Array]) -> tuple[Array, Array]:
+    def tabulate(self, measure: Callable[[KinematicResult], Array]) -> tuple[Array, Array]:
         """Positions in order, and what is measured there (positions, ...), of states that have rates.
 
         Besides the samples there are some just beyond open ends of the range, or nearer and nearer to its limits; what
         is closed goes on over its seam.
         """
         order = np.argsort(self.positions, kind="stable")
-        order = order[self.known[order]]
+        order = order[self.has_rates[order]]
         where, what = self.positions[order], np.asarray(measure(self.samples))[order]
         if self.closed and len(where):
-            if where[-1] - where[0] > self.period - SAME:  # both ends are one position
+            if where[-1] - where[0] > self.period - CLOSED_TOLERANCE:  # both ends are one position
                 where, what = where[:-1], what[:-1]
             return np.concatenate([where, where[:2] + self.period]), np.concatenate([what, what[:2]])
-        for position in self._beside() if len(where) else ():
+        for position in self._positions_beside_ends() if len(where) else ():
             try:
-                beside = np.asarray(measure(self.at(position)))[None]
+                beside = np.asarray(measure(self.state_at(position)))[None]
             except NoAnswer:
                 continue  # the motion does not go on so far
             index = int(np.searchsorted(where, position))
             where, what = np.insert(where, index, position), np.insert(what, index, beside, axis=0)
         return where, what
 
-    def limited(self) -> tuple[tuple[float, float], ...]:
+    def open_limits(self) -> tuple[tuple[float, float], ...]:
         """The ends of an open range that are limits, where no rate is determined, each with the way inwards."""
         if self.closed:
             return ()
-        ends = ((self.first, 1.0), (self.last, -1.0))
-        return tuple((end, way) for end, way in ends if not self.known[self.positions == end].any())
+        ends = ((self.lowest, 1.0), (self.highest, -1.0))
+        return tuple((end, way) for end, way in ends if not self.has_rates[self.positions == end].any())
 
-    def _beside(self) -> Iterator[float]:
+    def _positions_beside_ends(self) -> Iterator[float]:
         step = self.period / max(len(self.positions) - 1, 1)
-        limits = dict(self.limited())
-        for end, way in ((self.first, 1.0), (self.last, -1.0)):
+        limits = dict(self.open_limits())
+        for end, way in ((self.lowest, 1.0), (self.highest, -1.0)):
             if end in limits:
                 yield from (end + way * step * by for by in (0.1, 1e-2, 1e-3, 1e-4))
             elif step:
                 yield end - way * step * 0.01
 
-    def within(self, position: float) -> float | None:
+    def wrap_position(self, position: float) -> float | None:
         """The position in the range of the motion, over a closed one the same place of the turn; None outside."""
         if self.closed:
-            return max(position - self.period * ((position - self.first + SEAM) // self.period), self.first)
-        inside = self.first - SAME <= position <= self.last + SAME
-        return min(max(position, self.first), self.last) if inside else None
+            return max(position - self.period * ((position - self.lowest + SEAM_TOLERANCE) // self.period), self.lowest)
+        inside = self.lowest - CLOSED_TOLERANCE <= position <= self.highest + CLOSED_TOLERANCE
+        return min(max(position, self.lowest), self.highest) if inside else None
 
-    def _solver(self, position: float) -> Solver:
-        return Solver(with_inputs(self.mechanism, (Drive(self.pair, position),)))
+    def _solver_at(self, position: float) -> PositionSolver:
+        return PositionSolver(replace_inputs(self.mechanism, (Drive(self.pair, position),)))
 
-    def _determined(self) -> Array:
+    def _find_rates(self) -> Array:
         """Which samples have rates (samples,)."""
         jets = [each for f in self.samples.frames.values() if not f.fixed for each in (f.x, f.y, f.angle)]
         jets += [jet for own in self.samples.own.values() for jet in own]
@@ -152,18 +154,18 @@ class Steady:
             if not frame.fixed:
                 values |= {(link, part): getattr(frame, part).parts[0] for part in ("x", "y", "angle")}
         for name, own in motion.own.items():
-            parts = solver.pairs[name].coordinates
+            parts = solver.pairs[name].coordinate_kinds
             values |= {(name, part): jet.parts[0] for (part, _), jet in zip(parts, own, strict=True)}
         coordinates = solver.equations.coordinates
         w = np.array([np.broadcast_to(values[c.owner, c.part], many) for c in coordinates]).reshape(-1, many)
         return (w / solver.scale[:, None])[list(solver.equations.unknowns)].T
 
-    def _sampled(self, motion: Motion, velocity: float, acceleration: float) -> Motion:
+    def _samples_at_rate(self, motion: Motion, velocity: float, acceleration: float) -> Motion:
         """The samples at the steady rate."""
         if velocity and not acceleration:
             return motion
         if not velocity:
-            return self._restarted(motion)
+            return self._samples_at_unit_rate(motion)
 
         def steady(jet: Jet) -> Jet:
             # d2x/dt2 = x'' v^2 + x' a, of which the second part is the input's acceleration
@@ -177,12 +179,12 @@ class Steady:
         own = {name: tuple(map(steady, jets)) for name, jets in motion.own.items()}
         return replace(motion, mechanism=self.mechanism, frames=frames, own=own)
 
-    def _restarted(self, motion: Motion) -> Motion:
+    def _samples_at_unit_rate(self, motion: Motion) -> Motion:
         """The samples of a motion whose input stands still in the file, with rates."""
         states = []
         for position, z in zip(self.positions.tolist(), self.z, strict=True):
             try:
-                here = Solver(with_inputs(self.mechanism, (Drive(self.pair, position),)))
+                here = PositionSolver(replace_inputs(self.mechanism, (Drive(self.pair, position),)))
                 states.append(here.state(z))
             except NoAnswer:
                 states.append(None)
@@ -209,23 +211,27 @@ class Steady:
         }
         return replace(motion, mechanism=self.mechanism, frames=frames, own=own)
 
-    def _closes(self) -> bool:
+    def _is_closed(self) -> bool:
         """Whether the motion comes back to where it started after whole turns of the input."""
         turns = self.period / (2.0 * pi)
-        if self.solver.named[self.pair].drive_kind is Kind.LENGTH or turns < 0.5 or abs(turns - round(turns)) > SAME:
+        if (
+            self.solver.relative_motions[self.pair].input_kind is MeasureKind.LENGTH
+            or turns < 0.5
+            or abs(turns - round(turns)) > CLOSED_TOLERANCE
+        ):
             return False
         unit = self.solver.unit
         for frame in self.samples.frames.values():
             if not frame.fixed:
                 gaps = [(each.parts[0][-1] - each.parts[0][0]) / unit for each in (frame.x, frame.y)]
                 gaps += [each.parts[0][-1] - each.parts[0][0] for each in (frame.cos, frame.sin)]
-                if max(map(abs, gaps)) > SAME:
+                if max(map(abs, gaps)) > CLOSED_TOLERANCE:
                     return False
         slides = [jet.parts[0] for own in self.samples.own.values() for jet in own]
-        return all(abs(each[-1] - each[0]) <= SAME * unit for each in slides)
+        return all(abs(each[-1] - each[0]) <= CLOSED_TOLERANCE * unit for each in slides)
 
 
-def _one_way(motion: Motion) -> Motion:
+def _forward_part(motion: Motion) -> Motion:
     """The motion, or its way there if it comes back."""
     if motion.time is not None:
         raise BadInput("motion", "this is asked of the range of one input; the motion is a run in time")
@@ -234,5 +240,5 @@ def _one_way(motion: Motion) -> Motion:
         return motion
     middle = (len(motion) - 1) // 2
     if all(np.array_equal(given.position, given.position[::-1]) for given in motion.inputs.values()):
-        return motion.until(middle)
+        return motion.up_to_row(middle)
     raise BadInput("motion", "this is asked of one range of the input; a circuit goes through its dead points")

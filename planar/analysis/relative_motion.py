@@ -8,13 +8,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planar.foundation.geometry import Frame, Vector
-from planar.foundation.jets import orders
-from planar.results.motion import Unknown
+from planar.foundation.jets import value_and_rates
+from planar.results.motion import UnknownName
 
 Array = np.ndarray
 
 
-class Relative(NamedTuple):
+class RelativeMotion(NamedTuple):
     """The motion of a link in the axes of another: where its own axes are, how they turn, each with two rates.
 
     Of one position, or of n of them: vectors (2,) or (n, 2), turns () or (n,). SI.
@@ -24,9 +24,9 @@ class Relative(NamedTuple):
     velocity: Array
     acceleration: Array
     angle: Array
-    turning: Array
+    angular_velocity: Array
     "angular velocity"
-    hastening: Array
+    angular_acceleration: Array
     "angular acceleration"
 
     @property
@@ -36,54 +36,54 @@ class Relative(NamedTuple):
         It is w times the point (x, y, 1) that is at rest, where w is the angular velocity: from v + w k × (r - o) = 0,
         r = o + k × v / w. Where the link only slides, w = 0 and the pole lies at infinity, square to v.
         """
-        w, alpha = self.turning[..., None], self.hastening[..., None]
-        at = w * self.origin + quarter(self.velocity)
-        rate = alpha * self.origin + w * self.velocity + quarter(self.acceleration)
+        w, alpha = self.angular_velocity[..., None], self.angular_acceleration[..., None]
+        at = w * self.origin + quarter_turn(self.velocity)
+        rate = alpha * self.origin + w * self.velocity + quarter_turn(self.acceleration)
         return np.concatenate([at, w], axis=-1), np.concatenate([rate, alpha], axis=-1)
 
     @property
     def moving_pole(self) -> tuple[Array, Array]:
         """The same pole in the link's own axes, with its rate as seen from there."""
-        w, alpha = self.turning[..., None], self.hastening[..., None]
-        at = self.local(quarter(self.velocity))
-        rate = self.local(quarter(self.acceleration)) - w * quarter(at)
+        w, alpha = self.angular_velocity[..., None], self.angular_acceleration[..., None]
+        at = self.vectors_in_link(quarter_turn(self.velocity))
+        rate = self.vectors_in_link(quarter_turn(self.acceleration)) - w * quarter_turn(at)
         return np.concatenate([at, w], axis=-1), np.concatenate([rate, alpha], axis=-1)
 
-    def local(self, vectors: Array) -> Array:
+    def vectors_in_link(self, vectors: Array) -> Array:
         """Vectors of the other link's axes in the link's own."""
-        return _turned(vectors, -self.angle)
+        return _rotate(vectors, -self.angle)
 
-    def carried(self, points: Array) -> Array:
+    def points_in_other(self, points: Array) -> Array:
         """Where points of the link lie in the axes of the other."""
-        return self.origin + _turned(points, self.angle)
+        return self.origin + _rotate(points, self.angle)
 
 
-def relative(frames: Mapping[str, Frame], link: str, other: str) -> Relative:
+def relative_motion(frames: Mapping[str, Frame], link: str, other: str) -> RelativeMotion:
     """The motion of a link against another, from frames that are jets. Raises Unknown."""
     for name in (link, other):
         if name not in frames:
-            raise Unknown(f"there is no link {name!r}; links are {', '.join(frames)}")
+            raise UnknownName(f"there is no link {name!r}; links are {', '.join(frames)}")
     if link == other:
-        raise Unknown(f"a motion is of one link against another, and both are {link!r}")
+        raise UnknownName(f"a motion is of one link against another, and both are {link!r}")
     moved, base = frames[link], frames[other]
-    at, angle = base.local(Vector(moved.x, moved.y)), moved.angle - base.angle
-    x, y, turned = (_parts(value) for value in (at.x, at.y, angle))
+    at, angle = base.to_local(Vector(moved.x, moved.y)), moved.angle - base.angle
+    x, y, turned = (_value_and_rates(value) for value in (at.x, at.y, angle))
     places = (np.stack(np.broadcast_arrays(*both), axis=-1) for both in zip(x, y, strict=True))
     shape = np.broadcast_shapes(*(np.shape(part) for part in (*x, *y, *turned)))
     vectors = (np.broadcast_to(each, (*shape, 2)) for each in places)
-    return Relative(*vectors, *(np.broadcast_to(part, shape) for part in turned))
+    return RelativeMotion(*vectors, *(np.broadcast_to(part, shape) for part in turned))
 
 
-def quarter(vectors: Array) -> Array:
+def quarter_turn(vectors: Array) -> Array:
     """Vectors (..., 2) turned a quarter anticlockwise."""
     return np.stack([-vectors[..., 1], vectors[..., 0]], axis=-1)
 
 
-def _turned(vectors: Array, angle: Array) -> Array:
+def _rotate(vectors: Array, angle: Array) -> Array:
     cos, sin = np.cos(angle)[..., None], np.sin(angle)[..., None]
-    return cos * vectors + sin * quarter(vectors)
+    return cos * vectors + sin * quarter_turn(vectors)
 
 
-def _parts(value: Any) -> list[Array]:
-    parts = orders(value)
+def _value_and_rates(value: Any) -> list[Array]:
+    parts = value_and_rates(value)
     return [np.asarray(part, dtype=float) for part in parts]

@@ -6,11 +6,11 @@ from collections.abc import Iterable, Mapping
 from math import floor, isfinite, log10
 from typing import NamedTuple, Protocol
 
-from planar.foundation.units import printed
+from planar.foundation.units import format_unit
 
-DIGITS = 3
+SIGNIFICANT_DIGITS = 3
 """Significant digits of what is read from a drawing; what is exact with one more has that."""
-LARGE, SMALL = 1e6, 1e-4
+SCIENTIFIC_FROM, SCIENTIFIC_BELOW = 1e6, 1e-4
 """From where, and below which, a number is written with a power of ten."""
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
@@ -24,7 +24,7 @@ class Symbol(NamedTuple):
     superscript: str = ""
 
 
-class Spot(NamedTuple):
+class PolygonLetter(NamedTuple):
     """A letter of a polygon: b, b₁ is Spot("b", "1"), b_a is Spot("b", "a")."""
 
     letter: str
@@ -34,8 +34,8 @@ class Spot(NamedTuple):
 class Chord(NamedTuple):
     """What lies between two letters of a polygon: b₁c₁."""
 
-    tail: Spot
-    head: Spot
+    tail: PolygonLetter
+    head: PolygonLetter
 
 
 class Name(NamedTuple):
@@ -44,7 +44,7 @@ class Name(NamedTuple):
     text: str
 
 
-class Quantity(NamedTuple):
+class MeasuredValue(NamedTuple):
     """A number (SI) with its unit, `by` of which are one in SI.
 
     One of a `kind` that is drawn to scale has its length on paper beside it.
@@ -53,134 +53,138 @@ class Quantity(NamedTuple):
     value: float
     unit: str = ""
     kind: str = ""
-    by: float = 1.0
+    units_per_si: float = 1.0
 
 
 class Fraction(NamedTuple):
     """One phrase over another."""
 
-    over: Phrase
-    under: Phrase
+    numerator: Phrase
+    denominator: Phrase
 
 
-class Raised(NamedTuple):
+class Power(NamedTuple):
     """A phrase in brackets, or as it stands, to a power."""
 
-    of: Phrase
-    power: int
+    base: Phrase
+    exponent: int
 
 
-Piece = str | Symbol | Spot | Chord | Name | Quantity | Fraction | Raised
-Phrase = tuple[Piece, ...]
+PhrasePiece = str | Symbol | PolygonLetter | Chord | Name | MeasuredValue | Fraction | Power
+Phrase = tuple[PhrasePiece, ...]
 
 
-class Paper(Protocol):
+class PaperScale(Protocol):
     """A scale: how many millimetres a value takes on paper."""
 
     def on_paper(self, value: float) -> float:
         """Millimetres for a value (SI)."""
 
 
-def number(value: float, least: int = DIGITS) -> str:
+def format_number(value: float, digits: int = SIGNIFICANT_DIGITS) -> str:
     """A number as a chapter prints it: 5.51, 0.340, 26, 0.05, 3419, 1.23·10⁻⁷."""
     if value == 0.0 or not isfinite(value):
         return "0" if value == 0.0 else "—"
     sign, size = "−" if value < 0.0 else "", abs(value)
-    rounded = float(f"{size:.{least + 1}g}")
+    rounded = float(f"{size:.{digits + 1}g}")
     exact = abs(rounded - size) <= 1e-9 * size
-    power = floor(log10(float(f"{size:.{least}g}")))
-    if not SMALL <= size < LARGE:
-        first = f"{size / 10.0**power:.{least - 1}f}"
+    power = floor(log10(float(f"{size:.{digits}g}")))
+    if not SCIENTIFIC_BELOW <= size < SCIENTIFIC_FROM:
+        first = f"{size / 10.0**power:.{digits - 1}f}"
         return f"{sign}{first}·10{str(power).translate(_SUPERSCRIPTS)}"
     if exact:
         return sign + f"{rounded:.10f}".rstrip("0").rstrip(".")
-    return f"{sign}{size:.{max(least - 1 - power, 0)}f}"
+    return f"{sign}{size:.{max(digits - 1 - power, 0)}f}"
 
 
-def ratio(value: float) -> str:
+def format_ratio(value: float) -> str:
     """A number with at most four digits and no zeros at its end."""
-    return f"{value:.4g}" if SMALL <= abs(value) < LARGE else number(value)
+    return f"{value:.4g}" if SCIENTIFIC_BELOW <= abs(value) < SCIENTIFIC_FROM else format_number(value)
 
 
-def joined(phrases: Iterable[Phrase], between: str) -> Phrase:
+def join_phrases(phrases: Iterable[Phrase], between: str) -> Phrase:
     """Phrases with words between them."""
-    found: list[Piece] = []
+    found: list[PhrasePiece] = []
     for phrase in phrases:
         found += [*([between] if found else []), *phrase]
     return tuple(found)
 
 
-def listed(phrases: Iterable[Phrase]) -> Phrase:
+def list_phrases(phrases: Iterable[Phrase]) -> Phrase:
     """Phrases in a sentence: a, b and c."""
     each = list(phrases)
     if len(each) < 2:
         return each[0] if each else ()
-    return (*joined(each[:-1], ", "), " and ", *each[-1])
+    return (*join_phrases(each[:-1], ", "), " and ", *each[-1])
 
 
-def measured(value: Quantity, paper: Mapping[str, Paper] | None = None) -> str:
+def format_measured(value: MeasuredValue, paper: Mapping[str, PaperScale] | None = None) -> str:
     """A number with its unit, and in brackets its length on paper where its kind has a scale."""
-    told = f"{number(value.value * value.by)} {printed(value.unit)}".rstrip()
+    told = f"{format_number(value.value * value.units_per_si)} {format_unit(value.unit)}".rstrip()
     scale = (paper or {}).get(value.kind)
     return told if scale is None else f"{told} ({scale.on_paper(abs(value.value)):.1f} mm)"
 
 
-def plain(phrase: Phrase, paper: Mapping[str, Paper] | None = None) -> str:
+def plain_text(phrase: Phrase, paper: Mapping[str, PaperScale] | None = None) -> str:
     """A phrase as a line of text: f_cb^c, b₁c_b, (ab)²/AB."""
-    return "".join(_plain(piece, paper) for piece in phrase)
+    return "".join(_plain_piece(piece, paper) for piece in phrase)
 
 
-def _plain(piece: Piece, paper: Mapping[str, Paper] | None) -> str:
+def _plain_piece(piece: PhrasePiece, paper: Mapping[str, PaperScale] | None) -> str:
     if isinstance(piece, str):
         return piece
     if isinstance(piece, Name):
-        return primed(piece.text)
-    if isinstance(piece, Quantity):
-        return measured(piece, paper)
-    if isinstance(piece, Fraction | Raised):
-        return _fraction(piece, paper) if isinstance(piece, Fraction) else _raised(piece, paper)
-    return _lettered(piece)
+        return with_double_primes(piece.text)
+    if isinstance(piece, MeasuredValue):
+        return format_measured(piece, paper)
+    if isinstance(piece, Fraction | Power):
+        return _fraction_text(piece, paper) if isinstance(piece, Fraction) else _power_text(piece, paper)
+    return _letters_text(piece)
 
 
-def _lettered(piece: Symbol | Spot | Chord) -> str:
+def _letters_text(piece: Symbol | PolygonLetter | Chord) -> str:
     if isinstance(piece, Symbol):
-        return _symbol(piece)
-    return _spot(piece) if isinstance(piece, Spot) else _spot(piece.tail) + between(piece) + _spot(piece.head)
+        return _symbol_text(piece)
+    return (
+        _letter_text(piece)
+        if isinstance(piece, PolygonLetter)
+        else _letter_text(piece.tail) + chord_separator(piece) + _letter_text(piece.head)
+    )
 
 
-def _raised(raised: Raised, paper: Mapping[str, Paper] | None) -> str:
-    return plain(raised.of, paper) + str(raised.power).translate(_SUPERSCRIPTS)
+def _power_text(raised: Power, paper: Mapping[str, PaperScale] | None) -> str:
+    return plain_text(raised.base, paper) + str(raised.exponent).translate(_SUPERSCRIPTS)
 
 
-def _fraction(fraction: Fraction, paper: Mapping[str, Paper] | None) -> str:
-    over, under = plain(fraction.over, paper), plain(fraction.under, paper)
+def _fraction_text(fraction: Fraction, paper: Mapping[str, PaperScale] | None) -> str:
+    over, under = plain_text(fraction.numerator, paper), plain_text(fraction.denominator, paper)
     return f"{over}/({under})" if " " in under else f"{over}/{under}"
 
 
-def between(chord: Chord) -> str:
+def chord_separator(chord: Chord) -> str:
     """What stands between the letters of a chord: a dash where they are long, a space where the first has a letter."""
-    if max(bare(chord.tail.letter), bare(chord.head.letter)) > 1:
+    if max(length_without_primes(chord.tail.letter), length_without_primes(chord.head.letter)) > 1:
         return "–"
     return "\N{NO-BREAK SPACE}" if chord.tail.mark and not chord.tail.mark.isdigit() else ""
 
 
-def primed(name: str) -> str:
+def with_double_primes(name: str) -> str:
     """A name as it is written: two primes as one double prime."""
     return name.replace("′′", "″")
 
 
-def bare(name: str) -> int:
+def length_without_primes(name: str) -> int:
     """The length of a name without its primes."""
     return len(name.rstrip("′″"))
 
 
-def _spot(spot: Spot) -> str:
+def _letter_text(spot: PolygonLetter) -> str:
     if not spot.mark:
         return spot.letter
     return spot.letter + (spot.mark.translate(_SUBSCRIPTS) if spot.mark.isdigit() else f"_{spot.mark}")
 
 
-def _symbol(symbol: Symbol) -> str:
+def _symbol_text(symbol: Symbol) -> str:
     above = f"^{symbol.superscript}" if symbol.superscript else ""
     if not symbol.subscript:
         return symbol.letter + above

@@ -7,27 +7,27 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from math import hypot
 
-from planar.assemblies.joint_feasibility import Joining, Member
+from planar.assemblies.joint_feasibility import JointFeasibility, Requirement
 from planar.assemblies.modes import modes
 from planar.assemblies.polynomial.completeness import Completeness
 from planar.foundation.errors import NoAnswer
 from planar.foundation.geometry import Vector
-from planar.model.link_graph import farthest_first
-from planar.model.mechanism import Drive, Mechanism, with_inputs
-from planar.model.pairs import Kind, Pair
-from planar.model.wording import quoted
-from planar.solving.assembly.block_assemblies import Candidates
-from planar.solving.assembly.nearest_assembly import Failure, search
-from planar.solving.diagnosis.remedy import Change, mending, moving
-from planar.solving.position import Solver, known_of
+from planar.model.link_graph import pairs_farthest_first
+from planar.model.mechanism import Drive, Mechanism, replace_inputs
+from planar.model.pairs import MeasureKind, Pair
+from planar.model.wording import quote_names
+from planar.solving.assembly.block_assemblies import BlockAssemblies
+from planar.solving.assembly.nearest_assembly import AssemblySearchFailure, find_nearest_assembly
+from planar.solving.diagnosis.remedy import RemedyChange, mending_dimensions, mending_inputs
+from planar.solving.position import PositionSolver, solved_mechanism
 
-MARGIN = 1e-9
+TOO_LONG_MARGIN = 1e-9
 """By so much more a side of a ring is called too long: part of the others together."""
-LARGE = 8
+LARGE_CONFLICT = 8
 """Pairs and inputs: where a set has more, no other is looked for."""
-MOST = 12
+MAX_MOVING_LINKS = 12
 """Moving links among which a conflict is looked for."""
-SEEDS = 6
+MAX_SEED_PAIRS = 6
 """Pairs of the group that stays open about which a smallest set is looked for."""
 
 
@@ -46,27 +46,29 @@ class Conflict:
     "those that these relate: only a dimension of one of them can mend it"
     complete: Completeness
     "how surely there is no position that meets them: whether the list of these is complete"
-    _solver: Solver
-    _failure: Failure
+    _solver: PositionSolver
+    _failure: AssemblySearchFailure
 
     @cached_property
-    def dimensions(self) -> tuple[Change, ...]:
+    def dimensions(self) -> tuple[RemedyChange, ...]:
         """Changes of one dimension each that let the whole go together, the least first of those found."""
-        return tuple(mending(self._solver, self._failure, frozenset(self.links), thorough=True))
+        return tuple(mending_dimensions(self._solver, self._failure, frozenset(self.links), thorough=True))
 
     @cached_property
-    def positions(self) -> tuple[Change, ...]:
+    def positions(self) -> tuple[RemedyChange, ...]:
         """Positions of one input each, the others standing still, with which it goes together: the nearest found."""
-        return tuple(moving(self._solver, self._failure, self.inputs, thorough=True))
+        return tuple(mending_inputs(self._solver, self._failure, self.inputs, thorough=True))
 
     @property
     def said(self) -> tuple[str, ...]:
         """What is in conflict, and how surely."""
-        held = f"pair{'s' * (len(self.pairs) != 1)} {quoted(self.pairs)}"
+        held = f"pair{'s' * (len(self.pairs) != 1)} {quote_names(self.pairs)}"
         if self.inputs:
-            held += f" and the input{'s' * (len(self.inputs) != 1)} at {quoted(self.inputs)}"
+            held += f" and the input{'s' * (len(self.inputs) != 1)} at {quote_names(self.inputs)}"
         others = [given.pair for given in self.mechanism.inputs if given.pair not in self.inputs]
-        moved = f"moving the input{'s' * (len(others) != 1)} at {quoted(others)} does not mend it" if others else ""
+        moved = (
+            f"moving the input{'s' * (len(others) != 1)} at {quote_names(others)} does not mend it" if others else ""
+        )
         if self.complete is Completeness.NOT:
             sure = "no position was found by a search from many starts, which is no proof"
             sure += f"; if there is none, {moved}" if moved else ""
@@ -89,34 +91,34 @@ def conflict(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive]
     """
     if isinstance(drives, Mapping):
         drives = [Drive(pair, position) for pair, position in drives.items()]
-    mechanism = with_inputs(mechanism, tuple(drives))
+    mechanism = replace_inputs(mechanism, tuple(drives))
     if modes(mechanism, certify=False):
         return None
-    solver = known_of(mechanism).solver
-    failure = search(Candidates(solver))
-    joining = Joining(solver)
-    if not isinstance(failure, Failure):
+    solver = solved_mechanism(mechanism).solver
+    failure = find_nearest_assembly(BlockAssemblies(solver))
+    joining = JointFeasibility(solver)
+    if not isinstance(failure, AssemblySearchFailure):
         return None
-    joining.part(joining.members)
-    found: dict[tuple[Member, ...], Completeness] = {}
-    for order in _orders(joining, failure):
-        held = _reduced(joining, order)
+    joining.mark_infeasible(joining.requirements)
+    found: dict[tuple[Requirement, ...], Completeness] = {}
+    for order in _member_orders(joining, failure):
+        held = _irreducible_set(joining, order)
         while held and held not in found:
-            alone = _listed(joining, held)
+            alone = _empty_list_completeness(joining, held)
             if alone is not None:
                 found[held] = alone
             else:
-                joining.meet(held)
-                held = _reduced(joining, order)
-        if len(held) > LARGE:
+                joining.mark_feasible(held)
+                held = _irreducible_set(joining, order)
+        if len(held) > LARGE_CONFLICT:
             break
     if not found:
         return None
     least = min(found, key=len)
     return Conflict(
         mechanism,
-        tuple(each.name for each in least if not each.input),
-        tuple(each.name for each in least if each.input),
+        tuple(each.name for each in least if not each.is_input),
+        tuple(each.name for each in least if each.is_input),
         tuple(link.name for link in mechanism.links if any(link.name in joining.bodies(each) for each in least)),
         found[least],
         solver,
@@ -124,84 +126,86 @@ def conflict(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive]
     )
 
 
-def _orders(joining: Joining, failure: Failure) -> list[list[Member]]:
+def _member_orders(joining: JointFeasibility, failure: AssemblySearchFailure) -> list[list[Requirement]]:
     """All members in several orders: from some pair of the group that stays open, those next to it first."""
     mechanism = joining.setup.mechanism
     entry_of = {pair.name: pair.entry_name() for pair in mechanism.pairs}
     orders = []
     for seed in dict.fromkeys(entry_of[name] for name in (failure.stage.pairs or entry_of)):
         first = next(name for name, entry in entry_of.items() if entry == seed)
-        names = [seed, *(entry_of[name] for name in reversed(farthest_first(mechanism, first)))]
+        names = [seed, *(entry_of[name] for name in reversed(pairs_farthest_first(mechanism, first)))]
         rank = {name: index for index, name in reversed(list(enumerate(names)))}
-        orders.append(sorted(joining.members, key=lambda each: (rank[joining.entry(each)], each.input)))
-    return orders[:SEEDS]
+        orders.append(sorted(joining.requirements, key=lambda each: (rank[joining.entry(each)], each.is_input)))
+    return orders[:MAX_SEED_PAIRS]
 
 
-def _reduced(joining: Joining, order: Sequence[Member]) -> tuple[Member, ...]:
+def _irreducible_set(joining: JointFeasibility, order: Sequence[Requirement]) -> tuple[Requirement, ...]:
     """An irreducible set among members that do not agree, of the first as far as can be; none if it is too large.
 
     Of the first ones that do not agree one after the other is left out that is not needed for that: the deletion
     filter of J. Chinneck, E. Dravnieks, Locating Minimal Infeasible Constraint Sets in Linear Programs, ORSA J.
     Comput. 3, 1991.
     """
-    near = [each for many, each in enumerate(order, start=1) if len(joining.moved(order[:many])) <= MOST]
-    if len(near) < len(order) and joining.agree(near):
+    near = [
+        each for many, each in enumerate(order, start=1) if len(joining.moving_links(order[:many])) <= MAX_MOVING_LINKS
+    ]
+    if len(near) < len(order) and joining.is_feasible(near):
         return ()
     agreeing, not_so = 0, 1
     order = near
-    while not_so < len(order) and joining.agree(order[:not_so]):
+    while not_so < len(order) and joining.is_feasible(order[:not_so]):
         agreeing, not_so = not_so, min(2 * not_so, len(order))
     while not_so - agreeing > 1:
         middle = (agreeing + not_so) // 2
-        agreeing, not_so = (middle, not_so) if joining.agree(order[:middle]) else (agreeing, middle)
+        agreeing, not_so = (middle, not_so) if joining.is_feasible(order[:middle]) else (agreeing, middle)
     held = order[:not_so]
     for each in reversed(order[: not_so - 1]):
         rest = [other for other in held if other != each]
-        if not joining.agree(rest):
+        if not joining.is_feasible(rest):
             held = rest
-    return tuple(each for each in joining.members if each in held)
+    return tuple(each for each in joining.requirements if each in held)
 
 
-def _listed(joining: Joining, members: Sequence[Member]) -> Completeness | None:
+def _empty_list_completeness(joining: JointFeasibility, members: Sequence[Requirement]) -> Completeness | None:
     """How complete the list of positions that meet these is, which is empty; None where it is not."""
-    alone = _alone(joining, members)
+    alone = _mechanism_of(joining, members)
     if alone is None:
         return Completeness.NOT
     try:
         found = modes(alone)
     except NoAnswer:  # some links are free
-        return Completeness.NUMERICALLY if _too_long(joining, alone.pairs) else Completeness.NOT
+        return Completeness.NUMERICALLY if _is_side_too_long(joining, alone.pairs) else Completeness.NOT
     return None if found else found.complete
 
 
-def _too_long(joining: Joining, pairs: Sequence[Pair]) -> bool:
+def _is_side_too_long(joining: JointFeasibility, pairs: Sequence[Pair]) -> bool:
     """Whether these are pins that join links to one ring in which one is longer than all others together."""
     ends: dict[str, list[Vector]] = {}
     for pair in pairs:
-        if not pair.lower or pair.drive_kind is not Kind.ANGLE:
+        if not pair.is_lower_pair or pair.input_kind is not MeasureKind.ANGLE:
             return False
-        for link, point in pair.coincident():
+        for link, point in pair.coincident_points():
             ends.setdefault(link, []).append(joining.setup.shapes[link].points[point])
     if any(len(each) != 2 for each in ends.values()):
         return False
     sides = [hypot(*(one - other)) for one, other in ends.values()]
-    return max(sides) > (sum(sides) - max(sides)) * (1.0 + MARGIN)
+    return max(sides) > (sum(sides) - max(sides)) * (1.0 + TOO_LONG_MARGIN)
 
 
-def _alone(joining: Joining, members: Sequence[Member]) -> Mechanism | None:
+def _mechanism_of(joining: JointFeasibility, members: Sequence[Requirement]) -> Mechanism | None:
     """The mechanism of these alone, without links that dangle; None where an input's pair is not among them."""
     mechanism = joining.setup.mechanism
     held = [link for member in members for link in joining.bodies(member)]
     needed = {link for link in held if held.count(link) > 1} | {mechanism.frame}
     pairs: list[Pair] = []
     for member in members:
-        if not member.input:
+        if not member.is_input:
             group = joining.pairs[member]
-            among = [pair for pair in type(group[0]).motions(group) if needed.issuperset(pair.links)]
+            among = [pair for pair in type(group[0]).relative_motions(group) if needed.issuperset(pair.links)]
             pairs += [pair for pair in among if pair.links[0] == among[0].links[0]]
     links = tuple(link for link in mechanism.links if any(link.name in pair.bodies for pair in pairs))
-    inputs = [member.name for member in members if member.input]
-    if not {Member(joining.entry(member)) for member in members} <= set(members):
+    inputs = [member.name for member in members if member.is_input]
+    if not {Requirement(joining.entry(member)) for member in members} <= set(members):
         return None
     return replace(
         mechanism,

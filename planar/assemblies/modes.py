@@ -13,23 +13,23 @@ from typing import Any, NamedTuple, overload
 import numpy as np
 
 from planar.assemblies.polynomial.completeness import Completeness
-from planar.assemblies.search_tree import WORST, Path, Tree
-from planar.equations.functions import length, placed
+from planar.assemblies.search_tree import BEST_TO_WORST, AssemblyPath, AssemblyTree
+from planar.equations.functions import frames_from_coordinates, slice_length
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.geometry import Frame
 from planar.foundation.notebook_display import Displayable
-from planar.model.link_shapes import Shape
-from planar.model.mechanism import Drive, Mechanism, NamedPoint, named_points, with_inputs
-from planar.model.wording import listed, many
+from planar.model.link_shapes import LinkShape
+from planar.model.mechanism import Drive, Mechanism, NamedPoint, named_points, replace_inputs
+from planar.model.wording import count_phrase, join_all_names
 from planar.results.motion import State
 from planar.solving.diagnosis import refusals
-from planar.solving.position import Solver, known_of, solve
+from planar.solving.position import PositionSolver, solve, solved_mechanism
 
 Array = np.ndarray
 
-MOST = 4096
+MAX_SOLVED_FOR_COUNT = 4096
 """Dyads, or larger groups by what they take, that are solved for the sake of a number alone."""
-MOST_CERTIFIED = 256
+MAX_CERTIFIED_FOR_CLAIM = 256
 """The same, certified, for the sake of a claim about the whole list."""
 
 
@@ -43,14 +43,16 @@ def modes(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = 
     """
     if isinstance(drives, Mapping):
         drives = [Drive(pair, position) for pair, position in drives.items()]
-    solver = known_of(mechanism).solver
-    if any(stage.free for stage in solver.equations.stages):
-        raise refusals.free(solver)
+    solver = solved_mechanism(mechanism).solver
+    if any(stage.is_free for stage in solver.equations.blocks):
+        raise refusals.free_links(solver)
     moved = tuple(drives)
-    return Modes(solver.moved(with_inputs(mechanism, moved)) if moved else solver, mechanism, moved, certify)
+    return Modes(
+        solver.with_inputs_of(replace_inputs(mechanism, moved)) if moved else solver, mechanism, moved, certify
+    )
 
 
-class Group(NamedTuple):
+class ModesBlock(NamedTuple):
     """One group of links that are assembled together, those before it given.
 
     `expected` complex solutions are there by the count for this structure (None: it is not known), `found` of them
@@ -77,22 +79,22 @@ class Modes(Displayable, Sequence["Mode"]):
     do not hang on each other not listed together; else TypeError is raised, and `bound` says how many there may be.
     """
 
-    def __init__(self, solver: Solver, mechanism: Mechanism, drives: tuple[Drive, ...], certify: bool):
-        self._solver, self._source, self._drives = solver, mechanism, drives
+    def __init__(self, solver: PositionSolver, mechanism: Mechanism, drives: tuple[Drive, ...], certify: bool):
+        self._solver, self._source_mechanism, self._drives = solver, mechanism, drives
         self._certify = certify
-        self._missing = certify and find_spec("flint") is None
-        self._tree = Tree(solver, certify and not self._missing)
-        self._bare = Tree(solver, False) if self._tree.certify else self._tree  # to count with
+        self._lacks_certifier = certify and find_spec("flint") is None
+        self._tree = AssemblyTree(solver, certify and not self._lacks_certifier)
+        self._uncertified_tree = AssemblyTree(solver, False) if self._tree.certify else self._tree  # to count with
         self._paths = self._tree.paths()
         self._ended = False
         self._listed: list[Mode] = []
 
     def __repr__(self) -> str:
-        return f"<Modes of {self.mechanism.name!r} {self._solver.at()}>"
+        return f"<Modes of {self.mechanism.name!r} {self._solver.describe_position()}>"
 
     def __reduce__(self) -> tuple[Any, ...]:
         # compiled equations stay in their process: another one lists them again
-        return partial(modes, certify=self._certify), (self._source, self._drives)
+        return partial(modes, certify=self._certify), (self._source_mechanism, self._drives)
 
     @property
     def mechanism(self) -> Mechanism:
@@ -101,7 +103,7 @@ class Modes(Displayable, Sequence["Mode"]):
 
     def __iter__(self) -> Iterator[Mode]:
         number = 0
-        while self._reach(number + 1):
+        while self._list_up_to(number + 1):
             yield self._listed[number]
             number += 1
 
@@ -114,16 +116,16 @@ class Modes(Displayable, Sequence["Mode"]):
             ends = [end for end in (index.start, index.stop) if end is not None]
             if index.stop is None or min(ends) < 0 or (index.step or 1) < 0:
                 return [self[k] for k in range(*index.indices(len(self)))]
-            self._reach(index.stop)
+            self._list_up_to(index.stop)
             return self._listed[index]
         if index < 0:
             index += len(self)
-        if index < 0 or not self._reach(index + 1):
-            raise IndexError(f"there are {many(len(self._listed), 'assembly', 'assemblies')}")
+        if index < 0 or not self._list_up_to(index + 1):
+            raise IndexError(f"there are {count_phrase(len(self._listed), 'assembly', 'assemblies')}")
         return self._listed[index]
 
     def __bool__(self) -> bool:
-        return self._reach(1)
+        return self._list_up_to(1)
 
     def __len__(self) -> int:
         if self.total is None:
@@ -134,11 +136,11 @@ class Modes(Displayable, Sequence["Mode"]):
     @property
     def total(self) -> int | None:
         """How many assemblies there are; None where that cannot be told by solving a few thousand groups."""
-        return len(self._listed) if self._ended else self._counted
+        return len(self._listed) if self._ended else self._counted_total
 
     @cached_property
-    def _counted(self) -> int | None:
-        return self._bare.count(MOST)
+    def _counted_total(self) -> int | None:
+        return self._uncertified_tree.count(MAX_SOLVED_FOR_COUNT)
 
     @property
     def bound(self) -> int | None:
@@ -148,9 +150,9 @@ class Modes(Displayable, Sequence["Mode"]):
     @property
     def _expected(self) -> list[int | None]:
         """Of every group how many complex solutions its structure has."""
-        self._reach(1)
-        solved = [self._tree.solved(index) for index in range(len(self._tree.stages))]
-        return [_most([each.expected for each in of]) if of else None for of in solved]
+        self._list_up_to(1)
+        solved = [self._tree.solved_roots(index) for index in range(len(self._tree.stages))]
+        return [_maximum_if_known([each.expected for each in of]) if of else None for of in solved]
 
     @property
     def complete(self) -> Completeness:
@@ -158,32 +160,32 @@ class Modes(Displayable, Sequence["Mode"]):
 
         All are solved for that, the first few hundred certified; of more than a few thousand it is not known.
         """
-        if self._ended or self._tree.count(MOST_CERTIFIED) is not None:
+        if self._ended or self._tree.count(MAX_CERTIFIED_FOR_CLAIM) is not None:
             return self._tree.complete
-        return Completeness.NOT if self.total is None else self._bare.complete
+        return Completeness.NOT if self.total is None else self._uncertified_tree.complete
 
     @property
-    def groups(self) -> tuple[Group, ...]:
+    def groups(self) -> tuple[ModesBlock, ...]:
         """The groups of links in the order in which they are assembled, with what has been found of them so far."""
-        self._reach(1)
+        self._list_up_to(1)
         found = []
         for index, stage in enumerate(self._tree.stages):
-            solved = self._tree.solved(index)
-            if not solved or not length(stage.unknowns):
+            solved = self._tree.solved_roots(index)
+            if not solved or not slice_length(stage.unknowns):
                 continue
             counts = [each.found for each in solved]
             real = [len(each.real) for each in solved]
-            worst = max(solved, key=lambda each: WORST.index(each.complete))
+            worst = max(solved, key=lambda each: BEST_TO_WORST.index(each.complete))
             found.append(
-                Group(
+                ModesBlock(
                     stage.links,
                     stage.pairs,
-                    _most([each.expected for each in solved]),
+                    _maximum_if_known([each.expected for each in solved]),
                     (min(counts), max(counts)),
                     (min(real), max(real)),
                     worst.complete,
-                    any(each.curve for each in solved),
-                    worst.said,
+                    any(each.has_curve for each in solved),
+                    worst.method,
                     len(solved),
                 )
             )
@@ -195,15 +197,15 @@ class Modes(Displayable, Sequence["Mode"]):
         how: dict[str, list[int]] = {}
         for number, group in enumerate(self.groups, start=1):
             how.setdefault(group.said, []).append(number)
-        told = [f"group{'s' * (len(of) > 1)} {_in_words(of)}: {said}" for said, of in how.items()]
+        told = [f"group{'s' * (len(of) > 1)} {_number_ranges(of)}: {said}" for said, of in how.items()]
         if any(group.curve for group in self.groups):
             told.append(
                 "some links can move while the inputs are held: of each curve of assemblies that was found one place "
                 "is listed, with what goes together there"
             )
-        if self._solver.outline.counts:
+        if self._solver.structure.counts:
             told.append("of angles that count turns the least are taken")
-        if self._missing:
+        if self._lacks_certifier:
             told.append("nothing is certified: that needs python-flint (pip install 'planar[modes]')")
         return tuple(told)
 
@@ -214,43 +216,44 @@ class Modes(Displayable, Sequence["Mode"]):
 
     def refusal(self) -> NoAnswer:
         """The same to be raised, where there is no assembly."""
-        moving = () if self else self._tree.moving()
+        moving = () if self else self._tree.moving_links()
         if moving:
             return NoAnswer(
                 Outcome.CHANGE_POINT,
-                f"{self._solver.at()} {listed(moving)} can move while the inputs are held; what comes after does not "
+                f"{self._solver.describe_position()} {join_all_names(moving)} can move while the inputs are "
+                "held; what comes after does not "
                 f"go together with the places of theirs that were tried, but may with others: move the input, or give "
                 f"one more",
             )
         try:
-            self._solver.state(self._solver.assembly().z)
+            self._solver.state(self._solver.find_assembly().z)
         except NoAnswer as problem:
             return problem
-        return NoAnswer(Outcome.CANNOT_BE_ASSEMBLED, f"{self._solver.at()} no assembly was found")
+        return NoAnswer(Outcome.CANNOT_BE_ASSEMBLED, f"{self._solver.describe_position()} no assembly was found")
 
     @cached_property
     def places(self) -> dict[str, int]:
         """Every named point, and after which of the groups it stands (from 0; -1 where the inputs alone say so)."""
-        return {name: level for name, (level, _, _) in self._solver.outline.places.first.items()}
+        return {name: level for name, (level, _, _) in self._solver.structure.point_locations.first_link.items()}
 
     @cached_property
     def nearest(self) -> Mode | None:
         """The assembly that the sketch means, or to which it leads where inputs are moved; None where it is none."""
         try:
             if self._drives:
-                state = solve(self._source, self._drives)
+                state = solve(self._source_mechanism, self._drives)
                 z = self._solver.coordinates(state.frames, state.own)[list(self._solver.equations.unknowns)]
             else:
-                z = known_of(self._source).assembly.z
+                z = solved_mechanism(self._source_mechanism).assembly.z
         except NoAnswer:
             return None
-        path = self._tree.towards(z)
+        path = self._tree.path_to(z)
         if path is None:
             return None
-        number = self._bare.before(path, MOST)
+        number = self._uncertified_tree.count_before(path, MAX_SOLVED_FOR_COUNT)
         return self._mode(None if number is None else number + 1, path)
 
-    def _reach(self, number: int) -> bool:
+    def _list_up_to(self, number: int) -> bool:
         """Whether there are so many assemblies; they are listed up to there."""
         while len(self._listed) < number:
             try:
@@ -264,14 +267,16 @@ class Modes(Displayable, Sequence["Mode"]):
             self._listed.append(self._mode(len(self._listed) + 1, path))
         return True
 
-    def _mode(self, number: int | None, path: Path) -> Mode:
+    def _mode(self, number: int | None, path: AssemblyPath) -> Mode:
         shown = [
-            rank + 1 for stage, rank in zip(self._tree.stages, path.choices, strict=True) if length(stage.unknowns)
+            rank + 1
+            for stage, rank in zip(self._tree.stages, path.choices, strict=True)
+            if slice_length(stage.unknowns)
         ]
         return Mode(number, tuple(shown), path.certified, path.double, path.z, self._solver)
 
 
-def _in_words(numbers: Sequence[int]) -> str:
+def _number_ranges(numbers: Sequence[int]) -> str:
     """Numbers that rise: 1 to 4, 6 and 8."""
     runs: list[list[int]] = []
     for number in numbers:
@@ -280,10 +285,10 @@ def _in_words(numbers: Sequence[int]) -> str:
         else:
             runs.append([number])
     told = [[f"{run[0]} to {run[-1]}"] if len(run) > 2 else [str(each) for each in run] for run in runs]
-    return listed([each for part in told for each in part])
+    return join_all_names([each for part in told for each in part])
 
 
-def _most(numbers: Sequence[int | None]) -> int | None:
+def _maximum_if_known(numbers: Sequence[int | None]) -> int | None:
     """The greatest number; None where one is not known."""
     known = [each for each in numbers if each is not None]
     return max(known) if len(known) == len(numbers) else None
@@ -302,15 +307,15 @@ class Mode:
     "whether two assemblies meet here: a dead point"
     z: Array
     "(unknowns,) of the equations"
-    _solver: Solver
+    _solver: PositionSolver
 
     def __reduce__(self) -> tuple[Any, ...]:
         # compiled equations stay in their process: another one makes them again
         of = (self.number, self.choices, self.certified, self.double, self.z)
-        return _again, (of, self._solver.mechanism)
+        return _restore_mode, (of, self._solver.mechanism)
 
     @cached_property
-    def _answer(self) -> State | NoAnswer:
+    def _state_or_refusal(self) -> State | NoAnswer:
         try:
             return self._solver.state(self.z, self._solver.mechanism.remarks)
         except NoAnswer as problem:
@@ -319,20 +324,20 @@ class Mode:
     @property
     def state(self) -> State | None:
         """The solved position with its rates; None where these are not determined, for which `reason` says why."""
-        return self._answer if isinstance(self._answer, State) else None
+        return self._state_or_refusal if isinstance(self._state_or_refusal, State) else None
 
     @property
     def outcome(self) -> Outcome:
         """Solved, or why there is no state."""
-        return self._answer.outcome if isinstance(self._answer, NoAnswer) else Outcome.SOLVED
+        return self._state_or_refusal.outcome if isinstance(self._state_or_refusal, NoAnswer) else Outcome.SOLVED
 
     @property
     def reason(self) -> str:
         """Why there is no state; empty where there is one."""
-        return self._answer.reason if isinstance(self._answer, NoAnswer) else ""
+        return self._state_or_refusal.reason if isinstance(self._state_or_refusal, NoAnswer) else ""
 
     @property
-    def shapes(self) -> dict[str, Shape]:
+    def shapes(self) -> dict[str, LinkShape]:
         """The points of every link in its own axes (m)."""
         return self._solver.shapes
 
@@ -340,8 +345,8 @@ class Mode:
     def frames(self) -> dict[str, Frame]:
         """Where every link is (m, rad), without rates."""
         setup = self._solver
-        w = setup.program.coordinates(self.z, setup.station.u, setup.station.p) * setup.scale
-        return placed(w.tolist(), setup.column, setup.shapes, {})[0]
+        w = setup.functions.coordinates(self.z, setup.inputs.u, setup.inputs.p) * setup.scale
+        return frames_from_coordinates(w.tolist(), setup.column, setup.shapes, {})[0]
 
     @cached_property
     def points(self) -> dict[str, Array]:
@@ -349,7 +354,7 @@ class Mode:
 
         def at(named: NamedPoint) -> Array:
             link, point = named.members[0]
-            return np.array([*self.frames[link].carry(self.shapes[link].at(point))], dtype=float)
+            return np.array([*self.frames[link].to_world(self.shapes[link].position(point))], dtype=float)
 
         return {each.name: at(each) for each in named_points(self._solver.mechanism)}
 
@@ -370,6 +375,6 @@ class Mode:
         return replace(self._solver.mechanism, sketch=sketch)
 
 
-def _again(of: tuple[Any, ...], mechanism: Mechanism) -> Mode:
+def _restore_mode(of: tuple[Any, ...], mechanism: Mechanism) -> Mode:
     """A mode where it has been sent to."""
-    return Mode(*of, known_of(mechanism).solver)
+    return Mode(*of, solved_mechanism(mechanism).solver)

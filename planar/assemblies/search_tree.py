@@ -7,27 +7,27 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.assemblies.polynomial.completeness import Completeness, Roots
-from planar.equations.constraint_equations import Stage
-from planar.equations.functions import POLISHED, length
-from planar.model.pairs import Kind
-from planar.solving.assembly.block_assemblies import MEETING, hanging
-from planar.solving.newton import CLOSED
-from planar.solving.prepared_mechanism import Setup
+from planar.assemblies.polynomial.completeness import BlockRoots, Completeness
+from planar.equations.constraint_equations import Block
+from planar.equations.functions import POLISHING_STEPS, slice_length
+from planar.model.pairs import MeasureKind
+from planar.solving.assembly.block_assemblies import MEETING_COSINE_SQUARED, block_dependencies
+from planar.solving.newton import CLOSED_TOLERANCE
+from planar.solving.prepared_mechanism import PreparedMechanism
 
 Array = np.ndarray
 
-WORST = (Completeness.PROVED, Completeness.NUMERICALLY, Completeness.NOT)
+BEST_TO_WORST = (Completeness.PROVED, Completeness.NUMERICALLY, Completeness.NOT)
 """From the best to the worst."""
-SAME, NEAR_DOUBLE = 1e-6, 1e-4
+SAME_ROOT_DISTANCE, SAME_DOUBLE_ROOT_DISTANCE = 1e-6, 1e-4
 """How near to a root unknowns are that root, and one where two meet, which rounding puts farther off."""
-REGULAR = 1e-9
+REGULAR_SINGULAR_VALUE = 1e-9
 """A linear group whose slope is weaker than this part of itself has no single assembly."""
-VANISHES = 1e-12
+JACOBIAN_ROUNDING = 1e-12
 """What is rounding in a slope."""
 
 
-class Path(NamedTuple):
+class AssemblyPath(NamedTuple):
     """One assembly of all groups: which root of each (from 0), the unknowns, and what is known of those roots."""
 
     choices: tuple[int, ...]
@@ -36,58 +36,58 @@ class Path(NamedTuple):
     double: bool
 
 
-class _Counting:
+class _CountingNode:
     """A group on the way of counting: the root that is next, and how many assemblies there are with those before."""
 
     def __init__(self, index: int, key: bytes, real: Array):
         self.index, self.key, self.real = index, key, real
         self.rank = self.total = 0
-        self.stuck = False
+        self.is_over_budget = False
 
 
-class Tree:
+class AssemblyTree:
     """The assemblies of a mechanism at its inputs, group after group; nothing is solved before it is asked for.
 
     A group that hangs on the same choices before it is solved once.
     """
 
-    def __init__(self, setup: Setup, certify: bool):
+    def __init__(self, setup: PreparedMechanism, certify: bool):
         self.setup, self.certify = setup, certify
-        self.stages = setup.equations.stages
-        touched = hanging(setup)
-        self._hangs_on = [np.array(sorted(columns), dtype=int) for columns in touched]
+        self.stages = setup.equations.blocks
+        touched = block_dependencies(setup)
+        self._dependencies = [np.array(sorted(columns), dtype=int) for columns in touched]
         # what is chosen before a group and matters for it or for a later one
-        self._matters: list[Array] = []
+        self._relevant_choices: list[Array] = []
         later: set[int] = set()
         for stage, columns in zip(reversed(self.stages), reversed(touched), strict=True):
             later = {column for column in later | columns if column < stage.unknowns.start}
-            self._matters.append(np.array(sorted(later), dtype=int))
-        self._matters.reverse()
-        self._solved: list[dict[bytes, Roots]] = [{} for _ in self.stages]
-        self._dead: list[set[bytes]] = [set() for _ in self.stages]
+            self._relevant_choices.append(np.array(sorted(later), dtype=int))
+        self._relevant_choices.reverse()
+        self._solved: list[dict[bytes, BlockRoots]] = [{} for _ in self.stages]
+        self._dead_ends: list[set[bytes]] = [set() for _ in self.stages]
         self._counted: list[dict[bytes, int]] = [{} for _ in self.stages]
 
-    def roots(self, index: int, z: Array) -> Roots:
+    def roots(self, index: int, z: Array) -> BlockRoots:
         """The assemblies of one group, the unknowns of those before it in z (unknowns,)."""
-        key = z[self._hangs_on[index]].tobytes()
+        key = z[self._dependencies[index]].tobytes()
         known = self._solved[index]
         if key not in known:
-            known[key] = _solved(self.setup, self.stages[index], z, self.certify)
+            known[key] = _solve_block(self.setup, self.stages[index], z, self.certify)
         return known[key]
 
-    def solved(self, index: int) -> tuple[Roots, ...]:
+    def solved_roots(self, index: int) -> tuple[BlockRoots, ...]:
         """What has been found of one group so far, once for each of the places of those before it."""
         return tuple(self._solved[index].values())
 
     @property
     def complete(self) -> Completeness:
         """How surely what has been solved of the groups is all: of a curve only one place is taken further."""
-        found = [self.solved(index) for index in range(len(self.stages))]
-        if any(each.curve for of in found[:-1] for each in of):
+        found = [self.solved_roots(index) for index in range(len(self.stages))]
+        if any(each.has_curve for of in found[:-1] for each in of):
             return Completeness.NOT
-        return max((each.complete for of in found for each in of), key=WORST.index, default=Completeness.PROVED)
+        return max((each.complete for of in found for each in of), key=BEST_TO_WORST.index, default=Completeness.PROVED)
 
-    def moving(self) -> Sequence[str]:
+    def moving_links(self) -> Sequence[str]:
         """Where there is no assembly: links with a curve of them, of which another place might go on to one.
 
         None of them where some group never goes together that does not hang on any such curve.
@@ -95,23 +95,23 @@ class Tree:
         moving: list[str] = []
         hanging: set[int] = set()
         for index, stage in enumerate(self.stages):
-            if not self._hangs_on[index].size:  # the list may have ended before it came to this one
+            if not self._dependencies[index].size:  # the list may have ended before it came to this one
                 self.roots(index, np.zeros(len(self.setup.equations.unknowns)))
-            found = self.solved(index)
-            if any(each.curve for each in found):
+            found = self.solved_roots(index)
+            if any(each.has_curve for each in found):
                 moving += stage.links
-            elif not hanging.intersection(self._hangs_on[index].tolist()):
+            elif not hanging.intersection(self._dependencies[index].tolist()):
                 if found and not any(len(each.real) for each in found):
                     return ()
                 continue
             hanging.update(range(stage.unknowns.start, stage.unknowns.stop))
         return moving
 
-    def paths(self) -> Iterator[Path]:
+    def paths(self) -> Iterator[AssemblyPath]:
         """All assemblies: of the first group the first, and with it those of the next in order, and so on."""
         z = np.zeros(len(self.setup.equations.unknowns))
         if not self.stages:
-            yield Path((), z, True, False)
+            yield AssemblyPath((), z, True, False)
             return
         # of every group on the way: its roots, the one that is next, and whether an earlier one led to an end
         way: list[list] = [[self.roots(0, z), 0, False]]
@@ -121,7 +121,7 @@ class Tree:
             if rank == len(found.real):
                 way.pop()
                 if not led:
-                    self._dead[depth].add(self._state(depth, z))
+                    self._dead_ends[depth].add(self._choice_key(depth, z))
                 elif way:
                     way[-1][2] = True
                 continue
@@ -130,19 +130,19 @@ class Tree:
             if depth + 1 == len(self.stages):
                 way[-1][2] = True
                 yield self._path(way, z)
-            elif self._state(depth + 1, z) not in self._dead[depth + 1]:
+            elif self._choice_key(depth + 1, z) not in self._dead_ends[depth + 1]:
                 way.append([self.roots(depth + 1, z), 0, False])
 
-    def _path(self, way: list[list], z: Array) -> Path:
+    def _path(self, way: list[list], z: Array) -> AssemblyPath:
         ranks = [(found, rank - 1) for found, rank, _ in way]
-        return Path(
+        return AssemblyPath(
             tuple(rank for _, rank in ranks),
             z.copy(),
             all(bool(found.certified[rank]) for found, rank in ranks),
             any(bool(found.double[rank]) for found, rank in ranks),
         )
 
-    def towards(self, target: Array) -> Path | None:
+    def path_to(self, target: Array) -> AssemblyPath | None:
         """The assembly with given unknowns (unknowns,); None where it is none of these."""
         z = np.zeros_like(target)
         way: list[list] = []
@@ -151,24 +151,24 @@ class Tree:
             if not len(found.real):
                 return None
             own = [self.setup.equations.coordinates[column] for column in self.setup.equations.unknowns[stage.unknowns]]
-            angles = np.array([c.kind is not Kind.LENGTH for c in own], dtype=bool)
+            angles = np.array([c.kind is not MeasureKind.LENGTH for c in own], dtype=bool)
             gaps = found.real - target[stage.unknowns]
             gaps = np.where(angles, np.abs(np.exp(1j * gaps) - 1.0), np.abs(gaps)).max(axis=1, initial=0.0)
             rank = int(np.argmin(gaps))
-            if gaps[rank] > (NEAR_DOUBLE if found.double[rank] else SAME):
+            if gaps[rank] > (SAME_DOUBLE_ROOT_DISTANCE if found.double[rank] else SAME_ROOT_DISTANCE):
                 return None
             z[stage.unknowns] = found.real[rank]
             way.append([found, rank + 1, True])
         return self._path(way, z)
 
-    def before(self, path: Path, most: int) -> int | None:
+    def count_before(self, path: AssemblyPath, most: int) -> int | None:
         """How many assemblies stand before one in order; None where telling takes more than so many dyads solved."""
         z, found, room = np.zeros_like(path.z), 0, [most]
         for depth, rank in enumerate(path.choices):
             real = self.roots(depth, z).real
             for other in range(rank):
                 z[self.stages[depth].unknowns] = real[other]
-                many = self._count(depth + 1, z, room)
+                many = self._count_from(depth + 1, z, room)
                 if many is None:
                     return None
                 found += many
@@ -180,18 +180,18 @@ class Tree:
 
         None where that takes more than so many dyads solved, or what larger groups are in dyads.
         """
-        return self._count(0, np.zeros(len(self.setup.equations.unknowns)), [most])
+        return self._count_from(0, np.zeros(len(self.setup.equations.unknowns)), [most])
 
-    def _count(self, first: int, z: Array, room: list[int]) -> int | None:
+    def _count_from(self, first: int, z: Array, room: list[int]) -> int | None:
         """How many assemblies the groups from one on have; `room` runs down as groups are solved."""
         z = z.copy()
-        way: list[_Counting] = []
-        many = self._counting(first, z, way, room)
+        way: list[_CountingNode] = []
+        many = self._count_or_push(first, z, way, room)
         while way:
             here = way[-1]
             if many is not None:
                 here.total += many
-            elif here.stuck:
+            elif here.is_over_budget:
                 return None
             if here.rank == len(here.real):
                 self._counted[here.index][here.key] = many = here.total
@@ -199,45 +199,45 @@ class Tree:
                 continue
             z[self.stages[here.index].unknowns] = here.real[here.rank]
             here.rank += 1
-            many = self._counting(here.index + 1, z, way, room)
+            many = self._count_or_push(here.index + 1, z, way, room)
         return many
 
-    def _counting(self, index: int, z: Array, way: list[_Counting], room: list[int]) -> int | None:
+    def _count_or_push(self, index: int, z: Array, way: list[_CountingNode], room: list[int]) -> int | None:
         """How many the groups from one on have if that is known, else the group is put on the way to be counted."""
         if index == len(self.stages):
             return 1
-        key = self._state(index, z)
+        key = self._choice_key(index, z)
         if key not in self._counted[index]:
-            room[0] -= max(1, length(self.stages[index].unknowns) ** 3 // 8)
+            room[0] -= max(1, slice_length(self.stages[index].unknowns) ** 3 // 8)
             if room[0] >= 0:
-                way.append(_Counting(index, key, self.roots(index, z).real))
+                way.append(_CountingNode(index, key, self.roots(index, z).real))
             elif way:
-                way[-1].stuck = True
+                way[-1].is_over_budget = True
             return None
         return self._counted[index][key]
 
-    def _state(self, index: int, z: Array) -> bytes:
+    def _choice_key(self, index: int, z: Array) -> bytes:
         """What of the choices before a group matters for it and for all later ones."""
-        return z[self._matters[index]].tobytes()
+        return z[self._relevant_choices[index]].tobytes()
 
 
-def _solved(setup: Setup, stage: Stage, z: Array, certify: bool) -> Roots:
+def _solve_block(setup: PreparedMechanism, stage: Block, z: Array, certify: bool) -> BlockRoots:
     """One group: nothing to choose, one linear solution, two in closed form, or a larger group."""
-    if not length(stage.unknowns):
-        left, _ = setup.program.closed(stage)(z, setup.station.u, setup.station.p)
-        stands = int(np.abs(left).max(initial=0.0) <= CLOSED)
-        return _known(np.zeros((stands, 0)), stands, "it stands with the others")
-    known = _linear(setup, stage, z) or _dyad(setup, stage, z)
+    if not slice_length(stage.unknowns):
+        left, _ = setup.functions.block_call(stage)(z, setup.inputs.u, setup.inputs.p)
+        stands = int(np.abs(left).max(initial=0.0) <= CLOSED_TOLERANCE)
+        return _uncertified_roots(np.zeros((stands, 0)), stands, "it stands with the others")
+    known = _linear_roots(setup, stage, z) or _dyad_roots(setup, stage, z)
     if known is not None and not certify:
         return known
     # positions of dyads alone are told without what larger groups need
-    from planar.assemblies.block_roots import roots
+    from planar.assemblies.block_roots import block_roots
 
-    found = roots(setup, stage, z, certify)
-    return found if known is None else _ordered(known, found)
+    found = block_roots(setup, stage, z, certify)
+    return found if known is None else _in_known_order(known, found)
 
 
-def _ordered(known: Roots, found: Roots) -> Roots:
+def _in_known_order(known: BlockRoots, found: BlockRoots) -> BlockRoots:
     """What has been found and certified, in the order of what was known before, which stays as the group moves."""
     if len(known.real) != len(found.real) or found.complete is Completeness.NOT:
         return known
@@ -248,62 +248,62 @@ def _ordered(known: Roots, found: Roots) -> Roots:
     return found._replace(real=found.real[order], double=found.double[order], certified=found.certified[order])
 
 
-def _known(real: Array, expected: int, said: str) -> Roots:
+def _uncertified_roots(real: Array, expected: int, said: str) -> BlockRoots:
     """What follows from the form of the equations; that it is so in these numbers only rounding stands for."""
     none = np.zeros(len(real), dtype=bool)
-    return Roots(real, none, none, expected, expected, Completeness.NUMERICALLY, False, said)
+    return BlockRoots(real, none, none, expected, expected, Completeness.NUMERICALLY, False, said)
 
 
-def straight(setup: Setup, stage: Stage, z: Array) -> bool:
+def is_linear(setup: PreparedMechanism, stage: Block, z: Array) -> bool:
     """Whether the slope of a group does not depend on its own unknowns, those before it given in z (unknowns,)."""
-    rng, closing, many = np.random.default_rng(0), _closing(setup, stage, z), length(stage.unknowns)
+    rng, closing, many = np.random.default_rng(0), _residual_function(setup, stage, z), slice_length(stage.unknowns)
     slope = closing(np.zeros(many))[1]
     others = (closing(rng.uniform(0.5, 2.0, many))[1] for _ in range(2))
-    return all(np.abs(other - slope).max(initial=0.0) <= VANISHES for other in others)
+    return all(np.abs(other - slope).max(initial=0.0) <= JACOBIAN_ROUNDING for other in others)
 
 
-def _closing(setup: Setup, stage: Stage, z: Array) -> Callable[[Array], tuple[Array, Array]]:
+def _residual_function(setup: PreparedMechanism, stage: Block, z: Array) -> Callable[[Array], tuple[Array, Array]]:
     """What a group leaves open (rows,) and its slope (rows, unknowns) at its own unknowns."""
 
     def closing(own: Array) -> tuple[Array, Array]:
         whole = z.copy()
         whole[stage.unknowns] = own
-        left, slope = setup.program.closed(stage)(whole, setup.station.u, setup.station.p)
+        left, slope = setup.functions.block_call(stage)(whole, setup.inputs.u, setup.inputs.p)
         return left[0], slope.T
 
     return closing
 
 
-def _linear(setup: Setup, stage: Stage, z: Array) -> Roots | None:
+def _linear_roots(setup: PreparedMechanism, stage: Block, z: Array) -> BlockRoots | None:
     """The one assembly of a group whose constraints are linear in its unknowns; None where they are not."""
-    e, many = setup.equations, length(stage.unknowns)
+    e, many = setup.equations, slice_length(stage.unknowns)
     rows = e.rows[stage.rows]
-    if len(rows) != many or (many > 1 and any(row.kind is Kind.ANGLE for row in rows)):
+    if len(rows) != many or (many > 1 and any(row.kind is MeasureKind.ANGLE for row in rows)):
         return None
 
-    closing = _closing(setup, stage, z)
+    closing = _residual_function(setup, stage, z)
     at = np.zeros(many)
     left, slope = closing(at)
-    if not straight(setup, stage, z):
+    if not is_linear(setup, stage, z):
         return None
     values = np.linalg.svd(slope, compute_uv=False)
-    turns = any(row.kind is Kind.ANGLE for row in rows) and abs(abs(slope[0, 0]) - 1.0) > VANISHES
-    if values[-1] < REGULAR * max(1.0, values[0]) or turns:
+    turns = any(row.kind is MeasureKind.ANGLE for row in rows) and abs(abs(slope[0, 0]) - 1.0) > JACOBIAN_ROUNDING
+    if values[-1] < REGULAR_SINGULAR_VALUE * max(1.0, values[0]) or turns:
         return None
-    for _ in range(POLISHED):
+    for _ in range(POLISHING_STEPS):
         at = at - np.linalg.solve(slope, left)
         left, _ = closing(at)
-    if np.abs(left).max() > CLOSED:
+    if np.abs(left).max() > CLOSED_TOLERANCE:
         return None
-    return _known(at[None], 1, "its equations are linear")
+    return _uncertified_roots(at[None], 1, "its equations are linear")
 
 
-def _dyad(setup: Setup, stage: Stage, z: Array) -> Roots | None:
+def _dyad_roots(setup: PreparedMechanism, stage: Block, z: Array) -> BlockRoots | None:
     """The two assemblies of a group with a closed form, always in the same order; None where they all but meet."""
-    form = setup.program.assemblies(stage)
+    form = setup.functions.block_assemblies(stage)
     if form is None:
         return None
-    both, left, bend = form(z, setup.station.u, setup.station.p)
-    if bend < MEETING and left <= CLOSED:
-        return _known(np.array(both), 2, "in closed form")
-    return _known(np.zeros((0, 2)), 2, "in closed form") if bend > 2.0 - MEETING else None
+    both, left, bend = form(z, setup.inputs.u, setup.inputs.p)
+    if bend < MEETING_COSINE_SQUARED and left <= CLOSED_TOLERANCE:
+        return _uncertified_roots(np.array(both), 2, "in closed form")
+    return _uncertified_roots(np.zeros((0, 2)), 2, "in closed form") if bend > 2.0 - MEETING_COSINE_SQUARED else None

@@ -8,42 +8,42 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from planar.assemblies.polynomial.completeness import Completeness
-from planar.assemblies.search_tree import Tree
+from planar.assemblies.search_tree import AssemblyTree
 from planar.foundation.errors import BadInput, NoAnswer
 from planar.model.mechanism import Mechanism
-from planar.model.wording import many
-from planar.solving.position import known_of, solve
+from planar.model.wording import count_phrase
+from planar.solving.position import solve, solved_mechanism
 
 if TYPE_CHECKING:
     from planar.assemblies.modes import Mode, Modes
 
-NEAR = 1e-6
+SAME_POINT_TOLERANCE = 1e-6
 """Places of points are the same within this part of the greatest coordinate."""
 
-FEW = 32
+MAX_SOLVED_FOR_REMARK = 32
 """Dyads, or larger groups by what they take, that are solved with every position for the sake of a remark."""
 
 
-def numbered(mechanism: Mechanism) -> Mechanism:
+def with_assembly_number(mechanism: Mechanism) -> Mechanism:
     """The mechanism with a remark of which assembly the sketch means, where that is told within some milliseconds.
 
     Where there is nothing to choose, or the numbers are not sure, the mechanism as it is.
     """
-    known = known_of(mechanism)
-    stages = known.solver.equations.stages
-    if len(stages) > FEW:
+    known = solved_mechanism(mechanism)
+    stages = known.solver.equations.blocks
+    if len(stages) > MAX_SOLVED_FOR_REMARK:
         return mechanism
     try:
         z = known.assembly.z
     except NoAnswer:
         return mechanism  # as it will be said
-    tree = Tree(known.solver, certify=False)
-    total = tree.count(FEW)
+    tree = AssemblyTree(known.solver, certify=False)
+    total = tree.count(MAX_SOLVED_FOR_REMARK)
     if total is None or total < 2:
         return mechanism
-    path = tree.towards(z)
-    before = None if path is None else tree.before(path, FEW)
-    solved = (each for index in range(len(stages)) for each in tree.solved(index))
+    path = tree.path_to(z)
+    before = None if path is None else tree.count_before(path, MAX_SOLVED_FOR_REMARK)
+    solved = (each for index in range(len(stages)) for each in tree.solved_roots(index))
     if before is None or any(each.complete is Completeness.NOT for each in solved):
         return mechanism
     why = "the nearest to the sketch" if mechanism.sketch else "without a sketch"
@@ -53,7 +53,7 @@ def numbered(mechanism: Mechanism) -> Mechanism:
     return replace(mechanism, remarks=(*mechanism.remarks, told))
 
 
-def chosen(mechanism: Mechanism, number: int) -> Mechanism:
+def select_assembly(mechanism: Mechanism, number: int) -> Mechanism:
     """The mechanism with the assembly of a number as its sketch, and a remark that says so.
 
     What a book prints of another assembly is left out. Raises BadInput where there are not so many, NoAnswer where
@@ -67,14 +67,14 @@ def chosen(mechanism: Mechanism, number: int) -> Mechanism:
     try:
         mode = found[number - 1]
     except IndexError:
-        raise BadInput("--mode", f"{_of(found)}; see `planar modes`") from None
+        raise BadInput("--mode", f"{_count_sentence(found)}; see `planar modes`") from None
     near = found.nearest
     own = near is not None and near.choices == mode.choices
-    told = f"assembly {number}: {_of(found)}, {found.complete.value}"
+    told = f"assembly {number}: {_count_sentence(found)}, {found.complete.value}"
     if not own and near is not None and near.number is not None:
         told += f"; the sketch means number {near.number}"
     kept = mode.mechanism
-    if not _leads_back(kept, mode):
+    if not _is_solved_to(kept, mode):
         raise BadInput(
             "--mode",
             f"a sketch of assembly {number} is solved to another one: the two lie near each other, or differ in turns",
@@ -82,18 +82,20 @@ def chosen(mechanism: Mechanism, number: int) -> Mechanism:
     return replace(kept, remarks=(*kept.remarks, told), published=kept.published if own else ())
 
 
-def _leads_back(kept: Mechanism, mode: Mode) -> bool:
+def _is_solved_to(kept: Mechanism, mode: Mode) -> bool:
     """Whether a mechanism is solved to the assembly that is its sketch; one whose angles count turns may not be."""
     try:
         state = solve(kept)
     except NoAnswer:
         return True  # as it will be said
     gaps = [np.abs(state.point(name).position - at).max() for name, at in mode.points.items()]
-    return max(gaps, default=0.0) <= NEAR * (max(float(np.abs(at).max()) for at in mode.points.values()) or 1.0)
+    return max(gaps, default=0.0) <= SAME_POINT_TOLERANCE * (
+        max(float(np.abs(at).max()) for at in mode.points.values()) or 1.0
+    )
 
 
-def _of(found: Modes) -> str:
+def _count_sentence(found: Modes) -> str:
     if found.total is None:
         return "there are more than can be counted here"
     are = "is" if found.total == 1 else "are"
-    return f"there {are} {many(found.total, 'assembly', 'assemblies')}"
+    return f"there {are} {count_phrase(found.total, 'assembly', 'assemblies')}"

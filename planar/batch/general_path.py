@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
-from planar.model.link_shapes import Unplaced
+from planar.model.link_shapes import PointPlacementError
 from planar.model.mechanism import Mechanism
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
@@ -16,23 +16,23 @@ Array = np.ndarray
 
 OUTCOMES = tuple(Outcome)
 """What the integers of a status stand for: 0 is solved."""
-ON_GRID = 1e-9
+GRID_TOLERANCE = 1e-9
 """rad or sizes by which a row may be off the grid."""
 
 
-class Solved(NamedTuple):
+class SolvedDesign(NamedTuple):
     """One design: positions of the running input (rows,), the points (rows, 2 a point and order; m, s), the status of
     every row, and what there is to say."""
 
     input: Array
     out: Array
     status: Array
-    said: str
+    message: str
 
 
-def solve_one(
+def solve_design(
     mechanism: Mechanism, pair: str, grid: Array | None, steps: int, range_: tuple, points: tuple[str, ...], rates: bool
-) -> Solved:
+) -> SolvedDesign:
     """A design over a grid of positions (rows,) of its running input, or, without one, over a range of its own.
 
     `range_` is the start and the stop that the cycle is asked for. Never raises NoAnswer: the status says it.
@@ -44,24 +44,24 @@ def solve_one(
         motion = cycle(mechanism, steps, *range_, pair)
     except NoAnswer as problem:
         status[:] = OUTCOMES.index(problem.outcome)
-        return Solved(input_, out, status, str(problem))
-    except (BadInput, Unplaced) as problem:
+        return SolvedDesign(input_, out, status, str(problem))
+    except (BadInput, PointPlacementError) as problem:
         status[:] = OUTCOMES.index(Outcome.CANNOT_BE_ASSEMBLED)
-        return Solved(input_, out, status, str(problem))
+        return SolvedDesign(input_, out, status, str(problem))
     position = motion.inputs[pair].position
     if grid is None:
         input_[: len(position)] = position[: steps + 1]
         many = min(len(position), steps + 1)
     else:
         both = min(len(position), steps + 1)
-        off = np.abs(position[:both] - grid[:both]) > ON_GRID * max(1.0, float(np.max(np.abs(grid))))
+        off = np.abs(position[:both] - grid[:both]) > GRID_TOLERANCE * max(1.0, float(np.max(np.abs(grid))))
         many = int(np.argmax(off)) if off.any() else both
-    out[:many] = _told(motion, points, rates)[:many]
+    out[:many] = _point_rows(motion, points, rates)[:many]
     status[many:] = OUTCOMES.index(motion.outcome)
-    return Solved(input_, out, status, motion.reason if many <= steps else "")
+    return SolvedDesign(input_, out, status, motion.reason if many <= steps else "")
 
 
-def _told(motion: Motion, points: tuple[str, ...], rates: bool) -> Array:
+def _point_rows(motion: Motion, points: tuple[str, ...], rates: bool) -> Array:
     found = [motion.point(name) for name in points]
     orders = ("position", "velocity", "acceleration") if rates else ("position",)
     if not found:

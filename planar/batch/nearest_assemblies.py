@@ -7,38 +7,43 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.march.backend import Closed, Closing, March, NotMarched
-from planar.batch.reference_design import Base, spread
-from planar.equations.constraint_equations import Stage
-from planar.equations.functions import length
-from planar.model.link_shapes import Shape
-from planar.solving.assembly.block_assemblies import CLEAR, SAME, Candidates
-from planar.solving.assembly.nearest_assembly import ALIKE
+from planar.batch.march.backend import AssemblyCorrector, CorrectedAssemblies, DesignBatch, UnsupportedStructure
+from planar.batch.reference_design import ReferenceDesign, stack_rows
+from planar.equations.constraint_equations import Block
+from planar.equations.functions import slice_length
+from planar.model.link_shapes import LinkShape
+from planar.solving.assembly.block_assemblies import CLEAR_SKETCH_DISTANCE, SAME_ASSEMBLY_TOLERANCE, BlockAssemblies
+from planar.solving.assembly.nearest_assembly import EQUAL_DISTANCE_TOLERANCE
 
 Array = np.ndarray
 
 CORRECTIONS = 6
 """Newton's steps from the assembly of the base."""
-REGULAR = 0.2
+CLEAR_REGULARITY = 0.2
 """The volume that the columns of a slope span, each of length one, from which on no other assembly is near."""
-NEAR = 0.15
+NEAR_SKETCH = 0.15
 """Lengths of the size, on average, from the sketch: a large group that lies farther off may have another assembly that
 is
 nearer, of which no start tells."""
-MOST = 4
+MAX_BLOCK_UNKNOWNS = 4
 """Unknowns of the largest group whose regularity a backend tells as that volume."""
 
 
-class Nearby(NamedTuple):
+class NearestAssemblies(NamedTuple):
     """z (unknowns, designs), and which of the designs are clearly meant to be assembled so (designs,)."""
 
     z: Array
-    clear: Array
+    is_clear: Array
 
 
-def nearby(
-    base: Base, shapes: Mapping[str, Shape], p: Array, u: Array, tolerance: float, close: Closing
-) -> Nearby | None:
+def find_nearest_assemblies(
+    reference: ReferenceDesign,
+    shapes: Mapping[str, LinkShape],
+    p: Array,
+    u: Array,
+    tolerance: float,
+    corrector: AssemblyCorrector,
+) -> NearestAssemblies | None:
     """The assemblies at inputs u (inputs, designs); None where the sketch does not show every group, or `close` cannot.
 
     Costs never fall: where the nearest assembly is taken of every group, and each group's next one alone would cost
@@ -46,47 +51,53 @@ def nearby(
     many as
     the base has, if they are found again, or it lies where it does at the sketch, and so regular that no other is near.
     """
-    candidates = base.candidates
-    stages = [stage for stage in base.program.equations.stages if length(stage.unknowns)]
-    at = {stage.level: candidates.sketched_at.get(stage.level, ()) for stage in stages}
-    if candidates.counts or any(length(stage.unknowns) > MOST or not at[stage.level] for stage in stages):
+    candidates = reference.candidates
+    stages = [stage for stage in reference.functions.equations.blocks if slice_length(stage.unknowns)]
+    at = {stage.block_index: candidates.sketched_by_level.get(stage.block_index, ()) for stage in stages}
+    if candidates.counts_turns or any(
+        slice_length(stage.unknowns) > MAX_BLOCK_UNKNOWNS or not at[stage.block_index] for stage in stages
+    ):
         return None
     try:
-        return _Near(base, shapes, p, u, tolerance, close, candidates, stages).found()
-    except NotMarched:
+        return _NearestAssemblySearch(reference, shapes, p, u, tolerance, corrector, candidates, stages).search()
+    except UnsupportedStructure:
         return None
 
 
-class _Near:
+class _NearestAssemblySearch:
     def __init__(
         self,
-        base: Base,
-        shapes: Mapping[str, Shape],
+        base: ReferenceDesign,
+        shapes: Mapping[str, LinkShape],
         p: Array,
         u: Array,
         tolerance: float,
-        close: Closing,
-        candidates: Candidates,
-        stages: list[Stage],
+        close: AssemblyCorrector,
+        candidates: BlockAssemblies,
+        stages: list[Block],
     ):
-        self.many, self.close, self.stages = p.shape[1], close, stages
-        at = candidates.sketched_at
+        self.design_count, self.corrector, self.blocks = p.shape[1], close, stages
+        at = candidates.sketched_by_level
         self.roots = {
-            stage.level: each for stage, each in zip(base.program.equations.stages, base.roots(), strict=True)
+            stage.block_index: each
+            for stage, each in zip(base.functions.equations.blocks, base.block_assemblies(), strict=True)
         }
-        self.names = [name for stage in stages for name in at[stage.level]]
-        self.levels = tuple(stage.level for stage in stages for _ in at[stage.level])
+        self.names = [name for stage in stages for name in at[stage.block_index]]
+        self.point_blocks = tuple(stage.block_index for stage in stages for _ in at[stage.block_index])
         self.sketch = np.array([candidates.sketch[name] for name in self.names]).reshape(-1, 2, 1)
-        members = [candidates.first[name][1:] for name in self.names]
-        q = spread([part for link, point in members for part in shapes[link].at(point)], self.many) / base.unit
+        members = [candidates.first_link[name][1:] for name in self.names]
+        q = (
+            stack_rows([part for link, point in members for part in shapes[link].position(point)], self.design_count)
+            / base.unit
+        )
         links = tuple(link for link, _ in members)
         start = np.concatenate([np.zeros(0), *(roots[0] for roots, _ in self.roots.values() if len(roots))])
-        self.march = March(
-            base.program,
+        self.batch = DesignBatch(
+            base.functions,
             base.mechanism,
             p,
             q,
-            np.repeat(start[:, None], self.many, axis=1),
+            np.repeat(start[:, None], self.design_count, axis=1),
             np.zeros((1, len(u))),
             u,
             u,
@@ -97,37 +108,44 @@ class _Near:
             base.unit,
         )
 
-    def found(self) -> Nearby:
+    def search(self) -> NearestAssemblies:
         """See `nearby`."""
-        found = self.close(self.march, self.levels, CORRECTIONS)
-        costs, others = (np.square(places - self.sketch).sum(axis=1) for places in (found.points, found.others))
-        clear, total, before = found.closed.copy(), costs.sum(axis=0), np.zeros(self.many)
-        for stage in self.stages:
-            own = np.array(self.levels) == stage.level
+        found = self.corrector(self.batch, self.point_blocks, CORRECTIONS)
+        costs, others = (np.square(places - self.sketch).sum(axis=1) for places in (found.points, found.other_points))
+        clear, total, before = found.converged.copy(), costs.sum(axis=0), np.zeros(self.design_count)
+        for stage in self.blocks:
+            own = np.array(self.point_blocks) == stage.block_index
             cost, other = costs[own].sum(axis=0), others[own].sum(axis=0)
             if np.all(np.isinf(other)):
-                clear &= (cost <= np.count_nonzero(own) * NEAR**2) & (found.regular > REGULAR)
-                near = cost <= np.count_nonzero(own) * CLEAR**2
-                clear &= near if near.all() else near | (before + self._next(stage, found, own) > total + ALIKE)
+                clear &= (cost <= np.count_nonzero(own) * NEAR_SKETCH**2) & (found.regularity > CLEAR_REGULARITY)
+                near = cost <= np.count_nonzero(own) * CLEAR_SKETCH_DISTANCE**2
+                clear &= (
+                    near
+                    if near.all()
+                    else near | (before + self._next_cost(stage, found, own) > total + EQUAL_DISTANCE_TOLERANCE)
+                )
             else:
-                clear &= before + other > total + ALIKE
+                clear &= before + other > total + EQUAL_DISTANCE_TOLERANCE
             before += cost
-        return Nearby(found.z, clear)
+        return NearestAssemblies(found.z, clear)
 
-    def _next(self, stage: Stage, found: Closed, own: Array) -> Array:
+    def _next_cost(self, stage: Block, found: CorrectedAssemblies, own: Array) -> Array:
         """The least cost of a group's other assemblies (designs,); nothing where not as many are found as it has."""
-        roots, most = self.roots[stage.level]
-        least, known = np.full(self.many, np.inf), [found.z[stage.unknowns]]
-        count = np.ones(self.many, dtype=int)
+        roots, most = self.roots[stage.block_index]
+        least, known = np.full(self.design_count, np.inf), [found.z[stage.unknowns]]
+        count = np.ones(self.design_count, dtype=int)
         for root in roots[1:]:
-            self.march.z0[stage.unknowns] = root[:, None]
-            other = self.close(self.march, self.levels, CORRECTIONS)
+            self.batch.z0[stage.unknowns] = root[:, None]
+            other = self.corrector(self.batch, self.point_blocks, CORRECTIONS)
             z = other.z[stage.unknowns]
-            apart = [~(np.max(np.abs(np.exp(1j * z) - np.exp(1j * each)), axis=0) <= SAME) for each in known]
-            new = other.closed & np.all(apart, axis=0)
+            apart = [
+                ~(np.max(np.abs(np.exp(1j * z) - np.exp(1j * each)), axis=0) <= SAME_ASSEMBLY_TOLERANCE)
+                for each in known
+            ]
+            new = other.converged & np.all(apart, axis=0)
             cost = np.square(other.points - self.sketch)[own].sum(axis=(0, 1))
             least = np.where(new, np.minimum(least, cost), least)
             count += new
             known.append(np.where(new, z, np.nan))
-        self.march.z0[stage.unknowns] = roots[0][:, None]
+        self.batch.z0[stage.unknowns] = roots[0][:, None]
         return np.where(count == most, least, -np.inf)

@@ -8,103 +8,103 @@ from itertools import combinations
 
 import numpy as np
 
-from planar.batch.design_arrays import liftable
-from planar.document.cursor import did_you_mean
-from planar.equations.functions import scaled
+from planar.batch.design_arrays import design_variables
+from planar.document.cursor import suggest_spelling
+from planar.equations.functions import scale_lengths
 from planar.foundation.errors import BadInput
 from planar.foundation.jets import Scalar
 from planar.model.dimensions import Dimension
-from planar.model.link_shapes import Shape, shape
+from planar.model.link_shapes import LinkShape, link_shape
 from planar.model.mechanism import (
     Drive,
     Mechanism,
     NamedPoint,
     named_points,
-    running_input,
-    with_inputs,
+    replace_inputs,
+    running_input_index,
 )
-from planar.model.pairs import Kind
+from planar.model.pairs import MeasureKind
 from planar.model.pairs.base import Pair
-from planar.solving.assembly.block_assemblies import Candidates
+from planar.solving.assembly.block_assemblies import BlockAssemblies
 from planar.solving.checks.residual_check import EPS, SHORT_ARM
-from planar.solving.position import Solver
+from planar.solving.position import PositionSolver
 
 Array = np.ndarray
 
-MOST_ROOTS = 16
+MAX_ROOTS = 16
 """Assemblies of the base from which those of its designs are looked for."""
 
 
-class Base:
+class ReferenceDesign:
     """A mechanism one of whose inputs runs while the others stand still, before its designs change it."""
 
     def __init__(self, mechanism: Mechanism, pair: str | None):
         names = [given.pair for given in mechanism.inputs]
-        self.index = running_input(mechanism, pair)
-        self.pair = names[self.index]
+        self.running_index = running_input_index(mechanism, pair)
+        self.pair = names[self.running_index]
         still = tuple(Drive(name, None, 0.0, 0.0) for name in names if name != self.pair)
-        self.mechanism = with_inputs(mechanism, still)
-        self.solver = Solver(self.mechanism)
-        self.unit, self.program = self.solver.unit, self.solver.program
-        self.slides = self.solver.slides(self.pair)
-        self.scale = np.array([self.unit if self.solver.slides(name) else 1.0 for name in names])
+        self.mechanism = replace_inputs(mechanism, still)
+        self.solver = PositionSolver(self.mechanism)
+        self.unit, self.functions = self.solver.unit, self.solver.functions
+        self.is_sliding = self.solver.is_sliding(self.pair)
+        self.input_scale = np.array([self.unit if self.solver.is_sliding(name) else 1.0 for name in names])
         self.points = {each.name: each for each in named_points(mechanism)}
 
     @cached_property
-    def candidates(self) -> Candidates:
+    def candidates(self) -> BlockAssemblies:
         """The assemblies of the base's groups."""
-        return Candidates(self.solver)
+        return BlockAssemblies(self.solver)
 
     @property
-    def marched(self) -> bool:
+    def can_run_backend(self) -> bool:
         """Whether a backend can run the structure: every group closes once, and no contact is kept closed by others."""
-        watched = any(type(pair).apart is not Pair.apart for pair in self.mechanism.pairs)
-        return self.program.square and not watched
+        watched = any(type(pair).contact_gap is not Pair.contact_gap for pair in self.mechanism.pairs)
+        return self.functions.is_square and not watched
 
     @property
-    def moved(self) -> dict[str, NamedPoint]:
+    def moving_points(self) -> dict[str, NamedPoint]:
         """The points that do not lie on the frame."""
         frame = self.mechanism.frame
         return {name: each for name, each in self.points.items() if frame not in dict(each.members)}
 
-    def wanted(self, points: object) -> tuple[str, ...]:
+    def select_points(self, points: object) -> tuple[str, ...]:
         """The result names of points, given by those or as `link.point`; all that move where none are. BadInput."""
         if points is None:
-            return tuple(self.moved)
+            return tuple(self.moving_points)
         given = [points] if isinstance(points, str) else list(points)  # type: ignore[call-overload]
         members = {f"{link}.{point}": name for name, each in self.points.items() for link, point in each.members}
         known = members | {name: name for name in self.points}
         for each in given:
             if each not in known:
-                meant = did_you_mean(str(each), known, cutoff=0.5) or f"; points are {', '.join(self.points)}"
+                meant = suggest_spelling(str(each), known, cutoff=0.5) or f"; points are {', '.join(self.points)}"
                 raise BadInput("points", f"there is no point {each!r:.60}{meant}")
         return tuple(dict.fromkeys(known[each] for each in given))
 
-    def member(self, name: str) -> tuple[str, str]:
+    def point_member(self, name: str) -> tuple[str, str]:
         """The (link, point) by which a point is told: on the frame where it lies there."""
         members = self.points[name].members
         return next((each for each in members if each[0] == self.mechanism.frame), members[0])
 
-    def shapes(self, designs: Mechanism) -> dict[str, Shape]:
+    def shapes(self, designs: Mechanism) -> dict[str, LinkShape]:
         """The shapes of the links of all designs at once (m): numbers where they agree, arrays where they do not."""
         own = {link.name: link for link in self.mechanism.links}
         with np.errstate(invalid="ignore", divide="ignore"):  # what cannot be placed is not a number, and judged later
             return {
-                link.name: self.solver.shapes[link.name] if link is own[link.name] else shape(link)
+                link.name: self.solver.shapes[link.name] if link is own[link.name] else link_shape(link)
                 for link in designs.links
             }
 
-    def numbers(self, shapes: Mapping[str, Shape], many: int) -> Array:
+    def pair_numbers(self, shapes: Mapping[str, LinkShape], many: int) -> Array:
         """p (numbers, designs), lengths in units of the base's size."""
         rows: list[Scalar] = []
         for pair in self.mechanism.pairs:
-            rows += scaled(pair.measure([shapes[link] for link in pair.bodies]), pair.measures, self.unit)
-        return spread(rows, many)
+            rows += scale_lengths(pair.measure([shapes[link] for link in pair.bodies]), pair.number_kinds, self.unit)
+        return stack_rows(rows, many)
 
     def tolerance(self, p: Array) -> float:
         """What the gate lets pass for these designs: as `Gate.tolerance`, with the greatest length of any of them."""
-        kinds = [kind for pair in self.mechanism.pairs for kind in pair.measures]
-        lengths = np.array([kind is Kind.LENGTH for kind in kinds], dtype=bool)
+        kinds = [kind for pair in self.mechanism.pairs for kind in pair.number_kinds]
+        lengths = np.array([kind is MeasureKind.LENGTH for kind in kinds], dtype=bool)
         reach = float(np.nanmax(np.abs(p[lengths]), initial=0.0))
         return 16.0 * EPS * (4 + len(self.mechanism.links)) * max(1.0, reach)
 
@@ -113,92 +113,94 @@ class Base:
         parts = (
             [getattr(given, what) for given in designs.inputs] for what in ("position", "velocity", "acceleration")
         )
-        position, velocity, acceleration = (spread(part, many) / self.scale[:, None] for part in parts)
-        runs = np.arange(len(self.scale))[:, None] == self.index
+        position, velocity, acceleration = (stack_rows(part, many) / self.input_scale[:, None] for part in parts)
+        runs = np.arange(len(self.input_scale))[:, None] == self.running_index
         return position, np.where(runs, velocity, 0.0), np.where(runs, acceleration, 0.0)
 
-    def unfit(self, values: Mapping[str, Array], shapes: Mapping[str, Shape]) -> Array:
+    def is_unfit(self, values: Mapping[str, Array], shapes: Mapping[str, LinkShape]) -> Array:
         """The designs that the pairs may refuse before anything moves (designs,): they are looked at one by one."""
         many = len(next(iter(values.values())))
         found = np.zeros(many, dtype=bool)
         for shape_ in shapes.values():
             for at in shape_.points.values():
                 found |= ~np.isfinite(np.asarray(at.x + at.y))
-        choosy = [pair for pair in self.mechanism.pairs if type(pair).misfit is not Pair.misfit]
-        known = liftable(self.mechanism)
+        choosy = [pair for pair in self.mechanism.pairs if type(pair).find_misfit is not Pair.find_misfit]
+        known = design_variables(self.mechanism)
         if choosy and any(isinstance(known[name], Dimension) for name in values):
             for index in range(many):
-                own = {name: at_design(each, index) for name, each in shapes.items()}
-                found[index] |= any(pair.misfit(self.mechanism.pairs, own, str) for pair in choosy)
+                own = {name: shape_of_design(each, index) for name, each in shapes.items()}
+                found[index] |= any(pair.find_misfit(self.mechanism.pairs, own, str) for pair in choosy)
         return found
 
-    def short(self, shapes: Mapping[str, Shape], many: int) -> Array:
+    def has_short_arm(self, shapes: Mapping[str, LinkShape], many: int) -> Array:
         """The designs with a link whose arm is so short that rounding may take digits (designs,)."""
         found = np.zeros(many, dtype=bool)
-        column, known_from = self.solver.column, self.program.equations.known_from
+        column, known_from = self.solver.column, self.functions.equations.known_after_block
         for link, at in shapes.items():
             if known_from[column[link, "angle"]] < 0 if (link, "angle") in column else True:
                 continue  # what the input turns is turned exactly
-            pinned = {point for pair in self.mechanism.pairs for owner, point in pair.coincident() if owner == link}
+            pinned = {
+                point for pair in self.mechanism.pairs for owner, point in pair.coincident_points() if owner == link
+            }
             for one, other in combinations([at.points[point] for point in sorted(pinned)], 2):
                 arm = np.hypot(other.x - one.x, other.y - one.y)
                 found |= (arm > 0.0) & (arm < SHORT_ARM * self.unit)
         return found
 
-    def roots(self) -> tuple[tuple[Array, int], ...]:
+    def block_assemblies(self) -> tuple[tuple[Array, int], ...]:
         """For every group the assemblies (roots, unknowns) from which those of designs start, and how many one finds.
 
         Looked for once, when first asked for.
         """
-        if self._roots is None:
-            self._roots = tuple(self._searched())
-        return self._roots
+        if self._block_assemblies is None:
+            self._block_assemblies = tuple(self._search_block_assemblies())
+        return self._block_assemblies
 
-    _roots: tuple[tuple[Array, int], ...] | None = None
+    _block_assemblies: tuple[tuple[Array, int], ...] | None = None
 
-    def _searched(self):  # noqa: ANN202
+    def _search_block_assemblies(self):  # noqa: ANN202
         candidates = self.candidates
         nodes = [(0.0, np.zeros(len(self.solver.equations.unknowns)))]
-        for stage in self.solver.equations.stages:
+        for stage in self.solver.equations.blocks:
             ways = []
             for cost, z in nodes:
-                found, nearest = candidates.of(stage, z, every=True)
+                found, nearest = candidates.near_sketch(stage, z, every=True)
                 ways.append([(cost + each.distance, each.z) for each in found] or [(cost + 1e3, nearest)])
             most = max(ways, key=len)
             starts = [z[stage.unknowns] for _, z in sorted((*most, *ways[0]), key=lambda each: each[0])]
             apart = [
                 z for k, z in enumerate(starts) if all(np.max(np.abs(z - o), initial=0.0) > 1e-6 for o in starts[:k])
             ]
-            yield np.array(apart[:MOST_ROOTS]), len(most)
-            nodes = sorted((each for way in ways for each in way), key=lambda each: each[0])[:MOST_ROOTS]
+            yield np.array(apart[:MAX_ROOTS]), len(most)
+            nodes = sorted((each for way in ways for each in way), key=lambda each: each[0])[:MAX_ROOTS]
 
 
 @lru_cache(maxsize=16)
-def base(mechanism: Mechanism, pair: str | None) -> Base:
+def reference_design(mechanism: Mechanism, pair: str | None) -> ReferenceDesign:
     """The base of a mechanism's designs; kept, since a worker solves many blocks of one sweep."""
-    return Base(mechanism, pair)
+    return ReferenceDesign(mechanism, pair)
 
 
-def spread(rows, many: int) -> Array:  # noqa: ANN001 - numbers and arrays mixed
+def stack_rows(rows, design_count: int) -> Array:  # noqa: ANN001 - numbers and arrays mixed
     """Rows of numbers, or of arrays of one for each design, as one array (rows, designs)."""
-    found = np.empty((len(rows), many))
+    found = np.empty((len(rows), design_count))
     for k, row in enumerate(rows):
         found[k] = row
     return found
 
 
-def at_design(whole: Shape, index: int) -> Shape:
+def shape_of_design(whole: LinkShape, index: int) -> LinkShape:
     """The shape of one design, out of that of all."""
-    return _shaped(whole, lambda part: float(part[index]))
+    return _map_shape(whole, lambda part: float(part[index]))
 
 
-def of_designs(whole: Shape, which: Array) -> Shape:
+def shape_of_designs(whole: LinkShape, which: Array) -> LinkShape:
     """The shapes of some designs, out of those of all."""
-    return _shaped(whole, lambda part: part[which])
+    return _map_shape(whole, lambda part: part[which])
 
 
-def _shaped(whole: Shape, of: Callable[[Array], Scalar]) -> Shape:
+def _map_shape(whole: LinkShape, of: Callable[[Array], Scalar]) -> LinkShape:
     def own(value):  # noqa: ANN001, ANN202
         return type(value)(*(of(part) if isinstance(part, np.ndarray) else part for part in value))
 
-    return Shape({name: own(at) for name, at in whole.points.items()}, own(whole.origin), own(whole.axis))
+    return LinkShape({name: own(at) for name, at in whole.points.items()}, own(whole.origin), own(whole.axis))

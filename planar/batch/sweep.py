@@ -11,23 +11,23 @@ from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
 
-from planar.batch.block import Block, Done, solve_block
-from planar.batch.design_arrays import blocks, checked
-from planar.batch.march.choice import marching
-from planar.batch.reference_design import base
+from planar.batch.block import DesignBlock, SolvedDesigns, solve_design_block
+from planar.batch.design_arrays import read_designs, split_into_blocks
+from planar.batch.march.choice import available_runners
+from planar.batch.reference_design import reference_design
 from planar.batch.results import Sweep
-from planar.batch.stores.store import Plan, sink
+from planar.batch.stores.store import SweepPlan, open_store
 from planar.foundation.errors import BadInput
-from planar.model.mechanism import FARTHEST, Mechanism
-from planar.solving.cycle import MOST_STEPS
+from planar.model.mechanism import LARGEST_INPUT_POSITION, Mechanism
+from planar.solving.cycle import MAX_STEPS
 
-BYTES = 128 * 2**20
+MAX_BLOCK_BYTES = 128 * 2**20
 """Bytes of a block's results."""
-LANES = 16
+BLOCK_MULTIPLE = 16
 """Blocks are multiples of so many designs, where there are enough."""
-TRIES = 2
+MAX_EXECUTOR_TRIES = 2
 """How often a block is given to an executor before it is solved here."""
-WAITING = 2
+BLOCKS_PER_WORKER = 2
 """Blocks in the hands of an executor for each of its workers."""
 
 
@@ -71,43 +71,45 @@ def sweep(
     Raises BadInput for a name that is not there, a range or a store that cannot be; NotWritten, which is one, where a
     store finds no more room.
     """
-    values = checked(mechanism, designs)
+    values = read_designs(mechanism, designs)
     if block is not None and (isinstance(block, bool) or not isinstance(block, Integral) or block < 1):
         raise BadInput("block", f"a whole number of designs is wanted, not {block!r:.40}")
-    mechanism = range_checked(mechanism, steps, start, stop, pair)
-    common = base(mechanism, pair)
-    names = common.wanted(points)
-    marching(backend)
+    mechanism = check_range(mechanism, steps, start, stop, pair)
+    common = reference_design(mechanism, pair)
+    names = common.select_points(points)
+    available_runners(backend)
     many = len(next(iter(values.values())))
-    size = int(block) if block is not None else _size(many, steps, len(names), rates, executor)
-    whole = Block(mechanism, values, int(steps), names, rates, start, stop, pair, backend)
-    into = sink(store, Plan(whole, size))
-    size = into.size
+    size = int(block) if block is not None else _block_size(many, steps, len(names), rates, executor)
+    whole = DesignBlock(mechanism, values, int(steps), names, rates, start, stop, pair, backend)
+    into = open_store(store, SweepPlan(whole, size))
+    size = into.block_size
 
-    def task(part: slice) -> Block:
+    def task(part: slice) -> DesignBlock:
         return whole._replace(designs={name: array[part] for name, array in values.items()})
 
-    parts = dict(enumerate(blocks(many, size)))
+    parts = dict(enumerate(split_into_blocks(many, size)))
     ready = sum(part.stop - part.start for k, part in parts.items() if k in into.finished)
     if progress is not None and ready:
         progress(ready, many)
     todo = {k: part for k, part in parts.items() if k not in into.finished}
-    for k, done in _solved({k: task(part) for k, part in todo.items()}, executor, lambda k: into.room(parts[k])):
-        into.take(k, parts[k], done)
+    for k, done in _solve_blocks(
+        {k: task(part) for k, part in todo.items()}, executor, lambda k: into.output_array(parts[k])
+    ):
+        into.write_block(k, parts[k], done)
         ready += parts[k].stop - parts[k].start
         if progress is not None:
             progress(ready, many)
     return into.result()
 
 
-def range_checked(mechanism: Mechanism, steps: object, start: object, stop: object, pair: str | None) -> Mechanism:
+def check_range(mechanism: Mechanism, steps: object, start: object, stop: object, pair: str | None) -> Mechanism:
     """The mechanism with inputs that run over a range at their own rates, whatever their laws. Raises BadInput."""
-    if isinstance(steps, bool) or not isinstance(steps, Integral) or not 1 <= steps <= MOST_STEPS:
-        raise BadInput("steps", f"a whole number of steps from 1 to {MOST_STEPS} is wanted, not {steps!r:.40}")
+    if isinstance(steps, bool) or not isinstance(steps, Integral) or not 1 <= steps <= MAX_STEPS:
+        raise BadInput("steps", f"a whole number of steps from 1 to {MAX_STEPS} is wanted, not {steps!r:.40}")
     for name, value in (("start", start), ("stop", stop)):
-        wrong = isinstance(value, bool) or not isinstance(value, Real) or not abs(value) <= FARTHEST
+        wrong = isinstance(value, bool) or not isinstance(value, Real) or not abs(value) <= LARGEST_INPUT_POSITION
         if value is not None and wrong:
-            raise BadInput(name, f"a number up to {FARTHEST:g} (rad or m) is wanted, not {value!r:.40}")
+            raise BadInput(name, f"a number up to {LARGEST_INPUT_POSITION:g} (rad or m) is wanted, not {value!r:.40}")
     lawful = [given.pair for given in mechanism.inputs if given.law is not None]
     if lawful and start is None and stop is None and pair is None:
         told = f"the input at {lawful[0]!r} has a law of time, which a sweep does not run; give it a start and a stop"
@@ -115,38 +117,38 @@ def range_checked(mechanism: Mechanism, steps: object, start: object, stop: obje
     return replace(mechanism, inputs=tuple(given._replace(law=None) for given in mechanism.inputs))
 
 
-def _size(many: int, steps: int, points: int, rates: bool, executor: Executor | None) -> int:
+def _block_size(many: int, steps: int, points: int, rates: bool, executor: Executor | None) -> int:
     """How many designs make a block."""
     each = (steps + 1) * 2 * max(points, 1) * (3 if rates else 1) * 8
-    size = max(1, BYTES // each)
+    size = max(1, MAX_BLOCK_BYTES // each)
     if executor is not None:
-        size = min(size, ceil(many / (WAITING * _workers(executor))))
-    return min(many, ceil(size / LANES) * LANES)
+        size = min(size, ceil(many / (BLOCKS_PER_WORKER * _worker_count(executor))))
+    return min(many, ceil(size / BLOCK_MULTIPLE) * BLOCK_MULTIPLE)
 
 
-def _workers(executor: Executor) -> int:
+def _worker_count(executor: Executor) -> int:
     return max(1, getattr(executor, "_max_workers", None) or os.cpu_count() or 1)
 
 
-def _solved(
-    tasks: Mapping[int, Block], executor: Executor | None, room: Callable[[int], Any]
-) -> Iterator[tuple[int, Done]]:
+def _solve_blocks(
+    tasks: Mapping[int, DesignBlock], executor: Executor | None, output_array: Callable[[int], Any]
+) -> Iterator[tuple[int, SolvedDesigns]]:
     """The blocks as they are solved, here, each in its room, or by an executor; each by its number."""
     if executor is None:
         for k, task in tasks.items():
-            yield k, solve_block(task, room(k))
+            yield k, solve_design_block(task, output_array(k))
         return
     waiting, tries = list(tasks)[::-1], dict.fromkeys(tasks, 0)
     running: dict[Future, int] = {}
-    most = WAITING * _workers(executor)
+    most = BLOCKS_PER_WORKER * _worker_count(executor)
     try:
         while waiting or running:
             while waiting and len(running) < most:
                 k = waiting.pop()
-                future = _submitted(executor, tasks[k]) if tries[k] < TRIES else None
+                future = _submit(executor, tasks[k]) if tries[k] < MAX_EXECUTOR_TRIES else None
                 tries[k] += 1
                 if future is None:
-                    yield k, solve_block(tasks[k])
+                    yield k, solve_design_block(tasks[k])
                 else:
                     running[future] = k
             for future in wait(running, return_when=FIRST_COMPLETED).done if running else ():
@@ -163,9 +165,9 @@ def _solved(
             future.cancel()
 
 
-def _submitted(executor: Executor, task: Block) -> Future | None:
+def _submit(executor: Executor, task: DesignBlock) -> Future | None:
     """The block in the executor's hands; None where it takes no more, as when its workers have been killed."""
     try:
-        return executor.submit(solve_block, task)
+        return executor.submit(solve_design_block, task)
     except Exception:  # whatever an executor raises, the block can be solved here
         return None

@@ -11,47 +11,52 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.general_path import OUTCOMES, solve_one
-from planar.batch.march.choice import marching
-from planar.batch.mechanisms.bar_linkages import MOST, bars
-from planar.batch.mechanisms.initial_assembly import Started, started
-from planar.batch.mechanisms.linkage_arrays import Lot, One, lot_of
-from planar.batch.mechanisms.march import ran
-from planar.batch.mechanisms.partition import Parted, Unparted, parted
-from planar.batch.mechanisms.results import Each, Points, Swept
+from planar.batch.general_path import OUTCOMES, solve_design
+from planar.batch.march.choice import available_runners
+from planar.batch.mechanisms.bar_linkages import MAX_BARS, bar_linkage_arrays
+from planar.batch.mechanisms.initial_assembly import StartAssemblies, find_start_assemblies
+from planar.batch.mechanisms.linkage_arrays import LinkageArrays, PartitionedLinkage, make_linkage_arrays
+from planar.batch.mechanisms.march import run_linkages
+from planar.batch.mechanisms.partition import NotPartitionable, Partition, partition_mechanism
+from planar.batch.mechanisms.results import Each, PointMapping, Swept
 from planar.foundation.errors import BadInput, Outcome
-from planar.model.link_shapes import Unplaced
-from planar.model.mechanism import Mechanism, motions, named_points
-from planar.model.pairs import Kind as Measure
-from planar.model.pin_linkage import Pinned
-from planar.model.wording import many
-from planar.solving.cycle import MOST_STEPS
+from planar.model.link_shapes import PointPlacementError
+from planar.model.mechanism import Mechanism, named_points, relative_motions
+from planar.model.pairs import MeasureKind as Measure
+from planar.model.pin_linkage import PinnedMechanism
+from planar.model.wording import count_phrase
+from planar.solving.cycle import MAX_STEPS
 
 Array = np.ndarray
 
-TURN = 2.0 * np.pi
-FINE, FINER = 0.07, 8
+FULL_TURN = 2.0 * np.pi
+LONGEST_INPUT_STEP, REFINEMENT = 0.07, 8
 """rad: steps that are longer are divided, so that a position is never far from the one before; those that are not sure
 once more, into so many."""
-TOGETHER = 512
+PART_SIZE = 512
 """Mechanisms that are assembled together, and handed to an executor."""
-BYTES = 16 * 2**20
+MAX_STATE_BYTES = 16 * 2**20
 """Bytes of the links' places that are worked on at once."""
 
 
 class _Attempt(NamedTuple):
     """How linkages are run: with steps so many times finer, `polished` and `quick` as in `running.ran`."""
 
-    finer: int
+    refinement: int
     polished: bool
-    quick: bool
+    verdict_only: bool
 
 
-_ATTEMPTS = (_Attempt(1, False, True), _Attempt(1, True, True), _Attempt(1, True, False), _Attempt(FINER, True, False))
+_ATTEMPTS = (
+    _Attempt(1, False, True),
+    _Attempt(1, True, True),
+    _Attempt(1, True, False),
+    _Attempt(REFINEMENT, True, False),
+)
 """One after the other, each for those that the ones before left open; the quick ones are for machine code."""
 
 
-class Wanted(NamedTuple):
+class SweepRequest(NamedTuple):
     """What is asked of every mechanism, see `sweep_each`."""
 
     steps: int
@@ -93,19 +98,19 @@ def sweep_each(
     Raises BadInput for a point that no mechanism has, an input that is not there, or steps that cannot be.
     """
     whole = list(mechanisms)
-    if isinstance(steps, bool) or not isinstance(steps, Integral) or not 1 <= steps <= MOST_STEPS:
-        raise BadInput("steps", f"a whole number of steps from 1 to {MOST_STEPS} is wanted, not {steps!r:.40}")
+    if isinstance(steps, bool) or not isinstance(steps, Integral) or not 1 <= steps <= MAX_STEPS:
+        raise BadInput("steps", f"a whole number of steps from 1 to {MAX_STEPS} is wanted, not {steps!r:.40}")
     for k, mechanism in enumerate(whole):
         if not isinstance(mechanism, Mechanism):
             raise BadInput(f"mechanisms[{k}]", f"a mechanism is wanted, not {mechanism!r:.40}")
-        if pair is not None or not isinstance(mechanism, Pinned) or mechanism.laid is None:
-            _running(mechanism, pair, f"mechanisms[{k}]")
+        if pair is not None or not isinstance(mechanism, PinnedMechanism) or mechanism.layout is None:
+            _running_input(mechanism, pair, f"mechanisms[{k}]")
     names = (points,) if isinstance(points, str) else None if points is None else tuple(dict.fromkeys(points))
-    native = marching(backend)[0][0] == "native" if whole else False
-    wanted = Wanted(int(steps), names, rates, pair, native)
-    parts = [whole[k : k + TOGETHER] for k in range(0, len(whole), TOGETHER)]
+    native = available_runners(backend)[0][0] == "native" if whole else False
+    wanted = SweepRequest(int(steps), names, rates, pair, native)
+    parts = [whole[k : k + PART_SIZE] for k in range(0, len(whole), PART_SIZE)]
     found: list[Swept] = []
-    for done in _solved(parts, wanted, executor):
+    for done in _solve_parts(parts, wanted, executor):
         found += done
         if progress is not None:
             progress(len(found), len(whole))
@@ -113,33 +118,37 @@ def sweep_each(
         if found and not any(name in each.position for each in found):
             raise BadInput("points", f"no mechanism has a point {name!r:.60}")
     general = [each for each in found if each.general]
-    return Each(tuple(found), sum(int(np.sum(each.status == 0)) for each in general), len(general), _said(found))
+    return Each(tuple(found), sum(int(np.sum(each.status == 0)) for each in general), len(general), _messages(found))
 
 
-def _said(found: Sequence[Swept]) -> tuple[str, ...]:
+def _messages(found: Sequence[Swept]) -> tuple[str, ...]:
     """What there is to say: how many the general path solved, and how many ended before their time, with a reason."""
     told = []
     sent = sum(each.general for each in found)
     if sent:
-        told.append(f"the general path solved {sent} of {many(len(found), 'mechanism')}, one after the other")
+        told.append(f"the general path solved {sent} of {count_phrase(len(found), 'mechanism')}, one after the other")
     ended: dict[int, list[Swept]] = {}
     for each in found:
         if each.status.any():
             ended.setdefault(int(each.status[-1]), []).append(each)
-    told += [f"{many(len(own), 'mechanism')}: {OUTCOMES[code].value}; {own[0].reason}" for code, own in ended.items()]
+    told += [
+        f"{count_phrase(len(own), 'mechanism')}: {OUTCOMES[code].value}; {own[0].reason}" for code, own in ended.items()
+    ]
     return tuple(told)
 
 
-def _solved(parts: Sequence[list[Mechanism]], wanted: Wanted, executor: Executor | None) -> Iterator[list[Swept]]:
+def _solve_parts(
+    parts: Sequence[list[Mechanism]], request: SweepRequest, executor: Executor | None
+) -> Iterator[list[Swept]]:
     """The parts as they are solved, in their order, here or by an executor."""
     if executor is None:
         for part in parts:
-            yield solve_part(part, wanted)
+            yield solve_mechanisms(part, request)
         return
     futures = []
     for part in parts:
         try:
-            futures.append(executor.submit(solve_part, part, wanted))
+            futures.append(executor.submit(solve_mechanisms, part, request))
         except Exception:  # whatever an executor raises, the part can be solved here
             futures.append(None)
     try:
@@ -147,14 +156,14 @@ def _solved(parts: Sequence[list[Mechanism]], wanted: Wanted, executor: Executor
             problem = None if future is None else future.exception()
             if isinstance(problem, BadInput):
                 raise problem
-            yield solve_part(part, wanted) if future is None or problem is not None else future.result()
+            yield solve_mechanisms(part, request) if future is None or problem is not None else future.result()
     finally:
         for future in futures:
             if future is not None:
                 future.cancel()
 
 
-def _running(mechanism: Mechanism, pair: str | None, place: str) -> int:
+def _running_input(mechanism: Mechanism, pair: str | None, place: str) -> int:
     """The number of the input that runs. Raises BadInput."""
     names = [given.pair for given in mechanism.inputs]
     if not names:
@@ -166,49 +175,58 @@ def _running(mechanism: Mechanism, pair: str | None, place: str) -> int:
     return names.index(pair) if pair is not None else 0
 
 
-class _Ready(NamedTuple):
+class _LinkageGroup(NamedTuple):
     """Linkages that can be solved group after group: their numbers, as arrays, names of their points, where each
     starts, and the links of all groups."""
 
     numbers: Array
-    lot: Lot
+    arrays: LinkageArrays
     names: Sequence[Sequence[str]]
     start: Array
-    groups: Callable[[int], str]
+    links_of_block: Callable[[int], str]
 
 
-def solve_part(mechanisms: Sequence[Mechanism], wanted: Wanted) -> list[Swept]:
+def solve_mechanisms(mechanisms: Sequence[Mechanism], request: SweepRequest) -> list[Swept]:
     """Some mechanisms, in their order."""
     found: dict[int, Swept] = {}
-    for ready in _ready(mechanisms, wanted):
-        start = started(ready.lot, wanted.native)
-        left = np.flatnonzero(start.sure)
-        for each in _ATTEMPTS if wanted.native else _ATTEMPTS[2:]:
-            for some in _blocks(ready.lot.places, left, wanted, _finer(wanted.steps) * each.finer):
-                found |= _run(ready, some, start, wanted, each)
+    for ready in _linkage_groups(mechanisms, request):
+        start = find_start_assemblies(ready.arrays, request.native)
+        left = np.flatnonzero(start.is_sure)
+        for each in _ATTEMPTS if request.native else _ATTEMPTS[2:]:
+            for some in _cache_sized_chunks(
+                ready.arrays.link_counts, left, request, _step_division(request.steps) * each.refinement
+            ):
+                found |= _run_attempt(ready, some, start, request, each)
             left = np.array([k for k in left if ready.numbers[k] not in found], dtype=int)
             if not left.size:
                 break
-    return [found[k] if k in found else _general(mechanism, wanted) for k, mechanism in enumerate(mechanisms)]
+    return [
+        found[k] if k in found else _solve_with_general_path(mechanism, request)
+        for k, mechanism in enumerate(mechanisms)
+    ]
 
 
-def _ready(mechanisms: Sequence[Mechanism], wanted: Wanted) -> Iterator[_Ready]:
+def _linkage_groups(mechanisms: Sequence[Mechanism], request: SweepRequest) -> Iterator[_LinkageGroup]:
     """Those of the mechanisms that are not for the general path."""
     taken: set[int] = set()
-    pins = _pins(wanted.points) if wanted.pair is None else ()
-    laid = {k: each.laid for k, each in enumerate(mechanisms) if isinstance(each, Pinned) and each.laid is not None}
-    laid = {k: each for k, each in laid.items() if len(each.bars) <= MOST}
+    pins = _pin_numbers(request.points) if request.pair is None else ()
+    laid = {
+        k: each.layout
+        for k, each in enumerate(mechanisms)
+        if isinstance(each, PinnedMechanism) and each.layout is not None
+    }
+    laid = {k: each for k, each in laid.items() if len(each.bars) <= MAX_BARS}
     if laid and pins != ():
         numbers = np.array(list(laid))
-        own = bars(list(laid.values()), pins)
+        own = bar_linkage_arrays(list(laid.values()), pins)
         if own is not None:
             taken = set(numbers[own.which].tolist())
-            called = [f"P{k}" for k in range(max(len(each.at) for each in laid.values()))]
+            called = [f"P{k}" for k in range(max(len(each.pin_positions) for each in laid.values()))]
             names = [[called[pin] for pin in each] for each in own.pins]
-            yield _Ready(numbers[own.which], own.lot, names, own.start, own.links)
+            yield _LinkageGroup(numbers[own.which], own.arrays, names, own.start, own.links_of_block)
     ones, numbers, names, starts = [], [], [], []
     for k, mechanism in enumerate(mechanisms):
-        made = None if k in taken else _one(mechanism, wanted)
+        made = None if k in taken else _partition_linkage(mechanism, request)
         if made is not None:
             one, own_names, start = made
             ones.append(one)
@@ -218,18 +236,18 @@ def _ready(mechanisms: Sequence[Mechanism], wanted: Wanted) -> Iterator[_Ready]:
     if not ones:
         return
 
-    def told(number: int) -> str:
+    def block_links(number: int) -> str:
         for one in ones:
-            if number < len(one.parted.groups):
-                links = list(one.parted.shapes)
-                return ", ".join(links[k] for k in one.parted.groups[number].inner)
-            number -= len(one.parted.groups)
+            if number < len(one.partition.blocks):
+                links = list(one.partition.shapes)
+                return ", ".join(links[k] for k in one.partition.blocks[number].inner_links)
+            number -= len(one.partition.blocks)
         return ""
 
-    yield _Ready(np.array(numbers), lot_of(ones), names, np.array(starts), told)
+    yield _LinkageGroup(np.array(numbers), make_linkage_arrays(ones), names, np.array(starts), block_links)
 
 
-def _pins(points: tuple[str, ...] | None) -> list[int] | tuple[()] | None:
+def _pin_numbers(points: tuple[str, ...] | None) -> list[int] | tuple[()] | None:
     """The numbers of pins by their names: None for all that move, nothing where a name is not one of a pin."""
     if points is None:
         return None
@@ -238,61 +256,67 @@ def _pins(points: tuple[str, ...] | None) -> list[int] | tuple[()] | None:
     return ()
 
 
-def _one(mechanism: Mechanism, wanted: Wanted) -> tuple[One, list[str], float] | None:
+def _partition_linkage(
+    mechanism: Mechanism, request: SweepRequest
+) -> tuple[PartitionedLinkage, list[str], float] | None:
     """A mechanism parted into groups, with the names of its points and where it starts; None where it is for the
     general path."""
-    running = _running(mechanism, wanted.pair, "inputs")
+    running = _running_input(mechanism, request.pair, "inputs")
     try:
-        own = parted(mechanism)
-    except (Unparted, BadInput, Unplaced):
+        own = partition_mechanism(mechanism)
+    except (NotPartitionable, BadInput, PointPlacementError):
         return None
-    kinds = {pair.name: pair.drive_kind for pair in mechanism.pairs}
+    kinds = {pair.name: pair.input_kind for pair in mechanism.pairs}
     angles = [kinds[given.pair] is not Measure.LENGTH for given in mechanism.inputs]
-    if not angles[running] or not all(group.kind.direct or group.kind.followed for group in own.groups):
+    if not angles[running] or not all(
+        group.block_type.has_closed_form or group.block_type.has_newton_formulas for group in own.blocks
+    ):
         return None
     unit = own.unit
     inputs = [
         (given.position if angle else given.position / unit, angle, k == running, given.velocity, given.acceleration)
         for k, (given, angle) in enumerate(zip(mechanism.inputs, angles, strict=True))
     ]
-    members = _members(mechanism, wanted.points)
-    shown = [] if all(group.kind.direct for group in own.groups) else _shown(mechanism, own, members)
+    members = _point_members(mechanism, request.points)
+    shown = (
+        [] if all(group.block_type.has_closed_form for group in own.blocks) else _shown_points(mechanism, own, members)
+    )
     sketch: list[tuple[float, ...]] = []
     for name, x, y in mechanism.sketch:
         if name not in members:
             return None
-        place, link, point = min((own.place_of[link], link, point) for link, point in members[name])
+        place, link, point = min((own.link_index[link], link, point) for link, point in members[name])
         if place:
             at = own.shapes[link].points[point]
             sketch.append((place, at.x / unit, at.y / unit, x / unit, y / unit))
     names, points = [], []
-    for name in _wanted(mechanism, members, wanted.points):
-        place, link, point = min((own.place_of[link], link, point) for link, point in members[name])
+    for name in _wanted_points(mechanism, members, request.points):
+        place, link, point = min((own.link_index[link], link, point) for link, point in members[name])
         names.append(name)
         points.append((place, *own.shapes[link].points[point]))
-    return One(own, inputs, sketch, points, shown), names, mechanism.inputs[running].position
+    return PartitionedLinkage(own, inputs, sketch, points, shown), names, mechanism.inputs[running].position
 
 
-def _shown(mechanism: Mechanism, own: Parted, members: Mapping) -> list[tuple[float, ...]]:
+def _shown_points(mechanism: Mechanism, partition: Partition, members: Mapping) -> list[tuple[float, ...]]:
     """Points of every link that the sketch shows, or that lie on the frame: see `Lot.shown`."""
     at = {name: (x, y) for name, x, y in mechanism.sketch}
     found: list[tuple[float, ...]] = []
     for name, both in members.items():
         on = next((point for link, point in both if link == mechanism.frame), None)
-        place = at.get(name) if on is None else own.shapes[mechanism.frame].points[on]
+        place = at.get(name) if on is None else partition.shapes[mechanism.frame].points[on]
         if place is not None:
             for link, point in both:
-                if own.place_of[link]:
-                    local = own.shapes[link].points[point]
-                    found.append((own.place_of[link], *(part / own.unit for part in (*local, *place))))
+                if partition.link_index[link]:
+                    local = partition.shapes[link].points[point]
+                    found.append((partition.link_index[link], *(part / partition.unit for part in (*local, *place))))
     return found
 
 
-def _members(mechanism: Mechanism, points: tuple[str, ...] | None) -> Mapping[str, Sequence[tuple[str, str]]]:
+def _point_members(mechanism: Mechanism, points: tuple[str, ...] | None) -> Mapping[str, Sequence[tuple[str, str]]]:
     """The (link, point) of named points: of all, or of those that pairs keep together where no other is asked for."""
     together: dict[str, list[tuple[str, str]]] = {}
     for pair in mechanism.pairs:
-        own = pair.coincident()
+        own = pair.coincident_points()
         if own:
             together.setdefault(pair.entry_name(), []).extend(own)
     wanted = (*(points or ()), *(name for name, _, _ in mechanism.sketch))
@@ -301,7 +325,7 @@ def _members(mechanism: Mechanism, points: tuple[str, ...] | None) -> Mapping[st
     return {each.name: each.members for each in named_points(mechanism)}
 
 
-def _wanted(
+def _wanted_points(
     mechanism: Mechanism, members: Mapping[str, Sequence[tuple[str, str]]], points: tuple[str, ...] | None
 ) -> list[str]:
     """The names of the points that are wanted of a mechanism."""
@@ -310,42 +334,55 @@ def _wanted(
     return [name for name, own in members.items() if all(link != mechanism.frame for link, _ in own)]
 
 
-def _blocks(places: Array, left: Array, wanted: Wanted, finer: int) -> Iterator[Array]:
+def _cache_sized_chunks(
+    link_counts: Array, remaining: Array, request: SweepRequest, refinement: int
+) -> Iterator[Array]:
     """So many of what is left at a time that their places fit into memory near the processor."""
-    each = (wanted.steps + 1) * finer * 8 * (10 if wanted.rates else 4)
-    ends = np.cumsum(places[left] * each)
+    each = (request.steps + 1) * refinement * 8 * (10 if request.rates else 4)
+    ends = np.cumsum(link_counts[remaining] * each)
     first = 0
-    while first < len(left):
+    while first < len(remaining):
         before = ends[first - 1] if first else 0
-        last = max(int(np.searchsorted(ends, before + BYTES, side="right")), first + 1)
-        yield left[first:last]
+        last = max(int(np.searchsorted(ends, before + MAX_STATE_BYTES, side="right")), first + 1)
+        yield remaining[first:last]
         first = last
 
 
-def _finer(steps: int) -> int:
+def _step_division(steps: int) -> int:
     """Into how many a step is divided."""
-    return ceil(TURN / steps / FINE)
+    return ceil(FULL_TURN / steps / LONGEST_INPUT_STEP)
 
 
-def _run(ready: _Ready, some: Array, start: Started, wanted: Wanted, how: _Attempt) -> dict[int, Swept]:
+def _run_attempt(
+    group: _LinkageGroup, some: Array, start: StartAssemblies, request: SweepRequest, attempt: _Attempt
+) -> dict[int, Swept]:
     """Those that came to their end, or to a dead point, by their numbers."""
-    steps, finer = wanted.steps, _finer(wanted.steps) * how.finer
-    gone = np.linspace(0.0, TURN, steps * finer + 1)
-    lot = ready.lot.of(some)
-    told = ran(lot, start, gone, TURN / (steps * finer), wanted.rates, wanted.native, how.polished, how.quick)
-    orders = 3 if wanted.rates else 1
+    steps, finer = request.steps, _step_division(request.steps) * attempt.refinement
+    gone = np.linspace(0.0, FULL_TURN, steps * finer + 1)
+    lot = group.arrays.select(some)
+    told = run_linkages(
+        lot,
+        start,
+        gone,
+        FULL_TURN / (steps * finer),
+        request.rates,
+        request.native,
+        attempt.polished,
+        attempt.verdict_only,
+    )
+    orders = 3 if request.rates else 1
     out = told.out[:, :, : len(gone) : finer].reshape(len(told.out), orders, 2, steps + 1)
     if finer > 1:
         out = np.ascontiguousarray(out)
     out = out.transpose(0, 1, 3, 2)
     found, first = {}, 0
-    grid = np.linspace(0.0, 1.0, steps + 1) * TURN
+    grid = np.linspace(0.0, 1.0, steps + 1) * FULL_TURN
     solved = np.zeros(steps + 1, dtype=np.int8)
     solved.flags.writeable = False
-    inputs = ready.start[some][:, None] + grid
-    come, dead = told.good.tolist(), told.dead.tolist()
+    inputs = group.start[some][:, None] + grid
+    come, dead = told.good_steps.tolist(), told.ends_in_dead_point.tolist()
     for k, one in enumerate(some.tolist()):
-        names = ready.names[one]
+        names = group.names[one]
         own = out[first : first + len(names)]
         first += len(names)
         status, reason, good = solved, "", come[k]
@@ -356,19 +393,19 @@ def _run(ready: _Ready, some: Array, start: Started, wanted: Wanted, how: _Attem
             own[:, :, row:] = np.nan
             status = np.zeros(steps + 1, dtype=np.int8)
             status[row:] = OUTCOMES.index(Outcome.DEAD_POINT)
-            near = ready.start[one] + gone[good - 1 : good + 1]
-            links = ready.groups(int(told.at[k]))
+            near = group.start[one] + gone[good - 1 : good + 1]
+            links = group.links_of_block(int(told.dead_point_block[k]))
             reason = f"links {links} come to a dead point at an input of {near[0]:.6g} to {near[1]:.6g} rad"
-        parts = [Points(names, own[:, order]) for order in range(orders)]
-        position, velocity, acceleration = parts if wanted.rates else (parts[0], None, None)
-        number = int(ready.numbers[one])
+        parts = [PointMapping(names, own[:, order]) for order in range(orders)]
+        position, velocity, acceleration = parts if request.rates else (parts[0], None, None)
+        number = int(group.numbers[one])
         found[number] = Swept(position, velocity, acceleration, inputs[k], status, reason, False)
     return found
 
 
-def _general(mechanism: Mechanism, wanted: Wanted) -> Swept:
+def _solve_with_general_path(mechanism: Mechanism, request: SweepRequest) -> Swept:
     """One mechanism, solved as a cycle of its own."""
-    running = _running(mechanism, wanted.pair, "inputs")
+    running = _running_input(mechanism, request.pair, "inputs")
     inputs = tuple(
         given._replace(law=None) if k == running else given._replace(velocity=0.0, acceleration=0.0, law=None)
         for k, given in enumerate(mechanism.inputs)
@@ -377,12 +414,12 @@ def _general(mechanism: Mechanism, wanted: Wanted) -> Swept:
     pair = inputs[running].pair
     grid = None
     members = {each.name: each.members for each in named_points(mechanism)}
-    names = tuple(_wanted(mechanism, members, wanted.points))
-    if motions(mechanism)[pair].drive_kind is not Measure.LENGTH:
-        grid = inputs[running].position + np.linspace(0.0, 1.0, wanted.steps + 1) * TURN
+    names = tuple(_wanted_points(mechanism, members, request.points))
+    if relative_motions(mechanism)[pair].input_kind is not Measure.LENGTH:
+        grid = inputs[running].position + np.linspace(0.0, 1.0, request.steps + 1) * FULL_TURN
     ends = (None, None) if grid is None else (float(grid[0]), float(grid[-1]))
-    told = solve_one(mechanism, pair, grid, wanted.steps, ends, names, wanted.rates)
-    out = told.out.reshape(wanted.steps + 1, 3 if wanted.rates else 1, len(names), 2)
+    told = solve_design(mechanism, pair, grid, request.steps, ends, names, request.rates)
+    out = told.out.reshape(request.steps + 1, 3 if request.rates else 1, len(names), 2)
     parts = [{name: out[:, k, i] for i, name in enumerate(names)} for k in range(out.shape[1])]
-    position, velocity, acceleration = parts if wanted.rates else (parts[0], None, None)
-    return Swept(position, velocity, acceleration, told.input, told.status, told.said, True)
+    position, velocity, acceleration = parts if request.rates else (parts[0], None, None)
+    return Swept(position, velocity, acceleration, told.input, told.status, told.message, True)

@@ -9,16 +9,26 @@ from pathlib import Path
 import click
 
 from planar.cli.exit_status import NO_ANSWER
-from planar.cli.options import as_json, at, busy, drives, main, output, running, show, spare
+from planar.cli.options import (
+    at_option,
+    input_option,
+    json_option,
+    main,
+    output_option,
+    parse_drives,
+    print_or_write,
+    refuse_overwriting,
+    show_status,
+)
 from planar.foundation.errors import BadInput
 
 
 @main.command()
 @click.argument("model")
-@as_json
-@running
-@at
-@output("Write the tables to a .txt, .svg or .html file.")
+@json_option
+@input_option
+@at_option
+@output_option("Write the tables to a .txt, .svg or .html file.")
 def circuits(model: str, as_json: bool, pair: str | None, at: tuple[str, ...], output: Path | None) -> None:
     """All circuits while an input runs, their branches, and where it goes together."""
     from planar.assemblies.circuits.circuits import circuits as all_circuits
@@ -29,15 +39,15 @@ def circuits(model: str, as_json: bool, pair: str | None, at: tuple[str, ...], o
     if as_json and output is not None:
         raise BadInput("-o", "tables go to a file or SI values are printed with --json; give one of the two")
     mechanism = load(model)
-    spare(model, output)
-    with busy(f"{mechanism.name}: circuits"):
-        here = modes(mechanism, drives(mechanism, at), certify=False)
+    refuse_overwriting(model, output)
+    with show_status(f"{mechanism.name}: circuits"):
+        here = modes(mechanism, parse_drives(mechanism, at), certify=False)
         found = all_circuits(here.mechanism, pair)
         told = record(found, here) if as_json else table(found, here)
     if as_json:
         click.echo(json.dumps(told, ensure_ascii=False, indent=1, allow_nan=False))
     else:
-        show(told, output)
+        print_or_write(told, output)
     if not here:
         click.echo(f"planar: {here.refusal()}", err=True)
         sys.exit(NO_ANSWER)

@@ -13,15 +13,15 @@ from typing import Any, NoReturn
 
 import click
 
-from planar.foundation.errors import BadInput, MissingGlyphs, NoAnswer, NotWritten, listed
+from planar.foundation.errors import BadInput, MissingGlyphs, NoAnswer, WriteFailure, join_names
 
 NO_ANSWER, BAD_INPUT, NOT_WRITTEN, INTERRUPTED = 1, 2, 3, 130
 """Exit statuses; 0 is done, 130 what shells give for an interrupt from the keyboard."""
-CLOSED_PIPE = 128 + 13
+CLOSED_PIPE_STATUS = 128 + 13
 """What a shell tells of programs that the closing of their pipe ends (SIGPIPE is signal 13), as by `| head`."""
 
 
-SYNONYMS = {
+COMMAND_SYNONYMS = {
     "advantage": "forces",
     "analyse": "solve",
     "analyze": "solve",
@@ -55,7 +55,7 @@ SYNONYMS = {
 """Commands by other words for what they do."""
 
 
-class Commands(click.Group):
+class CommandGroup(click.Group):
     """Every command ends with the same sentences and exit statuses."""
 
     def main(self, *args: Any, **more: Any) -> Any:
@@ -71,13 +71,13 @@ class Commands(click.Group):
                 if sys.stdout is not None:
                     sys.stdout.flush()
         except OSError as problem:
-            _lost(problem)
+            _exit_unwritable(problem)
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         for stream in (sys.stdout, sys.stderr):
             if hasattr(stream, "reconfigure"):
                 stream.reconfigure(errors="backslashreplace")  # what the screen's alphabet lacks
-        with _ending() if args else nullcontext():  # without any words click shows the help
+        with _exit_with_status() if args else nullcontext():  # without any words click shows the help
             return super().parse_args(ctx, args)
 
     def resolve_command(
@@ -87,43 +87,43 @@ class Commands(click.Group):
         if not name.startswith("-") and self.get_command(ctx, name) is None:
             from difflib import get_close_matches
 
-            near = get_close_matches(name.lower(), self.commands, 1) or [SYNONYMS.get(name.lower(), "")]
+            near = get_close_matches(name.lower(), self.commands, 1) or [COMMAND_SYNONYMS.get(name.lower(), "")]
             if near[0]:
                 ctx.fail(f"no such command {name!r}; did you mean {near[0]!r}?")
-            ctx.fail(f"no such command {name!r}; commands are {listed(sorted(self.commands), None)}")
+            ctx.fail(f"no such command {name!r}; commands are {join_names(sorted(self.commands), None)}")
         return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: click.Context) -> Any:
-        with _ending(), _missing_glyphs_named():
+        with _exit_with_status(), _report_missing_glyphs():
             return super().invoke(ctx)
 
 
 @contextmanager
-def _ending() -> Iterator[None]:
+def _exit_with_status() -> Iterator[None]:
     try:
         yield
     except OSError as problem:
-        _lost(problem)
-    except NotWritten as problem:
-        _refuse(str(problem), "not written", str(problem), NOT_WRITTEN)
+        _exit_unwritable(problem)
+    except WriteFailure as problem:
+        _exit_refused(str(problem), "not written", str(problem), NOT_WRITTEN)
     except BadInput as problem:
-        _refuse(str(problem), "bad input", str(problem), BAD_INPUT)
+        _exit_refused(str(problem), "bad input", str(problem), BAD_INPUT)
     except NoAnswer as problem:
-        _refuse(str(problem), problem.outcome.value, problem.reason, NO_ANSWER, problem.more)
+        _exit_refused(str(problem), problem.outcome.value, problem.reason, NO_ANSWER, problem.more)
     except KeyboardInterrupt:
         told = "stopped by the user before it was done"
-        _refuse(f"interrupted: {told}", "interrupted", told, INTERRUPTED)
+        _exit_refused(f"interrupted: {told}", "interrupted", told, INTERRUPTED)
     except click.UsageError as problem:
         told = " ".join(problem.format_message().split()).rstrip(".").replace(". Did", "; did").replace(". (", " (")
         told = re.sub(r" for '\{[^}]*\}'", "", told)  # click names an argument by its choices, and then lists them
         if not told.endswith(("?", "?)")):
             told += f"; see `{problem.ctx.command_path if problem.ctx else 'planar'} --help`"
         wrong = str(BadInput("command line", told[0].lower() + told[1:]))
-        _refuse(wrong, "bad input", wrong, BAD_INPUT)
+        _exit_refused(wrong, "bad input", wrong, BAD_INPUT)
 
 
 @contextmanager
-def _missing_glyphs_named() -> Iterator[None]:
+def _report_missing_glyphs() -> Iterator[None]:
     """What no font can show is named in one line, however many texts have it; other warnings go their way."""
     found: set[str] = set()
     before = warnings.showwarning
@@ -142,37 +142,37 @@ def _missing_glyphs_named() -> Iterator[None]:
         click.echo(f"planar: {MissingGlyphs(found)}", err=True)
 
 
-def _refuse(
+def _exit_refused(
     sentence: str, outcome: str, reason: str, status: int, more: Mapping[str, Any] = MappingProxyType({})
 ) -> None:
     if "--json" in sys.argv:
         try:
             click.echo(json.dumps({"outcome": outcome, "reason": reason, **more}, ensure_ascii=False))
         except OSError as problem:
-            _lost(problem)
-    _say(sentence)
+            _exit_unwritable(problem)
+    _print_error(sentence)
     sys.exit(status)
 
 
-def _lost(problem: OSError) -> NoReturn:
+def _exit_unwritable(problem: OSError) -> NoReturn:
     """End where what is printed cannot be written, quietly where nobody reads it any more."""
-    from planar.document.files import OUT_OF_ROOM, abandon
+    from planar.document.files import NO_SPACE_ERRORS, discard_stream
 
-    if problem.errno not in OUT_OF_ROOM:
+    if problem.errno not in NO_SPACE_ERRORS:
         raise problem
-    abandon(sys.stdout)
+    discard_stream(sys.stdout)
     if isinstance(problem, BrokenPipeError):
-        sys.exit(CLOSED_PIPE)
-    _say(f"the output cannot be written: {problem.strerror}")
+        sys.exit(CLOSED_PIPE_STATUS)
+    _print_error(f"the output cannot be written: {problem.strerror}")
     sys.exit(NOT_WRITTEN)
 
 
-def _say(sentence: str) -> None:
+def _print_error(sentence: str) -> None:
     """One line on stderr, if that takes it."""
     shown = "".join(each if each.isprintable() else repr(each)[1:-1] for each in sentence)
     try:
         click.echo(f"planar: {shown}", err=True)
     except OSError:
-        from planar.document.files import abandon
+        from planar.document.files import discard_stream
 
-        abandon(sys.stderr)
+        discard_stream(sys.stderr)

@@ -11,39 +11,41 @@ import click
 from click.core import ParameterSource
 
 from planar.cli.options import (
-    advancing,
-    as_json,
-    at,
-    busy,
-    cycled,
-    drives,
-    loaded,
+    at_option,
+    json_option,
+    load_model,
     main,
-    moded,
-    output,
-    run,
-    show,
-    spare,
-    stepped,
-    tell,
+    mode_option,
+    motion_options,
+    output_option,
+    parse_drives,
+    print_or_write,
+    refuse_overwriting,
+    report_motion,
+    run_motion,
+    show_progress,
+    show_status,
+    steps_option,
 )
 from planar.foundation.errors import BadInput
 
 if TYPE_CHECKING:
     from planar.model.mechanism import Mechanism
 
-ONE_PLACE = "results go to a file or are printed with --json; give one of the two"
+ONE_DESTINATION = "results go to a file or are printed with --json; give one of the two"
 
 
 @main.command()
 @click.argument("model")
-@as_json
-@at
-@moded
+@json_option
+@at_option
+@mode_option
 @click.option("--static", is_flag=True, help="Leave the links' inertia out: at rest, or in slow motion.")
 @click.option("--cycle", "whole", is_flag=True, help="Over the whole motion, as `planar cycle` has it.")
-@cycled
-@output("Write the tables to a .txt, .svg or .html file; with --cycle every position to .csv, .json, .npz or .parquet.")
+@motion_options
+@output_option(
+    "Write the tables to a .txt, .svg or .html file; with --cycle every position to .csv, .json, .npz or .parquet."
+)
 def forces(
     model: str,
     as_json: bool,
@@ -56,23 +58,23 @@ def forces(
 ) -> None:
     """What the inputs supply and the pairs carry against loads, weights, springs and inertia."""
     if as_json and output is not None:
-        raise BadInput("-o", ONE_PLACE)
+        raise BadInput("-o", ONE_DESTINATION)
     if whole and at:
         raise BadInput("--at", "the forces of a whole motion have no one position; say where it starts with --from")
     if not whole:
-        _refuse(course)
-    from planar.dynamics.load_validation import refuse_unloaded
+        _refuse_motion_options(course)
+    from planar.dynamics.load_validation import require_loads
 
-    mechanism = loaded(model, mode)
-    spare(model, output)
-    refuse_unloaded(mechanism)
+    mechanism = load_model(model, mode)
+    refuse_overwriting(model, output)
+    require_loads(mechanism)
     if whole:
-        _over(mechanism, not static, as_json, output, course)
+        _forces_over_motion(mechanism, not static, as_json, output, course)
     else:
-        _here(mechanism, at, not static, as_json, output)
+        _forces_at_position(mechanism, at, not static, as_json, output)
 
 
-def _refuse(course: Iterable[str]) -> None:
+def _refuse_motion_options(course: Iterable[str]) -> None:
     """Refuse options of a whole motion, which would not be heeded."""
     context = click.get_current_context()
     for option in context.command.params:
@@ -80,45 +82,51 @@ def _refuse(course: Iterable[str]) -> None:
             raise BadInput(option.opts[0], "this is for the forces of a whole motion, with --cycle")
 
 
-def _here(mechanism: Mechanism, at: tuple[str, ...], inertia: bool, as_json: bool, output: Path | None) -> None:
+def _forces_at_position(
+    mechanism: Mechanism, at: tuple[str, ...], inertia: bool, as_json: bool, output: Path | None
+) -> None:
     """The forces at one position."""
     from planar.analysis.motion.mechanical_advantage import advantages
-    from planar.analysis.worked.published import compare
+    from planar.analysis.worked.published import compare_published
     from planar.dynamics.forces import forces as at_state
     from planar.reports.tables.forces import record, tables
     from planar.solving.position import solve
 
-    moved = drives(mechanism, at)
-    with busy(mechanism.name):
+    moved = parse_drives(mechanism, at)
+    with show_status(mechanism.name):
         state = solve(mechanism, moved)
         found, ratios = at_state(state, inertia), advantages(state)
-        printed = [] if moved else [each for each in compare(state) if each.published.quantity == "input torque"]
+        printed = (
+            [] if moved else [each for each in compare_published(state) if each.published.quantity == "input torque"]
+        )
     if as_json:
         click.echo(json.dumps(record(found, ratios, printed), ensure_ascii=False, indent=1, allow_nan=False))
         return
-    show(tables(found, ratios, printed), output)
+    print_or_write(tables(found, ratios, printed), output)
 
 
-def _over(mechanism: Mechanism, inertia: bool, as_json: bool, output: Path | None, course: dict[str, Any]) -> None:
+def _forces_over_motion(
+    mechanism: Mechanism, inertia: bool, as_json: bool, output: Path | None, course: dict[str, Any]
+) -> None:
     """The forces over a whole motion."""
     from planar.dynamics.forces import forces as over_motion
-    from planar.reports.files.run_files import writable
-    from planar.reports.tables.forces_over_motion import said, tables, told
+    from planar.reports.files.run_files import check_writable
+    from planar.reports.tables.forces_over_motion import force_series, run_facts, tables
 
     if output is not None:
-        writable(output.suffix)
-    with busy(f"{mechanism.name}: {course['steps']} steps"):
-        motion = run(mechanism, **course)
+        check_writable(output.suffix)
+    with show_status(f"{mechanism.name}: {course['steps']} steps"):
+        motion = run_motion(mechanism, **course)
         found = over_motion(motion, inertia)
-    tell(motion, as_json, output, lambda: [tables(found)], told(found), said(found))
+    report_motion(motion, as_json, output, lambda: [tables(found)], force_series(found), run_facts(found))
 
 
 @main.command()
 @click.argument("model")
-@as_json
+@json_option
 @click.option("--duration", required=True, metavar="TIME", help="How long: 2s, 500ms.")
-@stepped
-@moded
+@steps_option
+@mode_option
 @click.option(
     "--drive",
     "driven",
@@ -127,7 +135,7 @@ def _over(mechanism: Mechanism, inertia: bool, as_json: bool, output: Path | Non
     help="An input that keeps to the file's velocity and acceleration; one with a law keeps to it anyway.",
 )
 @click.option("--moving", is_flag=True, help="Start with the file's velocities, not from rest.")
-@output("Write positions, velocities, accelerations and energies to a .csv, .json, .npz or .parquet file.")
+@output_option("Write positions, velocities, accelerations and energies to a .csv, .json, .npz or .parquet file.")
 def simulate(
     model: str,
     as_json: bool,
@@ -141,16 +149,16 @@ def simulate(
     """The mechanism let go: its motion in time under loads, weights and springs."""
     from planar.document import read_time
     from planar.dynamics.simulation import simulate as let_go
-    from planar.reports.files.run_files import writable
-    from planar.reports.tables.simulation import said, tables, told
+    from planar.reports.files.run_files import check_writable
+    from planar.reports.tables.simulation import energy_series, simulation_facts, tables
 
     if as_json and output is not None:
-        raise BadInput("-o", ONE_PLACE)
-    mechanism = loaded(model, mode)
-    spare(model, output)
+        raise BadInput("-o", ONE_DESTINATION)
+    mechanism = load_model(model, mode)
+    refuse_overwriting(model, output)
     if output is not None:
-        writable(output.suffix)
-    with advancing(mechanism.name) as progress:
+        check_writable(output.suffix)
+    with show_progress(mechanism.name) as progress:
         tick = None if progress is None else lambda done: progress(done, 1.0)
         found = let_go(mechanism, read_time(duration, "--duration"), steps, driven, moving=moving, tick=tick)
-    tell(found.motion, as_json, output, lambda: [tables(found)], told(found), said(found))
+    report_motion(found.motion, as_json, output, lambda: [tables(found)], energy_series(found), simulation_facts(found))

@@ -6,28 +6,28 @@ import json
 
 import click
 
-from planar.cli.options import as_json, busy, main, show
+from planar.cli.options import json_option, main, print_or_write, show_status
 
 
 @main.command()
 @click.argument("model")
-@as_json
+@json_option
 def inspect(model: str, as_json: bool) -> None:
     """What it is: links, pairs, chain, mobility, motions, names."""
     from planar.analysis.identity.inspection import inspect as inspected
     from planar.document.files import load
 
     mechanism = load(model)
-    with busy(mechanism.name):
+    with show_status(mechanism.name):
         found = inspected(mechanism)
     if as_json:
         from dataclasses import asdict
 
         click.echo(json.dumps(asdict(found), ensure_ascii=False))
         return
-    from planar.reports.tables.inspection import inspection
+    from planar.reports.tables.inspection import inspection_tables
 
-    show(inspection(found), None)
+    print_or_write(inspection_tables(found), None)
 
 
 @main.command()
@@ -39,18 +39,18 @@ def schema() -> None:
 
 
 @main.command()
-@as_json
+@json_option
 def models(as_json: bool) -> None:
     """The models that come along."""
-    from planar.document.files import models as known
+    from planar.document.files import load_models as known
 
     rows = [(file.stem, [name for name in m.ids if name != file.stem], m.about or m.name) for file, m in known()]
     if as_json:
         click.echo(json.dumps([{"model": n, "ids": ids, "about": about} for n, ids, about in rows], ensure_ascii=False))
         return
-    from planar.reports.tables_of_numbers import models as table
+    from planar.reports.tables_of_numbers import models_table as table
 
-    show(table((name, ", ".join(ids), about) for name, ids, about in rows), None)
+    print_or_write(table((name, ", ".join(ids), about) for name, ids, about in rows), None)
 
 
 @main.command()
@@ -62,20 +62,20 @@ def models(as_json: bool) -> None:
     show_default=True,
     help="About how long the sweeps of a mechanism are timed.",
 )
-@as_json
+@json_option
 def bench(model: str | None, seconds: float, as_json: bool) -> None:
     """How fast it is solved on this machine: one position, a run, many designs, and what bounds it."""
-    from planar.bench.benchmark import measure
+    from planar.bench.benchmark import measure_speed
     from planar.document.files import load
 
     mechanisms = [load(name) for name in ([model] if model else ["four-bar", "slider-crank", "double-butterfly"])]
     speeds = []
     for mechanism in mechanisms:
-        with busy(mechanism.name):
-            speeds.append(measure(mechanism, seconds=seconds))
+        with show_status(mechanism.name):
+            speeds.append(measure_speed(mechanism, seconds=seconds))
     if as_json:
         click.echo(json.dumps([speed.record() for speed in speeds], ensure_ascii=False))
         return
     from planar.reports.tables.benchmark import table
 
-    show(table(speeds), None)
+    print_or_write(table(speeds), None)

@@ -8,7 +8,16 @@ from typing import TYPE_CHECKING
 
 import click
 
-from planar.cli.options import as_json, busy, drives, main, output, running, show, spare
+from planar.cli.options import (
+    input_option,
+    json_option,
+    main,
+    output_option,
+    parse_drives,
+    print_or_write,
+    refuse_overwriting,
+    show_status,
+)
 from planar.foundation.errors import BadInput
 
 if TYPE_CHECKING:
@@ -18,7 +27,7 @@ if TYPE_CHECKING:
 
 @main.command()
 @click.argument("model")
-@as_json
+@json_option
 @click.option(
     "--at",
     "at",
@@ -32,8 +41,8 @@ if TYPE_CHECKING:
 @click.option("--point", "points", multiple=True, metavar="NAME", help="A point whose place is printed.")
 @click.option("--certify/--no-certify", default=True, help="Prove every assembly by intervals, or leave it.")
 @click.option("--circuits", "circled", is_flag=True, help="Also the circuit and the branch on which each lies.")
-@running
-@output("Write the tables to a .txt, .svg or .html file.")
+@input_option
+@output_option("Write the tables to a .txt, .svg or .html file.")
 def modes(
     model: str,
     as_json: bool,
@@ -56,20 +65,20 @@ def modes(
     if pair is not None and not circled:
         raise BadInput("--input", "without --circuits no input runs")
     mechanism = load(model)
-    spare(model, output)
-    with busy(f"{mechanism.name}: assemblies"):
-        found = assemblies(mechanism, drives(mechanism, at), certify=certify)
+    refuse_overwriting(model, output)
+    with show_status(f"{mechanism.name}: assemblies"):
+        found = assemblies(mechanism, parse_drives(mechanism, at), certify=certify)
         if not found:
-            raise _refused(found, as_json, output)
+            raise _explain_refusal(found, as_json, output)
         on = circuits(found.mechanism, pair) if circled else None
         told = record(found, limit, on) if as_json else table(found, limit, points, on)
     if as_json:
         click.echo(json.dumps(told, ensure_ascii=False, indent=1, allow_nan=False))
         return
-    show(told, output)
+    print_or_write(told, output)
 
 
-def _refused(found: Modes, as_json: bool, output: Path | None) -> NoAnswer:
+def _explain_refusal(found: Modes, as_json: bool, output: Path | None) -> NoAnswer:
     """The refusal to be raised, once it has been told why no assembly was found."""
     from planar.assemblies.circuits.circuits import circuits
     from planar.assemblies.conflict import conflict
@@ -81,5 +90,5 @@ def _refused(found: Modes, as_json: bool, output: Path | None) -> NoAnswer:
         if as_json:
             problem.more = {"conflict": conflict_record(why, runs)}
         else:
-            show(conflict_table(why, runs), output)
+            print_or_write(conflict_table(why, runs), output)
     return problem

@@ -14,21 +14,21 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from planar import __version__
-from planar.cli.exit_status import NO_ANSWER, Commands
+from planar.cli.exit_status import NO_ANSWER, CommandGroup
 from planar.foundation.errors import BadInput, Outcome
 
 if TYPE_CHECKING:
     from planar.model.mechanism import Drive, Mechanism
-    from planar.reports.columns import Told
+    from planar.reports.columns import ReportedSeries
     from planar.results.motion import Motion
 
 
-ONE_THREAD = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+THREAD_LIMITS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 """Set before numpy is loaded, unless the user did: matrices are small, and on a busy machine threads that share one
 wait for each other longer than they work."""
 
 
-@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=CommandGroup, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, message="planar %(version)s")
 def main() -> None:
     """How any planar linkage moves.
@@ -38,14 +38,14 @@ def main() -> None:
     Ends with status 0 when all is done, 1 where the mechanism has no answer, 2 on bad input, 3 where the result cannot
     be written, as on a full disk.
     """
-    for limit in ONE_THREAD:
+    for limit in THREAD_LIMITS:
         os.environ.setdefault(limit, "1")
 
 
-as_json = click.option("--json", "as_json", is_flag=True, help="Print machine-readable SI values.")
+json_option = click.option("--json", "as_json", is_flag=True, help="Print machine-readable SI values.")
 
 
-at = click.option(
+at_option = click.option(
     "--at",
     "at",
     multiple=True,
@@ -54,7 +54,7 @@ at = click.option(
 )
 
 
-scaled = click.option(
+scale_option = click.option(
     "--scale",
     "scales",
     multiple=True,
@@ -63,7 +63,7 @@ scaled = click.option(
 )
 
 
-moded = click.option(
+mode_option = click.option(
     "--mode",
     "mode",
     type=click.IntRange(1),
@@ -72,33 +72,33 @@ moded = click.option(
 )
 
 
-def loaded(model: str, mode: int | None) -> Mechanism:
+def load_model(model: str, mode: int | None) -> Mechanism:
     """The mechanism of a file, the assembly chosen that `--mode` names, else with the number of the sketch's own."""
-    from planar.assemblies.selection import chosen, numbered
+    from planar.assemblies.selection import select_assembly, with_assembly_number
     from planar.document.files import load
 
     mechanism = load(model)
     if mode is None:
-        return numbered(mechanism)
-    with busy(f"{mechanism.name}: assemblies"):
-        return chosen(mechanism, mode)
+        return with_assembly_number(mechanism)
+    with show_status(f"{mechanism.name}: assemblies"):
+        return select_assembly(mechanism, mode)
 
 
-running = click.option("--input", "pair", metavar="PAIR", help="The input that runs, where there are several.")
+input_option = click.option("--input", "pair", metavar="PAIR", help="The input that runs, where there are several.")
 
 
-def ranged(command: Any) -> Any:
+def range_options(command: Any) -> Any:
     """The options of a run: which input runs, from where to where."""
     for option in (
         click.option("--to", "stop", metavar="POSITION", help="Where it stops; left out, a turn on, or to its limits."),
         click.option("--from", "start", metavar="POSITION", help="Where the range starts: 30deg, 20mm, a bare number."),
-        running,
+        input_option,
     ):
         command = option(command)
     return command
 
 
-def cycled(command: Any) -> Any:
+def motion_options(command: Any) -> Any:
     """The options of a whole motion, all of which `run` takes."""
     for option in (
         click.option(
@@ -118,37 +118,37 @@ def cycled(command: Any) -> Any:
         click.option("--there-and-back", is_flag=True, help="Come back through the range by the same positions."),
     ):
         command = option(command)
-    return stepped(ranged(command))
+    return steps_option(range_options(command))
 
 
-stepped = click.option(
+steps_option = click.option(
     "--steps", default=360, show_default=True, metavar="N", help="Parts that the motion is divided into."
 )
 
 
-def output(help: str, required: bool = False) -> Callable[[Any], Any]:  # noqa: A002
+def output_option(help: str, required: bool = False) -> Callable[[Any], Any]:  # noqa: A002
     """The option that names a file to write."""
     kind = click.Path(dir_okay=False, path_type=Path)
     return click.option("-o", "output", type=kind, metavar="FILE", help=help, required=required)
 
 
-def spare(model: str, output: Path | None) -> None:
+def refuse_overwriting(model: str, output: Path | None) -> None:
     """Refuse to write over the mechanism's own file."""
     if output is not None and output.exists() and Path(model).exists() and output.samefile(model):
         raise BadInput("-o", "this is the mechanism's own file, which would be lost; name another")
 
 
-def busy(doing: str) -> AbstractContextManager[Any]:
+def show_status(description: str) -> AbstractContextManager[Any]:
     """A sign on a terminal that work is under way."""
     if not sys.stderr.isatty():
         return nullcontext()
     from rich.console import Console
 
-    return Console(stderr=True, markup=False).status(doing)
+    return Console(stderr=True, markup=False).status(description)
 
 
 @contextmanager
-def advancing(doing: str, gone: bool = False) -> Iterator[Callable[[float, float], None] | None]:
+def show_progress(description: str, transient: bool = False) -> Iterator[Callable[[float, float], None] | None]:
     """A bar on a terminal that shows how much of a long work is done; it may be gone when that is."""
     if not sys.stderr.isatty():
         yield None
@@ -156,19 +156,19 @@ def advancing(doing: str, gone: bool = False) -> Iterator[Callable[[float, float
     from rich.console import Console
     from rich.progress import Progress
 
-    with Progress(console=Console(stderr=True, markup=False), transient=gone) as bar:
-        task = bar.add_task(doing.replace("[", r"\["), total=None)
+    with Progress(console=Console(stderr=True, markup=False), transient=transient) as bar:
+        task = bar.add_task(description.replace("[", r"\["), total=None)
         yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
-def drives(mechanism: Mechanism, told: tuple[str, ...]) -> tuple[Drive, ...]:
+def parse_drives(mechanism: Mechanism, texts: tuple[str, ...]) -> tuple[Drive, ...]:
     """The inputs that `--at` moves."""
-    if not told:
+    if not texts:
         return ()
     from planar.document import read_drive
 
     drives = []
-    for text in told:
+    for text in texts:
         pair, equals, position = text.partition("=")
         if not equals:
             raise BadInput("--at", f"{text!r} is not of the form PAIR=POSITION, such as A=75deg")
@@ -178,7 +178,7 @@ def drives(mechanism: Mechanism, told: tuple[str, ...]) -> tuple[Drive, ...]:
     return tuple(drives)
 
 
-def show(renderable: Any, output: Path | None) -> None:
+def print_or_write(renderable: Any, output: Path | None) -> None:
     """Print a table, or write it to a file in the format that its name says."""
     from rich.console import Console
 
@@ -193,13 +193,13 @@ def show(renderable: Any, output: Path | None) -> None:
             console.width = 140
         console.print(renderable, crop=False)
         return
-    from planar.document.files import save
-    from planar.reports.files.table_files import written
+    from planar.document.files import save_file
+    from planar.reports.files.table_files import encode_tables
 
-    save(output, written(renderable, output.suffix))
+    save_file(output, encode_tables(renderable, output.suffix))
 
 
-def run(
+def run_motion(
     mechanism: Mechanism,
     steps: int,
     pair: str | None,
@@ -214,40 +214,40 @@ def run(
 
     names = [given.pair for given in mechanism.inputs]
     of = pair if pair is not None or len(names) != 1 else names[0]
-    ends = [_position(mechanism, of, text, option) for option, text in (("--from", start), ("--to", stop))]
+    ends = [_parse_position(mechanism, of, text, option) for option, text in (("--from", start), ("--to", stop))]
     time = None if duration is None else read_time(duration, "--duration")
     return cycle(mechanism, steps, ends[0], ends[1], pair, duration=time, **more)
 
 
-def tell(
+def report_motion(
     motion: Motion,
     as_json: bool,
     output: Path | None,
-    shown: Callable[[], Iterable[Any]],
-    more: Iterable[Told] = (),
-    said: Mapping[str, Any] | None = None,
+    tables: Callable[[], Iterable[Any]],
+    more: Iterable[ReportedSeries] = (),
+    facts: Mapping[str, Any] | None = None,
 ) -> None:
     """A whole motion, with what `more` is told and `said` of it: as JSON, or as tables, and in a file that is named.
 
     Ends with a sentence and a status where the motion did not come to its end.
     """
-    from planar.reports.files.run_files import record, written
+    from planar.reports.files.run_files import encode_run, record
 
     if as_json:
-        click.echo(json.dumps(record(motion, more, said or {}), ensure_ascii=False, allow_nan=False))
+        click.echo(json.dumps(record(motion, more, facts or {}), ensure_ascii=False, allow_nan=False))
     else:
         if output is not None:
-            from planar.document.files import save
+            from planar.document.files import save_file
 
-            save(output, written(motion, output.suffix, more, said or {}))
-        for each in shown():
-            show(each, None)
+            save_file(output, encode_run(motion, output.suffix, more, facts or {}))
+        for each in tables():
+            print_or_write(each, None)
     if motion.outcome is not Outcome.SOLVED:
         click.echo(f"planar: {motion.outcome.value}: {motion.reason}", err=True)
         sys.exit(NO_ANSWER)
 
 
-def _position(mechanism: Mechanism, pair: str | None, text: str | None, option: str) -> float | None:
+def _parse_position(mechanism: Mechanism, pair: str | None, text: str | None, option: str) -> float | None:
     """An end of a run's range."""
     from planar.document import read_drive
 

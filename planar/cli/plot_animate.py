@@ -9,18 +9,18 @@ import click
 from click.core import ParameterSource
 
 from planar.cli.options import (
-    advancing,
-    at,
-    busy,
-    drives,
-    loaded,
+    at_option,
+    load_model,
     main,
-    moded,
-    output,
-    ranged,
-    run,
-    scaled,
-    spare,
+    mode_option,
+    output_option,
+    parse_drives,
+    range_options,
+    refuse_overwriting,
+    run_motion,
+    scale_option,
+    show_progress,
+    show_status,
 )
 from planar.foundation.errors import BadInput
 
@@ -28,20 +28,22 @@ if TYPE_CHECKING:
     from planar.model.mechanism import Mechanism
     from planar.results.motion import Motion
 
-POSITION = ("scheme", "velocity", "acceleration", "centres", "forces")
-ASSEMBLIES = ("modes",)
-BRANCHES = ("circuits",)
-MOTION = ("positions", "loci", "centrodes", "diagrams", "torque", "bearings")
-SMOOTH = 360
+POSITION_DRAWINGS = ("scheme", "velocity", "acceleration", "centres", "forces")
+ASSEMBLY_DRAWINGS = ("modes",)
+CIRCUIT_DRAWINGS = ("circuits",)
+MOTION_DRAWINGS = ("positions", "loci", "centrodes", "diagrams", "torque", "bearings")
+DRAWN_STEPS = 360
 """Steps of a run that is drawn."""
 
 
 @main.command()
 @click.argument("model")
-@click.argument("what", type=click.Choice((*POSITION, *MOTION, *ASSEMBLIES, *BRANCHES)))
-@output("Write the drawing to a .png, .svg or .pdf file.", required=True)
-@scaled
-@at
+@click.argument(
+    "what", type=click.Choice((*POSITION_DRAWINGS, *MOTION_DRAWINGS, *ASSEMBLY_DRAWINGS, *CIRCUIT_DRAWINGS))
+)
+@output_option("Write the drawing to a .png, .svg or .pdf file.", required=True)
+@scale_option
+@at_option
 @click.option(
     "--point", "points", multiple=True, metavar="NAME", help="A point to be lettered, or whose path is drawn."
 )
@@ -64,8 +66,8 @@ SMOOTH = 360
 )
 @click.option("--steps", default=12, show_default=True, metavar="N", help="Positions, or chords of the diagrams.")
 @click.option("--chords", is_flag=True, help="Diagrams with graphical differentiation beside the curves.")
-@ranged
-@moded
+@range_options
+@mode_option
 def plot(
     model: str,
     what: str,
@@ -91,37 +93,37 @@ def plot(
     steps_told = click.get_current_context().get_parameter_source("steps") is ParameterSource.COMMANDLINE
     for option, told, kinds in (
         ("--point", points, ("positions", "loci")),
-        ("--of", of, ("diagrams", "torque", *BRANCHES)),
+        ("--of", of, ("diagrams", "torque", *CIRCUIT_DRAWINGS)),
         ("--pair", pairs, ("bearings",)),
         ("--fluctuation", fluctuation is not None, ("torque",)),
         ("--link", links, ("centres", "centrodes")),
         ("--chords", chords, ("diagrams",)),
         ("--steps", steps_told, ("positions", "diagrams") if chords else ("positions",)),
-        ("--scale", scales, (*POSITION, "positions", "loci", "centrodes", *ASSEMBLIES)),
-        ("--mode", mode is not None, (*POSITION, *MOTION)),
+        ("--scale", scales, (*POSITION_DRAWINGS, "positions", "loci", "centrodes", *ASSEMBLY_DRAWINGS)),
+        ("--mode", mode is not None, (*POSITION_DRAWINGS, *MOTION_DRAWINGS)),
     ):
         if told and what not in kinds:
             raise BadInput(option, f"this is for {' and '.join(kinds)}; {what} would not heed it")
-    mechanism = loaded(model, mode)
-    spare(model, output)
-    with busy(f"{mechanism.name}: {what}"):
+    mechanism = load_model(model, mode)
+    refuse_overwriting(model, output)
+    with show_status(f"{mechanism.name}: {what}"):
         _refuse_range(what, pair, start, stop)
-        if what in (*ASSEMBLIES, *BRANCHES):
+        if what in (*ASSEMBLY_DRAWINGS, *CIRCUIT_DRAWINGS):
             from planar.assemblies.circuits.circuits import circuits
             from planar.assemblies.modes import modes
 
-            every = what in ASSEMBLIES
-            here = modes(mechanism, drives(mechanism, at), certify=every)
+            every = what in ASSEMBLY_DRAWINGS
+            here = modes(mechanism, parse_drives(mechanism, at), certify=every)
             sheets = drawn.modes(here, scales) if every else drawn.circuits(circuits(here.mechanism, pair), of, here)
             drawn.save(sheets, output)
             return
-        if what in POSITION:
-            state = solve(mechanism, drives(mechanism, at))
+        if what in POSITION_DRAWINGS:
+            state = solve(mechanism, parse_drives(mechanism, at))
             figure = drawn.centres(state, scales, links) if what == "centres" else getattr(drawn, what)(state, scales)
         else:
             if at:
                 raise BadInput("--at", f"{what} are of a run; say where it starts with --from")
-            moving = _run(mechanism, pair, start, stop)
+            moving = _run_or_mechanism(mechanism, pair, start, stop)
             if len(links) > 2:
                 raise BadInput(
                     "--link", "centrodes are of two links; name one, or one and the link that it is seen from"
@@ -139,19 +141,19 @@ def plot(
 
 def _refuse_range(what: str, pair: str | None, start: str | None, stop: str | None) -> None:
     """Raise BadInput for a range that a drawing would not heed."""
-    if what in BRANCHES and (start or stop):
+    if what in CIRCUIT_DRAWINGS and (start or stop):
         raise BadInput("--from", f"{what} are of the whole range of an input")
-    if (pair or start or stop) and what in (*POSITION, *ASSEMBLIES):
-        told = f"{what} are" if what in ASSEMBLIES else f"a {what} is"
+    if (pair or start or stop) and what in (*POSITION_DRAWINGS, *ASSEMBLY_DRAWINGS):
+        told = f"{what} are" if what in ASSEMBLY_DRAWINGS else f"a {what} is"
         raise BadInput("--input", f"{told} of one position; move an input there with --at")
 
 
 @main.command()
 @click.argument("model")
-@output("Write the moving picture to a .gif or .mp4 file.", required=True)
+@output_option("Write the moving picture to a .gif or .mp4 file.", required=True)
 @click.option("--point", "points", multiple=True, metavar="NAME", help="A point whose path is drawn as it moves.")
-@ranged
-@moded
+@range_options
+@mode_option
 def animate(
     model: str,
     output: Path,
@@ -164,14 +166,16 @@ def animate(
     """The mechanism in motion, to and fro or round and round."""
     from planar import plot as drawn
 
-    mechanism = loaded(model, mode)
-    spare(model, output)
-    with advancing(mechanism.name) as progress:
-        drawn.animate(_run(mechanism, pair, start, stop), output, points or None, progress)
+    mechanism = load_model(model, mode)
+    refuse_overwriting(model, output)
+    with show_progress(mechanism.name) as progress:
+        drawn.animate(_run_or_mechanism(mechanism, pair, start, stop), output, points or None, progress)
 
 
-def _run(mechanism: Mechanism, pair: str | None, start: str | None, stop: str | None) -> Mechanism | Motion:
+def _run_or_mechanism(
+    mechanism: Mechanism, pair: str | None, start: str | None, stop: str | None
+) -> Mechanism | Motion:
     """The run that the options ask for; without any the mechanism, whose drawings start where a slide's stroke does."""
     if pair is None and start is None and stop is None and len(mechanism.inputs) == 1:
         return mechanism
-    return run(mechanism, SMOOTH, pair, start, stop)
+    return run_motion(mechanism, DRAWN_STEPS, pair, start, stop)

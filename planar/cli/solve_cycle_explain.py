@@ -10,23 +10,23 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from planar.cli.options import (
-    advancing,
-    as_json,
-    at,
-    busy,
-    cycled,
-    drives,
-    loaded,
+    at_option,
+    json_option,
+    load_model,
     main,
-    moded,
-    output,
-    run,
-    scaled,
-    show,
-    spare,
-    tell,
+    mode_option,
+    motion_options,
+    output_option,
+    parse_drives,
+    print_or_write,
+    refuse_overwriting,
+    report_motion,
+    run_motion,
+    scale_option,
+    show_progress,
+    show_status,
 )
-from planar.foundation.errors import BadInput, no_format
+from planar.foundation.errors import BadInput, unknown_format_error
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -42,9 +42,9 @@ PAGES = (".pdf", ".png")
 
 @main.command()
 @click.argument("model")
-@as_json
-@at
-@moded
+@json_option
+@at_option
+@mode_option
 @click.option(
     "--relative",
     "relative",
@@ -52,82 +52,82 @@ PAGES = (".pdf", ".png")
     metavar="POINT,POINT[,LINK]",
     help="Also how the first point moves against the second, in parts, in the axes of a link that carries the second.",
 )
-@output("Write the tables to a .txt, .svg or .html file.")
+@output_option("Write the tables to a .txt, .svg or .html file.")
 def solve(
     model: str, as_json: bool, at: tuple[str, ...], mode: int | None, relative: tuple[str, ...], output: Path | None
 ) -> None:
     """This position: mobility, all positions, velocities, accelerations, rubbing speeds."""
-    state, comparisons = _solved(model, mode, at, as_json, output)
-    relatives = {text: _relative(state, text) for text in relative}
+    state, comparisons = _solve_model(model, mode, at, as_json, output)
+    relatives = {text: _relative_motion(state, text) for text in relative}
     if as_json:
         from planar.reports.files.json_values import record
 
         click.echo(json.dumps(record(state, comparisons, relatives), ensure_ascii=False, indent=1, allow_nan=False))
         return
-    from planar.reports.tables_of_numbers import solution
+    from planar.reports.tables_of_numbers import solution_tables
 
-    show(solution(state, comparisons, relatives), output)
+    print_or_write(solution_tables(state, comparisons, relatives), output)
 
 
 @main.command()
 @click.argument("model")
-@as_json
-@at
-@moded
-@scaled
-@output("Write the text to a .txt, .svg or .html file, or pages with drawings to scale to a .pdf or .png file.")
+@json_option
+@at_option
+@mode_option
+@scale_option
+@output_option("Write the text to a .txt, .svg or .html file, or pages with drawings to scale to a .pdf or .png file.")
 def explain(
     model: str, as_json: bool, at: tuple[str, ...], mode: int | None, scales: tuple[str, ...], output: Path | None
 ) -> None:
     """The worked solution: vector equations and tables, both polygons step by step, results."""
-    from planar.drawing.paper.scales import scales as read
+    from planar.drawing.paper.scales import parse_scales as read
 
     on_pages = output is not None and output.suffix.lower() in PAGES
     if output is not None and not on_pages:
         from planar.reports.files.table_files import SUFFIXES
 
         if output.suffix not in SUFFIXES:
-            raise no_format(output.suffix, "a worked solution", (*SUFFIXES, *PAGES))
-    state, comparisons = _solved(model, mode, at, as_json, output)
+            raise unknown_format_error(output.suffix, "a worked solution", (*SUFFIXES, *PAGES))
+    state, comparisons = _solve_model(model, mode, at, as_json, output)
     given = read(scales)
     if output is not None and on_pages:
-        from planar.document.files import save
-        from planar.drawing.output.solution_pages import sheets, solution_pages
+        from planar.document.files import save_file
+        from planar.drawing.output.solution_pages import encode_sheets, solution_pages
 
-        with busy(state.mechanism.name):
-            save(output, sheets(solution_pages(state, comparisons, given), output.suffix))
+        with show_status(state.mechanism.name):
+            save_file(output, encode_sheets(solution_pages(state, comparisons, given), output.suffix))
         return
     from planar.analysis.worked.solution import worked_solution
-    from planar.reports.tables.worked_solution import explained, record
+    from planar.reports.tables.worked_solution import record, solution_text
 
     solution = worked_solution(state, comparisons)
     if as_json:
         click.echo(json.dumps(record(solution, given), ensure_ascii=False, indent=1, allow_nan=False))
         return
-    show(explained(solution, given), output)
+    print_or_write(solution_text(solution, given), output)
 
 
-def _solved(
+def _solve_model(
     model: str, mode: int | None, at: tuple[str, ...], as_json: bool, output: Path | None
 ) -> tuple[State, tuple[Comparison, ...]]:
     """A model's position, moved to where `--at` says, with its published values unless it was moved."""
-    from planar.analysis.worked.published import compare
+    from planar.analysis.worked.published import compare_published
     from planar.solving.position import solve
 
     if as_json and output is not None:
         raise BadInput("-o", "tables go to a file or SI values are printed with --json; give one of the two")
-    mechanism = loaded(model, mode)
-    spare(model, output)
-    moved = drives(mechanism, at)
+    mechanism = load_model(model, mode)
+    refuse_overwriting(model, output)
+    moved = parse_drives(mechanism, at)
     state = solve(mechanism, moved)
-    return state, () if moved else compare(state)
+    return state, () if moved else compare_published(state)
 
 
 @main.command()
 @click.argument("model")
-@as_json
-@cycled
-@moded
+@json_option
+@motion_options
+@mode_option
 @click.option("--jerk", is_flag=True, help="Third rates as well.")
 @click.option(
     "--of",
@@ -136,7 +136,7 @@ def _solved(
     metavar="NAME",
     help="Also what is asked of a pair, link or point: stroke or swing, greatest speed, time ratio, dwells, area, ...",
 )
-@output("Write positions, velocities and accelerations to a .csv, .json, .npz or .parquet file.")
+@output_option("Write positions, velocities and accelerations to a .csv, .json, .npz or .parquet file.")
 def cycle(
     model: str,
     as_json: bool,
@@ -150,22 +150,22 @@ def cycle(
     """The whole motion: position to position through the range of an input, or in time by the inputs' laws."""
     if as_json and output is not None:
         raise BadInput("-o", "a run goes to a file or is printed with --json; give one of the two")
-    mechanism = loaded(model, mode)
-    spare(model, output)
+    mechanism = load_model(model, mode)
+    refuse_overwriting(model, output)
     if output is not None:
-        from planar.reports.files.run_files import writable
+        from planar.reports.files.run_files import check_writable
 
-        writable(output.suffix)
-    with advancing(f"{mechanism.name}: {steps} steps", gone=True) as progress:
-        motion = run(mechanism, steps, **course, jerk=jerk, progress=progress)
+        check_writable(output.suffix)
+    with show_progress(f"{mechanism.name}: {steps} steps", transient=True) as progress:
+        motion = run_motion(mechanism, steps, **course, jerk=jerk, progress=progress)
         if not as_json:
             motion.limits  # noqa: B018 - solved for while the sign is up
         told = {name: _answers(motion, name) for name in asked}
 
     def shown() -> Iterator[RenderableType]:
-        from planar.reports.tables.motion import ran
+        from planar.reports.tables.motion import motion_tables
 
-        yield ran(motion)
+        yield motion_tables(motion)
         if told:
             from planar.reports.tables.answers import tables
 
@@ -176,28 +176,28 @@ def cycle(
         from planar.reports.tables.answers import record
 
         said = {"answers": record(told)}
-    tell(motion, as_json, output, shown, said=said)
+    report_motion(motion, as_json, output, shown, facts=said)
 
 
 def _answers(motion: Motion, name: str) -> tuple[Answers, ...]:
     """What `--of` asks for."""
     from planar.analysis.motion.answers import answers
-    from planar.results.motion import Unknown
+    from planar.results.motion import UnknownName
 
     try:
         return answers(motion, name)
-    except Unknown as problem:
+    except UnknownName as problem:
         raise BadInput("--of", str(problem)) from None
 
 
-def _relative(state: State, text: str) -> RelativeState:
+def _relative_motion(state: State, text: str) -> RelativeState:
     """The relative motion that `--relative` asks for."""
-    from planar.results.motion import Unknown
+    from planar.results.motion import UnknownName
 
     names = [name.strip() for name in text.split(",")]
     if len(names) not in (2, 3):
         raise BadInput("--relative", f"{text!r} is not of the form POINT,POINT or POINT,POINT,LINK, such as C,B")
     try:
         return state.relative(*names)
-    except Unknown as problem:
+    except UnknownName as problem:
         raise BadInput("--relative", str(problem)) from None

@@ -6,19 +6,19 @@ import numpy as np
 
 Array = np.ndarray
 
-ALIGNED = 8
+WIDEST_VECTOR = 8
 """Numbers of the widest vectors of a machine."""
 
 
-def room(steps: int, rows: int, designs: int) -> Array:
+def allocate_aligned(steps: int, rows: int, designs: int) -> Array:
     """An array (steps, rows, designs), not filled, every row of which begins at a whole vector."""
-    width = -(-designs // ALIGNED) * ALIGNED
-    made = np.empty(steps * rows * width + ALIGNED)
-    first = -(made.ctypes.data // made.itemsize) % ALIGNED
+    width = -(-designs // WIDEST_VECTOR) * WIDEST_VECTOR
+    made = np.empty(steps * rows * width + WIDEST_VECTOR)
+    first = -(made.ctypes.data // made.itemsize) % WIDEST_VECTOR
     return made[first : first + steps * rows * width].reshape(steps, rows, width)[:, :, :designs]
 
 
-def is_room(array: Array) -> bool:
+def is_aligned(array: Array) -> bool:
     """Whether every row of an array begins so."""
-    whole = ALIGNED * array.itemsize
+    whole = WIDEST_VECTOR * array.itemsize
     return not (array.ctypes.data % whole or array.strides[0] % whole or array.strides[1] % whole)

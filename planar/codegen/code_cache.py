@@ -18,43 +18,45 @@ from contextvars import ContextVar
 from hashlib import sha256
 from pathlib import Path
 
-from planar.document.files import PART, own_bytes, put_private
+from planar.document.files import PARTIAL_FILE_NAME, read_private, write_private
 
-MOST = 256 * 2**20
+MAX_CACHE_BYTES = 256 * 2**20
 """Bytes of all that is kept; those that have not been read for longest go first."""
-DIGEST = 32
+CHECKSUM_LENGTH = 32
 """Bytes of a digest, which stands before the code."""
-ENDING = ".code"
-OWN = "code"
+CODE_SUFFIX = ".code"
+CODE_FOLDER = "code"
 """The folder in that of all that is kept."""
-MARK = b"planar machine code\n"
+CODE_HEADER = b"planar machine code\n"
 """How every file of code begins."""
-NAME = re.compile(rf"[0-9a-f]{{64}}{re.escape(ENDING)}")
-TAG = "CACHEDIR.TAG"
-TAGGED = b"Signature: 8a477f597d28d172789f06886806bc55\n# Machine code kept by planar; may be removed at any time.\n"
+CODE_FILE_NAME = re.compile(rf"[0-9a-f]{{64}}{re.escape(CODE_SUFFIX)}")
+CACHE_TAG_NAME = "CACHEDIR.TAG"
+CACHE_TAG_TEXT = (
+    b"Signature: 8a477f597d28d172789f06886806bc55\n# Machine code kept by planar; may be removed at any time.\n"
+)
 """By the Cache Directory Tagging Specification, so that backups leave the folder out."""
-_nowhere: ContextVar[bool] = ContextVar("nowhere", default=False)
+_is_disabled: ContextVar[bool] = ContextVar("nowhere", default=False)
 
 
 @contextmanager
-def nowhere() -> Iterator[None]:
+def disable_cache() -> Iterator[None]:
     """Nothing is read or kept."""
-    before = _nowhere.set(True)
+    before = _is_disabled.set(True)
     try:
         yield
     finally:
-        _nowhere.reset(before)
+        _is_disabled.reset(before)
 
 
-def folder() -> Path | None:
+def code_folder() -> Path | None:
     """Where code is kept; None where it is not to be, or where the system tells no place."""
-    place = _place()
-    return place and place / OWN
+    place = _cache_folder()
+    return place and place / CODE_FOLDER
 
 
-def _place() -> Path | None:
+def _cache_folder() -> Path | None:
     told = os.environ.get("PLANAR_CACHE", "")
-    if _nowhere.get() or told.strip().lower() == "off":
+    if _is_disabled.get() or told.strip().lower() == "off":
         return None
     if told:
         return Path(told)
@@ -71,54 +73,54 @@ def _place() -> Path | None:
     return (of_caches if of_caches.is_absolute() else home / ".cache") / "planar"
 
 
-def read(key: str) -> bytes | None:
+def read_code(key: str) -> bytes | None:
     """The code of a fingerprint, if it is kept and nothing is amiss."""
-    place = folder()
+    place = code_folder()
     if place is None:
         return None
-    path = place / f"{key}{ENDING}"
-    whole = own_bytes(path)
-    if whole is None or not whole.startswith(MARK):
+    path = place / f"{key}{CODE_SUFFIX}"
+    whole = read_private(path)
+    if whole is None or not whole.startswith(CODE_HEADER):
         return None
-    digest, code = whole[len(MARK) :][:DIGEST], whole[len(MARK) + DIGEST :]
-    if digest != _digest(key, code):
+    digest, code = whole[len(CODE_HEADER) :][:CHECKSUM_LENGTH], whole[len(CODE_HEADER) + CHECKSUM_LENGTH :]
+    if digest != _checksum(key, code):
         return None
     with suppress(OSError):
         os.utime(path)
     return code
 
 
-def write(key: str, code: bytes) -> bool:
+def write_code(key: str, code: bytes) -> bool:
     """Keep the code of a fingerprint; whether that was possible."""
-    place = folder()
+    place = code_folder()
     if place is None:
         return False
-    if not (place / TAG).exists():
-        put_private(place / TAG, TAGGED)
-    if not put_private(place / f"{key}{ENDING}", MARK + _digest(key, code) + code):
+    if not (place / CACHE_TAG_NAME).exists():
+        write_private(place / CACHE_TAG_NAME, CACHE_TAG_TEXT)
+    if not write_private(place / f"{key}{CODE_SUFFIX}", CODE_HEADER + _checksum(key, code) + code):
         return False
-    _bound(place)
+    _remove_oldest(place)
     return True
 
 
-def _digest(key: str, code: bytes) -> bytes:
+def _checksum(key: str, code: bytes) -> bytes:
     """Of code under its fingerprint: no file stands for another."""
     return sha256(key.encode() + code).digest()
 
 
-def _bound(place: Path) -> None:
+def _remove_oldest(place: Path) -> None:
     """Remove what was not read for longest, until no more than MOST is kept."""
     # another process may remove the same files meanwhile
     with suppress(OSError):
         found = []
         for path in place.iterdir():
-            if NAME.fullmatch(path.name) or PART.fullmatch(path.name):
+            if CODE_FILE_NAME.fullmatch(path.name) or PARTIAL_FILE_NAME.fullmatch(path.name):
                 known = path.stat()
                 found.append((known.st_mtime_ns, known.st_size, path))
         whole = sum(size for _, size, _ in found)
         for _, size, path in sorted(found):
-            if whole <= MOST:
+            if whole <= MAX_CACHE_BYTES:
                 return
-            if PART.fullmatch(path.name) or (own_bytes(path) or b"").startswith(MARK):
+            if PARTIAL_FILE_NAME.fullmatch(path.name) or (read_private(path) or b"").startswith(CODE_HEADER):
                 path.unlink(missing_ok=True)
             whole -= size

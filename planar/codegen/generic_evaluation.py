@@ -7,7 +7,7 @@ from typing import Any
 
 import casadi as ca
 
-DONE: Mapping[int, Callable[..., Any]] = {
+OPERATIONS: Mapping[int, Callable[..., Any]] = {
     ca.OP_ADD: lambda a, b: a + b,
     ca.OP_SUB: lambda a, b: a - b,
     ca.OP_MUL: lambda a, b: a * b,
@@ -23,23 +23,23 @@ DONE: Mapping[int, Callable[..., Any]] = {
 """What the coefficients of a linkage are made of."""
 
 
-def computed(
+def evaluate_function(
     function: ca.Function,
     inputs: Sequence[Sequence[Any]],
-    number: Callable[[float], Any],
-    done: Mapping[int, Callable[..., Any]] = DONE,
+    convert: Callable[[float], Any],
+    operations: Mapping[int, Callable[..., Any]] = OPERATIONS,
 ) -> list[list[Any]]:
     """The results of a function of dense matrices, column by column. Raises KeyError where it holds anything else."""
     work: dict[int, Any] = {}
-    found: list[list[Any]] = [[number(0.0)] * function.numel_out(k) for k in range(function.n_out())]
+    found: list[list[Any]] = [[convert(0.0)] * function.numel_out(k) for k in range(function.n_out())]
     for k in range(function.n_instructions()):
         code, out, of = function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)
         if code == ca.OP_INPUT:
             work[out[0]] = inputs[of[0]][of[1]]
         elif code == ca.OP_CONST:
-            work[out[0]] = number(function.instruction_constant(k))
+            work[out[0]] = convert(function.instruction_constant(k))
         elif code == ca.OP_OUTPUT:
             found[out[0]][out[1]] = work[of[0]]
         else:
-            work[out[0]] = done[code](*(work[each] for each in of))
+            work[out[0]] = operations[code](*(work[each] for each in of))
     return found

@@ -6,120 +6,128 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from planar.codegen.instructions import Listing, Value, needed
+from planar.codegen.instructions import Instruction, InstructionList, required_values
 
-LONGEST = 6
+MAX_REUSED_TERMS = 6
 """Terms of a sum that is wanted more than once: a longer one is computed once, and not put into other sums."""
 
 
-class _Sum(NamedTuple):
+class _LinearForm(NamedTuple):
     """Factors by what they multiply, and a rest; all are numbers of values."""
 
     factors: dict[int, int]
     rest: int | None
 
 
-class Collecting:
+class InvariantHoister:
     """Makes listings again, all into one. `is_still`: which inputs do not vary; `still`: all values that do not."""
 
-    def __init__(self, is_still: Callable[[Value], bool]):
-        self.is_still, self.made = is_still, Listing()
-        self.still: set[int] = set()
-        self.sums: dict[int, _Sum] = {}
-        self.whole: dict[int, int] = {}
+    def __init__(self, is_still: Callable[[Instruction], bool]):
+        self.is_invariant, self.result = is_still, InstructionList()
+        self.invariants: set[int] = set()
+        self.linear_forms: dict[int, _LinearForm] = {}
+        self.value_numbers: dict[int, int] = {}
 
-    def again(self, listing: Listing, wanted: Sequence[int]) -> list[int]:
+    def rebuild(self, listing: InstructionList, wanted: Sequence[int]) -> list[int]:
         """The numbers of the wanted values in the listing that is made."""
-        self.sums, self.whole = {}, {}
-        order = needed(listing, wanted)
-        uses = Counter(each for k in order for each in listing.values[k].of)
+        self.linear_forms, self.value_numbers = {}, {}
+        order = required_values(listing, wanted)
+        uses = Counter(each for k in order for each in listing.instructions[k].operands)
         for k in order:
-            found = self._sum(listing.values[k])
-            if uses[k] > 1 and (len(found.factors) > LONGEST or self._fresh(found) > 1):
-                found = self._atom(self._made(found))
-            self.sums[k] = found
-        return [self._value(k) for k in wanted]
+            found = self._linear_form(listing.instructions[k])
+            if uses[k] > 1 and (len(found.factors) > MAX_REUSED_TERMS or self._computed_term_count(found) > 1):
+                found = self._single_term(self._write_form(found))
+            self.linear_forms[k] = found
+        return [self._value_number(k) for k in wanted]
 
-    def _sum(self, value: Value) -> _Sum:
-        of = [self.sums[k] for k in value.of]
-        if not any(part.factors for part in of) and (value.what not in ("input",) or self.is_still(value)):
-            return _Sum({}, self._still(value.what, *(self._rest(part) for part in of), data=value.data))
-        if value.what in ("add", "sub", "neg"):
-            first, second = of if len(of) == 2 else (_Sum({}, None), of[0])
-            return self._plus(first, second, "add" if value.what == "add" else "sub")
-        if value.what == "mul" and not all(part.factors for part in of):
+    def _linear_form(self, value: Instruction) -> _LinearForm:
+        of = [self.linear_forms[k] for k in value.operands]
+        if not any(part.factors for part in of) and (value.operation not in ("input",) or self.is_invariant(value)):
+            return _LinearForm(
+                {}, self._add_invariant(value.operation, *(self._rest_or_zero(part) for part in of), data=value.data)
+            )
+        if value.operation in ("add", "sub", "neg"):
+            first, second = of if len(of) == 2 else (_LinearForm({}, None), of[0])
+            return self._add_forms(first, second, "add" if value.operation == "add" else "sub")
+        if value.operation == "mul" and not all(part.factors for part in of):
             by, part = (of[0], of[1]) if not of[0].factors else (of[1], of[0])
-            return self._times(part, self._rest(by))
-        if value.what == "div":
-            return self._divided(value, *of)
-        return self._atom(self.made.add(value.what, *(self._value(k) for k in value.of), data=value.data))
+            return self._scale_form(part, self._rest_or_zero(by))
+        if value.operation == "div":
+            return self._divide(value, *of)
+        return self._single_term(
+            self.result.add(value.operation, *(self._value_number(k) for k in value.operands), data=value.data)
+        )
 
-    def _divided(self, value: Value, above: _Sum, below: _Sum) -> _Sum:
+    def _divide(self, value: Instruction, above: _LinearForm, below: _LinearForm) -> _LinearForm:
         """One division for all that is divided by the same."""
         if not below.factors:
-            return self._times(above, self._still("div", self._constant(1.0), self._rest(below)))
-        inverse = self.made.add("div", self._constant(1.0), self._value(value.of[1]))
+            return self._scale_form(above, self._add_invariant("div", self._constant(1.0), self._rest_or_zero(below)))
+        inverse = self.result.add("div", self._constant(1.0), self._value_number(value.operands[1]))
         if not above.factors:
-            return self._times(self._atom(inverse), self._rest(above))
-        return self._atom(self.made.add("mul", self._value(value.of[0]), inverse))
+            return self._scale_form(self._single_term(inverse), self._rest_or_zero(above))
+        return self._single_term(self.result.add("mul", self._value_number(value.operands[0]), inverse))
 
-    def _fresh(self, part: _Sum) -> int:
+    def _computed_term_count(self, part: _LinearForm) -> int:
         """How many of a sum's terms are products or the like, which stand in few other sums."""
-        return sum(self.made.values[atom].what != "input" for atom in part.factors)
+        return sum(self.result.instructions[atom].operation != "input" for atom in part.factors)
 
-    def _atom(self, number: int) -> _Sum:
-        return _Sum({number: self._constant(1.0)}, None) if number not in self.still else _Sum({}, number)
+    def _single_term(self, number: int) -> _LinearForm:
+        return (
+            _LinearForm({number: self._constant(1.0)}, None)
+            if number not in self.invariants
+            else _LinearForm({}, number)
+        )
 
-    def _still(self, what: str, *of: int, data: float | tuple[int, int] | str = 0.0) -> int:
-        number = self.made.add(what, *of, data=data)
-        self.still.add(number)
+    def _add_invariant(self, what: str, *of: int, data: float | tuple[int, int] | str = 0.0) -> int:
+        number = self.result.add(what, *of, data=data)
+        self.invariants.add(number)
         return number
 
     def _constant(self, value: float) -> int:
-        number = self.made.const(value)
-        self.still.add(number)
+        number = self.result.add_constant(value)
+        self.invariants.add(number)
         return number
 
-    def _rest(self, part: _Sum) -> int:
+    def _rest_or_zero(self, part: _LinearForm) -> int:
         return self._constant(0.0) if part.rest is None else part.rest
 
-    def _plus(self, first: _Sum, second: _Sum, what: str) -> _Sum:
+    def _add_forms(self, first: _LinearForm, second: _LinearForm, what: str) -> _LinearForm:
         factors = dict(first.factors)
         for atom, factor in second.factors.items():
-            both = self._still(what, factors.get(atom, self._constant(0.0)), factor)
-            if self.made.number(both) == 0.0:
+            both = self._add_invariant(what, factors.get(atom, self._constant(0.0)), factor)
+            if self.result.constant_value(both) == 0.0:
                 factors.pop(atom, None)
             else:
                 factors[atom] = both
         if second.rest is None:
-            return _Sum(factors, first.rest)
-        return _Sum(factors, self._still(what, self._rest(first), second.rest))
+            return _LinearForm(factors, first.rest)
+        return _LinearForm(factors, self._add_invariant(what, self._rest_or_zero(first), second.rest))
 
-    def _times(self, part: _Sum, by: int) -> _Sum:
-        if self.made.number(by) == 0.0:
-            return _Sum({}, None)
-        if self._fresh(part) > 1:
-            part = self._atom(self._made(part))
-        factors = {atom: self._still("mul", factor, by) for atom, factor in part.factors.items()}
-        return _Sum(factors, None if part.rest is None else self._still("mul", part.rest, by))
+    def _scale_form(self, part: _LinearForm, by: int) -> _LinearForm:
+        if self.result.constant_value(by) == 0.0:
+            return _LinearForm({}, None)
+        if self._computed_term_count(part) > 1:
+            part = self._single_term(self._write_form(part))
+        factors = {atom: self._add_invariant("mul", factor, by) for atom, factor in part.factors.items()}
+        return _LinearForm(factors, None if part.rest is None else self._add_invariant("mul", part.rest, by))
 
-    def _value(self, k: int) -> int:
-        if k not in self.whole:
-            self.whole[k] = self._made(self.sums[k])
-        return self.whole[k]
+    def _value_number(self, k: int) -> int:
+        if k not in self.value_numbers:
+            self.value_numbers[k] = self._write_form(self.linear_forms[k])
+        return self.value_numbers[k]
 
-    def _made(self, part: _Sum) -> int:
+    def _write_form(self, part: _LinearForm) -> int:
         """The number of a sum's value."""
         if not part.factors:
-            return self._rest(part)
-        terms = [(atom, factor, self.made.number(factor)) for atom, factor in part.factors.items()]
+            return self._rest_or_zero(part)
+        terms = [(atom, factor, self.result.constant_value(factor)) for atom, factor in part.factors.items()]
         terms.sort(key=lambda term: term[2] == -1.0)
-        total = part.rest if part.rest is not None and self.made.number(part.rest) != 0.0 else None
+        total = part.rest if part.rest is not None and self.result.constant_value(part.rest) != 0.0 else None
         for atom, factor, known in terms:
             if known == -1.0:
-                total = self.made.add("neg", atom) if total is None else self.made.add("sub", total, atom)
+                total = self.result.add("neg", atom) if total is None else self.result.add("sub", total, atom)
             else:
-                term = self.made.add("mul", atom, factor)
-                total = term if total is None else self.made.add("add", total, term)
+                term = self.result.add("mul", atom, factor)
+                total = term if total is None else self.result.add("add", total, term)
         assert total is not None
         return total

@@ -6,13 +6,13 @@ from math import isnan
 
 import casadi as ca
 
-from planar.codegen.instructions import Listing, needed
+from planar.codegen.instructions import InstructionList, required_values
 
-CASES = {ca.OP_LT: "less", ca.OP_LE: "most", ca.OP_NOT: "not", ca.OP_IF_ELSE_ZERO: "where"}
+CASE_OPERATIONS = {ca.OP_LT: "less", ca.OP_LE: "most", ca.OP_NOT: "not", ca.OP_IF_ELSE_ZERO: "where"}
 """What machine code is not asked for."""
 
-BINARY = {"add": "+", "sub": "-", "mul": "*", "div": "/", "less": "<", "most": "<="}
-CALLS = {
+JS_OPERATORS = {"add": "+", "sub": "-", "mul": "*", "div": "/", "less": "<", "most": "<="}
+JS_FUNCTIONS = {
     "sqrt": "Math.sqrt",
     "cos": "Math.cos",
     "sin": "Math.sin",
@@ -23,53 +23,53 @@ CALLS = {
 }
 
 
-class Told(Listing):
+class CaseInstructionList(InstructionList):
     """A listing that knows cases as well."""
 
-    def _made(self, code: int, of: list[int]) -> int:
-        return self.add(CASES[code], *of) if code in CASES else super()._made(code, of)
+    def _add_operation(self, code: int, of: list[int]) -> int:
+        return self.add(CASE_OPERATIONS[code], *of) if code in CASE_OPERATIONS else super()._add_operation(code, of)
 
 
-def printed(name: str, function: ca.Function) -> str:
+def write_javascript(name: str, function: ca.Function) -> str:
     """A function of arrays, the last of which receives all results, one dense matrix after the other, column by column.
 
     Raises NotPrinted where it holds an operation that is not known.
     """
-    listing = Told()
+    listing = CaseInstructionList()
     inputs = [
         [listing.add("input", data=(k, at)) for at in range(function.numel_in(k))] for k in range(function.n_in())
     ]
-    wanted = [value for result in listing.inlined(function, inputs) for value in result]
+    wanted = [value for result in listing.inline_function(function, inputs) for value in result]
     arguments = [f"a{k}" for k in range(function.n_in())]
     told: dict[int, str] = {}
     lines = []
-    for number in needed(listing, wanted):
-        what, of, data = listing.values[number]
+    for number in required_values(listing, wanted):
+        what, of, data = listing.instructions[number]
         if what == "const":
-            told[number] = _number(float(data))
+            told[number] = _js_number(float(data))
         elif what == "input":
             argument, at = data
             told[number] = f"a{argument}[{at}]"
         else:
             told[number] = f"v{number}"
-            lines.append(f"const v{number}={_made(what, [told[each] for each in of])};")
+            lines.append(f"const v{number}={_js_expression(what, [told[each] for each in of])};")
     lines += [f"o[{at}]={told[value]};" for at, value in enumerate(wanted)]
     return f"function {name}({','.join([*arguments, 'o'])}){{{''.join(lines)}return o}}"
 
 
-def _number(value: float) -> str:
+def _js_number(value: float) -> str:
     if isnan(value):
         return "NaN"
     return repr(value) if value >= 0.0 else f"({value!r})"
 
 
-def _made(what: str, of: list[str]) -> str:
-    if what in BINARY:
-        return f"{of[0]}{BINARY[what]}{of[1]}"
+def _js_expression(what: str, of: list[str]) -> str:
+    if what in JS_OPERATORS:
+        return f"{of[0]}{JS_OPERATORS[what]}{of[1]}"
     if what == "neg":
         return f"-{of[0]}"
     if what == "not":
         return f"!{of[0]}"
     if what == "where":
         return f"{of[0]}?{of[1]}:0"
-    return f"{CALLS[what]}({','.join(of)})"
+    return f"{JS_FUNCTIONS[what]}({','.join(of)})"

@@ -15,43 +15,43 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, BinaryIO, TextIO
 
-from planar.document import read
-from planar.foundation.errors import BadInput, NotWritten
+from planar.document import read_mechanism
+from planar.foundation.errors import BadInput, WriteFailure
 from planar.model.mechanism import Mechanism
 
 PIPED = "-"
 """What stands for the input of the process in place of a file's name."""
-MOST_FILES = 10_000
+MAX_FILES_SEARCHED = 10_000
 """Files of a folder that are looked at for one that may be meant."""
-LARGEST = 8 * 1024 * 1024
+MAX_FILE_BYTES = 8 * 1024 * 1024
 """Bytes; a mechanism of ten thousand links takes about two million."""
-OUT_OF_ROOM = {
+NO_SPACE_ERRORS = {
     getattr(errno, name) for name in ("ENOSPC", "EDQUOT", "EFBIG", "EIO", "EPIPE", "EBADF") if hasattr(errno, name)
 }
 """What comes of writing, and not of where."""
-NOT_REPLACED = {errno.EACCES, errno.EPERM, errno.EROFS, errno.EBUSY, errno.EXDEV}
+NOT_REPLACEABLE_ERRORS = {errno.EACCES, errno.EPERM, errno.EROFS, errno.EBUSY, errno.EXDEV}
 """What comes of a folder that takes no other file, as where one file alone is mounted or may be written."""
-PART = re.compile(r"\.[0-9a-f]{24}\.part")
+PARTIAL_FILE_NAME = re.compile(r"\.[0-9a-f]{24}\.part")
 """Names of files that are not whole yet."""
-MOST_LINKS = 40
+MAX_SYMLINKS = 40
 """From link to link, as Linux has it."""
 
 
 def loads(text: str | bytes, place: str = "$") -> Mechanism:
     """The mechanism in a JSON text. Raises BadInput."""
-    return read(_parsed(text, place))
+    return read_mechanism(_parse_json(text, place))
 
 
 def from_dict(value: Any) -> Mechanism:
     """The mechanism in a JSON value (dicts, lists, texts, numbers). Raises BadInput."""
-    return read(value)
+    return read_mechanism(value)
 
 
 def to_dict(mechanism: Mechanism) -> dict[str, Any]:
     """The JSON value of a mechanism; `from_dict` gives the same mechanism back, to the last bit."""
-    from planar.document.writer import write
+    from planar.document.writer import write_mechanism
 
-    return write(mechanism)
+    return write_mechanism(mechanism)
 
 
 def dumps(mechanism: Mechanism) -> str:
@@ -66,28 +66,28 @@ def load(model: str | Path) -> Mechanism:
     """
     if str(model) == PIPED:
         return loads(_piped(), "standard input")
-    path = found(model)
-    content = bytes_of(path)
+    path = find_model_file(model)
+    content = read_limited(path)
     if path.suffix.lower() not in ("", ".json") and not content.lstrip(b"\xef\xbb\xbf \t\r\n").startswith((b"{", b"[")):
         told = "name a JSON file that describes a mechanism, or a model that comes along by its name"
         raise BadInput(str(path), f"this is a {path.suffix} file and no mechanism; {told}")
     return loads(content, str(path))
 
 
-def save(path: Path, content: str | bytes) -> None:
+def save_file(path: Path, content: str | bytes) -> None:
     """Write a text, or bytes, to a file: all of it, or nothing, so that a file that is there stays whole till then.
 
     Raises BadInput where there can be no such file, NotWritten where its content finds no room.
     """
     try:
-        write_whole(path, content.encode() if isinstance(content, str) else content)
+        write_atomically(path, content.encode() if isinstance(content, str) else content)
     except (OSError, ValueError) as problem:
-        raise unwritten(str(path), "the file", problem) from None
+        raise write_error(str(path), "the file", problem) from None
 
 
-def unwritten(place: str, what: str, problem: Exception, done: str = "written") -> BadInput:
+def write_error(place: str, what: str, problem: Exception, done: str = "written") -> BadInput:
     """That something cannot be written, as an error: NotWritten where its content found no room, else BadInput."""
-    kind = NotWritten if getattr(problem, "errno", None) in OUT_OF_ROOM else BadInput
+    kind = WriteFailure if getattr(problem, "errno", None) in NO_SPACE_ERRORS else BadInput
     return kind(place, f"{what} cannot be {done}: {getattr(problem, 'strerror', None) or problem}")
 
 
@@ -96,7 +96,7 @@ def closed_output() -> TextIO:
     return os.fdopen(os.open(os.devnull, os.O_RDONLY), "w", encoding="utf-8", closefd=False)
 
 
-def abandon(stream: Any) -> None:
+def discard_stream(stream: Any) -> None:
     """Let what is left of a stream go nowhere, or the interpreter would try to write it once more at its end."""
     with suppress(OSError, ValueError):  # a stream within this process has no number
         number, nowhere = stream.fileno(), os.open(os.devnull, os.O_WRONLY)
@@ -104,71 +104,71 @@ def abandon(stream: Any) -> None:
         os.close(nowhere)
 
 
-def asset(name: str) -> str:
+def read_asset(name: str) -> str:
     """A text that comes along for pages."""
     return (Path(__file__).parents[1] / "pages" / "assets" / name).read_text(encoding="utf-8")
 
 
-def own_bytes(path: Path) -> bytes | None:
+def read_private(path: Path) -> bytes | None:
     """A file's content if it and its folder are this user's and nobody else may write there; else None."""
     try:
-        if not _own(path.parent.stat()):
+        if not _is_private(path.parent.stat()):
             return None
         with path.open("rb") as file:
-            return file.read() if _own(os.fstat(file.fileno())) else None
+            return file.read() if _is_private(os.fstat(file.fileno())) else None
     except OSError:
         return None
 
 
-def put_private(path: Path, content: bytes) -> bool:
+def write_private(path: Path, content: bytes) -> bool:
     """Write a file that only this user can read, all at once, into a folder of his own; whether that was possible.
 
     A folder that is not there is made.
     """
     try:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        if not _own(path.parent.stat()):
+        if not _is_private(path.parent.stat()):
             return False
-        _replace(path, content, 0o600)
+        _replace_file(path, content, 0o600)
     except OSError:
         return False
     return True
 
 
-def write_whole(path: Path, content: bytes) -> None:
+def write_atomically(path: Path, content: bytes) -> None:
     """Write a file all at once: a process that is killed leaves the old file or the new one, never a part.
 
     A link stays one, and the file that it leads to is written, which keeps its owner and permissions. A pipe or a
     device takes the bytes as they come. Raises OSError.
     """
-    target, number = _meant(path)
+    target, number = _resolve_target(path)
     if number is not None:
         if sys.stdout is not None:
             sys.stdout.flush()
-        _pass(number, content)
+        _write_all(number, content)
         return
     try:
         known = target.stat()
     except FileNotFoundError:
-        _replace(target, content)
+        _replace_file(target, content)
         return
     if not stat.S_ISREG(known.st_mode):
         with target.open("wb", buffering=0) as device:
-            _pass(device.fileno(), content)
+            _write_all(device.fileno(), content)
         return
     if not os.access(target, os.W_OK):
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
     try:
-        _replace(target, content, stat.S_IMODE(known.st_mode), known)
+        _replace_file(target, content, stat.S_IMODE(known.st_mode), known)
     except OSError as problem:
-        if problem.errno not in NOT_REPLACED:
+        if problem.errno not in NOT_REPLACEABLE_ERRORS:
             raise
         _overwrite(target, content)
 
 
-def _meant(path: Path) -> tuple[Path, int | None]:
+def _resolve_target(path: Path) -> tuple[Path, int | None]:
     """The file to which links lead; of one that stands for what this process has open, as /dev/stdout, its number."""
-    for _ in range(MOST_LINKS):
+    for _ in range(MAX_SYMLINKS):
         folder = os.path.realpath(path.parent)
         path = Path(folder, path.name)
         if folder in ("/dev/fd", f"/proc/{os.getpid()}/fd") and path.name.isdecimal():
@@ -179,14 +179,16 @@ def _meant(path: Path) -> tuple[Path, int | None]:
     raise OSError(errno.ELOOP, os.strerror(errno.ELOOP))
 
 
-def _pass(number: int, content: bytes) -> None:
+def _write_all(number: int, content: bytes) -> None:
     """Write bytes to what is open."""
     rest = memoryview(content)
     while rest:
         rest = rest[os.write(number, rest) :]
 
 
-def _replace(path: Path, content: bytes, mode: int | None = None, like: os.stat_result | None = None) -> None:
+def _replace_file(
+    path: Path, content: bytes, mode: int | None = None, expected_owner: os.stat_result | None = None
+) -> None:
     """Write beside a file, then take its place; without a mode it is what new files have.
 
     Raises OSError, of `NOT_REPLACED` where the file has an owner, or other names, that the new one would not have.
@@ -198,7 +200,11 @@ def _replace(path: Path, content: bytes, mode: int | None = None, like: os.stat_
         number = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), least)
         with os.fdopen(number, "wb") as file:
             own = os.fstat(number)
-            if like is not None and (like.st_nlink, like.st_uid, like.st_gid) != (1, own.st_uid, own.st_gid):
+            if expected_owner is not None and (
+                expected_owner.st_nlink,
+                expected_owner.st_uid,
+                expected_owner.st_gid,
+            ) != (1, own.st_uid, own.st_gid):
                 raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
             file.write(content)
         if mode is not None:
@@ -219,18 +225,18 @@ def _overwrite(path: Path, content: bytes) -> None:
                 os.posix_fallocate(file.fileno(), 0, len(content))
         except OSError as problem:
             file.truncate(before)
-            if problem.errno in OUT_OF_ROOM:
+            if problem.errno in NO_SPACE_ERRORS:
                 raise
-        _pass(file.fileno(), content)
+        _write_all(file.fileno(), content)
         file.truncate(len(content))
 
 
-def _own(known: os.stat_result) -> bool:
+def _is_private(known: os.stat_result) -> bool:
     """Whether a file or folder is this user's, and nobody else may write to it; where there are no users it is."""
     return not hasattr(os, "getuid") or (known.st_uid == os.getuid() and not known.st_mode & 0o022)
 
 
-def found(model: str | Path) -> Path:
+def find_model_file(model: str | Path) -> Path:
     """The file that a MODEL argument means: a path, else the name or id of a model that comes along."""
     path = Path(model)
     try:
@@ -247,12 +253,12 @@ def found(model: str | Path) -> Path:
     if str(model) in known:
         return known[str(model)]
     for file in known.values():
-        if str(model) in _parsed(bytes_of(file), str(file)).get("ids", ()):
+        if str(model) in _parse_json(read_limited(file), str(file)).get("ids", ()):
             return file
-    raise BadInput(str(model), _missing(path, known))
+    raise BadInput(str(model), _explain_missing(path, known))
 
 
-def _missing(path: Path, models: Iterable[str]) -> str:
+def _explain_missing(path: Path, models: Iterable[str]) -> str:
     """What to say of an argument that is no file and no model: what was meant, by its looks a path or a name."""
     from difflib import get_close_matches
 
@@ -265,7 +271,7 @@ def _missing(path: Path, models: Iterable[str]) -> str:
         return f"there is no such file, and no model of that name; {meant}"
     if not path.parent.is_dir():
         return f"there is no such file: there is no folder {str(path.parent)!r}"
-    there = {each.stem.lower(): each.name for each in islice(path.parent.glob("*.json"), MOST_FILES)}
+    there = {each.stem.lower(): each.name for each in islice(path.parent.glob("*.json"), MAX_FILES_SEARCHED)}
     near = get_close_matches(path.stem.lower(), there, 1, 0.6)  # an ending that all have makes none alike
     told = f"; did you mean {str(path.parent / there[near[0]])!r}?" if near else ""
     return f"there is no such file{told or '; name a mechanism file (JSON), or a model that comes along by its name'}"
@@ -278,13 +284,13 @@ def model_files() -> tuple[Path, ...]:
     return tuple(sorted(folder.rglob("*.json"), key=lambda file: file.stem))
 
 
-def models() -> Iterator[tuple[Path, Mechanism]]:
+def load_models() -> Iterator[tuple[Path, Mechanism]]:
     """Every model that comes along, read."""
     for file in model_files():
         yield file, load(file)
 
 
-def digest(path: Path) -> str:
+def file_sha256(path: Path) -> str:
     """The SHA-256 of a file's content, in hexadecimal digits. Raises OSError."""
     from hashlib import file_digest
 
@@ -292,7 +298,7 @@ def digest(path: Path) -> str:
         return file_digest(file, "sha256").hexdigest()
 
 
-def bytes_of(path: Path) -> bytes:
+def read_limited(path: Path) -> bytes:
     """The content of a file that is no larger than a mechanism may be. Raises BadInput."""
     try:
         with path.open("rb") as file:
@@ -314,13 +320,13 @@ def _piped() -> bytes:
 
 
 def _limited(file: BinaryIO, place: str) -> bytes:
-    content = file.read(LARGEST + 1)
-    if len(content) > LARGEST:
-        raise BadInput(place, f"the file is larger than the {LARGEST // 2**20} MiB that a mechanism may take")
+    content = file.read(MAX_FILE_BYTES + 1)
+    if len(content) > MAX_FILE_BYTES:
+        raise BadInput(place, f"the file is larger than the {MAX_FILE_BYTES // 2**20} MiB that a mechanism may take")
     return content
 
 
-def _parsed(text: str | bytes, place: str) -> Any:
+def _parse_json(text: str | bytes, place: str) -> Any:
     def constant(word: str) -> Any:
         raise BadInput(place, f"{word} is not a number that a mechanism can have")
 

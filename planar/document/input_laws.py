@@ -5,104 +5,106 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from planar.document.cursor import Cursor, did_you_mean
-from planar.foundation.units import SI, unit
-from planar.model.input_laws import MOST, MOTIONS, Key, Law, Piece, Table
-from planar.model.mechanism import FARTHEST, Input
-from planar.model.pairs import Pair, Quantity
+from planar.document.cursor import Cursor, suggest_spelling
+from planar.foundation.units import SI_UNITS, parse_unit
+from planar.model.input_laws import MAX_LAW_ITEMS, SEGMENT_TYPES, InputLaw, LawSegment, SegmentKey, TableSegment
+from planar.model.mechanism import LARGEST_INPUT_POSITION, Input
+from planar.model.pairs import Pair, QuantityWriter
 
-Kinds = tuple[str, str, str]
+InputKinds = tuple[str, str, str]
 """The kinds of quantity of an input's position, velocity and acceleration."""
 
 
-def read_law(cursor: Cursor, given: Input, kinds: Kinds) -> Law:
+def read_law(cursor: Cursor, given: Input, kinds: InputKinds) -> InputLaw:
     """The law of an input that starts as given. Raises BadInput."""
     places = tuple(cursor.items()) if isinstance(cursor.value, list) else (cursor,)
-    if not 1 <= len(places) <= MOST:
-        raise cursor.refuse(None, f"a law has from 1 to {MOST} pieces, not {len(places)}")
-    law = Law(tuple(_piece(place, kinds) for place in places))
+    if not 1 <= len(places) <= MAX_LAW_ITEMS:
+        raise cursor.error_at(None, f"a law has from 1 to {MAX_LAW_ITEMS} pieces, not {len(places)}")
+    law = InputLaw(tuple(_read_segment(place, kinds) for place in places))
     joints = law.joints(given.position, given.velocity)
-    for place, piece, before, after in zip(places, law.pieces, joints, joints[1:], strict=False):
-        if isinstance(piece, Table) and not piece.begins(before.position):
-            told = [_told(cursor, each, kinds[0]) for each in (piece.positions[0], before.position)]
-            raise place.refuse("positions[0]", f"the table starts at {told[0]}, but the piece starts at {told[1]}")
-        if not abs(after.position) <= FARTHEST:
-            told = f"this leads to {after.position:.6g} {SI[kinds[0]]}"
-            raise place.refuse(None, f"{told}; an input moves to {FARTHEST:g} rad or m at most")
+    for place, piece, before, after in zip(places, law.segments, joints, joints[1:], strict=False):
+        if isinstance(piece, TableSegment) and not piece.starts_at(before.position):
+            told = [_format_value(cursor, each, kinds[0]) for each in (piece.positions[0], before.position)]
+            raise place.error_at("positions[0]", f"the table starts at {told[0]}, but the piece starts at {told[1]}")
+        if not abs(after.position) <= LARGEST_INPUT_POSITION:
+            told = f"this leads to {after.position:.6g} {SI_UNITS[kinds[0]]}"
+            raise place.error_at(None, f"{told}; an input moves to {LARGEST_INPUT_POSITION:g} rad or m at most")
     return law
 
 
-def write_law(law: Law, kinds: Kinds, quantity: Quantity) -> list[dict[str, Any]]:
+def write_law(law: InputLaw, kinds: InputKinds, quantity: QuantityWriter) -> list[dict[str, Any]]:
     """The pieces of a law as a file has them."""
-    return [{"motion": piece.motion} | dict(_values(piece, kinds, quantity)) for piece in law.pieces]
+    return [{"motion": piece.motion} | dict(_written_values(piece, kinds, quantity)) for piece in law.segments]
 
 
-def jumps(inputs: Iterable[Input], known: Mapping[str, Pair]) -> Iterator[str]:
+def speed_jump_remarks(inputs: Iterable[Input], known: Mapping[str, Pair]) -> Iterator[str]:
     """What is to be said of each law whose pieces do not go on at the speed at which those before end."""
     for given in inputs:
         if given.law is None:
             continue
         joints = given.law.joints(given.position, given.velocity)[:-1]
-        fastest = max(abs(speed) for joint in joints for speed in (joint.ending, joint.starting))
+        fastest = max(abs(speed) for joint in joints for speed in (joint.velocity_before, joint.velocity_after))
         # an input that rests in the file has no speed there that its law could go against
         found = [
             (i, joint)
             for i, joint in enumerate(joints)
-            if abs(joint.starting - joint.ending) > 1e-9 * fastest and (i > 0 or given.velocity != 0.0)
+            if abs(joint.velocity_after - joint.velocity_before) > 1e-9 * fastest and (i > 0 or given.velocity != 0.0)
         ]
         if found:
             (i, joint), *more = found
-            si = SI[known[given.pair].driven()[1]]
+            si = SI_UNITS[known[given.pair].input_quantity_kinds()[1]]
             before = f"piece {i} ends" if i else "the input's velocity is"
-            starts, ends = (f"at {v:.6g} {si}" if v else "at rest" for v in (joint.starting, joint.ending))
+            starts, ends = (
+                f"at {v:.6g} {si}" if v else "at rest" for v in (joint.velocity_after, joint.velocity_before)
+            )
             others = f"; so it does at {len(more)} more of its joints" if more else ""
             told = f"{before} {ends if i else ends.removeprefix('at ')}"
             yield f"the law of input {given.pair!r} jumps in speed: piece {i + 1} starts {starts} where {told}{others}"
 
 
-def _piece(cursor: Cursor, kinds: Kinds) -> Piece:
+def _read_segment(cursor: Cursor, kinds: InputKinds) -> LawSegment:
     cursor["motion"].as_text()
-    motion = cursor.one_of("motion", tuple(MOTIONS))
-    kind = MOTIONS[motion]
+    motion = cursor.choice("motion", tuple(SEGMENT_TYPES))
+    kind = SEGMENT_TYPES[motion]
     for key in cursor.fields():
         if key not in ("motion", *kind.keys):
             told = f"{motion!r} has no {key!r}, only {', '.join(map(repr, kind.keys))}"
-            raise cursor.refuse(key, f"{told}{did_you_mean(key, kind.keys)}")
+            raise cursor.error_at(key, f"{told}{suggest_spelling(key, kind.keys)}")
     for key, each in kind.keys.items():
-        if each.many and len(tuple(cursor[key].items())) > MOST:
-            raise cursor.refuse(key, f"a table has at most {MOST} points")
+        if each.is_list and len(tuple(cursor[key].items())) > MAX_LAW_ITEMS:
+            raise cursor.error_at(key, f"a table has at most {MAX_LAW_ITEMS} points")
     read = {
-        each.field: _value(cursor[key], each, kinds)
+        each.field: _read_value(cursor[key], each, kinds)
         for key, each in kind.keys.items()
-        if cursor.has(key) or each.needed
+        if cursor.has(key) or each.is_required
     }
     piece = kind(**read)
-    wrong = piece.problem()
+    wrong = piece.find_problem()
     if wrong is not None:
-        raise cursor.refuse(*wrong)
+        raise cursor.error_at(*wrong)
     return piece
 
 
-def _value(cursor: Cursor, key: Key, kinds: Kinds) -> Any:
+def _read_value(cursor: Cursor, key: SegmentKey, kinds: InputKinds) -> Any:
     def one(cursor: Cursor) -> float:
-        return cursor.as_number() if key.what == "number" else cursor.as_quantity(_kind(key, kinds))
+        return cursor.as_number() if key.value_kind == "number" else cursor.as_quantity(_quantity_kind(key, kinds))
 
-    return tuple(map(one, cursor.items())) if key.many else one(cursor)
+    return tuple(map(one, cursor.items())) if key.is_list else one(cursor)
 
 
-def _values(piece: Piece, kinds: Kinds, quantity: Quantity) -> Iterator[tuple[str, Any]]:
+def _written_values(piece: LawSegment, kinds: InputKinds, quantity: QuantityWriter) -> Iterator[tuple[str, Any]]:
     for name, key in piece.keys.items():
         value = getattr(piece, key.field)
         if value is not None:
-            kind = _kind(key, kinds)
-            yield name, [quantity(each, kind) for each in value] if key.many else quantity(value, kind)
+            kind = _quantity_kind(key, kinds)
+            yield name, [quantity(each, kind) for each in value] if key.is_list else quantity(value, kind)
 
 
-def _kind(key: Key, kinds: Kinds) -> str:
+def _quantity_kind(key: SegmentKey, kinds: InputKinds) -> str:
     orders = ("position", "velocity", "acceleration")
-    return kinds[orders.index(key.what)] if key.what in orders else key.what
+    return kinds[orders.index(key.value_kind)] if key.value_kind in orders else key.value_kind
 
 
-def _told(cursor: Cursor, value: float, kind: str) -> str:
-    units = cursor.whole.units._asdict()
-    return f"{unit(units[kind]).from_si(value):.9g} {units[kind]}"
+def _format_value(cursor: Cursor, value: float, kind: str) -> str:
+    units = cursor.context.units._asdict()
+    return f"{parse_unit(units[kind]).from_si(value):.9g} {units[kind]}"

@@ -6,28 +6,28 @@ from collections.abc import Iterable
 from typing import Any
 
 from planar.document.input_laws import write_law
-from planar.document.loads import write_applied
-from planar.document.schema import DRIVE, FORMAT
-from planar.foundation.units import SI, Unit, shortest, unit
-from planar.model.link_shapes import Along, At, Place
+from planar.document.loads import write_loads
+from planar.document.schema import DRIVE_SCHEMA, FORMAT_VERSION
+from planar.foundation.units import SI_UNITS, Unit, parse_unit, shortest_number
+from planar.model.link_shapes import Along, At, PointDefinition
 from planar.model.mechanism import (
-    QUANTITIES,
+    PUBLISHED_QUANTITIES,
     Drive,
     Input,
     Link,
     Mechanism,
-    Published,
-    entries,
-    motions,
+    PublishedValue,
+    pair_entries,
+    relative_motions,
 )
-from planar.model.pairs import Quantity
+from planar.model.pairs import QuantityWriter
 
 
-def write(mechanism: Mechanism) -> dict[str, Any]:
+def write_mechanism(mechanism: Mechanism) -> dict[str, Any]:
     """The mechanism as a file has it, in its own units; each number reads back to the last bit."""
-    quantity = _quantities(mechanism)
-    value: dict[str, Any] = {"planar": FORMAT, "name": mechanism.name}
-    value |= _told(
+    quantity = _quantity_writer(mechanism)
+    value: dict[str, Any] = {"planar": FORMAT_VERSION, "name": mechanism.name}
+    value |= _nonempty_fields(
         ids=list(mechanism.ids),
         about=mechanism.about,
         source=mechanism.source,
@@ -36,32 +36,32 @@ def write(mechanism: Mechanism) -> dict[str, Any]:
     )
     value["units"] = {"length": mechanism.units.length, "angle": mechanism.units.angle}
     value["frame"] = mechanism.frame
-    value["links"] = {link.name: _link(link, quantity) for link in mechanism.links}
-    value["pairs"] = [type(group[0]).write(group, quantity) for group in entries(mechanism)]
-    value |= _told(
-        inputs=[_drive_entry(mechanism, given, quantity) for given in mechanism.inputs],
-        **write_applied(mechanism, quantity),
+    value["links"] = {link.name: _write_link(link, quantity) for link in mechanism.links}
+    value["pairs"] = [type(group[0]).write(group, quantity) for group in pair_entries(mechanism)]
+    value |= _nonempty_fields(
+        inputs=[_write_input(mechanism, given, quantity) for given in mechanism.inputs],
+        **write_loads(mechanism, quantity),
         sketch={point: [quantity(x, "length"), quantity(y, "length")] for point, x, y in mechanism.sketch},
-        published=[_published(item, mechanism, quantity) for item in mechanism.published],
+        published=[_write_published(item, mechanism, quantity) for item in mechanism.published],
     )
     return value
 
 
-def _quantities(mechanism: Mechanism) -> Quantity:
-    declared = {"length": unit(mechanism.units.length), "angle": unit(mechanism.units.angle)}
+def _quantity_writer(mechanism: Mechanism) -> QuantityWriter:
+    declared = {"length": parse_unit(mechanism.units.length), "angle": parse_unit(mechanism.units.angle)}
 
     def quantity(value: float, kind: str) -> float | str:
         value = float(value)  # a number of numpy would write its type
         if kind in declared:
-            return shortest(value, declared[kind])
+            return shortest_number(value, declared[kind])
         if kind.startswith("angular") and value != 0.0:
-            return f"{value!r} {SI[kind]}"  # a bare rate is refused where angles are in degrees
-        return shortest(value, Unit(kind, 1.0, 1.0))
+            return f"{value!r} {SI_UNITS[kind]}"  # a bare rate is refused where angles are in degrees
+        return shortest_number(value, Unit(kind, 1.0, 1.0))
 
     return quantity
 
 
-def _told(**fields: Any) -> dict[str, Any]:
+def _nonempty_fields(**fields: Any) -> dict[str, Any]:
     """Only the fields that say something."""
     return {
         key: value
@@ -70,20 +70,20 @@ def _told(**fields: Any) -> dict[str, Any]:
     }
 
 
-def _list(values: Iterable[Any] | None) -> list[Any] | None:
+def _list_or_none(values: Iterable[Any] | None) -> list[Any] | None:
     return None if values is None else list(values)
 
 
-def _link(link: Link, quantity: Quantity) -> dict[str, Any]:
-    return _told(
-        ends=_list(link.ends),
+def _write_link(link: Link, quantity: QuantityWriter) -> dict[str, Any]:
+    return _nonempty_fields(
+        ends=_list_or_none(link.ends),
         length=None if link.length is None else quantity(link.length, "length"),
-        axis=_list(link.axis),
-        points={point.name: _place(point.place, quantity) for point in link.points},
+        axis=_list_or_none(link.axis),
+        points={point.name: _write_point_definition(point.place, quantity) for point in link.points},
     )
 
 
-def _place(place: Place, quantity: Quantity) -> Any:
+def _write_point_definition(place: PointDefinition, quantity: QuantityWriter) -> Any:
     if isinstance(place, At):
         return [quantity(place.x, "length"), quantity(place.y, "length")]
     if isinstance(place, Along):
@@ -101,24 +101,28 @@ def _place(place: Place, quantity: Quantity) -> Any:
     }
 
 
-def _drive_entry(mechanism: Mechanism, drive: Input, quantity: Quantity) -> dict[str, Any]:
-    law = None if drive.law is None else write_law(drive.law, motions(mechanism)[drive.pair].driven(), quantity)
-    return {"pair": drive.pair} | _drive(mechanism, drive, quantity) | _told(law=law)
+def _write_input(mechanism: Mechanism, drive: Input, quantity: QuantityWriter) -> dict[str, Any]:
+    law = (
+        None
+        if drive.law is None
+        else write_law(drive.law, relative_motions(mechanism)[drive.pair].input_quantity_kinds(), quantity)
+    )
+    return {"pair": drive.pair} | _write_drive(mechanism, drive, quantity) | _nonempty_fields(law=law)
 
 
-def _drive(mechanism: Mechanism, drive: Any, quantity: Quantity) -> dict[str, Any]:
-    kinds = dict(zip(DRIVE, motions(mechanism)[drive.pair].driven(), strict=True))
+def _write_drive(mechanism: Mechanism, drive: Any, quantity: QuantityWriter) -> dict[str, Any]:
+    kinds = dict(zip(DRIVE_SCHEMA, relative_motions(mechanism)[drive.pair].input_quantity_kinds(), strict=True))
     told = {key: getattr(drive, key) for key in kinds}
     return {key: quantity(value, kinds[key]) for key, value in told.items() if value is not None}
 
 
-def _drives(mechanism: Mechanism, drives: tuple[Drive, ...], quantity: Quantity) -> dict[str, Any]:
-    return {drive.pair: _drive(mechanism, drive, quantity) for drive in drives}
+def _write_drives(mechanism: Mechanism, drives: tuple[Drive, ...], quantity: QuantityWriter) -> dict[str, Any]:
+    return {drive.pair: _write_drive(mechanism, drive, quantity) for drive in drives}
 
 
-def _published(item: Published, mechanism: Mechanism, quantity: Quantity) -> dict[str, Any]:
-    value = None if item.value is None else f"{float(item.value)!r} {SI[QUANTITIES[item.quantity]]}"
-    return {"symbol": item.symbol, "quantity": item.quantity, "of": item.of, "value": value} | _told(
+def _write_published(item: PublishedValue, mechanism: Mechanism, quantity: QuantityWriter) -> dict[str, Any]:
+    value = None if item.value is None else f"{float(item.value)!r} {SI_UNITS[PUBLISHED_QUANTITIES[item.quantity]]}"
+    return {"symbol": item.symbol, "quantity": item.quantity, "of": item.of, "value": value} | _nonempty_fields(
         tolerance=item.tolerance,
         relative_to=item.relative_to,
         component=item.component,
@@ -126,6 +130,6 @@ def _published(item: Published, mechanism: Mechanism, quantity: Quantity) -> dic
         case=item.case,
         note=item.note,
         slip=item.slip,
-        inputs=_drives(mechanism, item.inputs, quantity),
-        **{"from": _drives(mechanism, item.start, quantity)},
+        inputs=_write_drives(mechanism, item.inputs, quantity),
+        **{"from": _write_drives(mechanism, item.start, quantity)},
     )

@@ -15,24 +15,24 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from planar.dynamics.lagrangian import Work
-from planar.dynamics.load_variation import factors
-from planar.equations.casadi_call import Called
+from planar.dynamics.lagrangian import LagrangianFunctions
+from planar.dynamics.load_variation import load_factors
+from planar.equations.casadi_call import BufferedFunction
 from planar.foundation.errors import NoAnswer, Outcome
-from planar.model.wording import quoted
-from planar.solving.runs.time_run import by_law
+from planar.model.wording import quote_names
+from planar.solving.runs.time_run import input_law_rates
 
 Array = np.ndarray
 
-NONE = 1e-9
+RANK_TOLERANCE = 1e-9
 """A singular value below this part of the greatest is none."""
-MASSLESS = 1e-12
+MASSLESS_TOLERANCE = 1e-12
 """Of the greatest inertia: a motion with less has none that could be accelerated."""
-CLOSED, STEPS = 1e-14, 8
+CLOSED_TOLERANCE, MAX_NEWTON_STEPS = 1e-14, 8
 """Sizes: what stays open of the constraints, and Newton's steps to there."""
 
 
-class Pushed(NamedTuple):
+class AccelerationResult(NamedTuple):
     """Accelerations of the coordinates, and the power (W) of what stores none: loads, dampers and driven inputs.
 
     `firm` is the weakest constraint beside the strongest: nothing on a change point.
@@ -40,34 +40,34 @@ class Pushed(NamedTuple):
 
     q2: Array
     power: float
-    firm: float
+    regularity: float
 
 
-class Driven:
+class DrivenInputs:
     """The inputs that keep to their laws while the others are free."""
 
-    def __init__(self, work: Work, pairs: Sequence[str]):
+    def __init__(self, work: LagrangianFunctions, pairs: Sequence[str]):
         names = [given.pair for given in work.mechanism.inputs]
         self.index = [names.index(pair) for pair in pairs]
-        self.given = [work.mechanism.inputs[k] for k in self.index]
+        self.inputs = [work.mechanism.inputs[k] for k in self.index]
 
-    def at(self, time: float) -> Array:
+    def motion_at(self, time: float) -> Array:
         """Position, velocity and acceleration (3, driven)."""
-        return np.array([by_law(each, np.array([time]))[:3, 0] for each in self.given]).reshape(-1, 3).T
+        return np.array([input_law_rates(each, np.array([time]))[:3, 0] for each in self.inputs]).reshape(-1, 3).T
 
 
-class Accelerations:
+class EquationsOfMotion:
     """The equations of motion of one mechanism; lengths count in parts of its size `unit` (m)."""
 
-    def __init__(self, work: Work, driven: Sequence[str], unit: float, wound: Array):
-        self.work, self.driven, self.wound = work, Driven(work, driven), wound
+    def __init__(self, work: LagrangianFunctions, driven: Sequence[str], unit: float, wound: Array):
+        self.work, self.driven, self.spring_turns = work, DrivenInputs(work, driven), wound
         q, q1 = work.q, work.q1
         self.scale = np.full(q.numel(), unit)
-        self.scale[2 : work.many : 3] = 1.0  # angles
-        held = [work.drives[k] for k in self.driven.index]
-        rows = ca.vertcat(work.gaps, *held)
+        self.scale[2 : work.link_coordinate_count : 3] = 1.0  # angles
+        held = [work.input_positions[k] for k in self.driven.index]
+        rows = ca.vertcat(work.residuals, *held)
         slope = ca.jacobian(rows, q)
-        loads, efforts = work.pushed
+        loads, efforts = work.applied_forces
         force = loads + efforts
         still = ca.substitute(work.inertia, work.q2, ca.SX.zeros(q.numel()))
         outputs = [
@@ -76,94 +76,94 @@ class Accelerations:
             ca.jtimes(ca.mtimes(slope, q1), q, q1),
             ca.jacobian(work.momentum, q1),
             force,
-            work.kept - still,
-            work.drives,
+            work.conservative_forces - still,
+            work.input_positions,
             ca.vertcat(*work.energies[:2]),
         ]
-        given = [q, q1, work.factors, work.turns]
-        self._called = Called(ca.Function("accelerations", given, [ca.densify(each) for each in outputs]))
-        self._closing = Called(ca.Function("closing", [q], [ca.densify(rows), ca.densify(slope)]))
+        given = [q, q1, work.factors, work.spring_turns]
+        self._called = BufferedFunction(ca.Function("accelerations", given, [ca.densify(each) for each in outputs]))
+        self._closing = BufferedFunction(ca.Function("closing", [q], [ca.densify(rows), ca.densify(slope)]))
         self.rank: int | None = None
 
-    def of(self, time: float, q: Array, q1: Array) -> Pushed:
+    def accelerations_at(self, time: float, q: Array, q1: Array) -> AccelerationResult:
         """The accelerations at a time, and the power that comes in."""
-        _, slope, bend, inertia, force, rest, *_ = self._at(time, q, q1)
+        _, slope, bend, inertia, force, rest, *_ = self._evaluate(time, q, q1)
         wanted = -bend[0]
         if self.driven.index:
-            wanted[-len(self.driven.index) :] += self.driven.at(time)[2]
+            wanted[-len(self.driven.index) :] += self.driven.motion_at(time)[2]
         held = slope.T * self.scale
         if not np.all(np.isfinite(held)):  # of a stage far out, which the integrator takes back
-            return Pushed(np.full(len(q), np.nan), np.nan, 1.0)
+            return AccelerationResult(np.full(len(q), np.nan), np.nan, 1.0)
         u, s, v = np.linalg.svd(held)
-        many = self._held(s)
+        many = self._constraint_rank(s)
         firm = float(s[many - 1] / s[0]) if many else 1.0
         ways = v[many:].T
         asked = v[:many].T @ ((u[:, :many].T @ wanted) / s[:many])
         mass = inertia.T * self.scale * self.scale[:, None]
         push = (force[0] + rest[0]) * self.scale
         free = ways.T @ mass @ ways
-        if free.size and np.linalg.eigvalsh(free)[0] <= MASSLESS * max(float(np.abs(mass).max()), 1e-300):
-            raise self._massless(ways, free)
+        if free.size and np.linalg.eigvalsh(free)[0] <= MASSLESS_TOLERANCE * max(float(np.abs(mass).max()), 1e-300):
+            raise self._massless_error(ways, free)
         scaled = asked + ways @ np.linalg.solve(free, ways.T @ (push - mass @ asked)) if free.size else asked
         power = float(force[0] @ q1)
         if self.driven.index:
             # what holds the links does no work, but for the inputs, which move
-            carried = np.linalg.lstsq(held.T, mass @ scaled - push, rcond=NONE)[0]
-            power += float(carried[-len(self.driven.index) :] @ self.driven.at(time)[1])
-        return Pushed(scaled * self.scale, power, firm)
+            carried = np.linalg.lstsq(held.T, mass @ scaled - push, rcond=RANK_TOLERANCE)[0]
+            power += float(carried[-len(self.driven.index) :] @ self.driven.motion_at(time)[1])
+        return AccelerationResult(scaled * self.scale, power, firm)
 
-    def closed(self, time: float, q: Array, q1: Array) -> tuple[Array, Array]:
+    def project(self, time: float, q: Array, q1: Array) -> tuple[Array, Array]:
         """The nearest coordinates and rates that the constraints allow."""
-        given = self.driven.at(time)
+        given = self.driven.motion_at(time)
         ways = held = None
-        for _ in range(STEPS):
-            left, slope = self._left(q, given[0])
+        for _ in range(MAX_NEWTON_STEPS):
+            left, slope = self._residuals_and_jacobian(q, given[0])
             u, s, v = np.linalg.svd(slope * self.scale, full_matrices=False)
-            many = self._held(s)
+            many = self._constraint_rank(s)
             held, ways = (u[:, :many] / s[:many]).T, v[:many].T
             step = ways @ (held @ left)
             q = q - step * self.scale
-            if np.abs(step).max(initial=0.0) < CLOSED:
+            if np.abs(step).max(initial=0.0) < CLOSED_TOLERANCE:
                 break
-        left, slope = self._left(q, given[0])
+        left, slope = self._residuals_and_jacobian(q, given[0])
         wrong = slope @ q1
         if self.driven.index:
             wrong[-len(self.driven.index) :] -= given[1]
         return q, (q1 - (ways @ (held @ wrong)) * self.scale if ways is not None and held is not None else q1)
 
-    def energy(self, time: float, q: Array, q1: Array) -> Array:
+    def energies(self, time: float, q: Array, q1: Array) -> Array:
         """Kinetic energy, and potential of weights and springs (2,), J."""
-        return self._at(time, q, q1)[-1][0]
+        return self._evaluate(time, q, q1)[-1][0]
 
-    def _left(self, q: Array, at: Array) -> tuple[Array, Array]:
+    def _residuals_and_jacobian(self, q: Array, at: Array) -> tuple[Array, Array]:
         rows, slope = self._closing(q)
         left = rows[0]
         if self.driven.index:
             left[-len(self.driven.index) :] -= at
         return left, slope.T
 
-    def _at(self, time: float, q: Array, q1: Array) -> list[Array]:
+    def _evaluate(self, time: float, q: Array, q1: Array) -> list[Array]:
         by = np.ones(len(self.work.mechanism.loads))
         if any(load.varies is not None for load in self.work.mechanism.loads):
-            drives = self._called(q, q1, by, self.wound)[6][0]
+            drives = self._called(q, q1, by, self.spring_turns)[6][0]
             named = [given.pair for given in self.work.mechanism.inputs]
             inputs = {name: np.array([at]) for name, at in zip(named, drives, strict=True)}
-            by = factors(self.work.mechanism, inputs, np.array([time]), 1)[0]
-        return self._called(q, q1, by, self.wound)
+            by = load_factors(self.work.mechanism, inputs, np.array([time]), 1)[0]
+        return self._called(q, q1, by, self.spring_turns)
 
-    def _held(self, values: Array) -> int:
+    def _constraint_rank(self, values: Array) -> int:
         """How many constraints hold: at the start they are counted, and near a change point they stay as many."""
         if self.rank is None:
-            self.rank = int(np.sum(values > NONE * values.max(initial=0.0)))
+            self.rank = int(np.sum(values > RANK_TOLERANCE * values.max(initial=0.0)))
         return self.rank
 
-    def _massless(self, ways: Array, free: Array) -> NoAnswer:
+    def _massless_error(self, ways: Array, free: Array) -> NoAnswer:
         """That something moves whose inertia is nothing."""
         way = np.abs(ways @ np.linalg.eigh(free)[1][:, 0])
-        moved = [link for link, at in self.work.column.items() if way[at : at + 3].max() > 0.1 * way.max()]
+        moved = [link for link, at in self.work.link_columns.items() if way[at : at + 3].max() > 0.1 * way.max()]
         return NoAnswer(
             Outcome.TOO_FEW_INPUTS,
-            f"link{'s' * (len(moved) != 1)} {quoted(moved)} can move without anything that "
+            f"link{'s' * (len(moved) != 1)} {quote_names(moved)} can move without anything that "
             f"has a mass, so nothing tells how fast; give {'one of them' if len(moved) > 1 else 'it'} a mass with an "
             f"inertia, or let an input drive it",
         )

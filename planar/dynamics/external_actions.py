@@ -13,19 +13,19 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.dynamics.load_attachment import Attachment, attachments
-from planar.dynamics.load_variation import factors
-from planar.equations.functions import size
+from planar.dynamics.load_variation import load_factors
+from planar.equations.functions import mechanism_size
 from planar.foundation.geometry import Frame, Vector
-from planar.foundation.jets import orders
-from planar.model.link_shapes import Shape
-from planar.model.loads import MET, Load, Spring
-from planar.model.mechanism import motions
-from planar.results.motion import Moving
+from planar.foundation.jets import value_and_rates
+from planar.model.link_shapes import LinkShape
+from planar.model.loads import COINCIDENCE_TOLERANCE, Load, Spring
+from planar.model.mechanism import relative_motions
+from planar.results.motion import KinematicResult
 
 Array = np.ndarray
 
 
-class Acting(NamedTuple):
+class ExternalAction(NamedTuple):
     """A force (n, 2) at a place (n, 2) of a link, a couple (n,), and their power, at n positions (N, N m, m, W).
 
     `kind` is "load", "weight", "spring", "input" or "inertia", and `name` what it is called in the file.
@@ -40,179 +40,192 @@ class Acting(NamedTuple):
     power: Array | float = 0.0
 
 
-class Field:
+class KinematicArrays:
     """The positions of a state or a motion (n), with rates, as arrays."""
 
-    def __init__(self, moving: Moving, shapes: Mapping[str, Shape]):
+    def __init__(self, moving: KinematicResult, shapes: Mapping[str, LinkShape]):
         self.moving, self.shapes = moving, shapes
         self.mechanism = moving.mechanism
-        parts = [np.size(part) for frame in moving.frames.values() for part in orders(frame.angle)]
-        self.many = max(parts, default=1)
+        parts = [np.size(part) for frame in moving.frames.values() for part in value_and_rates(frame.angle)]
+        self.position_count = max(parts, default=1)
         self._known: dict[str, Array] = {}
 
     def frame(self, link: str) -> Frame:
         """A link's axes at every position, rates left out."""
-        return Frame(*self._parts(link)[0], self.moving.frames[link].fixed)
+        return Frame(*self._frame_rates(link)[0], self.moving.frames[link].fixed)
 
     @property
     def frames(self) -> dict[str, Frame]:
         """The axes of all links."""
         return {link: self.frame(link) for link in self.moving.frames}
 
-    def at(self, link: str, place: Vector, rate: int = 0) -> Array:
+    def point_rates(self, link: str, local_point: Vector, rate: int = 0) -> Array:
         """Where a place of a link is, or one of its rates (n, 2)."""
-        x, y, cosine, sine, _ = self._parts(link)[rate]  # a place goes with these as they go
-        across, up = cosine * place.x - sine * place.y, sine * place.x + cosine * place.y
+        x, y, cosine, sine, _ = self._frame_rates(link)[rate]  # a place goes with these as they go
+        across, up = cosine * local_point.x - sine * local_point.y, sine * local_point.x + cosine * local_point.y
         return np.stack([x + across, y + up], axis=-1)
 
-    def turning(self, link: str, rate: int = 1) -> Array:
+    def angle_rates(self, link: str, rate: int = 1) -> Array:
         """A link's angle or one of its rates (n,)."""
-        return self._parts(link)[rate][4]
+        return self._frame_rates(link)[rate][4]
 
     @cached_property
     def attachments(self) -> Mapping[str, Attachment]:
         """On which links loads and springs act."""
         return attachments(self.mechanism)
 
-    def velocity(self, link: str, at: Array) -> Array:
+    def velocity_at(self, link: str, at: Array) -> Array:
         """The velocity of what of a link is at places (n, 2) of the world."""
-        place, rate = self._parts(link)[:2]
+        place, rate = self._frame_rates(link)[:2]
         return np.stack([rate[0] - rate[4] * (at[:, 1] - place[1]), rate[1] + rate[4] * (at[:, 0] - place[0])], axis=-1)
 
-    def _parts(self, link: str) -> Array:
+    def _frame_rates(self, link: str) -> Array:
         """The five numbers of a link's axes, and their two rates (3, 5, n)."""
         if link not in self._known:
-            found = np.empty((3, 5, self.many))
+            found = np.empty((3, 5, self.position_count))
             for k, part in enumerate(self.moving.frames[link][:5]):
-                for rate, value in enumerate(orders(part)[:3]):
+                for rate, value in enumerate(value_and_rates(part)[:3]):
                     found[rate, k] = value
             self._known[link] = found
         return self._known[link]
 
 
-def acting(field: Field, time: Array | None, efforts: Array, inertia: bool) -> list[Acting]:
+def collect_actions(field: KinematicArrays, time: Array | None, efforts: Array, inertia: bool) -> list[ExternalAction]:
     """All that acts, the inputs' efforts (n, inputs) among it, and the inertia of the links where wanted."""
-    found = [*_loads(field, time), *_weights(field)]
+    found = [*_load_actions(field, time), *_weight_actions(field)]
     for number, spring in enumerate(field.mechanism.springs, start=1):
-        found += _spring(field, spring, f"spring {number}")
+        found += _spring_actions(field, spring, f"spring {number}")
     for given, effort in zip(field.mechanism.inputs, efforts.T, strict=True):
-        found += _effort(field, "input", given.pair, given.pair, effort)
-    return found + (list(_inertia(field)) if inertia else [])
+        found += _effort_actions(field, "input", given.pair, given.pair, effort)
+    return found + (list(_inertia_actions(field)) if inertia else [])
 
 
-class Speeds(NamedTuple):
+class ActionVelocities(NamedTuple):
     """How what something acts on moves: its place (acting, n, 2), m/s, and its link (acting, n), rad/s."""
 
     velocity: Array
-    turning: Array
+    angular_velocity: Array
 
 
-def speeds(field: Field, all_of: Sequence[Acting]) -> Speeds:
+def action_velocities(field: KinematicArrays, all_of: Sequence[ExternalAction]) -> ActionVelocities:
     """Of all that acts at once."""
-    velocity = [field.velocity(each.link, each.at) for each in all_of]
-    turning = [field.turning(each.link) for each in all_of]
-    many = len(all_of), field.many
-    return Speeds(np.array(velocity).reshape(*many, 2), np.array(turning).reshape(many))
+    velocity = [field.velocity_at(each.link, each.at) for each in all_of]
+    turning = [field.angle_rates(each.link) for each in all_of]
+    many = len(all_of), field.position_count
+    return ActionVelocities(np.array(velocity).reshape(*many, 2), np.array(turning).reshape(many))
 
 
-def power(field: Field, all_of: Sequence[Acting], at: Speeds) -> Array:
+def action_powers(field: KinematicArrays, all_of: Sequence[ExternalAction], velocities: ActionVelocities) -> Array:
     """The power of each (acting, n), W."""
     rows = [
         each.force[:, 0] * velocity[:, 0] + each.force[:, 1] * velocity[:, 1] + each.couple * turning
-        for each, velocity, turning in zip(all_of, *at, strict=True)
+        for each, velocity, turning in zip(all_of, *velocities, strict=True)
     ]
-    return np.array(rows).reshape(len(all_of), field.many)
+    return np.array(rows).reshape(len(all_of), field.position_count)
 
 
-def _loads(field: Field, time: Array | None) -> Iterator[Acting]:
-    inputs = {given.pair: _driven(field, given.pair) for given in field.mechanism.inputs}
-    by = factors(field.mechanism, inputs, time, field.many)
+def _load_actions(field: KinematicArrays, time: Array | None) -> Iterator[ExternalAction]:
+    inputs = {given.pair: _input_positions(field, given.pair) for given in field.mechanism.inputs}
+    by = load_factors(field.mechanism, inputs, time, field.position_count)
     for load, factor in zip(field.mechanism.loads, by.T, strict=True):
-        yield from _load(field, load, factor)
+        yield from _actions_of_load(field, load, factor)
 
 
-def _load(field: Field, load: Load, factor: Array) -> Iterator[Acting]:
-    none = np.zeros((field.many, 2))
+def _actions_of_load(field: KinematicArrays, load: Load, factor: Array) -> Iterator[ExternalAction]:
+    none = np.zeros((field.position_count, 2))
     if load.point is not None and load.force is not None:
         link, point = field.attachments[load.point][:2]
-        place = field.shapes[link].at(point)
+        place = field.shapes[link].position(point)
         force = Vector(*load.force)
-        turned = field.frame(load.axes).turn(force) if load.axes is not None else force
+        turned = field.frame(load.axes).rotate_to_world(force) if load.axes is not None else force
         wide = np.stack(np.broadcast_arrays(*turned, factor)[:2], axis=-1) * factor[:, None]
-        yield Acting("load", load.point, link, field.at(link, place), wide, none[:, 0])
+        yield ExternalAction("load", load.point, link, field.point_rates(link, place), wide, none[:, 0])
     if load.link is not None and load.torque is not None:
-        yield Acting("load", load.link, load.link, field.at(load.link, Vector(0.0, 0.0)), none, load.torque * factor)
+        yield ExternalAction(
+            "load", load.link, load.link, field.point_rates(load.link, Vector(0.0, 0.0)), none, load.torque * factor
+        )
     if load.pair is not None and load.effort is not None:
-        yield from _effort(field, "load", load.pair, load.pair, load.effort * factor)
+        yield from _effort_actions(field, "load", load.pair, load.pair, load.effort * factor)
 
 
-def _effort(field: Field, kind: str, name: str, pair: str, effort: Array) -> list[Acting]:
+def _effort_actions(field: KinematicArrays, kind: str, name: str, pair: str, effort: Array) -> list[ExternalAction]:
     """What drives a pair, on the one link and on the other."""
-    way = motions(field.mechanism)[pair].effort(field.frames, field.shapes)
+    way = relative_motions(field.mechanism)[pair].effort_action(field.frames, field.shapes)
     found = []
-    for link, sense in ((way.on, 1.0), (way.against, -1.0)):
-        force, couple, at = np.zeros((field.many, 2)), sense * effort, field.at(link, Vector(0.0, 0.0))
-        if way.at is not None and way.way is not None:
-            at = np.stack(np.broadcast_arrays(*way.at, effort)[:2], axis=-1)
-            force, couple = np.stack([each * sense * effort for each in way.way], axis=-1), 0.0 * effort
-        found.append(Acting(kind, name, link, at, force, couple))
+    for link, sense in ((way.link, 1.0), (way.reaction_link, -1.0)):
+        force, couple, at = (
+            np.zeros((field.position_count, 2)),
+            sense * effort,
+            field.point_rates(link, Vector(0.0, 0.0)),
+        )
+        if way.point is not None and way.direction is not None:
+            at = np.stack(np.broadcast_arrays(*way.point, effort)[:2], axis=-1)
+            force, couple = np.stack([each * sense * effort for each in way.direction], axis=-1), 0.0 * effort
+        found.append(ExternalAction(kind, name, link, at, force, couple))
     return found
 
 
-def _driven(field: Field, pair: str) -> Array:
+def _input_positions(field: KinematicArrays, pair: str) -> Array:
     given = next(each for each in field.mechanism.inputs if each.pair == pair)
     inputs = getattr(field.moving, "inputs", {})
     position = inputs[pair].position if pair in inputs else given.position
-    return np.broadcast_to(np.asarray(position, dtype=float), (field.many,))
+    return np.broadcast_to(np.asarray(position, dtype=float), (field.position_count,))
 
 
-def _weights(field: Field) -> Iterator[Acting]:
+def _weight_actions(field: KinematicArrays) -> Iterator[ExternalAction]:
     gravity = np.array(field.mechanism.gravity)
     if not gravity.any():
         return
     for mass in field.mechanism.masses:
-        place = field.shapes[mass.link].at(mass.at)
-        weight = np.tile(mass.mass * gravity, (field.many, 1))
-        yield Acting(
-            "weight", f"weight of {mass.link}", mass.link, field.at(mass.link, place), weight, 0.0 * weight[:, 0]
+        place = field.shapes[mass.link].position(mass.at)
+        weight = np.tile(mass.mass * gravity, (field.position_count, 1))
+        yield ExternalAction(
+            "weight",
+            f"weight of {mass.link}",
+            mass.link,
+            field.point_rates(mass.link, place),
+            weight,
+            0.0 * weight[:, 0],
         )
 
 
-def _inertia(field: Field) -> Iterator[Acting]:
+def _inertia_actions(field: KinematicArrays) -> Iterator[ExternalAction]:
     """D'Alembert's forces: minus mass times acceleration, at the centre of mass."""
     for mass in field.mechanism.masses:
-        place = field.shapes[mass.link].at(mass.at)
-        force = -mass.mass * field.at(mass.link, place, 2)
-        couple = -mass.inertia * field.turning(mass.link, 2)
-        yield Acting("inertia", f"inertia of {mass.link}", mass.link, field.at(mass.link, place), force, couple)
+        place = field.shapes[mass.link].position(mass.at)
+        force = -mass.mass * field.point_rates(mass.link, place, 2)
+        couple = -mass.inertia * field.angle_rates(mass.link, 2)
+        yield ExternalAction(
+            "inertia", f"inertia of {mass.link}", mass.link, field.point_rates(mass.link, place), force, couple
+        )
 
 
-def _spring(field: Field, spring: Spring, name: str) -> list[Acting]:
+def _spring_actions(field: KinematicArrays, spring: Spring, name: str) -> list[ExternalAction]:
     """A spring with its damper on both its ends: it pulls where it is longer than free, or grows."""
     first, second = spring.ends
-    if spring.turns:
-        angle = field.turning(second, 0) - field.turning(first, 0)
+    if spring.is_torsional:
+        angle = field.angle_rates(second, 0) - field.angle_rates(first, 0)
         start = angle[0] - (spring.free if abs(spring.free) <= np.pi else 0.0)
         wound = angle - 2.0 * np.pi * np.round(start / (2.0 * np.pi)) - spring.free
-        couple = spring.stiffness * wound + spring.damping * (field.turning(second) - field.turning(first))
-        none = np.zeros((field.many, 2))
+        couple = spring.stiffness * wound + spring.damping * (field.angle_rates(second) - field.angle_rates(first))
+        none = np.zeros((field.position_count, 2))
         return [
-            Acting("spring", name, link, field.at(link, Vector(0.0, 0.0)), none, sense * couple)
+            ExternalAction("spring", name, link, field.point_rates(link, Vector(0.0, 0.0)), none, sense * couple)
             for link, sense in ((first, 1.0), (second, -1.0))
         ]
     carried = [field.attachments[end] for end in spring.ends]
-    ends = [(each.link, field.shapes[each.link].at(each.point)) for each in carried]
-    at, rate = ([field.at(*end, order) for end in ends] for order in (0, 1))
+    ends = [(each.link, field.shapes[each.link].position(each.point)) for each in carried]
+    at, rate = ([field.point_rates(*end, order) for end in ends] for order in (0, 1))
     way = at[1] - at[0]
     length = np.hypot(*way.T)
     pull = spring.stiffness * way
-    met = length <= MET * size(field.mechanism, field.shapes)
+    met = length <= COINCIDENCE_TOLERANCE * mechanism_size(field.mechanism, field.shapes)
     unit = way / np.where(met, np.nan, length)[:, None]
     if spring.free:
         pull = pull - spring.stiffness * spring.free * unit
     if spring.damping:
         pull = pull + spring.damping * ((rate[1] - rate[0]) * unit).sum(axis=1)[:, None] * unit
     return [
-        Acting("spring", name, link, place, sense * pull, 0.0 * length)
+        ExternalAction("spring", name, link, place, sense * pull, 0.0 * length)
         for (link, _), place, sense in zip(ends, at, (1.0, -1.0), strict=True)
     ]

@@ -13,14 +13,14 @@ from planar.results.motion import Motion
 
 Array = np.ndarray
 
-FLUCTUATION = 0.02
+DEFAULT_FLUCTUATION = 0.02
 """The coefficient of fluctuation of speed where none is given."""
-AGAIN = 1e-6
+CYCLE_TOLERANCE = 1e-6
 """Of the greatest: what may differ between the start and the end of a whole cycle."""
-STEADY = 1e-6
+STEADY_SPEED_TOLERANCE = 1e-6
 """Of the speed: what it may differ by and be steady."""
 
-ROUNDED = 1e-13
+ZERO_MEAN_TOLERANCE = 1e-13
 """Of the greatest torque: a smaller mean is none."""
 
 
@@ -44,7 +44,7 @@ class Flywheel:
     inertia: float | None
 
 
-def flywheel(forces: Forces, of: str | None = None, fluctuation: float = FLUCTUATION) -> Flywheel:
+def flywheel(forces: Forces, of: str | None = None, fluctuation: float = DEFAULT_FLUCTUATION) -> Flywheel:
     """The flywheel of an input (left out: the one that runs) after forces over a whole cycle of it.
 
     The torque goes through all positions by a periodic cubic spline, whose integral and places are exact; the links'
@@ -57,56 +57,56 @@ def flywheel(forces: Forces, of: str | None = None, fluctuation: float = FLUCTUA
         raise BadInput("fluctuation", f"a coefficient between 0 and 2 is wanted, not {fluctuation!r:.40}")
     if not isinstance(motion, Motion):
         raise BadInput("forces", "a flywheel is of a whole cycle; give the forces over a motion")
-    name = motion.running if of is None else of
+    name = motion.running_input if of is None else of
     if name not in forces.inputs:
         raise BadInput(name, f"there is no input of this name; inputs are at {', '.join(forces.inputs)}")
     angle, torque = motion.inputs[name].position, np.asarray(forces.inputs[name])
-    refused = no_cycle(forces, name)
+    refused = explain_no_cycle(forces, name)
     if refused:
         raise BadInput(name, refused)
     if angle[-1] < angle[0]:
         angle, torque = angle[::-1], torque[::-1]
-    return _evened(name, angle, torque, fluctuation, _speed(motion.inputs[name].velocity))
+    return _flywheel_over_cycle(name, angle, torque, fluctuation, _steady_speed(motion.inputs[name].velocity))
 
 
-def turns(motion: Motion, name: str) -> int:
+def whole_turns(motion: Motion, name: str) -> int:
     """The whole turns of an input after which a motion ends as it began; 0 where it does not, or turns back."""
     angle = motion.inputs[name].position
     gone = abs(angle[-1] - angle[0]) / (2.0 * pi)
     ahead = np.sign(angle[-1] - angle[0]) * np.diff(angle) > 0.0
-    if motion.slides(name) or not isclose(gone, round(gone), rel_tol=1e-9) or not ahead.all():
+    if motion.has_length_motion(name) or not isclose(gone, round(gone), rel_tol=1e-9) or not ahead.all():
         return 0
     places = [motion.point(point).position for point in motion.point_names]
     size = max((float(np.ptp(each, axis=0).max()) for each in places), default=0.0)
-    return round(gone) if all(np.abs(each[-1] - each[0]).max() <= AGAIN * size for each in places) else 0
+    return round(gone) if all(np.abs(each[-1] - each[0]).max() <= CYCLE_TOLERANCE * size for each in places) else 0
 
 
-def no_cycle(forces: Forces, name: str) -> str:
+def explain_no_cycle(forces: Forces, name: str) -> str:
     """Why forces over a motion are not those of a whole cycle of an input; nothing where they are."""
     motion, torque = forces.moving, np.asarray(forces.inputs[name])
-    if motion.slides(name):
+    if motion.has_length_motion(name):
         return "a flywheel turns; this input is a length"
-    if not turns(motion, name):
+    if not whole_turns(motion, name):
         return "the motion is no whole cycle: it does not end as it began after whole turns of this input"
     if not np.isfinite(torque).all():
         return "the torque is not told all over the cycle"
-    if abs(torque[-1] - torque[0]) > AGAIN * float(np.abs(torque).max()):
+    if abs(torque[-1] - torque[0]) > CYCLE_TOLERANCE * float(np.abs(torque).max()):
         return "the motion is no whole cycle: the torque does not end as it began"
     return ""
 
 
-def _speed(velocity: Array) -> float | None:
+def _steady_speed(velocity: Array) -> float | None:
     """The steady speed, if it is that."""
     mean = abs(float(np.mean(velocity)))
-    return mean if mean and float(np.ptp(velocity)) <= STEADY * mean else None
+    return mean if mean and float(np.ptp(velocity)) <= STEADY_SPEED_TOLERANCE * mean else None
 
 
-def _evened(name: str, angle: Array, torque: Array, fluctuation: float, speed: float | None) -> Flywheel:
+def _flywheel_over_cycle(name: str, angle: Array, torque: Array, fluctuation: float, speed: float | None) -> Flywheel:
     from scipy.interpolate import CubicSpline  # slow to load, and only needed here
 
     closed = np.append(torque[:-1], torque[0])
     mean = float(CubicSpline(angle, closed, bc_type="periodic").integrate(angle[0], angle[-1]) / (angle[-1] - angle[0]))
-    if abs(mean) <= ROUNDED * float(np.abs(torque).max()):
+    if abs(mean) <= ZERO_MEAN_TOLERANCE * float(np.abs(torque).max()):
         mean = 0.0
     over = CubicSpline(angle, closed - mean, bc_type="periodic")
     turning = over.roots(extrapolate=False)

@@ -9,24 +9,31 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.dynamics.external_actions import Acting, Field, Speeds, acting, power, speeds
-from planar.dynamics.free_body_check import left_open
-from planar.dynamics.load_validation import check
-from planar.dynamics.load_variation import factors
-from planar.dynamics.multipliers import Reactions
-from planar.dynamics.reactions import ROUNDED, Reaction, efforts, reaction
-from planar.dynamics.virtual_velocities import alone, refuse_surplus, slides
-from planar.dynamics.virtual_work import Balancing, balancing
+from planar.dynamics.external_actions import (
+    ActionVelocities,
+    ExternalAction,
+    KinematicArrays,
+    action_powers,
+    action_velocities,
+    collect_actions,
+)
+from planar.dynamics.free_body_check import free_body_imbalance
+from planar.dynamics.load_validation import check_loads
+from planar.dynamics.load_variation import load_factors
+from planar.dynamics.multipliers import ReactionSolver
+from planar.dynamics.reactions import ZERO_COUPLE_TOLERANCE, Reaction, input_efforts, pair_reaction
+from planar.dynamics.virtual_velocities import has_length_motion, refuse_surplus_inputs, unit_rate_state
+from planar.dynamics.virtual_work import BalanceFunction, balance_function
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.foundation.notebook_display import Displayable
 from planar.model.mechanism import Mechanism
-from planar.model.wording import quoted
+from planar.model.wording import quote_names
 from planar.results.motion import Motion, State
 
 Array = np.ndarray
 
 
-class Proof(NamedTuple):
+class ForceProof(NamedTuple):
     """How far laws are from being kept, each beside what it balances; None where a law says nothing.
 
     `power`: what everything supplies together, inertia included, beside the greatest part of it; None where nothing
@@ -55,9 +62,9 @@ class Forces(Displayable):
     inputs: Mapping[str, Array | float]
     powers: Mapping[str, Array | float]
     reactions: Mapping[str, Reaction]
-    acting: tuple[Acting, ...]
+    acting: tuple[ExternalAction, ...]
     undetermined: Mapping[str, str]
-    proof: Proof
+    proof: ForceProof
     bodies: tuple[str, ...]
 
     def __repr__(self) -> str:
@@ -69,7 +76,7 @@ class Forces(Displayable):
         return self.moving.mechanism
 
     @property
-    def loads(self) -> tuple[Acting, ...]:
+    def loads(self) -> tuple[ExternalAction, ...]:
         """What acts on the links, the inputs and the links' inertia apart."""
         return tuple(each for each in self.acting if each.kind not in ("input", "inertia"))
 
@@ -91,9 +98,9 @@ class Forces(Displayable):
         none = np.zeros(np.shape(next(iter(self.inputs.values()), 0.0)))
         return sum((each.force for each in of), np.stack([none, none], axis=-1)), sum(at, none)
 
-    def slides(self, name: str) -> bool:
+    def is_force_input(self, name: str) -> bool:
         """Whether an input's effort is a force (N), not a torque (N m)."""
-        return slides(self.mechanism, name)
+        return has_length_motion(self.mechanism, name)
 
 
 def forces(moving: State | Motion, inertia: bool = True) -> Forces:
@@ -106,39 +113,39 @@ def forces(moving: State | Motion, inertia: bool = True) -> Forces:
     links, as at a dead point (of a motion such rows are NaN).
     """
     mechanism = moving.mechanism
-    check(mechanism)
+    check_loads(mechanism)
     one = isinstance(moving, State)
     if one:
-        refuse_surplus(moving)
+        refuse_surplus_inputs(moving)
     time = np.zeros(1) if one else moving.time
     if time is None and any(load.varies is not None and load.varies.input is None for load in mechanism.loads):
         raise BadInput("loads", "a load varies with time, which this motion has not; give it a duration")
-    equations = balancing(mechanism)
-    field = Field(moving, equations.work.shapes)
-    reactions = _balanced(equations, field, time, inertia)
-    solved = reactions.solved()
+    equations = balance_function(mechanism)
+    field = KinematicArrays(moving, equations.work.shapes)
+    reactions = _make_reaction_solver(equations, field, time, inertia)
+    solved = reactions.solve()
     if one and not np.isfinite(reactions.balance.loads).all():
         raise NoAnswer(
             Outcome.DEAD_POINT,
             "the ends of a spring or damper meet here, so that its force has no direction; move the input",
         )
-    if one and not solved.balanced.all():
-        told = quoted([given.pair for given in mechanism.inputs])
+    if one and not solved.is_balanced.all():
+        told = quote_names([given.pair for given in mechanism.inputs])
         raise NoAnswer(
             Outcome.DEAD_POINT,
             f"no forces in the pairs balance the links here, which the inputs at {told} cannot hold; move the input",
         )
-    supplied, whys = efforts(solved)
-    all_of = acting(field, time, supplied, inertia)
-    moved = speeds(field, all_of)
-    powers = power(field, all_of, moved)
+    supplied, whys = input_efforts(solved)
+    all_of = collect_actions(field, time, supplied, inertia)
+    moved = action_velocities(field, all_of)
+    powers = action_powers(field, all_of, moved)
     all_of = [each._replace(power=row) for each, row in zip(all_of, powers, strict=True)]
-    told = {pair.name: reaction(pair, field, reactions, solved) for pair in mechanism.pairs}
-    equilibrium, bodies = left_open(field, all_of, told, reactions.arm)
+    told = {pair.name: pair_reaction(pair, field, reactions, solved) for pair in mechanism.pairs}
+    equilibrium, bodies = free_body_imbalance(field, all_of, told, reactions.arm)
     names = [given.pair for given in mechanism.inputs]
     undetermined = {name: why for name, why in zip(names, whys, strict=True) if why}
     undetermined |= {name: each.why for name, each in told.items() if each.why}
-    routes = _routes(moving, field, all_of, supplied[0]) if one else None
+    routes = _second_route_error(moving, field, all_of, supplied[0]) if one else None
     found = Forces(
         moving,
         dict(zip(names, supplied.T, strict=True)),
@@ -146,59 +153,65 @@ def forces(moving: State | Motion, inertia: bool = True) -> Forces:
         told,
         tuple(all_of),
         undetermined,
-        Proof(_open(powers, all_of, moved), routes, equilibrium),
+        ForceProof(_power_imbalance(powers, all_of, moved), routes, equilibrium),
         bodies,
     )
-    return _at_one(found) if one else found
+    return _single_position(found) if one else found
 
 
-def _balanced(equations: Balancing, field: Field, time: Array | None, inertia: bool) -> Reactions:
+def _make_reaction_solver(
+    equations: BalanceFunction, field: KinematicArrays, time: Array | None, inertia: bool
+) -> ReactionSolver:
     """The balance of every position."""
     body, moving = equations.work, field.moving
-    inputs = {name: np.broadcast_to(each.position, (field.many,)) for name, each in moving.inputs.items()}
+    inputs = {name: np.broadcast_to(each.position, (field.position_count,)) for name, each in moving.inputs.items()}
     q, q1, q2 = body.coordinates(moving)
-    balance = equations.over(q, q1, q2, factors(moving.mechanism, inputs, time, field.many), body.wound(q[0]))
+    balance = equations.evaluate(
+        q, q1, q2, load_factors(moving.mechanism, inputs, time, field.position_count), body.initial_spring_turns(q[0])
+    )
     if not inertia:
         balance = balance._replace(inertia=np.zeros_like(balance.inertia))
-    return Reactions(equations, balance, field)
+    return ReactionSolver(equations, balance, field)
 
 
-def _open(powers: Array, all_of: Sequence[Acting], moved: Speeds) -> float | None:
+def _power_imbalance(powers: Array, all_of: Sequence[ExternalAction], moved: ActionVelocities) -> float | None:
     """What all powers (acting, n) add up to, beside the greatest of them; None where that is rounding alone."""
     told = np.isfinite(powers).all(axis=0)
     greatest = float(np.abs(powers[:, told]).max(initial=0.0))
-    if greatest <= ROUNDED * _could(all_of, moved):
+    if greatest <= ZERO_COUPLE_TOLERANCE * _power_scale(all_of, moved):
         return None
     return float(np.abs(powers[:, told].sum(axis=0)).max(initial=0.0)) / greatest
 
 
-def _could(all_of: Sequence[Acting], moved: Speeds) -> float:
+def _power_scale(all_of: Sequence[ExternalAction], moved: ActionVelocities) -> float:
     """The power that the greatest force would have at the greatest speed: powers are rounding beside it."""
-    pushed, turned = _most(each.force for each in all_of), _most(each.couple for each in all_of)
-    return pushed * _most(moved.velocity) + turned * _most(moved.turning)
+    pushed, turned = _greatest_size(each.force for each in all_of), _greatest_size(each.couple for each in all_of)
+    return pushed * _greatest_size(moved.velocity) + turned * _greatest_size(moved.angular_velocity)
 
 
-def _most(values: Iterable[Array | float]) -> float:
+def _greatest_size(values: Iterable[Array | float]) -> float:
     flat = [np.ravel(each) for each in values]
     return float(np.abs(np.nan_to_num(np.concatenate(flat))).max(initial=0.0)) if flat else 0.0
 
 
-def _routes(state: State, field: Field, all_of: Sequence[Acting], supplied: Array) -> float | None:
+def _second_route_error(
+    state: State, field: KinematicArrays, all_of: Sequence[ExternalAction], supplied: Array
+) -> float | None:
     """How far the efforts are from those by virtual power, beside what each input would supply against every part."""
     worst, others = None, [each for each in all_of if each.kind != "input"]
     for given, effort in zip(state.mechanism.inputs, supplied, strict=True):
-        unit = Field(alone(state, given.pair), field.shapes)
-        moved = speeds(unit, others)
-        parts = power(unit, others, moved)
+        unit = KinematicArrays(unit_rate_state(state, given.pair), field.shapes)
+        moved = action_velocities(unit, others)
+        parts = action_powers(unit, others, moved)
         whole = float(np.abs(parts).sum())
-        could = _could(others, moved)
-        beside = whole if whole > ROUNDED * could else could
+        could = _power_scale(others, moved)
+        beside = whole if whole > ZERO_COUPLE_TOLERANCE * could else could
         if beside and np.isfinite(effort):
             worst = max(worst or 0.0, abs(float(parts.sum() + effort)) / beside)
     return worst
 
 
-def _at_one(found: Forces) -> Forces:
+def _single_position(found: Forces) -> Forces:
     """The same for the one position that there is, without an axis for it."""
 
     def one(each: Reaction) -> Reaction:
@@ -206,7 +219,7 @@ def _at_one(found: Forces) -> Forces:
         couples = {link: float(couple[0]) for link, couple in each.couples.items()}
         return each._replace(at=at, force=each.force[0], couple=float(each.couple[0]), couples=couples)
 
-    def act(each: Acting) -> Acting:
+    def act(each: ExternalAction) -> ExternalAction:
         return each._replace(
             at=each.at[0], force=each.force[0], couple=float(each.couple[0]), power=float(each.power[0])
         )

@@ -17,45 +17,47 @@ import casadi as ca
 import numpy as np
 
 from planar.dynamics.load_attachment import Attachment, attachments
-from planar.equations.functions import shapes, size
+from planar.equations.functions import mechanism_size, shapes_of_links
 from planar.foundation.geometry import GROUND, Frame, Vector, frame_at
-from planar.foundation.jets import orders
-from planar.model.loads import MET, Load, Mass, Spring
-from planar.model.mechanism import Mechanism, motions
+from planar.foundation.jets import value_and_rates
+from planar.model.loads import COINCIDENCE_TOLERANCE, Load, Mass, Spring
+from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import Pair
-from planar.results.motion import Moving
+from planar.results.motion import KinematicResult
 
 Array = np.ndarray
 
 
-class Work:
+class LagrangianFunctions:
     """The functions of one mechanism."""
 
     def __init__(self, mechanism: Mechanism, unit: float | None = None):
         """Dimensions may be symbols; then `unit` is the mechanism's size (m)."""
         self.mechanism = mechanism
-        self.shapes = shapes(mechanism)
-        self.unit = size(mechanism, self.shapes) if unit is None else unit
+        self.shapes = shapes_of_links(mechanism)
+        self.size = mechanism_size(mechanism, self.shapes) if unit is None else unit
         self.links = tuple(link.name for link in mechanism.links if link.name != mechanism.frame)
-        self.column = {link: 3 * k for k, link in enumerate(self.links)}
-        self.named = motions(mechanism)
+        self.link_columns = {link: 3 * k for k, link in enumerate(self.links)}
+        self.relative_motions = relative_motions(mechanism)
         self.attachments = attachments(mechanism)
-        own = {pair.name: len(pair.coordinates) for pair in mechanism.pairs}
-        self.many = 3 * len(self.links)
-        self.q, self.q1, self.q2 = (ca.SX.sym(name, self.many + sum(own.values())) for name in ("q", "q1", "q2"))
+        own = {pair.name: len(pair.coordinate_kinds) for pair in mechanism.pairs}
+        self.link_coordinate_count = 3 * len(self.links)
+        self.q, self.q1, self.q2 = (
+            ca.SX.sym(name, self.link_coordinate_count + sum(own.values())) for name in ("q", "q1", "q2")
+        )
         self.factors = ca.SX.sym("f", len(mechanism.loads))
-        self.turns = ca.SX.sym("t", len(mechanism.springs))
+        self.spring_turns = ca.SX.sym("t", len(mechanism.springs))
         self.frames = {mechanism.frame: GROUND} | {
-            link: frame_at(*(self.q[at + k] for k in range(3))) for link, at in self.column.items()
+            link: frame_at(*(self.q[at + k] for k in range(3))) for link, at in self.link_columns.items()
         }
-        self.own: dict[str, slice] = {}
+        self.own_slices: dict[str, slice] = {}
         "of every pair: its own coordinates"
-        at = self.many
+        at = self.link_coordinate_count
         for name, count in own.items():
-            self.own[name] = slice(at, at + count)
+            self.own_slices[name] = slice(at, at + count)
             at += count
 
-    def wound(self, q: Array) -> Array:
+    def initial_spring_turns(self, q: Array) -> Array:
         """The whole turns (rad) by which links stand apart whose torsional springs do not count them (springs,).
 
         Nothing says in a file how often links have turned: where they stand at coordinates q the spring is wound up the
@@ -63,31 +65,36 @@ class Work:
         """
         found = np.zeros(len(self.mechanism.springs))
         for number, spring in enumerate(self.mechanism.springs):
-            if spring.turns:
-                first, second = (q[self.column[link] + 2] if link in self.column else 0.0 for link in spring.ends)
+            if spring.is_torsional:
+                first, second = (
+                    q[self.link_columns[link] + 2] if link in self.link_columns else 0.0 for link in spring.ends
+                )
                 near = spring.free if abs(spring.free) <= np.pi else 0.0
                 found[number] = 2.0 * np.pi * np.round((second - first - near) / (2.0 * np.pi))
         return found
 
-    def coordinates(self, moving: Moving) -> tuple[Array, Array, Array]:
+    def coordinates(self, moving: KinematicResult) -> tuple[Array, Array, Array]:
         """The coordinates of a state or a motion with their two rates (n, coordinates)."""
         values = [getattr(moving.frames[link], part) for link in self.links for part in ("x", "y", "angle")]
         values += [each for pair in self.mechanism.pairs for each in moving.own.get(pair.name, ())]
-        parts = [orders(value)[:3] for value in values]
+        parts = [value_and_rates(value)[:3] for value in values]
         many = max((np.size(part) for each in parts for part in each), default=1)
         found = np.array([[np.broadcast_to(part, (many,)) for part in each] for each in parts], dtype=float)
         return tuple(found.reshape(-1, 3, many).transpose(1, 2, 0))  # type: ignore[return-value]
 
     @cached_property
-    def gaps(self) -> ca.SX:
+    def residuals(self) -> ca.SX:
         """What every constraint leaves open (rows,), m or rad."""
-        gaps = [row for pair in self.mechanism.pairs for row in pair.residual(*self.of(pair))]
+        gaps = [row for pair in self.mechanism.pairs for row in pair.residual(*self.pair_arguments(pair))]
         return ca.vertcat(*gaps) if gaps else ca.SX.zeros(0)
 
     @cached_property
-    def drives(self) -> ca.SX:
+    def input_positions(self) -> ca.SX:
         """The positions of the inputs (inputs,)."""
-        drives = [self.named[given.pair].drive(*self.of(self.named[given.pair])) for given in self.mechanism.inputs]
+        drives = [
+            self.relative_motions[given.pair].input_position(*self.pair_arguments(self.relative_motions[given.pair]))
+            for given in self.mechanism.inputs
+        ]
         return ca.vertcat(*drives) if drives else ca.SX.zeros(0)
 
     @cached_property
@@ -102,22 +109,22 @@ class Work:
         return rate - ca.gradient(self.energies[0], self.q)
 
     @cached_property
-    def kept(self) -> ca.SX:
+    def conservative_forces(self) -> ca.SX:
         """-dV/dq: weights and springs."""
         return -ca.gradient(self.energies[1], self.q)
 
     @cached_property
-    def pushed(self) -> tuple[ca.SX, ca.SX]:
+    def applied_forces(self) -> tuple[ca.SX, ca.SX]:
         """Loads and dampers on the coordinates, and efforts between the links of pairs."""
         loads, efforts = -ca.gradient(self.energies[2], self.q1), ca.SX.zeros(self.q.numel())
         for k, load in enumerate(self.mechanism.loads):
-            at, relative = self._load(load)
+            at, relative = self._load_forces(load)
             loads, efforts = loads + at * self.factors[k], efforts + relative * self.factors[k]
         return loads, efforts
 
-    def of(self, pair: Pair) -> tuple[list[Frame], Sequence[float], list[ca.SX]]:
+    def pair_arguments(self, pair: Pair) -> tuple[list[Frame], Sequence[float], list[ca.SX]]:
         """What a pair's formulas take."""
-        own = self.own.get(pair.name, slice(0, 0))
+        own = self.own_slices.get(pair.name, slice(0, 0))
         numbers = pair.measure([self.shapes[link] for link in pair.bodies])
         return [self.frames[link] for link in pair.bodies], numbers, [self.q[k] for k in range(own.start, own.stop)]
 
@@ -126,100 +133,102 @@ class Work:
         """Kinetic energy, potential of weights and springs (J), and what dampers take up, halved (W)."""
         kinetic = potential = lost = ca.SX(0.0)
         for mass in self.mechanism.masses:
-            at = self.centre(mass)
-            potential += self._lifted(mass)
-            if mass.link in self.column:
-                v = self._rate(ca.vertcat(at.x, at.y))
-                turning = self.q1[self.column[mass.link] + 2]
+            at = self.mass_centre(mass)
+            potential += self._weight_potential(mass)
+            if mass.link in self.link_columns:
+                v = self._time_derivative(ca.vertcat(at.x, at.y))
+                turning = self.q1[self.link_columns[mass.link] + 2]
                 kinetic += 0.5 * mass.mass * ca.dot(v, v) + 0.5 * mass.inertia * turning**2
         for number, spring in enumerate(self.mechanism.springs):
-            stored, taken = self._spring(spring, number)
+            stored, taken = self._spring_energy_and_dissipation(spring, number)
             potential, lost = potential + stored, lost + taken
         return kinetic, potential, lost
 
     @cached_property
-    def acting(self) -> ca.SX:
+    def actions_on_links(self) -> ca.SX:
         """What each load, weight and spring puts on the links (coordinates, loads + masses + springs)."""
         q, q1 = self.q, self.q1
         loads = []
         for k, load in enumerate(self.mechanism.loads):
-            effort = self.effort(load.pair) * (load.effort or 0.0) if load.pair is not None else 0.0
-            loads.append((self._load(load)[0] + effort) * self.factors[k])
-        weights = [-ca.gradient(self._lifted(mass), q) for mass in self.mechanism.masses]
-        energies = [self._spring(spring, number) for number, spring in enumerate(self.mechanism.springs)]
+            effort = self.unit_effort_on_links(load.pair) * (load.effort or 0.0) if load.pair is not None else 0.0
+            loads.append((self._load_forces(load)[0] + effort) * self.factors[k])
+        weights = [-ca.gradient(self._weight_potential(mass), q) for mass in self.mechanism.masses]
+        energies = [
+            self._spring_energy_and_dissipation(spring, number) for number, spring in enumerate(self.mechanism.springs)
+        ]
         springs = [-ca.gradient(stored, q) - ca.gradient(taken, q1) for stored, taken in energies]
         return ca.horzcat(ca.SX(q.numel(), 0), *loads, *weights, *springs)
 
-    def effort(self, name: str) -> ca.SX:
+    def unit_effort_on_links(self, name: str) -> ca.SX:
         """What an effort of one at a pair puts on the links (coordinates,), the pairs' own coordinates left alone."""
-        way = self.named[name].effort(self.frames, self.shapes)
-        return self.push({way.on: 1.0, way.against: -1.0}, way.at, way.way)
+        way = self.relative_motions[name].effort_action(self.frames, self.shapes)
+        return self.unit_action_on_links({way.link: 1.0, way.reaction_link: -1.0}, way.point, way.direction)
 
-    def push(self, senses: Mapping[str, float], at: Vector | None, way: Vector | None) -> ca.SX:
+    def unit_action_on_links(self, senses: Mapping[str, float], at: Vector | None, way: Vector | None) -> ca.SX:
         """A force of one along a way at a place of the world, or a couple of one, on links (coordinates,)."""
         found = ca.SX.zeros(self.q.numel())
         for link, sense in senses.items():
-            if link in self.column:
+            if link in self.link_columns:
                 parts = (0.0, 0.0, 1.0)
                 if at is not None and way is not None:
                     frame = self.frames[link]
                     parts = (way.x, way.y, (at - Vector(frame.x, frame.y)).cross(way))
                 for k, part in enumerate(parts):
-                    found[self.column[link] + k] += sense * part
+                    found[self.link_columns[link] + k] += sense * part
         return found
 
-    def centre(self, mass: Mass) -> Vector:
+    def mass_centre(self, mass: Mass) -> Vector:
         """Where a mass is centred."""
-        return self.frames[mass.link].carry(self.shapes[mass.link].at(mass.at))
+        return self.frames[mass.link].to_world(self.shapes[mass.link].position(mass.at))
 
-    def _lifted(self, mass: Mass) -> ca.SX:
+    def _weight_potential(self, mass: Mass) -> ca.SX:
         """The potential energy of a weight (J)."""
-        at, gravity = self.centre(mass), self.mechanism.gravity
+        at, gravity = self.mass_centre(mass), self.mechanism.gravity
         return ca.SX(-mass.mass * (gravity[0] * at.x + gravity[1] * at.y))
 
-    def _spring(self, spring: Spring, number: int) -> tuple[ca.SX, ca.SX]:
+    def _spring_energy_and_dissipation(self, spring: Spring, number: int) -> tuple[ca.SX, ca.SX]:
         """What a spring stores (J), and half of what its damper takes up (W)."""
         first, second = spring.ends
-        if spring.turns:
-            way = self.frames[second].angle - self.frames[first].angle - spring.free - self.turns[number]
-            return 0.5 * spring.stiffness * way**2, 0.5 * spring.damping * self._rate(way) ** 2
+        if spring.is_torsional:
+            way = self.frames[second].angle - self.frames[first].angle - spring.free - self.spring_turns[number]
+            return 0.5 * spring.stiffness * way**2, 0.5 * spring.damping * self._time_derivative(way) ** 2
         ends = self.attachments
-        apart = ca.vertcat(*(self.place(ends[second]) - self.place(ends[first])))
+        apart = ca.vertcat(*(self.attachment_position(ends[second]) - self.attachment_position(ends[first])))
         square = ca.dot(apart, apart)
         away = ca.sqrt(square)
-        met = square <= (MET * self.unit) ** 2
+        met = square <= (COINCIDENCE_TOLERANCE * self.size) ** 2
         known = ca.if_else(met, np.nan, 1.0)  # as a factor, so that slopes have it too
         stored = 0.5 * spring.stiffness * ((away - spring.free) ** 2 * known if spring.free else square)
         taken = ca.SX(0.0)
         if spring.damping:
-            taken = 0.5 * spring.damping * (ca.dot(apart, self._rate(apart)) / away) ** 2 * known
+            taken = 0.5 * spring.damping * (ca.dot(apart, self._time_derivative(apart)) / away) ** 2 * known
         return stored, taken
 
-    def _load(self, load: Load) -> tuple[ca.SX, ca.SX]:
+    def _load_forces(self, load: Load) -> tuple[ca.SX, ca.SX]:
         """A load on the coordinates, and an effort between the links of a pair."""
         q = self.q
         found, effort = ca.SX.zeros(q.numel()), ca.SX.zeros(q.numel())
         if load.point is not None and load.force is not None:
             force = Vector(*load.force)
-            at = ca.vertcat(*self.place(self.attachments[load.point]))
-            turned = self.frames[load.axes].turn(force) if load.axes is not None else force
+            at = ca.vertcat(*self.attachment_position(self.attachments[load.point]))
+            turned = self.frames[load.axes].rotate_to_world(force) if load.axes is not None else force
             found += ca.jtimes(at, q, ca.vertcat(*turned), True)
-        if load.link is not None and load.torque is not None and load.link in self.column:
-            found[self.column[load.link] + 2] += load.torque
+        if load.link is not None and load.torque is not None and load.link in self.link_columns:
+            found[self.link_columns[load.link] + 2] += load.torque
         if load.pair is not None and load.effort is not None:
-            pair = self.named[load.pair]
-            effort += load.effort * ca.gradient(pair.drive(*self.of(pair)), q)
+            pair = self.relative_motions[load.pair]
+            effort += load.effort * ca.gradient(pair.input_position(*self.pair_arguments(pair)), q)
         return found, effort
 
-    def place(self, at: Attachment) -> Vector:
+    def attachment_position(self, at: Attachment) -> Vector:
         """Where something acts."""
-        return self.frames[at.link].carry(self.shapes[at.link].at(at.point))
+        return self.frames[at.link].to_world(self.shapes[at.link].position(at.point))
 
-    def _rate(self, value: ca.SX) -> ca.SX:
+    def _time_derivative(self, value: ca.SX) -> ca.SX:
         return ca.jtimes(value, self.q, self.q1)
 
 
 @lru_cache(maxsize=32)
-def work(mechanism: Mechanism) -> Work:
+def lagrangian_functions(mechanism: Mechanism) -> LagrangianFunctions:
     """The functions of a mechanism, kept for the next time."""
-    return Work(mechanism)
+    return LagrangianFunctions(mechanism)

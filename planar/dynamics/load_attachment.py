@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from planar.model.mechanism import Mechanism, named_points
-from planar.model.pairs import Kind
-from planar.model.wording import listed
+from planar.model.pairs import MeasureKind
+from planar.model.wording import join_all_names
 
 
 class Attachment(NamedTuple):
@@ -24,7 +24,7 @@ def attachments(mechanism: Mechanism) -> Mapping[str, Attachment]:
     At a pin that several links share it acts on the one that slides there (a block, a piston, a ram), one on the frame
     before one on a moving link; where none slides, on the first in the order of the file.
     """
-    slides = _sliding(mechanism)
+    slides = _sliding_links(mechanism)
     found: dict[str, Attachment] = {}
     for each in named_points(mechanism):
         # a stable sort: links alike stay in the order of the file
@@ -34,23 +34,25 @@ def attachments(mechanism: Mechanism) -> Mapping[str, Attachment]:
     return found
 
 
-def _sliding(mechanism: Mechanism) -> dict[str, int]:
+def _sliding_links(mechanism: Mechanism) -> dict[str, int]:
     """The links that slide, those on the frame first; in a pair of two moving links the second of them does."""
-    slides = [pair.links for pair in mechanism.pairs if pair.lower and pair.drive_kind is Kind.LENGTH]
+    slides = [pair.links for pair in mechanism.pairs if pair.is_lower_pair and pair.input_kind is MeasureKind.LENGTH]
     on_frame = [link for links in slides if mechanism.frame in links for link in links if link != mechanism.frame]
     others = [links[1] for links in slides if mechanism.frame not in links]
     return {link: rank for rank, link in enumerate(dict.fromkeys((*on_frame, *others)))}
 
 
-def choices(mechanism: Mechanism) -> tuple[str, ...]:
+def attachment_remarks(mechanism: Mechanism) -> tuple[str, ...]:
     """A sentence for every load and every end of a spring of which another link might have been meant."""
     where = attachments(mechanism)
     named = [("the load", load.point) for load in mechanism.loads if load.point is not None]
     named += [("the spring's end", end) for spring in mechanism.springs for end in spring.points or ()]
-    return tuple(_choice(what, name, where[name]) for what, name in dict.fromkeys(named) if where[name].others)
+    return tuple(
+        _attachment_remark(what, name, where[name]) for what, name in dict.fromkeys(named) if where[name].others
+    )
 
 
-def _choice(what: str, name: str, at: Attachment) -> str:
-    others = listed([repr(other.rpartition(".")[0]) for other in at.others])
+def _attachment_remark(what: str, name: str, at: Attachment) -> str:
+    others = join_all_names([repr(other.rpartition(".")[0]) for other in at.others])
     written = " or ".join(repr(other) for other in at.others)
     return f"{what} at {name!r} acts on link {at.link!r}, not on {others}; to have it there write {written}"

@@ -9,16 +9,16 @@ from math import isfinite
 from planar.dynamics.load_attachment import attachments
 from planar.foundation.errors import BadInput
 from planar.model.loads import Load, Mass, Spring
-from planar.model.mechanism import Mechanism, motions, named_points
+from planar.model.mechanism import Mechanism, named_points, relative_motions
 
-Wrong = Iterator[str]
+Problems = Iterator[str]
 
 
-def check(mechanism: Mechanism) -> None:
+def check_loads(mechanism: Mechanism) -> None:
     """Refuse loads, springs and masses that are none of this mechanism's. Raises BadInput."""
-    known = _Known(mechanism)
-    of = (("loads", mechanism.loads, known.load), ("springs", mechanism.springs, known.spring))
-    for name, each, problems in (*of, ("masses", mechanism.masses, known.mass)):
+    known = _LoadChecker(mechanism)
+    of = (("loads", mechanism.loads, known.load_problems), ("springs", mechanism.springs, known.spring_problems))
+    for name, each, problems in (*of, ("masses", mechanism.masses, known.mass_problems)):
         for index, item in enumerate(each):
             for sentence in problems(item):
                 raise BadInput(f"{name}[{index}]", sentence)
@@ -26,13 +26,13 @@ def check(mechanism: Mechanism) -> None:
         raise BadInput("gravity", "gravity is two finite numbers")
 
 
-def refuse_unloaded(mechanism: Mechanism) -> None:
+def require_loads(mechanism: Mechanism) -> None:
     """Raise BadInput where a mechanism has no loads, springs or masses, so that there are no forces to be shown."""
     if not (mechanism.loads or mechanism.springs or mechanism.masses):
-        raise BadInput("$.loads", _how_to_load(mechanism))
+        raise BadInput("$.loads", _explain_loads(mechanism))
 
 
-def _how_to_load(mechanism: Mechanism) -> str:
+def _explain_loads(mechanism: Mechanism) -> str:
     """That nothing acts on a mechanism, and how what acts is written, with names of its own."""
     frame = mechanism.frame
     moving = [each.name for each in named_points(mechanism) if frame not in (link for link, _ in each.members)]
@@ -46,60 +46,60 @@ def _how_to_load(mechanism: Mechanism) -> str:
     )
 
 
-class _Known:
+class _LoadChecker:
     """The names of one mechanism."""
 
     def __init__(self, mechanism: Mechanism):
         self.names = {
             "point": tuple(attachments(mechanism)),
             "link": tuple(link.name for link in mechanism.links),
-            "pair": tuple(motions(mechanism)),
+            "pair": tuple(relative_motions(mechanism)),
             "input": tuple(given.pair for given in mechanism.inputs),
         }
         self.own = {link.name: link.names for link in mechanism.links}
 
-    def load(self, load: Load) -> Wrong:
+    def load_problems(self, load: Load) -> Problems:
         """What is wrong with a load."""
         parts = ((load.point, load.force), (load.link, load.torque), (load.pair, load.effort))
         if any((on is None) != (what is None) for on, what in parts):
             yield "a force acts at a point, a torque on a link, an effort at a pair; one of the two is left out"
         if all(on is None for on, _ in parts):
             yield "a load is a force at a point, or a torque on a link, or an effort at a pair"
-        yield from self._unknown(point=load.point, link=load.link, pair=load.pair)
-        yield from self._unknown(link=load.axes)
-        yield from _infinite((*(load.force or ()), load.torque or 0.0, load.effort or 0.0))
+        yield from self._unknown_name_problems(point=load.point, link=load.link, pair=load.pair)
+        yield from self._unknown_name_problems(link=load.axes)
+        yield from _nonfinite_problems((*(load.force or ()), load.torque or 0.0, load.effort or 0.0))
         if load.varies is not None:
             course = load.varies
-            yield from self._unknown(input=course.input)
+            yield from self._unknown_name_problems(input=course.input)
             if len(course.at) < 2 or len(course.at) != len(course.factors) or list(course.at) != sorted(course.at):
                 yield "a load varies over two places or more that rise, with a factor for each"
-            yield from _infinite((*course.at, *course.factors))
+            yield from _nonfinite_problems((*course.at, *course.factors))
 
-    def spring(self, spring: Spring) -> Wrong:
+    def spring_problems(self, spring: Spring) -> Problems:
         """What is wrong with a spring."""
         if (spring.points is None) == (spring.links is None):
             yield "a spring stands between two points, or turns between two links"
         for end in spring.ends:
-            yield from self._unknown(**{"link" if spring.turns else "point": end})
-        yield from _infinite((spring.stiffness, spring.free, spring.damping))
+            yield from self._unknown_name_problems(**{"link" if spring.is_torsional else "point": end})
+        yield from _nonfinite_problems((spring.stiffness, spring.free, spring.damping))
         if min(spring.stiffness, spring.damping) < 0.0:
             yield "stiffness and damping are zero or more"
 
-    def mass(self, mass: Mass) -> Wrong:
+    def mass_problems(self, mass: Mass) -> Problems:
         """What is wrong with a mass."""
-        yield from self._unknown(link=mass.link)
+        yield from self._unknown_name_problems(link=mass.link)
         if isinstance(mass.at, str) and mass.at not in self.own[mass.link]:
             yield f"link {mass.link!r} has no point {mass.at!r}"
-        yield from _infinite((mass.mass, mass.inertia, *(() if isinstance(mass.at, str) else mass.at)))
+        yield from _nonfinite_problems((mass.mass, mass.inertia, *(() if isinstance(mass.at, str) else mass.at)))
         if min(mass.mass, mass.inertia) < 0.0:
             yield "mass and inertia are zero or more"
 
-    def _unknown(self, **named: str | None) -> Wrong:
+    def _unknown_name_problems(self, **named: str | None) -> Problems:
         for what, name in named.items():
             if name is not None and name not in self.names[what]:
                 yield f"there is no {what} {name!r}; {what}s are {', '.join(self.names[what])}"
 
 
-def _infinite(values: Iterable[float]) -> Wrong:
+def _nonfinite_problems(values: Iterable[float]) -> Problems:
     if not all(map(isfinite, values)):
         yield "loads, springs and masses are finite numbers"

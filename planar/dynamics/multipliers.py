@@ -12,20 +12,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.dynamics.external_actions import Field
-from planar.dynamics.virtual_work import Balance, Balancing
-from planar.equations.functions import size
+from planar.dynamics.external_actions import KinematicArrays
+from planar.dynamics.virtual_work import BalanceFunction, VirtualWorkBalance
+from planar.equations.functions import mechanism_size
 from planar.foundation.geometry import Vector
 from planar.model.pairs import Pair
-from planar.model.pairs.base import Contact
+from planar.model.pairs.base import ToothContact
 
 Array = np.ndarray
 
-NONE = 1e-9
+RANK_TOLERANCE = 1e-9
 """A singular value below this part of the greatest is none: what it would hold is held by others, or by nothing."""
-BARRED = 1e-7
+WHEEL_LOAD_TOLERANCE = 1e-7
 """What takes efforts, or is not held, by more than this beside a force of one is no way in which wheels load pairs."""
-OPEN = 1e-8
+BALANCE_TOLERANCE = 1e-8
 """Links that stay out of balance by more than this part of the greatest force are not held by any."""
 
 
@@ -35,12 +35,12 @@ class Wrench(NamedTuple):
     force: Array
     moment: Array
 
-    def about(self, at: Array) -> Array:
+    def moment_about(self, at: Array) -> Array:
         """The moment about places (..., 2)."""
         return self.moment - at[..., 0] * self.force[..., 1] + at[..., 1] * self.force[..., 0]
 
 
-class Solved(NamedTuple):
+class ForceSolution(NamedTuple):
     """What inputs and pairs do at positions (n).
 
     `efforts` (n, inputs); `wrenches` of every pair on each of its bodies (n), and by `changes` (n, ways) how they may
@@ -50,69 +50,76 @@ class Solved(NamedTuple):
     """
 
     efforts: Array
-    efforts_change: Array
+    effort_changes: Array
     wrenches: dict[str, dict[str, Wrench]]
-    changes: dict[str, dict[str, Wrench]]
-    because: tuple[str, ...]
-    balanced: Array
+    wrench_changes: dict[str, dict[str, Wrench]]
+    causes: tuple[str, ...]
+    is_balanced: Array
 
 
-class Reactions:
+class ReactionSolver:
     """One mechanism at n positions, its balance filled in."""
 
-    def __init__(self, balancing: Balancing, balance: Balance, field: Field):
-        self.work, self.rows, self.balance = balancing.work, balancing.rows, balance
+    def __init__(self, balancing: BalanceFunction, balance: VirtualWorkBalance, field: KinematicArrays):
+        self.work, self.pair_rows, self.balance = balancing.work, balancing.pair_rows, balance
         self.pairs = {pair.name: pair for pair in self.work.mechanism.pairs}
-        self.many = len(balance.loads)
+        self.position_count = len(balance.loads)
         self.frames = field.frames
-        self.arm = size(self.work.mechanism, self.work.shapes)
-        self.scale = np.tile([1.0, 1.0, 1.0 / self.arm], len(self.work.links))
+        self.arm = mechanism_size(self.work.mechanism, self.work.shapes)
+        self.coordinate_scale = np.tile([1.0, 1.0, 1.0 / self.arm], len(self.work.links))
         rows = balance.constraints.copy()
         for name, contact in self.contacts.items():
-            rows[:, self.rows[name]] = self._along(self.pairs[name], contact, contact.way)
-        held = np.concatenate([rows, balance.drives], axis=1) * self.scale
-        self.size = np.maximum(np.linalg.norm(held, axis=2), 1e-300)  # (n, forces)
-        self.held = (held / self.size[:, :, None]).transpose(0, 2, 1)  # (n, links, forces)
+            rows[:, self.pair_rows[name]] = self._unit_force_on_pair(self.pairs[name], contact, contact.drive_direction)
+        held = np.concatenate([rows, balance.input_directions], axis=1) * self.coordinate_scale
+        self.column_scale = np.maximum(np.linalg.norm(held, axis=2), 1e-300)  # (n, forces)
+        self.equilibrium_matrix = (held / self.column_scale[:, :, None]).transpose(0, 2, 1)  # (n, links, forces)
 
     @cached_property
-    def contacts(self) -> dict[str, Contact]:
+    def contacts(self) -> dict[str, ToothContact]:
         """Where teeth touch, for the pairs of which that is known."""
         beside = self.work.mechanism.pairs
-        found = {name: pair.contact(self.frames, self.work.shapes, beside) for name, pair in self.pairs.items()}
+        found = {name: pair.tooth_contact(self.frames, self.work.shapes, beside) for name, pair in self.pairs.items()}
         return {name: contact for name, contact in found.items() if contact is not None}
 
     @cached_property
-    def unshared(self) -> tuple[str, ...]:
+    def couple_only_pairs(self) -> tuple[str, ...]:
         """The pairs of which only couples are known: what forces they come from, and load other pairs, is not."""
         return tuple(name for name, pair in self.pairs.items() if pair.ties_angles and name not in self.contacts)
 
-    def solved(self) -> Solved:
+    def solve(self) -> ForceSolution:
         """The efforts and reactions that balance loads and inertia."""
-        asked = (self.balance.inertia - self.balance.loads) * self.scale
-        found, ways, balanced = self._carried(asked[:, :, None])
+        asked = (self.balance.inertia - self.balance.loads) * self.coordinate_scale
+        found, ways, balanced = self._solve_balance(asked[:, :, None])
         pushed = {}
         for name, contact in self.contacts.items():
-            pair, rows = self.pairs[name], self.rows[name]
-            press = np.abs(found[:, rows, 0] / self.size[:, rows])
-            pushed[name] = self._along(pair, contact, contact.apart) * (contact.slope * press)[:, :, None]
+            pair, rows = self.pairs[name], self.pair_rows[name]
+            press = np.abs(found[:, rows, 0] / self.column_scale[:, rows])
+            pushed[name] = (
+                self._unit_force_on_pair(pair, contact, contact.separation_direction)
+                * (contact.pressure_tangent * press)[:, :, None]
+            )
         if pushed:
-            off = sum(each[:, 0] for each in pushed.values()) * self.scale
-            found, ways, balanced = self._carried((asked - off)[:, :, None])
-        by_cause = {"": ways} | {name: self._share(self.pairs[name]) for name in self.unshared}
-        by_cause = {name: np.concatenate([each, *self._pushed_off(each)], axis=2) for name, each in by_cause.items()}
+            off = sum(each[:, 0] for each in pushed.values()) * self.coordinate_scale
+            found, ways, balanced = self._solve_balance((asked - off)[:, :, None])
+        by_cause = {"": ways} | {name: self._unknown_wheel_forces(self.pairs[name]) for name in self.couple_only_pairs}
+        by_cause = {
+            name: np.concatenate([each, *self._separation_changes(each)], axis=2) for name, each in by_cause.items()
+        }
         because = tuple(name for name, each in by_cause.items() for _ in range(each.shape[2]))
         ways = np.concatenate([*by_cause.values()], axis=2)
-        wrenches = {name: self._wrenches(pair, found[:, self.rows[name]]) for name, pair in self.pairs.items()}
+        wrenches = {
+            name: self._pair_wrenches(pair, found[:, self.pair_rows[name]]) for name, pair in self.pairs.items()
+        }
         for name, push in pushed.items():
-            also = self._on_bodies(self.pairs[name], push[:, 0, :, None])
+            also = self._wrenches_on_bodies(self.pairs[name], push[:, 0, :, None])
             wrenches[name] = {
                 link: Wrench(each.force + also[link].force, each.moment + also[link].moment)
                 for link, each in wrenches[name].items()
             }
-        changes = {name: self._wrenches(pair, ways[:, self.rows[name]]) for name, pair in self.pairs.items()}
+        changes = {name: self._pair_wrenches(pair, ways[:, self.pair_rows[name]]) for name, pair in self.pairs.items()}
         inputs = slice(self.balance.constraints.shape[1], None)
-        by = self.size[:, inputs, None]
-        return Solved(
+        by = self.column_scale[:, inputs, None]
+        return ForceSolution(
             (found[:, inputs] / by)[:, :, 0],
             ways[:, inputs] / by,
             {
@@ -125,49 +132,49 @@ class Reactions:
         )
 
     @cached_property
-    def _inverse(self) -> tuple[Array, Array]:
+    def _inverse_and_null_space(self) -> tuple[Array, Array]:
         """The inverse (n, forces, links) as far as there is one, and the ways (n, forces, ways) in which forces that
         nothing asks for may stand against each other."""
-        many, links, forces = self.held.shape
+        many, links, forces = self.equilibrium_matrix.shape
         inverse, ways = np.zeros((many, forces, links)), np.zeros((many, forces, 0))
-        weak = np.full(many, bool(self.held.size))
+        weak = np.full(many, bool(self.equilibrium_matrix.size))
         if links == forces:
             # the norms tell that no singular value is weak, in a tenth of the time that it takes to find them
-            whole = np.linalg.slogdet(self.held)[0] != 0.0
-            inverse[whole] = np.linalg.inv(self.held[whole])
-            sizes = [np.linalg.norm(each, axis=(1, 2)) for each in (self.held, inverse)]
-            weak = ~whole | (sizes[0] * sizes[1] >= 1.0 / NONE)
+            whole = np.linalg.slogdet(self.equilibrium_matrix)[0] != 0.0
+            inverse[whole] = np.linalg.inv(self.equilibrium_matrix[whole])
+            sizes = [np.linalg.norm(each, axis=(1, 2)) for each in (self.equilibrium_matrix, inverse)]
+            weak = ~whole | (sizes[0] * sizes[1] >= 1.0 / RANK_TOLERANCE)
         if weak.any():
-            inverse[weak], spare = _pseudo_inverse(self.held[weak])
+            inverse[weak], spare = _pseudo_inverse(self.equilibrium_matrix[weak])
             ways = np.zeros((many, forces, spare.shape[2]))
             ways[weak] = spare
         return inverse, ways
 
-    def _carried(self, asked: Array) -> tuple[Array, Array, Array]:
+    def _solve_balance(self, asked: Array) -> tuple[Array, Array, Array]:
         """The forces (n, forces, 1) that do what is asked (n, links, 1), how else they may be, and whether they can."""
-        inverse, ways = self._inverse
+        inverse, ways = self._inverse_and_null_space
         found = inverse @ asked
-        found += inverse @ (asked - self.held @ found)
-        left = np.abs(asked - self.held @ found).max(axis=(1, 2), initial=0.0)
+        found += inverse @ (asked - self.equilibrium_matrix @ found)
+        left = np.abs(asked - self.equilibrium_matrix @ found).max(axis=(1, 2), initial=0.0)
         whole = np.maximum(np.abs(asked).max(axis=(1, 2), initial=0.0), np.abs(found).max(axis=(1, 2), initial=0.0))
-        return found, ways, left <= OPEN * whole
+        return found, ways, left <= BALANCE_TOLERANCE * whole
 
-    def _along(self, pair: Pair, contact: Contact, way: Vector) -> Array:
+    def _unit_force_on_pair(self, pair: Pair, contact: ToothContact, way: Vector) -> Array:
         """A force of one along a way at a contact, on the second link, and its opposite on the first (n, 1, links)."""
-        found = np.zeros((self.many, 1, self.work.many))
+        found = np.zeros((self.position_count, 1, self.work.link_coordinate_count))
         for link, sense in zip(pair.links, (-1.0, 1.0), strict=True):
-            self._add(found, link, contact.at, way, sense)
+            self._add_unit_action(found, link, contact.pitch_point, way, sense)
         return found
 
-    def _add(self, found: Array, link: str, at: Vector, way: Vector | None, sense: float) -> None:
+    def _add_unit_action(self, found: Array, link: str, at: Vector, way: Vector | None, sense: float) -> None:
         """Add a force of one along a way at a place of a link, or a couple of one at the mechanism's size."""
-        if link in self.work.column:
-            first, frame = self.work.column[link], self.frames[link]
+        if link in self.work.link_columns:
+            first, frame = self.work.link_columns[link], self.frames[link]
             arm = at - Vector(frame.x, frame.y)
             for k, part in enumerate((0.0, 0.0, self.arm) if way is None else (way.x, way.y, arm.cross(way))):
                 found[:, 0, first + k] += sense * part
 
-    def _share(self, pair: Pair) -> Array:
+    def _unknown_wheel_forces(self, pair: Pair) -> Array:
         """How forces change with an unknown wrench between two wheels beside the couples of their row (n, forces, 4).
 
         A force at a place and a couple between the wheels, and a couple between one and their carrier; of these only
@@ -176,18 +183,18 @@ class Reactions:
         first, second, carrier = pair.bodies
         x, y = Vector(1.0, 0.0), Vector(0.0, 1.0)
         at = Vector(self.frames[second].x, self.frames[second].y)
-        share = np.zeros((self.many, self.work.many, 4))
+        share = np.zeros((self.position_count, self.work.link_coordinate_count, 4))
         for k, (way, against) in enumerate(((x, first), (y, first), (None, first), (None, carrier))):
             for link, sense in ((against, -1.0), (second, 1.0)):
-                self._add(share[:, None, :, k], link, at, way, sense)
-        share *= self.scale[:, None]
-        change = -self._inverse[0] @ share
-        own, inputs = self.rows[pair.name], slice(self.balance.constraints.shape[1], None)
-        barred = np.concatenate([change[:, own], change[:, inputs], share + self.held @ change], axis=1)
+                self._add_unit_action(share[:, None, :, k], link, at, way, sense)
+        share *= self.coordinate_scale[:, None]
+        change = -self._inverse_and_null_space[0] @ share
+        own, inputs = self.pair_rows[pair.name], slice(self.balance.constraints.shape[1], None)
+        barred = np.concatenate([change[:, own], change[:, inputs], share + self.equilibrium_matrix @ change], axis=1)
         s, v = np.linalg.svd(barred)[1:]
-        return change @ (v.transpose(0, 2, 1) * (s <= BARRED)[:, None]) @ v
+        return change @ (v.transpose(0, 2, 1) * (s <= WHEEL_LOAD_TOLERANCE)[:, None]) @ v
 
-    def _pushed_off(self, ways: Array) -> list[Array]:
+    def _separation_changes(self, ways: Array) -> list[Array]:
         """How forces (n, forces, 1) change with what pushes teeth off each other, for every contact.
 
         Where ways (n, forces, ways) leave open how hard teeth press, they leave that open too, and whatever the sense.
@@ -196,26 +203,29 @@ class Reactions:
             return []
         found = []
         for name, contact in self.contacts.items():
-            rows = self.rows[name]
-            press = np.linalg.norm(ways[:, rows] / self.size[:, rows, None], axis=(1, 2))
-            push = self._along(self.pairs[name], contact, contact.apart)[:, 0] * (contact.slope * press)[:, None]
-            found.append(-self._inverse[0] @ (push * self.scale)[:, :, None])
+            rows = self.pair_rows[name]
+            press = np.linalg.norm(ways[:, rows] / self.column_scale[:, rows, None], axis=(1, 2))
+            push = (
+                self._unit_force_on_pair(self.pairs[name], contact, contact.separation_direction)[:, 0]
+                * (contact.pressure_tangent * press)[:, None]
+            )
+            found.append(-self._inverse_and_null_space[0] @ (push * self.coordinate_scale)[:, :, None])
         return found
 
-    def _wrenches(self, pair: Pair, forces: Array) -> dict[str, Wrench]:
+    def _pair_wrenches(self, pair: Pair, forces: Array) -> dict[str, Wrench]:
         """What a pair does to each of its bodies (n, ways) by forces of its own (n, rows, ways)."""
-        own = (self.held[:, :, self.rows[pair.name]] @ forces) / self.scale[None, :, None]
-        return self._on_bodies(pair, own)
+        own = (self.equilibrium_matrix[:, :, self.pair_rows[pair.name]] @ forces) / self.coordinate_scale[None, :, None]
+        return self._wrenches_on_bodies(pair, own)
 
-    def _on_bodies(self, pair: Pair, own: Array) -> dict[str, Wrench]:
+    def _wrenches_on_bodies(self, pair: Pair, own: Array) -> dict[str, Wrench]:
         """Forces on the coordinates of a pair's bodies (n, links, ways); the frame has what adds up to nothing."""
         bodies = dict.fromkeys(pair.bodies)
-        found = {link: self._on(link, own) for link in bodies if link in self.work.column}
+        found = {link: self._wrench_on_link(link, own) for link in bodies if link in self.work.link_columns}
         rest = Wrench(-sum(each.force for each in found.values()), -sum(each.moment for each in found.values()))
         return {link: found.get(link, rest) for link in bodies}
 
-    def _on(self, link: str, own: Array) -> Wrench:
-        at, frame = self.work.column[link], self.frames[link]
+    def _wrench_on_link(self, link: str, own: Array) -> Wrench:
+        at, frame = self.work.link_columns[link], self.frames[link]
         force = own[:, at : at + 2].transpose(0, 2, 1)
         return Wrench(force, own[:, at + 2] + frame.x[:, None] * force[..., 1] - frame.y[:, None] * force[..., 0])
 
@@ -223,7 +233,7 @@ class Reactions:
 def _pseudo_inverse(held: Array) -> tuple[Array, Array]:
     """Those of `Reactions._inverse` by singular values."""
     u, s, v = np.linalg.svd(held)
-    strong = s > NONE * s[:, :1]
+    strong = s > RANK_TOLERANCE * s[:, :1]
     few, back = s.shape[1], v.transpose(0, 2, 1)
     inverse = back[:, :, :few] * np.where(strong, 1.0 / np.where(strong, s, 1.0), 0.0)[:, None]
     spare = np.ones((len(held), back.shape[2]), dtype=bool)

@@ -9,37 +9,37 @@ from typing import Any
 
 import numpy as np
 
-from planar.dynamics.equations_of_motion import Accelerations
-from planar.dynamics.external_actions import Field
-from planar.dynamics.lagrangian import work
-from planar.dynamics.load_validation import check
-from planar.equations.functions import size
+from planar.dynamics.equations_of_motion import EquationsOfMotion
+from planar.dynamics.external_actions import KinematicArrays
+from planar.dynamics.lagrangian import lagrangian_functions
+from planar.dynamics.load_validation import check_loads
+from planar.equations.functions import mechanism_size
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.foundation.geometry import Frame, frame_at
 from planar.foundation.jets import Jet
 from planar.model.mechanism import Input, Mechanism
-from planar.model.wording import listed
+from planar.model.wording import join_all_names
 from planar.results.motion import Motion, State
 from planar.results.records import InputMotion
-from planar.solving.position import Solver, solve
+from planar.solving.position import PositionSolver, solve
 
 Array = np.ndarray
 
-RELATIVE = 1e-12
+RELATIVE_TOLERANCE = 1e-12
 """What a step may be off, of sizes and turns and of the rates that are reached."""
-LONGEST, MOST_STEPS = 1e4, 10**5
-STEADY = 1e-12
+MAX_DURATION, MAX_STEPS = 1e4, 10**5
+CONSTANT_ENERGY_TOLERANCE = 1e-12
 """Energies that change by less than this part of the greatest do not change."""
-LEAST, MOST_TINY = 1e-10, 20
+SHORTEST_STEP_RATIO, MAX_SHORT_STEPS = 1e-10, 20
 """Of the time: so many steps in a row that are shorter than this get nowhere."""
-WEAK, KEPT, MEMORY, SMOOTH = 5e-3, 6, 200, 1e-5
+CHANGE_POINT_REGULARITY, EXTRAPOLATION_STEPS, REMEMBERED_STEPS, EXTRAPOLATION_TOLERANCE = 5e-3, 6, 200, 1e-5
 """A weakest constraint beside the strongest as near a change point; from how many of the steps before, and of how many,
 the motion goes on beyond, and by how much these may miss."""
-BENT = 1e-8
+PROJECTION_TOLERANCE = 1e-8
 """What is brought back onto the constraints by more than this is bent: near a change point these are weak."""
-FIRM = 1e-5
+LEAST_REGULARITY = 1e-5
 """Nearer to a change point accelerations are no more told by the constraints."""
-Tick = Callable[[float], None]
+ProgressCallback = Callable[[float], None]
 """Told how much of the time is done, from 0 to 1."""
 
 
@@ -66,7 +66,7 @@ class Simulation:
         whole = self.kinetic + self.potential - self.work
         swing = max(float(np.ptp(each)) for each in (self.kinetic, self.potential, self.work))
         most = max(float(np.abs(each).max()) for each in (self.kinetic, self.potential, self.work))
-        beside = swing if swing > STEADY * most else most
+        beside = swing if swing > CONSTANT_ENERGY_TOLERANCE * most else most
         return float(np.ptp(whole)) / beside if beside else 0.0
 
 
@@ -77,7 +77,7 @@ def simulate(
     driven: Sequence[str] = (),
     *,
     moving: bool = False,
-    tick: Tick | None = None,
+    tick: ProgressCallback | None = None,
 ) -> Simulation:
     """The motion of a mechanism that is let go at the file's position, for a duration (s), in so many steps.
 
@@ -90,10 +90,10 @@ def simulate(
     A motion that cannot go on says so in its `outcome` and `reason`. Raises BadInput for a duration or names that are
     none, NoAnswer where there is no position to start from, or something can move that has no mass.
     """
-    if isinstance(duration, bool) or not isinstance(duration, Real) or not 0.0 < duration <= LONGEST:
-        raise BadInput("duration", f"a time above zero up to {LONGEST:g} s is wanted, not {duration!r:.40}")
-    if isinstance(steps, bool) or not isinstance(steps, Integral) or not 1 <= steps <= MOST_STEPS:
-        raise BadInput("steps", f"a whole number of steps from 1 to {MOST_STEPS} is wanted, not {steps!r:.40}")
+    if isinstance(duration, bool) or not isinstance(duration, Real) or not 0.0 < duration <= MAX_DURATION:
+        raise BadInput("duration", f"a time above zero up to {MAX_DURATION:g} s is wanted, not {duration!r:.40}")
+    if isinstance(steps, bool) or not isinstance(steps, Integral) or not 1 <= steps <= MAX_STEPS:
+        raise BadInput("steps", f"a whole number of steps from 1 to {MAX_STEPS} is wanted, not {steps!r:.40}")
     names = [given.pair for given in mechanism.inputs]
     for pair in driven:
         if pair not in names:
@@ -101,135 +101,147 @@ def simulate(
                 "driven", f"there is no input at {pair!r} to be driven; the inputs are at {', '.join(names)}"
             )
     kept = [given.pair for given in mechanism.inputs if given.law is not None or given.pair in driven]
-    check(mechanism)
+    check_loads(mechanism)
     started = (
-        mechanism if moving else replace(mechanism, inputs=tuple(_resting(each, kept) for each in mechanism.inputs))
+        mechanism
+        if moving
+        else replace(mechanism, inputs=tuple(_initial_input(each, kept) for each in mechanism.inputs))
     )
-    return _Run(solve(started), kept, duration, steps).done(tick)
+    return _SimulationRun(solve(started), kept, duration, steps).run(tick)
 
 
-def _resting(given: Input, kept: Sequence[str]) -> Input:
+def _initial_input(given: Input, kept: Sequence[str]) -> Input:
     """An input as it starts: from rest where it is let go, at its law's own rates where it is driven."""
     if given.pair not in kept:
         return given._replace(velocity=0.0, acceleration=0.0, law=None)
     if given.law is None:
         return given
-    _, velocity, acceleration, _ = given.law.at(np.zeros(1), given.position, given.velocity)[:, 0]
+    _, velocity, acceleration, _ = given.law.evaluate(np.zeros(1), given.position, given.velocity)[:, 0]
     return given._replace(velocity=float(velocity), acceleration=float(acceleration))
 
 
-def _only_to(time: float, why: str) -> str:
+def _end_sentence(time: float, why: str) -> str:
     return f"the motion can be told only to {time:.6g} s{why}"
 
 
-class _Run:
+class _SimulationRun:
     """One motion from a solved position."""
 
     def __init__(self, start: State, kept: Sequence[str], duration: float, steps: int):
-        self.start, self.mechanism, self.kept = start, start.mechanism, tuple(kept)
-        self.work = work(self.mechanism)
+        self.start, self.mechanism, self.driven = start, start.mechanism, tuple(kept)
+        self.work = lagrangian_functions(self.mechanism)
         q, q1, _ = (each[0] for each in self.work.coordinates(start))
-        unit = size(self.mechanism, self.work.shapes)
-        self.law = Accelerations(self.work, kept, unit, self.work.wound(q))
-        self.many = len(q)
-        q, q1 = self.law.closed(0.0, q, q1)
-        self.first = np.concatenate([q, q1, [0.0]])
+        unit = mechanism_size(self.mechanism, self.work.shapes)
+        self.equations = EquationsOfMotion(self.work, kept, unit, self.work.initial_spring_turns(q))
+        self.coordinate_count = len(q)
+        q, q1 = self.equations.project(0.0, q, q1)
+        self.initial_state = np.concatenate([q, q1, [0.0]])
         self.time = np.linspace(0.0, duration, steps + 1)
 
-    def done(self, tick: Tick | None) -> Simulation:
-        rows, outcome, reason = self._integrated(tick)
+    def run(self, tick: ProgressCallback | None) -> Simulation:
+        rows, outcome, reason = self._integrate(tick)
         time = self.time[: len(rows)]
-        q, q1 = rows[:, : self.many], rows[:, self.many : 2 * self.many]
+        q, q1 = rows[:, : self.coordinate_count], rows[:, self.coordinate_count : 2 * self.coordinate_count]
         q2 = np.array([self._accelerations(*each) for each in zip(time, q, q1, strict=True)])
-        energies = np.array([self.law.energy(*each) for each in zip(time, q, q1, strict=True)])
-        motion = replace(self._motion(time, q, q1, q2), outcome=outcome, reason=reason)
-        return Simulation(motion, energies[:, 0], energies[:, 1], rows[:, -1], self.kept)
+        energies = np.array([self.equations.energies(*each) for each in zip(time, q, q1, strict=True)])
+        motion = replace(self._make_motion(time, q, q1, q2), outcome=outcome, reason=reason)
+        return Simulation(motion, energies[:, 0], energies[:, 1], rows[:, -1], self.driven)
 
     def _accelerations(self, time: float, q: Array, q1: Array) -> Array:
         """Those of a row; not a number where nothing tells them."""
         try:
-            pushed = self.law.of(time, q, q1)
+            pushed = self.equations.accelerations_at(time, q, q1)
         except NoAnswer:
-            return np.full(self.many, np.nan)
-        return pushed.q2 if pushed.firm > FIRM else np.full(self.many, np.nan)
+            return np.full(self.coordinate_count, np.nan)
+        return pushed.q2 if pushed.regularity > LEAST_REGULARITY else np.full(self.coordinate_count, np.nan)
 
-    def _integrated(self, tick: Tick | None) -> tuple[Array, Outcome, str]:
+    def _integrate(self, tick: ProgressCallback | None) -> tuple[Array, Outcome, str]:
         """The rows at all times that were reached, and why not all of them were."""
-        rows = [self.first]
-        if not np.all(np.isfinite(self.law.of(0.0, *self._parts(self.first)).q2)):
-            return np.array(rows), Outcome.BRANCH_LOST, _only_to(0.0, self._why(0.0, self.first))
+        rows = [self.initial_state]
+        if not np.all(np.isfinite(self.equations.accelerations_at(0.0, *self._split_state(self.initial_state)).q2)):
+            return (
+                np.array(rows),
+                Outcome.BRANCH_LOST,
+                _end_sentence(0.0, self._explain_failure(0.0, self.initial_state)),
+            )
         try:
-            stopped = self._fill(rows, tick)
+            stopped = self._add_rows(rows, tick)
         except NoAnswer as massless:
-            told = _only_to(float(self.time[len(rows) - 1]), f": beyond, {massless.reason}")
+            told = _end_sentence(float(self.time[len(rows) - 1]), f": beyond, {massless.reason}")
             return np.array(rows), massless.outcome, told
         return np.array(rows), Outcome.BRANCH_LOST if stopped else Outcome.SOLVED, stopped
 
-    def _fill(self, rows: list[Array], tick: Tick | None) -> str:
+    def _add_rows(self, rows: list[Array], tick: ProgressCallback | None) -> str:
         """Add the rows after the first, as far as they can be told; why not all of them."""
         last = float(self.time[-1])
-        solver, good, tiny = self._integrator(0.0, self.first), [], 0
+        solver, good, tiny = self._integrator(0.0, self.initial_state), [], 0
         while solver.status == "running":
             failed = False
             try:
                 solver.step()
             except FloatingPointError:
                 failed = True
-            firm = self.law.of(solver.t, *self._parts(solver.y)).firm
-            y = self._back(solver.t, solver.y)
-            failed = failed or self._moved(solver.y, y) > BENT
-            tiny = tiny + 1 if (solver.step_size or 0.0) < LEAST * last else 0
-            if failed or solver.status == "failed" or tiny > MOST_TINY:
-                over = self._over(good, solver.t) if firm < WEAK else None
+            firm = self.equations.accelerations_at(solver.t, *self._split_state(solver.y)).regularity
+            y = self._project(solver.t, solver.y)
+            failed = failed or self._relative_change(solver.y, y) > PROJECTION_TOLERANCE
+            tiny = tiny + 1 if (solver.step_size or 0.0) < SHORTEST_STEP_RATIO * last else 0
+            if failed or solver.status == "failed" or tiny > MAX_SHORT_STEPS:
+                over = self._extrapolate_beyond(good, solver.t) if firm < CHANGE_POINT_REGULARITY else None
                 if over is None:
-                    return _only_to(solver.t, self._why(solver.t, solver.y))
+                    return _end_sentence(solver.t, self._explain_failure(solver.t, solver.y))
                 at, inner = over
-                self._reach(rows, at, inner)
-                solver, good, tiny = self._integrator(at, self._back(at, inner(at))), [], 0
+                self._add_rows_until(rows, at, inner)
+                solver, good, tiny = self._integrator(at, self._project(at, inner(at))), [], 0
                 continue
-            self._reach(rows, solver.t, solver.dense_output())
-            solver.y, solver.f = y, self._rate(solver.t, y)
-            if firm > WEAK:
-                good = [*good[-MEMORY:], (solver.t, y)]
+            self._add_rows_until(rows, solver.t, solver.dense_output())
+            solver.y, solver.f = y, self._state_rate(solver.t, y)
+            if firm > CHANGE_POINT_REGULARITY:
+                good = [*good[-REMEMBERED_STEPS:], (solver.t, y)]
             if tick is not None:
                 tick(solver.t / last)
         return ""
 
-    def _reach(self, rows: list[Array], end: float, inner: Callable[..., Array]) -> None:
+    def _add_rows_until(self, rows: list[Array], end: float, interpolant: Callable[..., Array]) -> None:
         """Add the rows up to a time, on the constraints; with rates as they come where constraints would bend them."""
         while len(rows) < len(self.time) and self.time[len(rows)] <= end:
             time = float(self.time[len(rows)])
-            y = np.asarray(inner(time))
-            back = self._back(time, y)
-            if self._moved(y, back) > BENT:
-                back[self.many :] = y[self.many :]
+            y = np.asarray(interpolant(time))
+            back = self._project(time, y)
+            if self._relative_change(y, back) > PROJECTION_TOLERANCE:
+                back[self.coordinate_count :] = y[self.coordinate_count :]
             rows.append(back)
 
-    def _moved(self, y: Array, back: Array) -> float:
+    def _relative_change(self, y: Array, back: Array) -> float:
         """How far coordinates and rates are moved, of sizes and turns and of the rates."""
-        scale = np.concatenate([self.law.scale, np.maximum(np.abs(y[self.many : -1]), self.law.scale)])
+        scale = np.concatenate(
+            [self.equations.scale, np.maximum(np.abs(y[self.coordinate_count : -1]), self.equations.scale)]
+        )
         return float(np.abs((back - y)[:-1] / scale).max(initial=0.0))
 
     def _integrator(self, time: float, y: Array) -> Any:
         from scipy.integrate import DOP853  # slow to load, and only needed here
 
-        last, n = float(self.time[-1]), self.many
-        scales = np.concatenate([self.law.scale, self.law.scale / last, [1.0]])
-        fastest = max(float(np.abs(self.first[n : 2 * n] / self.law.scale).max(initial=0.0)) * last, 1.0)
+        last, n = float(self.time[-1]), self.coordinate_count
+        scales = np.concatenate([self.equations.scale, self.equations.scale / last, [1.0]])
+        fastest = max(float(np.abs(self.initial_state[n : 2 * n] / self.equations.scale).max(initial=0.0)) * last, 1.0)
         scales[n : 2 * n] *= fastest
-        scales[-1] = max(float(np.abs(self.law.energy(0.0, *self._parts(self.first))).max()), 1e-9)
-        return DOP853(self._rate, time, y, last, rtol=RELATIVE, atol=RELATIVE * scales)
+        scales[-1] = max(
+            float(np.abs(self.equations.energies(0.0, *self._split_state(self.initial_state))).max()), 1e-9
+        )
+        return DOP853(self._state_rate, time, y, last, rtol=RELATIVE_TOLERANCE, atol=RELATIVE_TOLERANCE * scales)
 
-    def _why(self, time: float, y: Array) -> str:
-        pushed = self.law.of(time, *self._parts(y))
-        if pushed.firm < WEAK:
-            driven = f"a dead point of what is driven at {listed(self.kept)}, or " if self.kept else ""
+    def _explain_failure(self, time: float, y: Array) -> str:
+        pushed = self.equations.accelerations_at(time, *self._split_state(y))
+        if pushed.regularity < CHANGE_POINT_REGULARITY:
+            driven = f"a dead point of what is driven at {join_all_names(self.driven)}, or " if self.driven else ""
             return f", near {driven}a change point, where branches of the motion cross"
         if not np.all(np.isfinite(pushed.q2)):
             return ", where the ends of a spring or damper meet, so that it has no direction"
         return ", where accelerations grow without end"
 
-    def _over(self, good: Sequence[tuple[float, Array]], stalled: float) -> tuple[float, Callable[..., Array]] | None:
+    def _extrapolate_beyond(
+        self, good: Sequence[tuple[float, Array]], stalled: float
+    ) -> tuple[float, Callable[..., Array]] | None:
         """Half as far beyond a change point as the last good step is before it, and the polynomial to there.
 
         There constraints do not tell accelerations, but the motion is smooth. None where it is not, as where an input
@@ -242,54 +254,56 @@ class _Run:
             # about so far from one another as from what they tell
             if not chosen or chosen[-1][0] - time >= 0.5 * (stalled - good[-1][0]):
                 chosen.append((time, y))
-        if len(chosen) < KEPT:
+        if len(chosen) < EXTRAPOLATION_STEPS:
             return None
-        chosen = chosen[KEPT - 1 :: -1]
+        chosen = chosen[EXTRAPOLATION_STEPS - 1 :: -1]
         at = [time for time, _ in chosen for _ in range(2)]
-        inner = KroghInterpolator(at, [each for time, y in chosen for each in (y, self._rate(time, y))])
+        inner = KroghInterpolator(at, [each for time, y in chosen for each in (y, self._state_rate(time, y))])
         beyond = stalled + 0.5 * (stalled - good[-1][0])
         found = np.asarray(inner(beyond))
         if beyond > self.time[-1] or not np.all(np.isfinite(found)):
             return None
-        back = self._back(beyond, found)
+        back = self._project(beyond, found)
         return (
             (beyond, inner)
-            if self._moved(found, back) < SMOOTH and self.law.of(beyond, *self._parts(back)).firm > 0.1 * WEAK
+            if self._relative_change(found, back) < EXTRAPOLATION_TOLERANCE
+            and self.equations.accelerations_at(beyond, *self._split_state(back)).regularity
+            > 0.1 * CHANGE_POINT_REGULARITY
             else None
         )
 
-    def _parts(self, y: Array) -> tuple[Array, Array]:
-        return y[: self.many], y[self.many : -1]
+    def _split_state(self, y: Array) -> tuple[Array, Array]:
+        return y[: self.coordinate_count], y[self.coordinate_count : -1]
 
-    def _rate(self, time: float, y: Array) -> Array:
-        q, q1 = self._parts(y)
-        found = self.law.of(time, q, q1)
+    def _state_rate(self, time: float, y: Array) -> Array:
+        q, q1 = self._split_state(y)
+        found = self.equations.accelerations_at(time, q, q1)
         if not np.all(np.isfinite(found.q2)):
             raise FloatingPointError  # with no number the integrator would never end
         return np.concatenate([q1, found.q2, [found.power]])
 
-    def _back(self, time: float, y: Array) -> Array:
+    def _project(self, time: float, y: Array) -> Array:
         """The nearest position and rates that the constraints allow."""
-        return np.concatenate([*self.law.closed(time, *self._parts(y)), y[-1:]])
+        return np.concatenate([*self.equations.project(time, *self._split_state(y)), y[-1:]])
 
-    def _motion(self, time: Array, *orders: Array) -> Motion:
+    def _make_motion(self, time: Array, *orders: Array) -> Motion:
         """The rows as a motion like any other."""
         at = {
             link: [Jet(*(order[:, k + j] for order in orders)) for j in range(3)]
-            for link, k in self.work.column.items()
+            for link, k in self.work.link_columns.items()
         }
         frames: dict[str, Frame] = {
             name: frame_at(*at[name]) if name in at else frame for name, frame in self.start.frames.items()
         }
         own = {
             name: tuple(Jet(*(order[:, k] for order in orders)) for k in range(part.start, part.stop))
-            for name, part in self.work.own.items()
+            for name, part in self.work.own_slices.items()
         }
         inputs = {}
         for given in self.mechanism.inputs:
-            pair = self.work.named[given.pair]
+            pair = self.work.relative_motions[given.pair]
             numbers = pair.measure([self.work.shapes[link] for link in pair.bodies])
-            drive = pair.drive([frames[link] for link in pair.bodies], numbers, own.get(pair.name, ()))
+            drive = pair.input_position([frames[link] for link in pair.bodies], numbers, own.get(pair.name, ()))
             inputs[given.pair] = InputMotion(*drive.parts[:3])
         motion = Motion(
             mechanism=self.mechanism,
@@ -305,5 +319,7 @@ class _Run:
         )
         u = np.array([each.position for each in inputs.values()]).reshape(len(inputs), len(time))
         still = {name: [each.parts[0] for each in values] for name, values in own.items()}
-        gaps = Solver(self.mechanism).gate.gaps(Field(motion, self.work.shapes).frames, still, u)
+        gaps = PositionSolver(self.mechanism).residual_check.residuals(
+            KinematicArrays(motion, self.work.shapes).frames, still, u
+        )
         return replace(motion, residual=float(np.max(gaps, initial=0.0)))

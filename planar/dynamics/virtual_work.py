@@ -8,14 +8,14 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from planar.dynamics.lagrangian import Work
-from planar.equations.casadi_call import Called
+from planar.dynamics.lagrangian import LagrangianFunctions
+from planar.equations.casadi_call import BufferedFunction
 from planar.model.mechanism import Input, Mechanism
 
 Array = np.ndarray
 
 
-class Balance(NamedTuple):
+class VirtualWorkBalance(NamedTuple):
     """Everything at positions (n, ...), over the coordinates of the links alone (links: 3 per moving link).
 
     `constraints` (n, rows, links) with the pairs' own coordinates gone, `drives` (n, inputs, links), `loads` (n, links)
@@ -23,58 +23,62 @@ class Balance(NamedTuple):
     """
 
     constraints: Array
-    drives: Array
+    input_directions: Array
     loads: Array
     inertia: Array
 
 
-class Balancing:
+class BalanceFunction:
     """The function of one mechanism that fills a balance in."""
 
-    def __init__(self, work: Work):
-        self.work, self.many = work, work.many
-        self.rows: dict[str, slice] = {}
+    def __init__(self, work: LagrangianFunctions):
+        self.work, self.link_coordinate_count = work, work.link_coordinate_count
+        self.pair_rows: dict[str, slice] = {}
         "of every pair: its rows of the constraints"
         at = 0
         for pair in work.mechanism.pairs:
-            self.rows[pair.name] = slice(at, at + len(pair.constrains) - len(pair.coordinates))
-            at = self.rows[pair.name].stop
-        self.count = at
+            self.pair_rows[pair.name] = slice(at, at + len(pair.residual_kinds) - len(pair.coordinate_kinds))
+            at = self.pair_rows[pair.name].stop
+        self.row_count = at
         # what efforts do is told by their places: how a pair's own coordinates follow those of its links is not unique
-        drives = ca.vertcat(ca.SX(0, work.q.numel()), *(work.effort(given.pair).T for given in work.mechanism.inputs))
-        outputs = [ca.jacobian(work.gaps, work.q), drives, ca.sum2(work.acting), work.inertia]
-        given = [work.q, work.q1, work.q2, work.factors, work.turns]
-        self._called = Called(ca.Function("balance", given, [ca.densify(each) for each in outputs]))
+        drives = ca.vertcat(
+            ca.SX(0, work.q.numel()), *(work.unit_effort_on_links(given.pair).T for given in work.mechanism.inputs)
+        )
+        outputs = [ca.jacobian(work.residuals, work.q), drives, ca.sum2(work.actions_on_links), work.inertia]
+        given = [work.q, work.q1, work.q2, work.factors, work.spring_turns]
+        self._called = BufferedFunction(ca.Function("balance", given, [ca.densify(each) for each in outputs]))
 
-    def over(self, q: Array, q1: Array, q2: Array, factors: Array, wound: Array) -> Balance:
+    def evaluate(self, q: Array, q1: Array, q2: Array, factors: Array, wound: Array) -> VirtualWorkBalance:
         """Everything at coordinates with their rates (n, coordinates), each alike; factors of the loads (n, loads), and
         `wound` as `Work.wound` has it."""
-        parts = self._called.over(len(q), q, q1, q2, factors, wound)
+        parts = self._called.evaluate_batch(len(q), q, q1, q2, factors, wound)
         slopes, drives = (each.transpose(0, 2, 1) for each in parts[:2])
         loads, inertia = (each[:, 0] for each in parts[2:])
-        constraints = np.zeros((len(q), self.count, self.many))
+        constraints = np.zeros((len(q), self.row_count, self.link_coordinate_count))
         first = 0
         for pair in self.work.mechanism.pairs:
-            rows, own = slice(first, first + len(pair.constrains)), self.work.own[pair.name]
+            rows, own = slice(first, first + len(pair.residual_kinds)), self.work.own_slices[pair.name]
             first = rows.stop
-            of_links, of_own = slopes[:, rows, : self.many], slopes[:, rows, own]
+            of_links, of_own = slopes[:, rows, : self.link_coordinate_count], slopes[:, rows, own]
             count = of_own.shape[2]
             if count:
                 # what is left to hold the links, square to what its own coordinates do
                 basis = np.linalg.qr(of_own, mode="complete")[0]
                 of_links = (basis.transpose(0, 2, 1) @ of_links)[:, count:]
-            constraints[:, self.rows[pair.name]] = of_links
-        return Balance(constraints, *(each[..., : self.many] for each in (drives, loads, inertia)))
+            constraints[:, self.pair_rows[pair.name]] = of_links
+        return VirtualWorkBalance(
+            constraints, *(each[..., : self.link_coordinate_count] for each in (drives, loads, inertia))
+        )
 
 
-def balancing(mechanism: Mechanism) -> Balancing:
+def balance_function(mechanism: Mechanism) -> BalanceFunction:
     """The function of a mechanism, kept for the next time, wherever its inputs then stand and however fast they run."""
     inputs = tuple(Input(given.pair, 0.0) for given in mechanism.inputs)
     loads = tuple(load._replace(varies=None) for load in mechanism.loads)
     acted_on = mechanism.links, mechanism.pairs, inputs, loads, mechanism.springs, mechanism.masses, mechanism.gravity
-    return _balancing(Mechanism("", mechanism.frame, *acted_on))
+    return _cached_balance_function(Mechanism("", mechanism.frame, *acted_on))
 
 
 @lru_cache(maxsize=32)
-def _balancing(mechanism: Mechanism) -> Balancing:
-    return Balancing(Work(mechanism))
+def _cached_balance_function(mechanism: Mechanism) -> BalanceFunction:
+    return BalanceFunction(LagrangianFunctions(mechanism))

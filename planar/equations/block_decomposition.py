@@ -9,7 +9,7 @@ from typing import NamedTuple
 import casadi as ca
 
 
-class Group(NamedTuple):
+class BlockIndices(NamedTuple):
     """Constraints and coordinates that are solved together: `rows` close them, given all earlier groups.
 
     More rows than columns: some are redundant or in conflict. `free`: the constraints leave the columns free.
@@ -17,10 +17,10 @@ class Group(NamedTuple):
 
     rows: tuple[int, ...]
     columns: tuple[int, ...]
-    free: bool = False
+    is_free: bool = False
 
 
-def decompose(rows: Sequence[AbstractSet[int]], columns: int) -> tuple[Group, ...]:
+def decompose_blocks(rows: Sequence[AbstractSet[int]], columns: int) -> tuple[BlockIndices, ...]:
     """Split constraints into groups, in an order in which they can be solved.
 
     `rows[i]` holds the columns (coordinates) on which constraint i depends. Dulmage and Mendelsohn: a maximum matching
@@ -29,22 +29,25 @@ def decompose(rows: Sequence[AbstractSet[int]], columns: int) -> tuple[Group, ..
     T. Davis' CSparse, which casadi carries). What a constraint left unmatched reaches stays one group, with more rows
     than columns, and comes first; columns left unmatched come last, and what rests on them is free.
     """
-    row_of = _matching(rows, columns)
+    row_of = _maximum_matching(rows, columns)
     loose = tuple(column for column in range(columns) if column not in row_of)
     matched = set(row_of.values())
     surplus = [row for row in range(len(rows)) if row not in matched]
-    free = _resting_on(loose, rows, row_of)
-    groups = [Group(tuple(sorted(held)), tuple(sorted(block))) for held, block in _held_twice(surplus, rows, row_of)]
+    free = _underdetermined_columns(loose, rows, row_of)
+    groups = [
+        BlockIndices(tuple(sorted(held)), tuple(sorted(block)))
+        for held, block in _overdetermined_parts(surplus, rows, row_of)
+    ]
     taken = {column for group in groups for column in group.columns}
-    for block in _components(rows, {column: row for column, row in row_of.items() if column not in taken}):
+    for block in _strong_components(rows, {column: row for column, row in row_of.items() if column not in taken}):
         held = tuple(sorted(row_of[column] for column in block))
-        groups.append(Group(held, tuple(block), not free.isdisjoint(block)))
+        groups.append(BlockIndices(held, tuple(block), not free.isdisjoint(block)))
     if loose:
-        groups.append(Group((), loose, free=True))
+        groups.append(BlockIndices((), loose, is_free=True))
     return tuple(groups)
 
 
-def _held_twice(
+def _overdetermined_parts(
     surplus: Sequence[int], rows: Sequence[AbstractSet[int]], row_of: dict[int, int]
 ) -> list[tuple[set[int], set[int]]]:
     """The parts that are held more than once: each (rows, columns) joined to some unmatched row.
@@ -67,7 +70,7 @@ def _held_twice(
     return parts
 
 
-def _matching(rows: Sequence[AbstractSet[int]], columns: int) -> dict[int, int]:
+def _maximum_matching(rows: Sequence[AbstractSet[int]], columns: int) -> dict[int, int]:
     """A maximum matching: the row of every matched column."""
     pattern = ca.Sparsity.triplet(
         len(rows), columns, [row for row, held in enumerate(rows) for _ in held], [c for held in rows for c in held]
@@ -77,7 +80,7 @@ def _matching(rows: Sequence[AbstractSet[int]], columns: int) -> dict[int, int]:
     return dict(zip(q[: coarse_columns[3]], p[coarse_rows[1] :], strict=True))
 
 
-def _components(rows: Sequence[AbstractSet[int]], row_of: dict[int, int]) -> list[list[int]]:
+def _strong_components(rows: Sequence[AbstractSet[int]], row_of: dict[int, int]) -> list[list[int]]:
     """The strong components of the matched columns, each after those whose values its rows need."""
     order = sorted(row_of)
     index = {column: position for position, column in enumerate(order)}
@@ -87,14 +90,16 @@ def _components(rows: Sequence[AbstractSet[int]], row_of: dict[int, int]) -> lis
     return [sorted(order[k] for k in p[starts[b] : starts[b + 1]]) for b in reversed(range(blocks))]
 
 
-def _resting_on(loose: Sequence[int], rows: Sequence[AbstractSet[int]], row_of: dict[int, int]) -> set[int]:
+def _underdetermined_columns(
+    unmatched_columns: Sequence[int], rows: Sequence[AbstractSet[int]], row_of: dict[int, int]
+) -> set[int]:
     """The columns that stay free: the loose ones, and those whose constraints touch a free one."""
     touching: dict[int, list[int]] = {}
     column_of = {row: column for column, row in row_of.items()}
     for row, held in enumerate(rows):
         for column in held:
             touching.setdefault(column, []).append(row)
-    free, waiting = set(loose), list(loose)
+    free, waiting = set(unmatched_columns), list(unmatched_columns)
     while waiting:
         for row in touching.get(waiting.pop(), ()):
             if row in column_of and column_of[row] not in free:

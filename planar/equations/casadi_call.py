@@ -9,11 +9,11 @@ import numpy as np
 
 Array = np.ndarray
 
-SIZES = (256, 32, 8)
+CHUNK_SIZES = (256, 32, 8)
 """Positions that are worked on by one call."""
 
 
-class Called:
+class BufferedFunction:
     """A function of dense columns. Results are (columns, rows), or (positions, columns, rows).
 
     A call through casadi's own interface costs some 30 us, one through its buffers less than one.
@@ -22,14 +22,14 @@ class Called:
     def __init__(self, function: Any):
         self.function = function
         self.lock = Lock()
-        self.given = [np.zeros(function.numel_in(k)) for k in range(function.n_in())]
-        self.found = [np.zeros(function.size_out(k)[::-1]) for k in range(function.n_out())]
-        self.run = self._bound()
+        self.input_buffers = [np.zeros(function.numel_in(k)) for k in range(function.n_in())]
+        self.output_buffers = [np.zeros(function.size_out(k)[::-1]) for k in range(function.n_out())]
+        self.call_buffers = self._bind_buffers()
         self._mapped: dict[int, tuple[Any, Any]] = {}
 
-    def _bound(self) -> Any:
+    def _bind_buffers(self) -> Any:
         buffer, run = self.function.buffer()
-        for set_, arrays in ((buffer.set_arg, self.given), (buffer.set_res, self.found)):
+        for set_, arrays in ((buffer.set_arg, self.input_buffers), (buffer.set_res, self.output_buffers)):
             for k, each in enumerate(arrays):
                 if each.size:
                     set_(k, memoryview(each.reshape(-1)))
@@ -39,29 +39,29 @@ class Called:
     def __call__(self, *arguments: Array) -> list[Array]:
         """The results at one position, each argument as long as the function's."""
         with self.lock:
-            for own, each in zip(self.given, arguments, strict=True):
+            for own, each in zip(self.input_buffers, arguments, strict=True):
                 own[:] = each
-            self.run()
-            return [each.copy() for each in self.found]
+            self.call_buffers()
+            return [each.copy() for each in self.output_buffers]
 
-    def over(self, many: int, *arguments: Array) -> list[Array]:
+    def evaluate_batch(self, count: int, *arguments: Array) -> list[Array]:
         """The results at many positions; arguments (positions, entries), or (entries,) for all of them alike."""
-        room = -(-many // SIZES[-1]) * SIZES[-1]  # whole calls: what is over is not looked at
-        given, found = [], [np.empty((room, *own.shape)) for own in self.found]
-        for own, each in zip(self.given, arguments, strict=True):
+        room = -(-count // CHUNK_SIZES[-1]) * CHUNK_SIZES[-1]  # whole calls: what is over is not looked at
+        given, found = [], [np.empty((room, *own.shape)) for own in self.output_buffers]
+        for own, each in zip(self.input_buffers, arguments, strict=True):
             alike = each.ndim == 1
-            array = np.empty((min(room, SIZES[0]) if alike else room, len(own)))
-            array[: len(array) if alike else many] = each
-            array[len(array) if alike else many :] = 0.0
+            array = np.empty((min(room, CHUNK_SIZES[0]) if alike else room, len(own)))
+            array[: len(array) if alike else count] = each
+            array[len(array) if alike else count :] = 0.0
             given.append((array, alike))
         views = [(k, memoryview(array.reshape(-1)), array[:1].size, alike) for k, (array, alike) in enumerate(given)]
         told = [(k, memoryview(each.reshape(-1)), each[:1].size, False) for k, each in enumerate(found)]
         done = 0
         with self.lock:
-            for size in SIZES:
+            for size in CHUNK_SIZES:
                 first = True
                 while room - done >= size:
-                    buffer, run = self._over(size)
+                    buffer, run = self._mapped_call(size)
                     for set_, each in ((buffer.set_arg, views), (buffer.set_res, told)):
                         for k, view, entries, alike in each:
                             if entries and (first or not alike):
@@ -69,15 +69,15 @@ class Called:
                                 set_(k, view[start * entries : (start + size) * entries])
                     run()
                     done, first = done + size, False
-        return [each[:many] for each in found]
+        return [each[:count] for each in found]
 
-    def _over(self, size: int) -> tuple[Any, Any]:
+    def _mapped_call(self, size: int) -> tuple[Any, Any]:
         if size not in self._mapped:
             self._mapped[size] = self.function.map(size).buffer()
         return self._mapped[size]
 
 
-class Chained:
+class RunFunction:
     """A function (state, argument, numbers) -> state, from one position to the next of a run."""
 
     def __init__(self, function: Any):
@@ -91,10 +91,10 @@ class Chained:
         found = np.empty((many, len(state)))
         done = 0
         with self.lock:
-            for size in (*SIZES, 1):
+            for size in (*CHUNK_SIZES, 1):
                 if many - done < size or not found.size:
                     continue
-                run, (before, given, fixed, after) = self._of(size)
+                run, (before, given, fixed, after) = self._accumulated_call(size)
                 fixed[:] = numbers
                 while many - done >= size:
                     before[:] = found[done - 1] if done else state
@@ -104,7 +104,7 @@ class Chained:
                     done += size
         return found
 
-    def _of(self, size: int) -> tuple[Any, list[Array]]:
+    def _accumulated_call(self, size: int) -> tuple[Any, list[Array]]:
         if size not in self._made:
             function = self.function.mapaccum("runs", size) if size > 1 else self.function
             many = [self.function.numel_in(k) for k in range(3)]

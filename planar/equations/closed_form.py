@@ -17,16 +17,16 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from planar.equations.constraint_equations import Equations, Stage
-from planar.model.pairs import Kind
+from planar.equations.constraint_equations import Block, ConstraintEquations
+from planar.model.pairs import MeasureKind
 
-VANISHES = 1e-10
+ZERO_TOLERANCE = 1e-10
 """Of numbers about one: what is rounding."""
-PLACES = 3
+SAMPLE_POINTS = 3
 """Random places at which a form is compared with the equations."""
 
 
-class Closed(NamedTuple):
+class ClosedForm(NamedTuple):
     """One group in closed form, as expressions in the symbols of its equations and in `sign`.
 
     `found`: for each unknown the cos and sin of an angle, or a length alone, given those of earlier groups; `sign`: +1
@@ -34,101 +34,103 @@ class Closed(NamedTuple):
     both assemblies meet, beyond it there is none: the squared cosine of the angle between what holds the group.
     """
 
-    found: tuple[tuple[ca.SX, ...], ...]
+    values: tuple[tuple[ca.SX, ...], ...]
     sign: ca.SX
-    side: ca.SX
-    bend: ca.SX
+    sign_expression: ca.SX
+    coalescence: ca.SX
 
 
-class _Vector(NamedTuple):
+class _ComplexNumber(NamedTuple):
     """A complex number."""
 
     x: ca.SX
     y: ca.SX
 
-    def __add__(self, other: _Vector) -> _Vector:  # type: ignore[override]
-        return _Vector(self.x + other.x, self.y + other.y)
+    def __add__(self, other: _ComplexNumber) -> _ComplexNumber:  # type: ignore[override]
+        return _ComplexNumber(self.x + other.x, self.y + other.y)
 
-    def __neg__(self) -> _Vector:
-        return _Vector(-self.x, -self.y)
+    def __neg__(self) -> _ComplexNumber:
+        return _ComplexNumber(-self.x, -self.y)
 
-    def times(self, other: _Vector) -> _Vector:
-        return _Vector(self.x * other.x - self.y * other.y, self.y * other.x + self.x * other.y)
+    def multiply(self, other: _ComplexNumber) -> _ComplexNumber:
+        return _ComplexNumber(self.x * other.x - self.y * other.y, self.y * other.x + self.x * other.y)
 
-    def by(self, factor: ca.SX) -> _Vector:
-        return _Vector(self.x * factor, self.y * factor)
+    def scale(self, factor: ca.SX) -> _ComplexNumber:
+        return _ComplexNumber(self.x * factor, self.y * factor)
 
-    def along(self, other: _Vector) -> ca.SX:
+    def dot(self, other: _ComplexNumber) -> ca.SX:
         """The product with the other's conjugate, its real part: how far this goes along that."""
         return self.x * other.x + self.y * other.y
 
-    def across(self, other: _Vector) -> ca.SX:
+    def cross(self, other: _ComplexNumber) -> ca.SX:
         """The same, its imaginary part: positive where this is to the left of that."""
         return self.y * other.x - self.x * other.y
 
     @property
-    def square(self) -> ca.SX:
-        return self.along(self)
+    def squared_length(self) -> ca.SX:
+        return self.dot(self)
 
     @property
-    def conjugate(self) -> _Vector:
-        return _Vector(self.x, -self.y)
+    def conjugate(self) -> _ComplexNumber:
+        return _ComplexNumber(self.x, -self.y)
 
 
-def closed(e: Equations, stage: Stage) -> Closed | None:
+def find_closed_form(e: ConstraintEquations, stage: Block) -> ClosedForm | None:
     """The closed form of a group; None where it has none of the three forms."""
-    if stage.free or stage.rows.stop - stage.rows.start != 2 or stage.unknowns.stop - stage.unknowns.start != 2:
+    if stage.is_free or stage.rows.stop - stage.rows.start != 2 or stage.unknowns.stop - stage.unknowns.start != 2:
         return None
-    angles = [e.coordinates[column].kind is Kind.ANGLE for column in e.unknowns[stage.unknowns]]
-    if not any(angles) or any(e.rows[row].kind is Kind.ANGLE for row in range(stage.rows.start, stage.rows.stop)):
+    angles = [e.coordinates[column].kind is MeasureKind.ANGLE for column in e.unknowns[stage.unknowns]]
+    if not any(angles) or any(
+        e.rows[row].kind is MeasureKind.ANGLE for row in range(stage.rows.start, stage.rows.stop)
+    ):
         return None
     first = 0 if angles[0] else 1
     unknowns = [e.z[stage.unknowns.start + k] for k in (first, 1 - first)]
-    found = _angles(e, stage, unknowns) if all(angles) else _angle_and_length(e, stage, unknowns)
-    return found and found._replace(found=found.found[::-1] if first else found.found)
+    found = _solve_two_angles(e, stage, unknowns) if all(angles) else _solve_angle_and_length(e, stage, unknowns)
+    return found and found._replace(values=found.values[::-1] if first else found.values)
 
 
-def _angles(e: Equations, stage: Stage, unknowns: list[ca.SX]) -> Closed | None:
+def _solve_two_angles(e: ConstraintEquations, stage: Block, unknowns: list[ca.SX]) -> ClosedForm | None:
     one, two = unknowns
     rows = e.F[stage.rows]
-    a, turning_a = _turned(ca.substitute(rows, two, 0.0), one)
-    b, turning_b = _turned(ca.substitute(rows, one, 0.0), two)
+    a, turning_a = _cos_sin_coefficients(ca.substitute(rows, two, 0.0), one)
+    b, turning_b = _cos_sin_coefficients(ca.substitute(rows, one, 0.0), two)
     g = ca.substitute(rows, ca.vertcat(one, two), ca.SX.zeros(2)) - a - b
-    model = g + _applied(a, turning_a, one) + _applied(b, turning_b, two)
-    signs = _similar(e, rows - model, [(a, turning_a), (b, turning_b)])
+    model = g + _combine_cos_sin(a, turning_a, one) + _combine_cos_sin(b, turning_b, two)
+    signs = _rotation_senses(e, rows - model, [(a, turning_a), (b, turning_b)])
     if signs is None or 0 in signs:
         return None
-    a, b, g = (_read(part, signs) for part in (a, b, g))
+    a, b, g = (_rows_as_complex(part, signs) for part in (a, b, g))
     d = -g
     sign = ca.SX.sym("sign")
-    spanned, gap = a.square * b.square, 0.5 * (a.square + b.square - d.square)
+    spanned, gap = a.squared_length * b.squared_length, 0.5 * (a.squared_length + b.squared_length - d.squared_length)
     # spanned less the gap's square, as Heron has it: so nothing cancels where the angles are small
-    one_length, other_length = ca.sqrt(a.square), ca.sqrt(b.square)
+    one_length, other_length = ca.sqrt(a.squared_length), ca.sqrt(b.squared_length)
     least, greatest = one_length - other_length, one_length + other_length
-    across = sign * 0.5 * ca.sqrt((d.square - least * least) * (greatest * greatest - d.square))
-    scale = 1.0 / d.square
-    along = 0.5 + 0.5 * (a.square - b.square) * scale
-    reached = d.by(along) + _Vector(-d.y, d.x).by(across * scale)
-    e1 = reached.times(a.conjugate).by(1.0 / a.square)
-    e2 = (d + -reached).times(b.conjugate).by(1.0 / b.square)
-    side = a.times(_unit(one)).across(b.times(_unit(two)))
-    return Closed((tuple(e1), tuple(e2)), sign, side, gap * gap / spanned)
+    across = sign * 0.5 * ca.sqrt((d.squared_length - least * least) * (greatest * greatest - d.squared_length))
+    scale = 1.0 / d.squared_length
+    along = 0.5 + 0.5 * (a.squared_length - b.squared_length) * scale
+    reached = d.scale(along) + _ComplexNumber(-d.y, d.x).scale(across * scale)
+    e1 = reached.multiply(a.conjugate).scale(1.0 / a.squared_length)
+    e2 = (d + -reached).multiply(b.conjugate).scale(1.0 / b.squared_length)
+    side = a.multiply(_unit_number(one)).cross(b.multiply(_unit_number(two)))
+    return ClosedForm((tuple(e1), tuple(e2)), sign, side, gap * gap / spanned)
 
 
-def _angle_and_length(e: Equations, stage: Stage, unknowns: list[ca.SX]) -> Closed | None:
+def _solve_angle_and_length(e: ConstraintEquations, stage: Block, unknowns: list[ca.SX]) -> ClosedForm | None:
     turn, slide = unknowns
     rows = e.F[stage.rows]
     still = ca.substitute(rows, slide, 0.0)
     moved = ca.substitute(ca.jacobian(rows, slide), slide, 0.0)
-    a, turning_a = _turned(still, turn)
-    d, turning_d = _turned(moved, turn)
+    a, turning_a = _cos_sin_coefficients(still, turn)
+    d, turning_d = _cos_sin_coefficients(moved, turn)
     g, fixed = (ca.substitute(part, turn, 0.0) - turned for part, turned in ((still, a), (moved, d)))
-    model = g + _applied(a, turning_a, turn) + slide * (fixed + _applied(d, turning_d, turn))
-    signs = _similar(e, rows - model, [(a, turning_a), (d, turning_d)])
+    model = g + _combine_cos_sin(a, turning_a, turn) + slide * (fixed + _combine_cos_sin(d, turning_d, turn))
+    signs = _rotation_senses(e, rows - model, [(a, turning_a), (d, turning_d)])
     if signs is None:
         return None
-    rest = _vanishing(e, [fixed, d, a])
-    fixed, d, a, g = (_read(part, signs) for part in (fixed, d, a, g))
+    rest = _which_vanish(e, [fixed, d, a])
+    fixed, d, a, g = (_rows_as_complex(part, signs) for part in (fixed, d, a, g))
     sign = ca.SX.sym("sign")
     if rest[1] and not rest[0] and not rest[2]:
         # the length goes along a direction that is known
@@ -137,61 +139,63 @@ def _angle_and_length(e: Equations, stage: Stage, unknowns: list[ca.SX]) -> Clos
         way, base, reach = d, a, g
     else:
         return None
-    gap, spanned = base.across(way), reach.square * way.square
-    length = (sign * ca.sqrt(spanned - gap * gap) - base.along(way)) / way.square
-    side = way.square * slide + base.along(way)
+    gap, spanned = base.cross(way), reach.squared_length * way.squared_length
+    length = (sign * ca.sqrt(spanned - gap * gap) - base.dot(way)) / way.squared_length
+    side = way.squared_length * slide + base.dot(way)
     if way is fixed:
-        unit = (-(g + way.by(length))).times(a.conjugate).by(1.0 / a.square)
+        unit = (-(g + way.scale(length))).multiply(a.conjugate).scale(1.0 / a.squared_length)
     else:
-        unit = (-g).times((a + d.by(length)).conjugate).by(1.0 / g.square)
-    return Closed((tuple(unit), (length,)), sign, side, gap * gap / spanned)
+        unit = (-g).multiply((a + d.scale(length)).conjugate).scale(1.0 / g.squared_length)
+    return ClosedForm((tuple(unit), (length,)), sign, side, gap * gap / spanned)
 
 
-def _turned(rows: ca.SX, angle: ca.SX) -> tuple[ca.SX, ca.SX]:
+def _cos_sin_coefficients(rows: ca.SX, angle: ca.SX) -> tuple[ca.SX, ca.SX]:
     """By what the cos and the sin of an angle are multiplied in rows that depend on it by these alone."""
     slope = ca.jacobian(rows, angle)
     return -ca.substitute(ca.jacobian(slope, angle), angle, 0.0), ca.substitute(slope, angle, 0.0)
 
 
-def _applied(cosine: ca.SX, sine: ca.SX, angle: ca.SX) -> ca.SX:
+def _combine_cos_sin(cosine: ca.SX, sine: ca.SX, angle: ca.SX) -> ca.SX:
     return cosine * ca.cos(angle) + sine * ca.sin(angle)
 
 
-def _unit(angle: ca.SX) -> _Vector:
-    return _Vector(ca.cos(angle), ca.sin(angle))
+def _unit_number(angle: ca.SX) -> _ComplexNumber:
+    return _ComplexNumber(ca.cos(angle), ca.sin(angle))
 
 
-def _read(rows: ca.SX, signs: list[int]) -> _Vector:
+def _rows_as_complex(rows: ca.SX, signs: list[int]) -> _ComplexNumber:
     """Two rows as a complex number: the other way round where that makes angles turn to the left."""
     rows = ca.densify(rows)
-    return _Vector(rows[1], rows[0]) if -1 in signs else _Vector(rows[0], rows[1])
+    return _ComplexNumber(rows[1], rows[0]) if -1 in signs else _ComplexNumber(rows[0], rows[1])
 
 
-def _similar(e: Equations, gap: ca.SX, turned: list[tuple[ca.SX, ca.SX]]) -> list[int] | None:
+def _rotation_senses(e: ConstraintEquations, gap: ca.SX, turned: list[tuple[ca.SX, ca.SX]]) -> list[int] | None:
     """Which way every pair of factors turns: +1 left, -1 right, 0 where both vanish; None where the form is not it.
 
     Left: the factors of the sine are those of the cosine, turned to the left by a right angle. All have to turn alike,
     and the form has to agree with the equations.
     """
-    found, values = [], [_at_places(e, [gap, *each]) for each in turned]
+    found, values = [], [_evaluate_at_random(e, [gap, *each]) for each in turned]
     for left, cosine, sine in values:
-        if not np.all(np.abs(left) < VANISHES):
+        if not np.all(np.abs(left) < ZERO_TOLERANCE):
             return None
-        ways = [way for way in (1, -1) if np.all(np.abs(sine - way * np.stack([-cosine[1], cosine[0]])) < VANISHES)]
+        ways = [
+            way for way in (1, -1) if np.all(np.abs(sine - way * np.stack([-cosine[1], cosine[0]])) < ZERO_TOLERANCE)
+        ]
         if not ways:
             return None
         found.append(0 if len(ways) == 2 else ways[0])
     return found if len(set(found) - {0}) == 1 else None
 
 
-def _vanishing(e: Equations, parts: list[ca.SX]) -> list[bool]:
-    return [bool(np.all(np.abs(each) < VANISHES)) for each in _at_places(e, parts)]
+def _which_vanish(e: ConstraintEquations, parts: list[ca.SX]) -> list[bool]:
+    return [bool(np.all(np.abs(each) < ZERO_TOLERANCE)) for each in _evaluate_at_random(e, parts)]
 
 
-def _at_places(e: Equations, parts: list[ca.SX]) -> list[np.ndarray]:
+def _evaluate_at_random(e: ConstraintEquations, parts: list[ca.SX]) -> list[np.ndarray]:
     """Expressions (2,) in numbers (2, places): at random places an identity holds by accident nowhere."""
     function = ca.Function("parts", [e.z, e.u, e.p], [ca.densify(part) for part in parts])
     rng = np.random.default_rng(0)
-    values = [rng.uniform(0.5, 2.0, (symbol.numel(), PLACES)) for symbol in (e.z, e.u, e.p)]
+    values = [rng.uniform(0.5, 2.0, (symbol.numel(), SAMPLE_POINTS)) for symbol in (e.z, e.u, e.p)]
     found = function(*values)
     return [each.full() for each in (found if isinstance(found, tuple) else (found,))]

@@ -12,54 +12,54 @@ from typing import NamedTuple
 
 import casadi as ca
 
-NOTHING = 1e-12
+CANCELLATION_TOLERANCE = 1e-12
 """A factor below this part of those that it was made of is what rounding left of zero."""
 
 
-class Symbols(NamedTuple):
+class CoordinateSymbols(NamedTuple):
     """The coordinates' symbols, and for each that is an angle, by its index, those of its cos and sin."""
 
     values: Sequence[ca.SX]
-    turned: dict[int, tuple[ca.SX, ca.SX]]
+    cos_sin: dict[int, tuple[ca.SX, ca.SX]]
 
 
 @dataclass
-class Line:
+class EliminationRow:
     """A constraint under elimination: sum of factor * coordinate, plus a rest that is not linear in them."""
 
     factors: dict[int, float]
     rest: ca.SX
-    in_rest: set[int]
+    rest_coordinates: set[int]
     "coordinates whose symbols stand in `rest`"
-    bent: set[int]
+    nonlinear: set[int]
     "coordinates that the constraint depends on, through others or not, other than by its factors"
 
     @property
-    def depends(self) -> set[int]:
+    def dependencies(self) -> set[int]:
         """Every coordinate on which the constraint depends."""
-        return set(self.factors) | self.bent
+        return set(self.factors) | self.nonlinear
 
-    def whole(self, symbols: Symbols) -> ca.SX:
+    def as_expression(self, symbols: CoordinateSymbols) -> ca.SX:
         """The constraint as one expression."""
         return sum((slope * symbols.values[column] for column, slope in self.factors.items()), self.rest)
 
 
-Solved = list[tuple[int, Line]]
+EliminationSteps = list[tuple[int, EliminationRow]]
 """Coordinates in the order of their elimination, each with the constraint that gives it."""
 
 
-def stack(expressions: Iterable[ca.SX]) -> ca.SX:
+def stack_expressions(expressions: Iterable[ca.SX]) -> ca.SX:
     """Expressions one below the other, symbolic though there be none."""
     return ca.vertcat(ca.SX(0, 1), *expressions)
 
 
-def lines_of(closures: Sequence[ca.SX], symbols: Symbols) -> list[Line]:
+def split_constant_factors(closures: Sequence[ca.SX], symbols: CoordinateSymbols) -> list[EliminationRow]:
     """The constraints with their constant factors taken out."""
     count = len(symbols.values)
-    both = [symbol for pair in symbols.turned.values() for symbol in pair]
-    owner = [index for index in symbols.turned for _ in range(2)]
-    everything = stack([*symbols.values, *both])
-    stacked = stack(closures)
+    both = [symbol for pair in symbols.cos_sin.values() for symbol in pair]
+    owner = [index for index in symbols.cos_sin for _ in range(2)]
+    everything = stack_expressions([*symbols.values, *both])
+    stacked = stack_expressions(closures)
     slopes = ca.jacobian(stacked, everything)
     factors: list[dict[int, float]] = [{} for _ in closures]
     bent: list[set[int]] = [set() for _ in closures]
@@ -74,18 +74,18 @@ def lines_of(closures: Sequence[ca.SX], symbols: Symbols) -> list[Line]:
                 crooked.add(column)
     # a symbol that is linear wherever it stands is taken out of all constraints at once, any other one by one
     straight = [column for column in range(count) if column not in crooked]
-    zeroed = stack(symbols.values[index] for index in straight)
+    zeroed = stack_expressions(symbols.values[index] for index in straight)
     rest = ca.vertsplit(ca.substitute(stacked, zeroed, ca.SX.zeros(len(straight))))
     lines = []
     for row, expression in enumerate(rest):
         bends = [symbols.values[column] for column in factors[row] if column in crooked]
         straightened = ca.substitute(expression, ca.vertcat(*bends), ca.SX.zeros(len(bends))) if bends else expression
-        lines.append(Line(factors[row], straightened, set(bent[row]), set(bent[row])))
+        lines.append(EliminationRow(factors[row], straightened, set(bent[row]), set(bent[row])))
     return lines
 
 
 def eliminate(
-    rows: Sequence[int], columns: Sequence[int], lines: Sequence[Line], solved: Solved
+    rows: Sequence[int], columns: Sequence[int], constraints: Sequence[EliminationRow], solved: EliminationSteps
 ) -> tuple[list[int], list[int]]:
     """Solve constraints of a group for one coordinate each, the shortest first; `solved` grows by them.
 
@@ -95,82 +95,84 @@ def eliminate(
     while True:
         best: tuple[tuple[int, int, int], int, int] | None = None
         for row in remaining_rows:
-            line = lines[row]
+            line = constraints[row]
             inside = [column for column in line.factors if column in remaining]
-            size = len(inside) + len(line.bent & remaining)
+            size = len(inside) + len(line.nonlinear & remaining)
             for column in inside:
-                if column not in line.bent and (best is None or (size, row, column) < best[0]):
+                if column not in line.nonlinear and (best is None or (size, row, column) < best[0]):
                     best = (size, row, column), row, column
         if best is None:
             return remaining_rows, sorted(remaining)
         _, pivot_row, pivot = best
         remaining_rows.remove(pivot_row)
         remaining.discard(pivot)
-        by = lines[pivot_row]
+        by = constraints[pivot_row]
         solved.append((pivot, by))
         for row in remaining_rows:
-            _replace(lines[row], pivot, by)
+            _substitute_pivot(constraints[row], pivot, by)
 
 
-def _replace(line: Line, pivot: int, by: Line) -> None:
+def _substitute_pivot(line: EliminationRow, pivot: int, pivot_line: EliminationRow) -> None:
     """Put the solution of `by` for the pivot into another constraint."""
-    if pivot in line.bent:
-        line.bent.discard(pivot)
-        line.bent |= (set(by.factors) | by.bent) - {pivot}
+    if pivot in line.nonlinear:
+        line.nonlinear.discard(pivot)
+        line.nonlinear |= (set(pivot_line.factors) | pivot_line.nonlinear) - {pivot}
     factor = line.factors.pop(pivot, 0.0)
     if factor == 0.0:
         return
-    ratio = factor / by.factors[pivot]
-    for column, slope in by.factors.items():
+    ratio = factor / pivot_line.factors[pivot]
+    for column, slope in pivot_line.factors.items():
         if column != pivot:
             before = line.factors.get(column, 0.0)
             total = before - ratio * slope
-            if abs(total) <= NOTHING * max(abs(before), abs(ratio * slope)):
+            if abs(total) <= CANCELLATION_TOLERANCE * max(abs(before), abs(ratio * slope)):
                 line.factors.pop(column, None)
             else:
                 line.factors[column] = total
-    line.rest = line.rest - ratio * by.rest
-    line.in_rest |= by.in_rest
-    line.bent |= by.bent
+    line.rest = line.rest - ratio * pivot_line.rest
+    line.rest_coordinates |= pivot_line.rest_coordinates
+    line.nonlinear |= pivot_line.nonlinear
 
 
-def expressed(remaining: dict[int, ca.SX], solved: Solved, symbols: Symbols, wanted: list[ca.SX]) -> list[ca.SX]:
+def back_substitute(
+    remaining: dict[int, ca.SX], solved: EliminationSteps, symbols: CoordinateSymbols, wanted: list[ca.SX]
+) -> list[ca.SX]:
     """Expressions with every coordinate replaced: the remaining ones as given, the solved ones by their constraints."""
     replaced: list[ca.SX] = []
     by: list[ca.SX] = []
     for column, value in remaining.items():
         replaced.append(symbols.values[column])
         by.append(value)
-        if column in symbols.turned:
-            replaced += symbols.turned[column]
+        if column in symbols.cos_sin:
+            replaced += symbols.cos_sin[column]
             by += [ca.cos(value), ca.sin(value)]
-    for column, line in _in_order(solved):
+    for column, line in _dependency_order(solved):
         factor = line.factors[column]
         others = {other: -slope / factor for other, slope in line.factors.items() if other != column}
         rest = -line.rest / factor
         replaced.append(symbols.values[column])
         by.append(sum((slope * symbols.values[other] for other, slope in others.items()), rest))
-        if column in symbols.turned:
-            replaced += symbols.turned[column]
-            by += _turned(by[-1], others, rest, symbols)
+        if column in symbols.cos_sin:
+            replaced += symbols.cos_sin[column]
+            by += _cos_sin_of_sum(by[-1], others, rest, symbols)
     return ca.substitute_inplace(replaced, by, wanted)[1] if replaced else wanted
 
 
-def _turned(angle: ca.SX, others: dict[int, float], rest: ca.SX, symbols: Symbols) -> list[ca.SX]:
+def _cos_sin_of_sum(angle: ca.SX, others: dict[int, float], rest: ca.SX, symbols: CoordinateSymbols) -> list[ca.SX]:
     """cos and sin of an angle that is a sum of angles, from theirs where that needs no new sine of an unknown."""
-    if not all(abs(slope) == 1.0 and other in symbols.turned for other, slope in others.items()):
+    if not all(abs(slope) == 1.0 and other in symbols.cos_sin for other, slope in others.items()):
         return [ca.cos(angle), ca.sin(angle)]
     cosine, sine = (ca.cos(rest), ca.sin(rest)) if not rest.is_zero() else (ca.SX(1), ca.SX(0))
     for other, slope in others.items():
-        c, s = symbols.turned[other][0], slope * symbols.turned[other][1]
+        c, s = symbols.cos_sin[other][0], slope * symbols.cos_sin[other][1]
         cosine, sine = cosine * c - sine * s, sine * c + cosine * s
     return [cosine, sine]
 
 
-def _in_order(solved: Solved) -> Solved:
+def _dependency_order(solved: EliminationSteps) -> EliminationSteps:
     """The solved coordinates, each after those in which it is expressed."""
     line_of = dict(solved)
-    done: dict[int, Line] = {}
+    done: dict[int, EliminationRow] = {}
     for start in line_of:
         waiting = [start]
         while waiting:
@@ -178,7 +180,7 @@ def _in_order(solved: Solved) -> Solved:
             line = line_of[column]
             open_ones = [
                 other
-                for other in (set(line.factors) | line.in_rest) - {column}
+                for other in (set(line.factors) | line.rest_coordinates) - {column}
                 if other in line_of and other not in done
             ]
             if open_ones:

@@ -10,27 +10,27 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from planar.equations.casadi_call import Called, Chained
-from planar.equations.closed_form import Closed, closed
-from planar.equations.constraint_equations import Equations, Stage, build
-from planar.equations.elimination import stack
+from planar.equations.casadi_call import BufferedFunction, RunFunction
+from planar.equations.closed_form import ClosedForm, find_closed_form
+from planar.equations.constraint_equations import Block, ConstraintEquations, build_equations
+from planar.equations.elimination import stack_expressions
 from planar.foundation.geometry import GROUND, Frame, frame_at
 from planar.foundation.jets import Scalar
-from planar.model.link_shapes import Shape, shape
-from planar.model.mechanism import Input, Link, Mechanism, motions
-from planar.model.pairs import Kind, Pair
+from planar.model.link_shapes import LinkShape, link_shape
+from planar.model.mechanism import Input, Link, Mechanism, relative_motions
+from planar.model.pairs import MeasureKind, Pair
 
 Array = np.ndarray
-CACHED = 256
+MAX_CACHED_STRUCTURES = 256
 """Mechanisms of which what was derived is kept: more than come along, so that none is derived twice in a round."""
 
-POLISHED = 2
+POLISHING_STEPS = 2
 """Newton's steps that carry a closed form to round-off."""
-NEWTON_STEPS = 4
+RUN_NEWTON_STEPS = 4
 """Unrolled steps of a position within a run: from a start a degree or so away, four square the error away."""
 
 
-class Rates(NamedTuple):
+class EquationRates(NamedTuple):
     """What `Program.kinematics` returns: F and w with their first and second time derivatives, and dF/dz, dF/du.
 
     Each with a first axis for the samples, if there is one.
@@ -42,16 +42,16 @@ class Rates(NamedTuple):
     w: Array
     w1: Array
     w2: Array
-    slope: Array
+    jacobian: Array
     "(rows, unknowns)"
-    drive_slope: Array
+    input_jacobian: Array
     "(rows, inputs)"
 
 
-class Assemblies:
+class ClosedFormAssemblies:
     """The two assemblies of one stage in closed form, carried to round-off by Newton's steps."""
 
-    def __init__(self, unknowns: slice, form: Called, polished: Called):
+    def __init__(self, unknowns: slice, form: BufferedFunction, polished: BufferedFunction):
         self._unknowns, self._form, self._polished = unknowns, form, polished
 
     def __call__(self, z: Array, u: Array, p: Array) -> tuple[list[Array], float, float]:
@@ -65,7 +65,7 @@ class Assemblies:
             own, bends = self._form(z, u, p, np.array([sign]))
             bend = float(bends[0, 0])
             whole[self._unknowns] = own[0]
-            for _ in range(POLISHED):
+            for _ in range(POLISHING_STEPS):
                 whole[self._unknowns] = self._polished(whole, u, p)[0][0]
             # the greatest of what is left open does not see what is not a number
             sure = np.isfinite(whole[self._unknowns]).all()
@@ -74,61 +74,61 @@ class Assemblies:
         return found, float(left), bend
 
 
-class Program:
+class EquationFunctions:
     """The casadi functions of one structure, each built when it is first asked for."""
 
-    def __init__(self, equations: Equations):
+    def __init__(self, equations: ConstraintEquations):
         self.equations = equations
 
-    def closing(self, stage: Stage) -> ca.Function:
+    def block_function(self, stage: Block) -> ca.Function:
         """(z, u, p) -> F of this stage (rows,) and its slope in the stage's own unknowns (rows, unknowns)."""
-        return self._closing[stage.level]
+        return self._block_functions[stage.block_index]
 
     @cached_property
-    def _closing(self) -> dict[int, ca.Function]:
+    def _block_functions(self) -> dict[int, ca.Function]:
         e = self.equations
         slopes = ca.jacobian(e.F, e.z)
         return {
-            stage.level: ca.Function(
+            stage.block_index: ca.Function(
                 "closing", [e.z, e.u, e.p], [e.F[stage.rows], ca.densify(slopes[stage.rows, stage.unknowns])]
             )
-            for stage in e.stages
+            for stage in e.blocks
         }
 
-    def closed(self, stage: Stage) -> Called:
+    def block_call(self, stage: Block) -> BufferedFunction:
         """The same, called on arrays: F and the slope's columns (unknowns, rows)."""
-        if stage.level not in self._closed:
-            self._closed[stage.level] = Called(self.closing(stage))
-        return self._closed[stage.level]
+        if stage.block_index not in self._block_calls:
+            self._block_calls[stage.block_index] = BufferedFunction(self.block_function(stage))
+        return self._block_calls[stage.block_index]
 
     @cached_property
-    def _closed(self) -> dict[int, Called]:
+    def _block_calls(self) -> dict[int, BufferedFunction]:
         return {}
 
-    def assemblies(self, stage: Stage) -> Assemblies | None:
+    def block_assemblies(self, stage: Block) -> ClosedFormAssemblies | None:
         """Both assemblies of a stage; None for one without a closed form."""
-        if stage.level not in self._assemblies:
-            form = closed(self.equations, stage)
-            self._assemblies[stage.level] = form and self._both(stage, form)
-        return self._assemblies[stage.level]
+        if stage.block_index not in self._block_assemblies:
+            form = find_closed_form(self.equations, stage)
+            self._block_assemblies[stage.block_index] = form and self._make_assemblies(stage, form)
+        return self._block_assemblies[stage.block_index]
 
     @cached_property
-    def _assemblies(self) -> dict[int, Assemblies | None]:
+    def _block_assemblies(self) -> dict[int, ClosedFormAssemblies | None]:
         return {}
 
-    def _both(self, stage: Stage, form: Closed) -> Assemblies:
+    def _make_assemblies(self, stage: Block, form: ClosedForm) -> ClosedFormAssemblies:
         e = self.equations
-        found = stack(ca.atan2(each[1], each[0]) if len(each) == 2 else each[0] for each in form.found)
-        left, slope = self.closing(stage)(e.z, e.u, e.p)
-        polished = [e.z[stage.unknowns] - solved(slope, left), ca.norm_inf(left)]
-        return Assemblies(
+        found = stack_expressions(ca.atan2(each[1], each[0]) if len(each) == 2 else each[0] for each in form.values)
+        left, slope = self.block_function(stage)(e.z, e.u, e.p)
+        polished = [e.z[stage.unknowns] - solve_linear(slope, left), ca.norm_inf(left)]
+        return ClosedFormAssemblies(
             stage.unknowns,
-            Called(ca.Function("assembly", [e.z, e.u, e.p, form.sign], [found, form.bend])),
-            Called(ca.Function("polished", [e.z, e.u, e.p], polished)),
+            BufferedFunction(ca.Function("assembly", [e.z, e.u, e.p, form.sign], [found, form.coalescence])),
+            BufferedFunction(ca.Function("polished", [e.z, e.u, e.p], polished)),
         )
 
     @cached_property
-    def positions(self) -> ca.Function:
+    def coordinate_function(self) -> ca.Function:
         """(z, u, p) -> w."""
         e = self.equations
         return ca.Function("positions", [e.z, e.u, e.p], [ca.densify(e.w)])
@@ -136,55 +136,55 @@ class Program:
     def coordinates(self, z: Array, u: Array, p: Array) -> Array:
         """w (coordinates,) at z (unknowns,), or (samples, coordinates) at z (samples, unknowns), u alike."""
         if z.ndim == 1:
-            return self._coordinates(z, u, p)[0][0]
-        return self._coordinates.over(len(z), z, u, p)[0][:, 0]
+            return self._coordinate_call(z, u, p)[0][0]
+        return self._coordinate_call.evaluate_batch(len(z), z, u, p)[0][:, 0]
 
     @cached_property
-    def _coordinates(self) -> Called:
-        return Called(self.positions)
+    def _coordinate_call(self) -> BufferedFunction:
+        return BufferedFunction(self.coordinate_function)
 
     @cached_property
-    def _called(self) -> tuple[Called, Called]:
-        return Called(self.rates), Called(self._slopes)
+    def _kinematics_calls(self) -> tuple[BufferedFunction, BufferedFunction]:
+        return BufferedFunction(self.kinematics_function), BufferedFunction(self._jacobian_function)
 
     @cached_property
-    def rates(self) -> ca.Function:
+    def kinematics_function(self) -> ca.Function:
         """(y, y1, y2, p) -> F and w, one after the other, with their first and second rates, and dF/dy."""
         e = self.equations
         both = ca.vertcat(e.F, e.w)
-        y, y1, y2, first, second = derivatives(e, both)
+        y, y1, y2, first, second = time_derivatives(e, both)
         slopes = ca.jacobian(e.F, y)
         outputs = [ca.horzcat(both, first, second), slopes]
         return ca.Function("kinematics", [y, y1, y2, e.p], [ca.densify(output) for output in outputs])
 
     @cached_property
-    def _third(self) -> ca.Function:
+    def _third_rate_function(self) -> ca.Function:
         e = self.equations
-        y, y1, y2, _, second = derivatives(e, e.F)
+        y, y1, y2, _, second = time_derivatives(e, e.F)
         third = ca.jtimes(second, y, y1) + ca.jtimes(second, y1, y2)
         return ca.Function("third", [y, y1, y2, e.p], [ca.densify(third)])
 
     @cached_property
-    def _jerks(self) -> ca.Function:
+    def _jerk_function(self) -> ca.Function:
         e = self.equations
         both = ca.vertcat(e.F, e.w)
-        y, y1, y2, _, second = derivatives(e, both)
+        y, y1, y2, _, second = time_derivatives(e, both)
         y3 = ca.SX.sym("y3", y.numel())
         third = ca.jtimes(second, y, y1) + ca.jtimes(second, y1, y2) + ca.jtimes(second, y2, y3)
         return ca.Function("jerks", [y, y1, y2, y3, e.p], [ca.densify(third)])
 
-    def jerks(self, y: Array, y1: Array, y2: Array, y3: Array, p: Array) -> tuple[Array, Array]:
+    def third_rates(self, y: Array, y1: Array, y2: Array, y3: Array, p: Array) -> tuple[Array, Array]:
         """The third time derivatives of F (samples, rows) and of w (samples, coordinates); y (samples, y) alike."""
         rows = self.equations.F.numel()
-        both = self._jerks(y.T, y1.T, y2.T, y3.T, p).full().T
+        both = self._jerk_function(y.T, y1.T, y2.T, y3.T, p).full().T
         return both[:, :rows], both[:, rows:]
 
-    def third(self, y: Array, y1: Array, y2: Array, p: Array) -> Array:
+    def third_rate_remainder(self, y: Array, y1: Array, y2: Array, p: Array) -> Array:
         """The third time derivative of F (rows,), that of y left out."""
-        return self._third(y, y1, y2, p).full().ravel()
+        return self._third_rate_function(y, y1, y2, p).full().ravel()
 
     @cached_property
-    def _bends(self) -> tuple[ca.Function, ca.Function]:
+    def _second_derivative_functions(self) -> tuple[ca.Function, ca.Function]:
         e = self.equations
         y, way, rows = ca.vertcat(e.z, e.u), ca.SX.sym("way", e.z.numel() + e.u.numel()), ca.SX.sym("l", e.F.numel())
         along = ca.jacobian(ca.jtimes(e.F, y, way), y)
@@ -194,115 +194,120 @@ class Program:
             ca.Function("weighed", [y, rows, e.p], [ca.densify(weighed)]),
         )
 
-    def bend_along(self, y: Array, way: Array, p: Array) -> Array:
+    def second_derivative_along(self, y: Array, direction: Array, p: Array) -> Array:
         """The slope of (dF/dy) way (rows, y): the second derivatives of F with one direction filled in."""
-        return self._bends[0](y, way, p).full()
+        return self._second_derivative_functions[0](y, direction, p).full()
 
-    def bend_of(self, y: Array, rows: Array, p: Array) -> Array:
+    def weighted_hessian(self, y: Array, weights: Array, p: Array) -> Array:
         """The second derivatives (y, y) of the sum of the rows of F, each times its number."""
-        return self._bends[1](y, rows, p).full()
+        return self._second_derivative_functions[1](y, weights, p).full()
 
     @cached_property
-    def _deflated(self) -> ca.Function:
+    def _deflated_function(self) -> ca.Function:
         e = self.equations
         z1, u1 = ca.SX.sym("z1", e.z.numel()), ca.SX.sym("u1", e.u.numel())
         both = ca.vertcat(e.F, ca.jtimes(e.F, ca.vertcat(e.z, e.u), ca.vertcat(z1, u1)))
         slopes = ca.jacobian(both, ca.vertcat(e.z, z1))
         return ca.Function("deflated", [e.z, z1, e.u, u1, e.p], [ca.densify(both), ca.densify(slopes)])
 
-    def deflated(self, z: Array, z1: Array, u: Array, u1: Array, p: Array) -> tuple[Array, Array]:
+    def deflated_system(self, z: Array, z1: Array, u: Array, u1: Array, p: Array) -> tuple[Array, Array]:
         """F and its first time derivative (2 rows,), and their slope in z and z1 (2 rows, 2 unknowns).
 
         A. Leykin, J. Verschelde, A. Zhao, Newton's method with deflation for isolated singularities, Theor. Comp. Sci.
         359, 2006.
         """
-        both, slopes = self._deflated(z, z1, u, u1, p)
+        both, slopes = self._deflated_function(z, z1, u, u1, p)
         return both.full().ravel(), slopes.full()
 
-    def kinematics(self, y: Array, y1: Array, y2: Array, p: Array) -> Rates:
+    def kinematics(self, y: Array, y1: Array, y2: Array, p: Array) -> EquationRates:
         """Everything at one position, y = (z, u) with its first and second derivatives, or at samples (samples, y)."""
         rows, unknowns = self.equations.F.numel(), self.equations.z.numel()
         if y.ndim == 1:
-            parts, slopes = self._called[0](y, y1, y2, p)
-            return Rates(*parts[:, :rows], *parts[:, rows:], slopes[:unknowns].T, slopes[unknowns:].T)
-        parts, slopes = self._called[0].over(len(y), y, y1, y2, p)
+            parts, slopes = self._kinematics_calls[0](y, y1, y2, p)
+            return EquationRates(*parts[:, :rows], *parts[:, rows:], slopes[:unknowns].T, slopes[unknowns:].T)
+        parts, slopes = self._kinematics_calls[0].evaluate_batch(len(y), y, y1, y2, p)
         parts, slopes = parts.transpose(1, 0, 2), slopes.transpose(0, 2, 1)
-        return Rates(*parts[..., :rows], *parts[..., rows:], slopes[..., :unknowns], slopes[..., unknowns:])
+        return EquationRates(*parts[..., :rows], *parts[..., rows:], slopes[..., :unknowns], slopes[..., unknowns:])
 
     @cached_property
-    def advance(self) -> ca.Function:
+    def newton_function(self) -> ca.Function:
         """(z, u, p) -> z: Newton group after group, unrolled.
 
         Only for structures whose every group has as many constraints as unknowns.
         """
         e = self.equations
         z, u, p = (ca.SX.sym(name, each.numel()) for name, each in (("z", e.z), ("u", e.u), ("p", e.p)))
-        return compact("advance", [z, u, p], [self.corrected(z, u, p, NEWTON_STEPS)[0]])
+        return function_with_cse("advance", [z, u, p], [self.newton_expressions(z, u, p, RUN_NEWTON_STEPS)[0]])
 
-    def advanced(self, z: Array, u: Array, p: Array) -> Array:
+    def correct_samples(self, z: Array, u: Array, p: Array) -> Array:
         """The same at samples z (samples, unknowns), u and p alike, each by itself."""
-        return self._advanced.over(len(z), z, u, p)[0][:, 0]
+        return self._newton_call.evaluate_batch(len(z), z, u, p)[0][:, 0]
 
     @cached_property
-    def _advanced(self) -> Called:
-        return Called(self.advance)
+    def _newton_call(self) -> BufferedFunction:
+        return BufferedFunction(self.newton_function)
 
-    def corrected(self, z: ca.SX, u: ca.SX, p: ca.SX, steps: int = 1) -> tuple[ca.SX, ca.SX]:
+    def newton_expressions(self, z: ca.SX, u: ca.SX, p: ca.SX, steps: int = 1) -> tuple[ca.SX, ca.SX]:
         """Unknowns after so many of Newton's steps, group after group, for structures as `advance` takes, and what each
         group left open before its last step (rows,)."""
         open_ = []
         now = ca.vertsplit(z) if z.numel() else []
-        for stage in self.equations.stages:
-            for _ in range(steps if length(stage.unknowns) else 0):
-                left, slope = self.closing(stage)(ca.vertcat(*now), u, p)
-                now[stage.unknowns] = ca.vertsplit(ca.vertcat(*now[stage.unknowns]) - solved(slope, left))
-            open_ += [left] if length(stage.unknowns) else []
-        return stack(now), stack(open_)
+        for stage in self.equations.blocks:
+            for _ in range(steps if slice_length(stage.unknowns) else 0):
+                left, slope = self.block_function(stage)(ca.vertcat(*now), u, p)
+                now[stage.unknowns] = ca.vertsplit(ca.vertcat(*now[stage.unknowns]) - solve_linear(slope, left))
+            open_ += [left] if slice_length(stage.unknowns) else []
+        return stack_expressions(now), stack_expressions(open_)
 
-    def run(self, z: Array, u: Array, p: Array) -> Array:
+    def run_samples(self, z: Array, u: Array, p: Array) -> Array:
         """The unknowns at every sample of inputs u (samples, inputs), each from the one before, the first from z."""
-        return self._run(z, u, p)
+        return self._run_function(z, u, p)
 
     @cached_property
-    def _run(self) -> Chained:
-        return Chained(self.advance)
+    def _run_function(self) -> RunFunction:
+        return RunFunction(self.newton_function)
 
     @cached_property
-    def _slopes(self) -> ca.Function:
+    def _jacobian_function(self) -> ca.Function:
         e = self.equations
         slopes = ca.jacobian(e.F, ca.vertcat(e.z, e.u))
         return ca.Function("slopes", [e.z, e.u, e.p], [ca.densify(slopes)])
 
-    def slopes(self, z: Array, u: Array, p: Array) -> tuple[Array, Array]:
+    def jacobians(self, z: Array, u: Array, p: Array) -> tuple[Array, Array]:
         """dF/dz (samples, rows, unknowns) and dF/du (samples, rows, inputs) at z (samples, unknowns), u alike."""
         samples, unknowns = z.shape
         rows, inputs = self.equations.F.numel(), u.shape[1]
         if rows == 0:
             return np.zeros((samples, 0, unknowns)), np.zeros((samples, 0, inputs))
-        called = self._called[1]
-        both = (called(z[0], u[0], p)[0][None] if samples == 1 else called.over(samples, z, u, p)[0]).transpose(0, 2, 1)
+        called = self._kinematics_calls[1]
+        both = (
+            called(z[0], u[0], p)[0][None] if samples == 1 else called.evaluate_batch(samples, z, u, p)[0]
+        ).transpose(0, 2, 1)
         return both[:, :, :unknowns], both[:, :, unknowns:]
 
     @cached_property
-    def _left(self) -> Called:
+    def _residual_call(self) -> BufferedFunction:
         e = self.equations
         slopes = ca.jacobian(e.F, ca.vertcat(e.z, e.u))
-        return Called(ca.Function("left", [e.z, e.u, e.p], [ca.densify(e.F), ca.densify(slopes)]))
+        return BufferedFunction(ca.Function("left", [e.z, e.u, e.p], [ca.densify(e.F), ca.densify(slopes)]))
 
-    def left(self, z: Array, u: Array, p: Array) -> tuple[Array, Array]:
+    def residuals_and_jacobian(self, z: Array, u: Array, p: Array) -> tuple[Array, Array]:
         """F (rows,) and its slope (rows, unknowns and inputs) at one position."""
         if not len(self.equations.rows):
             return np.zeros(0), np.zeros((0, len(z) + len(u)))
-        left, slope = self._left(z, u, p)
+        left, slope = self._residual_call(z, u, p)
         return left[0], slope.T
 
     @cached_property
-    def square(self) -> bool:
+    def is_square(self) -> bool:
         """Whether every group has as many constraints as unknowns."""
-        return all(length(stage.rows) == length(stage.unknowns) and not stage.free for stage in self.equations.stages)
+        return all(
+            slice_length(stage.rows) == slice_length(stage.unknowns) and not stage.is_free
+            for stage in self.equations.blocks
+        )
 
 
-def derivatives(e: Equations, value: ca.SX) -> tuple[ca.SX, ...]:
+def time_derivatives(e: ConstraintEquations, value: ca.SX) -> tuple[ca.SX, ...]:
     """y = (z, u) with symbols for its derivatives, and those of an expression in y.
 
     The chain rule twice: d/dt = (d/dy) y1, d2/dt2 = (d/dy)(d/dt) y1 + (d/dy) y2.
@@ -313,38 +318,40 @@ def derivatives(e: Equations, value: ca.SX) -> tuple[ca.SX, ...]:
     return y, y1, y2, first, ca.jtimes(first, y, y1) + ca.jtimes(value, y, y2)
 
 
-def compact(name: str, given: Sequence[ca.SX], wanted: Sequence[ca.SX]) -> ca.Function:
+def function_with_cse(name: str, given: Sequence[ca.SX], wanted: Sequence[ca.SX]) -> ca.Function:
     """A function in which what stands in several places is computed once."""
     return ca.Function(name, given, ca.cse(list(wanted)))
 
 
-def length(part: slice) -> int:
+def slice_length(part: slice) -> int:
     """How many entries a part of z or F has."""
     return part.stop - part.start
 
 
-def solved(slope: ca.SX, left: ca.SX) -> ca.SX:
+def solve_linear(matrix: ca.SX, right_side: ca.SX) -> ca.SX:
     """slope^-1 left; two by two by the adjugate, larger by QR, neither of which needs a pivot to be chosen."""
-    if slope.numel() == 1:
-        return left / slope
-    if slope.numel() == 4:
-        a, b, c, d = slope[0, 0], slope[0, 1], slope[1, 0], slope[1, 1]
-        return ca.vertcat(d * left[0] - b * left[1], a * left[1] - c * left[0]) / (a * d - b * c)
-    q, r = ca.qr(slope)
-    return ca.solve(r, ca.mtimes(q.T, left))
+    if matrix.numel() == 1:
+        return right_side / matrix
+    if matrix.numel() == 4:
+        a, b, c, d = matrix[0, 0], matrix[0, 1], matrix[1, 0], matrix[1, 1]
+        return ca.vertcat(d * right_side[0] - b * right_side[1], a * right_side[1] - c * right_side[0]) / (
+            a * d - b * c
+        )
+    q, r = ca.qr(matrix)
+    return ca.solve(r, ca.mtimes(q.T, right_side))
 
 
-def program(mechanism: Mechanism) -> Program:
+def equation_functions(mechanism: Mechanism) -> EquationFunctions:
     """The program of a mechanism's structure; mechanisms that differ in their links' dimensions share one."""
-    return _program(structure(mechanism))
+    return _cached_equation_functions(equation_structure(mechanism))
 
 
-@lru_cache(maxsize=CACHED)
-def _program(structure: Mechanism) -> Program:
-    return Program(build(structure))
+@lru_cache(maxsize=MAX_CACHED_STRUCTURES)
+def _cached_equation_functions(structure: Mechanism) -> EquationFunctions:
+    return EquationFunctions(build_equations(structure))
 
 
-def structure(mechanism: Mechanism) -> Mechanism:
+def equation_structure(mechanism: Mechanism) -> Mechanism:
     """All of a mechanism that its equations depend on: names of links, pairs, which motions are driven."""
     return Mechanism(
         name="",
@@ -355,63 +362,63 @@ def structure(mechanism: Mechanism) -> Mechanism:
     )
 
 
-def shapes(mechanism: Mechanism) -> dict[str, Shape]:
+def shapes_of_links(mechanism: Mechanism) -> dict[str, LinkShape]:
     """The shape of every link (m)."""
-    return {link.name: shape(link) for link in mechanism.links}
+    return {link.name: link_shape(link) for link in mechanism.links}
 
 
-def size(mechanism: Mechanism, shapes: Mapping[str, Shape]) -> float:
+def mechanism_size(mechanism: Mechanism, shapes: Mapping[str, LinkShape]) -> float:
     """The mechanism's size (m): the greatest distance between two points of one link, else of a slide's travel."""
-    named = motions(mechanism)
-    slide = [named[given.pair].drive_kind is Kind.LENGTH for given in mechanism.inputs]
-    return greatest(mechanism, {name: extent(shape) for name, shape in shapes.items()}, slide)
+    named = relative_motions(mechanism)
+    slide = [named[given.pair].input_kind is MeasureKind.LENGTH for given in mechanism.inputs]
+    return size_from_extents(mechanism, {name: shape_extent(shape) for name, shape in shapes.items()}, slide)
 
 
-def greatest(mechanism: Mechanism, extents: Mapping[str, float], slide: Sequence[bool]) -> float:
+def size_from_extents(mechanism: Mechanism, extents: Mapping[str, float], is_slide: Sequence[bool]) -> float:
     """The mechanism's size (m) from the extents of its links and from which of its inputs slide."""
-    slides = [abs(given.position) for given, slides in zip(mechanism.inputs, slide, strict=True) if slides]
+    slides = [abs(given.position) for given, slides in zip(mechanism.inputs, is_slide, strict=True) if slides]
     return max(extents.values(), default=0.0) or max(slides, default=0.0) or 1.0
 
 
-def extent(shape: Shape) -> float:
+def shape_extent(shape: LinkShape) -> float:
     """The greatest distance between two points of a link (m)."""
     x, y = [at.x for at in shape.points.values()], [at.y for at in shape.points.values()]
     return hypot(max(x) - min(x), max(y) - min(y)) if x else 0.0
 
 
-def fitted(mechanism: Mechanism, shapes: Mapping[str, Shape], unit: float) -> Array:
+def pair_numbers(mechanism: Mechanism, shapes: Mapping[str, LinkShape], unit: float) -> Array:
     """p: the numbers of every pair, lengths divided by `unit`."""
     measured = {pair.name: pair.measure([shapes[link] for link in pair.bodies]) for pair in mechanism.pairs}
-    return gathered(mechanism, measured, unit)
+    return pair_numbers_from(mechanism, measured, unit)
 
 
-def gathered(mechanism: Mechanism, numbers: Mapping[str, Sequence[float]], unit: float) -> Array:
+def pair_numbers_from(mechanism: Mechanism, numbers: Mapping[str, Sequence[float]], unit: float) -> Array:
     """p from the numbers of every pair, lengths divided by `unit`."""
     found: list[float] = []
     for pair in mechanism.pairs:
-        found += scaled(numbers[pair.name], pair.measures, unit)
+        found += scale_lengths(numbers[pair.name], pair.number_kinds, unit)
     return np.array(found, dtype=float)
 
 
-def scaled(values: Sequence[float], kinds: Sequence[Kind], unit: float) -> list[float]:
+def scale_lengths(values: Sequence[float], kinds: Sequence[MeasureKind], unit: float) -> list[float]:
     """Numbers with the lengths among them divided by `unit`."""
-    return [value / unit if kind is Kind.LENGTH else value for value, kind in zip(values, kinds, strict=True)]
+    return [value / unit if kind is MeasureKind.LENGTH else value for value, kind in zip(values, kinds, strict=True)]
 
 
-def placed(
+def frames_from_coordinates(
     w: Sequence[Scalar] | Array,
     column: Mapping[tuple[str, str], int],
     links: Iterable[str],
     pairs: Mapping[str, Pair],
-    framed: Callable[..., Frame] = frame_at,
+    make_frame: Callable[..., Frame] = frame_at,
 ) -> tuple[dict[str, Frame], dict[str, tuple[Scalar, ...]]]:
     """Frames of links and own coordinates of pairs from w, whose entries may be floats, arrays or jets.
 
     `framed` makes a frame of x, y and angle.
     """
     frames = {
-        link: framed(*(w[column[link, part]] for part in ("x", "y", "angle"))) if (link, "x") in column else GROUND
+        link: make_frame(*(w[column[link, part]] for part in ("x", "y", "angle"))) if (link, "x") in column else GROUND
         for link in links
     }
-    own = {name: tuple(w[column[name, part]] for part, _ in pair.coordinates) for name, pair in pairs.items()}
+    own = {name: tuple(w[column[name, part]] for part, _ in pair.coordinate_kinds) for name, pair in pairs.items()}
     return frames, own

@@ -10,27 +10,27 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from planar.equations.constraint_equations import Row
-from planar.equations.elimination import stack
-from planar.equations.functions import CACHED, Program
-from planar.model.pairs import Kind
+from planar.equations.constraint_equations import ConstraintRow
+from planar.equations.elimination import stack_expressions
+from planar.equations.functions import MAX_CACHED_STRUCTURES, EquationFunctions
+from planar.model.pairs import MeasureKind
 
 Array = np.ndarray
 
 
-class Block(NamedTuple):
+class LowRankBlock(NamedTuple):
     """A part of the slope of all constraints: its rows, its columns (of unknowns, then inputs), what each row and each
     column is divided by, and its rank."""
 
     rows: tuple[int, ...]
     columns: tuple[int, ...]
-    by: Array
-    sizes: Array
+    row_scales: Array
+    column_scales: Array
     rank: int
 
 
-@lru_cache(maxsize=CACHED)
-def depends(program: Program) -> tuple[frozenset[int], ...]:
+@lru_cache(maxsize=MAX_CACHED_STRUCTURES)
+def constraint_dependencies(program: EquationFunctions) -> tuple[frozenset[int], ...]:
     """For every constraint the entries of (z, u) on which it depends."""
     e = program.equations
     columns: list[set[int]] = [set() for _ in e.rows]
@@ -39,37 +39,39 @@ def depends(program: Program) -> tuple[frozenset[int], ...]:
     return tuple(map(frozenset, columns))
 
 
-def with_minors(program: Program, blocks: Mapping[int, Block]) -> Program:
+def add_minors(program: EquationFunctions, blocks: Mapping[int, LowRankBlock]) -> EquationFunctions:
     """The program whose groups have the minors of their blocks as constraints too."""
     e = program.equations
     slope = ca.jacobian(e.F, ca.vertcat(e.z, e.u))
-    rows: list[Row] = []
+    rows: list[ConstraintRow] = []
     left, stages = [], []
-    for stage in e.stages:
+    for stage in e.blocks:
         first, own = len(rows), slice(stage.rows.start, stage.rows.stop)
         rows += e.rows[own]
         left.append(e.F[own])
-        if stage.level in blocks:
-            minors = list(_minors(slope, blocks[stage.level]))
-            rows += [Row(e.rows[stage.rows.start].pair, Kind.PURE)] * len(minors)
+        if stage.block_index in blocks:
+            minors = list(_minors(slope, blocks[stage.block_index]))
+            rows += [ConstraintRow(e.rows[stage.rows.start].pair, MeasureKind.PURE)] * len(minors)
             left += minors
         stages.append(stage._replace(rows=slice(first, len(rows))))
-    return Program(replace(e, rows=tuple(rows), stages=tuple(stages), F=stack(left)))
+    return EquationFunctions(replace(e, rows=tuple(rows), blocks=tuple(stages), F=stack_expressions(left)))
 
 
-def _minors(slope: ca.SX, block: Block) -> Iterator[ca.SX]:
+def _minors(slope: ca.SX, block: LowRankBlock) -> Iterator[ca.SX]:
     """As many minors, one larger than the rank, as tell where the slope keeps it: of mixed rows and columns, so that
     none is special."""
-    part = ca.densify(slope[list(block.rows), list(block.columns)]) / ca.DM(np.outer(block.by, block.sizes))
+    part = ca.densify(slope[list(block.rows), list(block.columns)]) / ca.DM(
+        np.outer(block.row_scales, block.column_scales)
+    )
     rng, size = np.random.default_rng(0), block.rank + 1
-    across = [_mixing(rng, size, part.size1()) for _ in range(part.size1() - block.rank)]
-    along = [_mixing(rng, size, part.size2()).T for _ in range(part.size2() - block.rank)]
+    across = [_orthonormal_rows(rng, size, part.size1()) for _ in range(part.size1() - block.rank)]
+    along = [_orthonormal_rows(rng, size, part.size2()).T for _ in range(part.size2() - block.rank)]
     for rows in across:
         for columns in along:
             yield _determinant(ca.mtimes([ca.DM(rows), part, ca.DM(columns)]))
 
 
-def _mixing(rng: np.random.Generator, size: int, many: int) -> Array:
+def _orthonormal_rows(rng: np.random.Generator, size: int, many: int) -> Array:
     """Orthonormal rows (size, many)."""
     return np.linalg.qr(rng.normal(size=(many, many)))[0][:size] if size < many else np.eye(many)
 

@@ -8,37 +8,39 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from planar.equations.casadi_call import Called
-from planar.equations.constraint_equations import Equations
-from planar.equations.functions import compact, derivatives
+from planar.equations.casadi_call import BufferedFunction
+from planar.equations.constraint_equations import ConstraintEquations
+from planar.equations.functions import function_with_cse, time_derivatives
 
 Array = np.ndarray
 
 
-class RoundOff(NamedTuple):
+class RoundingTerms(NamedTuple):
     """What `round_off` returns of F and w, one after the other (samples, rows and coordinates)."""
 
     value: Array
-    terms: Array
+    term_sum: Array
     "the sum of the sizes of all numbers in them, each by its slope: a part of it is lost where all are rounded by it"
-    slope: Array
+    jacobian: Array
     "by y = (z, u), (samples, rows and coordinates, y)"
-    first: Array
+    first_rate_jacobian: Array
     "the slope of the first rates, alike"
-    second: Array
+    second_rate_jacobian: Array
     "the slope of the second rates"
 
 
-def round_off(equations: Equations, y: Array, y1: Array, y2: Array, p: Array) -> RoundOff:
+def rounding_terms(equations: ConstraintEquations, y: Array, y1: Array, y2: Array, p: Array) -> RoundingTerms:
     """What carries round-off at samples y = (z, u) with first and second rates, each (samples, y)."""
-    value, terms, *slopes = _called(equations).over(len(y), y, y1, y2, p)
-    return RoundOff(value[:, 0], terms[:, 0], *(each.transpose(0, 2, 1) for each in slopes))
+    value, terms, *slopes = _rounding_function(equations).evaluate_batch(len(y), y, y1, y2, p)
+    return RoundingTerms(value[:, 0], terms[:, 0], *(each.transpose(0, 2, 1) for each in slopes))
 
 
 @lru_cache(maxsize=16)
-def _called(e: Equations) -> Called:
+def _rounding_function(e: ConstraintEquations) -> BufferedFunction:
     both = ca.vertcat(e.F, e.w)
-    y, y1, y2, first, second = derivatives(e, both)
+    y, y1, y2, first, second = time_derivatives(e, both)
     slopes = [ca.jacobian(each, y) for each in (both, first, second)]
     terms = ca.mtimes(ca.fabs(ca.jacobian(both, e.p)), ca.fabs(e.p)) + ca.mtimes(ca.fabs(slopes[0]), ca.fabs(y))
-    return Called(compact("round_off", [y, y1, y2, e.p], [ca.densify(each) for each in (both, terms, *slopes)]))
+    return BufferedFunction(
+        function_with_cse("round_off", [y, y1, y2, e.p], [ca.densify(each) for each in (both, terms, *slopes)])
+    )

@@ -4,11 +4,11 @@ from collections.abc import Iterable
 from enum import StrEnum
 from typing import Any
 
-MOST_NAMES = 12
+MAX_NAMES_LISTED = 12
 """Names that a sentence lists; of more it tells how many."""
-JOINERS = "\u200c\u200d"
+INVISIBLE_JOINERS = "\u200c\u200d"
 """Invisible, but letters of some scripts need them."""
-LONGEST_PLACE, LONGEST, LONGEST_REASON = 200, 300, 1200
+MAX_LOCATION_LENGTH, MAX_SENTENCE_LENGTH, MAX_REASON_LENGTH = 200, 300, 1200
 """Characters of a place, of a sentence about it, and of a reason why there is no answer."""
 
 
@@ -26,30 +26,30 @@ class Outcome(StrEnum):
     TOO_INEXACT = "too inexact"
 
 
-class Ending(StrEnum):
+class TrackingEnd(StrEnum):
     """How a motion ends that cannot be followed further."""
 
     DEAD_POINT = "dead point"
     ENDLESS = "endless"
-    LOST = "lost"
-    FAR = "far"
-    SPENT = "spent"
+    BRANCH_LOST = "lost"
+    OUT_OF_RANGE = "far"
+    WORK_LIMIT = "spent"
 
 
-def listed(names: Iterable[str], most: int | None = MOST_NAMES, last: str = " and ") -> str:
+def join_names(names: Iterable[str], max_names: int | None = MAX_NAMES_LISTED, last_joiner: str = " and ") -> str:
     """Names in a sentence: a, b and c; of very many the first, and how many more."""
     every = list(names)
-    if most is not None and len(every) > most + 1:
-        every = [*every[:most], f"{len(every) - most} more"]
-    return last.join(filter(None, (", ".join(every[:-1]), every[-1]))) if every else "none"
+    if max_names is not None and len(every) > max_names + 1:
+        every = [*every[:max_names], f"{len(every) - max_names} more"]
+    return last_joiner.join(filter(None, (", ".join(every[:-1]), every[-1]))) if every else "none"
 
 
-def unshown(text: str) -> str:
+def first_unprintable(text: str) -> str:
     """The first character that cannot be shown in a line, or turns the order of others there; empty where all can."""
-    return next((each for each in text if not (each.isprintable() or each in JOINERS)), "")
+    return next((each for each in text if not (each.isprintable() or each in INVISIBLE_JOINERS)), "")
 
 
-def _shown(text: str, longest: int) -> str:
+def _printable_line(text: str, longest: int) -> str:
     """The text as one line that a screen can show, whatever a file put into it."""
     if len(text) > longest:
         text = f"{text[: longest * 3 // 5]} … {text[-longest * 3 // 10 :]}"
@@ -67,19 +67,19 @@ class BadInput(PlanarError):
     """
 
     def __init__(self, place: str, sentence: str):
-        self.place = _shown(place, LONGEST_PLACE)
-        self.sentence = _shown(sentence, LONGEST)
+        self.place = _printable_line(place, MAX_LOCATION_LENGTH)
+        self.sentence = _printable_line(sentence, MAX_SENTENCE_LENGTH)
         super().__init__(f"{self.place}: {self.sentence}")
 
 
-class NotWritten(BadInput):
+class WriteFailure(BadInput):
     """A result that was found could not be written whole, as on a full disk; `place` is where it was to go."""
 
 
-def no_format(suffix: str, what: str, endings: Iterable[str]) -> BadInput:
+def unknown_format_error(suffix: str, what: str, endings: Iterable[str]) -> BadInput:
     """What to say of a file whose name ends in what cannot be written: the endings that can."""
     place = f"a file name that ends in {suffix!r}" if suffix else "a file name without an ending"
-    return BadInput(place, f"{what} can be written to files that end in {listed(endings, last=' or ')}")
+    return BadInput(place, f"{what} can be written to files that end in {join_names(endings, last_joiner=' or ')}")
 
 
 class NoAnswer(PlanarError):
@@ -90,7 +90,7 @@ class NoAnswer(PlanarError):
 
     def __init__(self, outcome: Outcome, reason: str, **more: Any):
         self.outcome = outcome
-        self.reason = _shown(reason, LONGEST_REASON)
+        self.reason = _printable_line(reason, MAX_REASON_LENGTH)
         super().__init__(f"{outcome.value}: {self.reason}")
         self.more: dict[str, Any] = more
 
@@ -100,7 +100,7 @@ class MissingGlyphs(UserWarning):
 
     def __init__(self, characters: Iterable[str]):
         self.characters = tuple(sorted(set(characters)))
-        named = listed([f"{each} (U+{ord(each):04X})" for each in self.characters])
+        named = join_names([f"{each} (U+{ord(each):04X})" for each in self.characters])
         super().__init__(
             f"no installed font has {named}, so drawings show \N{REPLACEMENT CHARACTER} instead: install one that"
             " does, such as Noto Sans with its parts for other scripts"

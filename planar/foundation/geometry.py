@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from planar.foundation.jets import Scalar, Terms, cos, sin
+from planar.foundation.jets import Scalar, TermSizes, cos, sin
 
 
 class Vector(NamedTuple):
@@ -29,9 +29,9 @@ class Vector(NamedTuple):
         """The out-of-plane part of the vector product, anticlockwise positive."""
         return self.x * other.y - self.y * other.x
 
-    def turned(self, by: Vector) -> Vector:
+    def rotate(self, cos_sin: Vector) -> Vector:
         """This vector turned anticlockwise by the angle whose (cos, sin) is `by`."""
-        return Vector(by.x * self.x - by.y * self.y, by.y * self.x + by.x * self.y)
+        return Vector(cos_sin.x * self.x - cos_sin.y * self.y, cos_sin.y * self.x + cos_sin.x * self.y)
 
 
 def direction(angle: Scalar) -> Vector:
@@ -52,17 +52,17 @@ class Frame(NamedTuple):
     angle: Scalar
     fixed: bool = False
 
-    def carry(self, point: Vector) -> Vector:
+    def to_world(self, point: Vector) -> Vector:
         """Where a point of the link lies in the world."""
-        return Vector(self.x, self.y) + self.turn(point)
+        return Vector(self.x, self.y) + self.rotate_to_world(point)
 
-    def turn(self, vector: Vector) -> Vector:
+    def rotate_to_world(self, vector: Vector) -> Vector:
         """A vector of the link in the directions of the world."""
-        return vector.turned(Vector(self.cos, self.sin))
+        return vector.rotate(Vector(self.cos, self.sin))
 
-    def local(self, point: Vector) -> Vector:
+    def to_local(self, point: Vector) -> Vector:
         """Where a point of the world lies in the link's axes."""
-        return (point - Vector(self.x, self.y)).turned(Vector(self.cos, -self.sin))
+        return (point - Vector(self.x, self.y)).rotate(Vector(self.cos, -self.sin))
 
 
 GROUND = Frame(0.0, 0.0, 1.0, 0.0, 0.0, True)
@@ -73,8 +73,8 @@ def frame_at(x: Scalar, y: Scalar, angle: Scalar) -> Frame:
     return Frame(x, y, cos(angle), sin(angle), angle)
 
 
-def terms_of(x: Terms, y: Terms, angle: Terms) -> Frame:
+def frame_term_sizes(x: TermSizes, y: TermSizes, angle: TermSizes) -> Frame:
     """The sizes of a frame's parts and of their rates, its axes in whatever direction they are."""
     _, first, second = angle.parts
-    axes = Terms(1.0, first, second + first * first)
+    axes = TermSizes(1.0, first, second + first * first)
     return Frame(x, y, axes, axes, angle)

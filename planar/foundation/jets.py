@@ -17,7 +17,7 @@ Scalar = Any
 """A float, a numpy array, a casadi SX or a Jet: whatever has + - *."""
 
 
-def _by_its_own(name: str, x: Scalar) -> Scalar:
+def _apply_function(name: str, x: Scalar) -> Scalar:
     if type(x) is float:
         return getattr(math, name)(x)
     method = getattr(x, name, None)
@@ -26,17 +26,17 @@ def _by_its_own(name: str, x: Scalar) -> Scalar:
 
 def cos(x: Scalar) -> Scalar:
     """Cosine of an angle in radians."""
-    return _by_its_own("cos", x)
+    return _apply_function("cos", x)
 
 
 def sin(x: Scalar) -> Scalar:
     """Sine of an angle in radians."""
-    return _by_its_own("sin", x)
+    return _apply_function("sin", x)
 
 
 def sqrt(x: Scalar) -> Scalar:
     """Square root."""
-    return _by_its_own("sqrt", x)
+    return _apply_function("sqrt", x)
 
 
 def hypot(x: Scalar, y: Scalar) -> Scalar:
@@ -71,19 +71,19 @@ class Jet:
     def __init__(self, *parts: Scalar):
         self.parts = parts
 
-    def _lifted(self, other: Scalar) -> tuple[Scalar, ...]:
+    def _derivatives_of(self, other: Scalar) -> tuple[Scalar, ...]:
         if isinstance(other, Jet):
             return other.parts
         return (other,) + (0.0,) * (len(self.parts) - 1)
 
     def __add__(self, other: Scalar) -> Jet:
-        return Jet(*(a + b for a, b in zip(self.parts, self._lifted(other), strict=True)))
+        return Jet(*(a + b for a, b in zip(self.parts, self._derivatives_of(other), strict=True)))
 
     def __neg__(self) -> Jet:
         return Jet(*(-a for a in self.parts))
 
     def __sub__(self, other: Scalar) -> Jet:
-        return Jet(*(a - b for a, b in zip(self.parts, self._lifted(other), strict=True)))
+        return Jet(*(a - b for a, b in zip(self.parts, self._derivatives_of(other), strict=True)))
 
     def __rsub__(self, other: Scalar) -> Jet:
         return -self + other
@@ -103,7 +103,7 @@ class Jet:
     __radd__ = __add__
     __rmul__ = __mul__
 
-    def _turned(self) -> tuple[list[Scalar], list[Scalar]]:
+    def _cos_sin_derivatives(self) -> tuple[list[Scalar], list[Scalar]]:
         """Derivatives of cos and sin: c' = -s a', s' = c a', expanded by Leibniz."""
         a = self.parts
         c, s = [np.cos(a[0])], [np.sin(a[0])]
@@ -114,13 +114,13 @@ class Jet:
         return c, s
 
     def cos(self) -> Jet:
-        return Jet(*self._turned()[0])
+        return Jet(*self._cos_sin_derivatives()[0])
 
     def sin(self) -> Jet:
-        return Jet(*self._turned()[1])
+        return Jet(*self._cos_sin_derivatives()[1])
 
 
-class Terms(Jet):
+class TermSizes(Jet):
     """The sizes of a quantity's terms and of their derivatives: a formula run on these says how much it adds up.
 
     What cancels in the formula does not here: + and - both add, and every number counts by its size.
@@ -128,27 +128,27 @@ class Terms(Jet):
 
     __slots__ = ()
 
-    def _lifted(self, other: Scalar) -> tuple[Scalar, ...]:
-        return other.parts if isinstance(other, Terms) else (abs(other),) + (0.0,) * (len(self.parts) - 1)
+    def _derivatives_of(self, other: Scalar) -> tuple[Scalar, ...]:
+        return other.parts if isinstance(other, TermSizes) else (abs(other),) + (0.0,) * (len(self.parts) - 1)
 
-    def __add__(self, other: Scalar) -> Terms:
-        return Terms(*super().__add__(other).parts)
+    def __add__(self, other: Scalar) -> TermSizes:
+        return TermSizes(*super().__add__(other).parts)
 
-    def __neg__(self) -> Terms:
+    def __neg__(self) -> TermSizes:
         return self
 
-    def __mul__(self, other: Scalar) -> Terms:
-        return Terms(*super().__mul__(other if isinstance(other, Terms) else abs(other)).parts)
+    def __mul__(self, other: Scalar) -> TermSizes:
+        return TermSizes(*super().__mul__(other if isinstance(other, TermSizes) else abs(other)).parts)
 
     __sub__ = __radd__ = __rsub__ = __add__
     __rmul__ = __mul__
 
 
-def terms(value: Jet) -> Terms:
+def term_sizes(value: Jet) -> TermSizes:
     """The sizes of a quantity and its derivatives, each for itself."""
-    return Terms(*(abs(part) for part in value.parts))
+    return TermSizes(*(abs(part) for part in value.parts))
 
 
-def orders(value: Scalar) -> tuple[Scalar, ...]:
+def value_and_rates(value: Scalar) -> tuple[Scalar, ...]:
     """Value, rate, second rate (and more, if a jet has them); a plain number is at rest."""
     return value.parts if isinstance(value, Jet) else (value, 0.0, 0.0)

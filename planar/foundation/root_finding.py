@@ -5,21 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable
 from math import ulp
 
-EVALUATIONS = 80
+MAX_EVALUATIONS = 80
 """Bisection alone needs 52 for a root to round-off."""
 
 
-def root(function: Callable[[float], float], low: float, high: float) -> float:
+def find_root(function: Callable[[float], float], lower: float, upper: float) -> float:
     """A zero of a function between two places at which its signs differ, to round-off.
 
     T. Chandrupatla, A new hybrid quadratic/bisection algorithm, Advances in Engineering Software 28, 1997.
     """
-    a, b = high, low
+    a, b = upper, lower
     fa, fb = function(a), function(b)
     if fa * fb >= 0.0:  # an end at round-off of the zero
         return a if abs(fa) < abs(fb) else b
     part = 0.5
-    for _ in range(EVALUATIONS):
+    for _ in range(MAX_EVALUATIONS):
         x = a + part * (b - a)
         fx = function(x)
         if fx * fa > 0.0:

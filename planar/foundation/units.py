@@ -11,7 +11,7 @@ from functools import cache
 from math import isfinite, log10, pi
 from typing import NamedTuple
 
-SI = {
+SI_UNITS = {
     "length": "m",
     "angle": "rad",
     "angular velocity": "rad/s",
@@ -32,7 +32,7 @@ SI = {
 }
 """Every kind of quantity that a file holds, and its SI unit."""
 
-TABLE: dict[str, tuple[str, float, float]] = {
+UNIT_TABLE: dict[str, tuple[str, float, float]] = {
     "m": ("length", 1.0, 1.0),
     "mm": ("length", 1.0, 1e3),
     "cm": ("length", 1.0, 1e2),
@@ -71,19 +71,21 @@ TABLE: dict[str, tuple[str, float, float]] = {
 }
 """unit: (kind, numerator, denominator) of its size in SI."""
 
-_OF_LENGTH = {"velocity": "/s", "acceleration": "/s^2", "jerk": "/s^3"}
+_LENGTH_RATE_SUFFIXES = {"velocity": "/s", "acceleration": "/s^2", "jerk": "/s^3"}
 """Kinds of quantities that are lengths by time, and what stands behind the unit of length."""
 
-LONGEST = 64
+MAX_QUANTITY_LENGTH = 64
 """Characters of a quantity; the longest that `shortest` writes takes 33."""
 
-_NUMBER = re.compile(r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*(.*?)\s*", re.DOTALL)
+_QUANTITY_PATTERN = re.compile(r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*(.*?)\s*", re.DOTALL)
 # a word, with one small exponent at most, joined by a space, a dot, * or /: nothing that could be an expression
-_UNIT = re.compile(r"[A-Za-zµμΩ]+(\^[+-]?[0-9])?((\s*/\s*|\s*\*\s*|\s*·\s*|\s+)[A-Za-zµμΩ]+(\^[+-]?[0-9])?){0,7}")
+_UNIT_PATTERN = re.compile(
+    r"[A-Za-zµμΩ]+(\^[+-]?[0-9])?((\s*/\s*|\s*\*\s*|\s*·\s*|\s+)[A-Za-zµμΩ]+(\^[+-]?[0-9])?){0,7}"
+)
 _SPELLINGS = str.maketrans({"−": "-", "°": "deg", "²": "^2", "³": "^3", "µ": "u", "μ": "u", "⁻": "^-", "¹": "1"})
 
 
-_WORDS = {
+_UNIT_WORDS = {
     "rev": "turn",
     "revs": "turn",
     "revolutions": "turn",
@@ -95,9 +97,9 @@ _WORDS = {
     "Ns": "N s",
 }
 """Words that people write for units, each as it is looked up."""
-_RATES = frozenset({"1/s", "/s", "s^-1", "1/sec", "/sec", "1/min", "/min", "min^-1"})
+_AMBIGUOUS_RATES = frozenset({"1/s", "/s", "s^-1", "1/sec", "/sec", "1/min", "/min", "min^-1"})
 """Rates of what they do not say."""
-NAMED = 3
+MIN_UNIT_NAME_LENGTH = 3
 """Letters from which on a word is a unit's name, whose capitals say nothing, and no symbol."""
 
 
@@ -123,57 +125,57 @@ class Unit(NamedTuple):
         return value * self.denominator / self.numerator
 
 
-def unit(text: str) -> Unit:
+def parse_unit(text: str) -> Unit:
     """The unit that a text names. Raises UnitError."""
-    if len(text) > LONGEST:
-        raise UnitError(f"a unit takes at most {LONGEST} characters, not {len(text)}")
+    if len(text) > MAX_QUANTITY_LENGTH:
+        raise UnitError(f"a unit takes at most {MAX_QUANTITY_LENGTH} characters, not {len(text)}")
     spelled = re.sub(r"\s+", " ", text.strip().translate(_SPELLINGS).replace("^-^", "^-").replace("**", "^"))
     spelled = re.sub(r"(?<=[A-Za-z])\^-(?=\^?[0-9])", "^-", spelled)
-    if spelled in TABLE:
-        return Unit(*TABLE[spelled])
+    if spelled in UNIT_TABLE:
+        return Unit(*UNIT_TABLE[spelled])
     if spelled == "r/min":
         spelled = "rpm"
     spelled = re.sub(r"(?<=[A-Za-z])[.-](?=[A-Za-z])", " ", spelled).rstrip(".")
-    spelled = re.sub(r"[A-Za-z]+", lambda word: _WORDS.get(word[0], word[0]), spelled)
-    if spelled in TABLE:
-        return Unit(*TABLE[spelled])
-    if not _UNIT.fullmatch(spelled):
+    spelled = re.sub(r"[A-Za-z]+", lambda word: _UNIT_WORDS.get(word[0], word[0]), spelled)
+    if spelled in UNIT_TABLE:
+        return Unit(*UNIT_TABLE[spelled])
+    if not _UNIT_PATTERN.fullmatch(spelled):
         raise UnitError(f"{text!r} is not a unit")
     try:
-        return _looked_up(spelled)
+        return _look_up_in_pint(spelled)
     except UnitError:
-        meant = _other_capitals(spelled)
+        meant = _unit_ignoring_case(spelled)
         if meant is None:
             raise
         return meant
 
 
-def _other_capitals(spelled: str) -> Unit | None:
+def _unit_ignoring_case(spelled: str) -> Unit | None:
     """The one unit of the table that is written so but for capitals, or one whose name is; None where several are."""
     small = spelled.lower()
-    alike = [key for key in TABLE if key.lower() == small]
+    alike = [key for key in UNIT_TABLE if key.lower() == small]
     if alike:
-        return Unit(*TABLE[alike[0]]) if len(alike) == 1 else None
+        return Unit(*UNIT_TABLE[alike[0]]) if len(alike) == 1 else None
     words = re.findall(r"[A-Za-z]+", spelled)
-    if small == spelled or any(word != word.lower() and len(word) < NAMED for word in words):
+    if small == spelled or any(word != word.lower() and len(word) < MIN_UNIT_NAME_LENGTH for word in words):
         return None
     try:
-        return _looked_up(small)
+        return _look_up_in_pint(small)
     except UnitError:
         return None
 
 
-def _unclear(spelled: str) -> UnitError:
+def _ambiguous_rate_error(spelled: str) -> UnitError:
     return UnitError(f"{spelled!r} leaves open whether turns or radians are meant; write rad/s, deg/s or rpm")
 
 
-def shown(kind: str, declared: tuple[str, str]) -> tuple[str, Unit]:
+def display_unit(kind: str, declared: tuple[str, str]) -> tuple[str, Unit]:
     """The unit in which a kind of quantity is shown, and its name as it is printed (see `own`)."""
-    name, of = own(kind, declared)
-    return printed(name), of
+    name, of = unit_of_kind(kind, declared)
+    return format_unit(name), of
 
 
-def own(kind: str, declared: tuple[str, str]) -> tuple[str, Unit]:
+def unit_of_kind(kind: str, declared: tuple[str, str]) -> tuple[str, Unit]:
     """The unit of a kind of quantity that goes with the length and the angle that a file declares, and its name.
 
     Lengths and angles are in the file's own. Velocities, accelerations and jerks are in metres by seconds where
@@ -183,50 +185,51 @@ def own(kind: str, declared: tuple[str, str]) -> tuple[str, Unit]:
     length, angle = declared
     theirs = {"length": length, "angle": angle}
     if kind in theirs:
-        return theirs[kind], unit(theirs[kind])
-    if kind in _OF_LENGTH:
-        name, (_, numerator, denominator) = length_of_rates(length)
-        return name + _OF_LENGTH[kind], Unit(kind, numerator, denominator)
-    return SI[kind], Unit(kind, 1.0, 1.0)
+        return theirs[kind], parse_unit(theirs[kind])
+    if kind in _LENGTH_RATE_SUFFIXES:
+        name, (_, numerator, denominator) = length_unit_of_rates(length)
+        return name + _LENGTH_RATE_SUFFIXES[kind], Unit(kind, numerator, denominator)
+    return SI_UNITS[kind], Unit(kind, 1.0, 1.0)
 
 
-def length_of_rates(length: str) -> tuple[str, Unit]:
+def length_unit_of_rates(length: str) -> tuple[str, Unit]:
     """The unit of length in which rates are shown: the metre where the declared one is metric, else that one."""
-    return coherent(length)
+    return coherent_unit(length)
 
 
-def coherent(text: str) -> tuple[str, Unit]:
+def coherent_unit(text: str) -> tuple[str, Unit]:
     """The SI unit of what a unit measures where it is a tenth, a thousand, ... of that, else the unit itself."""
-    own = unit(text)
+    own = parse_unit(text)
     power = log10(own.numerator / own.denominator)
     metric = abs(power - round(power)) < 1e-9
-    return (SI[own.kind], Unit(own.kind, 1.0, 1.0)) if metric else (text, own)
+    return (SI_UNITS[own.kind], Unit(own.kind, 1.0, 1.0)) if metric else (text, own)
 
 
-def printed(name: str) -> str:
+def format_unit(name: str) -> str:
     """A unit as it is printed: m/s², N·m."""
     return name.replace("^2", "²").replace("^3", "³").replace(" ", "·")
 
 
-def quantity(text: str, kind: str) -> float:
+def parse_quantity(text: str, kind: str) -> float:
     """A text such as "10.5 rad/s" as an SI number of the kind asked for. Raises UnitError."""
-    if len(text) > LONGEST:
-        raise UnitError(f"a number with a unit takes at most {LONGEST} characters, not {len(text)}")
-    match = _NUMBER.fullmatch(text.replace("−", "-"))
+    if len(text) > MAX_QUANTITY_LENGTH:
+        raise UnitError(f"a number with a unit takes at most {MAX_QUANTITY_LENGTH} characters, not {len(text)}")
+    match = _QUANTITY_PATTERN.fullmatch(text.replace("−", "-"))
     if match is None:
-        raise UnitError(f"{text!r} is not a number with a unit, such as {example(kind)!r}")
+        raise UnitError(f"{text!r} is not a number with a unit, such as {example_quantity(kind)!r}")
     number, written = match.groups()
     if not written:
-        raise UnitError(f"{text!r} has no unit; write a number, or a text such as {example(kind)!r}")
-    if kind == "angular velocity" and written in _RATES:
-        raise _unclear(written)
+        raise UnitError(f"{text!r} has no unit; write a number, or a text such as {example_quantity(kind)!r}")
+    if kind == "angular velocity" and written in _AMBIGUOUS_RATES:
+        raise _ambiguous_rate_error(written)
     try:
-        found = unit(written)
+        found = parse_unit(written)
     except UnknownUnit as problem:
         raise UnitError(f"{problem}{_offered(written, kind)}") from None
     if found.kind != kind:
         raise UnitError(
-            f"{text!r} is {_article(found.kind)}, but {_article(kind)} is wanted, such as {example(kind)!r}"
+            f"{text!r} is {_kind_with_article(found.kind)}, but {_kind_with_article(kind)} is wanted, such as "
+            f"{example_quantity(kind)!r}"
         )
     value = found.to_si(float(number))
     if not isfinite(value):
@@ -234,64 +237,68 @@ def quantity(text: str, kind: str) -> float:
     return value
 
 
-def example(kind: str) -> str:
+def example_quantity(kind: str) -> str:
     """A text that is a quantity of this kind."""
-    return {"angular velocity": "10.5 rad/s", "length": "50 mm", "angle": "60 deg"}.get(kind, f"2.5 {SI[kind]}")
+    return {"angular velocity": "10.5 rad/s", "length": "50 mm", "angle": "60 deg"}.get(kind, f"2.5 {SI_UNITS[kind]}")
 
 
 def _offered(written: str, kind: str) -> str:
     """A clause that offers the unit of this kind that is written most like it, or a quantity as an example."""
     from difflib import get_close_matches
 
-    near = get_close_matches(written, [name for name, (of, *_) in TABLE.items() if of == kind], 1)
-    return f"; did you mean {near[0]!r}?" if near else f"; write {_article(kind)} as {example(kind)!r}"
+    near = get_close_matches(written, [name for name, (of, *_) in UNIT_TABLE.items() if of == kind], 1)
+    return (
+        f"; did you mean {near[0]!r}?" if near else f"; write {_kind_with_article(kind)} as {example_quantity(kind)!r}"
+    )
 
 
-def shortest(value: float, written: Unit) -> float | str:
+def shortest_number(value: float, target_unit: Unit) -> float | str:
     """The shortest number in `written` that reads back as exactly `value` (SI), or failing that an SI text."""
     value = float(value)  # a number of numpy would write its type
-    near = written.from_si(value)
+    near = target_unit.from_si(value)
     for digits in range(1, 18):
         candidate = float(f"{near:.{digits}g}")
-        if written.to_si(candidate) == value:
+        if target_unit.to_si(candidate) == value:
             return int(candidate) if candidate.is_integer() and abs(candidate) < 1e15 else candidate
-    return f"{value!r} {SI[written.kind]}"
+    return f"{value!r} {SI_UNITS[target_unit.kind]}"
 
 
-def _article(kind: str) -> str:
+def _kind_with_article(kind: str) -> str:
     return f"{'an' if kind[0] in 'aeiou' else 'a'} {kind}"
 
 
 @cache
-def _looked_up(spelled: str) -> Unit:
+def _look_up_in_pint(spelled: str) -> Unit:
     import pint  # slow to load, so only for a unit beyond the table
 
-    registry = _registry()
+    registry = _pint_registry()
     try:
         one = registry.Quantity(1.0, spelled.replace("^", "**").replace("·", "*"))
         if any(name.endswith(("hertz", "counts_per_second")) for name in one._units):
-            raise _unclear(spelled)
+            raise _ambiguous_rate_error(spelled)
         # compared in root units, not by dimension: an angle is no dimension to pint, but the radian is a root unit
         root = one.to_root_units().units
-        for kind, si in SI.items():
+        for kind, si in SI_UNITS.items():
             ours = registry.Quantity(1.0, si.replace("^", "**"))
             if root == ours.to_root_units().units:
-                return _of_size(spelled, kind, float(one.to(ours.units).magnitude))
+                return _check_unit_size(spelled, kind, float(one.to(ours.units).magnitude))
     except UnitError:
         raise
     except (pint.PintError, ArithmeticError, AssertionError, LookupError, ValueError, TypeError, AttributeError):
         raise UnknownUnit(f"{spelled!r} is not a known unit") from None
-    raise UnitError(f"{spelled!r} measures none of the kinds that a mechanism has, such as {', '.join(tuple(SI)[:5])}")
+    raise UnitError(
+        f"{spelled!r} measures none of the kinds that a mechanism has, such as {', '.join(tuple(SI_UNITS)[:5])}"
+    )
 
 
-def _of_size(spelled: str, kind: str, factor: float) -> Unit:
+def _check_unit_size(spelled: str, kind: str, factor: float) -> Unit:
     if not 1e-100 < factor < 1e100:
         raise UnitError(f"{spelled!r} is too large or too small a unit")
     return Unit(kind, factor, 1.0)
 
 
 @cache
-def _registry():  # noqa: ANN202 - pint's own type, which would load pint
+def _pint_registry():  # noqa: ANN202 - pint's own type, which would load pint
     import pint
 
     return pint.UnitRegistry(cache_folder=None)

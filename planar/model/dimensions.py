@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
-from planar.model.mechanism import Along, At, Distances, Link, Mechanism, Place, Point
+from planar.model.mechanism import Along, At, Distances, Link, Mechanism, Point, PointDefinition
 
 
 class Dimension(NamedTuple):
@@ -28,11 +28,11 @@ def dimensions(mechanism: Mechanism, links: frozenset[str]) -> Iterator[Dimensio
         if link.length is not None:
             yield Dimension(f"{link.name}.length", link.name, link.length)
         for point in link.points:
-            for what, value in _lengths(point.place).items():
+            for what, value in _lengths_of_place(point.place).items():
                 yield Dimension(f"{link.name}.{point.name}.{what}", link.name, value)
 
 
-def changed(mechanism: Mechanism, dimension: Dimension, value: float) -> Mechanism:
+def change_dimension(mechanism: Mechanism, dimension: Dimension, value: float) -> Mechanism:
     """The mechanism with this dimension at another value (m)."""
 
     def remade(link: Link) -> Link:
@@ -42,13 +42,13 @@ def changed(mechanism: Mechanism, dimension: Dimension, value: float) -> Mechani
         if what == "length":
             return replace(link, length=value)
         point, part = what.rsplit(".", 1)
-        points = (Point(p.name, _changed(p.place, part, value)) if p.name == point else p for p in link.points)
+        points = (Point(p.name, _change_place(p.place, part, value)) if p.name == point else p for p in link.points)
         return replace(link, points=tuple(points))
 
     return replace(mechanism, links=tuple(remade(link) for link in mechanism.links))
 
 
-def _lengths(place: Place) -> dict[str, float]:
+def _lengths_of_place(place: PointDefinition) -> dict[str, float]:
     if isinstance(place, At):
         return {"x": place.x, "y": place.y}
     if isinstance(place, Along):
@@ -56,7 +56,7 @@ def _lengths(place: Place) -> dict[str, float]:
     return {place.first: place.from_first, place.second: place.from_second}
 
 
-def _changed(place: Place, part: str, value: float) -> Place:
+def _change_place(place: PointDefinition, part: str, value: float) -> PointDefinition:
     if isinstance(place, Distances):
         field = "from_first" if part == place.first else "from_second"
         return place._replace(**{field: value})

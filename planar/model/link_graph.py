@@ -8,17 +8,17 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations, count
 from typing import TYPE_CHECKING, NamedTuple
 
-from planar.model.mechanism import Mechanism, entries, motions
-from planar.model.pairs import Kind, Pair
+from planar.model.mechanism import Mechanism, pair_entries, relative_motions
+from planar.model.pairs import MeasureKind, Pair
 
 if TYPE_CHECKING:
     import networkx as nx
 
-_NUMBER = re.compile(r"0|[1-9][0-9]{0,3}")
+_LINK_NUMBER = re.compile(r"0|[1-9][0-9]{0,3}")
 """A link's name that is its number."""
 
 
-def linkage(mechanism: Mechanism) -> nx.Graph:
+def link_pair_graph(mechanism: Mechanism) -> nx.Graph:
     """Links and pairs, both as nodes ("link", name) and ("pair", name), so that two links may share two pairs.
 
     A pin of n links is one pair node with n edges.
@@ -27,50 +27,50 @@ def linkage(mechanism: Mechanism) -> nx.Graph:
 
     graph = nx.Graph(name=mechanism.name)
     graph.add_nodes_from(("link", link.name) for link in mechanism.links)
-    for group in entries(mechanism):
+    for group in pair_entries(mechanism):
         node = ("pair", group[0].entry_name())
         for pair in group:
             graph.add_edges_from((node, ("link", link)) for link in pair.links)
     return graph
 
 
-def detached(mechanism: Mechanism) -> tuple[str, ...]:
+def unconnected_links(mechanism: Mechanism) -> tuple[str, ...]:
     """Links that no chain of pairs joins to the frame."""
     import networkx as nx
 
-    joined = nx.node_connected_component(linkage(mechanism), ("link", mechanism.frame))
+    joined = nx.node_connected_component(link_pair_graph(mechanism), ("link", mechanism.frame))
     return tuple(link.name for link in mechanism.links if ("link", link.name) not in joined)
 
 
-def farthest_first(mechanism: Mechanism, name: str) -> tuple[str, ...]:
+def pairs_farthest_first(mechanism: Mechanism, name: str) -> tuple[str, ...]:
     """The other pairs, those first that are most links and pairs away from this one."""
     import networkx as nx
 
     entry_of = {pair.name: pair.entry_name() for pair in mechanism.pairs}
-    away = nx.single_source_shortest_path_length(linkage(mechanism), ("pair", entry_of[name]))
+    away = nx.single_source_shortest_path_length(link_pair_graph(mechanism), ("pair", entry_of[name]))
     others = [other for other in entry_of if other != name]
     return tuple(sorted(others, key=lambda other: -away.get(("pair", entry_of[other]), 0)))
 
 
-class Figure(NamedTuple):
+class JointDiagram(NamedTuple):
     """A chain by its joints alone: of each its kind and the links that meet in it; the fixed link where it matters."""
 
-    joints: tuple[tuple[Kind, tuple[str, ...]], ...]
+    joints: tuple[tuple[MeasureKind, tuple[str, ...]], ...]
     frame: str | None = None
 
 
-class Likeness(NamedTuple):
+class JointIsomorphism(NamedTuple):
     """Which link, and which joint by its index, of a second figure stands for each of a first one."""
 
     links: Mapping[str, str]
     joints: Mapping[int, int]
 
 
-def likenesses(first: Figure, second: Figure) -> Iterator[Likeness]:
+def isomorphisms(first: JointDiagram, second: JointDiagram) -> Iterator[JointIsomorphism]:
     """Every way in which two figures are the same but for names: joint for joint of one kind, frame for frame."""
     if len(first.joints) != len(second.joints):
         return
-    a, b = _marked(first), _marked(second)
+    a, b = _labelled_graph(first), _labelled_graph(second)
     marks = (sorted((graph.degree(node), mark) for node, mark in graph.nodes(data="mark")) for graph in (a, b))
     if next(marks) != next(marks):
         return
@@ -79,10 +79,10 @@ def likenesses(first: Figure, second: Figure) -> Iterator[Likeness]:
     matcher = GraphMatcher(a, b, node_match=lambda one, other: one["mark"] == other["mark"])
     for found in matcher.isomorphisms_iter():
         links = {name: found[what, name][1] for what, name in found if what == "link"}
-        yield Likeness(links, {index: found[what, index][1] for what, index in found if what == "pair"})
+        yield JointIsomorphism(links, {index: found[what, index][1] for what, index in found if what == "pair"})
 
 
-def _marked(figure: Figure) -> nx.Graph:
+def _labelled_graph(figure: JointDiagram) -> nx.Graph:
     import networkx as nx
 
     graph = nx.Graph()
@@ -94,23 +94,23 @@ def _marked(figure: Figure) -> nx.Graph:
     return graph
 
 
-def joined(figure: Figure, links: Sequence[str]) -> bool:
+def are_connected(figure: JointDiagram, links: Sequence[str]) -> bool:
     """Whether each of these links is joined to all the others."""
     import networkx as nx
 
-    graph = _marked(figure)
+    graph = _labelled_graph(figure)
     return bool(graph) and nx.is_connected(graph) and all(("link", link) in graph for link in links)
 
 
-def loops(figure: Figure) -> int:
+def independent_loop_count(figure: JointDiagram) -> int:
     """How many independent loops the links make."""
     import networkx as nx
 
-    graph = _marked(figure)
+    graph = _labelled_graph(figure)
     return graph.number_of_edges() - graph.number_of_nodes() + nx.number_connected_components(graph)
 
 
-def trees(links: Sequence[str]) -> tuple[tuple[tuple[str, str], ...], ...]:
+def pin_pair_trees(links: Sequence[str]) -> tuple[tuple[tuple[str, str], ...], ...]:
     """Every choice of n - 1 pairs that a pin of n links may stand for."""
     import networkx as nx
 
@@ -118,7 +118,7 @@ def trees(links: Sequence[str]) -> tuple[tuple[tuple[str, str], ...], ...]:
     return tuple(pairs for pairs in choices if len({*sum(pairs, ())}) == len(links) and nx.is_forest(nx.Graph(pairs)))
 
 
-def numbered(mechanism: Mechanism) -> dict[str, str]:
+def link_numbers(mechanism: Mechanism) -> dict[str, str]:
     """The number of each link, in the order of the numbers.
 
     A link whose name is a number has that number. The others have the numbers that are left, in the manner of
@@ -128,11 +128,11 @@ def numbered(mechanism: Mechanism) -> dict[str, str]:
     """
     place = {link.name: index for index, link in enumerate(mechanism.links) if link.name != mechanism.frame}
     beside: dict[str, set[str]] = {link: set() for link in place}
-    for group in entries(mechanism):
-        meeting = _meeting(group, place)
+    for group in pair_entries(mechanism):
+        meeting = _links_of_entry(group, place)
         for link in meeting:
             beside[link].update(meeting)
-    named = motions(mechanism)
+    named = relative_motions(mechanism)
     driven = [link for given in mechanism.inputs[:1] for link in reversed(named[given.pair].links) if link in place]
     order: dict[str, None] = {}
     for start in (*driven[:1], *place):
@@ -142,45 +142,45 @@ def numbered(mechanism: Mechanism) -> dict[str, str]:
             if link not in order:
                 order[link] = None
                 waiting += sorted(beside[link], key=place.__getitem__)
-    own = {link for link in (*order, mechanism.frame) if _NUMBER.fullmatch(link)}
+    own = {link for link in (*order, mechanism.frame) if _LINK_NUMBER.fullmatch(link)}
     free = (str(number) for number in count(1) if str(number) not in own)
     numbers = {link: link if link in own else next(free) for link in (*order, mechanism.frame)}
     return dict(sorted(numbers.items(), key=lambda item: int(item[1])))
 
 
-def number_and_name(number: str, link: str) -> str:
+def link_label(number: str, link: str) -> str:
     """A link by its number and its name, once where they are the same."""
     return number if number == link else f"{number} {link}"
 
 
-def parting(numbers: Mapping[str, str]) -> str:
+def number_separator(numbers: Mapping[str, str]) -> str:
     """What stands between the numbers of two links: nothing, or a comma where one of all has two digits."""
     return "," if any(len(number) > 1 for number in numbers.values()) else ""
 
 
-def pair_words(mechanism: Mechanism) -> tuple[tuple[str, tuple[str, ...]], ...]:
+def pair_labels_by_type(mechanism: Mechanism) -> tuple[tuple[str, tuple[str, ...]], ...]:
     """The pairs of each type as textbooks list them: ("turning", ("O-1", "1-2", "2-3")), ("sliding", ("3-4",)).
 
     A turning pair on the frame is written with its pin's name in place of the frame's number. A pin of n links
     stands for n - 1 pairs: of the frame, else of its link of the lowest number, with each of the others.
     """
-    number = {link: int(text) for link, text in numbered(mechanism).items()}
+    number = {link: int(text) for link, text in link_numbers(mechanism).items()}
     frame = number[mechanism.frame]
     found: dict[tuple[bool, str, str], list[tuple[tuple[int, int], str]]] = {}
-    for group in entries(mechanism):
+    for group in pair_entries(mechanism):
         pair = group[0]
-        hub, *others = sorted(number[link] for link in _meeting(group, number))
+        hub, *others = sorted(number[link] for link in _links_of_entry(group, number))
         if frame in others:
             hub, others = frame, [hub, *(each for each in others if each != frame)]
         for other in others:
             low, high = sorted((hub, other))
-            pinned = hub == frame and pair.lower and pair.drive_kind is Kind.ANGLE
+            pinned = hub == frame and pair.is_lower_pair and pair.input_kind is MeasureKind.ANGLE
             key = (other, frame) if hub == frame else (high, low)
             text = f"{pair.entry_name()}-{other}" if pinned else f"{low}-{high}"
-            found.setdefault((not pair.lower, pair.drive_kind.value, pair.keyword), []).append((key, text))
+            found.setdefault((not pair.is_lower_pair, pair.input_kind.value, pair.keyword), []).append((key, text))
     return tuple((kind[-1], tuple(text for _, text in sorted(found[kind]))) for kind in sorted(found))
 
 
-def _meeting(group: Sequence[Pair], among: Mapping[str, int]) -> tuple[str, ...]:
+def _links_of_entry(group: Sequence[Pair], among: Mapping[str, int]) -> tuple[str, ...]:
     """Those of some links that meet in an entry's pairs."""
     return tuple(dict.fromkeys(link for pair in group for link in pair.links if link in among))

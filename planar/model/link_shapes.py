@@ -36,8 +36,8 @@ class Distances(NamedTuple):
     left: bool = True
 
 
-Place = At | Along | Distances
-Spot = str | tuple[Scalar, Scalar]
+PointDefinition = At | Along | Distances
+PointReference = str | tuple[Scalar, Scalar]
 """A point of a link by name, or by coordinates in the axes in which the link was drawn."""
 
 
@@ -45,7 +45,7 @@ class Point(NamedTuple):
     """A named point of a link."""
 
     name: str
-    place: Place
+    place: PointDefinition
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class Link:
         return (self.ends or ()) + tuple(point.name for point in self.points)
 
 
-class Unplaced(Exception):
+class PointPlacementError(Exception):
     """A point cannot be placed; `point` names it (None: the axis), the text says why."""
 
     def __init__(self, point: str | None, why: str):
@@ -77,7 +77,7 @@ class Unplaced(Exception):
 
 
 @dataclass(frozen=True)
-class Shape:
+class LinkShape:
     """The points of one link in the link's own axes (m)."""
 
     points: Mapping[str, Vector]
@@ -85,14 +85,14 @@ class Shape:
     axis: Vector
     """cos and sin of the link's x-axis in the axes in which it was drawn."""
 
-    def at(self, point: Spot) -> Vector:
+    def position(self, point: PointReference) -> Vector:
         """A point by name, or by coordinates in the axes in which the link was drawn."""
         if isinstance(point, str):
             return self.points[point]
-        return (Vector(*point) - self.origin).turned(Vector(self.axis.x, -self.axis.y))
+        return (Vector(*point) - self.origin).rotate(Vector(self.axis.x, -self.axis.y))
 
 
-def shape(link: Link) -> Shape:
+def link_shape(link: Link) -> LinkShape:
     """Place every point of a link.
 
     Raises Unplaced where a point rests on itself, on a missing point, or on a triangle that does not close.
@@ -104,66 +104,66 @@ def shape(link: Link) -> Shape:
     places = {point.name: point.place for point in link.points}
     for name in places:
         if name not in drawn:
-            _place(name, places, drawn)
+            _place_point(name, places, drawn)
     if link.axis is None:
-        return Shape(drawn, Vector(0.0, 0.0), Vector(1.0, 0.0))
+        return LinkShape(drawn, Vector(0.0, 0.0), Vector(1.0, 0.0))
     origin, towards = (drawn[name] for name in link.axis)
     way = towards - origin
     length = sqrt(way.dot(way))
     if isinstance(length, float) and length == 0.0:
-        raise Unplaced(None, f"points {link.axis[0]!r} and {link.axis[1]!r} coincide, so they give no axis")
+        raise PointPlacementError(None, f"points {link.axis[0]!r} and {link.axis[1]!r} coincide, so they give no axis")
     axis = Vector(way.x / length, way.y / length)
     back = Vector(axis.x, -axis.y)
-    return Shape({name: (p - origin).turned(back) for name, p in drawn.items()}, origin, axis)
+    return LinkShape({name: (p - origin).rotate(back) for name, p in drawn.items()}, origin, axis)
 
 
-def _place(name: str, places: Mapping[str, Place], drawn: dict[str, Vector]) -> None:
+def _place_point(name: str, places: Mapping[str, PointDefinition], drawn: dict[str, Vector]) -> None:
     """Place a point after those that it rests on; a chain of them may be as long as it likes."""
     way = {name: None}
     while way:
         name = next(reversed(way))
         if name not in places:
-            raise Unplaced([*way][-2], f"there is no point {name!r} on this link")
+            raise PointPlacementError([*way][-2], f"there is no point {name!r} on this link")
         place = places[name]
-        open_ones = [other for other in _rests_on(place) if other not in drawn]
+        open_ones = [other for other in _reference_points(place) if other not in drawn]
         if not open_ones:
-            drawn[name] = _placed(name, place, drawn)
+            drawn[name] = _point_position(name, place, drawn)
             del way[name]
             continue
         if open_ones[0] in way:
             circle = " on ".join((*way, open_ones[0]))
-            raise Unplaced(name, f"point {name!r} rests on itself: {circle}")
+            raise PointPlacementError(name, f"point {name!r} rests on itself: {circle}")
         way[open_ones[0]] = None
 
 
-def _rests_on(place: Place) -> tuple[str, ...]:
+def _reference_points(place: PointDefinition) -> tuple[str, ...]:
     if isinstance(place, At):
         return ()
     return (place.start, place.towards) if isinstance(place, Along) else (place.first, place.second)
 
 
-def _placed(name: str, place: Place, drawn: Mapping[str, Vector]) -> Vector:
+def _point_position(name: str, place: PointDefinition, drawn: Mapping[str, Vector]) -> Vector:
     if isinstance(place, At):
         return Vector(place.x, place.y)
-    base, other = _rests_on(place)
+    base, other = _reference_points(place)
     p, q = drawn[base], drawn[other]
     way = q - p
     length = sqrt(way.dot(way))
     if isinstance(length, float) and length == 0.0:
-        raise Unplaced(name, f"points {base!r} and {other!r} coincide, so they give no direction")
+        raise PointPlacementError(name, f"points {base!r} and {other!r} coincide, so they give no direction")
     unit = Vector(way.x / length, way.y / length)
     if isinstance(place, Along):
-        return p + unit.turned(direction(place.angle)) * place.distance
-    return p + _apex(name, place, length).turned(unit)
+        return p + unit.rotate(direction(place.angle)) * place.distance
+    return p + _triangle_apex(name, place, length).rotate(unit)
 
 
-def _apex(name: str, place: Distances, base: Scalar) -> Vector:
+def _triangle_apex(name: str, place: Distances, base: Scalar) -> Vector:
     """The apex of a triangle on the x-axis from its three sides (law of cosines)."""
     a, b = place.from_first, place.from_second
     if isinstance(a + b + base, float):
         longest = max(a, b, base)
         if 2.0 * longest - (a + b + base) > 1e-12 * longest:
-            raise Unplaced(
+            raise PointPlacementError(
                 name,
                 f"the triangle {place.first}-{place.second}-{name} does not close: sides "
                 f"{base:.6g}, {a:.6g} and {b:.6g} m (no side may exceed the sum of the others)",

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from planar.model.link_shapes import Spot
+from planar.model.link_shapes import PointReference
 
-MET = 1e-12
+COINCIDENCE_TOLERANCE = 1e-12
 """Of a mechanism's size: ends of a spring that are nearer to each other have met, and nothing tells its direction."""
 
 
@@ -56,7 +56,7 @@ class Spring(NamedTuple):
     damping: float = 0.0
 
     @property
-    def turns(self) -> bool:
+    def is_torsional(self) -> bool:
         """Whether it acts by angles."""
         return self.links is not None
 
@@ -75,5 +75,5 @@ class Mass(NamedTuple):
 
     link: str
     mass: float
-    at: Spot
+    at: PointReference
     inertia: float = 0.0

@@ -9,47 +9,47 @@ from math import isfinite
 from numbers import Real
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from planar.foundation.errors import BadInput, listed, unshown
+from planar.foundation.errors import BadInput, first_unprintable, join_names
 from planar.foundation.notebook_display import Displayable
-from planar.foundation.units import unit
-from planar.model.link_shapes import Along, At, Distances, Link, Place, Point, Shape
+from planar.foundation.units import parse_unit
+from planar.model.link_shapes import Along, At, Distances, Link, LinkShape, Point, PointDefinition
 from planar.model.loads import Course, Load, Mass, Spring
 from planar.model.pairs.base import Pair
 
 if TYPE_CHECKING:
-    from planar.model.input_laws import Law
+    from planar.model.input_laws import InputLaw
 
 __all__ = [
-    "QUANTITIES",
+    "PUBLISHED_QUANTITIES",
     "Along",
     "At",
     "Course",
     "Distances",
     "Drive",
+    "FileUnits",
     "Input",
     "Link",
     "Load",
     "Mass",
     "Mechanism",
     "NamedPoint",
-    "Place",
     "Point",
-    "Published",
+    "PointDefinition",
+    "PublishedValue",
     "Spring",
-    "Units",
-    "check",
-    "counting",
-    "entries",
-    "misfits",
-    "motions",
+    "check_mechanism",
+    "find_law_problem",
+    "links_counting_turns",
     "named_points",
-    "running_input",
-    "unlawful",
-    "with_inputs",
+    "pair_entries",
+    "pair_misfits",
+    "relative_motions",
+    "replace_inputs",
+    "running_input_index",
 ]
 
 
-QUANTITIES = {
+PUBLISHED_QUANTITIES = {
     "position": "length",
     "velocity": "velocity",
     "acceleration": "acceleration",
@@ -67,13 +67,13 @@ QUANTITIES = {
 """What a published value may be of, and what it is measured in."""
 
 
-HUGE = 10**100
+LARGEST_NUMBER = 10**100
 """SI; beyond it squares, and squares of squares, overflow."""
-TINY = 1e-100
+SMALLEST_NUMBER = 1e-100
 """SI; a number that is not 0 is no smaller, or its square is none."""
-FARTHEST = 1e4
+LARGEST_INPUT_POSITION = 1e4
 """rad or m: to where a position is followed step by step."""
-MOST_COUNTED = 1e12
+LARGEST_COUNTED_ANGLE = 1e12
 """rad: how far an angle may count; beyond it rounding leaves less than three digits of where it points."""
 
 
@@ -87,7 +87,7 @@ class Input(NamedTuple):
     position: float
     velocity: float = 0.0
     acceleration: float = 0.0
-    law: Law | None = None
+    law: InputLaw | None = None
 
 
 class Drive(NamedTuple):
@@ -99,7 +99,7 @@ class Drive(NamedTuple):
     acceleration: float | None = None
 
 
-class Published(NamedTuple):
+class PublishedValue(NamedTuple):
     """A value that a book prints for a quantity of this mechanism (SI), or None where it prints none.
 
     `tolerance` is the part of the exact value by which a drawing may be off; `slip` says why a printed value
@@ -121,7 +121,7 @@ class Published(NamedTuple):
     start: tuple[Drive, ...] = ()
 
 
-class Units(NamedTuple):
+class FileUnits(NamedTuple):
     """The units in which a mechanism's file is written and its positions are printed."""
 
     length: str = "m"
@@ -146,13 +146,13 @@ class Mechanism(Displayable):
     masses: tuple[Mass, ...] = ()
     gravity: tuple[float, float] = (0.0, 0.0)
     sketch: tuple[tuple[str, float, float], ...] = ()
-    units: Units = field(default_factory=Units)
+    units: FileUnits = field(default_factory=FileUnits)
     ids: tuple[str, ...] = ()
     about: str | None = None
     source: str | None = None
     geometry: str | None = None
     notes: tuple[str, ...] = ()
-    published: tuple[Published, ...] = ()
+    published: tuple[PublishedValue, ...] = ()
     remarks: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
@@ -178,7 +178,7 @@ class NamedPoint(NamedTuple):
     members: tuple[tuple[str, str], ...]
 
 
-def with_inputs(mechanism: Mechanism, drives: tuple[Drive, ...]) -> Mechanism:
+def replace_inputs(mechanism: Mechanism, drives: tuple[Drive, ...]) -> Mechanism:
     """The same mechanism with some of its inputs changed; their laws start from there.
 
     Raises BadInput where it has no such input.
@@ -189,8 +189,8 @@ def with_inputs(mechanism: Mechanism, drives: tuple[Drive, ...]) -> Mechanism:
         for value in drive[1:]:
             if value is not None and (isinstance(value, bool) or not isinstance(value, Real) or not isfinite(value)):
                 raise BadInput(drive.pair, f"an input moves to a finite number (rad or m), not {value!r:.60}")
-            if value is not None and abs(value) > MOST_COUNTED:
-                raise BadInput(drive.pair, f"an input moves to {MOST_COUNTED:g} rad or m at most")
+            if value is not None and abs(value) > LARGEST_COUNTED_ANGLE:
+                raise BadInput(drive.pair, f"an input moves to {LARGEST_COUNTED_ANGLE:g} rad or m at most")
     changes = {drive.pair: drive for drive in drives}
     for pair in changes.keys() - {given.pair for given in mechanism.inputs}:
         known = ", ".join(given.pair for given in mechanism.inputs) or "none"
@@ -201,12 +201,12 @@ def with_inputs(mechanism: Mechanism, drives: tuple[Drive, ...]) -> Mechanism:
         if drive is None:
             return given
         found = given._replace(**{key: new for key, new in drive._asdict().items() if new is not None})
-        return found._replace(law=given.law and given.law.started(found.position, found.velocity))
+        return found._replace(law=given.law and given.law.start_at(found.position, found.velocity))
 
     return replace(mechanism, inputs=tuple(changed(given) for given in mechanism.inputs))
 
 
-def running_input(mechanism: Mechanism, pair: str | None) -> int:
+def running_input_index(mechanism: Mechanism, pair: str | None) -> int:
     """Which of the inputs runs while the others stand still; `pair` names it where there are several.
 
     Raises BadInput where there is no such input, or several of which none is named.
@@ -217,11 +217,11 @@ def running_input(mechanism: Mechanism, pair: str | None) -> int:
     if pair is None and len(names) > 1:
         raise BadInput("inputs", f"there are several inputs, {', '.join(names)}; name the one that runs")
     if pair is not None and pair not in names:
-        raise BadInput(pair, f"there is no input at {pair!r}; inputs are at {listed(names)}")
+        raise BadInput(pair, f"there is no input at {pair!r}; inputs are at {join_names(names)}")
     return 0 if pair is None else names.index(pair)
 
 
-def check(mechanism: Mechanism) -> None:
+def check_mechanism(mechanism: Mechanism) -> None:
     """Refuse a mechanism made in Python that names what it does not have. Raises BadInput.
 
     What comes from a file has been checked at its place there.
@@ -229,52 +229,57 @@ def check(mechanism: Mechanism) -> None:
     points = {link.name: set(link.names) for link in mechanism.links}
     names = (*points, *(name for link in mechanism.links for name in link.names), *(p.name for p in mechanism.pairs))
     for name in names:
-        if unshown(name):
+        if first_unprintable(name):
             raise BadInput(name, f"the name {name!r} holds a character that cannot be shown")
     if mechanism.frame not in points:
-        raise BadInput("frame", f"there is no link {mechanism.frame!r} to be the frame; links are {listed(points)}")
+        raise BadInput("frame", f"there is no link {mechanism.frame!r} to be the frame; links are {join_names(points)}")
     for pair in mechanism.pairs:
         for link in pair.bodies:
             if link not in points:
-                raise BadInput(pair.name, f"there is no link {link!r}; links are {listed(points)}")
-        rides = pair.rides()
-        for link, point in (*pair.coincident(), *((rides[0],) if rides else ())):
+                raise BadInput(pair.name, f"there is no link {link!r}; links are {join_names(points)}")
+        rides = pair.point_on_line()
+        for link, point in (*pair.coincident_points(), *((rides[0],) if rides else ())):
             if point not in points[link]:
                 raise BadInput(
-                    pair.name, f"link {link!r} has no point {point!r}; its points are {listed(sorted(points[link]))}"
+                    pair.name,
+                    f"link {link!r} has no point {point!r}; its points are {join_names(sorted(points[link]))}",
                 )
-    named = motions(mechanism)
+    named = relative_motions(mechanism)
     for given in mechanism.inputs:
         if given.pair not in named:
-            raise BadInput(given.pair, f"there is no pair {given.pair!r} to be driven; pairs are {listed(named)}")
-    wrong = unlawful(mechanism)
+            raise BadInput(given.pair, f"there is no pair {given.pair!r} to be driven; pairs are {join_names(named)}")
+    wrong = find_law_problem(mechanism)
     if wrong:
         raise BadInput(*wrong)
 
 
-def unlawful(mechanism: Mechanism) -> tuple[str, str] | None:
+def find_law_problem(mechanism: Mechanism) -> tuple[str, str] | None:
     """The place of the first law that cannot be, and a sentence why."""
     for given in mechanism.inputs:
-        wrong = given.law and given.law.problem()
+        wrong = given.law and given.law.find_problem()
         if wrong:
             return f"{given.pair}.law{wrong[0]}", wrong[1]
     return None
 
 
-def misfits(pairs: Sequence[Pair], shapes: Mapping[str, Shape], units: Units) -> Iterator[tuple[Pair, str]]:
+def pair_misfits(
+    pairs: Sequence[Pair], shapes: Mapping[str, LinkShape], units: FileUnits
+) -> Iterator[tuple[Pair, str]]:
     """Pairs that do not go with the others, each with a sentence."""
     for pair in pairs:
-        wrong = pair.misfit(pairs, shapes, lambda value: f"{unit(units.length).from_si(value):.6g} {units.length}")
+        wrong = pair.find_misfit(
+            pairs, shapes, lambda value: f"{parse_unit(units.length).from_si(value):.6g} {units.length}"
+        )
         if wrong is not None:
             yield pair, wrong
 
 
-def counting(mechanism: Mechanism) -> frozenset[str]:
+def links_counting_turns(mechanism: Mechanism) -> frozenset[str]:
     """The links whose angles count turns."""
     return frozenset(link for pair in mechanism.pairs if pair.counts_turns for link in pair.bodies)
 
 
-def entries(mechanism: Mechanism) -> tuple[tuple[Pair, ...], ...]:
+def pair_entries(mechanism: Mechanism) -> tuple[tuple[Pair, ...], ...]:
     """The pairs grouped as a file's entries have them: a pin of n links is one entry of n - 1 pairs."""
     grouped: dict[str, list[Pair]] = {}
     for pair in mechanism.pairs:
@@ -282,9 +287,9 @@ def entries(mechanism: Mechanism) -> tuple[tuple[Pair, ...], ...]:
     return tuple(tuple(group) for group in grouped.values())
 
 
-def motions(mechanism: Mechanism) -> Mapping[str, Pair]:
+def relative_motions(mechanism: Mechanism) -> Mapping[str, Pair]:
     """Every relative motion that has a name: each pair, and at a pin of n links each two of them."""
-    return {pair.name: pair for group in entries(mechanism) for pair in type(group[0]).motions(group)}
+    return {pair.name: pair for group in pair_entries(mechanism) for pair in type(group[0]).relative_motions(group)}
 
 
 def named_points(mechanism: Mechanism) -> tuple[NamedPoint, ...]:
@@ -295,7 +300,7 @@ def named_points(mechanism: Mechanism) -> tuple[NamedPoint, ...]:
     """
     together: dict[tuple[str, str], str] = {}
     for pair in mechanism.pairs:
-        for member in pair.coincident():
+        for member in pair.coincident_points():
             together[member] = pair.entry_name()
     carried = dict.fromkeys((link.name, point) for link in mechanism.links for point in link.names)
     names = set(together.values())
@@ -307,7 +312,7 @@ def named_points(mechanism: Mechanism) -> tuple[NamedPoint, ...]:
     return tuple(NamedPoint(name, tuple(members)) for name, members in grouped.items())
 
 
-def unjoined(mechanism: Mechanism) -> dict[str, tuple[str, ...]]:
+def unjoined_points(mechanism: Mechanism) -> dict[str, tuple[str, ...]]:
     """The points that several links carry under one name though no pair keeps them together there: a link of each.
 
     Of those alone that are an end of a link, or on a link without ends that one pair at most joins: a name may stand

@@ -13,10 +13,10 @@ import numpy as np
 
 from planar.foundation.errors import BadInput
 from planar.model.link_shapes import At, Link, Point
-from planar.model.mechanism import FARTHEST, Input, Mechanism, Units
-from planar.model.pairs import Kind, Pair, pair_types
+from planar.model.mechanism import LARGEST_INPUT_POSITION, FileUnits, Input, Mechanism
+from planar.model.pairs import MeasureKind, Pair, pair_types
 
-FRAME = "frame"
+FRAME_NAME = "frame"
 
 
 def pinned(
@@ -39,9 +39,9 @@ def pinned(
     Raises BadInput, with the place among the arguments, for pins that are not there or stand alone, bars of no length,
     a crank that is not pinned to the frame at one point.
     """
-    at, lists = _places(places), _lists(bars)
+    at, lists = _read_positions(places), _read_bars(bars)
     numbers = at.tolist()
-    fixed = tuple(dict.fromkeys(_pin(pin, f"frame[{k}]", len(at)) for k, pin in enumerate(frame)))
+    fixed = tuple(dict.fromkeys(_check_pin(pin, f"frame[{k}]", len(at)) for k, pin in enumerate(frame)))
     if not fixed:
         raise BadInput("frame", "no pin is on the frame")
     if isinstance(crank, bool) or not isinstance(crank, Integral) or not 0 <= crank < len(lists):
@@ -54,7 +54,7 @@ def pinned(
     plain = set(map(type, flat)) == {int} and min(flat) >= 0 and max(flat) < len(at) and all(len(b) == 2 for b in lists)
     if not plain or len(set(map(tuple, numbers))) < len(numbers):
         for k, bar in enumerate(lists):
-            _checked(k, bar, numbers)
+            _check_bar(k, bar, numbers)
     for pin in range(len(at)):
         if pin not in held:
             raise BadInput(f"places[{pin}]", f"pin {pin} is on no bar, and not on the frame")
@@ -62,56 +62,58 @@ def pinned(
     if len(on) != 1:
         told = "is not pinned to the frame" if not on else "is pinned to the frame twice, so it cannot turn"
         raise BadInput("crank", f"bar {crank} {told}")
-    return Pinned.laid_out(name, Laid(at, numbers, lists, fixed, int(crank), float(velocity), float(acceleration)))
+    return PinnedMechanism.from_layout(
+        name, PinLayout(at, numbers, lists, fixed, int(crank), float(velocity), float(acceleration))
+    )
 
 
-class Laid(NamedTuple):
+class PinLayout(NamedTuple):
     """A pinned linkage as numbers: places (pins, 2), also as lists; the pins of every bar; those on the frame."""
 
-    at: np.ndarray
-    numbers: list[list[float]]
+    pin_positions: np.ndarray
+    position_lists: list[list[float]]
     bars: list[list[int]]
-    fixed: tuple[int, ...]
+    frame_pins: tuple[int, ...]
     crank: int
     velocity: float
     acceleration: float
 
     @property
-    def position(self) -> float:
+    def crank_angle(self) -> float:
         """The angle of the crank (rad)."""
-        (ax, ay), (bx, by) = (self.numbers[pin] for pin in self.bars[self.crank][:2])
+        (ax, ay), (bx, by) = (self.position_lists[pin] for pin in self.bars[self.crank][:2])
         return atan2(by - ay, bx - ax)
 
 
-class Pinned(Mechanism):
+class PinnedMechanism(Mechanism):
     """A mechanism whose links, pairs, input and sketch are made of `laid` when they are first asked for."""
 
-    laid: Laid | None = None
+    layout: PinLayout | None = None
 
     @classmethod
-    def laid_out(cls, name: str, laid: Laid) -> Pinned:
+    def from_layout(cls, name: str, laid: PinLayout) -> PinnedMechanism:
         """The mechanism of a linkage that has been checked."""
         own = object.__new__(cls)
-        own.__dict__.update(name=name, frame=FRAME, units=_UNITS, laid=laid)
+        own.__dict__.update(name=name, frame=FRAME_NAME, units=_UNITS, layout=laid)
         return own
 
     def __reduce__(self) -> Any:
-        if self.laid is not None:
-            return Pinned.laid_out, (self.name, self.laid)
+        if self.layout is not None:
+            return PinnedMechanism.from_layout, (self.name, self.layout)
         return Mechanism, tuple([getattr(self, each.name) for each in fields(Mechanism)])
 
     @cached_property
     def links(self) -> tuple[Link, ...]:  # type: ignore[override]
         """The frame, then the bars."""
-        laid = self._laid
-        frame = Link(FRAME, tuple([Point(f"P{pin}", At(*laid.numbers[pin])) for pin in laid.fixed]))
-        return (frame, *[_link(f"bar{k}", bar, laid.numbers) for k, bar in enumerate(laid.bars)])
+        laid = self._checked_layout
+        frame = Link(FRAME_NAME, tuple([Point(f"P{pin}", At(*laid.position_lists[pin])) for pin in laid.frame_pins]))
+        return (frame, *[_bar_link(f"bar{k}", bar, laid.position_lists) for k, bar in enumerate(laid.bars)])
 
     @cached_property
     def pairs(self) -> tuple[Pair, ...]:  # type: ignore[override]
         """The pins, one after the other."""
-        of, found = joined(), []
-        for pin, held in enumerate(self._holding):
+        of, found = turning_pair_type(), []
+        for pin, held in enumerate(self._links_on_pins):
             point, first = f"P{pin}", held[0]
             for other in held[1:]:
                 name = point if len(held) == 2 else f"{point}:{first},{other}"
@@ -121,40 +123,40 @@ class Pinned(Mechanism):
     @cached_property
     def inputs(self) -> tuple[Input, ...]:  # type: ignore[override]
         """The crank's."""
-        laid = self._laid
-        (pin,) = (pin for pin in laid.bars[laid.crank] if pin in laid.fixed)
-        name = f"P{pin}" if len(self._holding[pin]) == 2 else f"P{pin}:{FRAME},bar{laid.crank}"
-        return (Input(name, laid.position, laid.velocity, laid.acceleration),)
+        laid = self._checked_layout
+        (pin,) = (pin for pin in laid.bars[laid.crank] if pin in laid.frame_pins)
+        name = f"P{pin}" if len(self._links_on_pins[pin]) == 2 else f"P{pin}:{FRAME_NAME},bar{laid.crank}"
+        return (Input(name, laid.crank_angle, laid.velocity, laid.acceleration),)
 
     @cached_property
     def sketch(self) -> tuple[tuple[str, float, float], ...]:  # type: ignore[override]
         """Where the pins are that move."""
-        laid = self._laid
-        fixed = set(laid.fixed)
-        return tuple([(f"P{pin}", *at) for pin, at in enumerate(laid.numbers) if pin not in fixed])
+        laid = self._checked_layout
+        fixed = set(laid.frame_pins)
+        return tuple([(f"P{pin}", *at) for pin, at in enumerate(laid.position_lists) if pin not in fixed])
 
     @cached_property
-    def _holding(self) -> list[list[str]]:
+    def _links_on_pins(self) -> list[list[str]]:
         """The links on every pin, the frame first."""
-        laid = self._laid
-        holding: list[list[str]] = [[] for _ in laid.numbers]
-        for pin in laid.fixed:
-            holding[pin].append(FRAME)
+        laid = self._checked_layout
+        holding: list[list[str]] = [[] for _ in laid.position_lists]
+        for pin in laid.frame_pins:
+            holding[pin].append(FRAME_NAME)
         for k, bar in enumerate(laid.bars):
             for pin in bar:
                 holding[pin].append(f"bar{k}")
         return holding
 
     @property
-    def _laid(self) -> Laid:
-        assert self.laid is not None
-        return self.laid
+    def _checked_layout(self) -> PinLayout:
+        assert self.layout is not None
+        return self.layout
 
 
-_UNITS = Units()
+_UNITS = FileUnits()
 
 
-def _places(places: Any) -> np.ndarray:
+def _read_positions(places: Any) -> np.ndarray:
     """The places as an array of its own."""
     try:
         at = np.array(places, dtype=float)
@@ -162,14 +164,14 @@ def _places(places: Any) -> np.ndarray:
         raise BadInput("places", "an array (pins, 2) of numbers (m) is wanted") from None
     if at.ndim != 2 or at.shape[1] != 2 or len(at) < 2:
         raise BadInput("places", "an array (pins, 2) is wanted, of two pins at least")
-    if not np.abs(at).max() <= FARTHEST:
-        k = int(np.argmin(np.all(np.abs(at) <= FARTHEST, axis=1)))
-        raise BadInput(f"places[{k}]", f"numbers up to {FARTHEST:g} m are wanted, not {at[k].tolist()}")
+    if not np.abs(at).max() <= LARGEST_INPUT_POSITION:
+        k = int(np.argmin(np.all(np.abs(at) <= LARGEST_INPUT_POSITION, axis=1)))
+        raise BadInput(f"places[{k}]", f"numbers up to {LARGEST_INPUT_POSITION:g} m are wanted, not {at[k].tolist()}")
     at.flags.writeable = False
     return at
 
 
-def _lists(bars: Any) -> list[list[int]]:
+def _read_bars(bars: Any) -> list[list[int]]:
     """The pins of every bar."""
     try:
         return bars.tolist() if hasattr(bars, "tolist") else [list(bar) for bar in bars]
@@ -177,22 +179,22 @@ def _lists(bars: Any) -> list[list[int]]:
         raise BadInput("bars", "lists of pin numbers are wanted, one for each bar") from None
 
 
-def _pin(pin: Any, place: str, many: int) -> int:
+def _check_pin(pin: Any, place: str, many: int) -> int:
     if isinstance(pin, bool) or not isinstance(pin, Integral) or not 0 <= pin < many:
         raise BadInput(place, f"the number of a pin is wanted, of which there are {many}, not {pin!r:.40}")
     return int(pin)
 
 
-def _checked(number: int, bar: list[int], at: Sequence[Sequence[float]]) -> None:
+def _check_bar(number: int, bar: list[int], at: Sequence[Sequence[float]]) -> None:
     """Refuse a bar that is none; its pins become whole numbers of Python's own."""
-    bar[:] = [_pin(pin, f"bars[{number}][{k}]", len(at)) for k, pin in enumerate(bar)]
+    bar[:] = [_check_pin(pin, f"bars[{number}][{k}]", len(at)) for k, pin in enumerate(bar)]
     if len(bar) < 2 or len(set(bar)) < len(bar):
         raise BadInput(f"bars[{number}]", "two pins or more are wanted, each once")
     if at[bar[0]] == at[bar[1]]:
         raise BadInput(f"bars[{number}]", f"pins {bar[0]} and {bar[1]} are at one place, so the bar has no length")
 
 
-def _link(own: str, bar: Sequence[int], at: Sequence[Sequence[float]]) -> Link:
+def _bar_link(own: str, bar: Sequence[int], at: Sequence[Sequence[float]]) -> Link:
     """One bar, its own axes along its first two pins."""
     (ax, ay), (bx, by) = at[bar[0]], at[bar[1]]
     dx, dy = bx - ax, by - ay
@@ -206,7 +208,7 @@ def _link(own: str, bar: Sequence[int], at: Sequence[Sequence[float]]) -> Link:
 
 
 @lru_cache
-def joined() -> type[Pair]:
+def turning_pair_type() -> type[Pair]:
     """The pair that keeps a point of one link on a point of another."""
-    two = (Kind.LENGTH, Kind.LENGTH)
-    return next(each for each in pair_types().values() if each.constrains == two and not each.coordinates)
+    two = (MeasureKind.LENGTH, MeasureKind.LENGTH)
+    return next(each for each in pair_types().values() if each.residual_kinds == two and not each.coordinate_kinds)

@@ -7,31 +7,31 @@ from math import atan2, hypot, pi
 
 import numpy as np
 
-from planar.foundation.errors import listed as several
-from planar.foundation.units import unit
-from planar.model.mechanism import Units
+from planar.foundation.errors import join_names as several
+from planar.foundation.units import parse_unit
+from planar.model.mechanism import FileUnits
 
-STILL = 1e-9
+REST_TOLERANCE = 1e-9
 """A rate below this part of the greatest of its kind is at rest."""
 
 
-def amount(value: float, kind: str, units: Units) -> str:
+def amount(value: float, kind: str, units: FileUnits) -> str:
     """A length or an angle in the units of a mechanism's file, with its unit."""
     name = units.length if kind == "length" else units.angle
-    return f"{unit(name).from_si(value):.6g} {name}"
+    return f"{parse_unit(name).from_si(value):.6g} {name}"
 
 
-def turning(rate: float, scale: float = 0.0) -> str:
+def turning_sense(rate: float, scale: float = 0.0) -> str:
     """The sense of an angular rate, beside the greatest of its kind."""
-    if abs(rate) <= STILL * scale:
+    if abs(rate) <= REST_TOLERANCE * scale:
         return "at rest"
     return "anticlockwise" if rate > 0.0 else "clockwise"
 
 
-def heading(vector: Sequence[float] | np.ndarray, scale: float = 0.0) -> str:
+def direction_sense(vector: Sequence[float] | np.ndarray, scale: float = 0.0) -> str:
     """The sense of a vector, beside the greatest of its kind: one of four ways along an axis, else two together."""
     x, y = float(vector[0]), float(vector[1])
-    if hypot(x, y) <= STILL * scale:
+    if hypot(x, y) <= REST_TOLERANCE * scale:
         return "at rest"
     sector = round(atan2(y, x) / (pi / 4)) % 8
     across = "to the right" if x > 0 else "to the left"
@@ -41,29 +41,29 @@ def heading(vector: Sequence[float] | np.ndarray, scale: float = 0.0) -> str:
     return f"{along}, {across}" if abs(y) > abs(x) else f"{across}, {along}"
 
 
-def hurrying(power: float, scale: float = 0.0) -> str:
+def speed_trend(power: float, scale: float = 0.0) -> str:
     """Whether speed grows, from the product of velocity and acceleration, beside the greatest that it could be."""
-    if abs(power) <= STILL * scale:
+    if abs(power) <= REST_TOLERANCE * scale:
         return "steady"
     return "speeding up" if power > 0.0 else "slowing down"
 
 
-def many(count: int, what: str, plural: str = "") -> str:
+def count_phrase(count: int, what: str, plural: str = "") -> str:
     """So many of something: 1 way, 2 ways."""
     return f"{count} {what if count == 1 else plural or what + 's'}"
 
 
-def listed(names: Sequence[str]) -> str:
+def join_all_names(names: Sequence[str]) -> str:
     """All names in a sentence: a, b and c. Where they may be very many, see `errors.listed`."""
     return several(names, None)
 
 
-def quoted(names: Sequence[str]) -> str:
+def quote_names(names: Sequence[str]) -> str:
     """The first of names, in quotes, and how many more there are."""
     return several([repr(name) for name in names])
 
 
-def ranged(numbers: Iterable[int]) -> str:
+def number_ranges(numbers: Iterable[int]) -> str:
     """Numbers in a sentence, three or more in a row by their ends: 1–4, 7 and 9."""
     runs: list[list[int]] = []
     for number in sorted({*numbers}):
@@ -74,4 +74,4 @@ def ranged(numbers: Iterable[int]) -> str:
     short = [run for run in runs if len(run) > 2]
     parts = [(run[0], f"{run[0]}–{run[-1]}") for run in short]
     parts += [(number, str(number)) for run in runs if run not in short for number in run]
-    return listed([text for _, text in sorted(parts)])
+    return join_all_names([text for _, text in sorted(parts)])

@@ -5,54 +5,54 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from planar.codegen.javascript import printed
-from planar.equations.functions import placed
+from planar.codegen.javascript import write_javascript
+from planar.equations.functions import frames_from_coordinates
 from planar.foundation.errors import Outcome
 from planar.foundation.jets import Jet
-from planar.model.link_shapes import Shape
-from planar.model.mechanism import Mechanism, counting, motions
-from planar.model.pairs import Kind
-from planar.reports.columns import columns
+from planar.model.link_shapes import LinkShape
+from planar.model.mechanism import Mechanism, links_counting_turns, relative_motions
+from planar.model.pairs import MeasureKind
+from planar.reports.columns import run_columns
 from planar.results.motion import Motion
 from planar.results.records import InputMotion
-from planar.solving.position import Solver
+from planar.solving.position import PositionSolver
 
 
-def heads(mechanism: Mechanism, solver: Solver) -> list[list[str]]:
+def column_heads(mechanism: Mechanism, solver: PositionSolver) -> list[list[str]]:
     """Name, unit and kind of every column, of inputs, points, links and pairs in this order; none of what stands."""
     if not mechanism.inputs:
         return []
     rest = np.zeros(1)
     still = [Jet(rest, rest, rest) for _ in solver.equations.coordinates]
     inputs = {given.pair: InputMotion(rest, rest, rest) for given in mechanism.inputs}
-    frames, own = placed(still, solver.column, solver.shapes, solver.pairs)
+    frames, own = frames_from_coordinates(still, solver.column, solver.shapes, solver.pairs)
     one = Motion(mechanism, inputs, Outcome.SOLVED, "", 0.0, (), frames, own, solver.shapes)
-    return [[column.name, column.unit, column.kind] for column in columns(one)]
+    return [[column.name, column.unit, column.kind] for column in run_columns(one)]
 
 
-def starting(mechanism: Mechanism) -> list[list[int]]:
+def uncounted_angles(mechanism: Mechanism) -> list[list[int]]:
     """Of what pairs report the angles whose turns are not counted: which number it is, and its input's number or -1.
 
     They start within half a turn either way, or where the input is (see `planar.results.motion.Motion.pair`).
     """
-    inputs, counts = [given.pair for given in mechanism.inputs], counting(mechanism)
+    inputs, counts = [given.pair for given in mechanism.inputs], links_counting_turns(mechanism)
     found, at = [], 0
-    for name, pair in motions(mechanism).items():
-        if pair.drive_kind is Kind.ANGLE and not counts.issuperset(pair.links):
+    for name, pair in relative_motions(mechanism).items():
+        if pair.input_kind is MeasureKind.ANGLE and not counts.issuperset(pair.links):
             found.append([at, inputs.index(name) if name in inputs else -1])
-        at += sum(each is not None for each in pair.report(0.0, 0.0, 0.0).values())
+        at += sum(each is not None for each in pair.results(0.0, 0.0, 0.0).values())
     return found
 
 
-def reported(mechanism: Mechanism, solver: Solver, d: ca.SX, changed: dict[str, Shape]) -> str:
+def reported_function(mechanism: Mechanism, solver: PositionSolver, d: ca.SX, changed: dict[str, LinkShape]) -> str:
     """reported(w, w1, w2, d): all that pairs report (SI), of coordinates and rates in SI."""
     w, w1, w2 = (ca.SX.sym(name, len(solver.equations.coordinates)) for name in ("w", "w1", "w2"))
-    frames, own = placed(ca.vertsplit(w), solver.column, changed, solver.pairs)
+    frames, own = frames_from_coordinates(ca.vertsplit(w), solver.column, changed, solver.pairs)
     values: list[ca.SX] = []
-    for name, pair in motions(mechanism).items():
+    for name, pair in relative_motions(mechanism).items():
         numbers = pair.measure([changed[link] for link in pair.bodies])
-        position = ca.SX(pair.drive([frames[link] for link in pair.bodies], numbers, own.get(name, ())))
+        position = ca.SX(pair.input_position([frames[link] for link in pair.bodies], numbers, own.get(name, ())))
         rate = ca.jtimes(position, w, w1)
         second = ca.jtimes(rate, w, w1) + ca.jtimes(position, w, w2)
-        values += [ca.SX(each) for each in pair.report(position, rate, second).values() if each is not None]
-    return printed("reported", ca.Function("reported", [w, w1, w2, d], [ca.vertcat(*values)]))
+        values += [ca.SX(each) for each in pair.results(position, rate, second).values() if each is not None]
+    return write_javascript("reported", ca.Function("reported", [w, w1, w2, d], [ca.vertcat(*values)]))

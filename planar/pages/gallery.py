@@ -10,15 +10,15 @@ from urllib.parse import quote
 
 import numpy as np
 
-from planar.document.files import asset, save, unwritten
+from planar.document.files import read_asset, save_file, write_error
 from planar.foundation.errors import BadInput, NoAnswer
 from planar.model.mechanism import Mechanism
-from planar.pages.gallery_kinds import KINDS, described
-from planar.pages.page import filled, page, told
-from planar.pages.page_data import drawn
+from planar.pages.gallery_kinds import KINDS, kind_and_search_text
+from planar.pages.page import fill_template, page, script_safe_json
+from planar.pages.page_data import fixed_drawing_data
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
-from planar.solving.position import known_of
+from planar.solving.position import solved_mechanism
 
 SCRIPTS = (
     "stage/bodies.js",
@@ -32,13 +32,13 @@ SCRIPTS = (
 STYLES = ("page.css", "stage/stage.css", "gallery.css", "print.css")
 """The drawing as pages have it, and what moves many of them."""
 
-STEPS = 36
+PICTURE_STEPS = 36
 """Of the motion in a small picture, between which it goes on evenly."""
-DIGITS = 5
+PICTURE_DIGITS = 5
 """Of places and angles there: less than a hundredth of a pixel."""
 
 
-def gallery(
+def write_gallery(
     models: Sequence[tuple[str, Mechanism]], folder: Path, progress: Callable[[int, int], None] | None = None
 ) -> tuple[Path, list[tuple[str, NoAnswer]]]:
     """Write a page for each mechanism under its name, and the index; gives the index's path.
@@ -49,47 +49,47 @@ def gallery(
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as problem:
-        raise unwritten(str(folder), "the folder", problem, "made") from None
+        raise write_error(str(folder), "the folder", problem, "made") from None
     taken, shown, refused = {"index"}, [], []
     for done, (name, mechanism) in enumerate(models, start=1):
         try:
-            text, moving = page(mechanism, back="index.html"), small(mechanism)
+            text, moving = page(mechanism, back="index.html"), small_picture_data(mechanism)
         except NoAnswer as problem:
             refused.append((name, problem))
             continue
         finally:
             if progress is not None:
                 progress(done, len(models))
-        file = _new(name, taken)
-        save(folder / f"{file}.html", text)
-        under, words = described(mechanism, name)
+        file = _unused_name(name, taken)
+        save_file(folder / f"{file}.html", text)
+        under, words = kind_and_search_text(mechanism, name)
         titles = {"name": mechanism.name, "about": mechanism.about or "", "href": quote(f"{file}.html")}
         shown.append(moving | titles | {"kind": under, "words": words})
-    save(folder / "index.html", index(shown))
+    save_file(folder / "index.html", index_page(shown))
     return folder / "index.html", refused
 
 
-def index(shown: list[dict[str, Any]]) -> str:
+def index_page(shown: list[dict[str, Any]]) -> str:
     """The page of small pictures, kind after kind."""
     shown = sorted(shown, key=lambda each: KINDS.index(each["kind"]))
     kinds = [(kind, [each for each in shown if each["kind"] == kind]) for kind in KINDS]
     kinds = [(kind, own) for kind, own in kinds if own]
     links = "".join(f'<a href="#kind-{KINDS.index(kind)}">{escape(kind)}</a> ' for kind, _ in kinds)
     title = escape(f"{len(shown)} mechanisms" if len(shown) != 1 else "1 mechanism")
-    scripts = "\n".join(asset(name) for name in SCRIPTS)
-    styles = "\n".join(asset(name) for name in STYLES).replace("#drawing", ".small")  # a page has one drawing
+    scripts = "\n".join(read_asset(name) for name in SCRIPTS)
+    styles = "\n".join(read_asset(name) for name in STYLES).replace("#drawing", ".small")  # a page has one drawing
     parts = {
         "title": title,
         "styles": styles,
         "kinds": links if len(kinds) > 1 else "",
-        "list": "\n".join(_listed(kind, own) for kind, own in kinds),
-        "data": told(shown),
+        "list": "\n".join(_kind_section(kind, own) for kind, own in kinds),
+        "data": script_safe_json(shown),
         "scripts": scripts,
     }
-    return filled(asset("gallery.html"), parts)
+    return fill_template(read_asset("gallery.html"), parts)
 
 
-def _listed(kind: str, shown: Sequence[dict[str, Any]]) -> str:
+def _kind_section(kind: str, shown: Sequence[dict[str, Any]]) -> str:
     """The mechanisms of a kind, which stand there also without scripts."""
     items = [
         f'<li><a href="{escape(each["href"])}"><strong>{escape(each["name"])}</strong>'
@@ -100,13 +100,13 @@ def _listed(kind: str, shown: Sequence[dict[str, Any]]) -> str:
     return f'<section id="kind-{number}"><h2>{escape(kind)}</h2><ul>{"".join(items)}</ul></section>'
 
 
-def small(mechanism: Mechanism) -> dict[str, Any]:
+def small_picture_data(mechanism: Mechanism) -> dict[str, Any]:
     """What a small picture is drawn from: how the links look, and where they are at every step.
 
     `closed` says whether the motion comes back to its start, so that it goes round, not to and fro.
     """
-    looks, sizes = drawn(mechanism)
-    motion = _motion(mechanism)
+    looks, sizes = fixed_drawing_data(mechanism)
+    motion = _picture_motion(mechanism)
     paths = [
         np.stack([np.broadcast_to(part.parts[0], (len(motion),)) for part in (frame.x, frame.y, frame.angle)], axis=1)
         for frame in (motion.frames[link] for link in looks["links"] if link != mechanism.frame)
@@ -116,33 +116,37 @@ def small(mechanism: Mechanism) -> dict[str, Any]:
         np.abs(p[-1] - p[0] - [0.0, 0.0, whole * round((p[-1, 2] - p[0, 2]) / whole)]).max() < 1e-6 for p in paths
     )
     return looks | {
-        "size": known_of(mechanism).solver.unit,
+        "size": solved_mechanism(mechanism).solver.unit,
         "inputs": [{"pair": given.pair} for given in mechanism.inputs],
-        "sizes": [_short(value) for value in sizes],
-        "frames": [[_short(value) for value in path.ravel()] for path in paths],
+        "sizes": [_round_digits(value) for value in sizes],
+        "frames": [[_round_digits(value) for value in path.ravel()] for path in paths],
         "closed": closed and len(motion) > 1,
     }
 
 
-def _motion(mechanism: Mechanism) -> Motion:
+def _picture_motion(mechanism: Mechanism) -> Motion:
     """The motion of the first input over its own range; of a slide without limits, its own size either way."""
     given = mechanism.inputs[0]
     try:
-        return cycle(mechanism, STEPS, pair=given.pair) if _timeless(mechanism) else cycle(mechanism, STEPS)
+        return (
+            cycle(mechanism, PICTURE_STEPS, pair=given.pair)
+            if _has_no_laws(mechanism)
+            else cycle(mechanism, PICTURE_STEPS)
+        )
     except BadInput:
-        far = known_of(mechanism).solver.unit
-        return cycle(mechanism, STEPS, given.position - far, given.position + far, given.pair)
+        far = solved_mechanism(mechanism).solver.unit
+        return cycle(mechanism, PICTURE_STEPS, given.position - far, given.position + far, given.pair)
 
 
-def _timeless(mechanism: Mechanism) -> bool:
+def _has_no_laws(mechanism: Mechanism) -> bool:
     return not any(given.law is not None for given in mechanism.inputs)
 
 
-def _short(value: float) -> float:
-    return float(f"{float(value):.{DIGITS}g}")
+def _round_digits(value: float) -> float:
+    return float(f"{float(value):.{PICTURE_DIGITS}g}")
 
 
-def _new(name: str, taken: set[str]) -> str:
+def _unused_name(name: str, taken: set[str]) -> str:
     """A name for a file that no other of the folder has, on any system."""
     kept = "".join(each if each.isalnum() or each in "-_." else "-" for each in name)[:80].strip(".-") or "mechanism"
     found, again = kept, 1

@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 import unicodedata
 
-from planar.analysis.identity.mechanism_names import names
+from planar.analysis.identity.mechanism_names import mechanism_names
 from planar.drawing.scheme.link_bodies import all_marks
-from planar.equations.functions import shapes
+from planar.equations.functions import shapes_of_links
 from planar.model.mechanism import Mechanism
-from planar.model.pairs.symbols import Band, PitchLine, Wheel
+from planar.model.pairs.symbols import BeltMark, PitchLineMark, WheelMark
 
 FOUR_BARS = "Four-bar linkages"
 SLIDER_CRANKS = "Slider-cranks and their inversions"
@@ -21,7 +21,7 @@ WHEELS = "Gears, belts and racks"
 OPEN = "Open chains"
 KINDS = (FOUR_BARS, SLIDER_CRANKS, DOUBLE_SLIDERS, SIX_BARS, LARGER, OTHERS, WHEELS, OPEN)
 """In the order in which they are shown."""
-MANY = 8
+LARGER_LINK_COUNT = 8
 """Links of the least of the larger linkages."""
 
 SYNONYMS = (
@@ -54,11 +54,14 @@ SYNONYMS = (
 NUMBERS = ("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve")
 
 
-def kind(mechanism: Mechanism, named: tuple[str, ...]) -> str:
+def choose_kind(mechanism: Mechanism, names: tuple[str, ...]) -> str:
     """One of KINDS, by the pairs, the names (as `planar inspect` lists them) and the number of the links."""
-    if any(name.startswith("open chain") for name in named):
+    if any(name.startswith("open chain") for name in names):
         return OPEN
-    if any(isinstance(mark, Wheel | Band | PitchLine) for mark in all_marks(mechanism, shapes(mechanism))):
+    if any(
+        isinstance(mark, WheelMark | BeltMark | PitchLineMark)
+        for mark in all_marks(mechanism, shapes_of_links(mechanism))
+    ):
         return WHEELS
     for words, found in (
         ("double slider-crank chain", DOUBLE_SLIDERS),
@@ -66,12 +69,12 @@ def kind(mechanism: Mechanism, named: tuple[str, ...]) -> str:
         ("four-bar chain", FOUR_BARS),
         ("six-bar", SIX_BARS),
     ):
-        if any(words in name for name in named):
+        if any(words in name for name in names):
             return found
-    return LARGER if len(mechanism.links) >= MANY else OTHERS
+    return LARGER if len(mechanism.links) >= LARGER_LINK_COUNT else OTHERS
 
 
-def plain(text: str) -> str:
+def search_text(text: str) -> str:
     """A text as it is searched: small letters without accents, hyphens and apostrophes, numbers before bars as words.
 
     "4-bar", "Four bar" and "fourbar" are "four bar"; the gallery's script does the same to what is looked for.
@@ -80,19 +83,19 @@ def plain(text: str) -> str:
     words = " ".join(re.sub(r"[^\w]+|_", " ", re.sub(r"['’]", "", letters)).split())
     counted = "|".join(NUMBERS)
     words = re.sub(rf"\b({counted})(bar|link)", r"\1 \2", words)
-    words = re.sub(r"\b(\d{1,2})(?= ?(?:bar|link))", lambda found: _word(int(found[1])), words)
+    words = re.sub(r"\b(\d{1,2})(?= ?(?:bar|link))", lambda found: _number_word(int(found[1])), words)
     return re.sub(rf"\b({counted})(bar|link)", r"\1 \2", words)
 
 
-def _word(number: int) -> str:
+def _number_word(number: int) -> str:
     return NUMBERS[number] if number < len(NUMBERS) else str(number)
 
 
-def described(mechanism: Mechanism, name: str) -> tuple[str, str]:
+def kind_and_search_text(mechanism: Mechanism, name: str) -> tuple[str, str]:
     """The kind of a mechanism, and the text in which a reader's words are looked for."""
-    named = names(mechanism)
-    under = kind(mechanism, named)
-    text = plain(" ; ".join((mechanism.name, mechanism.about or "", name, *mechanism.ids, *named, under)))
+    named = mechanism_names(mechanism)
+    under = choose_kind(mechanism, named)
+    text = search_text(" ; ".join((mechanism.name, mechanism.about or "", name, *mechanism.ids, *named, under)))
     alike = [each.split(", ") for each in SYNONYMS]
     more = [word for words in alike if any(f" {word}" in f" {text}" for word in words) for word in words]
     return under, " ".join([text, *more])

@@ -8,14 +8,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planar.document.files import asset
+from planar.document.files import read_asset
 from planar.model.mechanism import Mechanism
-from planar.pages.notebook import packed
-from planar.pages.page_data import carried
-from planar.pages.still_picture import still
+from planar.pages.notebook import pack_scripts
+from planar.pages.page_data import page_data
+from planar.pages.still_picture import still_svg
 
 
-class Window(NamedTuple):
+class PageRange(NamedTuple):
     """The part of an input's range that a page runs through: the number of the input, and both ends (rad or m)."""
 
     running: int
@@ -68,7 +68,7 @@ SCRIPTS = (
 def page(
     mechanism: Mechanism,
     z: np.ndarray | None = None,
-    window: Window | None = None,
+    window: PageRange | None = None,
     *,
     back: str | None = None,
     layers: tuple[str, ...] = ("paths",),
@@ -81,26 +81,26 @@ def page(
     shown at first. `library` is of notebooks: the page carries the scripts for others beside it (True), or takes them
     from one of those (False). Raises NoAnswer where it has no position to start from.
     """
-    data, functions = carried(mechanism, z)
+    data, functions = page_data(mechanism, z)
     data["window"], data["layers"] = window and window._asdict(), layers
-    styles, scripts = ("\n".join(asset(name) for name in names) for names in (STYLES, SCRIPTS))
-    start = f"{functions}\n{START}"
+    styles, scripts = ("\n".join(read_asset(name) for name in names) for names in (STYLES, SCRIPTS))
+    start = f"{functions}\n{START_SCRIPT}"
     if library is not None:
-        key, carrying = packed(styles, scripts)
+        key, carrying = pack_scripts(styles, scripts)
         carrying = json.dumps(carrying) if library else "null"
-        styles = asset("stage/still.css")
-        scripts, start = asset("shared.js"), f"shareScripts({json.dumps(key)}, {carrying}, () => {{\n{start}\n}});"
+        styles = read_asset("stage/still.css")
+        scripts, start = read_asset("shared.js"), f"shareScripts({json.dumps(key)}, {carrying}, () => {{\n{start}\n}});"
     parts = {
         "title": escape(mechanism.name),
         "back": f'<a class="back" href="{escape(back)}">All mechanisms</a>' if back else "",
         "about": _about(mechanism),
-        "still": still(mechanism, z),
+        "still": still_svg(mechanism, z),
         "notes": _notes(mechanism),
         "styles": styles,
-        "data": told(data),
+        "data": script_safe_json(data),
         "scripts": f"{scripts}\n{start}",
     }
-    return filled(asset("page.html"), parts)
+    return fill_template(read_asset("page.html"), parts)
 
 
 def _about(mechanism: Mechanism) -> str:
@@ -118,7 +118,7 @@ def _notes(mechanism: Mechanism) -> str:
     return f'<section id="notes"><h2>Notes</h2><ul>{each}</ul></section>\n'
 
 
-START = r"""
+START_SCRIPT = r"""
 const page = new Page(JSON.parse(document.getElementById("data").textContent), program);
 const svg = document.getElementById("drawing"), drawing = new Drawing(page, svg), dragging = new Dragging(page, svg);
 const controls = new Controls(page, document.getElementById("controls"), svg, drawing, dragging);
@@ -132,7 +132,7 @@ document.getElementById("still").remove(); // what moves stands in its place
 """
 
 
-def filled(template: str, parts: dict[str, str]) -> str:
+def fill_template(template: str, parts: dict[str, str]) -> str:
     """A template with its parts in place; what stands in a part is not looked at again."""
     found = template
     pieces = []
@@ -146,7 +146,7 @@ def filled(template: str, parts: dict[str, str]) -> str:
     return "".join([*pieces, found])
 
 
-def told(value: Any) -> str:
+def script_safe_json(value: Any) -> str:
     """A JSON text that ends no script, whatever texts it holds."""
     text = json.dumps(value, ensure_ascii=False, allow_nan=False)
     return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")

@@ -8,20 +8,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planar.document.files import save
+from planar.document.files import save_file
 from planar.foundation.errors import BadInput, NoAnswer
 from planar.foundation.geometry import frame_at
 from planar.foundation.jets import Jet, Scalar
 from planar.foundation.notebook_display import Displayable
-from planar.model.mechanism import Drive, Mechanism, with_inputs
-from planar.pages.notebook import carries, output
-from planar.pages.page import Window, page
-from planar.pages.still_picture import still
-from planar.reports.files.html import html
+from planar.model.mechanism import Drive, Mechanism, replace_inputs
+from planar.pages.notebook import must_carry_scripts, output_html
+from planar.pages.page import PageRange, page
+from planar.pages.still_picture import still_svg
+from planar.reports.files.html import to_html
 from planar.results.motion import Motion, State
-from planar.solving.position import known_of
+from planar.solving.position import solved_mechanism
 
-LISTED = 12
+MAX_LISTED_ASSEMBLIES = 12
 """Assemblies of the table that a notebook shows."""
 
 
@@ -35,44 +35,44 @@ def view(shown: Mechanism | State | Motion, path: str | Path | None = None) -> P
         raise BadInput("view", f"a Mechanism, a State or a Motion is wanted, not {type(shown).__name__}")
     text = page_of(shown)
     if path is not None:
-        save(Path(path), text)
+        save_file(Path(path), text)
         return Path(path)
     from webbrowser import open_new_tab  # only where one is opened
 
     made = Path(mkdtemp(prefix="planar-")) / "page.html"
-    save(made, text)
+    save_file(made, text)
     open_new_tab(made.as_uri())
     return made
 
 
-class Subject(NamedTuple):
+class PageSubject(NamedTuple):
     """What a page is of: a mechanism at its inputs, the unknowns of an assembly, and a range."""
 
     mechanism: Mechanism
     z: np.ndarray | None = None
-    window: Window | None = None
+    window: PageRange | None = None
 
 
 def page_of(shown: Mechanism | State | Motion) -> str:
     """The text of the page of a mechanism, a position or a motion."""
-    return page(*_subject(shown))
+    return page(*_page_subject(shown))
 
 
-def _subject(shown: Mechanism | State | Motion) -> Subject:
+def _page_subject(shown: Mechanism | State | Motion) -> PageSubject:
     if isinstance(shown, Mechanism):
-        return Subject(shown)
+        return PageSubject(shown)
     if isinstance(shown, State):
-        return Subject(shown.mechanism, _unknowns(shown, shown.mechanism))
+        return PageSubject(shown.mechanism, _unknowns(shown, shown.mechanism))
     ends = {name: given.position for name, given in shown.inputs.items()}
     # of inputs that run in time together the one that goes farthest runs on the page
     pair = max(ends, key=lambda name: float(np.ptp(ends[name])))
-    window = Window(list(ends).index(pair), float(ends[pair].min()), float(ends[pair].max()))
-    row = _start(shown, pair)
-    there = with_inputs(shown.mechanism, tuple(Drive(name, float(at[row])) for name, at in ends.items()))
-    return Subject(there, _unknowns(shown, there, row), window if window.low < window.high else None)
+    window = PageRange(list(ends).index(pair), float(ends[pair].min()), float(ends[pair].max()))
+    row = _start_row(shown, pair)
+    there = replace_inputs(shown.mechanism, tuple(Drive(name, float(at[row])) for name, at in ends.items()))
+    return PageSubject(there, _unknowns(shown, there, row), window if window.low < window.high else None)
 
 
-def _start(motion: Motion, pair: str) -> int:
+def _start_row(motion: Motion, pair: str) -> int:
     """The row nearest to the file's position, among those that are no dead points."""
     rates = [
         np.broadcast_to(frame.angle.parts[1], (len(motion),)) for frame in motion.frames.values() if not frame.fixed
@@ -82,22 +82,22 @@ def _start(motion: Motion, pair: str) -> int:
     return int(np.argmin(np.abs(motion.inputs[pair].position - filed) + np.where(lost & ~lost.all(), np.inf, 0.0)))
 
 
-def framed(shown: Displayable) -> str | None:
+def notebook_html(shown: Displayable) -> str | None:
     """What a notebook shows of a mechanism or a result: tables of a result, a still picture, the page over it.
 
     None where there is nothing of these, so that the text is shown.
     """
-    moving, layers, table = _presented(shown)
+    moving, layers, table = _presentation(shown)
     try:
-        subject = _subject(moving)
-        picture = still(subject.mechanism, subject.z)
-        text = page(*subject, layers=layers, library=carries())
+        subject = _page_subject(moving)
+        picture = still_svg(subject.mechanism, subject.z)
+        text = page(*subject, layers=layers, library=must_carry_scripts())
     except (BadInput, NoAnswer):
         return table or None
-    return output(subject.mechanism.name, table, picture, text)
+    return output_html(subject.mechanism.name, table, picture, text)
 
 
-def _presented(shown: Any) -> tuple[Mechanism | State | Motion, tuple[str, ...], str]:
+def _presentation(shown: Any) -> tuple[Mechanism | State | Motion, tuple[str, ...], str]:
     """Of what the page is, its layers, and the tables above it."""
     from planar.analysis.centres.centres import Centres
     from planar.assemblies.circuits.circuits import Circuits
@@ -111,14 +111,14 @@ def _presented(shown: Any) -> tuple[Mechanism | State | Motion, tuple[str, ...],
         return (
             shown.moving,
             ("paths", "forces"),
-            html(forces_over_motion.tables(shown) if over else forces.tables(shown, {})),
+            to_html(forces_over_motion.tables(shown) if over else forces.tables(shown, {})),
         )
     if isinstance(shown, Centres):
-        return shown.state, ("centres",), html(centres.table(shown))
+        return shown.state, ("centres",), to_html(centres.table(shown))
     if isinstance(shown, Modes):
-        return shown.mechanism, ("paths",), html(assemblies.table(shown, LISTED))
+        return shown.mechanism, ("paths",), to_html(assemblies.table(shown, MAX_LISTED_ASSEMBLIES))
     if isinstance(shown, Circuits):
-        return shown.mechanism, ("paths",), html(circuits.table(shown, modes(shown.mechanism, certify=False)))
+        return shown.mechanism, ("paths",), to_html(circuits.table(shown, modes(shown.mechanism, certify=False)))
     return shown, ("paths",), ""
 
 
@@ -129,7 +129,7 @@ def _unknowns(shown: State | Motion, mechanism: Mechanism, row: int = 0) -> np.n
         rows = np.ravel(value.parts[0] if isinstance(value, Jet) else value)
         return float(rows[row if rows.size > 1 else 0])  # what stands still has one for all
 
-    solver = known_of(mechanism).solver
+    solver = solved_mechanism(mechanism).solver
     frames = {name: frame_at(*map(number, (frame.x, frame.y, frame.angle))) for name, frame in shown.frames.items()}
     own = {name: tuple(map(number, values)) for name, values in shown.own.items()}
     return solver.coordinates(frames, own)[list(solver.equations.unknowns)]

@@ -7,24 +7,24 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.foundation.units import SI, own
+from planar.foundation.units import SI_UNITS, unit_of_kind
 from planar.results.motion import Motion
 
 Array = np.ndarray
 
-POINTS = {"position": "length", "velocity": "velocity", "acceleration": "acceleration", "jerk": "jerk"}
+POINT_KINDS = {"position": "length", "velocity": "velocity", "acceleration": "acceleration", "jerk": "jerk"}
 """What is told of a point, and the kind of quantity that each is; a jerk where the run has one."""
 
-MEASURES = SI | {"power": "W", "energy": "J"}
+UNITS_BY_KIND = SI_UNITS | {"power": "W", "energy": "J"}
 """The unit of every kind of quantity that results have."""
 
-_LETTERS = {"position": "", "velocity": "v", "acceleration": "a", "jerk": "j", "force": "F"}
+_VECTOR_LETTERS = {"position": "", "velocity": "v", "acceleration": "a", "jerk": "j", "force": "F"}
 
 
-_KINDS = {"inputs": "input ", "pairs": "pair ", "reactions": "reaction "}
+_GROUP_PREFIXES = {"inputs": "input ", "pairs": "pair ", "reactions": "reaction "}
 
 
-class Told(NamedTuple):
+class ReportedSeries(NamedTuple):
     """What a run tells of one thing, in SI.
 
     `group` is "inputs", "points", "links" or "pairs", or what else is told beside the run; a name that is empty means
@@ -38,7 +38,7 @@ class Told(NamedTuple):
     values: Mapping[str, Array | None]
 
 
-class Column(NamedTuple):
+class RunColumn(NamedTuple):
     """A column of a table: its name, its unit, its kind of quantity, and its values (n,) in that unit."""
 
     name: str
@@ -52,59 +52,59 @@ class Column(NamedTuple):
         return f"{self.name} [{self.unit}]"
 
 
-def about(motion: Motion) -> dict[str, str]:
+def run_header(motion: Motion) -> dict[str, str]:
     """The texts that stand at the head of a run in every format that has room for texts."""
     return {"mechanism": motion.mechanism.name, "outcome": motion.outcome.value, "reason": motion.reason}
 
 
-def told(motion: Motion) -> Iterator[Told]:
+def reported_series(motion: Motion) -> Iterator[ReportedSeries]:
     """Inputs, points, links, then what the pairs report; the jerks of points and links where the run has them."""
     for name, given in motion.inputs.items():
         values = given._asdict()
-        yield Told("inputs", name, dict(zip(values, motion.driven(name), strict=True)), values)
+        yield ReportedSeries("inputs", name, dict(zip(values, motion.input_quantity_kinds(name), strict=True)), values)
     jerked = motion.jerked is not None
     for name in motion.point_names:
         values = motion.point(name)._asdict() | ({"jerk": motion.jerk(name)} if jerked else {})
-        yield Told("points", name, POINTS, values)
+        yield ReportedSeries("points", name, POINT_KINDS, values)
     for name in motion.frames:
         values = motion.link(name)._asdict() | ({"angular_jerk": motion.angular_jerk(name)} if jerked else {})
-        yield Told("links", name, {what: what.replace("_", " ") for what in values}, values)
+        yield ReportedSeries("links", name, {what: what.replace("_", " ") for what in values}, values)
     for name, report in motion.pairs.items():
-        yield Told("pairs", name, motion.reported(name), report)
+        yield ReportedSeries("pairs", name, motion.result_kinds(name), report)
 
 
-def columns(motion: Motion, more: Iterable[Told] = ()) -> Iterator[Column]:
+def run_columns(motion: Motion, more: Iterable[ReportedSeries] = ()) -> Iterator[RunColumn]:
     """Time where there is one, all that is told of the run but the frame's rest, then more; under names that differ.
 
     Units are those that go with the mechanism's file (see `planar.foundation.units.own`).
     """
     taken: set[str] = set()
-    for name, kind, values in _named(motion, more):
+    for name, kind, values in _named_values(motion, more):
         different, again = name, 1
         while different in taken:  # as a link "pair G" beside a pair "G"
             again += 1
             different = f"{name} ({again})"
         taken.add(different)
-        if kind in SI:
-            measure, (_, numerator, denominator) = own(kind, motion.mechanism.units)
-            yield Column(different, measure, kind, values * denominator / numerator)
+        if kind in SI_UNITS:
+            measure, (_, numerator, denominator) = unit_of_kind(kind, motion.mechanism.units)
+            yield RunColumn(different, measure, kind, values * denominator / numerator)
         else:
-            yield Column(different, MEASURES[kind], kind, values)
+            yield RunColumn(different, UNITS_BY_KIND[kind], kind, values)
 
 
-def _named(motion: Motion, more: Iterable[Told]) -> Iterator[tuple[str, str, Array]]:
+def _named_values(motion: Motion, more: Iterable[ReportedSeries]) -> Iterator[tuple[str, str, Array]]:
     """Name, kind and values (n,) in SI of every column."""
     if motion.time is not None:
         yield "time", "time", motion.time
-    for thing in (*told(motion), *more):
+    for thing in (*reported_series(motion), *more):
         if thing.group == "links" and thing.name == motion.mechanism.frame:
             continue
-        of = _KINDS.get(thing.group, "") + thing.name or thing.group
+        of = _GROUP_PREFIXES.get(thing.group, "") + thing.name or thing.group
         for what, values in thing.values.items():
             if values is None:
                 continue
             if values.ndim == 2:
                 for axis, part in zip("xy", values.T, strict=True):
-                    yield f"{of} {_LETTERS[what]}{axis}", thing.kinds[what], part
+                    yield f"{of} {_VECTOR_LETTERS[what]}{axis}", thing.kinds[what], part
             else:
                 yield f"{of} {what.replace('_', ' ')}", thing.kinds[what], values

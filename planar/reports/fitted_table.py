@@ -15,30 +15,30 @@ from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
-HEADING = 13
+MAX_HEADING_WIDTH = 13
 """Characters: longer headings stand in several lines, so that the tables of a textbook mechanism fit 80 columns."""
-NARROW = 5
+MIN_COLUMN_WIDTH = 5
 """Characters that a column takes where there is room."""
-TEXT = 20
+KEPT_TEXT_WIDTH = 20
 """Characters that a long text keeps as long as there is another way to find room."""
-GAP, EDGES = 2, 2
+COLUMN_GAP, EDGE_WIDTH = 2, 2
 """Characters between two columns, and beside all of them."""
 
 Cell = str | Text
 
 
-class Column(NamedTuple):
+class TableColumn(NamedTuple):
     """A column: its name and its unit, whether words stand in it, and whether it belongs to the one before it."""
 
     name: str
     unit: str
-    words: bool
-    joined: bool
+    has_words: bool
+    joins_previous: bool
 
     @property
     def lines(self) -> list[str]:
         """The heading in lines, the unit last; no word of it is broken."""
-        named = wrap(self.name, HEADING, break_long_words=False, break_on_hyphens=False)
+        named = wrap(self.name, MAX_HEADING_WIDTH, break_long_words=False, break_on_hyphens=False)
         return [*named, self.unit] if self.unit else named
 
     @property
@@ -47,7 +47,7 @@ class Column(NamedTuple):
         return ", ".join(filter(None, (self.name, self.unit)))
 
 
-class Widths(NamedTuple):
+class ColumnWidths(NamedTuple):
     """Characters that a column takes with nothing broken, with its cells in two lines or so, and at the least."""
 
     natural: int
@@ -64,7 +64,7 @@ class FittedTable:
     """
 
     title: str | None
-    columns: tuple[Column, ...]
+    columns: tuple[TableColumn, ...]
     keys: int = 1
     rows: list[tuple[Cell, ...]] = field(default_factory=list)
 
@@ -77,48 +77,48 @@ class FittedTable:
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Segment | RenderableType]:
         if self.title:
             yield Text(self.title, style="bold")
-        for table, width in self._tables(options.max_width):
+        for table, width in self._fitting_tables(options.max_width):
             # a table that cannot be narrower than the terminal is not to be cut by it
             yield from console.render(table, options.update_width(max(width, options.max_width)))
 
     def __rich_measure__(self, console: Console, options: ConsoleOptions) -> Measurement:
-        widest = max((width for _, width in self._tables(options.max_width)), default=0)
+        widest = max((width for _, width in self._fitting_tables(options.max_width)), default=0)
         return Measurement(widest, widest)
 
-    def _tables(self, room: int) -> Iterator[tuple[Table, int]]:
+    def _fitting_tables(self, width: int) -> Iterator[tuple[Table, int]]:
         """The tables that fit, each with the characters that it takes."""
-        widths = [_widths(column, [row[k] for row in self.rows]) for k, column in enumerate(self.columns)]
-        parts = _parts(self.columns, self.keys, widths, room)
+        widths = [_column_widths(column, [row[k] for row in self.rows]) for k, column in enumerate(self.columns)]
+        parts = _split_columns(self.columns, self.keys, widths, width)
         if parts is None:
-            yield from (self._record(row, room) for row in self.rows)
+            yield from (self._draw_record(row, width) for row in self.rows)
             return
         for part in parts:
-            yield self._part(part), _total(part.values())
+            yield self._draw_table(part), _total_width(part.values())
 
-    def _part(self, widths: dict[int, int]) -> Table:
+    def _draw_table(self, widths: dict[int, int]) -> Table:
         """Some of the columns, by their numbers, with the width of each."""
         table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
         for k, width in widths.items():
             column = self.columns[k]
-            justify = "left" if column.words else "right"
+            justify = "left" if column.has_words else "right"
             table.add_column("\n".join(column.lines), justify=justify, overflow="fold", width=width)
         for row in self.rows:
             table.add_row(*(row[k] for k in widths))
         return table
 
-    def _record(self, row: Sequence[Cell], room: int) -> tuple[Table, int]:
+    def _draw_record(self, row: Sequence[Cell], room: int) -> tuple[Table, int]:
         """A row by itself: every cell behind its heading."""
         both = zip(self.columns, row, strict=True)
         told = [(Text(column.label), cell) for column, cell in both if column.label or str(cell)]
-        widths = [_of_cells([each[k] for each in told]) for k in (0, 1)]
-        wide = _spread(widths, [each.hard for each in widths], room) or [each.hard for each in widths]
+        widths = [_cell_widths([each[k] for each in told]) for k in (0, 1)]
+        wide = _spread_widths(widths, [each.hard for each in widths], room) or [each.hard for each in widths]
         table = Table(box=None, show_header=False, padding=(0, 1, 0, 1), pad_edge=True)
         for width in wide:
             table.add_column(overflow="fold", width=width)
         for each in told:
             table.add_row(*each)
         table.add_row("", "")
-        return table, _total(wide)
+        return table, _total_width(wide)
 
 
 def plain_table(
@@ -129,83 +129,89 @@ def plain_table(
     Headings in a tuple stand side by side at any width, as a magnitude and its direction. Words stand in the columns of
     the numbers `left`, numbers in the others; the first `keys` columns say what a row is of.
     """
-    columns: list[Column] = []
+    columns: list[TableColumn] = []
     for group in headings:
         for index, heading in enumerate((group,) if isinstance(group, str) else group):
             name, _, unit = heading.partition(", ")
             words = len(columns) in left or heading == "sense"
-            columns.append(Column(name, unit, words, index > 0))
+            columns.append(TableColumn(name, unit, words, index > 0))
     return FittedTable(title, tuple(columns), keys)
 
 
-def _parts(columns: Sequence[Column], keys: int, widths: Sequence[Widths], room: int) -> list[dict[int, int]] | None:
+def _split_columns(
+    columns: Sequence[TableColumn], keys: int, widths: Sequence[ColumnWidths], room: int
+) -> list[dict[int, int]] | None:
     """The columns of each table, by number, with their widths; None where they do not fit in any number of tables."""
     every = list(range(len(columns)))
     soft, hard = ([getattr(each, how) for each in widths] for how in ("soft", "hard"))
-    whole = [soft, hard] if all(column.words for column in columns) else [soft]
+    whole = [soft, hard] if all(column.has_words for column in columns) else [soft]
     for least in whole:
-        found = _spread(widths, least, room)
+        found = _spread_widths(widths, least, room)
         if found is not None:
             return [dict(zip(every, found, strict=True))]
     groups: list[list[int]] = []
     for k in every[keys:]:
-        if columns[k].joined and k > keys:
+        if columns[k].joins_previous and k > keys:
             groups[-1].append(k)
         else:
             groups.append([k])
-    return _packed(every[:keys], groups, widths, soft, room) or _packed(every[:keys], groups, widths, hard, room)
+    return _pack_groups(every[:keys], groups, widths, soft, room) or _pack_groups(
+        every[:keys], groups, widths, hard, room
+    )
 
 
-def _packed(
-    keys: list[int], groups: Sequence[list[int]], widths: Sequence[Widths], least: Sequence[int], room: int
+def _pack_groups(
+    keys: list[int], groups: Sequence[list[int]], widths: Sequence[ColumnWidths], least: Sequence[int], room: int
 ) -> list[dict[int, int]] | None:
     """As many groups of columns in each table as fit beside the keys."""
     filled: list[list[int]] = []
     for group in groups:
-        if filled and _total(least[k] for k in (*filled[-1], *group)) <= room:
+        if filled and _total_width(least[k] for k in (*filled[-1], *group)) <= room:
             filled[-1] += group
         else:
             filled.append([*keys, *group])
     found = []
     for part in filled:
-        spread = _spread([widths[k] for k in part], [least[k] for k in part], room)
+        spread = _spread_widths([widths[k] for k in part], [least[k] for k in part], room)
         if spread is None:
             return None
         found.append(dict(zip(part, spread, strict=True)))
     return found
 
 
-def _spread(widths: Sequence[Widths], least: Sequence[int], room: int) -> list[int] | None:
+def _spread_widths(widths: Sequence[ColumnWidths], least: Sequence[int], room: int) -> list[int] | None:
     """The widths of columns side by side, the widest narrowed first; None where they do not fit."""
-    if _total(least) > room:
+    if _total_width(least) > room:
         return None
     most = max((each.natural for each in widths), default=0)
     while True:
         found = [max(low, min(each.natural, most)) for each, low in zip(widths, least, strict=True)]
-        if _total(found) <= room:
+        if _total_width(found) <= room:
             return found
         most -= 1
 
 
-def _total(widths: Sequence[int] | Iterator[int]) -> int:
+def _total_width(widths: Sequence[int] | Iterator[int]) -> int:
     """The characters that columns of these widths take side by side."""
     told = list(widths)
-    return sum(told) + GAP * (len(told) - 1) + EDGES
+    return sum(told) + COLUMN_GAP * (len(told) - 1) + EDGE_WIDTH
 
 
-def _widths(column: Column, cells: Sequence[Cell]) -> Widths:
-    found, heading = _of_cells(cells), max(map(cell_len, column.lines), default=0)
-    return Widths(max(found.natural, heading, NARROW), max(found.soft, heading), max(found.hard, heading))
+def _column_widths(column: TableColumn, cells: Sequence[Cell]) -> ColumnWidths:
+    found, heading = _cell_widths(cells), max(map(cell_len, column.lines), default=0)
+    return ColumnWidths(
+        max(found.natural, heading, MIN_COLUMN_WIDTH), max(found.soft, heading), max(found.hard, heading)
+    )
 
 
-def _of_cells(cells: Sequence[Cell]) -> Widths:
+def _cell_widths(cells: Sequence[Cell]) -> ColumnWidths:
     texts = [cell.plain if isinstance(cell, Text) else cell for cell in cells]
     natural = max(map(cell_len, texts), default=0)
     hard = max((cell_len(word) for text in texts for word in _words(text)), default=0)
     soft = hard
-    while soft < min(natural, TEXT) and any(_lines(text, soft) > 2 for text in texts):
+    while soft < min(natural, KEPT_TEXT_WIDTH) and any(_count_lines(text, soft) > 2 for text in texts):
         soft += 1
-    return Widths(natural, soft, hard)
+    return ColumnWidths(natural, soft, hard)
 
 
 def _words(text: str) -> list[str]:
@@ -216,7 +222,7 @@ def _words(text: str) -> list[str]:
     return words
 
 
-def _lines(text: str, width: int) -> int:
+def _count_lines(text: str, width: int) -> int:
     """How many lines a text takes."""
     count, taken = 1, -1
     for word in _words(text):

@@ -10,49 +10,55 @@ from rich.table import Table
 from rich.text import Text
 
 from planar.analysis.worked.published import Comparison
-from planar.foundation.units import Unit, shown, unit
-from planar.model.mechanism import QUANTITIES, Units, motions
+from planar.foundation.units import Unit, display_unit, parse_unit
+from planar.model.mechanism import PUBLISHED_QUANTITIES, FileUnits, relative_motions
 from planar.model.pairs import Pair
-from planar.model.wording import amount, listed
+from planar.model.wording import amount, join_all_names
 from planar.reports.fitted_table import FittedTable, plain_table
 from planar.results.motion import RelativeState, State
 
 DIGITS = 6
 """Significant digits printed; `--json` has all of them."""
-SIZE = "of the mechanism's size"
-ROUND_OFF = 1e-10
+SIZE_PHRASE = "of the mechanism's size"
+ROUND_OFF_THRESHOLD = 1e-10
 """Of what it is told beside: a proof that leaves less is as good as numbers are."""
-ROUNDING = 1e-12
+ROUNDING_RATIO = 1e-12
 """What is less than this part of what it is told beside is printed as 0."""
 
 
-def solution(
+def solution_tables(
     state: State, comparisons: Iterable[Comparison], relatives: Mapping[str, RelativeState] | None = None
 ) -> RenderableType:
     """A solved position: links, points, pairs, relative motions, and the published values beside the solved ones."""
-    parts: list[RenderableType] = [_heading(state), Text(), _links(state), _points(state), _pairs(state)]
-    parts += [_relative(text, each, state) for text, each in (relatives or {}).items()]
+    parts: list[RenderableType] = [
+        _state_heading(state),
+        Text(),
+        _links_table(state),
+        _points_table(state),
+        _pair_tables(state),
+    ]
+    parts += [_relative_table(text, each, state) for text, each in (relatives or {}).items()]
     comparisons = tuple(comparisons)
     if comparisons:
-        parts.append(published(comparisons, state.mechanism.units))
+        parts.append(published_table(comparisons, state.mechanism.units))
     notes = [*state.remarks, *state.mechanism.notes]
     if notes:
         parts += [Text(), Text("Notes", style="bold"), paragraphs(("-", note) for note in notes)]
     return Group(*parts)
 
 
-def published(comparisons: Iterable[Comparison], units: Units) -> RenderableType:
+def published_table(comparisons: Iterable[Comparison], units: FileUnits) -> RenderableType:
     """Solved values beside those that a book prints."""
     headings = ("", "quantity", ("solved", "printed", "unit"), ("off", ""))
     table = plain_table("Published values", *headings, left=(0, 1, 4, 6))
     reasons: list[tuple[str, str]] = []
     for each in comparisons:
         item = each.published
-        measure, of = shown(QUANTITIES[item.quantity], units)
-        off = "" if each.apart is None else f"{round(100.0 * each.apart, 1) + 0.0:+.1f} %"
+        measure, of = display_unit(PUBLISHED_QUANTITIES[item.quantity], units)
+        off = "" if each.relative_difference is None else f"{round(100.0 * each.relative_difference, 1) + 0.0:+.1f} %"
         style = {"differs": "bold red", "sense differs": "bold red", "slip in the book": "yellow"}.get(each.verdict, "")
         printed = "-" if item.value is None else f"{of.from_si(item.value):.6g}"
-        solved = number(of.from_si(each.solved))
+        solved = format_number(of.from_si(each.solved))
         table.add_row(item.symbol, each.about, solved, printed, measure, off, Text(each.verdict, style))
         why = item.slip or item.note
         if why:
@@ -70,7 +76,7 @@ def paragraphs(rows: Iterable[tuple[str, str]]) -> Table:
     return grid
 
 
-def models(rows: Iterable[tuple[str, str, str]]) -> RenderableType:
+def models_table(rows: Iterable[tuple[str, str, str]]) -> RenderableType:
     """The models that come along: name, other ids, what each is."""
     table = plain_table(None, "model", "also", "what it is", left=(0, 1, 2))
     for row in rows:
@@ -78,105 +84,110 @@ def models(rows: Iterable[tuple[str, str, str]]) -> RenderableType:
     return table
 
 
-def _heading(state: State) -> RenderableType:
+def _state_heading(state: State) -> RenderableType:
     mechanism = state.mechanism
     lines = [Text(mechanism.name, style="bold")]
     if mechanism.source:
         lines.append(Text(mechanism.source, style="italic"))
-    named = motions(mechanism)
+    named = relative_motions(mechanism)
     inputs = [
-        f"{name} = {amount(given.position, named[name].drive_kind.value, mechanism.units)}"
+        f"{name} = {amount(given.position, named[name].input_kind.value, mechanism.units)}"
         for name, given in state.inputs.items()
     ]
-    at = f"at {listed(inputs)}" if inputs else "without inputs"
-    lines.append(Text(f"{at}; mobility {state.mobility}; every pair closes {kept(state.residual, SIZE)}"))
+    at = f"at {join_all_names(inputs)}" if inputs else "without inputs"
+    lines.append(
+        Text(f"{at}; mobility {state.mobility}; every pair closes {precision_text(state.residual, SIZE_PHRASE)}")
+    )
     return Group(*lines)
 
 
-def heading(name: str, kind: str, units: Units) -> str:
+def column_heading(name: str, kind: str, units: FileUnits) -> str:
     """The heading of a column: its name and the unit in which its kind of quantity is shown."""
-    return f"{name}, {shown(kind, units)[0]}"
+    return f"{name}, {display_unit(kind, units)[0]}"
 
 
-def _links(state: State) -> FittedTable:
+def _links_table(state: State) -> FittedTable:
     units = state.mechanism.units
     table = plain_table(
         "Links",
         "link",
-        heading("angle", "angle", units),
-        heading("ang. velocity", "angular velocity", units),
-        (heading("ang. acceleration", "angular acceleration", units), "sense"),
+        column_heading("angle", "angle", units),
+        column_heading("ang. velocity", "angular velocity", units),
+        (column_heading("ang. acceleration", "angular acceleration", units), "sense"),
     )
-    angle = unit(units.angle)
+    angle = parse_unit(units.angle)
     for name, link in state.links.items():
         if name != state.mechanism.frame:
             table.add_row(
                 name,
-                number(angle.from_si(link.angle)),
-                number(link.angular_velocity),
-                number(link.angular_acceleration),
+                format_number(angle.from_si(link.angle)),
+                format_number(link.angular_velocity),
+                format_number(link.angular_acceleration),
                 link.sense,
             )
     return table
 
 
-def _points(state: State) -> FittedTable:
+def _points_table(state: State) -> FittedTable:
     units = state.mechanism.units
-    at = heading("at", "angle", units)
+    at = column_heading("at", "angle", units)
     table = plain_table(
         "Points",
         "point",
-        tuple(heading(axis, "length", units) for axis in "xy"),
-        (heading("velocity", "velocity", units), at),
-        (heading("acceleration", "acceleration", units), at),
+        tuple(column_heading(axis, "length", units) for axis in "xy"),
+        (column_heading("velocity", "velocity", units), at),
+        (column_heading("acceleration", "acceleration", units), at),
         "sense",
     )
-    length, velocity, acceleration = (shown(kind, units)[1] for kind in ("length", "velocity", "acceleration"))
+    length, velocity, acceleration = (display_unit(kind, units)[1] for kind in ("length", "velocity", "acceleration"))
     points = state.points
     scale = max((float(np.hypot(*point.position)) for point in points.values()), default=1.0) or 1.0
     for name, point in points.items():
-        placed = (number(length.from_si(float(each) if abs(each) > 1e-13 * scale else 0.0)) for each in point.position)
+        placed = (
+            format_number(length.from_si(float(each) if abs(each) > 1e-13 * scale else 0.0)) for each in point.position
+        )
         table.add_row(
             name,
             *placed,
-            *_arrow(point.velocity, velocity, units),
-            *_arrow(point.acceleration, acceleration, units),
+            *_polar_cells(point.velocity, velocity, units),
+            *_polar_cells(point.acceleration, acceleration, units),
             point.sense,
         )
     return table
 
 
-def _arrow(vector: np.ndarray, of: Unit, units: Units) -> tuple[str, str]:
+def _polar_cells(vector: np.ndarray, of: Unit, units: FileUnits) -> tuple[str, str]:
     """A vector's magnitude and direction; without a direction where it is nothing."""
     size = float(np.hypot(*vector))
-    way = number(unit(units.angle).from_si(direction(vector))) if size > 1e-14 else ""
-    return number(of.from_si(size)), way
+    way = format_number(parse_unit(units.angle).from_si(vector_direction(vector))) if size > 1e-14 else ""
+    return format_number(of.from_si(size)), way
 
 
-def _pairs(state: State) -> RenderableType:
+def _pair_tables(state: State) -> RenderableType:
     kinds: dict[type[Pair], list[Pair]] = {}
-    for pair in motions(state.mechanism).values():
+    for pair in relative_motions(state.mechanism).values():
         kinds.setdefault(type(pair), []).append(pair)
     tables, units = [], state.mechanism.units
     for kind, pairs in kinds.items():
         titles = [
-            heading(name.replace("_", " ").replace("angular", "ang."), of, units) for name, of in kind.reports.items()
+            column_heading(name.replace("_", " ").replace("angular", "ang."), of, units)
+            for name, of in kind.result_kinds.items()
         ]
         table = plain_table(f"{kind.keyword.capitalize()} pairs", "pair", "links", *titles, left=(0, 1), keys=2)
         for pair in pairs:
             report = state.pair(pair.name)
-            values = [_reported(report[name], of, units) for name, of in kind.reports.items()]
+            values = [_report_cell(report[name], of, units) for name, of in kind.result_kinds.items()]
             table.add_row(pair.name, " - ".join(pair.links), *values)
         tables.append(table)
     return Group(*tables)
 
 
-def _relative(text: str, relative: RelativeState, state: State) -> RenderableType:
+def _relative_table(text: str, relative: RelativeState, state: State) -> RenderableType:
     """How one point moves against another, part by part."""
     point, other = text.split(",")[:2]
     units = state.mechanism.units
     title = f"{point.strip()} against {other.strip()}, in the axes of {relative.axes}"
-    at = heading("at", "angle", units)
+    at = column_heading("at", "angle", units)
     table = plain_table(title, "part", ("magnitude", "unit", at), ("x", "y"), left=(0, 2))
     parts = {
         "velocity": ("velocity", relative.velocity),
@@ -189,35 +200,41 @@ def _relative(text: str, relative: RelativeState, state: State) -> RenderableTyp
         "  by sliding ": ("acceleration", relative.sliding_acceleration),
     }
     for name, (kind, part) in parts.items():
-        measure, of = shown(kind, units)
-        size, way = _arrow(part, of, units)
-        table.add_row(name, size, measure, way, *(number(of.from_si(float(each))) for each in part))
+        measure, of = display_unit(kind, units)
+        size, way = _polar_cells(part, of, units)
+        table.add_row(name, size, measure, way, *(format_number(of.from_si(float(each))) for each in part))
     return table
 
 
-def _reported(value: float | None, kind: str, units: Units) -> str:
-    return "-" if value is None else number(shown(kind, units)[1].from_si(value))
+def _report_cell(value: float | None, kind: str, units: FileUnits) -> str:
+    return "-" if value is None else format_number(display_unit(kind, units)[1].from_si(value))
 
 
-def direction(vector: np.ndarray) -> float:
+def vector_direction(vector: np.ndarray) -> float:
     """The direction of a vector (rad), above -pi up to pi; what rounding leaves of a part is none."""
-    least = ROUNDING * float(np.hypot(*vector))
+    least = ROUNDING_RATIO * float(np.hypot(*vector))
     x, y = (float(part) if abs(part) > least else 0.0 for part in vector)
     return float(np.arctan2(y, x))
 
 
-def kept(value: float, of: str = "") -> str:
+def precision_text(value: float, reference: str = "") -> str:
     """How well something holds that leaves `value` of another thing open: exactly, to round-off, or but for that."""
-    beside = f"{value:.1e} {of}".rstrip()
-    return "exactly" if value == 0.0 else f"to round-off ({beside})" if value < ROUND_OFF else f"but for {beside}"
+    beside = f"{value:.1e} {reference}".rstrip()
+    return (
+        "exactly"
+        if value == 0.0
+        else f"to round-off ({beside})"
+        if value < ROUND_OFF_THRESHOLD
+        else f"but for {beside}"
+    )
 
 
-def number(value: float) -> str:
+def format_number(value: float) -> str:
     return "0" if abs(value) < 1e-14 else f"{value:#.{DIGITS}g}".rstrip(".")
 
 
-def counted(value: float | None, beside: float = 0.0) -> str:
+def format_or_zero(value: float | None, beside: float = 0.0) -> str:
     """A number, nothing where it is only what rounding leaves of another beside it; a dash where there is none."""
     if value is None or not np.isfinite(value):
         return "-"
-    return f"{value:#.{DIGITS}g}".rstrip(".") if abs(value) > ROUNDING * abs(beside) else "0"
+    return f"{value:#.{DIGITS}g}".rstrip(".") if abs(value) > ROUNDING_RATIO * abs(beside) else "0"

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planar.foundation.geometry import Frame, Vector
-from planar.foundation.jets import Jet, orders
+from planar.foundation.jets import Jet, value_and_rates
 
 Array = np.ndarray
 
@@ -109,29 +109,29 @@ class RelativeState(NamedTuple):
     sliding_acceleration: Array
 
 
-class Jerked(NamedTuple):
+class ThirdRates(NamedTuple):
     """Frames of links and own coordinates of pairs over a motion, as jets that have third rates as well."""
 
     frames: Mapping[str, Frame]
     own: Mapping[str, tuple[Jet, ...]]
 
 
-SEAM = 1e-9
+HALF_TURN_TOLERANCE = 1e-9
 """rad: an angle so little beyond half a turn is told as half a turn."""
 
 
-def wrapped(angle: float) -> float:
+def wrap_angle(angle: float) -> float:
     """The same direction as an angle between -pi and pi."""
     return float(np.arctan2(np.sin(angle), np.cos(angle))) if abs(angle) > np.pi else angle
 
 
-def turns_to_least(angles: Array) -> float:
+def principal_turns(angles: Array) -> float:
     """The whole turns (rad) to add to angles so that their least lies between -pi and pi, as positions have it.
 
     Of such as turn right round it is the first that lies there.
     """
     first = float(angles[0] if np.ptp(angles) >= 2.0 * np.pi else np.min(angles))
-    return 0.0 if abs(first) <= np.pi + SEAM else wrapped(first) - first
+    return 0.0 if abs(first) <= np.pi + HALF_TURN_TOLERANCE else wrap_angle(first) - first
 
 
 def third_rate(value: Any) -> Any:
@@ -139,9 +139,9 @@ def third_rate(value: Any) -> Any:
     return value.parts[3] if isinstance(value, Jet) else 0.0
 
 
-def vector_orders(vector: Vector) -> list[tuple[Any, Any]]:
+def vector_and_rates(vector: Vector) -> list[tuple[Any, Any]]:
     """x and y of a vector, then of its rates."""
-    return list(zip(orders(vector.x), orders(vector.y), strict=True))
+    return list(zip(value_and_rates(vector.x), value_and_rates(vector.y), strict=True))
 
 
 def scales(points: Array, angles: Array) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -158,11 +158,11 @@ def scales(points: Array, angles: Array) -> tuple[tuple[float, float], tuple[flo
     return (float(speed), float(push)), (float(turning), float(max(swing, turning**2)))
 
 
-def vectors_of(x: Any, y: Any) -> Array:
+def stack_vectors(x: Any, y: Any) -> Array:
     """x and y as vectors (..., 2)."""
     return np.stack(np.broadcast_arrays(np.asarray(x, dtype=float), y), axis=-1)
 
 
-def quarter_turned(vectors: Array) -> Array:
+def rotate_quarter_turn(vectors: Array) -> Array:
     """Vectors (..., 2) turned a quarter anticlockwise."""
     return np.stack([-vectors[..., 1], vectors[..., 0]], axis=-1)

@@ -6,14 +6,14 @@ from collections.abc import Iterable, Sequence
 from numbers import Integral, Real
 
 from planar.foundation.errors import BadInput
-from planar.model.mechanism import MOST_COUNTED, Mechanism
+from planar.model.mechanism import LARGEST_COUNTED_ANGLE, Mechanism
 from planar.results.motion import Motion
-from planar.solving.runs.range_run import Progress, Ranged
-from planar.solving.runs.time_run import Timed
+from planar.solving.runs.range_run import Progress, RangeRun
+from planar.solving.runs.time_run import TimeRun
 
-MOST_STEPS = 10**5
+MAX_STEPS = 10**5
 """A run of so many positions of forty links takes some hundred megabytes."""
-LONGEST = 1e6
+MAX_DURATION = 1e6
 """s"""
 
 
@@ -58,12 +58,12 @@ def cycle(
     range is followed, in rad or m of the input's way. Raises BadInput for an input or a range that is not there,
     NoAnswer where there is no position to start from.
     """
-    if isinstance(steps, bool) or not isinstance(steps, Integral) or not 1 <= steps <= MOST_STEPS:
-        raise BadInput("steps", f"a whole number of steps from 1 to {MOST_STEPS} is wanted, not {steps!r:.40}")
+    if isinstance(steps, bool) or not isinstance(steps, Integral) or not 1 <= steps <= MAX_STEPS:
+        raise BadInput("steps", f"a whole number of steps from 1 to {MAX_STEPS} is wanted, not {steps!r:.40}")
     for name, value, most in (
-        ("start", start, MOST_COUNTED),
-        ("stop", stop, MOST_COUNTED),
-        ("duration", duration, LONGEST),
+        ("start", start, LARGEST_COUNTED_ANGLE),
+        ("stop", stop, LARGEST_COUNTED_ANGLE),
+        ("duration", duration, MAX_DURATION),
     ):
         if value is None:
             continue
@@ -83,8 +83,10 @@ def cycle(
     if duration is not None or (lawful and not any(ranged)):
         if any(ranged):
             raise BadInput("duration", "a run in time has no range of one input; give the one or the other")
-        return Timed(mechanism, branches, jerk).over(int(steps), duration)
+        return TimeRun(mechanism, branches, jerk).run(int(steps), duration)
     if circuit and (stop is not None or there_and_back):
         raise BadInput("circuit", "a circuit goes all round; it has no end to stop at, and comes back by itself")
-    runner = Ranged(mechanism, pair, branches, jerk, progress)
-    return runner.round(int(steps), start) if circuit else runner.between(int(steps), start, stop, there_and_back)
+    runner = RangeRun(mechanism, pair, branches, jerk, progress)
+    return (
+        runner.run_circuit(int(steps), start) if circuit else runner.run_range(int(steps), start, stop, there_and_back)
+    )

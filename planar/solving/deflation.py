@@ -14,97 +14,97 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from planar.equations.constraint_equations import Stage
-from planar.equations.functions import Program
-from planar.equations.minors import Block, depends, with_minors
-from planar.solving.prepared_mechanism import Setup
+from planar.equations.constraint_equations import Block
+from planar.equations.functions import EquationFunctions
+from planar.equations.minors import LowRankBlock, add_minors, constraint_dependencies
+from planar.solving.prepared_mechanism import PreparedMechanism
 
 Array = np.ndarray
 
-LARGEST = 12
+MAX_MINOR_RANK = 12
 """Rank from which on minors would be expressions too long."""
-SINGULAR = 1e-5
+SINGULAR_TOLERANCE = 1e-5
 """A singular value below this part of the greatest is zero: a double root is known to about 1e-8."""
-AWAY = 1e-2
+PROBE_DISTANCE = 1e-2
 """rad, or lengths of the size: how far along the motion it is looked whether the rank is as low."""
-TRIES = 4
-CORRECTIONS, CLOSED = 12, 1e-10
+PROBE_COUNT = 4
+MAX_CORRECTIONS, CLOSED_TOLERANCE = 12, 1e-10
 
 
-def deflated(setup: Setup, weak: Sequence[Stage], z: Array) -> tuple[Program, Array] | None:
+def deflate(setup: PreparedMechanism, weak: Sequence[Block], z: Array) -> tuple[EquationFunctions, Array] | None:
     """The program in which groups that are singular at z, and all along the motion, have the minors that vanish there
     as constraints too; and z by it. None where they are singular in this position alone, or something is free.
     """
-    y = np.concatenate([z, setup.station.u])
+    y = np.concatenate([z, setup.inputs.u])
     for with_earlier in (False, True):
-        blocks = {stage.level: _block(setup, stage, z, with_earlier) for stage in weak}
+        blocks = {stage.block_index: _minor_block(setup, stage, z, with_earlier) for stage in weak}
         known = {level: block for level, block in blocks.items() if block is not None}
         if len(known) < len(blocks):
             continue
-        program = with_minors(setup.program, known)
-        there = _closed(setup, program, y, z.size)
-        if there is not None and _goes_on(setup, program, there):
+        program = add_minors(setup.functions, known)
+        there = _correct(setup, program, y, z.size)
+        if there is not None and _holds_along_motion(setup, program, there):
             return program, there[: z.size]
     return None
 
 
-def _goes_on(setup: Setup, program: Program, y: Array) -> bool:
+def _holds_along_motion(setup: PreparedMechanism, program: EquationFunctions, y: Array) -> bool:
     """Whether only the motions that inputs can make are left, and the minors vanish wherever these lead.
 
     So many ways at first order as inputs are there on their dead points too.
     """
-    inputs = len(setup.station.u)
+    inputs = len(setup.inputs.u)
     if not inputs:
         return False
-    slope = program.left(y[:-inputs], y[-inputs:], setup.station.p)[1]
-    least = np.concatenate([setup.least, np.ones(inputs)])
+    slope = program.residuals_and_jacobian(y[:-inputs], y[-inputs:], setup.inputs.p)[1]
+    least = np.concatenate([setup.min_column_scale, np.ones(inputs)])
     sizes = np.maximum(np.linalg.norm(slope, axis=0), least)
     _, values, vectors = np.linalg.svd(slope / sizes)
-    if int(np.sum(values > SINGULAR * max(1.0, values[0]))) != len(y) - inputs:
+    if int(np.sum(values > SINGULAR_TOLERANCE * max(1.0, values[0]))) != len(y) - inputs:
         return False
     ways = vectors[len(y) - inputs :] / sizes
-    for seed in range(TRIES):
+    for seed in range(PROBE_COUNT):
         way = np.random.default_rng(seed).normal(size=inputs) @ ways
-        if _closed(setup, program, y + AWAY * way / np.linalg.norm(way), len(y)) is None:
+        if _correct(setup, program, y + PROBE_DISTANCE * way / np.linalg.norm(way), len(y)) is None:
             return False
     return True
 
 
-def _closed(setup: Setup, program: Program, y: Array, free: int) -> Array | None:
+def _correct(setup: PreparedMechanism, program: EquationFunctions, y: Array, free_count: int) -> Array | None:
     """The nearest position to y = (unknowns, inputs) that closes, of which the first `free` may move; None without."""
-    y, many, before = y.copy(), len(y) - len(setup.station.u), np.inf
-    for _ in range(CORRECTIONS):
-        left, slope = program.left(y[:many], y[many:], setup.station.p)
+    y, many, before = y.copy(), len(y) - len(setup.inputs.u), np.inf
+    for _ in range(MAX_CORRECTIONS):
+        left, slope = program.residuals_and_jacobian(y[:many], y[many:], setup.inputs.p)
         gap = float(np.max(np.abs(left), initial=0.0))
         if not gap < before:
             break
         before = gap
-        y[:free] -= np.linalg.lstsq(slope[:, :free], left, rcond=SINGULAR)[0]
-    return y if before <= CLOSED else None
+        y[:free_count] -= np.linalg.lstsq(slope[:, :free_count], left, rcond=SINGULAR_TOLERANCE)[0]
+    return y if before <= CLOSED_TOLERANCE else None
 
 
-def _block(setup: Setup, stage: Stage, z: Array, with_earlier: bool) -> Block | None:
+def _minor_block(setup: PreparedMechanism, stage: Block, z: Array, with_earlier: bool) -> LowRankBlock | None:
     """The block of a group's constraints, and of those on which it rests if wanted; None where that has full rank."""
-    columns_of = depends(setup.program)
+    columns_of = constraint_dependencies(setup.functions)
     stages = [stage]
-    columns = _columns(columns_of, stage)
-    for before in reversed(setup.equations.stages[: stage.level] if with_earlier else ()):
+    columns = _dependent_columns(columns_of, stage)
+    for before in reversed(setup.equations.blocks[: stage.block_index] if with_earlier else ()):
         if columns & set(range(before.unknowns.start, before.unknowns.stop)):
             stages.append(before)
-            columns |= _columns(columns_of, before)
+            columns |= _dependent_columns(columns_of, before)
     rows = [row for each in reversed(stages) for row in range(each.rows.start, each.rows.stop)]
     many = sorted(columns)
-    both = setup.program.slopes(z[None], setup.station.u[None], setup.station.p)
-    own = np.hstack([each[0] for each in both])[np.ix_(rows, many)] / setup.by[rows, None]
-    least = np.concatenate([setup.least, np.ones(len(setup.station.u))])[many]
+    both = setup.functions.jacobians(z[None], setup.inputs.u[None], setup.inputs.p)
+    own = np.hstack([each[0] for each in both])[np.ix_(rows, many)] / setup.row_scale[rows, None]
+    least = np.concatenate([setup.min_column_scale, np.ones(len(setup.inputs.u))])[many]
     sizes = np.maximum(np.linalg.norm(own, axis=0), least)
     values = np.linalg.svd(own / sizes, compute_uv=False)
-    rank = int(np.sum(values > SINGULAR * max(1.0, values[0])))
-    if rank == min(own.shape) or rank >= LARGEST:
+    rank = int(np.sum(values > SINGULAR_TOLERANCE * max(1.0, values[0])))
+    if rank == min(own.shape) or rank >= MAX_MINOR_RANK:
         return None
-    return Block(tuple(rows), tuple(many), setup.by[rows], sizes, rank)
+    return LowRankBlock(tuple(rows), tuple(many), setup.row_scale[rows], sizes, rank)
 
 
-def _columns(columns_of: Sequence[frozenset[int]], stage: Stage) -> set[int]:
+def _dependent_columns(columns_of: Sequence[frozenset[int]], stage: Block) -> set[int]:
     """The columns that a group's constraints depend on."""
     return set().union(*columns_of[stage.rows])

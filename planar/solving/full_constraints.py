@@ -11,144 +11,153 @@ from typing import Any
 
 import numpy as np
 
-from planar.equations.functions import placed, scaled
+from planar.equations.functions import frames_from_coordinates, scale_lengths
 from planar.foundation.geometry import Frame
-from planar.model.pairs import Kind, Pair
-from planar.solving.assembly.sketch_start import sketched
-from planar.solving.prepared_mechanism import Setup
+from planar.model.pairs import MeasureKind, Pair
+from planar.solving.assembly.sketch_start import sketch_coordinates
+from planar.solving.prepared_mechanism import PreparedMechanism
 
 Array = np.ndarray
 
-STEP = 1e-30
-CLOSED, ROUNDED = 1e-10, 1e-15
-NEARLY = 1e-6
+COMPLEX_STEP = 1e-30
+CLOSED_TOLERANCE, ROUND_OFF = 1e-10, 1e-15
+ROUGH_STEP_DAMPING = 1e-6
 """Damping above which a step need not be exact."""
-LONGEST = 60
+MAX_NEWTON_STEPS = 60
 """Iterations: where constraints only just touch, the error halves each time."""
-TRIES = 4
+MAX_STARTS = 4
 """Starts from which a linkage is joined that its inputs do not determine."""
-AWAY = 0.02
+PROBE_DISTANCE = 0.02
 """How far (sizes, rad) a position is moved along what it allows, to see whether the motion goes on."""
-LEAST_SEEDS, MOST_SEEDS = 3, 12
-NEAR = 1e-3
+MIN_PROBES, MAX_PROBES = 3, 12
+NEIGHBOUR_DISTANCE = 1e-3
 """How far its neighbours are from a position whose motions are counted; what bends back within it is none."""
-SINGULAR = 1e-6
+SINGULAR_TOLERANCE = 1e-6
 """A singular value below this part of the greatest is zero: where constraints touch, rounding leaves about 1e-8."""
 
 
-class Constraints:
+class FullConstraints:
     """The residuals of all pairs, or of some, at coordinates w (coordinates,), as `Equations.coordinates` has them."""
 
-    def __init__(self, setup: Setup, pairs: Sequence[Pair] | None = None):
+    def __init__(self, setup: PreparedMechanism, pairs: Sequence[Pair] | None = None):
         self.setup = setup
         self.pairs = tuple(setup.mechanism.pairs if pairs is None else pairs)
         self.coordinates = setup.equations.coordinates
-        self.pair_of_row = tuple(pair.name for pair in self.pairs for _ in pair.constrains)
+        self.pair_of_row = tuple(pair.name for pair in self.pairs for _ in pair.residual_kinds)
         self._numbers = {
-            pair.name: scaled(pair.measure([setup.shapes[link] for link in pair.bodies]), pair.measures, setup.unit)
-            for pair in (*self.pairs, *setup.named.values())
+            pair.name: scale_lengths(
+                pair.measure([setup.shapes[link] for link in pair.bodies]), pair.number_kinds, setup.unit
+            )
+            for pair in (*self.pairs, *setup.relative_motions.values())
         }
 
-    def gaps(self, w: Array) -> Array:
+    def residuals(self, w: Array) -> Array:
         """What every constraint leaves open (rows,), of w (coordinates, many) of each (rows, many)."""
-        left, (frames, own) = [], self._placed(w)
+        left, (frames, own) = [], self._frames_and_own(w)
         for pair in self.pairs:
-            for kind, value in zip(pair.constrains, pair.residual(*self._of(pair, frames, own)), strict=True):
+            for kind, value in zip(
+                pair.residual_kinds, pair.residual(*self._pair_arguments(pair, frames, own)), strict=True
+            ):
                 left.append(np.arctan2(np.sin(value), np.cos(value)) if self._wraps(kind, w) else value)
         return np.array(np.broadcast_arrays(*left)) if left else np.zeros((0, *w.shape[1:]))
 
     @staticmethod
-    def _wraps(kind: Kind, w: Array) -> bool:
-        return kind is Kind.ANGLE and not np.iscomplexobj(w)
+    def _wraps(kind: MeasureKind, w: Array) -> bool:
+        return kind is MeasureKind.ANGLE and not np.iscomplexobj(w)
 
-    def slope(self, w: Array) -> Array:
+    def jacobian(self, w: Array) -> Array:
         """(rows, coordinates)"""
-        return np.imag(self.gaps(self._nudged(w))) / STEP
+        return np.imag(self.residuals(self._complex_steps(w))) / COMPLEX_STEP
 
-    def drives(self, names: tuple[str, ...], w: Array) -> Array:
+    def relative_positions(self, names: tuple[str, ...], w: Array) -> Array:
         """The drives of these relative motions (names,)."""
-        return np.array(self._drives(names, w))
+        return np.array(self._relative_positions(names, w))
 
-    def drive_slope(self, names: tuple[str, ...], w: Array) -> Array:
+    def relative_jacobian(self, names: tuple[str, ...], w: Array) -> Array:
         """(names, coordinates)"""
-        nudged = self._nudged(w)
-        rows = [np.broadcast_to(np.imag(drive), (w.size,)) for drive in self._drives(names, nudged)]
-        return np.array(rows).reshape(len(names), w.size) / STEP
+        nudged = self._complex_steps(w)
+        rows = [np.broadcast_to(np.imag(drive), (w.size,)) for drive in self._relative_positions(names, nudged)]
+        return np.array(rows).reshape(len(names), w.size) / COMPLEX_STEP
 
-    def _drives(self, names: tuple[str, ...], w: Array) -> list[Array]:
-        frames, own = self._placed(w)
-        return [pair.drive(*self._of(pair, frames, own)) for pair in (self.setup.named[name] for name in names)]
+    def _relative_positions(self, names: tuple[str, ...], w: Array) -> list[Array]:
+        frames, own = self._frames_and_own(w)
+        return [
+            pair.input_position(*self._pair_arguments(pair, frames, own))
+            for pair in (self.setup.relative_motions[name] for name in names)
+        ]
 
-    def _nudged(self, w: Array) -> Array:
-        return np.repeat(w[:, None].astype(complex), w.size, axis=1) + 1j * STEP * np.eye(w.size)
+    def _complex_steps(self, w: Array) -> Array:
+        return np.repeat(w[:, None].astype(complex), w.size, axis=1) + 1j * COMPLEX_STEP * np.eye(w.size)
 
-    def _placed(self, w: Array) -> tuple[dict[str, Frame], dict[str, tuple[Array, ...]]]:
-        return placed(w, self.setup.column, self.setup.shapes, self.setup.pairs)
+    def _frames_and_own(self, w: Array) -> tuple[dict[str, Frame], dict[str, tuple[Array, ...]]]:
+        return frames_from_coordinates(w, self.setup.column, self.setup.shapes, self.setup.pairs)
 
-    def _of(self, pair: Pair, frames: dict[str, Frame], own: dict[str, tuple[Array, ...]]) -> tuple[Any, Any, Any]:
+    def _pair_arguments(
+        self, pair: Pair, frames: dict[str, Frame], own: dict[str, tuple[Array, ...]]
+    ) -> tuple[Any, Any, Any]:
         """What the pair's formulas take."""
         return [frames[link] for link in pair.bodies], self._numbers[pair.name], own.get(pair.name, ())
 
-    def closed(self, w: Array, drives: tuple[str, ...] = (), at: Array | None = None) -> Array | None:
+    def correct(self, w: Array, held: tuple[str, ...] = (), positions: Array | None = None) -> Array | None:
         """The nearest closed position by Gauss and Newton's method, some drives held; None where there is none."""
-        left, slope = self._held(w, drives, at)
+        left, slope = self._residuals_and_jacobian(w, held, positions)
         damping = 1e-3
-        for _ in range(LONGEST):
-            if np.max(np.abs(left), initial=0.0) < ROUNDED or damping > 1e8:
+        for _ in range(MAX_NEWTON_STEPS):
+            if np.max(np.abs(left), initial=0.0) < ROUND_OFF or damping > 1e8:
                 break
-            tried = w + _damped(slope, left, damping)
-            new = self._held(tried, drives, at)
+            tried = w + _damped_step(slope, left, damping)
+            new = self._residuals_and_jacobian(tried, held, positions)
             if np.sum(new[0] ** 2) < np.sum(left**2):
                 w, (left, slope), damping = tried, new, 0.1 * damping
             else:
                 damping *= 10.0
-        return w if np.max(np.abs(left), initial=0.0) <= CLOSED else None
+        return w if np.max(np.abs(left), initial=0.0) <= CLOSED_TOLERANCE else None
 
-    def _held(self, w: Array, drives: tuple[str, ...], at: Array | None) -> tuple[Array, Array]:
-        left, slope = self.gaps(w), self.slope(w)
+    def _residuals_and_jacobian(self, w: Array, drives: tuple[str, ...], at: Array | None) -> tuple[Array, Array]:
+        left, slope = self.residuals(w), self.jacobian(w)
         if drives and at is not None:
-            left = np.concatenate([left, self.drives(drives, w) - at])
-            slope = np.vstack([slope, self.drive_slope(drives, w)])
+            left = np.concatenate([left, self.relative_positions(drives, w) - at])
+            slope = np.vstack([slope, self.relative_jacobian(drives, w)])
         return left, slope
 
 
-def _damped(slope: Array, left: Array, damping: float) -> Array:
-    top = float(np.linalg.norm(slope)) or 1.0
-    if damping > NEARLY:
+def _damped_step(jacobian: Array, residuals: Array, damping: float) -> Array:
+    top = float(np.linalg.norm(jacobian)) or 1.0
+    if damping > ROUGH_STEP_DAMPING:
         # far away the normal equations will do, at a fraction of the cost
-        square = slope.T @ slope + (damping * top) ** 2 * np.eye(slope.shape[1])
-        return -np.linalg.solve(square, slope.T @ left)
-    u, s, vt = np.linalg.svd(slope, full_matrices=False)
+        square = jacobian.T @ jacobian + (damping * top) ** 2 * np.eye(jacobian.shape[1])
+        return -np.linalg.solve(square, jacobian.T @ residuals)
+    u, s, vt = np.linalg.svd(jacobian, full_matrices=False)
     gain = np.where(s > 1e-13 * top, s / np.maximum(s * s + (damping * top) ** 2, 1e-300), 0.0)
-    return -vt.T @ (gain * (u.T @ left))
+    return -vt.T @ (gain * (u.T @ residuals))
 
 
-def rank(slope: Array) -> int:
+def rank(jacobian: Array) -> int:
     """The rank of a slope, rounding apart."""
-    values = np.linalg.svd(slope, compute_uv=False) if slope.size else np.zeros(0)
-    return int(np.sum(values > SINGULAR * max(values[0], 1e-300))) if values.size else 0
+    values = np.linalg.svd(jacobian, compute_uv=False) if jacobian.size else np.zeros(0)
+    return int(np.sum(values > SINGULAR_TOLERANCE * max(values[0], 1e-300))) if values.size else 0
 
 
-def null_space(slope: Array) -> Array:
+def null_space(jacobian: Array) -> Array:
     """Orthonormal columns that the slope takes to zero (columns, nullity)."""
-    if not slope.size:
-        return np.eye(slope.shape[1])
-    return np.linalg.svd(slope)[2][rank(slope) :].T
+    if not jacobian.size:
+        return np.eye(jacobian.shape[1])
+    return np.linalg.svd(jacobian)[2][rank(jacobian) :].T
 
 
-def moved(free: Array, rng: np.random.Generator, far: float) -> Array:
+def random_step(free: Array, rng: np.random.Generator, length: float) -> Array:
     """A random move of a length within the columns of `free`."""
     way = free @ rng.normal(size=free.shape[1])
-    return way * (far / np.linalg.norm(way))
+    return way * (length / np.linalg.norm(way))
 
 
-def joined(constraints: Constraints) -> Array | None:
+def find_closed_position(constraints: FullConstraints) -> Array | None:
     """A closed position near the sketch, with the inputs where they are if that can be; None where none is found."""
     setup = constraints.setup
     names = tuple(given.pair for given in setup.mechanism.inputs)
-    for held, at in ((names, setup.station.u), ((), None)):
-        for seed in range(TRIES):
-            found = constraints.closed(sketched(setup, seed), held, at)
+    for held, at in ((names, setup.inputs.u), ((), None)):
+        for seed in range(MAX_STARTS):
+            found = constraints.correct(sketch_coordinates(setup, seed), held, at)
             if found is not None:
                 return found
         if not names:
@@ -156,32 +165,32 @@ def joined(constraints: Constraints) -> Array | None:
     return None
 
 
-def motion_from(constraints: Constraints, w: Array) -> tuple[int, Array]:
+def motion_dimension(constraints: FullConstraints, w: Array) -> tuple[int, Array]:
     """The dimension of the motion that leads away from a position, and a position on it."""
-    free = null_space(constraints.slope(w))
+    free = null_space(constraints.jacobian(w))
     found, place, held = 0, w, -1
-    for seed in range(MOST_SEEDS if free.size else 0):
+    for seed in range(MAX_PROBES if free.size else 0):
         rng = np.random.default_rng(seed)
-        away = constraints.closed(w + moved(free, rng, AWAY))
+        away = constraints.correct(w + random_step(free, rng, PROBE_DISTANCE))
         if away is not None:
-            ways, holds = _ways(constraints, away, rng), rank(constraints.slope(away))
+            ways, holds = _spread_dimension(constraints, away, rng), rank(constraints.jacobian(away))
             # of places that move alike the one where nothing is singular: some fall back beside w
             if (ways, holds) > (found, held):
                 found, place, held = ways, away, holds
-        if seed >= LEAST_SEEDS and found + held == w.size:
+        if seed >= MIN_PROBES and found + held == w.size:
             break
     return found, place
 
 
-def _ways(constraints: Constraints, w: Array, rng: np.random.Generator) -> int:
+def _spread_dimension(constraints: FullConstraints, w: Array, rng: np.random.Generator) -> int:
     """In how many directions the closed positions next to one spread."""
-    free = null_space(constraints.slope(w))
+    free = null_space(constraints.jacobian(w))
     many = 2 * free.shape[1] + 2
     moves = []
     for _ in range(many if free.size else 0):
-        beside = constraints.closed(w + moved(free, rng, NEAR))
+        beside = constraints.correct(w + random_step(free, rng, NEIGHBOUR_DISTANCE))
         if beside is not None:
-            moves.append((beside - w) / NEAR)
+            moves.append((beside - w) / NEIGHBOUR_DISTANCE)
     if not moves:
         return 0
     values = np.linalg.svd(np.array(moves), compute_uv=False)

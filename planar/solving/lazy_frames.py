@@ -8,51 +8,53 @@ from typing import Any
 
 import numpy as np
 
-from planar.equations.functions import placed
+from planar.equations.functions import frames_from_coordinates
 from planar.foundation.jets import Jet
-from planar.solving.prepared_mechanism import Setup
+from planar.solving.prepared_mechanism import PreparedMechanism
 
 Array = np.ndarray
 
 
-class Placing:
+class LazyFrames:
     """Coordinates with rates, scaled: (coordinates, orders), or of a motion for each order (rows, coordinates)."""
 
-    def __init__(self, setup: Setup, parts: Array | list[Array]):
+    def __init__(self, setup: PreparedMechanism, parts: Array | list[Array]):
         self.column, self.shapes, self.pairs, self.scale = setup.column, setup.shapes, setup.pairs, setup.scale
-        self.parts = parts
+        self.coordinate_rates = parts
 
     @cached_property
-    def both(self) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
+    def frames_and_own(self) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
         """The frames of all links and the own coordinates of all pairs, as jets (m, rad, s)."""
-        if isinstance(self.parts, list):
-            scaled = [part * self.scale for part in self.parts]
+        if isinstance(self.coordinate_rates, list):
+            scaled = [part * self.scale for part in self.coordinate_rates]
             jets = [Jet(*(part[:, column] for part in scaled)) for column in range(scaled[0].shape[1])]
         else:
-            jets = [Jet(*each) for each in (self.parts * self.scale[:, None]).tolist()]
-        return placed(jets, self.column, self.shapes, self.pairs)
+            jets = [Jet(*each) for each in (self.coordinate_rates * self.scale[:, None]).tolist()]
+        return frames_from_coordinates(jets, self.column, self.shapes, self.pairs)
 
 
-class Placed(Mapping[str, Any]):
+class LazyFrameMapping(Mapping[str, Any]):
     """The frames (0) or the own coordinates (1) of a placing, by name."""
 
-    def __init__(self, placing: Placing, which: int):
-        self.placing, self.which = placing, which
+    def __init__(self, placing: LazyFrames, which: int):
+        self.source, self.which = placing, which
 
     def __getitem__(self, name: str) -> Any:
-        return self.placing.both[self.which][name]
+        return self.source.frames_and_own[self.which][name]
 
     def __or__(self, other: Mapping[str, Any]) -> dict[str, Any]:
         return {**self, **other}
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self.placing.shapes if self.which == 0 else self.placing.pairs)
+        return iter(self.source.shapes if self.which == 0 else self.source.pairs)
 
     def __len__(self) -> int:
-        return len(self.placing.shapes if self.which == 0 else self.placing.pairs)
+        return len(self.source.shapes if self.which == 0 else self.source.pairs)
 
 
-def laid(setup: Setup, parts: Array | list[Array]) -> tuple[Placed, Placed]:
+def lazy_frames(
+    setup: PreparedMechanism, coordinate_rates: Array | list[Array]
+) -> tuple[LazyFrameMapping, LazyFrameMapping]:
     """Frames of links and own coordinates of pairs; see `Placing`."""
-    placing = Placing(setup, parts)
-    return Placed(placing, 0), Placed(placing, 1)
+    placing = LazyFrames(setup, coordinate_rates)
+    return LazyFrameMapping(placing, 0), LazyFrameMapping(placing, 1)

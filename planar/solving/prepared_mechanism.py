@@ -8,22 +8,29 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from planar.equations.acceptance import Judged
-from planar.equations.functions import Program, extent, gathered, greatest, placed, shapes
+from planar.equations.acceptance import AcceptanceFunctions
+from planar.equations.functions import (
+    EquationFunctions,
+    frames_from_coordinates,
+    pair_numbers_from,
+    shape_extent,
+    shapes_of_links,
+    size_from_extents,
+)
 from planar.foundation.errors import BadInput
-from planar.foundation.errors import listed as several
+from planar.foundation.errors import join_names as several
 from planar.foundation.geometry import Frame
 from planar.foundation.jets import Jet, Scalar
-from planar.model.mechanism import HUGE, TINY, Mechanism, misfits
-from planar.model.pairs import Kind
+from planar.model.mechanism import LARGEST_NUMBER, SMALLEST_NUMBER, Mechanism, pair_misfits
+from planar.model.pairs import MeasureKind
 from planar.model.wording import amount
-from planar.solving.checks.residual_check import Gate
-from planar.solving.structure import outline
+from planar.solving.checks.residual_check import ResidualCheck
+from planar.solving.structure import mechanism_structure
 
 Array = np.ndarray
 
 
-class Station(NamedTuple):
+class PositionInputs(NamedTuple):
     """The numbers of one position: inputs u with their rates (scaled), and the numbers p of the pairs."""
 
     u: Array
@@ -32,95 +39,104 @@ class Station(NamedTuple):
     p: Array
 
 
-class Setup:
+class PreparedMechanism:
     """What does not change from one position of a mechanism to the next, and what the file's own inputs are."""
 
     def __init__(self, mechanism: Mechanism):
-        self.outline = outline(mechanism)
+        self.structure = mechanism_structure(mechanism)
         self.mechanism = mechanism
-        self.shapes = shapes(mechanism)
-        self.program, self.equations = self.outline.program, self.outline.equations
-        self.column, self.pairs, self.named = self.outline.column, self.outline.pairs, self.outline.named
-        for pair, wrong in misfits(mechanism.pairs, self.shapes, mechanism.units):
+        self.shapes = shapes_of_links(mechanism)
+        self.functions, self.equations = self.structure.functions, self.structure.equations
+        self.column, self.pairs, self.relative_motions = (
+            self.structure.column,
+            self.structure.pairs,
+            self.structure.relative_motions,
+        )
+        for pair, wrong in pair_misfits(mechanism.pairs, self.shapes, mechanism.units):
             raise BadInput(pair.name, wrong)
         for name, shape in self.shapes.items():
             for point, at in shape.points.items():
-                if not all(value == 0.0 or TINY <= abs(value) < HUGE for value in at):
-                    told = f"a place is 0, or from {TINY:g} to {HUGE:.0e} m, not [{at.x:g}, {at.y:g}]"
+                if not all(value == 0.0 or SMALLEST_NUMBER <= abs(value) < LARGEST_NUMBER for value in at):
+                    told = (
+                        f"a place is 0, or from {SMALLEST_NUMBER:g} to {LARGEST_NUMBER:.0e} m, not [{at.x:g}, {at.y:g}]"
+                    )
                     raise BadInput(f"{name}.{point}", told)
-        extents = {name: extent(shape) for name, shape in self.shapes.items()}
-        self.unit = greatest(mechanism, extents, self.outline.slide)
-        self.gate = Gate(mechanism, self.shapes, self.unit, self.named)
-        self.scale = np.where(self.outline.lengths, self.unit, 1.0)
+        extents = {name: shape_extent(shape) for name, shape in self.shapes.items()}
+        self.unit = size_from_extents(mechanism, extents, self.structure.input_slides)
+        self.residual_check = ResidualCheck(mechanism, self.shapes, self.unit, self.relative_motions)
+        self.scale = np.where(self.structure.is_length, self.unit, 1.0)
         self.reach = {name: each / self.unit for name, each in extents.items()}
-        self.extended = any(self.reach.values())
+        self.has_extent = any(self.reach.values())
         "whether the unit is a length of some link, and no slide's travel"
-        self.station = Station(*self._inputs(mechanism), gathered(mechanism, self.gate.numbers, self.unit))
+        self.inputs = PositionInputs(
+            *self._inputs(mechanism), pair_numbers_from(mechanism, self.residual_check.numbers, self.unit)
+        )
 
-    def moved(self, mechanism: Mechanism) -> Self:
+    def with_inputs_of(self, mechanism: Mechanism) -> Self:
         """The same for a mechanism that differs from this one in its inputs' numbers alone."""
         lawful = any(given.law is not None for given in mechanism.inputs)
-        if lawful or not self.extended:
+        if lawful or not self.has_extent:
             there = type(self)(mechanism)
-            return there.solved_by(self.program) if self.deflated else there
+            return there.with_functions(self.functions) if self.is_deflated else there
         there = object.__new__(type(self))
         there.__dict__.update(self.__dict__)
-        there.mechanism, there.gate = mechanism, self.gate.moved(mechanism)
-        there.station = Station(*self._inputs(mechanism), self.station.p)
+        there.mechanism, there.residual_check = mechanism, self.residual_check.with_inputs_of(mechanism)
+        there.inputs = PositionInputs(*self._inputs(mechanism), self.inputs.p)
         return there
 
-    def solved_by(self, program: Program) -> Self:
+    def with_functions(self, program: EquationFunctions) -> Self:
         """The same with more constraints, which hold wherever its own do on the motion; see `solving.deflation`."""
         there = object.__new__(type(self))
         there.__dict__.update(self.__dict__)
-        for name in ("by", "least", "_reaches"):
+        for name in ("row_scale", "min_column_scale", "_block_reaches"):
             there.__dict__.pop(name, None)
-        there.program, there.equations = program, program.equations
+        there.functions, there.equations = program, program.equations
         return there
 
     @property
-    def deflated(self) -> bool:
+    def is_deflated(self) -> bool:
         """Whether it has more constraints than those of its pairs and inputs."""
-        return self.program is not self.outline.program
+        return self.functions is not self.structure.functions
 
     def _inputs(self, mechanism: Mechanism) -> tuple[Array, Array, Array]:
         """Positions, velocities and accelerations of a mechanism's inputs (scaled)."""
-        by = [self.unit if slides else 1.0 for slides in self.outline.slide]
+        by = [self.unit if slides else 1.0 for slides in self.structure.input_slides]
         parts = [[value / size for value in given[1:4]] for given, size in zip(mechanism.inputs, by, strict=True)]
         u, u1, u2 = np.array(parts, dtype=float).reshape(-1, 3).T.copy()
         return u, u1, u2
 
     @property
-    def judged(self) -> Judged | None:
+    def acceptance(self) -> AcceptanceFunctions | None:
         """What judges positions in compiled functions, for the structures that have it."""
-        return None if self.deflated else self.outline.judged
+        return None if self.is_deflated else self.structure.acceptance
 
     @cached_property
-    def by(self) -> Array:
+    def row_scale(self) -> Array:
         """What every row of a slope is divided by (rows,): lengths by the reach of their group."""
         e = self.equations
         by = np.ones(len(e.rows))
-        for stage, reach in zip(e.stages, self._reaches, strict=True):
-            by[stage.rows] = [reach if row.kind is Kind.LENGTH else 1.0 for row in e.rows[stage.rows]]
+        for stage, reach in zip(e.blocks, self._block_reaches, strict=True):
+            by[stage.rows] = [reach if row.kind is MeasureKind.LENGTH else 1.0 for row in e.rows[stage.rows]]
         return by
 
     @cached_property
-    def least(self) -> Array:
+    def min_column_scale(self) -> Array:
         """What the column of every unknown could be at best in its group, rows divided so (unknowns,)."""
         e = self.equations
         least = np.ones(len(e.unknowns))
-        for stage, reach in zip(e.stages, self._reaches, strict=True):
+        for stage, reach in zip(e.blocks, self._block_reaches, strict=True):
             own = [e.coordinates[column] for column in e.unknowns[stage.unknowns]]
             least[stage.unknowns] = [
-                1.0 / reach if c.kind is Kind.LENGTH else self.reach.get(c.owner, reach) / reach or 1.0 for c in own
+                1.0 / reach if c.kind is MeasureKind.LENGTH else self.reach.get(c.owner, reach) / reach or 1.0
+                for c in own
             ]
         return least
 
     @cached_property
-    def _reaches(self) -> list[float]:
+    def _block_reaches(self) -> list[float]:
         """The reach of every group's links (sizes); where they have but one point each, of the least link beside."""
         found = []
-        for stage in self.equations.stages:
+        for stage in self.equations.blocks:
             own = max((self.reach[link] for link in stage.links), default=0.0)
             beside = (self.reach[link] for pair in stage.pairs for link in self.pairs[pair].links)
             found.append(own or min((reach for reach in beside if reach > 0.0), default=1.0))
@@ -129,43 +145,45 @@ class Setup:
     @property
     def tolerance(self) -> float:
         """What the gate lets pass: round-off of the residual, in lengths of the size."""
-        return self.gate.tolerance
+        return self.residual_check.tolerance
 
-    def gaps(self, z: Array, u: Array) -> Array:
+    def residuals(self, z: Array, u: Array) -> Array:
         """What every constraint leaves open (constraints, samples); z (samples, unknowns), u (samples, inputs)."""
-        w = self.program.coordinates(z, u, self.station.p).T
-        scale = np.array([self.unit if self.slides(given.pair) else 1.0 for given in self.mechanism.inputs])
+        w = self.functions.coordinates(z, u, self.inputs.p).T
+        scale = np.array([self.unit if self.is_sliding(given.pair) else 1.0 for given in self.mechanism.inputs])
         with np.errstate(invalid="ignore"):  # what is not a number counts as open, and is refused as such
-            frames, own = placed(w * self.scale[:, None], self.column, self.shapes, self.pairs)
-            return self.gate.gaps(frames, own, u.T * scale[:, None]).reshape(-1, len(z))
+            frames, own = frames_from_coordinates(w * self.scale[:, None], self.column, self.shapes, self.pairs)
+            return self.residual_check.residuals(frames, own, u.T * scale[:, None]).reshape(-1, len(z))
 
     def coordinates(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Scalar]]) -> Array:
         """w (coordinates,) where the links' frames and the pairs' own coordinates are, jets or numbers (m, rad)."""
         parts = {(link, name): getattr(frame, name) for link, frame in frames.items() for name in ("x", "y", "angle")}
         for pair, values in own.items():
             parts |= {
-                (pair, name): value for (name, _), value in zip(self.pairs[pair].coordinates, values, strict=True)
+                (pair, name): value for (name, _), value in zip(self.pairs[pair].coordinate_kinds, values, strict=True)
             }
         found = (parts[each.owner, each.part] for each in self.equations.coordinates)
         return np.array([value.parts[0] if isinstance(value, Jet) else value for value in found]) / self.scale
 
-    def open_along(self, z: Array, u: Array) -> Array:
+    def max_residuals(self, z: Array, u: Array) -> Array:
         """What the worst constraint leaves open at every sample (samples,)."""
-        return self.gaps(z, u).max(axis=0, initial=0.0)
+        return self.residuals(z, u).max(axis=0, initial=0.0)
 
-    def at(self) -> str:
+    def describe_position(self) -> str:
         """The file's own position in words: at A = 60 deg."""
-        return f"at {self.where(self.station.u)}" if self.mechanism.inputs else "as drawn"
+        return f"at {self.describe_inputs(self.inputs.u)}" if self.mechanism.inputs else "as drawn"
 
-    def where(self, u: Array) -> str:
+    def describe_inputs(self, u: Array) -> str:
         """A position of the inputs in words: A = 60 deg."""
-        return several([self.told(given.pair, at) for given, at in zip(self.mechanism.inputs, u, strict=True)])
+        return several(
+            [self.describe_input(given.pair, at) for given, at in zip(self.mechanism.inputs, u, strict=True)]
+        )
 
-    def told(self, pair: str, position: float) -> str:
+    def describe_input(self, pair: str, position: float) -> str:
         """A position of one input in words."""
-        kind, by = ("length", self.unit) if self.slides(pair) else ("angle", 1.0)
+        kind, by = ("length", self.unit) if self.is_sliding(pair) else ("angle", 1.0)
         return f"{pair} = {amount(position * by, kind, self.mechanism.units)}"
 
-    def slides(self, pair: str) -> bool:
+    def is_sliding(self, pair: str) -> bool:
         """Whether the relative motion at a pair is a length."""
-        return self.named[pair].drive_kind is Kind.LENGTH
+        return self.relative_motions[pair].input_kind is MeasureKind.LENGTH

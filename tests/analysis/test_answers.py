@@ -11,9 +11,9 @@ from click.testing import CliRunner
 import planar
 from planar.cli import main
 from planar.foundation.errors import BadInput
-from planar.model.mechanism import Drive, motions, with_inputs
+from planar.model.mechanism import Drive, relative_motions, replace_inputs
 from planar.reports.tables.answers import record, tables
-from planar.results.motion import Unknown
+from planar.results.motion import UnknownName
 from tests.analysis.test_extremes import slider_crank, turn_apart
 from tests.draws import part
 
@@ -276,9 +276,9 @@ def test_an_advantage_is_infinite_at_a_sample_on_an_end_and_without_rates_not_to
 def test_what_there_is_not_is_refused_in_a_sentence():
     motion = planar.cycle(planar.load("crank-rocker"), 12)
     for ask in (planar.swing, planar.time_ratio, planar.dwells, planar.advantage_over, planar.answers, planar.greatest):
-        with pytest.raises(Unknown, match="there is no"):
+        with pytest.raises(UnknownName, match="there is no"):
             ask(motion, "nothing")
-    with pytest.raises(Unknown, match="there is no point"):
+    with pytest.raises(UnknownName, match="there is no point"):
         planar.extremes(motion, "nothing")
     with pytest.raises(BadInput, match="'x', 'y' or a direction"):
         planar.extremes(motion, "A", "z")
@@ -319,7 +319,7 @@ def test_a_pin_is_asked_of_as_pair_and_as_point():
 
 
 def test_an_input_at_rest_is_told_per_unit():
-    mechanism = with_inputs(planar.load("crank-rocker"), (Drive("A0", None, 0.0, 0.0),))
+    mechanism = replace_inputs(planar.load("crank-rocker"), (Drive("A0", None, 0.0, 0.0),))
     (found,) = planar.answers(planar.cycle(mechanism, 24), "rocker")
     assert found.per_unit
     assert found.velocity.value == pytest.approx(1.0 / found.advantage.least.value, rel=1e-12)
@@ -349,7 +349,7 @@ def test_an_angle_of_one_thing_is_told_one_way(model):
     motion = planar.cycle(planar.load(model), 24)
     state = planar.solve(motion.mechanism)
     compared = 0
-    for name, pair in motions(motion.mechanism).items():
+    for name, pair in relative_motions(motion.mechanism).items():
         told = next(iter(motion.pair(name).values()))
         here = next(iter(state.pair(name).values()))
         if name in motion.inputs:

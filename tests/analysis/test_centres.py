@@ -20,9 +20,9 @@ from planar.analysis.centres.two_directions import centre_of
 from planar.analysis.centres.velocities import links_by_centres, velocity_by_centres
 from planar.document import files
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
-from planar.model.mechanism import Drive, Mechanism, with_inputs
+from planar.model.mechanism import Drive, Mechanism, replace_inputs
 from planar.reports.tables.centres import remarks
-from planar.results.motion import State, Unknown
+from planar.results.motion import State, UnknownName
 from planar.solving.position import solve
 from tests.command import run
 from tests.draws import draws
@@ -42,7 +42,7 @@ def moved(mechanism: Mechanism, rng: np.random.Generator) -> State | None:
     for far in (0.2, 0.05, 0.01):
         drives = []
         for each in mechanism.inputs:
-            slides = planar.model.mechanism.motions(mechanism)[each.pair].drive_kind.value == "length"
+            slides = planar.model.mechanism.relative_motions(mechanism)[each.pair].input_kind.value == "length"
             size = abs(each.position) or 0.1 if slides else 1.0
             drives.append(Drive(each.pair, each.position + far * size * float(rng.uniform(-1.0, 1.0))))
         try:
@@ -168,7 +168,7 @@ class Again:
         self.centres = centres
         self.state = centres.state
         self.scale = Scale(self.state)
-        self.entries = planar.model.mechanism.motions(self.state.mechanism)
+        self.entries = planar.model.mechanism.relative_motions(self.state.mechanism)
         self.known: dict[str, np.ndarray] = {}
         self.linked = {each.name: frozenset(each.links) for each in centres}
 
@@ -220,7 +220,7 @@ class Again:
         """Of the line at a pair, in the frame's axes."""
         pair = self.entries[name]
         guide = pair.links[0]
-        angle = pair.line.angle_on(self.state.shapes[guide]) + self.state.link(guide).angle
+        angle = pair.line.direction_angle(self.state.shapes[guide]) + self.state.link(guide).angle
         return np.array([cos(angle), sin(angle)])
 
     def rider(self, name: str) -> np.ndarray:
@@ -230,7 +230,7 @@ class Again:
     def contact(self, name: str) -> np.ndarray:
         """The pin of a pair, or where a pinion touches its rack."""
         pair = self.entries[name]
-        together = pair.coincident()
+        together = pair.coincident_points()
         if together:
             return self.scale.point(*self.state.point(".".join(together[0])).position)
         way = self.direction(name)
@@ -309,8 +309,8 @@ def test_pins_and_slides_show_as_many_as_there_are_two_links_that_they_join(stem
     mechanism = MODELS[stem]
     joined = {
         frozenset(pair.links)
-        for pair in planar.model.mechanism.motions(mechanism).values()
-        if pair.holds() == 2 and len(pair.bodies) == 2
+        for pair in planar.model.mechanism.relative_motions(mechanism).values()
+        if pair.prevented_motion_count() == 2 and len(pair.bodies) == 2
     }
     assert joined <= {frozenset(each.links) for each in found(stem) if each.how == "pair"}
 
@@ -422,7 +422,7 @@ def test_a_rolling_wheel_turns_about_where_it_touches():
     centre = result.state.point(f"{rack.links[1]}.{rack.point}").position
     assert hypot(*(rolling.position - centre)) == pytest.approx(abs(rack.radius), rel=1e-12)
     frame = result.state.link(rack.links[0]).angle
-    way = rack.line.angle_on(result.state.shapes[rack.links[0]]) + frame
+    way = rack.line.direction_angle(result.state.shapes[rack.links[0]]) + frame
     assert abs((rolling.position - centre) @ [cos(way), sin(way)]) < 1e-12 * abs(rack.radius)
     assert rolling.how == "pair"
 
@@ -514,7 +514,7 @@ def alike(first: Centres, second: Centres, moving=still, within: float = 1e-9) -
 def test_an_input_at_rest_or_twice_as_fast_changes_nothing(stem):
     (given_input,) = MODELS[stem].inputs
     for rate in (0.0, 2.0 * (given_input.velocity or 1.0)):
-        other = with_inputs(MODELS[stem], (Drive(given_input.pair, velocity=rate, acceleration=3.0),))
+        other = replace_inputs(MODELS[stem], (Drive(given_input.pair, velocity=rate, acceleration=3.0),))
         alike(found(stem), centres(solve(other)), within=1e-13)
 
 
@@ -557,7 +557,7 @@ def test_linkages_of_pins_turned_and_moved_have_their_centres_turned_and_moved(s
     value["sketch"] = {name: place(at) for name, at in value["sketch"].items()}
     mechanism = files.from_dict(value)
     (given_input,) = mechanism.inputs
-    mechanism = with_inputs(mechanism, (Drive(given_input.pair, given_input.position + turn),))
+    mechanism = replace_inputs(mechanism, (Drive(given_input.pair, given_input.position + turn),))
     motion = np.block([[way, shift[:, None]], [np.zeros((1, 2)), np.ones((1, 1))]])
     alike(found(stem), centres(solve(mechanism)), lambda at: motion @ at)
 
@@ -670,17 +670,17 @@ def test_several_inputs_have_the_centres_of_the_ratio_of_their_rates(stem):
     mechanism = MODELS[stem]
     rng = np.random.default_rng(3)
     rates = {each.pair: float(rng.uniform(0.5, 2.0)) for each in mechanism.inputs}
-    first = with_inputs(mechanism, tuple(Drive(pair, velocity=rate) for pair, rate in rates.items()))
+    first = replace_inputs(mechanism, tuple(Drive(pair, velocity=rate) for pair, rate in rates.items()))
     result = centres(solve(first))
     lawful(result)
-    thrice = with_inputs(mechanism, tuple(Drive(pair, velocity=3.0 * rate) for pair, rate in rates.items()))
+    thrice = replace_inputs(mechanism, tuple(Drive(pair, velocity=3.0 * rate) for pair, rate in rates.items()))
     alike(result, centres(thrice), within=1e-9)
 
 
 @pytest.mark.parametrize("stem", SEVERAL)
 def test_with_all_inputs_at_rest_the_centres_that_depend_on_them_are_left_open(stem):
     mechanism = MODELS[stem]
-    still = with_inputs(mechanism, tuple(Drive(each.pair, velocity=0.0) for each in mechanism.inputs))
+    still = replace_inputs(mechanism, tuple(Drive(each.pair, velocity=0.0) for each in mechanism.inputs))
     result = centres(still)
     lawful(result)
     left = [each for each in result if each.how == "open"]
@@ -778,9 +778,9 @@ def test_a_sliding_link_moves_by_its_centre_at_infinity():
 def test_points_of_the_frame_rest_and_unknown_ones_are_refused():
     result = found("four-bar")
     assert not velocity_by_centres(result, "A").velocity.any()
-    with pytest.raises(Unknown, match="there is no point 'X'"):
+    with pytest.raises(UnknownName, match="there is no point 'X'"):
         velocity_by_centres(result, "X")
-    with pytest.raises(Unknown, match="links are"):
+    with pytest.raises(UnknownName, match="links are"):
         _ = result["AB", "X"]
 
 
@@ -793,7 +793,7 @@ def test_on_a_dead_point_the_rate_of_the_input_tells_no_velocity():
 
 
 def test_an_input_at_rest_leaves_all_at_rest():
-    still = with_inputs(MODELS["four-bar"], (Drive("A", velocity=0.0),))
+    still = replace_inputs(MODELS["four-bar"], (Drive("A", velocity=0.0),))
     result = centres(still)
     assert not any(velocity_by_centres(result, name).velocity.any() for name in "ABCD")
 

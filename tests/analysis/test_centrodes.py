@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 import planar
-from planar.analysis.centres.centrodes import Centrode, _arcs, centrodes, usual
-from planar.analysis.relative_motion import quarter
-from planar.drawing.centres.centrodes import MOST, ROOM, centrodes_picture
-from planar.drawing.paper.clipping import clipped, once
-from planar.drawing.paper.picture import Circle, Letter, Line, Pen, extent
+from planar.analysis.centres.centrodes import Centrode, _split_at_infinity, centrodes, usual_links
+from planar.analysis.relative_motion import quarter_turn
+from planar.drawing.centres.centrodes import DRAWING_SIZE, MAX_WINDOW_RATIO, centrodes_picture
+from planar.drawing.paper.clipping import clip_homogeneous_curve, remove_repeated_strokes
+from planar.drawing.paper.picture import Circle, Label, Pen, Polyline, extent
 from planar.drawing.paper.scales import Scale
 from planar.foundation.errors import BadInput
-from planar.model.mechanism import Drive, with_inputs
-from planar.results.motion import Unknown
+from planar.model.mechanism import Drive, replace_inputs
+from planar.results.motion import UnknownName
 from tests import command
 from tests.known import MODELS, some_models
 
@@ -35,7 +35,7 @@ def run(model, steps=48):
 
 
 def turned(vectors, angle):
-    return np.cos(angle)[:, None] * vectors + np.sin(angle)[:, None] * quarter(vectors)
+    return np.cos(angle)[:, None] * vectors + np.sin(angle)[:, None] * quarter_turn(vectors)
 
 
 def distances(places, centre):
@@ -44,7 +44,7 @@ def distances(places, centre):
 
 @pytest.mark.parametrize("model", some_models(4))
 def test_both_curves_touch_in_the_pole_and_run_through_it_at_one_velocity(model):
-    found = centrodes(run(model), *usual(MODELS[model]))
+    found = centrodes(run(model), *usual_links(MODELS[model]))
     if found.reason:
         assert not found.arcs
         return
@@ -73,7 +73,7 @@ def test_both_curves_touch_in_the_pole_and_run_through_it_at_one_velocity(model)
 def test_arcs_between_two_positions_are_as_long_on_both_curves_and_chords_come_to_that_at_second_order(
     model, link, other
 ):
-    link, other = (link, other) if link else usual(MODELS[model])
+    link, other = (link, other) if link else usual_links(MODELS[model])
     apart, lengths = [], []
     for steps in (240, 480, 960):
         motion = run(model, steps)
@@ -100,7 +100,7 @@ def test_arcs_between_two_positions_are_as_long_on_both_curves_and_chords_come_t
 
 @pytest.mark.parametrize("model", ["four-bar", "slotted-lever", "cardan-gears", "crank-rocker"])
 def test_rates_are_those_of_the_curve_and_the_curve_between_rows_is_exact_to_the_fourth_order(model):
-    link, other = usual(MODELS[model])
+    link, other = usual_links(MODELS[model])
     coarse, fine = (centrodes(run(model, steps), link, other) for steps in (60, 120))
     finest = centrodes(run(model, 240), link, other)
     for which in ("fixed", "moving"):
@@ -220,8 +220,8 @@ def test_a_row_at_infinity_belongs_to_no_arc():
 def test_a_pole_that_passes_through_infinity_twice_between_two_rows_is_cut_there():
     inputs = np.array([0.0, 1.0])
     at, rate = np.array([[1.0, 0.0, 0.1]] * 2), np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]])
-    assert [arc.tolist() for arc in _arcs(Centrode(inputs, at, rate))] == [[0], [1]]
-    assert [arc.tolist() for arc in _arcs(Centrode(inputs, at, 0.0 * rate))] == [[0, 1]]
+    assert [arc.tolist() for arc in _split_at_infinity(Centrode(inputs, at, rate))] == [[0], [1]]
+    assert [arc.tolist() for arc in _split_at_infinity(Centrode(inputs, at, 0.0 * rate))] == [[0, 1]]
 
 
 def test_a_rocker_that_rests_in_passing_turns_about_its_pin_all_the_while():
@@ -248,7 +248,7 @@ def test_links_that_only_slide_or_move_as_one_are_said_to():
 def test_the_rate_of_the_input_does_not_matter():
     mechanism = MODELS["crank-rocker"]
     found = [
-        centrodes(planar.cycle(with_inputs(mechanism, (Drive("A0", None, *rates),)), 90), "coupler")
+        centrodes(planar.cycle(replace_inputs(mechanism, (Drive("A0", None, *rates),)), 90), "coupler")
         for rates in ((6.0, 0.0), (-2.0, 11.0), (0.0, 0.0))
     ]
     for each in found[1:]:
@@ -269,9 +269,9 @@ def test_seen_the_other_way_round_the_moving_centrode_is_the_fixed_one():
 
 def test_names_that_are_not_there_are_refused():
     motion = run("four-bar", 4)
-    with pytest.raises(Unknown, match="no link 'XY'"):
+    with pytest.raises(UnknownName, match="no link 'XY'"):
         centrodes(motion, "XY")
-    with pytest.raises(Unknown, match="both are 'BC'"):
+    with pytest.raises(UnknownName, match="both are 'BC'"):
         centrodes(motion, "BC", "BC")
     with pytest.raises(BadInput, match="no link 'XY'"):
         centrodes_picture(MODELS["four-bar"], "BC", "XY")
@@ -288,14 +288,14 @@ def test_names_that_are_not_there_are_refused():
     ],
 )
 def test_the_usual_links_are_a_coupler_and_the_frame_or_two_that_are_pinned(model, links):
-    assert usual(MODELS[model]) == links
+    assert usual_links(MODELS[model]) == links
 
 
 FULL = Scale("length", 1e-3, "mm")
 
 
 def strokes(picture, pen):
-    return [np.array(mark.spots) for mark in picture.marks if isinstance(mark, Line) and mark.pen is pen]
+    return [np.array(mark.points) for mark in picture.marks if isinstance(mark, Polyline) and mark.pen is pen]
 
 
 def beside(lines, at):
@@ -333,16 +333,16 @@ def test_both_curves_are_drawn_touching_in_the_pole_inside_the_paper(model, link
     at = pole(picture)
     assert beside(fixed, at) < 0.02
     assert beside(moving, at) < 0.02
-    low, high = (np.array(corner) for corner in extent(mark for mark in picture.marks if not isinstance(mark, Letter)))
-    assert np.all(high - low <= np.array(ROOM) * 1.35)
-    texts = {mark.text for mark in picture.marks if isinstance(mark, Letter)}
+    low, high = (np.array(corner) for corner in extent(mark for mark in picture.marks if not isinstance(mark, Label)))
+    assert np.all(high - low <= np.array(DRAWING_SIZE) * 1.35)
+    texts = {mark.text for mark in picture.marks if isinstance(mark, Label)}
     assert {"fixed centrode", "moving centrode"} <= texts
     assert any(text.startswith("$I_") for text in texts)
 
 
 def test_cardan_circles_are_drawn_once_and_in_their_places():
     picture = centrodes_picture(MODELS["cardan-gears"], scale=FULL)
-    (c,) = {mark.at for mark in picture.marks if isinstance(mark, Letter) and mark.text == "C"}
+    (c,) = {mark.at for mark in picture.marks if isinstance(mark, Label) and mark.text == "C"}
     for pen, centre, radius in ((Pen.FIXED_CENTRODE, (0.0, 0.0), 100.0), (Pen.MOVING_CENTRODE, c, 50.0)):
         lines = strokes(picture, pen)
         for line in lines:
@@ -354,15 +354,15 @@ def test_cardan_circles_are_drawn_once_and_in_their_places():
 def test_curves_end_at_the_window_and_the_notes_say_that_they_go_on():
     picture = centrodes_picture(MODELS["crank-rocker"], scale=Scale("length", 5e-3, "mm"))
     lines = np.concatenate([*strokes(picture, Pen.FIXED_CENTRODE), *strokes(picture, Pen.MOVING_CENTRODE)])
-    rest = [mark for mark in picture.marks if not isinstance(mark, Letter)]
-    rest = [mark for mark in rest if not (isinstance(mark, Line) and mark.pen.value.endswith("centrode"))]
+    rest = [mark for mark in picture.marks if not isinstance(mark, Label)]
+    rest = [mark for mark in rest if not (isinstance(mark, Polyline) and mark.pen.value.endswith("centrode"))]
     low, high = (np.array(corner) for corner in extent(rest))
-    assert np.ptp(lines, axis=0).max() <= 1.1 * MOST * (high - low).max()
+    assert np.ptp(lines, axis=0).max() <= 1.1 * MAX_WINDOW_RATIO * (high - low).max()
     assert any("infinity" in note for note in picture.notes)
 
 
 def test_where_the_pole_is_far_away_the_nearest_position_is_drawn_in_which_it_is_not():
-    nearly = with_inputs(MODELS["slider-crank"], (Drive("O", 1.5),))
+    nearly = replace_inputs(MODELS["slider-crank"], (Drive("O", 1.5),))
     picture = centrodes_picture(nearly, scale=Scale("length", 20e-3, "mm"))
     assert beside(strokes(picture, Pen.FIXED_CENTRODE), pole(picture)) < 0.02
     (told,) = [note for note in picture.notes if note.startswith("Drawn with")]
@@ -380,7 +380,7 @@ def test_what_has_no_centrodes_is_drawn_without_and_the_notes_say_why():
 
 def test_a_speed_that_the_file_does_not_give_is_not_drawn():
     (given,) = MODELS["four-bar"].inputs
-    still = with_inputs(MODELS["four-bar"], (Drive(given.pair, None, 0.0, 0.0),))
+    still = replace_inputs(MODELS["four-bar"], (Drive(given.pair, None, 0.0, 0.0),))
     picture = centrodes_picture(still)
     assert not [mark for mark in picture.marks if mark.about.startswith("input")]
     assert pole(picture) == pytest.approx(pole(centrodes_picture(MODELS["four-bar"])), abs=1e-6)
@@ -388,23 +388,25 @@ def test_a_speed_that_the_file_does_not_give_is_not_drawn():
 
 def test_a_polygon_is_clipped_to_a_window_and_parts_at_infinity():
     low, high = np.zeros(2), np.ones(2)
-    (piece,) = clipped(np.array([[-1.0, 0.5, 1.0], [0.5, 0.5, 1.0], [0.5, 3.0, 1.0]]), low, high)
+    (piece,) = clip_homogeneous_curve(np.array([[-1.0, 0.5, 1.0], [0.5, 0.5, 1.0], [0.5, 3.0, 1.0]]), low, high)
     assert piece == pytest.approx(np.array([[0.0, 0.5], [0.5, 0.5], [0.5, 1.0]]))
     through = np.array([[0.5, 0.5, 1.0], [0.5, 0.5, 0.1], [0.5, 0.5, -0.1], [-0.5, -0.5, -1.0]])
-    first, last = clipped(through, low, high)
+    first, last = clip_homogeneous_curve(through, low, high)
     assert first == pytest.approx(np.array([[0.5, 0.5], [1.0, 1.0]]))
     assert last[-1] == pytest.approx([0.5, 0.5])
-    assert clipped(np.array([[2.0, 2.0, 1.0], [3.0, 3.0, 1.0]]), low, high) == ()
+    assert clip_homogeneous_curve(np.array([[2.0, 2.0, 1.0], [3.0, 3.0, 1.0]]), low, high) == ()
 
 
 def test_what_runs_over_itself_is_drawn_once_and_what_crosses_itself_all():
     turn = np.linspace(0.0, 6.0 * pi, 4000)
     thrice = np.column_stack([20.0 * np.cos(turn), 20.0 * np.sin(turn)])
-    length = sum(np.hypot(*np.diff(line, axis=0).T).sum() for line in once([thrice]))
+    length = sum(np.hypot(*np.diff(line, axis=0).T).sum() for line in remove_repeated_strokes([thrice]))
     assert length == pytest.approx(40.0 * pi, abs=1.0)
     eight = np.column_stack([30.0 * np.cos(turn / 3.0), 20.0 * np.sin(turn / 1.5)])
     whole = np.hypot(*np.diff(eight, axis=0).T).sum()
-    assert sum(np.hypot(*np.diff(line, axis=0).T).sum() for line in once([eight])) == pytest.approx(whole, abs=1.0)
+    assert sum(np.hypot(*np.diff(line, axis=0).T).sum() for line in remove_repeated_strokes([eight])) == pytest.approx(
+        whole, abs=1.0
+    )
 
 
 def test_the_command_draws_them_and_refuses_what_are_no_two_links(tmp_path):

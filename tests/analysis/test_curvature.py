@@ -8,25 +8,25 @@ import pytest
 
 import planar
 from planar.analysis.centres.curvature import curvature
-from planar.analysis.relative_motion import quarter, relative
+from planar.analysis.relative_motion import quarter_turn, relative_motion
 from planar.foundation.errors import BadInput
-from planar.model.mechanism import Drive, with_inputs
-from planar.results.motion import Unknown
+from planar.model.mechanism import Drive, replace_inputs
+from planar.results.motion import UnknownName
 from tests.known import MODELS, some_models, state_of
 
 
 def driven(mechanism, velocity, acceleration, **positions):
     """The mechanism at other rates of its only input."""
     (given,) = mechanism.inputs
-    return with_inputs(mechanism, (Drive(given.pair, positions.get("position"), velocity, acceleration),))
+    return replace_inputs(mechanism, (Drive(given.pair, positions.get("position"), velocity, acceleration),))
 
 
 def velocity_and_acceleration(found, at):
     m = found.motion
     r = at - m.origin
     return (
-        m.velocity + m.turning * quarter(r),
-        m.acceleration + m.hastening * quarter(r) - m.turning**2 * r,
+        m.velocity + m.angular_velocity * quarter_turn(r),
+        m.acceleration + m.angular_acceleration * quarter_turn(r) - m.angular_velocity**2 * r,
     )
 
 
@@ -58,7 +58,10 @@ def test_what_belongs_to_pole_inflection_circle_and_acceleration_pole_holds_ther
         most, hardest = (
             max(hypot(*each) for each in parts)
             for parts in zip(
-                *(velocity_and_acceleration(found, found.motion.carried(np.array(at))) for at in found.shape.values()),
+                *(
+                    velocity_and_acceleration(found, found.motion.points_in_other(np.array(at)))
+                    for at in found.shape.values()
+                ),
                 strict=True,
             )
         )
@@ -69,7 +72,9 @@ def test_what_belongs_to_pole_inflection_circle_and_acceleration_pole_holds_ther
         out = found.inflection.centre - found.pole
         assert hypot(*out) == pytest.approx(found.inflection.diameter / 2.0)
         assert abs(out @ found.pole_velocity) <= 1e-9 * hypot(*out) * hypot(*found.pole_velocity)
-        assert found.inflection.diameter == pytest.approx(hypot(*found.pole_velocity) / abs(found.motion.turning))
+        assert found.inflection.diameter == pytest.approx(
+            hypot(*found.pole_velocity) / abs(found.motion.angular_velocity)
+        )
         for angle in np.linspace(0.5, 5.5, 6):
             way = np.array([cos(angle), sin(angle)])
             v, a = velocity_and_acceleration(found, found.inflection.centre + found.inflection.diameter / 2.0 * way)
@@ -88,7 +93,7 @@ def circle_through(a, b, c):
     """Radius and centre of the circle through three places."""
     ab, ac = b - a, c - a
     area = 2.0 * (ab[0] * ac[1] - ab[1] * ac[0])
-    out = (quarter(ab) * (ac @ ac) - quarter(ac) * (ab @ ab)) / area
+    out = (quarter_turn(ab) * (ac @ ac) - quarter_turn(ac) * (ab @ ab)) / area
     return hypot(*out), a + out
 
 
@@ -103,7 +108,7 @@ def test_circles_through_three_places_of_the_exact_path_come_to_the_circle_of_cu
     (given,) = mechanism.inputs
     state = planar.solve(mechanism)
     link = link or next(name for name in state.frames if point in state.shapes[name].points)
-    local = np.array(state.shapes[link].at(point)) if point else np.array([0.3, 0.2])
+    local = np.array(state.shapes[link].position(point)) if point else np.array([0.3, 0.2])
     path = curvature(state, link).path(local)
     wrong = []
     for step in (0.02, 0.01, 0.005):
@@ -118,7 +123,7 @@ def test_circles_through_three_places_of_the_exact_path_come_to_the_circle_of_cu
 
 
 def _place(state, link, local):
-    return relative(state.frames, link, state.mechanism.frame).carried(local)
+    return relative_motion(state.frames, link, state.mechanism.frame).points_in_other(local)
 
 
 @pytest.mark.parametrize(
@@ -172,7 +177,7 @@ def test_of_cardan_motion_the_inflection_circle_is_the_moving_centrode(model, li
     found = curvature(state, link)
     # R = 2 r: 1 / d = 1 / r - 1 / R, so that d = 2 r
     assert found.inflection.diameter == pytest.approx(2.0 * radius)
-    middle = found.motion.carried(np.array([radius, 0.0])) if link == "bar" else state.point("C").position
+    middle = found.motion.points_in_other(np.array([radius, 0.0])) if link == "bar" else state.point("C").position
     assert found.inflection.centre == pytest.approx(middle)
     on_rim = [(0.0, 0.0), (0.12, 0.0), (0.06, 0.06)] if link == "bar" else ["T", "N"]
     for point in on_rim:
@@ -278,7 +283,7 @@ def test_seen_from_another_link_the_motion_is_the_relative_one():
     assert hypot(*(ring.pole)) == pytest.approx(
         hypot(
             *(
-                curvature(state, "wheel").motion.local(
+                curvature(state, "wheel").motion.vectors_in_link(
                     curvature(state, "wheel").pole - curvature(state, "wheel").motion.origin
                 )
             )
@@ -296,14 +301,14 @@ def test_links_that_move_as_one_are_said_to():
 
 def test_names_that_are_not_there_and_inputs_that_are_all_at_rest_are_refused():
     state = state_of("four-bar")
-    with pytest.raises(Unknown, match="no link 'XY'"):
+    with pytest.raises(UnknownName, match="no link 'XY'"):
         curvature(state, "XY")
-    with pytest.raises(Unknown, match="both are 'BC'"):
+    with pytest.raises(UnknownName, match="both are 'BC'"):
         curvature(state, "BC", "BC")
-    with pytest.raises(Unknown, match="carries no point 'D'"):
+    with pytest.raises(UnknownName, match="carries no point 'D'"):
         curvature(state, "BC").path("D")
     several = next(each for each in MODELS.values() if len(each.inputs) > 1)
-    still = with_inputs(several, tuple(Drive(given.pair, None, 0.0, 0.0) for given in several.inputs))
+    still = replace_inputs(several, tuple(Drive(given.pair, None, 0.0, 0.0) for given in several.inputs))
     moving = next(link.name for link in several.links if link.name != several.frame)
     with pytest.raises(BadInput, match="all at rest"):
         curvature(planar.solve(still), moving)

@@ -9,14 +9,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import planar
-from planar.analysis.interpolated_run import Steady
+from planar.analysis.interpolated_run import InterpolatedRun
 from planar.analysis.motion.extremes import Extreme, greatest, stroke
 from planar.foundation.errors import BadInput, NoAnswer
 from planar.foundation.jets import Jet
-from planar.foundation.root_finding import root
-from planar.model.mechanism import Drive, motions, with_inputs
-from planar.model.pairs import Kind
-from planar.results.motion import Unknown
+from planar.foundation.root_finding import find_root
+from planar.model.mechanism import Drive, relative_motions, replace_inputs
+from planar.model.pairs import MeasureKind
+from planar.results.motion import UnknownName
 from tests.draws import draws
 
 NEAR = 1e-12
@@ -176,7 +176,7 @@ def test_what_does_not_slide_or_does_not_move_has_no_stroke():
     assert stroke(motion, "A") is None
     held = planar.cycle(planar.load("excavator-arm"), 20, pair="boom cylinder")
     assert stroke(held, "stick cylinder") is None
-    with pytest.raises(Unknown, match="there is no pair 'nothing'"):
+    with pytest.raises(UnknownName, match="there is no pair 'nothing'"):
         stroke(motion, "nothing")
 
 
@@ -288,29 +288,31 @@ def test_the_greatest_velocity_or_acceleration_is_asked_for_and_of_what_there_is
     motion = planar.cycle(planar.load("000-P5"), 12)
     with pytest.raises(BadInput, match="'velocity' or 'acceleration'"):
         greatest(motion, "stroke", "jerk")
-    with pytest.raises(Unknown, match="there is no point 'nothing'"):
+    with pytest.raises(UnknownName, match="there is no point 'nothing'"):
         greatest(motion, "nothing")
 
 
 def test_a_motion_between_its_samples_is_the_motion():
     mechanism = planar.load("002-E3.4")
-    steady = Steady(planar.cycle(mechanism, 24))
+    steady = InterpolatedRun(planar.cycle(mechanism, 24))
     for position in (1.1, 2.345, 7.2):
         known = planar.solve(mechanism, {"O": position})
-        assert steady.at(position).point("F").acceleration == pytest.approx(known.point("F").acceleration, rel=1e-10)
+        assert steady.state_at(position).point("F").acceleration == pytest.approx(
+            known.point("F").acceleration, rel=1e-10
+        )
     assert steady.closed
     assert steady.rate == -210 * pi / 30
-    assert not Steady(planar.cycle(planar.load("002-E3.6a"), 24)).closed  # the ratio of its wheels is 2.122
+    assert not InterpolatedRun(planar.cycle(planar.load("002-E3.6a"), 24)).closed  # the ratio of its wheels is 2.122
     with pytest.raises(NoAnswer):
-        Steady(planar.cycle(planar.load("000-P1"))).at(2.5)
+        InterpolatedRun(planar.cycle(planar.load("000-P1"))).state_at(2.5)
 
 
 @pytest.mark.parametrize("name", ["000-P2", "002-E3.5", "atkinson-cycle-engine", "slotted-lever", "hand-pump"])
 def test_strokes_of_other_machines_are_what_a_fine_run_shows(name):
     mechanism = planar.load(name)
     coarse, fine = (planar.cycle(mechanism, steps) for steps in (48, 2400))
-    for pair, each in motions(mechanism).items():
-        if each.drive_kind is Kind.LENGTH:
+    for pair, each in relative_motions(mechanism).items():
+        if each.input_kind is MeasureKind.LENGTH:
             found, sampled = stroke(coarse, pair), fine.pair(pair)["displacement"]
             assert found.length >= np.ptp(sampled) - NEAR
             assert found.length == pytest.approx(np.ptp(sampled), rel=2e-5)
@@ -326,18 +328,18 @@ def test_several_inputs_run_one_at_a_time():
 
 @given(st.floats(-3.0, 3.0), st.floats(0.01, 5.0))
 def test_a_root_is_found_to_round_off(at, by):
-    found = root(lambda x: np.expm1(by * (x - at)), at - 1.0, at + 1.3)
+    found = find_root(lambda x: np.expm1(by * (x - at)), at - 1.0, at + 1.3)
     assert found == pytest.approx(at, abs=1e-14)
-    assert root(lambda x: (x - at) ** 3, at - 1.0, at + 1.3) == pytest.approx(at, abs=1e-4)
+    assert find_root(lambda x: (x - at) ** 3, at - 1.0, at + 1.3) == pytest.approx(at, abs=1e-4)
 
 
 def test_the_files_velocity_is_not_lost_in_a_steady_run():
-    mechanism = with_inputs(planar.load("000-P5"), (Drive("O", None, 3.0, 7.0),))
-    steady = Steady(planar.cycle(mechanism, 36))
-    plain = planar.cycle(with_inputs(mechanism, (Drive("O", None, 3.0, 0.0),)), 36)
+    mechanism = replace_inputs(planar.load("000-P5"), (Drive("O", None, 3.0, 7.0),))
+    steady = InterpolatedRun(planar.cycle(mechanism, 36))
+    plain = planar.cycle(replace_inputs(mechanism, (Drive("O", None, 3.0, 0.0),)), 36)
     for part in ("velocity", "acceleration"):
         assert steady.samples.pair("stroke")[part] == pytest.approx(plain.pair("stroke")[part], abs=1e-12)
-    unit = Steady(planar.cycle(with_inputs(mechanism, (Drive("O", None, 0.0, 7.0),)), 36))
+    unit = InterpolatedRun(planar.cycle(replace_inputs(mechanism, (Drive("O", None, 0.0, 7.0),)), 36))
     assert 9.0 * unit.samples.pair("stroke")["acceleration"] == pytest.approx(
         plain.pair("stroke")["acceleration"], abs=1e-12
     )

@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import planar
-from planar.analysis.motion.analytical_route import routes
+from planar.analysis.motion.analytical_route import analytical_routes
 from planar.analysis.motion.harmonics import harmonics
-from planar.analysis.motion.piston import Exact, Piston, TwoTerms, piston
+from planar.analysis.motion.piston import ExactFormulas, Piston, TwoTermFormulas, find_piston
 from planar.foundation.errors import BadInput, NoAnswer
-from planar.model.mechanism import Drive, motions, with_inputs
+from planar.model.mechanism import Drive, relative_motions, replace_inputs
 from planar.reports.tables.analytical import record
 from tests.command import run
 from tests.draws import draws
@@ -85,7 +85,7 @@ def test_an_in_line_piston_has_the_harmonics_of_the_binomial_series(r, l):  # no
 @pytest.mark.parametrize("ratio", [0.2, 0.02, 0.002])
 def test_the_two_terms_are_the_series_to_the_first_power_of_r_by_l(ratio):
     # c_2 = r^2/4l (1 + (r/l)^2/4 + ...), and what the two terms leave out is of the third power
-    found, two = harmonics(slider_crank(ratio, 1.0), "stroke"), TwoTerms(ratio, 1.0)
+    found, two = harmonics(slider_crank(ratio, 1.0), "stroke"), TwoTermFormulas(ratio, 1.0)
     assert found.cosines[0] == pytest.approx(ratio, rel=NEAR)
     assert found.cosines[1] == pytest.approx(0.25 * ratio**2 * (1.0 + 0.25 * ratio**2), rel=0.2 * ratio**4 + 1e-9)
     theta = np.linspace(0.0, 2.0 * pi, 50)
@@ -114,11 +114,11 @@ def test_the_series_is_the_motion_between_its_samples_with_its_rates(name, of, a
     mechanism = planar.load(name)
     crank = mechanism.inputs[0].pair
     found = harmonics(mechanism, of, axis)
-    moving = with_inputs(mechanism, (Drive(crank, None, 2.0, 3.0),))
+    moving = replace_inputs(mechanism, (Drive(crank, None, 2.0, 3.0),))
     motion = planar.cycle(moving, 97)  # no divisor of the series' own positions
     if axis is not None:
         value, velocity, acceleration = (part["xy".index(axis)] for part in map(np.transpose, motion.point(of)))
-    elif of in motions(mechanism):
+    elif of in relative_motions(mechanism):
         value, velocity, acceleration = list(motion.pair(of).values())[:3]
     else:
         value, velocity, acceleration = motion.link(of)
@@ -247,14 +247,14 @@ def test_a_mechanism_without_inputs_is_refused():
 
 
 def test_a_piston_is_recognised_wherever_it_stands():
-    found = piston(planar.load("002-E3.4"), "guide B")
+    found = find_piston(planar.load("002-E3.4"), "guide B")
     assert (found.crank, found.rod, found.input) == ("OA", "AB", "O")
     assert (found.r, found.l, found.n, found.offset) == pytest.approx((0.2, 0.8, 4.0, 0.0), abs=1e-15)
     # the others hang on the rod, not on a crank
-    assert piston(planar.load("002-E3.4"), "guide D") is None
-    assert piston(planar.load("002-E3.4"), "guide F") is None
-    assert piston(planar.load("walschaerts-valve-gear"), "guide").n == pytest.approx(5.0)
-    assert piston(planar.load("sewing-machine"), "bush").heading == pytest.approx(-pi / 2.0)
+    assert find_piston(planar.load("002-E3.4"), "guide D") is None
+    assert find_piston(planar.load("002-E3.4"), "guide F") is None
+    assert find_piston(planar.load("walschaerts-valve-gear"), "guide").n == pytest.approx(5.0)
+    assert find_piston(planar.load("sewing-machine"), "bush").heading == pytest.approx(-pi / 2.0)
 
 
 @pytest.mark.parametrize(
@@ -271,13 +271,17 @@ def test_a_piston_is_recognised_wherever_it_stands():
 )
 def test_what_is_no_piston_is_none(name, pair):
     mechanism = planar.load(name)
-    pair = pair if pair in motions(mechanism) else next(p.name for p in mechanism.pairs if p.rides() is not None)
-    assert piston(mechanism, pair) is None
+    pair = (
+        pair
+        if pair in relative_motions(mechanism)
+        else next(p.name for p in mechanism.pairs if p.point_on_line() is not None)
+    )
+    assert find_piston(mechanism, pair) is None
 
 
 def test_a_piston_is_asked_of_a_pair_that_there_is():
     with pytest.raises(BadInput, match="there is no pair 'nothing'"):
-        piston(planar.load("000-P5"), "nothing")
+        find_piston(planar.load("000-P5"), "nothing")
 
 
 @settings(max_examples=draws(5), deadline=None)
@@ -291,7 +295,7 @@ def test_a_piston_is_asked_of_a_pair_that_there_is():
 def test_the_closed_form_is_the_solved_motion_whichever_way_the_stroke_lies(r, more, part, heading, rate):
     l, e = r * more, part * r * (more - 1.0)  # noqa: E741
     mechanism = slider_crank(r, l, e, heading, velocity=rate)
-    found = piston(mechanism, "stroke")
+    found = find_piston(mechanism, "stroke")
     assert isinstance(found, Piston)
     assert (found.r, found.l, found.offset) == pytest.approx((r, l, e), abs=1e-12)
     assert cos(found.heading - heading) == pytest.approx(1.0)
@@ -309,28 +313,30 @@ def test_displacement_may_grow_away_from_the_piston_and_the_slide_may_carry_the_
     value = planar.to_dict(slider_crank(0.1, 0.3))
     slide = next(pair for pair in value["pairs"] if "line" in pair)
     slide["line"] = {"through": [1.0, 0.0], "angle": pi}
-    turned = piston(planar.from_dict(value), "stroke")
+    turned = find_piston(planar.from_dict(value), "stroke")
     assert turned.slide == pytest.approx((0.6, 1.0), abs=NEAR)
     assert turned.heading == pytest.approx(0.0, abs=NEAR)
     # the line in the block, the point in the frame
     slide["links"] = slide["links"][::-1]
     slide["line"], slide["point"] = {"through": "B", "angle": 0.0}, "O"
     carried = planar.from_dict(value)
-    found, motion = piston(carried, "stroke"), planar.cycle(carried, 30)
+    found, motion = find_piston(carried, "stroke"), planar.cycle(carried, 30)
     told = found.slide[0] + found.slide[1] * found.exact.displacement(motion.inputs["O"].position)
     assert told == pytest.approx(motion.pair("stroke")["displacement"], abs=NEAR)
 
 
 def test_off_the_crank_axis_the_two_terms_do_not_hold_and_are_refused():
-    found = piston(planar.load("offset-slider-crank"), "stroke")
+    found = find_piston(planar.load("offset-slider-crank"), "stroke")
     assert found.offset == pytest.approx(0.04)
-    assert not found.in_line
+    assert not found.is_in_line
     with pytest.raises(BadInput, match=r"for a stroke through the crank's axis; here it is 0\.04 m off"):
         _ = found.two_terms
-    (route,) = routes(planar.load("offset-slider-crank"))
+    (route,) = analytical_routes(planar.load("offset-slider-crank"))
     assert route.piston is not None
     assert route.formula is None
-    assert route.fastest.value == pytest.approx(abs(float(found.exact.velocity(found.exact.fastest(), route.rate))))
+    assert route.fastest.value == pytest.approx(
+        abs(float(found.exact.velocity(found.exact.angle_of_greatest_speed(), route.rate)))
+    )
 
 
 # what the chapters print
@@ -338,7 +344,7 @@ def test_off_the_crank_axis_the_two_terms_do_not_hold_and_are_refused():
 
 def engine():
     """000-P5: r = 150, l = 600 mm, 450 rpm, 60 degrees from inner dead centre."""
-    return piston(planar.load("000-P5"), "stroke"), 450 * pi / 30, radians(60)
+    return find_piston(planar.load("000-P5"), "stroke"), 450 * pi / 30, radians(60)
 
 
 def test_000_p5_velocity_printed_6_8_is_the_two_term_value_6_887_cut_short():
@@ -357,18 +363,20 @@ def test_000_p5_acceleration_printed_124_89_is_the_two_term_value_at_the_rounded
 
 def test_000_p5_angle_printed_77_is_right_by_two_terms_and_cos_printed_0_25_is_a_slip():
     two = engine()[0].two_terms
-    assert cos(two.fastest()) == pytest.approx((sqrt(24.0) - 4.0) / 4.0, rel=NEAR)  # 2 c^2 + 4 c - 1 = 0
-    assert round(cos(two.fastest()), 4) == 0.2247
-    assert round(degrees(two.fastest()), 2) == 77.01
+    assert cos(two.angle_of_greatest_speed()) == pytest.approx(
+        (sqrt(24.0) - 4.0) / 4.0, rel=NEAR
+    )  # 2 c^2 + 4 c - 1 = 0
+    assert round(cos(two.angle_of_greatest_speed()), 4) == 0.2247
+    assert round(degrees(two.angle_of_greatest_speed()), 2) == 77.01
     assert degrees(acos(0.25)) == pytest.approx(75.5, abs=0.05)  # what the slip would give
-    assert degrees(engine()[0].exact.fastest()) == pytest.approx(76.72, abs=5e-3)
+    assert degrees(engine()[0].exact.angle_of_greatest_speed()) == pytest.approx(76.72, abs=5e-3)
 
 
 def test_000_p5_greatest_speed_printed_7_227_is_a_slip_for_7_274():
     found, omega, _ = engine()
     two, right = found.two_terms, radians(77)
-    assert two.velocity(two.fastest(), omega) == pytest.approx(7.2747, abs=5e-5)
-    assert found.exact.velocity(found.exact.fastest(), omega) == pytest.approx(7.287, abs=5e-4)
+    assert two.velocity(two.angle_of_greatest_speed(), omega) == pytest.approx(7.2747, abs=5e-5)
+    assert found.exact.velocity(found.exact.angle_of_greatest_speed(), omega) == pytest.approx(7.287, abs=5e-4)
     lost = sin(radians(2 * 77 / (2 * 4)))  # sin(2 x 77 / (2 x 4)), as printed, for sin(2 x 77) / (2 x 4)
     assert 0.15 * omega * (sin(right) + lost) == pytest.approx(9.22, abs=0.005)
     assert two.velocity(right, omega) == pytest.approx(7.2747, abs=5e-5)
@@ -377,7 +385,7 @@ def test_000_p5_greatest_speed_printed_7_227_is_a_slip_for_7_274():
 
 def example():
     """004: r = 160, l = 500 mm, 4500 rpm, 40 degrees from TDC; P is 360 mm from the piston."""
-    return piston(planar.load("004-EX-piston"), "stroke"), 4500 * pi / 30, radians(40)
+    return find_piston(planar.load("004-EX-piston"), "stroke"), 4500 * pi / 30, radians(40)
 
 
 def test_004_the_printed_acceleration_with_r_by_2l_is_a_slip_that_is_3_4_percent_off():
@@ -412,7 +420,7 @@ def test_004_form_the_two_terms_are_off_by_so_much_at_r_by_l_0_32():
 
 def test_004_ex_p_the_printed_66_48_of_the_drawing_is_the_exact_speed_of_p():
     found, omega, theta = example()
-    exact, two = (each.point(theta, omega, 0.36) for each in (found.exact, found.two_terms))
+    exact, two = (each.rod_point(theta, omega, 0.36) for each in (found.exact, found.two_terms))
     assert round(hypot(*exact.velocity), 2) == 66.48
     assert hypot(*two.velocity) == pytest.approx(66.42, abs=5e-3)  # by two terms 0.09 % less
     assert hypot(*two.velocity) == pytest.approx(66.48, rel=0.02)
@@ -424,7 +432,7 @@ def test_004_ex_p_the_formulas_of_p_are_those_printed():
     # x_P = x - b (1 - r^2/2l^2 sin^2 t), y_P = r (b/l) sin t; "r sin t = b sin phi" is a slip for l sin phi
     found, omega, theta = example()
     r, l, b = found.r, found.l, 0.36  # noqa: E741
-    told = found.two_terms.point(theta, omega, b)
+    told = found.two_terms.rod_point(theta, omega, b)
     x = r * cos(theta) + l - r**2 / (4.0 * l) * (1.0 - cos(2.0 * theta)) - b * (1.0 - (r / l * sin(theta)) ** 2 / 2.0)
     assert told.position == pytest.approx([x, r * b / l * sin(theta)], rel=NEAR)
     vx = -r * omega * (sin(theta) + r / (2.0 * l) * (1.0 - b / l) * sin(2.0 * theta))
@@ -438,8 +446,8 @@ def test_a_point_of_the_rod_moves_as_it_is_solved(r, l, e):  # noqa: E741
     value = planar.to_dict(slider_crank(r, l, e, velocity=3.0))
     value["links"]["AB"]["points"] = {"P": {"along": ["B", "A"], "distance": 0.7 * l}}
     mechanism = planar.from_dict(value)
-    found, state = piston(mechanism, "stroke"), planar.solve(mechanism)
-    told, point = found.exact.point(found.theta(1.0), 3.0, 0.7 * l), state.point("P")
+    found, state = find_piston(mechanism, "stroke"), planar.solve(mechanism)
+    told, point = found.exact.rod_point(found.theta(1.0), 3.0, 0.7 * l), state.point("P")
     for mine, solved in zip(told, (point.position, point.velocity, point.acceleration), strict=True):
         assert mine == pytest.approx(solved, abs=1e-12)
 
@@ -450,16 +458,16 @@ def test_points_off_the_line_of_the_rods_pins_have_no_two_term_formula():
         "P": {"along": ["B", "A"], "distance": 0.36},
         "Q": {"along": ["B", "A"], "distance": 0.36, "angle": 0.2},
     }
-    p, q, a = routes(planar.from_dict(value), points=("P", "Q", "A"))
+    p, q, a = analytical_routes(planar.from_dict(value), points=("P", "Q", "A"))
     assert [rod.b for rod in p.rods] == pytest.approx([0.36])
     assert [rod.b for rod in a.rods] == pytest.approx([0.5])
     assert q.rods == ()
 
 
 def test_the_greatest_deviation_is_that_of_all_angles():
-    found = Exact(0.15, 0.6)
+    found = ExactFormulas(0.15, 0.6)
     theta = np.linspace(0.0, 2.0 * pi, 20001)
-    off = np.abs(TwoTerms(0.15, 0.6).velocity(theta, 1.0) - found.velocity(theta, 1.0))
+    off = np.abs(TwoTermFormulas(0.15, 0.6).velocity(theta, 1.0) - found.velocity(theta, 1.0))
     part = off.max() / np.abs(found.velocity(theta, 1.0)).max()
     told = engine()[0].deviation(1)
     assert told.part == pytest.approx(part, rel=1e-5)
@@ -514,7 +522,7 @@ def test_a_point_of_the_rod_is_printed_by_both_formulas(tmp_path):
 
 def test_a_point_of_the_rod_is_as_it_is_solved_and_as_the_closed_form_has_it():
     mechanism = planar.load("004-EX-piston")
-    (route,) = routes(mechanism, points=("P",))
+    (route,) = analytical_routes(mechanism, points=("P",))
     (rod,) = route.rods
     assert (rod.b, route.position) == pytest.approx((0.36, radians(40)))
     for mine, solved in zip(rod.exact, route.here, strict=True):
@@ -529,12 +537,12 @@ def test_every_slide_on_the_frame_that_is_not_driven_is_told(tmp_path):
     out = run(tmp_path, "harmonics", "002-E3.4").done()
     told = [line for line in out.splitlines() if line.startswith("Slide ")]
     assert told == ["Slide guide B", "Slide guide D", "Slide guide F"]
-    (named,) = routes(planar.load("004-QR"), pairs=("slot",))
+    (named,) = analytical_routes(planar.load("004-QR"), pairs=("slot",))
     assert named.of == "slot"
 
 
 def test_without_a_speed_rates_are_per_radian(tmp_path):
-    value = planar.to_dict(with_inputs(planar.load("004-SC12"), (Drive("O", None, 0.0, 0.0),)))
+    value = planar.to_dict(replace_inputs(planar.load("004-SC12"), (Drive("O", None, 0.0, 0.0),)))
     (tmp_path / "still.json").write_text(json.dumps(value))
     out = run(tmp_path, "harmonics", "still.json").done()
     assert numbers(out, "greatest speed")[:2] == pytest.approx([0.03133, 74.5289])
@@ -565,4 +573,4 @@ def test_what_cannot_be_told_is_refused_in_one_sentence(tmp_path, words, status,
 )
 def test_what_is_not_there_is_bad_input(name, named, told):
     with pytest.raises(BadInput, match=told):
-        routes(planar.load(name), **named)
+        analytical_routes(planar.load(name), **named)

@@ -12,12 +12,12 @@ import planar
 from planar.document import files
 from planar.document.files import to_dict
 from planar.drawing.forces.free_bodies import free_bodies
-from planar.drawing.paper.picture import Letter
+from planar.drawing.paper.picture import Label
 from planar.drawing.scheme.scheme import scheme
-from planar.model.link_graph import numbered
-from planar.model.mechanism import entries
-from planar.pages.page_data import carried
-from planar.reports.tables.inspection import inspection, orders
+from planar.model.link_graph import link_numbers
+from planar.model.mechanism import pair_entries
+from planar.pages.page_data import page_data
+from planar.reports.tables.inspection import inspection_tables, link_orders_text
 from tests.cli.test_commands import written
 from tests.command import ROOT, run
 from tests.known import MODELS, some_models
@@ -112,21 +112,21 @@ def test_every_model_is_inspected_and_shown(name, found):
     if not any(pair.keyword in ("belt", "chain", "rack", "gear") for pair in mechanism.pairs):
         assert each.gruebler == count
     console = Console(width=140, file=None, record=True, quiet=True)
-    console.print(inspection(each))
+    console.print(inspection_tables(each))
 
 
 def test_the_kinds_of_pairs_and_orders_of_links_are_those_of_the_graph(found):
     """Counted again from the file: a pin of three links is one joint of each of them."""
     for name in ("double-butterfly", "peaucellier-lipkin", "stephenson-3-five-bar", "scissor-lift"):
         joints = {}
-        for group in entries(MODELS[name]):
+        for group in pair_entries(MODELS[name]):
             for link in {link for pair in group for link in pair.links}:
                 joints[link] = joints.get(link, 0) + 1
         words = {1: "unary", 2: "binary", 3: "ternary", 4: "quaternary", 5: "quinary"}
         assert {link: each.order for link, each in found(name).links.items()} == {
             link: words[count] for link, count in joints.items()
         }
-    assert orders(found("double-butterfly")) == "4 binary and 4 ternary"
+    assert link_orders_text(found("double-butterfly")) == "4 binary and 4 ternary"
     assert found("rotary-engine").links["cylinders"].order == "of 8 pairs"
 
 
@@ -330,14 +330,14 @@ def test_links_that_are_numbers_keep_them_in_text_tables_drawings_and_pages(rena
     assert dict(centres.numbers) == expected
     assert centres["2", "frame"].name == "I2,5"
     assert centres["2", "15"].name == "I2,15"
-    texts = {mark.about: mark.text for mark in scheme(state).marks if isinstance(mark, Letter)}
+    texts = {mark.about: mark.text for mark in scheme(state).marks if isinstance(mark, Label)}
     assert {link: texts[f"number of {link}"] for link in expected} == expected
     pictures, _ = free_bodies(planar.forces(state))
     titles = [each.title for each in pictures]
     assert {"1", "2", "4", "15", "3 block D"} <= set(titles)
     abouts = {mark.about for each in pictures for mark in each.marks}
     assert {"force F_12", "force F_21", "force F_3,15"} <= abouts
-    data, _ = carried(renamed)
+    data, _ = page_data(renamed)
     assert data["numbers"] == expected
     shown = run(tmp_path, "centres", written(tmp_path, to_dict(renamed))).done()
     assert "links: 1, 2, 3 block D, 4, 5 frame and 15" in shown
@@ -346,7 +346,7 @@ def test_links_that_are_numbers_keep_them_in_text_tables_drawings_and_pages(rena
 @pytest.mark.parametrize("name", ["01", "1a", "-1", "½", "２", "99999"])
 def test_only_a_plain_number_is_a_links_number(name):
     value = json.loads(json.dumps(four_bar()).replace('"c"', json.dumps(name)))
-    number = numbered(files.from_dict(value))
+    number = link_numbers(files.from_dict(value))
     assert sorted(number.values()) == ["1", "2", "3", "4"]
 
 

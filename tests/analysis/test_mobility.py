@@ -11,8 +11,8 @@ import pytest
 import planar
 from planar.document import files
 from planar.foundation.errors import NoAnswer, Outcome
-from planar.solving.full_constraints import Constraints, rank
-from planar.solving.position import Solver
+from planar.solving.full_constraints import FullConstraints, rank
+from planar.solving.position import PositionSolver
 from tests.draws import part
 from tests.linkages import conditioning, determinate, random_linkage
 
@@ -45,10 +45,10 @@ def three(found):
 
 def constraints_at(value):
     """All constraints of a mechanism and its coordinates in the file's position."""
-    solver = Solver(value)
-    z = solver.assembly().z
-    w = solver.program.positions(z, solver.station.u, solver.station.p).full().ravel()
-    return Constraints(solver), w
+    solver = PositionSolver(value)
+    z = solver.find_assembly().z
+    w = solver.functions.coordinate_function(z, solver.inputs.u, solver.inputs.p).full().ravel()
+    return FullConstraints(solver), w
 
 
 def excess(slope, owners, among):
@@ -60,7 +60,7 @@ def excess(slope, owners, among):
 def smallest(value, sets):
     """Every set depends on itself, none of its pairs can be left out of that, and together they hold all surplus."""
     constraints, w = constraints_at(value)
-    slope, owners = constraints.slope(w), constraints.pair_of_row
+    slope, owners = constraints.jacobian(w), constraints.pair_of_row
     for each in sets:
         assert excess(slope, owners, each) > 0
         for pair in each:
@@ -228,7 +228,7 @@ def test_of_parallel_guides_any_two_hold_the_same(count):
     # every guide is named, and each set is one of the pairs of them
     assert {name for each in found.redundant for name in each} == {f"sG{k}" for k in range(count)}
     constraints, w = constraints_at(value)
-    slope, owners = constraints.slope(w), constraints.pair_of_row
+    slope, owners = constraints.jacobian(w), constraints.pair_of_row
     assert all(excess(slope, owners, pair) == 2 for pair in combinations(set(owners), 2))
     smallest(value, found.redundant)
     state = planar.solve(value)
@@ -387,8 +387,8 @@ def test_of_random_linkages_that_are_solved_all_mobilities_are_the_number_of_inp
         assert not settled
         return
     assert settled
-    solver = Solver(value)
-    if conditioning(solver, solver.assembly().z) < 1e-3:
+    solver = PositionSolver(value)
+    if conditioning(solver, solver.find_assembly().z) < 1e-3:
         return
     found = planar.mobility(value)
     assert found.finite == found.instantaneous == state.mobility == len(value.inputs)
@@ -396,5 +396,5 @@ def test_of_random_linkages_that_are_solved_all_mobilities_are_the_number_of_inp
     assert (found.surplus, found.redundant, found.why) == (0, (), ())
     # the rank that the count rests on, by numpy alone
     constraints, w = constraints_at(value)
-    slope = constraints.slope(w)
+    slope = constraints.jacobian(w)
     assert np.linalg.matrix_rank(slope, tol=1e-7) == w.size - len(value.inputs)

@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import planar
-from planar.analysis.identity.mechanism_names import names
+from planar.analysis.identity.mechanism_names import mechanism_names
 from planar.document.files import model_files
-from planar.model.link_graph import numbered, pair_words
+from planar.model.link_graph import link_numbers, pair_labels_by_type
 
 
 def made(frame, links, pairs, **more):
@@ -455,12 +455,12 @@ MODELS = {
 @pytest.mark.parametrize("case", CASES)
 def test_names(case):
     value, expected = CASES[case]
-    assert names(planar.from_dict(value)) == expected
+    assert mechanism_names(planar.from_dict(value)) == expected
 
 
 @pytest.mark.parametrize("model", MODELS)
 def test_models_are_called_what_they_are(model):
-    found = names(planar.load(model))
+    found = mechanism_names(planar.load(model))
     assert set(MODELS[model]) <= set(found)
     assert bool(found) == bool(MODELS[model])
 
@@ -577,69 +577,76 @@ def test_names_ask_neither_for_words_nor_for_their_order(value, seed):
     )
     assert not known(other) & set(words)
     other = planar.from_dict(shuffled(other | {"name": "another"}, random))
-    assert names(other) == names(planar.from_dict(value))
+    assert mechanism_names(other) == mechanism_names(planar.from_dict(value))
 
 
 @settings(deadline=None)
 @given(st.sampled_from(VALUES), st.integers(0, 2**32), st.sampled_from(["m", "inch", "mm"]))
 def test_names_ask_neither_for_the_scale_nor_for_the_axes(value, seed, unit):
     value = full(value)
-    assert names(planar.from_dict(moved(value, Random(seed), unit))) == names(planar.from_dict(value))
+    assert mechanism_names(planar.from_dict(moved(value, Random(seed), unit))) == mechanism_names(
+        planar.from_dict(value)
+    )
 
 
 def test_the_chapters_listing_of_its_slider_crank():
     """Machine Elements, 1.3.5 (i): 3 turning pairs O-1, 1-2 and 2-3, 1 sliding pair 3-4."""
     mechanism = planar.load("slider-crank")
-    assert numbered(mechanism) == {"crank": "1", "rod": "2", "piston": "3", "frame": "4"}
-    assert pair_words(mechanism) == (("turning", ("O-1", "1-2", "2-3")), ("sliding", ("3-4",)))
+    assert link_numbers(mechanism) == {"crank": "1", "rod": "2", "piston": "3", "frame": "4"}
+    assert pair_labels_by_type(mechanism) == (("turning", ("O-1", "1-2", "2-3")), ("sliding", ("3-4",)))
 
 
 def test_the_chapters_numbers_of_its_quick_return():
     """Machine Elements, 1.3.5 (ii): crank 1, slider 2, link 3; then two more links and the frame."""
     mechanism = planar.load("004-QR")
     order = ("OA", "block A", "CD", "DR", "block R", "frame")
-    assert numbered(mechanism) == {link: str(number) for number, link in enumerate(order, start=1)}
-    turning, sliding = pair_words(mechanism)
+    assert link_numbers(mechanism) == {link: str(number) for number, link in enumerate(order, start=1)}
+    turning, sliding = pair_labels_by_type(mechanism)
     assert turning == ("turning", ("O-1", "1-2", "C-3", "3-4", "4-5"))
     assert sliding == ("sliding", ("2-3", "5-6"))
 
 
 def test_numbers_begin_at_what_drives():
-    assert numbered(planar.load("hand-pump")) == {"handle": "1", "plunger": "2", "swinging link": "3", "barrel": "4"}
+    assert link_numbers(planar.load("hand-pump")) == {
+        "handle": "1",
+        "plunger": "2",
+        "swinging link": "3",
+        "barrel": "4",
+    }
     value = four_bar(200, 50, 180, 120)
-    assert numbered(planar.from_dict(value)) == {"OA": "1", "AB": "2", "QB": "3", "frame": "4"}
+    assert link_numbers(planar.from_dict(value)) == {"OA": "1", "AB": "2", "QB": "3", "frame": "4"}
     value["inputs"] = [{"pair": "Q", "position": 90}]
-    assert numbered(planar.from_dict(value)) == {"QB": "1", "AB": "2", "OA": "3", "frame": "4"}
+    assert link_numbers(planar.from_dict(value)) == {"QB": "1", "AB": "2", "OA": "3", "frame": "4"}
 
 
 def test_links_beyond_the_frame_are_numbered_after_the_others():
     value = made({"O": [0, 0], "Q": [9, 0]}, {"q": bar("Q", "R", length=1), "o": bar("O", "P", length=1)}, pins("O Q"))
     value["inputs"] = [{"pair": "O", "position": 0}]
-    assert numbered(planar.from_dict(value)) == {"o": "1", "q": "2", "frame": "3"}
+    assert link_numbers(planar.from_dict(value)) == {"o": "1", "q": "2", "frame": "3"}
 
 
 @pytest.mark.parametrize("model", ["toggle-press", "peaucellier-lipkin", "scissor-lift", "excavator-arm"])
 def test_a_pin_of_n_links_gives_its_binary_pairs(model):
     mechanism = planar.load(model)
-    listed = [text for _, some in pair_words(mechanism) for text in some]
+    listed = [text for _, some in pair_labels_by_type(mechanism) for text in some]
     assert len(listed) == len(mechanism.pairs) == len(set(listed))
 
 
 def test_a_pin_of_three_links_is_listed_from_its_lowest_number_or_from_the_frame():
-    turning, sliding = pair_words(planar.load("toggle-press"))
+    turning, sliding = pair_labels_by_type(planar.load("toggle-press"))
     assert turning == ("turning", ("A0-1", "1-2", "2-3", "C-3", "2-4", "4-5"))
     assert sliding == ("sliding", ("5-6",))
     shared = planar.from_dict(graph("g", "O: a g b", "P: a b"))
-    assert pair_words(shared) == (("turning", ("O-1", "1-2", "O-2")),)
+    assert pair_labels_by_type(shared) == (("turning", ("O-1", "1-2", "O-2")),)
 
 
 def test_higher_pairs_are_listed_last():
-    assert [kind for kind, _ in pair_words(planar.from_dict(rack()))] == ["turning", "sliding", "rack"]
-    assert pair_words(planar.from_dict(wheels())) == (("turning", ("O-1", "P-2")), ("gear", ("1-2",)))
+    assert [kind for kind, _ in pair_labels_by_type(planar.from_dict(rack()))] == ["turning", "sliding", "rack"]
+    assert pair_labels_by_type(planar.from_dict(wheels())) == (("turning", ("O-1", "P-2")), ("gear", ("1-2",)))
 
 
 def test_long_chains_are_named_without_delay():
     """No search through the likenesses of large graphs."""
     links = {f"l{k}": bar(f"P{k}", f"P{k + 1}", length=1) for k in range(600)}
     value = made({"P0": [0, 0]}, links, pins(" ".join(f"P{k}" for k in range(600))))
-    assert names(planar.from_dict(value)) == ("open chain of 600 moving links", "serial arm")
+    assert mechanism_names(planar.from_dict(value)) == ("open chain of 600 moving links", "serial arm")

@@ -14,16 +14,16 @@ from hypothesis import strategies as st
 from planar.analysis.polygons.construction import acceleration_polygon, velocity_polygon
 from planar.analysis.polygons.polygon import (
     Meeting,
-    Part,
+    PointImage,
     Polygon,
-    Simultaneous,
-    Triangle,
-    Turn,
-    Vector,
+    PolygonVector,
+    SimultaneousSolution,
+    TurningRate,
+    VectorPart,
 )
 from planar.document import files
 from planar.foundation.geometry import direction
-from planar.model.wording import heading
+from planar.model.wording import direction_sense
 from planar.solving.position import solve
 from tests.draws import draws
 from tests.known import some_models
@@ -93,10 +93,10 @@ def letter_of(polygon, point):
 def guide_lines(state):
     """Of every slide: the point that rides, the guide and the direction of its line."""
     for pair in state.mechanism.pairs:
-        if pair.rides() is None:
+        if pair.point_on_line() is None:
             continue
-        (rider, point), guide = pair.rides()
-        *_, x, y = pair.line.measure(state.shapes[guide])
+        (rider, point), guide = pair.point_on_line()
+        *_, x, y = pair.line.measure_line(state.shapes[guide])
         way = direction(spin(state, guide, 0))
         yield f"{rider}.{point}", guide, np.array([x * way.x - y * way.y, x * way.y + y * way.x])
 
@@ -124,7 +124,7 @@ def letters_are_what_the_state_has(polygon, tolerance):
     state, order = polygon.state, order_of(polygon)
     scale = tolerance * largest(polygon)
     frame = state.mechanism.frame
-    fixed = {name for name in state.point_names if any(link == frame for link, _ in state._named(name).members)}
+    fixed = {name for name in state.point_names if any(link == frame for link, _ in state._find_point(name).members)}
     assert len(set(polygon.points.values())) == len(polygon.points)
     # every point that can move has a letter
     assert {*state.point_names} - {*polygon.points.values()} <= fixed
@@ -138,7 +138,7 @@ def letters_are_what_the_state_has(polygon, tolerance):
             found = state.point(point)
             np.testing.assert_allclose(value, found.velocity if order == 1 else found.acceleration, atol=scale)
         elif point is not None:
-            sliding = {link for pair in state.mechanism.pairs if pair.rides() for link in pair.links}
+            sliding = {link for pair in state.mechanism.pairs if pair.point_on_line() for link in pair.links}
             routes = [moved(state, link, place(polygon, point), order) for link in sliding]
             assert min(hypot(*(route - value)) for route in routes) <= scale
     heads = {vector.head for vector in vectors(polygon)} | {*polygon.pole}
@@ -175,38 +175,38 @@ def directions_are_those_of_the_space_diagram(polygon, tolerance):
     speeds = velocity_polygon(state)
     for vector in vectors(polygon):
         size = hypot(*vector.value)
-        if vector.part in (Part.SLIDING, Part.CORIOLIS):
-            assert vector.square == (vector.part is Part.CORIOLIS)
+        if vector.part in (VectorPart.SLIDING, VectorPart.CORIOLIS):
+            assert vector.is_perpendicular == (vector.part is VectorPart.CORIOLIS)
             guide = vector.line.removeprefix("line on ") if vector.line.startswith("line on ") else None
             ways = [way for _, link, way in guide_lines(state) if link == (guide or state.mechanism.frame)]
-            off = [abs(way @ vector.value if vector.square else cross(way, vector.value)) for way in ways]
+            off = [abs(way @ vector.value if vector.is_perpendicular else cross(way, vector.value)) for way in ways]
             assert min(off) <= scale
         else:
-            assert vector.square == (vector.part is not Part.CENTRIPETAL)
+            assert vector.is_perpendicular == (vector.part is not VectorPart.CENTRIPETAL)
             reach = place(polygon, vector.of) - place(polygon, vector.against)
             length = hypot(*reach)
-            off = reach @ vector.value if vector.square else cross(reach, vector.value)
+            off = reach @ vector.value if vector.is_perpendicular else cross(reach, vector.value)
             assert abs(off) <= scale * length
-            if vector.part is Part.CENTRIPETAL:
+            if vector.part is VectorPart.CENTRIPETAL:
                 assert vector.towards == vector.against
                 assert reach @ vector.value <= scale * length
         if not vector.known:
             assert vector.towards == ""
-        elif vector.part is Part.TANGENTIAL and not vector.towards.startswith(("to the", "upwards", "downwards")):
+        elif vector.part is VectorPart.TANGENTIAL and not vector.towards.startswith(("to the", "upwards", "downwards")):
             # the letter of the velocity polygon to which it points
             head, tail = (letter_of(speeds, point) for point in (vector.of, vector.against))
             relative = speeds.letters[head] - speeds.letters[tail]
             assert vector.towards == (head if relative @ vector.value > 0.0 else tail)
             assert abs(cross(relative, vector.value)) <= tolerance * largest(speeds) * size + scale * hypot(*relative)
-        elif vector.part is not Part.CENTRIPETAL:
-            assert vector.towards == heading(vector.value)
+        elif vector.part is not VectorPart.CENTRIPETAL:
+            assert vector.towards == direction_sense(vector.value)
 
 
 def images_are_similar_and_of_the_same_sense(polygon, tolerance):
     state, order = polygon.state, order_of(polygon)
     scale = tolerance * largest(polygon)
     for stage in polygon.stages:
-        if not isinstance(stage, Triangle):
+        if not isinstance(stage, PointImage):
             continue
         points = (*stage.base, stage.point)
         ends = [polygon.letters[letter_of(polygon, point)] for point in points]
@@ -232,7 +232,7 @@ def images_are_similar_and_of_the_same_sense(polygon, tolerance):
 def turns_are_those_of_the_links(polygon, tolerance):
     state = polygon.state
     for turn in polygon.stages:
-        if not isinstance(turn, Turn):
+        if not isinstance(turn, TurningRate):
             continue
         link = state.link(turn.link)
         rate = link.angular_velocity if polygon.kind == "velocity" else link.angular_acceleration
@@ -255,12 +255,12 @@ def turns_are_those_of_the_links(polygon, tolerance):
 def equations_hold_for_the_rates_of_the_state(polygon, tolerance):
     state, order = polygon.state, order_of(polygon)
     for stage in polygon.stages:
-        if not isinstance(stage, Simultaneous):
+        if not isinstance(stage, SimultaneousSolution):
             continue
         values = {unknown.name: unknown.value for unknown in stage.unknowns}
         assert len(values) == len(stage.unknowns)
         for unknown in stage.unknowns:
-            if unknown.turns:
+            if unknown.is_angular:
                 symbol, link = unknown.name[0], unknown.name[2:]
                 assert symbol == ("ω" if order == 1 else "α")
                 assert unknown.value == pytest.approx(spin(state, link, order))
@@ -282,7 +282,7 @@ def equations_hold_for_the_rates_of_the_state(polygon, tolerance):
 
 def lines_of(polygon, vector):
     """The directions that a vector of unknown magnitude may have by what is drawn in the space diagram."""
-    if vector.part is Part.SLIDING:
+    if vector.part is VectorPart.SLIDING:
         guide = vector.line.removeprefix("line on ") if vector.line.startswith("line on ") else None
         state = polygon.state
         return [way for _, link, way in guide_lines(state) if link == (guide or state.mechanism.frame)]
@@ -293,13 +293,13 @@ def lines_of(polygon, vector):
 def a_pencil_can_draw_it_in_this_order(polygon, tolerance):
     there = {*polygon.pole}
     for stage in polygon.stages:
-        if isinstance(stage, Triangle):
+        if isinstance(stage, PointImage):
             assert {letter_of(polygon, point) for point in stage.base} <= there
             there.add(letter_of(polygon, stage.point))
-        elif isinstance(stage, Simultaneous):
+        elif isinstance(stage, SimultaneousSolution):
             assert not {*stage.letters} & there
             there |= {*stage.letters}
-        elif isinstance(stage, Turn):
+        elif isinstance(stage, TurningRate):
             assert {*stage.vector} - {""} <= there
         else:
             _meets(polygon, stage, there, tolerance)
@@ -409,9 +409,9 @@ def plan(polygon):
                 [(v.part, v.of, v.against, v.tail, v.head, v.known, v.line) for v in s.vectors] for s in stage.sides
             ]
             yield stage.letter, sides
-        elif isinstance(stage, Triangle):
+        elif isinstance(stage, PointImage):
             yield stage.link, stage.base, stage.point, stage.sense
-        elif isinstance(stage, Turn):
+        elif isinstance(stage, TurningRate):
             yield stage.link, stage.sense, stage.vector
         else:
             yield stage.links, stage.letters, [unknown.name for unknown in stage.unknowns]
@@ -434,7 +434,7 @@ def test_a_linkage_turned_as_a_whole_has_its_polygons_turned(seed, links, turn):
 
 # The chapters' tables: what is drawn, its letters, its magnitude in the book with the tolerance of the case, what it
 # is parallel or square to, and where it points. No magnitude: the direction alone is known.
-C, T, S = Part.CENTRIPETAL, Part.TANGENTIAL, Part.SLIDING
+C, T, S = VectorPart.CENTRIPETAL, VectorPart.TANGENTIAL, VectorPart.SLIDING
 TABLES = {
     "3.3 of 002-E3.1": [
         (C, "BA", "a_1 b_a", 5.51, 0.002, "∥ AB", "A"),
@@ -506,7 +506,7 @@ def test_rows_are_those_of_the_chapter(table):
     for (part, points, letters, magnitude, tolerance, line, towards), vector in zip(rows, found, strict=True):
         assert (vector.part, f"{vector.of}{vector.against}") == (part, points)
         assert f"{vector.tail} {vector.head}" == letters
-        assert f"{'⊥' if vector.square else '∥'} {vector.line}" == line
+        assert f"{'⊥' if vector.is_perpendicular else '∥'} {vector.line}" == line
         assert vector.towards == towards
         assert vector.known == (magnitude is not None)
         if magnitude is not None:
@@ -528,7 +528,9 @@ def test_rows_are_those_of_the_chapter(table):
     ],
 )
 def test_angular_accelerations_are_measured_as_in_the_chapter(stem, link, value, tolerance, vector, line):
-    (turn,) = (each for each in drawn(stem, "acceleration").stages if isinstance(each, Turn) and each.link == link)
+    (turn,) = (
+        each for each in drawn(stem, "acceleration").stages if isinstance(each, TurningRate) and each.link == link
+    )
     assert " ".join(turn.vector) == vector
     assert turn.line == line
     assert turn.value == pytest.approx(value, rel=tolerance)
@@ -536,7 +538,7 @@ def test_angular_accelerations_are_measured_as_in_the_chapter(stem, link, value,
 
 
 def test_images_of_the_four_bar_are_read_as_in_the_chapter():
-    images = [stage for stage in drawn("002-E3.1", "acceleration").stages if isinstance(stage, Triangle)]
+    images = [stage for stage in drawn("002-E3.1", "acceleration").stages if isinstance(stage, PointImage)]
     assert [(each.base, each.point, each.sense) for each in images] == [
         (("B", "C"), "E", ""),
         (("B", "C"), "F", "clockwise"),
@@ -546,13 +548,13 @@ def test_images_of_the_four_bar_are_read_as_in_the_chapter():
 
 
 def test_a_produced_link_has_its_image_produced():
-    (image,) = (stage for stage in drawn("002-E3.2", "acceleration").stages if isinstance(stage, Triangle))
+    (image,) = (stage for stage in drawn("002-E3.2", "acceleration").stages if isinstance(stage, PointImage))
     assert (image.base, image.point) == (("A", "B"), "E")
     assert image.ratio == pytest.approx(-450 / 1600)
 
 
-def coriolis(polygon) -> Vector:
-    (found,) = (vector for vector in vectors(polygon) if vector.part is Part.CORIOLIS)
+def coriolis(polygon) -> PolygonVector:
+    (found,) = (vector for vector in vectors(polygon) if vector.part is VectorPart.CORIOLIS)
     return found
 
 
@@ -624,14 +626,14 @@ def test_double_butterfly_is_told_to_need_equations_from_its_crank_on():
     polygon = drawn("double-butterfly", "velocity")
     turn, meeting, group = polygon.stages[:3]
     assert (turn.link, meeting.letter) == ("OA", "a")
-    assert isinstance(group, Simultaneous)
+    assert isinstance(group, SimultaneousSolution)
     assert len(group.unknowns) == len(group.equations) == 6
     assert {*polygon.pole} == {"o", "b", "c"}
 
 
 def test_a_block_that_only_turns_with_a_group_is_located_by_two_lines_afterwards():
     polygon = drawn("stephenson-valve-gear", "acceleration")
-    group = next(index for index, stage in enumerate(polygon.stages) if isinstance(stage, Simultaneous))
+    group = next(index for index, stage in enumerate(polygon.stages) if isinstance(stage, SimultaneousSolution))
     assert "d_1" not in polygon.stages[group].letters
     (meeting,) = (stage for stage in polygon.stages[group:] if isinstance(stage, Meeting))
     assert meeting.letter == "d_1"
@@ -639,7 +641,7 @@ def test_a_block_that_only_turns_with_a_group_is_located_by_two_lines_afterwards
 
 
 def test_the_image_of_a_link_that_does_not_turn_is_at_the_letter_of_a_point_of_it():
-    (image,) = (stage for stage in drawn("004-COS", "velocity").stages if isinstance(stage, Triangle))
+    (image,) = (stage for stage in drawn("004-COS", "velocity").stages if isinstance(stage, PointImage))
     # the yoke's own point below the block, not the block's
     assert (image.link, image.base, image.point, image.sense) == ("yoke", ("A′", "A′"), "B", "same")
 

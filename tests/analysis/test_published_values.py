@@ -7,49 +7,49 @@ import numpy as np
 import pytest
 
 import planar
-from planar.analysis.worked.published import compare
-from planar.model.mechanism import Drive, Published
-from planar.model.wording import heading, hurrying, listed, turning
+from planar.analysis.worked.published import compare_published
+from planar.model.mechanism import Drive, PublishedValue
+from planar.model.wording import direction_sense, join_all_names, speed_trend, turning_sense
 from tests.command import run
 
 
-def compared(item: Published, model: str = "002-E3.1"):
+def compared(item: PublishedValue, model: str = "002-E3.1"):
     mechanism = replace(planar.load(model), published=(item,))
-    (found,) = compare(planar.solve(mechanism))
+    (found,) = compare_published(planar.solve(mechanism))
     return found
 
 
 def test_a_value_beyond_the_reading_error_differs():
-    item = Published("v_C", "velocity", "C", value=0.4005, tolerance=0.01)
+    item = PublishedValue("v_C", "velocity", "C", value=0.4005, tolerance=0.01)
     assert compared(item).verdict == "agrees"
     assert compared(item._replace(value=0.41)).verdict == "differs"
     assert compared(item._replace(value=0.39, tolerance=0.03)).verdict == "agrees"
-    assert compared(item._replace(value=0.41)).apart == pytest.approx(0.41 / 0.400471 - 1, abs=1e-5)
+    assert compared(item._replace(value=0.41)).relative_difference == pytest.approx(0.41 / 0.400471 - 1, abs=1e-5)
 
 
 def test_a_wrong_sense_is_said_though_the_magnitude_agrees():
-    item = Published("alpha_BC", "angular acceleration", "BC", value=32.985, tolerance=0.01, sense="anticlockwise")
+    item = PublishedValue("alpha_BC", "angular acceleration", "BC", value=32.985, tolerance=0.01, sense="anticlockwise")
     assert compared(item).verdict == "agrees"
     assert compared(item._replace(sense="clockwise")).verdict == "sense differs"
-    assert compared(Published("v_C", "velocity", "C", value=0.4, sense="to the left")).verdict == "agrees"
-    assert compared(Published("v_C", "velocity", "C", value=0.4, sense="to the right")).verdict == "sense differs"
+    assert compared(PublishedValue("v_C", "velocity", "C", value=0.4, sense="to the left")).verdict == "agrees"
+    assert compared(PublishedValue("v_C", "velocity", "C", value=0.4, sense="to the right")).verdict == "sense differs"
 
 
 def test_a_component_is_compared_with_its_sign():
-    item = Published("v_Cx", "velocity", "C", component="x", value=-0.394, tolerance=0.01)
+    item = PublishedValue("v_Cx", "velocity", "C", component="x", value=-0.394, tolerance=0.01)
     assert compared(item).verdict == "agrees"
     assert compared(item._replace(value=0.394)).verdict == "differs"
 
 
 def test_what_is_not_printed_is_solved_all_the_same():
-    found = compared(Published("omega", "angular velocity", "BC"))
+    found = compared(PublishedValue("omega", "angular velocity", "BC"))
     assert found.verdict == "not printed"
     assert found.solved == pytest.approx(-5.150229849261061, rel=1e-12)
 
 
 def test_a_quantity_at_another_input_is_solved_there():
     at = (Drive("O", np.radians(90.0)),)
-    found = compared(Published("S", "position", "B", value=0.1, inputs=at, start=(Drive("O", 0.0),)), "004-SC12")
+    found = compared(PublishedValue("S", "position", "B", value=0.1, inputs=at, start=(Drive("O", 0.0),)), "004-SC12")
     assert found.solved == pytest.approx(0.13 - np.sqrt(0.1**2 - 0.03**2), rel=1e-12)
 
 
@@ -93,13 +93,13 @@ def test_efforts_need_no_speed_and_are_those_of_each_input():
     ],
 )
 def test_headings(vector, words):
-    assert heading(vector) == words
+    assert direction_sense(vector) == words
 
 
 def test_senses_and_lists():
-    assert (turning(2.0), turning(-2.0), turning(0.0)) == ("anticlockwise", "clockwise", "at rest")
-    assert (hurrying(2.0), hurrying(-2.0), hurrying(0.0)) == ("speeding up", "slowing down", "steady")
-    assert (listed([]), listed(["a"]), listed(["a", "b"]), listed(["a", "b", "c"])) == (
+    assert (turning_sense(2.0), turning_sense(-2.0), turning_sense(0.0)) == ("anticlockwise", "clockwise", "at rest")
+    assert (speed_trend(2.0), speed_trend(-2.0), speed_trend(0.0)) == ("speeding up", "slowing down", "steady")
+    assert (join_all_names([]), join_all_names(["a"]), join_all_names(["a", "b"]), join_all_names(["a", "b", "c"])) == (
         "none",
         "a",
         "a and b",

@@ -13,13 +13,13 @@ import pytest
 from rich.console import Console
 
 import planar
-from planar.analysis.rich_text import Chord, Quantity, Spot, Symbol, number, plain
-from planar.analysis.worked.published import compare
+from planar.analysis.rich_text import Chord, MeasuredValue, PolygonLetter, Symbol, format_number, plain_text
+from planar.analysis.worked.published import compare_published
 from planar.analysis.worked.sections import Section
-from planar.analysis.worked.solution import Solution, worked_solution
-from planar.drawing.paper.scales import given
+from planar.analysis.worked.solution import WorkedSolution, worked_solution
+from planar.drawing.paper.scales import parse_scale
 from planar.foundation.errors import PlanarError
-from planar.reports.tables.worked_solution import explained, record
+from planar.reports.tables.worked_solution import record, solution_text
 from tests.command import run
 from tests.known import some_models, state_of
 from tests.linkages import random_linkage
@@ -29,31 +29,36 @@ DRAWN = 0.03
 """What a drawing may be off, where the model's file states no other tolerance."""
 
 
-def solved(model: str) -> Solution:
+def solved(model: str) -> WorkedSolution:
     return worked_solution(state_of(model))
 
 
-def shown(solution: Solution, width: int = 100, scales: Any = None) -> str:
+def shown(solution: WorkedSolution, width: int = 100, scales: Any = None) -> str:
     with Path(os.devnull).open("w") as nowhere:
         console = Console(record=True, width=width, file=nowhere, markup=False, emoji=False, highlight=False)
-        console.print(explained(solution, scales))
+        console.print(solution_text(solution, scales))
         return console.export_text()
 
 
 def rows(section: Section) -> dict[str, tuple[str, str, str, str]]:
     """The vector table by symbol: letters, magnitude, direction, sense."""
     return {
-        plain((row.symbol,)): (plain((row.chord,)), plain(row.magnitude), plain(row.direction), plain(row.sense))
+        plain_text((row.symbol,)): (
+            plain_text((row.chord,)),
+            plain_text(row.magnitude),
+            plain_text(row.direction),
+            plain_text(row.sense),
+        )
         for row in section.rows
     }
 
 
 def sentences(section: Section) -> list[str]:
-    return [plain(each) for each in (*section.known, *section.steps, *section.images, *section.results)]
+    return [plain_text(each) for each in (*section.known, *section.steps, *section.images, *section.results)]
 
 
-def everything(solution: Solution) -> list[str]:
-    return [each for half in solution.halves for section in half.sections for each in sentences(section)]
+def everything(solution: WorkedSolution) -> list[str]:
+    return [each for half in solution.worked_polygons for section in half.sections for each in sentences(section)]
 
 
 # numbers and symbols
@@ -78,22 +83,22 @@ def everything(solution: Solution) -> list[str]:
     ],
 )
 def test_numbers_are_printed_as_a_chapter_prints_them(value: float, text: str) -> None:
-    assert number(value) == text
+    assert format_number(value) == text
 
 
 def test_symbols_letters_and_chords_are_written_plainly() -> None:
-    assert plain((Symbol("f", "cb", "c"),)) == "f_cb^c"
-    assert plain((Symbol("ω", "boom rod"),)) == "ω(boom rod)"
-    assert plain((Chord(Spot("a", "1"), Spot("b", "a")),)) == "a₁b_a"
-    assert plain((Chord(Spot("b", "a"), Spot("b", "1")),)).replace("\xa0", " ") == "b_a b₁"
-    assert plain((Chord(Spot("g″"), Spot("f")),)) == "g″f"
-    assert plain((Chord(Spot("o"), Spot("foot")),)) == "o–foot"
+    assert plain_text((Symbol("f", "cb", "c"),)) == "f_cb^c"
+    assert plain_text((Symbol("ω", "boom rod"),)) == "ω(boom rod)"
+    assert plain_text((Chord(PolygonLetter("a", "1"), PolygonLetter("b", "a")),)) == "a₁b_a"
+    assert plain_text((Chord(PolygonLetter("b", "a"), PolygonLetter("b", "1")),)).replace("\xa0", " ") == "b_a b₁"
+    assert plain_text((Chord(PolygonLetter("g″"), PolygonLetter("f")),)) == "g″f"
+    assert plain_text((Chord(PolygonLetter("o"), PolygonLetter("foot")),)) == "o–foot"
 
 
 def test_what_is_drawn_has_its_length_on_paper_beside_it_where_there_is_a_scale() -> None:
-    scale = {"acceleration": given("1 cm = 2 m/s^2")}
-    assert plain((Quantity(5.5125, "m/s^2", "acceleration"),), scale) == "5.51 m/s² (27.6 mm)"
-    assert plain((Quantity(5.5125, "m/s^2", "velocity"),), scale) == "5.51 m/s²"
+    scale = {"acceleration": parse_scale("1 cm = 2 m/s^2")}
+    assert plain_text((MeasuredValue(5.5125, "m/s^2", "acceleration"),), scale) == "5.51 m/s² (27.6 mm)"
+    assert plain_text((MeasuredValue(5.5125, "m/s^2", "velocity"),), scale) == "5.51 m/s²"
 
 
 # the chapter's tables, row by row: letters, magnitude (None where it is not known beforehand), direction, sense
@@ -178,7 +183,7 @@ def test_a_magnitude_has_its_formula_and_its_numbers() -> None:
 
 
 def test_the_vector_equation_of_example_3_1_is_the_chapters() -> None:
-    lines = [plain(line).replace("\xa0", " ") for line in solved("002-E3.1").acceleration.sections[0].equation]
+    lines = [plain_text(line).replace("\xa0", " ") for line in solved("002-E3.1").acceleration.sections[0].equation]
     assert lines == [
         "Acc. of C rel. to D = Acc. of B rel. to A + Acc. of C rel. to B",
         "f_cd = f_ba + f_cb",
@@ -189,7 +194,7 @@ def test_the_vector_equation_of_example_3_1_is_the_chapters() -> None:
 
 def test_the_construction_of_example_3_1_can_be_followed_with_a_pencil() -> None:
     section = solved("002-E3.1").acceleration.sections[0]
-    assert [plain(step).replace("\xa0", " ") for step in (*section.steps, *section.images)] == [
+    assert [plain_text(step).replace("\xa0", " ") for step in (*section.steps, *section.images)] == [
         "Take the pole a₁, d₁: what is fixed has no acceleration.",
         "From a₁ draw a₁b_a = 5.51 m/s² parallel to AB, towards A.",
         "To it add b_a b₁ = 1.3 m/s² square to AB, in the sense of ba in the velocity polygon.",
@@ -245,7 +250,7 @@ def test_a_turn_known_from_an_input_between_moving_links_is_not_called_given() -
 
 def test_pins_with_radii_rub() -> None:
     solution = solved("002-E3.1")
-    told = [plain(each) for each in solution.rubbing]
+    told = [plain_text(each) for each in solution.rubbing]
     assert told[1] == "At B: (ω_BC − ω_AB) × r = 15.7 × 0.04 = 0.626 m/s"
     assert told[0] == "At A: ω_AB × r = 10.5 × 0.03 = 0.315 m/s"
 
@@ -255,9 +260,9 @@ def test_pins_with_radii_rub() -> None:
 
 def test_the_double_butterfly_has_equations_instead_of_a_pencil_order() -> None:
     solution = solved("double-butterfly")
-    for half, order in zip(solution.halves, ("angular_velocity", "angular_acceleration"), strict=True):
+    for half, order in zip(solution.worked_polygons, ("angular_velocity", "angular_acceleration"), strict=True):
         (section,) = half.sections
-        told = [plain(each) for each in section.simultaneous]
+        told = [plain_text(each) for each in section.simultaneous]
         assert told[0].startswith("No two lines locate a point of links ADE, DKJ, CGH, EG, KH and BJ")
         assert "6 simultaneous equations in 6 unknowns" in told[0]
         letter = "ω" if order == "angular_velocity" else "α"
@@ -271,7 +276,7 @@ def test_the_double_butterfly_has_equations_instead_of_a_pencil_order() -> None:
             scale = max(abs(float(size or 1) * values[link]) for _, size, link in terms)
             assert total == pytest.approx(float(right.replace("−", "-")), abs=0.015 * scale)
         for link, value in values.items():
-            assert f"{letter}_{link} = {number(value)} rad/s" in told[-1]
+            assert f"{letter}_{link} = {format_number(value)} rad/s" in told[-1]
 
 
 # every model
@@ -288,7 +293,7 @@ def test_every_model_is_explained(model: str) -> None:
         assert link.velocity == pytest.approx(state.link(name).angular_velocity, abs=1e-6)
     assert {point.point for point in solution.points} == set(state.point_names)
     read: set[str] = set()
-    for half in solution.halves:
+    for half in solution.worked_polygons:
         order = 1 if half.kind == "velocity" else 2
         greatest = max((float(np.hypot(*point[order])) for point in state.points.values()), default=0.0)
         for section in half.sections:
@@ -309,7 +314,7 @@ def test_every_model_is_explained(model: str) -> None:
 def _agreed(phrase: Any, state: planar.State, order: int, greatest: float) -> set[str]:
     """A result against the state, by another route than the polygon; the point that it is of."""
     symbol, *rest = phrase
-    values = [piece.value for piece in rest if isinstance(piece, Quantity)]
+    values = [piece.value for piece in rest if isinstance(piece, MeasuredValue)]
     if not isinstance(symbol, Symbol) or not values:
         return set()
     if symbol.letter in ("ω", "α"):
@@ -317,7 +322,7 @@ def _agreed(phrase: Any, state: planar.State, order: int, greatest: float) -> se
         wanted = (link.angular_velocity, link.angular_acceleration)[order - 1]
         assert values[-1] == pytest.approx(abs(wanted), rel=1e-6, abs=1e-6)
         if values[-1]:
-            assert plain(phrase).endswith(", anticlockwise" if wanted > 0.0 else ", clockwise")
+            assert plain_text(phrase).endswith(", anticlockwise" if wanted > 0.0 else ", clockwise")
         return set()
     if symbol.letter == "f" or symbol.subscript not in state.point_names:
         return set()
@@ -328,7 +333,7 @@ def _agreed(phrase: Any, state: planar.State, order: int, greatest: float) -> se
 
 def _consistent(magnitude: Any, value: float, known: bool) -> None:
     """A formula's numbers make the magnitude."""
-    text = plain(magnitude)
+    text = plain_text(magnitude)
     assert known == (text != "—")
     parts = text.split(" = ")
     if len(parts) != 3:
@@ -428,7 +433,7 @@ def test_random_linkages_are_explained(seed: int) -> None:
     except PlanarError:  # links drawn at random may hold each other twice
         return
     solution = worked_solution(state)
-    for half in solution.halves:
+    for half in solution.worked_polygons:
         order = 1 if half.kind == "velocity" else 2
         greatest = max((float(np.hypot(*point[order])) for point in state.points.values()), default=0.0)
         for phrase in (phrase for section in half.sections for phrase in section.results):
@@ -438,5 +443,5 @@ def test_random_linkages_are_explained(seed: int) -> None:
 
 def test_published_values_with_their_slips_stand_at_the_end() -> None:
     state = planar.solve(planar.load("000-P2"))
-    told = record(worked_solution(state, compare(state)))["published"]
+    told = record(worked_solution(state, compare_published(state)))["published"]
     assert any(each["verdict"] == "slip in the book" and each["slip"] for each in told)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import planar
-from planar.assemblies.circuits.chebyshev_zeros import Value, zeros
+from planar.assemblies.circuits.chebyshev_zeros import SignedLog, find_zeros
 from planar.assemblies.polynomial.completeness import Completeness
 from tests.assemblies.test_modes import four_bar
 from tests.draws import draws, part
@@ -344,10 +344,10 @@ def test_zeros_are_found_however_near_to_each_other_and_to_the_ends():
 
         def function(x, at=at):
             factor = np.prod([x - each for each in at]) * (2.0 + sqrt(x) + sqrt(2.0 - x) * x)
-            return Value(float(np.sign(factor)), float(np.log(abs(factor))) if factor else -np.inf)
+            return SignedLog(float(np.sign(factor)), float(np.log(abs(factor))) if factor else -np.inf)
 
-        found = zeros(function, 0.0, 2.0)
-        assert found.all
+        found = find_zeros(function, 0.0, 2.0)
+        assert found.is_complete
         assert found.touched == ()
         assert found.crossed == pytest.approx(at, abs=1e-11)
 
@@ -356,9 +356,9 @@ def test_zeros_are_found_however_near_to_each_other_and_to_the_ends():
 def test_a_function_that_touches_zero_is_told_from_one_that_does_not(lift):
     def function(x):
         value = (x - 0.3) ** 2 * (x + 2.0) + lift
-        return Value(float(np.sign(value)), float(np.log(abs(value))) if value else -np.inf)
+        return SignedLog(float(np.sign(value)), float(np.log(abs(value))) if value else -np.inf)
 
-    found = zeros(function, -1.0, 1.0)
+    found = find_zeros(function, -1.0, 1.0)
     assert found.crossed == ()
     assert found.touched == (() if lift else pytest.approx((0.3,) * len(found.touched), abs=1e-6))
     assert bool(found.touched) is not bool(lift)
@@ -366,4 +366,4 @@ def test_a_function_that_touches_zero_is_told_from_one_that_does_not(lift):
 
 @pytest.mark.parametrize("place", np.random.default_rng(6).uniform(-1.0, 1.0, 20))
 def test_a_jump_is_not_taken_for_a_function_that_is_known(place):
-    assert not zeros(lambda x: Value(1.0 if x < place else -1.0, 0.0), -1.0, 1.0).all
+    assert not find_zeros(lambda x: SignedLog(1.0 if x < place else -1.0, 0.0), -1.0, 1.0).is_complete

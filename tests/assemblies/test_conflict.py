@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 import planar
 from planar.assemblies.polynomial.completeness import Completeness
 from planar.foundation.errors import NoAnswer, Outcome
-from planar.model.dimensions import changed, dimensions
+from planar.model.dimensions import change_dimension, dimensions
 from tests import command
 from tests.assemblies.test_modes import bars, four_bar
 from tests.draws import part
@@ -78,7 +78,8 @@ def check_mends(mechanism: planar.Mechanism, change) -> None:
     """With the change the whole has an assembly in the complete list, with a hundredth less of it none."""
     every = {each.name: each for each in dimensions(mechanism, frozenset(link.name for link in mechanism.links))}
     there, short = (
-        changed(mechanism, every[change.name], change.was + part * (change.value - change.was)) for part in (1.0, 0.99)
+        change_dimension(mechanism, every[change.name], change.was + part * (change.value - change.was))
+        for part in (1.0, 0.99)
     )
     assert planar.modes(there, certify=False)
     assert not planar.modes(short, certify=False)

@@ -11,17 +11,17 @@ from PIL import Image
 
 import planar
 from planar.assemblies.polynomial.completeness import Completeness
-from planar.document.files import models
-from planar.drawing.paper.picture import Circle, Letter
-from planar.drawing.paper.scales import given
+from planar.document.files import load_models
+from planar.drawing.paper.picture import Circle, Label
+from planar.drawing.paper.scales import parse_scale
 from planar.drawing.scheme import symbols
-from planar.drawing.scheme.assemblies import SHEET, sheets_of
+from planar.drawing.scheme.assemblies import ASSEMBLIES_PER_SHEET, assembly_sheets
 from tests import command
 from tests.bars import bars, four_bar, tower
 from tests.draws import part
 from tests.linkages import conditioning, determinate, random_linkage
 
-MODELS = [(file.stem, mechanism) for file, mechanism in models()]
+MODELS = [(file.stem, mechanism) for file, mechanism in load_models()]
 
 
 def meeting(p, q, r, s) -> list[np.ndarray]:
@@ -275,22 +275,22 @@ def test_what_a_book_prints_goes_with_its_own_assembly_only(tmp_path):
 
 
 def test_the_sheet_has_a_window_for_each_with_its_number(tmp_path):
-    sheets = sheets_of(planar.modes(tower(5), certify=False))
+    sheets = assembly_sheets(planar.modes(tower(5), certify=False))
     assert [len(pictures) for pictures, _ in sheets] == [16, 16]
-    assert SHEET >= 16
+    assert ASSEMBLIES_PER_SHEET >= 16
     assert "32 assemblies" in sheets[0][1]
-    ((pictures, heading),) = sheets_of(planar.modes(planar.load("jansen-leg"), certify=False))
+    ((pictures, heading),) = assembly_sheets(planar.modes(planar.load("jansen-leg"), certify=False))
     assert "8 assemblies" in heading
     titles = [picture.title for picture in pictures]
     assert titles == ["1", "2", "3", "4", "5", "6, the sketch's own", "7", "8"]
-    scale = given(pictures[0].notes[0])
+    scale = parse_scale(pictures[0].notes[0])
     windows = [next(mark for mark in picture.marks if mark.about.startswith("window")) for picture in pictures]
-    assert len({window.spots for window in windows}) == 1
+    assert len({window.points for window in windows}) == 1
     pins = [mark.radius for mark in pictures[0].marks if isinstance(mark, Circle) and mark.about.startswith("pin ")]
     assert pins
-    assert max(pins) < 0.8 * symbols.PIN  # small drawings have small pins
+    assert max(pins) < 0.8 * symbols.PIN_RADIUS  # small drawings have small pins
     for picture, mode in zip(pictures, planar.modes(planar.load("jansen-leg"), certify=False), strict=True):
-        at = next(np.array(mark.at) for mark in picture.marks if isinstance(mark, Letter) and mark.text == "foot")
+        at = next(np.array(mark.at) for mark in picture.marks if isinstance(mark, Label) and mark.text == "foot")
         assert at * scale.per_mm == pytest.approx(mode.points["foot"])
     command.run(tmp_path, "plot", "stephenson-3-five-bar", "modes", "-o", "modes.png").done()
     with Image.open(tmp_path / "modes.png") as drawn:

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 import planar
-from planar.assemblies.block_roots import roots
+from planar.assemblies.block_roots import block_roots
 from planar.assemblies.polynomial.completeness import Completeness
-from planar.assemblies.polynomial.gear_powers import gears
-from planar.assemblies.polynomial.isotropic_form import form
+from planar.assemblies.polynomial.gear_powers import gear_powers
+from planar.assemblies.polynomial.isotropic_form import isotropic_form
 from planar.document import files
-from planar.equations.functions import length
-from planar.solving.assembly.block_assemblies import Candidates
-from planar.solving.prepared_mechanism import Setup
+from planar.equations.functions import slice_length
+from planar.solving.assembly.block_assemblies import BlockAssemblies
+from planar.solving.prepared_mechanism import PreparedMechanism
 from tests.inversions import unknowns_of
 from tests.linkages import Built, random_linkage
 
@@ -53,9 +53,9 @@ def test_a_geared_five_bar_has_as_many_as_the_degree_of_its_closing_says(wheels,
     """With angles q phi and p phi the square of the way from A to B is of degree max(|p|, q, |p - q|) in exp(i phi)."""
     assert gcd(p, q) == 1
     for at in (80.0, 100.0):
-        setup = Setup(five_bar(wheels, at))
-        (stage,) = setup.equations.stages
-        found = roots(setup, stage, np.zeros(2))
+        setup = PreparedMechanism(five_bar(wheels, at))
+        (stage,) = setup.equations.blocks
+        found = block_roots(setup, stage, np.zeros(2))
         assert found.expected == found.found == 2 * max(abs(p), q, abs(p - q))
         assert found.complete in (Completeness.PROVED, Completeness.NUMERICALLY)
         assert found.certified.all()
@@ -87,11 +87,11 @@ def test_ratios_that_are_not_rational_are_searched_by_starts():
 
 def test_least_angles_keep_every_direction():
     rates = np.array([[1.0, 0.0], [0.0, 1.0], [1.5, -0.5]])
-    tied = gears(rates, np.zeros((0, 2)))
+    tied = gear_powers(rates, np.zeros((0, 2)))
     rng = np.random.default_rng(0)
     for _ in range(50):
         angles = rng.uniform(-40.0, 40.0, 2)
-        least = tied.least(angles)
+        least = tied.least_angles(angles)
         assert np.exp(1j * rates @ least) == pytest.approx(np.exp(1j * rates @ angles))
         assert np.abs(least).sum() < 2.0 * np.pi * 2.0
 
@@ -113,16 +113,20 @@ def test_of_random_geared_linkages_the_assembly_that_was_built_and_all_that_star
     compared = between = 0
     for seed in (11, 13, 41, 113, 137, 185, 190, 292, 499):
         built = random_linkage(seed, 2 + seed % 6, 0.5, 0.1)
-        setup = Setup(files.from_dict(with_whole_ratios(built, seed)))
+        setup = PreparedMechanism(files.from_dict(with_whole_ratios(built, seed)))
         z, e = unknowns_of(setup, built), setup.equations
-        for stage in e.stages:
-            written = None if length(stage.unknowns) > 4 else form(e, stage, setup.station.p)
-            if written is None or written.gears.powers == written.gears.back.shape[0] or written.bound > 100:
+        for stage in e.blocks:
+            written = None if slice_length(stage.unknowns) > 4 else isotropic_form(e, stage, setup.inputs.p)
+            if (
+                written is None
+                or written.gears.powers == written.gears.angles_from_new.shape[0]
+                or written.bezout_number > 100
+            ):
                 continue
-            found = roots(setup, stage, z, certify=False)
+            found = block_roots(setup, stage, z, certify=False)
             assert found.complete is Completeness.NUMERICALLY
             angles = np.array([e.coordinates[c].kind.value != "length" for c in e.unknowns[stage.unknowns]])
-            starts = [each.z[stage.unknowns] for each in Candidates(setup).everywhere(stage, z)]
+            starts = [each.z[stage.unknowns] for each in BlockAssemblies(setup).from_all_starts(stage, z)]
             for own in (z[stage.unknowns], *starts):
                 gaps = np.where(angles, np.abs(np.exp(1j * found.real) - np.exp(1j * own)), np.abs(found.real - own))
                 assert gaps.max(axis=1).min() < 1e-6

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 import planar
-from planar.assemblies.block_roots import roots
-from planar.assemblies.polynomial.certification import certified
-from planar.assemblies.polynomial.coefficient_family import family
+from planar.assemblies.block_roots import block_roots
+from planar.assemblies.polynomial.certification import certify_solutions
+from planar.assemblies.polynomial.coefficient_family import coefficient_family
 from planar.assemblies.polynomial.completeness import Completeness
-from planar.assemblies.polynomial.isotropic_form import form
-from planar.assemblies.polynomial.path_tracker import generic
+from planar.assemblies.polynomial.isotropic_form import isotropic_form
+from planar.assemblies.polynomial.path_tracker import solve_generic_instance
 from planar.document import files
-from planar.equations.functions import length
-from planar.solving.prepared_mechanism import Setup
+from planar.equations.functions import slice_length
+from planar.solving.prepared_mechanism import PreparedMechanism
 from tests.draws import draws, part
 from tests.inversions import group, listed, missed, one_group, structures, unknowns_of
 from tests.linkages import random_linkage
@@ -38,8 +38,8 @@ PLATFORMS = {
 
 def first(value):
     """The roots of the first group of a file's value."""
-    setup = Setup(files.from_dict(value) if isinstance(value, dict) else value)
-    return setup, roots(setup, setup.equations.stages[0], np.zeros(len(setup.equations.unknowns)))
+    setup = PreparedMechanism(files.from_dict(value) if isinstance(value, dict) else value)
+    return setup, block_roots(setup, setup.equations.blocks[0], np.zeros(len(setup.equations.unknowns)))
 
 
 def platform(pins, own, legs):
@@ -77,7 +77,7 @@ def test_dyads_have_two_assemblies_and_it_is_proved(name, many, expected):
     assert (len(found.real), found.expected, found.found, found.complete) == (many, expected, expected, PROVED)
     assert found.certified.all()
     assert not found.double.any()
-    assert not found.curve
+    assert not found.has_curve
 
 
 @pytest.mark.parametrize("many", PLATFORMS)
@@ -103,7 +103,7 @@ def test_triads_with_slides(slides, counts):
             built = group(joints, np.random.default_rng(3), own)
             if not one_group(built.setup, 4):
                 continue
-            found = roots(built.setup, built.setup.equations.stages[0], np.zeros(4))
+            found = block_roots(built.setup, built.setup.equations.blocks[0], np.zeros(4))
             assert found.found == found.expected
             assert found.complete is PROVED or slides == 3
             assert listed(built.setup, found, built.z)
@@ -133,7 +133,7 @@ def test_three_loops_have_their_published_numbers_and_it_is_proved():
     seen = set()
     for joints in structures(6, 10):
         built = group(joints, np.random.default_rng(5))
-        found = roots(built.setup, built.setup.equations.stages[0], np.zeros(6))
+        found = block_roots(built.setup, built.setup.equations.blocks[0], np.zeros(6))
         assert listed(built.setup, found, built.z)
         if found.complete is PROVED:
             assert found.found == found.expected == 20 - at_infinity(joints)
@@ -166,8 +166,8 @@ def taken_by_infinity(setup):
     c1(E) Z - c1(T) Z + 2 - 2 p: with 2d equations of bidegree (1, 1), on a product of two spaces of dimension d, that
     is d + 1 for each line less two for each crossing (W. Fulton, Intersection Theory, 1998, prop. 9.1.1).
     """
-    written = form(setup.equations, setup.equations.stages[0])
-    A = written.polynomials(np.zeros(len(setup.equations.unknowns)), setup.station.u, setup.station.p).A
+    written = isotropic_form(setup.equations, setup.equations.blocks[0])
+    A = written.polynomials(np.zeros(len(setup.equations.unknowns)), setup.inputs.u, setup.inputs.p).A
     P = np.linalg.svd(A)[2][len(A) :].conj().T
     many, size = P.shape
 
@@ -195,8 +195,8 @@ def taken_by_infinity(setup):
 def test_what_is_followed_of_four_loops_agrees_with_what_stands_at_infinity():
     built = group(structures(8, 1)[0], np.random.default_rng(1))
     counts = []
-    for setup in (Setup(planar.load("ten-link")), built.setup):
-        found = roots(setup, setup.equations.stages[0], np.zeros(8), certify=False)
+    for setup in (PreparedMechanism(planar.load("ten-link")), built.setup):
+        found = block_roots(setup, setup.equations.blocks[0], np.zeros(8), certify=False)
         assert found.expected == found.found == 70 - taken_by_infinity(setup)
         counts.append(found.expected)
     assert counts == [50, 48]
@@ -209,7 +209,7 @@ def test_random_starts_never_find_an_assembly_that_is_not_listed(links, count, e
     for joints in structures(links, count):
         for _ in range(each):
             built = group(joints, rng)
-            found = roots(built.setup, built.setup.equations.stages[0], np.zeros(links), certify=False)
+            found = block_roots(built.setup, built.setup.equations.blocks[0], np.zeros(links), certify=False)
             assert found.complete is NUMERICALLY
             assert listed(built.setup, found, built.z)
             assert not missed(built.setup, found, rng, 20)
@@ -218,16 +218,16 @@ def test_random_starts_never_find_an_assembly_that_is_not_listed(links, count, e
 @pytest.mark.parametrize("seed", part(range(40), 2))
 def test_the_assembly_that_built_a_random_linkage_is_listed(seed):
     built = random_linkage(seed, 1 + seed % 12, 0.0, 0.2 * (seed % 2))
-    setup = Setup(files.from_dict(built.value))
+    setup = PreparedMechanism(files.from_dict(built.value))
     e, z = setup.equations, unknowns_of(setup, built)
-    for stage in e.stages:
-        if stage.free or length(stage.unknowns) > 8:
+    for stage in e.blocks:
+        if stage.is_free or slice_length(stage.unknowns) > 8:
             continue
-        found = roots(setup, stage, z)
+        found = block_roots(setup, stage, z)
         angles = np.array([e.coordinates[c].kind.value != "length" for c in e.unknowns[stage.unknowns]], dtype=bool)
         own = z[stage.unknowns]
         apart = np.where(angles, np.abs(np.exp(1j * found.real) - np.exp(1j * own)), np.abs(found.real - own))
-        assert found.curve or np.any(np.all(apart < 1e-6, axis=1))
+        assert found.has_curve or np.any(np.all(apart < 1e-6, axis=1))
 
 
 def test_a_kite_folded_on_itself_is_a_curve_of_assemblies():
@@ -247,10 +247,10 @@ def test_a_kite_folded_on_itself_is_a_curve_of_assemblies():
         "sketch": {"B": [0.7, 0.4]},
     }
     _, found = first(value)
-    assert found.curve
+    assert found.has_curve
     assert found.complete is not PROVED
     _, apart = first(value | {"inputs": [{"pair": "O", "position": 0.3}]})
-    assert not apart.curve
+    assert not apart.has_curve
     assert (len(apart.real), apart.complete) == (2, PROVED)
 
 
@@ -259,7 +259,7 @@ def test_of_two_curves_of_assemblies_one_place_each_is_listed():
     point on this side of the line or on that."""
     own = [(-1.0, 0.0), (0.2, 0.0), (0.9, 0.0)]
     setup, found = first(platform([(0.0, 0.0)] * 3, own, [float(np.hypot(x, 0.7)) for x, _ in own]))
-    assert found.curve
+    assert found.has_curve
     assert found.complete is NOT
     assert not found.double.any()
     column = [setup.equations.coordinates[c].owner for c in setup.equations.unknowns].index("leg0")
@@ -346,7 +346,7 @@ def test_redundant_cranks_stand_in_one_way_only():
 
 
 def test_without_ball_arithmetic_nothing_is_said_to_be_proved(monkeypatch):
-    monkeypatch.setattr("planar.assemblies.block_roots.able", lambda: False)
+    monkeypatch.setattr("planar.assemblies.block_roots.is_available", lambda: False)
     for name, many in (("stephenson-3-five-bar", 4), ("scotch-yoke", 1)):
         _, found = first(planar.load(name))
         assert (len(found.real), found.complete) == (many, NUMERICALLY)
@@ -362,28 +362,32 @@ def test_groups_that_are_no_such_polynomials_are_searched_and_said_to_be():
     _, found = first(planar.load("rack-differential"))
     assert len(found.real) >= 1
     assert (found.complete, found.expected) == (NOT, None)
-    assert "starts only" in found.said
+    assert "starts only" in found.method
 
 
 def test_a_random_linkage_of_a_structure_has_as_many_solutions_whichever_it_is():
-    setup = Setup(planar.load("double-flier"))
-    written = form(setup.equations, setup.equations.stages[0])
-    drawn = family(setup.equations, written, np.zeros(written.many * len(written.combined), dtype=bool)).drawn
-    counts = {(len(each.V), each.finite) for each in (generic(written, drawn, seed) for seed in (1, 2, 3))}
+    setup = PreparedMechanism(planar.load("double-flier"))
+    written = isotropic_form(setup.equations, setup.equations.blocks[0])
+    drawn = coefficient_family(
+        setup.equations, written, np.zeros(written.entry_count * len(written.combined), dtype=bool)
+    ).draw_member
+    counts = {
+        (len(each.V), each.finite) for each in (solve_generic_instance(written, drawn, seed) for seed in (1, 2, 3))
+    }
     assert counts == {(20, 14)}
 
 
 def test_what_is_no_solution_is_not_certified():
-    setup = Setup(planar.load("stephenson-3-five-bar"))
-    stage = setup.equations.stages[0]
-    written = form(setup.equations, stage)
-    z, u, p = np.zeros(4), setup.station.u, setup.station.p
-    unit = np.exp(1j * roots(setup, stage, z).real)
+    setup = PreparedMechanism(planar.load("stephenson-3-five-bar"))
+    stage = setup.equations.blocks[0]
+    written = isotropic_form(setup.equations, stage)
+    z, u, p = np.zeros(4), setup.inputs.u, setup.inputs.p
+    unit = np.exp(1j * block_roots(setup, stage, z).real)
     one = np.ones((len(unit), 1))
     V = np.concatenate([one, unit, one, 1.0 / unit], axis=1)
-    found = certified(written, (z, u, p), V)
+    found = certify_solutions(written, (z, u, p), V)
     assert found.proved.all()
     assert found.real.all()
     # moved by less than drawings show, it is refused; twice the same is not two
-    assert not certified(written, (z, u, p), V * np.exp(1j * np.linspace(0.0, 1e-5, 10))).proved.any()
-    assert certified(written, (z, u, p), V[[0, 0]]).proved.sum() == 1
+    assert not certify_solutions(written, (z, u, p), V * np.exp(1j * np.linspace(0.0, 1e-5, 10))).proved.any()
+    assert certify_solutions(written, (z, u, p), V[[0, 0]]).proved.sum() == 1

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import planar
-from planar.batch.design_arrays import liftable
+from planar.batch.design_arrays import design_variables
 from planar.foundation.errors import BadInput
 from tests.analysis.test_answers import four_bar
 from tests.draws import part
@@ -38,9 +38,9 @@ def test_a_run_of_a_model_is_that_of_a_sweep(stem):
 def test_dimensions_change_from_run_to_run():
     mechanism = MODELS["crank-rocker"]
     ready = planar.prepared(mechanism, 60)
-    assert ready.turn is not None
-    name = next(name for name in liftable(mechanism) if name.endswith(".length"))
-    value = liftable(mechanism)[name].value
+    assert ready.kernel is not None
+    name = next(name for name in design_variables(mechanism) if name.endswith(".length"))
+    value = design_variables(mechanism)[name].value
     for factor in (1.0, 1.02, 0.99, 1.02):
         agree(ready({name: factor * value}), planar.sweep(mechanism, {name: [factor * value]}, 60), ready.points)
     agree(ready(), planar.sweep(mechanism, {name: [value]}, 60), ready.points)
@@ -50,7 +50,7 @@ def test_a_design_that_stops_says_so():
     mechanism = MODELS["crank-rocker"]
     ready = planar.prepared(mechanism, 60)
     crank = mechanism.links[1].name + ".length"
-    long = 3.0 * liftable(mechanism)[crank].value
+    long = 3.0 * design_variables(mechanism)[crank].value
     found, swept = ready({crank: long}), planar.sweep(mechanism, {crank: [long]}, 60)
     assert found.status[-1] != 0
     assert found.said == swept.said

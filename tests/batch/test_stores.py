@@ -9,7 +9,7 @@ import pytest
 
 import planar
 from planar.document import files
-from planar.foundation.errors import BadInput, NotWritten
+from planar.foundation.errors import BadInput, WriteFailure
 from tests.batch.test_sweep import ORDERS, around
 from tests.solving.test_cycle import ROCKER, TRIPLE, TURN, four_bar
 
@@ -170,7 +170,7 @@ def test_a_store_may_be_killed_at_any_time(store, writes, monkeypatch):
         else:
             from planar.batch.stores import parquet_store
 
-            patch.setattr(parquet_store, "write_whole", counted(parquet_store.write_whole))
+            patch.setattr(parquet_store, "write_atomically", counted(parquet_store.write_atomically))
         try:
             little(store)
         except Killed:
@@ -192,7 +192,7 @@ def test_a_full_disk_ends_in_a_sentence_and_the_sweep_goes_on_later(store):
     resource = pytest.importorskip("resource")
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     try:
-        with pytest.raises(NotWritten, match=f"store: {re.escape(str(store))} cannot be written: File too large"):
+        with pytest.raises(WriteFailure, match=f"store: {re.escape(str(store))} cannot be written: File too large"):
             little(store, progress=full)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)

@@ -10,16 +10,16 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import planar
-from planar.batch.design_arrays import lifted, one
+from planar.batch.design_arrays import values_of_design, with_design_values
 from planar.batch.march import choice, numpy_backend
-from planar.batch.march.backend import NotMarched
-from planar.batch.march.checks import Branches, Closed
-from planar.batch.march.design_functions import Columns
-from planar.batch.reference_design import base
+from planar.batch.march.backend import UnsupportedStructure
+from planar.batch.march.checks import DesignBranchCheck, DesignResidualCheck
+from planar.batch.march.design_functions import DesignFunctions
+from planar.batch.reference_design import reference_design
 from planar.document import files
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.model.dimensions import dimensions
-from planar.solving.position import Solver
+from planar.solving.position import PositionSolver
 from tests.draws import draws, part
 from tests.known import MODELS
 from tests.linkages import random_linkage
@@ -50,11 +50,11 @@ def cycles(mechanism, designs, result, steps, pair=None, start=None, stop=None):
     """Every design's status, rows and rates are those of its own cycle; returns how far they are off at most."""
     worst = 0.0
     for k in range(len(result)):
-        changed, inputs = lifted(mechanism, one(designs, k)), np.atleast_2d(result.input)
+        changed, inputs = with_design_values(mechanism, values_of_design(designs, k)), np.atleast_2d(result.input)
         row = inputs[k] if len(inputs) > 1 else inputs[0]
         ends = (start, stop) if start is None and stop is None else (row[0], row[-1])
         name = pair or changed.inputs[0].pair
-        if start is None and stop is None and not Solver(changed).slides(name):
+        if start is None and stop is None and not PositionSolver(changed).is_sliding(name):
             ends = row[0], row[-1]
         try:
             motion = planar.cycle(changed, steps, *ends, pair)
@@ -138,7 +138,9 @@ def test_a_range_is_that_of_the_cycle(start, stop):
     mechanism, designs = four_bar(*ROCKER, 0.8), {"BC.length": np.array([0.85, 0.9, 0.95])}
     result = planar.sweep(mechanism, designs, 30, start=start, stop=stop)
     for k in range(3):
-        motion = planar.cycle(lifted(mechanism, one(designs, k)), 30, 0.8 if start is None else start, stop)
+        motion = planar.cycle(
+            with_design_values(mechanism, values_of_design(designs, k)), 30, 0.8 if start is None else start, stop
+        )
         np.testing.assert_allclose(result.input, motion.inputs["A"].position, atol=1e-14)
         np.testing.assert_allclose(result.acceleration["E"][k], motion.point("E").acceleration, atol=1e-11)
 
@@ -202,32 +204,32 @@ def test_designs_that_cannot_turn_are_refused_exactly_where_they_must_be():
 
 def test_a_flipped_linkage_is_closed_and_does_not_pass():
     mechanism = four_bar(*ROCKER, 0.8)
-    solver, flipped = Solver(mechanism), Solver(four_bar(*ROCKER, 0.8, -1))
-    z, other = (each.assembly().z for each in (solver, flipped))
-    p = np.repeat(solver.station.p[:, None], 2, axis=1)
-    branches = Branches(Columns(solver.program, p), p)
-    u = solver.station.u
-    near = planar.solving.continuation.path.follow(solver, solver.station.p, z, u, u + 0.02)
-    before = branches.here(np.stack([z, z]), np.stack([u, u]))
-    after = branches.here(np.stack([near, other]), np.stack([u + 0.02, u + 0.02]))
-    assert branches.kept(before, after, None)[0].tolist() == [True, False]
+    solver, flipped = PositionSolver(mechanism), PositionSolver(four_bar(*ROCKER, 0.8, -1))
+    z, other = (each.find_assembly().z for each in (solver, flipped))
+    p = np.repeat(solver.inputs.p[:, None], 2, axis=1)
+    branches = DesignBranchCheck(DesignFunctions(solver.functions, p), p)
+    u = solver.inputs.u
+    near = planar.solving.continuation.path.follow_to(solver, solver.inputs.p, z, u, u + 0.02)
+    before = branches.evaluate(np.stack([z, z]), np.stack([u, u]))
+    after = branches.evaluate(np.stack([near, other]), np.stack([u + 0.02, u + 0.02]))
+    assert branches.check_step(before, after, None)[0].tolist() == [True, False]
 
 
 def test_what_is_open_by_the_pairs_own_formulas_does_not_pass():
-    solver = Solver(four_bar(*ROCKER, 0.8))
-    p, z = np.repeat(solver.station.p[:, None], 3, axis=1), np.repeat(solver.assembly().z[:, None], 3, axis=1)
-    u = np.repeat(solver.station.u[:, None], 3, axis=1)
+    solver = PositionSolver(four_bar(*ROCKER, 0.8))
+    p, z = np.repeat(solver.inputs.p[:, None], 3, axis=1), np.repeat(solver.find_assembly().z[:, None], 3, axis=1)
+    u = np.repeat(solver.inputs.u[:, None], 3, axis=1)
     z[0, 1] += 1e-9
     p[-1, 2] += 1e-9
-    w = solver.program.positions(z, u, p).full()
-    left = Closed(solver.gate, solver.mechanism, solver.program, p).left(w, u)
+    w = solver.functions.coordinate_function(z, u, p).full()
+    left = DesignResidualCheck(solver.residual_check, solver.mechanism, solver.functions, p).worst_residual(w, u)
     assert (left <= solver.tolerance).tolist() == [True, False, False]
 
 
 def backend(monkeypatch, march):
     """Puts a march in the place of the native backend."""
     module = ModuleType("a_backend")
-    module.__spec__, module.march = ModuleSpec("a_backend", None), march
+    module.__spec__, module.run_designs = ModuleSpec("a_backend", None), march
     monkeypatch.setitem(sys.modules, "a_backend", module)
     monkeypatch.setitem(choice.BACKENDS, "native", "a_backend")
 
@@ -238,7 +240,7 @@ def test_what_a_backend_does_not_let_pass_is_solved_all_the_same_and_counted(mon
     wanted = planar.sweep(mechanism, designs, 30, "E", rates=rates)
 
     def march(task, out):
-        good = numpy_backend.march(task, out)
+        good = numpy_backend.run_designs(task, out)
         out[7:, :, 1] = np.nan
         out[:, :, 2] = np.nan
         good[1], good[2] = 7, 0
@@ -256,7 +258,7 @@ def test_what_a_backend_does_not_let_pass_is_solved_all_the_same_and_counted(mon
 
 def test_a_structure_that_a_backend_cannot_do_is_done_by_the_next(monkeypatch):
     def march(task, out):
-        raise NotMarched("not this one")
+        raise UnsupportedStructure("not this one")
 
     backend(monkeypatch, march)
     for name in ("native", "auto"):
@@ -344,4 +346,4 @@ def test_wheels_that_do_not_mesh_are_refused_design_by_design():
 
 def test_what_a_base_has_in_common_is_made_once():
     mechanism = four_bar(*ROCKER, 0.8)
-    assert base(mechanism, None) is base(four_bar(*ROCKER, 0.8), None)
+    assert reference_design(mechanism, None) is reference_design(four_bar(*ROCKER, 0.8), None)

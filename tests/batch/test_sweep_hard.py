@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import planar
-from planar.batch.design_arrays import lifted, one
+from planar.batch.design_arrays import values_of_design, with_design_values
 from planar.foundation.errors import BadInput, Outcome
 from planar.model.dimensions import dimensions
 from tests.draws import part
@@ -77,7 +77,9 @@ def agrees(mechanism, designs, steps, **more):
     for index in range(len(swept)):
         row = np.atleast_2d(swept.input)[index if np.ndim(swept.input) == 2 else 0]
         try:
-            motion = planar.cycle(lifted(mechanism, one(designs, index)), steps, float(row[0]), float(row[-1]))
+            motion = planar.cycle(
+                with_design_values(mechanism, values_of_design(designs, index)), steps, float(row[0]), float(row[-1])
+            )
         except planar.NoAnswer as problem:
             assert {swept.outcomes[code] for code in swept.status[index]} == {problem.outcome}
             continue

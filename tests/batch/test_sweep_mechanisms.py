@@ -9,14 +9,14 @@ import pytest
 import planar
 from benchmarks import chain
 from planar.batch.mechanisms import partition
-from planar.batch.mechanisms.block_type import GROUNDED, Joint, Signature
-from planar.batch.mechanisms.partition import Unparted, parted
-from planar.batch.mechanisms.solved_block_type import kind
+from planar.batch.mechanisms.block_type import FRAME_BODY, BlockPair, BlockSignature
+from planar.batch.mechanisms.partition import NotPartitionable, partition_mechanism
+from planar.batch.mechanisms.solved_block_type import find_block_type
 from planar.codegen import block_formula, instructions
 from planar.document import files
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.model.pairs import pair_types
-from planar.solving.position import Solver
+from planar.solving.position import PositionSolver
 from tests.known import MODELS
 from tests.linkages import random_linkage
 from tests.solving.test_cycle import ROCKER, TURN, four_bar, rocker, slider_crank
@@ -31,7 +31,7 @@ def as_cycle(mechanism, found, steps, outcomes, allowed=1e-9):
     still = tuple(each._replace(velocity=0.0, acceleration=0.0) for each in mechanism.inputs[1:])
     mechanism = replace(mechanism, inputs=(mechanism.inputs[0], *still))
     start = mechanism.inputs[0].position
-    ends = (None, None) if Solver(mechanism).slides(pair) else (start, start + TURN)
+    ends = (None, None) if PositionSolver(mechanism).is_sliding(pair) else (start, start + TURN)
     try:
         motion = planar.cycle(mechanism, steps, *ends, pair)
     except (NoAnswer, BadInput) as problem:
@@ -133,7 +133,7 @@ def test_many_random_dyads_end_where_their_cycles_end():
 def test_pins_read_as_arrays_and_links_read_one_by_one_are_the_same(backend):
     laid = [dyads(seed, 9) for seed in range(6)]
     plain = [replace(each) for each in laid]
-    assert plain[0].laid is None
+    assert plain[0].layout is None
     one, two = (planar.sweep_each(each, 50, backend=backend) for each in (laid, plain))
     for own, other in zip(one, two, strict=True):
         np.testing.assert_array_equal(own.status, other.status)
@@ -147,9 +147,9 @@ def test_the_order_in_which_bars_are_given_does_not_matter():
     """A pin of many links is written from its first link; the dyad that places it may be of two others."""
     for seed in range(5):
         mechanism = dyads(seed, 9)
-        laid = mechanism.laid
+        laid = mechanism.layout
         turned = [laid.bars[0], *(bar[::-1] for bar in laid.bars[:0:-1])]
-        other = planar.pinned(laid.at, turned, laid.fixed, velocity=2.0, acceleration=1.0)
+        other = planar.pinned(laid.pin_positions, turned, laid.frame_pins, velocity=2.0, acceleration=1.0)
         result = planar.sweep_each([mechanism, other, replace(other)], 50)
         assert result.general == 0
         for found in result[1:]:
@@ -236,11 +236,11 @@ def test_what_the_general_path_does_is_counted_and_said():
 def test_formulas_too_long_to_be_compiled_are_left_to_the_general_path(monkeypatch):
     mechanisms = [MODELS["watt-six-bar"], MODELS["double-butterfly"]]  # dyads, and four unknowns at once
     longest = 500
-    monkeypatch.setattr(instructions, "MOST_INSTRUCTIONS", longest)
-    monkeypatch.setattr(partition, "_KINDS", {})
-    kind.cache_clear()
+    monkeypatch.setattr(instructions, "MAX_INSTRUCTIONS", longest)
+    monkeypatch.setattr(partition, "_BLOCK_TYPES", {})
+    find_block_type.cache_clear()
     result = planar.sweep_each(mechanisms, 12)
-    kind.cache_clear()
+    find_block_type.cache_clear()
     assert [each.general for each in result] == [False, True]
     for mechanism, found in zip(mechanisms, result, strict=True):
         as_cycle(mechanism, found, 12, result.outcomes)
@@ -286,7 +286,7 @@ def test_what_cannot_be_asked_is_refused(name):
 def test_elsewhere_in_parts_and_with_points_of_some(monkeypatch):
     from planar.batch import sweep_mechanisms as each
 
-    monkeypatch.setattr(each, "TOGETHER", 3)
+    monkeypatch.setattr(each, "PART_SIZE", 3)
     mechanisms = [dyads(seed, 5 + seed % 3) for seed in range(4)] + [four_bar(*ROCKER, 0.8)] * 4
     seen = []
     with ThreadPoolExecutor(2) as pool:
@@ -310,18 +310,20 @@ def test_a_mechanism_is_parted_into_links_that_follow_one_after_the_other():
         (triads(3), [1, 4, 4, 4]),
         (MODELS["double-butterfly"], [1, 6]),
     ):
-        own = parted(mechanism)
-        assert [len(group.inner) for group in own.groups] == sizes
-        assert sorted(own.place_of.values())[0] == 0
+        own = partition_mechanism(mechanism)
+        assert [len(group.inner_links) for group in own.blocks] == sizes
+        assert sorted(own.link_index.values())[0] == 0
         known = {0, 1}
-        for group in own.groups:
-            inner = set(group.places[len(group.places) - len(group.inner) :])
-            assert set(group.places) <= known | inner
+        for group in own.blocks:
+            inner = set(group.link_indices[len(group.link_indices) - len(group.inner_links) :])
+            assert set(group.link_indices) <= known | inner
             assert not known & inner
             known |= inner
-    assert len({id(group.kind) for group in parted(planar.from_dict(chain.document(42))).groups}) <= 4
-    with pytest.raises(Unparted, match=r"held more than once|free"):
-        parted(MODELS["three-parallel-cranks"])
+    assert (
+        len({id(group.block_type) for group in partition_mechanism(planar.from_dict(chain.document(42))).blocks}) <= 4
+    )
+    with pytest.raises(NotPartitionable, match=r"held more than once|free"):
+        partition_mechanism(MODELS["three-parallel-cranks"])
 
 
 DYADS = ("TTT", "TTS", "TST", "STS", "SST", "TSS")
@@ -331,16 +333,20 @@ DYADS = ("TTT", "TTS", "TST", "STS", "SST", "TSS")
 def test_every_dyad_is_in_closed_form(joints):
     types = {"T": pair_types()["turning"], "S": pair_types()["sliding"]}
     bodies = ((0, -1), (0, 1), (1, -2))
-    signature = Signature(2, 2, tuple(Joint(types[t], of, False) for t, of in zip(joints, bodies, strict=True)))
-    assert kind(signature).direct == (joints.count("S") < 3)
-    assert kind(signature) is kind(signature)
+    signature = BlockSignature(
+        2, 2, tuple(BlockPair(types[t], of, False) for t, of in zip(joints, bodies, strict=True))
+    )
+    assert find_block_type(signature).has_closed_form == (joints.count("S") < 3)
+    assert find_block_type(signature) is find_block_type(signature)
 
 
 def test_machine_code_tells_the_extremes_of_what_numpy_tells(monkeypatch):
     """What the quick look of machine code lets pass, and what not, as by all that it leaves out."""
-    crank = kind(Signature(1, 0, (Joint(pair_types()["turning"], (GROUNDED, 0), True),)))
-    dyad = kind(Signature(2, 2, tuple(Joint(pair_types()["turning"], of, False) for of in ((0, -1), (1, -2), (0, 1)))))
-    assert crank.direct
+    crank = find_block_type(BlockSignature(1, 0, (BlockPair(pair_types()["turning"], (FRAME_BODY, 0), True),)))
+    dyad = find_block_type(
+        BlockSignature(2, 2, tuple(BlockPair(pair_types()["turning"], of, False) for of in ((0, -1), (1, -2), (0, 1))))
+    )
+    assert crank.has_closed_form
     rng = np.random.default_rng(3)
     turn = np.linspace(0.0, 2.0, 24)
     state = np.zeros((4, 4, 24))
@@ -351,14 +357,14 @@ def test_machine_code_tells_the_extremes_of_what_numpy_tells(monkeypatch):
     p += 1e-3 * rng.uniform(size=p.shape) * (np.arange(13) < 12)
     # pairs of a kind read (inner link, given link)
     gives = tuple((slot, row) for slot in (2, 3) for row in range(4))
-    formula = dyad.run(False)
+    formula = dyad.run_formula(False)
     for one in (0, 1):
         both = state.copy(), state.copy()
-        plain = block_formula.walked(
-            formula, block_formula.Walk(gives, 13, 4, 2), both[0], index[:1], p[one : one + 1], False
+        plain = block_formula.run_kernel(
+            formula, block_formula.KernelLayout(gives, 13, 4, 2), both[0], index[:1], p[one : one + 1], False
         )
-        quick = block_formula.walked(
-            formula, block_formula.Walk(gives, 13, 4, 2, True), both[1], index[:1], p[one : one + 1], True
+        quick = block_formula.run_kernel(
+            formula, block_formula.KernelLayout(gives, 13, 4, 2, True), both[1], index[:1], p[one : one + 1], True
         )
         np.testing.assert_allclose(both[0], both[1], atol=1e-12)
         left, clear = plain[0]

@@ -13,9 +13,9 @@ import pytest
 import planar
 from planar.bench import benchmark as measuring
 from planar.bench import profiling as profiled
-from planar.bench.benchmark import STEPS, WITHIN, measure
-from planar.bench.profiling import OF_SWEEP, of_cycle, of_first, of_sweep, spent
-from planar.reports.tables.benchmark import time as shown
+from planar.bench.benchmark import LENGTH_VARIATIONS, SWEEP_STEPS, measure_speed
+from planar.bench.profiling import SWEEP_PARTS, profile_call, profile_cycle, profile_first_call, profile_sweep
+from planar.reports.tables.benchmark import format_time as shown
 from planar.solving.cycle import cycle
 from tests.command import run
 from tests.known import MODELS
@@ -37,7 +37,7 @@ def measured_by(monkeypatch, clock):
     monkeypatch.setattr(measuring, "perf_counter", clock)
     monkeypatch.setattr(profiled, "perf_counter", clock)
     monkeypatch.setattr(profiled, "Profile", lambda: Profile(clock))
-    monkeypatch.setattr(measuring, "GIVEN_UP", 600.0)  # s, by a clock on the wall
+    monkeypatch.setattr(measuring, "GRACE_SECONDS", 600.0)  # s, by a clock on the wall
 
 
 @pytest.fixture
@@ -71,7 +71,7 @@ def test_bench_gives_a_record(tmp_path, ticks):
     assert sweeps == [("native", True), ("native", False), ("casadi", True), ("casadi", False)]
     for each in record["sweeps"]:
         assert each["seconds"] > 0.0
-        assert (each["refused"], each["general"], each["within"]) == (0, 0, WITHIN[0])
+        assert (each["refused"], each["general"], each["within"]) == (0, 0, LENGTH_VARIATIONS[0])
         assert (each["compiling"] is None) == (each["backend"] == "casadi")
         # nothing is counted twice
         assert sum(each["parts"].values()) == pytest.approx(1.0, abs=1e-9)
@@ -90,26 +90,26 @@ def instead(monkeypatch, clock, each, closes):
         return SimpleNamespace(whole=closes(values), general=0)
 
     monkeypatch.setattr(measuring, "sweep", sweep)
-    monkeypatch.setattr(profiled, "OF_SWEEP", {})
+    monkeypatch.setattr(profiled, "SWEEP_PARTS", {})
 
 
 def test_the_time_of_a_position_is_that_of_the_whole_sweep_divided(monkeypatch, clock):
     instead(monkeypatch, clock, 1e-3, lambda values: np.ones(values.shape[1], dtype=bool))
-    found, _ = measuring._sweeps_within(MODELS["crank-rocker"], (None, None, "A0"), 2.0)
+    found, _ = measuring._time_sweeps_within(MODELS["crank-rocker"], (None, None, "A0"), 2.0)
     assert len(found) == 4
     for each in found:
-        assert each.designs >= measuring.MANY
-        assert each.seconds * (STEPS + 1) == pytest.approx(1e-3)
-        assert (each.refused, each.within) == (0, WITHIN[0])
+        assert each.designs >= measuring.FIRST_DESIGNS
+        assert each.seconds * (SWEEP_STEPS + 1) == pytest.approx(1e-3)
+        assert (each.refused, each.within) == (0, LENGTH_VARIATIONS[0])
 
 
 def test_a_linkage_that_is_not_closed_within_a_hundredth_is_swept_nearer(monkeypatch, clock):
     lengths = np.array([0.2, 0.05, 0.18, 0.12])[:, None]
     instead(monkeypatch, clock, 1e-4, lambda values: np.all(np.abs(values / lengths - 1.0) < 2e-4, axis=0))
-    found, _ = measuring._sweeps_within(MODELS["crank-rocker"], (None, None, "A0"), 0.2)
-    assert {(each.within, each.refused) for each in found} == {(WITHIN[1], 0)}
+    found, _ = measuring._time_sweeps_within(MODELS["crank-rocker"], (None, None, "A0"), 0.2)
+    assert {(each.within, each.refused) for each in found} == {(LENGTH_VARIATIONS[1], 0)}
     instead(monkeypatch, clock, 1e-4, lambda values: np.zeros(values.shape[1], dtype=bool))
-    found, _ = measuring._sweeps_within(MODELS["crank-rocker"], (None, None, "A0"), 0.2)
+    found, _ = measuring._time_sweeps_within(MODELS["crank-rocker"], (None, None, "A0"), 0.2)
     assert all(each.refused == each.designs for each in found)
 
 
@@ -125,23 +125,23 @@ def test_a_structure_has_neither_cycle_nor_sweeps():
         "pairs": [{"turning": name} for name in "ABC"],
         "sketch": {"C": [0.5, 0.8]},
     }
-    found = measure(planar.from_dict(value), rounds=1)
+    found = measure_speed(planar.from_dict(value), rounds=1)
     assert (found.cycle, found.sweeps) == (None, ())
     assert found.solve > 0.0
     assert found.bounds[0].startswith("Solved as one group with 2 unknowns at once (a, b)")
 
 
 def test_sweeps_that_take_far_too_long_are_given_up(monkeypatch):
-    monkeypatch.setattr(measuring, "GIVEN_UP", 0.2)
+    monkeypatch.setattr(measuring, "GRACE_SECONDS", 0.2)
 
     def slow(*args):
         yield "one"
         while True:
             math.sqrt(2.0)
 
-    monkeypatch.setattr(measuring, "_sweeps", slow)
+    monkeypatch.setattr(measuring, "_time_sweeps", slow)
     with watched(10):
-        found, told = measuring._sweeps_within(MODELS["crank-rocker"], (None, None, "A0"), 0.1)
+        found, told = measuring._time_sweeps_within(MODELS["crank-rocker"], (None, None, "A0"), 0.1)
     assert found == ("one",)
     assert told == ["Sweeps were given up after 0.3 s: some design takes so long"]
 
@@ -151,16 +151,16 @@ def test_an_interrupt_by_the_user_is_none_by_the_clock(monkeypatch):
         raise KeyboardInterrupt
         yield
 
-    monkeypatch.setattr(measuring, "_sweeps", interrupted)
+    monkeypatch.setattr(measuring, "_time_sweeps", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        measuring._sweeps_within(MODELS["crank-rocker"], (None, None, "A0"), 10.0)
+        measuring._time_sweeps_within(MODELS["crank-rocker"], (None, None, "A0"), 10.0)
 
 
 def test_the_parts_of_a_sweep_are_functions_that_are_there():
     import importlib
 
     package = Path(planar.__file__).parents[1]
-    for folder, file, name in OF_SWEEP:
+    for folder, file, name in SWEEP_PARTS:
         (path,) = package.glob(f"planar/**/{folder}/{file}")
         module = importlib.import_module(".".join(path.relative_to(package).with_suffix("").parts))
         assert callable(getattr(module, name, None)) or name.startswith("_"), name
@@ -184,9 +184,9 @@ def test_the_time_of_a_part_within_another_is_counted_once(monkeypatch, clock):
         outer()
         busy(0.01)
 
-    here = profiled._place(inner.__code__)[:2]
-    monkeypatch.setattr(profiled, "OF_SWEEP", {(*here, "outer"): "outer", (*here, "inner"): "inner"})
-    whole, parts = of_sweep(task)
+    here = profiled._function_key(inner.__code__)[:2]
+    monkeypatch.setattr(profiled, "SWEEP_PARTS", {(*here, "outer"): "outer", (*here, "inner"): "inner"})
+    whole, parts = profile_sweep(task)
     assert whole == pytest.approx(0.04)
     assert parts["inner"] == pytest.approx(0.5)
     assert parts["outer"] == pytest.approx(0.25)
@@ -196,11 +196,11 @@ def test_the_time_of_a_part_within_another_is_counted_once(monkeypatch, clock):
 def test_casadis_share_of_a_cycle_is_what_its_calls_take():
     mechanism = MODELS["crank-rocker"]
     cycle(mechanism, 60)
-    found = spent(lambda: cycle(mechanism, 60))
-    inside = found.own[profiled.CASADI]
-    assert 0.0 < inside < found.whole
-    assert of_cycle(lambda: None)["in casadi"] == 0.0
-    assert sum(of_cycle(lambda: cycle(mechanism, 60)).values()) == pytest.approx(1.0)
+    found = profile_call(lambda: cycle(mechanism, 60))
+    inside = found.own_seconds[profiled.CASADI_KEY]
+    assert 0.0 < inside < found.seconds
+    assert profile_cycle(lambda: None)["in casadi"] == 0.0
+    assert sum(profile_cycle(lambda: cycle(mechanism, 60)).values()) == pytest.approx(1.0)
 
 
 def test_a_first_call_compiles_whatever_is_kept():
@@ -210,8 +210,8 @@ def test_a_first_call_compiles_whatever_is_kept():
         return planar.sweep(mechanism, {"crank.length": [0.045]}, 5, backend="native")
 
     task()
-    assert of_first(task)[1] > 0.0
-    assert spent(task).total.get(("native", "compiled.py", "_made"), 0.0) == 0.0
+    assert profile_first_call(task)[1] > 0.0
+    assert profile_call(task).total_seconds.get(("native", "compiled.py", "_made"), 0.0) == 0.0
 
 
 def test_times_are_shown_in_the_unit_that_fits():

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 import planar
-from planar.document.files import LARGEST, models
+from planar.document.files import MAX_FILE_BYTES, load_models
 from tests.command import ROOT, process, run
 
 FAR = 1e-12
@@ -207,7 +207,7 @@ def test_at_refuses_what_is_no_position_of_an_input(word: str, words: list[str],
 def test_models_lists_every_model_that_comes_along(tmp_path: Path) -> None:
     out = run(tmp_path, "models").done()
     told = json.loads(run(tmp_path, "models", "--json").done())
-    known = list(models())
+    known = list(load_models())
     assert [each["model"] for each in told] == [file.stem for file, _ in known]
     for each, (file, mechanism) in zip(told, known, strict=True):
         assert set(each) == {"model", "ids", "about"}
@@ -216,7 +216,7 @@ def test_models_lists_every_model_that_comes_along(tmp_path: Path) -> None:
 
 
 def test_a_model_that_comes_along_solves_from_any_folder(tmp_path: Path) -> None:
-    for file, mechanism in list(models())[:1]:
+    for file, mechanism in list(load_models())[:1]:
         told = json.loads(run(tmp_path, "solve", file.stem, "--json").done())
         assert told["mechanism"] == mechanism.name
 
@@ -252,7 +252,7 @@ def test_an_interrupt_ends_a_long_run_with_130_and_one_line(tmp_path: Path, monk
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("planar.solving.continuation.path.course", interrupted)
+    monkeypatch.setattr("planar.solving.continuation.path.fast_run", interrupted)
     for words in (["four-bar"], ["four-bar", "--json"]):
         ended = run(tmp_path, "cycle", *words, "--to", "3000rad")
         assert ended.refused(130) == "interrupted: stopped by the user before it was done"
@@ -334,7 +334,7 @@ def told(old: str, new: str) -> str:
         ("[" * 20_000, ["m.json", "nested too deeply"]),
         ('{"a":' * 20_000 + "1" + "}" * 20_000, ["m.json", "nested too deeply"]),
         (told("66", "[" * 300 + "]" * 300), ["$.links.BC.length", "a list"]),
-        (TEXT + " " * LARGEST, ["m.json", "larger than the 8 MiB"]),
+        (TEXT + " " * MAX_FILE_BYTES, ["m.json", "larger than the 8 MiB"]),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
@@ -595,10 +595,10 @@ def test_a_word_that_is_no_command_is_answered_with_the_commands(tmp_path: Path)
 
 def test_every_other_name_of_a_command_is_of_one_that_there_is_and_is_none_itself() -> None:
     from planar.cli import main
-    from planar.cli.exit_status import SYNONYMS
+    from planar.cli.exit_status import COMMAND_SYNONYMS
 
-    assert set(SYNONYMS.values()) <= set(main.commands)
-    assert not set(SYNONYMS) & set(main.commands)
+    assert set(COMMAND_SYNONYMS.values()) <= set(main.commands)
+    assert not set(COMMAND_SYNONYMS) & set(main.commands)
 
 
 @pytest.mark.parametrize(

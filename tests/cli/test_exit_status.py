@@ -11,7 +11,7 @@ from unittest.mock import patch
 import pytest
 
 from planar.cli import main
-from planar.cli.exit_status import CLOSED_PIPE, NOT_WRITTEN
+from planar.cli.exit_status import CLOSED_PIPE_STATUS, NOT_WRITTEN
 from tests.command import ROOT
 
 FULL = Path("/dev/full")
@@ -64,7 +64,7 @@ def test_a_full_disk_is_one_sentence_and_a_status_of_its_own(words):
 @pytest.mark.parametrize("words", WORDS, ids=" ".join)
 def test_a_pipe_that_nobody_reads_ends_quietly_as_other_programs_do(words):
     with unread() as stream:
-        assert ended(*words, stdout=stream) == (CLOSED_PIPE, "")
+        assert ended(*words, stdout=stream) == (CLOSED_PIPE_STATUS, "")
 
 
 @full
@@ -97,7 +97,7 @@ def test_a_process_says_nothing_after_its_sentence():
     assert (found.returncode, found.stderr) == (NOT_WRITTEN, SENTENCE)
     with unread() as stream:
         found = subprocess.run(command, cwd=ROOT, stdout=stream, stderr=subprocess.PIPE, text=True, check=False)
-    assert (found.returncode, found.stderr) == (CLOSED_PIPE, "")
+    assert (found.returncode, found.stderr) == (CLOSED_PIPE_STATUS, "")
 
 
 @pytest.mark.skipif(os.name != "posix", reason="the shell closes streams otherwise")

@@ -28,8 +28,8 @@ def text(factor):
 
 def times(factor):
     """What the compiled function makes of 2."""
-    llvm_compile.compiled.cache_clear()
-    function, number = llvm_compile.compiled(text(factor), "times", "array"), ctypes.c_double(2.0)
+    llvm_compile.compile_function.cache_clear()
+    function, number = llvm_compile.compile_function(text(factor), "times", "array"), ctypes.c_double(2.0)
     function(ctypes.addressof(number))
     return number.value
 
@@ -38,19 +38,19 @@ def times(factor):
 def place(tmp_path, monkeypatch):
     """An empty folder of code."""
     monkeypatch.setenv("PLANAR_CACHE", str(tmp_path))
-    return tmp_path / code_cache.OWN
+    return tmp_path / code_cache.CODE_FOLDER
 
 
 @pytest.fixture
 def made(monkeypatch):
     """Whatever is compiled from now on, in turn."""
-    told, really = [], llvm_compile._made
+    told, really = [], llvm_compile._compile_object
 
     def making(asked):
         told.append(asked)
         return really(asked)
 
-    monkeypatch.setattr(llvm_compile, "_made", making)
+    monkeypatch.setattr(llvm_compile, "_compile_object", making)
     return told
 
 
@@ -61,8 +61,8 @@ def only(place):
 
 def codes(place):
     """The files of code that are kept."""
-    assert (place / code_cache.TAG).read_bytes() == code_cache.TAGGED
-    return [path for path in place.iterdir() if path.name != code_cache.TAG]
+    assert (place / code_cache.CACHE_TAG_NAME).read_bytes() == code_cache.CACHE_TAG_TEXT
+    return [path for path in place.iterdir() if path.name != code_cache.CACHE_TAG_NAME]
 
 
 def key(letter):
@@ -70,7 +70,7 @@ def key(letter):
     return sha256(letter.encode()).hexdigest()
 
 
-HEAD = len(code_cache.MARK) + code_cache.DIGEST
+HEAD = len(code_cache.CODE_HEADER) + code_cache.CHECKSUM_LENGTH
 
 
 def test_code_is_compiled_once_and_read_from_then_on(place, made):
@@ -90,7 +90,7 @@ def test_another_process_does_not_compile_again(place):
     assert (ended.stdout, ended.stderr) == ("6.0\n", "")
 
 
-@pytest.mark.parametrize("where", [0, len(code_cache.MARK), HEAD - 1, HEAD, 200, -1])
+@pytest.mark.parametrize("where", [0, len(code_cache.CODE_HEADER), HEAD - 1, HEAD, 200, -1])
 def test_a_damaged_file_is_compiled_again_and_replaced(place, made, where):
     times(3)
     path = only(place)
@@ -103,7 +103,7 @@ def test_a_damaged_file_is_compiled_again_and_replaced(place, made, where):
     assert path.read_bytes() == right
 
 
-@pytest.mark.parametrize("length", [0, 10, len(code_cache.MARK), HEAD, 300])
+@pytest.mark.parametrize("length", [0, 10, len(code_cache.CODE_HEADER), HEAD, 300])
 def test_a_part_of_a_file_is_compiled_again(place, made, length):
     times(3)
     path = only(place)
@@ -114,7 +114,7 @@ def test_a_part_of_a_file_is_compiled_again(place, made, length):
 
 def test_a_file_under_another_name_is_not_run(place, made):
     times(3)
-    only(place).rename(place / f"{llvm_compile.fingerprint(text(5))}{code_cache.ENDING}")
+    only(place).rename(place / f"{llvm_compile.fingerprint(text(5))}{code_cache.CODE_SUFFIX}")
     assert times(5) == 10.0
     assert len(made) == 2
 
@@ -127,11 +127,11 @@ def test_what_another_user_wrote_or_could_write_is_not_run(place, made, monkeypa
     for each, mode in ((path, 0o620), (path, 0o602), (place, 0o770), (place, 0o707)):
         usual = each.stat().st_mode
         each.chmod(mode)
-        assert files.own_bytes(path) is None
+        assert files.read_private(path) is None
         each.chmod(usual)
-    assert files.own_bytes(path) is not None
+    assert files.read_private(path) is not None
     monkeypatch.setattr(os, "getuid", lambda: mine + 1)
-    assert files.own_bytes(path) is None
+    assert files.read_private(path) is None
     before = path.stat().st_mtime_ns
     assert times(3) == 6.0  # nor is anything written into a folder of another
     assert (len(made), path.stat().st_mtime_ns) == (2, before)
@@ -149,30 +149,30 @@ def test_code_runs_where_nothing_can_be_kept(tmp_path, made, monkeypatch):
 
 
 def test_a_write_that_fails_leaves_nothing_behind(place, monkeypatch):
-    code_cache.write(key("a"), b"one")
+    code_cache.write_code(key("a"), b"one")
     monkeypatch.setattr(Path, "replace", lambda self, target: (_ for _ in ()).throw(OSError("no room")))
-    assert not code_cache.write(key("b"), b"two")
-    assert [path.name for path in codes(place)] == [f"{key('a')}{code_cache.ENDING}"]
-    assert code_cache.read(key("a")) == b"one"
+    assert not code_cache.write_code(key("b"), b"two")
+    assert [path.name for path in codes(place)] == [f"{key('a')}{code_cache.CODE_SUFFIX}"]
+    assert code_cache.read_code(key("a")) == b"one"
 
 
 def test_what_was_not_read_for_longest_goes_first(place, monkeypatch):
     size = len(b"code") + HEAD
-    monkeypatch.setattr(code_cache, "MOST", 3 * size)
+    monkeypatch.setattr(code_cache, "MAX_CACHE_BYTES", 3 * size)
     for age, letter in enumerate("abc"):
-        assert code_cache.write(key(letter), b"code")
-        os.utime(place / f"{key(letter)}{code_cache.ENDING}", (1000 + age, 1000 + age))
-    assert code_cache.read(key("a")) == b"code"
-    code_cache.write(key("d"), b"code")
+        assert code_cache.write_code(key(letter), b"code")
+        os.utime(place / f"{key(letter)}{code_cache.CODE_SUFFIX}", (1000 + age, 1000 + age))
+    assert code_cache.read_code(key("a")) == b"code"
+    code_cache.write_code(key("d"), b"code")
     assert {path.stem for path in codes(place)} == {key(letter) for letter in "acd"}
 
 
 def test_only_what_was_written_here_is_ever_removed(place, tmp_path, monkeypatch):
-    code_cache.write(key("a"), b"code")
+    code_cache.write_code(key("a"), b"code")
     names = (
         "notes.code",
         "my.part",
-        f"{key('b')}{code_cache.ENDING}",
+        f"{key('b')}{code_cache.CODE_SUFFIX}",
         "thesis.code",
         ".hidden.part",
         f"{key('c')}.txt",
@@ -184,10 +184,10 @@ def test_only_what_was_written_here_is_ever_removed(place, tmp_path, monkeypatch
     unfinished = place / f".{'0f' * 12}.part"
     unfinished.write_bytes(b"of a process that was killed")
     os.utime(unfinished, (2000, 2000))
-    monkeypatch.setattr(code_cache, "MOST", 0)
-    code_cache.write(key("d"), b"code")
+    monkeypatch.setattr(code_cache, "MAX_CACHE_BYTES", 0)
+    code_cache.write_code(key("d"), b"code")
     assert {path.name for path in codes(place)} == set(names)
-    assert {path.name for path in tmp_path.iterdir()} == {*names, code_cache.OWN}
+    assert {path.name for path in tmp_path.iterdir()} == {*names, code_cache.CODE_FOLDER}
     assert all(path.stat().st_size == 1900 for folder in (tmp_path, place) for path in map(folder.joinpath, names))
 
 
@@ -196,19 +196,19 @@ def test_the_folder_is_where_each_system_has_such_things(monkeypatch, tmp_path):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(Path, "home", lambda: tmp_path)
     monkeypatch.setattr(sys, "platform", "linux")
-    assert code_cache.folder() == tmp_path / ".cache" / "planar" / code_cache.OWN
+    assert code_cache.code_folder() == tmp_path / ".cache" / "planar" / code_cache.CODE_FOLDER
     monkeypatch.setenv("XDG_CACHE_HOME", "not/absolute")
-    assert code_cache.folder() == tmp_path / ".cache" / "planar" / code_cache.OWN
+    assert code_cache.code_folder() == tmp_path / ".cache" / "planar" / code_cache.CODE_FOLDER
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "other"))
-    assert code_cache.folder() == tmp_path / "other" / "planar" / code_cache.OWN
+    assert code_cache.code_folder() == tmp_path / "other" / "planar" / code_cache.CODE_FOLDER
     monkeypatch.setattr(sys, "platform", "darwin")
-    assert code_cache.folder() == tmp_path / "Library" / "Caches" / "planar" / code_cache.OWN
+    assert code_cache.code_folder() == tmp_path / "Library" / "Caches" / "planar" / code_cache.CODE_FOLDER
     monkeypatch.setattr(sys, "platform", "win32")
-    assert code_cache.folder() == tmp_path / "AppData" / "Local" / "planar" / "Cache" / code_cache.OWN
+    assert code_cache.code_folder() == tmp_path / "AppData" / "Local" / "planar" / "Cache" / code_cache.CODE_FOLDER
     monkeypatch.setenv("LOCALAPPDATA", str(tmp_path / "local"))
-    assert code_cache.folder() == tmp_path / "local" / "planar" / "Cache" / code_cache.OWN
+    assert code_cache.code_folder() == tmp_path / "local" / "planar" / "Cache" / code_cache.CODE_FOLDER
     monkeypatch.setenv("PLANAR_CACHE", str(tmp_path / "told"))
-    assert code_cache.folder() == tmp_path / "told" / code_cache.OWN
+    assert code_cache.code_folder() == tmp_path / "told" / code_cache.CODE_FOLDER
 
 
 def test_code_for_another_processor_or_compiler_has_another_fingerprint(monkeypatch):
@@ -218,8 +218,8 @@ def test_code_for_another_processor_or_compiler_has_another_fingerprint(monkeypa
         (llvm_compile, "_processor", lambda: ("another", llvm_compile.llvm.get_host_cpu_features().flatten())),
         (llvm_compile, "_processor", lambda: (llvm_compile.llvm.get_host_cpu_name(), "+none")),
         (llvm_compile.llvmlite, "__version__", "0.0"),
-        (llvm_compile, "SPEED", 3),
-        (llvm_compile, "CODE", 0),
+        (llvm_compile, "PASS_LEVEL", 3),
+        (llvm_compile, "CODEGEN_LEVEL", 0),
     ):
         with monkeypatch.context() as patch:
             patch.setattr(holder, name, value)

@@ -7,18 +7,18 @@ import pytest
 
 import planar
 from planar.batch.march import llvm_designs, llvm_runner
-from planar.batch.march.kernel import Outside
-from planar.batch.march.llvm_runner import Designs, layout, run
-from planar.batch.reference_design import base
+from planar.batch.march.kernel import BareAngle
+from planar.batch.march.llvm_runner import KernelArrays, designs_kernel, run_designs_kernel
+from planar.batch.reference_design import reference_design
 from planar.codegen import instructions, llvm_compile
 from planar.codegen.instructions import (
-    MOST_INSTRUCTIONS,
-    Listing,
-    NotPrinted,
-    Turned,
-    without_turning,
+    MAX_INSTRUCTIONS,
+    CosSin,
+    InstructionList,
+    UnsupportedOperation,
+    expand_angle_sums,
 )
-from planar.equations.functions import structure
+from planar.equations.functions import equation_structure
 from planar.foundation.errors import BadInput, Outcome
 from planar.model.mechanism import named_points
 from tests.draws import part
@@ -36,20 +36,20 @@ def arguments(motion, points):
     solver, found = course.ranged.solver, course.found
     named = {each.name: each.members[0] for each in named_points(motion.mechanism)}
     members = [named[point] for point in points]
-    u = found.given.u[PART]
-    places = [solver.shapes[link].at(name) for link, name in members]
+    u = found.inputs.u[PART]
+    places = [solver.shapes[link].position(name) for link, name in members]
     return {
-        "program": solver.program,
+        "program": solver.functions,
         "mechanism": motion.mechanism,
-        "designs": Designs(
-            solver.station.p[:, None],
+        "designs": KernelArrays(
+            solver.inputs.p[:, None],
             np.array([[part / solver.unit] for place in places for part in (place.x, place.y)]),
             found.z[PART][0][:, None],
             u[0][:, None],
-            solver.station.u1[:, None],
-            solver.station.u2[:, None],
+            solver.inputs.u1[:, None],
+            solver.inputs.u2[:, None],
         ),
-        "gone": u - u[0],
+        "offsets": u - u[0],
         "links": [link for link, _ in members],
         "rates": True,
         "tolerance": solver.tolerance,
@@ -58,7 +58,7 @@ def arguments(motion, points):
 
 def repeated(given, designs):
     """The same design so many times."""
-    return given | {"designs": Designs(*(np.repeat(each, designs, axis=1) for each in given["designs"]))}
+    return given | {"designs": KernelArrays(*(np.repeat(each, designs, axis=1) for each in given["designs"]))}
 
 
 @pytest.mark.parametrize("stem", part([stem for stem, mechanism in MODELS.items() if mechanism.inputs], 6))
@@ -72,16 +72,16 @@ def test_a_run_of_a_model_is_the_one_that_casadi_gives(stem):
     assert motion.outcome is Outcome.SOLVED
     points = motion.point_names[-3:]
     given = repeated(arguments(motion, points), 3)
-    if not given["program"].square:
-        with pytest.raises(NotPrinted, match="more than once"):
-            run(**given)
+    if not given["program"].is_square:
+        with pytest.raises(UnsupportedOperation, match="more than once"):
+            run_designs_kernel(**given)
         return
-    out, good = run(**given)
-    assert out.shape == (len(given["gone"]), 6 * len(points), 3)
+    out, good = run_designs_kernel(**given)
+    assert out.shape == (len(given["offsets"]), 6 * len(points), 3)
     np.testing.assert_array_equal(out, np.repeat(out[:, :, :1], 3, axis=2))
     # what is near a change point, or moves too far in a step, is left to the general path; a step condemns that before
     first = int(good[0])
-    near = [row - PART.start for row in motion.course.singular if row >= PART.start]
+    near = [row - PART.start for row in motion.course.singular_rows if row >= PART.start]
     assert first == len(out) or min(near, default=0) <= first + 2
     unit = motion.course.ranged.solver.unit
     for order, what in enumerate(("position", "velocity", "acceleration")):
@@ -93,12 +93,12 @@ def test_a_run_of_a_model_is_the_one_that_casadi_gives(stem):
 
 
 def test_cos_and_sin_of_sums_are_put_together_from_the_angles_own():
-    made_of = Listing()
+    made_of = InstructionList()
     a, b, c = (made_of.add("input", data=("z", k)) for k in range(3))
-    turned = [Turned(*(made_of.add("input", data=(part, k)) for part in ("zc", "zs"))) for k in range(2)]
-    inside = made_of.add("sub", made_of.add("add", a, made_of.add("mul", made_of.const(2.0), b)), c)
+    turned = [CosSin(*(made_of.add("input", data=(part, k)) for part in ("zc", "zs"))) for k in range(2)]
+    inside = made_of.add("sub", made_of.add("add", a, made_of.add("mul", made_of.add_constant(2.0), b)), c)
     wanted = [made_of.add("cos", inside), made_of.add("sin", inside)]
-    made, numbers = without_turning(made_of, wanted, {a: turned[0], b: turned[1]})
+    made, numbers = expand_angle_sums(made_of, wanted, {a: turned[0], b: turned[1]})
     values = {
         ("zc", 0): np.cos(0.3),
         ("zs", 0): np.sin(0.3),
@@ -115,13 +115,13 @@ def test_cos_and_sin_of_sums_are_put_together_from_the_angles_own():
         "mul": np.multiply,
     }
     found = []
-    for value in made.values:
-        if value.what == "input":
+    for value in made.instructions:
+        if value.operation == "input":
             found.append(values.get(value.data, np.nan))  # the angles' own values stand nowhere
-        elif value.what == "const":
+        elif value.operation == "const":
             found.append(value.data)
         else:
-            found.append(with_angles[value.what](*(found[k] for k in value.of)))
+            found.append(with_angles[value.operation](*(found[k] for k in value.operands)))
     angle = 0.3 + 2 * 1.1 - 0.7
     np.testing.assert_allclose([found[k] for k in numbers], [np.cos(angle), np.sin(angle)], atol=1e-15)
 
@@ -130,8 +130,8 @@ def test_what_is_not_a_number_is_not_good():
     motion = planar.cycle(MODELS["crank-rocker"])
     given = repeated(arguments(motion, motion.point_names[-1:]), 2)
     given["designs"].p[0, 1] = np.nan
-    _, good = run(**given)
-    assert good.tolist() == [len(given["gone"]), 0]
+    _, good = run_designs_kernel(**given)
+    assert good.tolist() == [len(given["offsets"]), 0]
 
 
 # how much is printed
@@ -143,9 +143,9 @@ IDLE = planar.load(Path(__file__).parents[1] / "data" / "idle-slide.json")
 
 def all_points(mechanism, rates):
     """The function that a sweep of the first input runs for all points that move."""
-    common = base(mechanism, mechanism.inputs[0].pair)
-    links = tuple(common.member(name)[0] for name in common.wanted(None))
-    return layout(common.program, structure(common.mechanism), links, rates)
+    common = reference_design(mechanism, mechanism.inputs[0].pair)
+    links = tuple(common.point_member(name)[0] for name in common.select_points(None))
+    return designs_kernel(common.functions, equation_structure(common.mechanism), links, rates)
 
 
 @pytest.mark.parametrize("rates", [False, True])
@@ -153,7 +153,7 @@ def all_points(mechanism, rates):
 def test_what_is_printed_ends(seed, rates):
     mechanism = IDLE if seed is None else planar.from_dict(random_linkage(seed, 6).value)
     with watched(10):
-        assert all_points(mechanism, rates).text.count("\n") < MOST_INSTRUCTIONS / 3
+        assert all_points(mechanism, rates).ir.count("\n") < MAX_INSTRUCTIONS / 3
 
 
 def test_a_slide_that_turns_nothing_leaves_a_sweep_as_the_cycle():
@@ -170,22 +170,27 @@ def test_a_slide_that_turns_nothing_leaves_a_sweep_as_the_cycle():
 
 def test_what_is_wanted_before_it_is_known_is_not_printed(monkeypatch):
     def written(self):
-        raise Outside(("z", 0))
+        raise BareAngle(("z", 0))
 
-    monkeypatch.setattr(llvm_designs._March, "written", written)
-    with watched(10), pytest.raises(NotPrinted, match="a later one"):
-        llvm_designs.march(llvm_runner.printed(base(IDLE, None).program, structure(IDLE)), ("L2",), False, 16)
+    monkeypatch.setattr(llvm_designs._DesignsKernelWriter, "write", written)
+    with watched(10), pytest.raises(UnsupportedOperation, match="a later one"):
+        llvm_designs.write_designs_kernel(
+            llvm_runner.kernel_equations(reference_design(IDLE, None).functions, equation_structure(IDLE)),
+            ("L2",),
+            False,
+            16,
+        )
 
 
 def test_what_cancels_is_nothing():
-    made = Listing()
+    made = InstructionList()
     value = made.add("mul", *(made.add("input", data=("p", k)) for k in range(2)))
     less = made.add("neg", value)
-    assert [made.number(made.add("add", *both)) for both in ((value, less), (less, value))] == [0.0, 0.0]
+    assert [made.constant_value(made.add("add", *both)) for both in ((value, less), (less, value))] == [0.0, 0.0]
 
 
 def test_a_longer_function_is_left_to_casadi_and_printed_once_in_vain(monkeypatch):
-    mechanism, tried, really = MODELS["stephenson-1-six-bar"], [], llvm_designs.march
+    mechanism, tried, really = MODELS["stephenson-1-six-bar"], [], llvm_designs.write_designs_kernel
 
     def printing(*given):
         tried.append(given)
@@ -194,11 +199,11 @@ def test_a_longer_function_is_left_to_casadi_and_printed_once_in_vain(monkeypatc
     at, pair = mechanism.inputs[0].position, mechanism.inputs[0].pair
     designs, run_ = {f"{pair}.velocity": np.linspace(1, 2, 6)}, {"start": at, "stop": at + 0.1, "pair": pair}
     wanted = planar.sweep(mechanism, designs, 5, backend="casadi", **run_)
-    monkeypatch.setattr(instructions, "MOST_INSTRUCTIONS", 100)
-    monkeypatch.setattr(llvm_runner, "march", printing)
-    llvm_runner._layout.cache_clear()
+    monkeypatch.setattr(instructions, "MAX_INSTRUCTIONS", 100)
+    monkeypatch.setattr(llvm_runner, "write_designs_kernel", printing)
+    llvm_runner._designs_kernel_or_reason.cache_clear()
     found = planar.sweep(mechanism, designs, 5, backend="native", block=2, **run_)
-    llvm_runner._layout.cache_clear()
+    llvm_runner._designs_kernel_or_reason.cache_clear()
     assert len({given[1:] for given in tried}) == len(tried) > 0
     assert (found.general, found.whole.all()) == (0, True)
     for point in found.points:
@@ -207,15 +212,15 @@ def test_a_longer_function_is_left_to_casadi_and_printed_once_in_vain(monkeypatc
 
 def test_a_long_text_is_compiled_briefly(monkeypatch):
     plan = all_points(MODELS["crank-rocker"], True)
-    usual, asked, really = llvm_compile.fingerprint(plan.text), [], llvm_compile._machine
+    usual, asked, really = llvm_compile.fingerprint(plan.ir), [], llvm_compile._target_machine
 
     def machine(code):
         asked.append(code)
         return really(code)
 
-    monkeypatch.setattr(llvm_compile, "_machine", machine)
-    llvm_compile._made(plan.text)
-    monkeypatch.setattr(llvm_compile, "LONG", plan.text.count("\n") - 1)
-    llvm_compile._made(plan.text)
-    assert asked == [llvm_compile.CODE, llvm_compile.BRIEF]
-    assert llvm_compile.fingerprint(plan.text) != usual
+    monkeypatch.setattr(llvm_compile, "_target_machine", machine)
+    llvm_compile._compile_object(plan.ir)
+    monkeypatch.setattr(llvm_compile, "LONG_TEXT_LINES", plan.ir.count("\n") - 1)
+    llvm_compile._compile_object(plan.ir)
+    assert asked == [llvm_compile.CODEGEN_LEVEL, llvm_compile.FAST_CODEGEN_LEVEL]
+    assert llvm_compile.fingerprint(plan.ir) != usual

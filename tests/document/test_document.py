@@ -15,30 +15,30 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import planar
-from planar.document.files import models
+from planar.document.files import load_models
 from planar.document.schema import schema
 from planar.foundation.errors import BadInput
 from planar.foundation.geometry import GROUND, frame_at
-from planar.model.link_shapes import shape
+from planar.model.link_shapes import link_shape
 from planar.model.mechanism import (
     Along,
     At,
     Course,
     Distances,
+    FileUnits,
     Input,
     Link,
     Load,
     Mass,
     Mechanism,
     Point,
-    Published,
+    PublishedValue,
     Spring,
-    Units,
-    motions,
     named_points,
+    relative_motions,
 )
 from planar.model.pairs import pair_types
-from planar.model.pairs.guide_line import Line
+from planar.model.pairs.guide_line import LinkLine
 from tests.draws import draws
 
 FOUR_BAR = """
@@ -246,7 +246,7 @@ def test_the_four_bar_of_the_contract_reads_as_it_is_written() -> None:
     m = planar.loads(FOUR_BAR)
     assert m.name == "Four-bar chain"
     assert m.source == "Theory of Machines, acceleration analysis, Example 3.1"
-    assert m.units == Units("mm", "deg")
+    assert m.units == FileUnits("mm", "deg")
     assert m.frame == "AD"
     assert m.links == (
         Link("AD", (Point("A", At(0.0, 0.0)), Point("D", At(0.1, 0.0)))),
@@ -280,9 +280,9 @@ def test_the_slider_crank_of_the_contract_reads_as_it_is_written() -> None:
         ("stroke", ("frame", "piston")),
     ]
     slide = m.pairs[3]
-    assert (slide.line, slide.point, slide.turn) == (Line("O", None, 0.0), "B", 0.0)
+    assert (slide.line, slide.point, slide.block_angle) == (LinkLine("O", None, 0.0), "B", 0.0)
     assert m.inputs == (Input("O", pytest.approx(pi / 3.0, rel=EPS4), 20.0, 0.0),)
-    assert shape(m.links[2]).points["E"] == (-0.45, 0.0)
+    assert link_shape(m.links[2]).points["E"] == (-0.45, 0.0)
     assert m.sketch == (("B", 1.78, 0.0),)
     assert m.remarks == ()
 
@@ -295,7 +295,7 @@ def test_an_example_written_and_read_again_is_the_same_mechanism(text: str) -> N
 
 
 def test_every_model_that_comes_along_written_and_read_again_is_the_same_mechanism() -> None:
-    for file, m in models():
+    for file, m in load_models():
         assert planar.loads(planar.dumps(m)) == m, file.stem
 
 
@@ -350,7 +350,7 @@ def test_reading_leaves_the_value_as_it_was() -> None:
 
 def test_a_bell_crank_turns_the_way_anticlockwise_about_the_first_point() -> None:
     bell = {"ends": ["B", "C"], "length": 66, "points": {"E": {"along": ["B", "C"], "distance": 40, "angle": 90}}}
-    e = shape(read((["links", "BC"], bell)).links[2]).points["E"]
+    e = link_shape(read((["links", "BC"], bell)).links[2]).points["E"]
     assert (e.x, e.y) == pytest.approx((0.0, 0.04), abs=1e-17)
 
 
@@ -362,7 +362,7 @@ def test_bare_numbers_are_metres_and_radians_where_no_units_are_declared() -> No
     value = base()
     del value["units"]
     m = planar.from_dict(put(value, ["inputs", 0], {"pair": "A", "position": 1.5, "velocity": 2, "acceleration": -3}))
-    assert m.units == Units("m", "rad")
+    assert m.units == FileUnits("m", "rad")
     assert m.links[1].length == 50.0
     assert m.pairs[0].radius == 30.0
     assert m.inputs == (Input("A", 1.5, 2.0, -3.0),)
@@ -405,10 +405,10 @@ def test_a_pin_of_n_links_is_n_minus_1_pairs_and_every_relative_motion_has_a_nam
     m = read((["pairs", 2, "links"], ["link", "rod", "rocker"]), of="two dyads")
     assert pins(m)[2:4] == [("C:link,rod", ("link", "rod")), ("C:link,rocker", ("link", "rocker"))]
     assert len(m.pairs) == 7
-    about_c = [name for name in motions(m) if name.startswith("C")]
+    about_c = [name for name in relative_motions(m) if name.startswith("C")]
     assert about_c == ["C:link,rod", "C:link,rocker", "C:rod,rocker"]
-    assert motions(m)["C:rod,rocker"].links == ("rod", "rocker")
-    assert {pair.radius for pair in motions(m).values() if pair.entry_name() == "C"} == {0.015}
+    assert relative_motions(m)["C:rod,rocker"].links == ("rod", "rocker")
+    assert {pair.radius for pair in relative_motions(m).values() if pair.entry_name() == "C"} == {0.015}
 
 
 def test_points_names_what_each_link_calls_the_pin() -> None:
@@ -466,7 +466,7 @@ def test_an_input_at_a_pin_on_the_frame_is_the_angle_of_the_other_link(joined: l
     frames = {"frame": GROUND, "crank": frame_at(0.0, 0.0, 0.7)}
     pair = m.pairs[0]
     assert pair.links == tuple(joined)
-    assert pair.drive([frames[link] for link in joined], (0.0,) * 4, ()) == pytest.approx(0.7, abs=0.0)
+    assert pair.input_position([frames[link] for link in joined], (0.0,) * 4, ()) == pytest.approx(0.7, abs=0.0)
     # the rest of the way: the solved crank stands at the input's angle, and turns with it
     crank = planar.solve(m).link("crank")
     assert crank.angle == pytest.approx(pi / 3.0, abs=1e-12)
@@ -524,12 +524,12 @@ def test_a_line_goes_through_a_place_at_an_angle_or_to_another(line: Any, throug
     m = read((["pairs", 3, "line"], line), of="slider-crank")
     slide = sliding(m)
     assert (slide.line.through, slide.line.to) == (through, to)
-    _, _, cosine, sine, *_, turned = slide.measure([shape(m.links[0]), shape(m.links[3])])
+    _, _, cosine, sine, *_, turned = slide.measure([link_shape(m.links[0]), link_shape(m.links[3])])
     assert (cosine, sine, turned) == pytest.approx((cos(angle), sin(angle), angle), rel=EPS4, abs=EPS4)
 
 
 def test_turn_is_the_fixed_angle_from_the_line_to_the_second_link() -> None:
-    assert sliding(read((["pairs", 3, "turn"], 180), of="slider-crank")).turn == pytest.approx(pi, rel=EPS4)
+    assert sliding(read((["pairs", 3, "turn"], 180), of="slider-crank")).block_angle == pytest.approx(pi, rel=EPS4)
 
 
 def test_a_block_is_a_link_of_its_own_pinned_to_the_links_that_carry_the_point() -> None:
@@ -644,7 +644,7 @@ def test_loads_name_points_and_links() -> None:
 
 def test_a_published_value_has_the_unit_of_its_quantity() -> None:
     (item,) = read(of="two dyads").published
-    assert item == Published("v_D", "velocity", "D", 0.5)
+    assert item == PublishedValue("v_D", "velocity", "D", 0.5)
     turning = {"symbol": "w", "quantity": "angular velocity", "of": "rod", "value": "60 rpm", "sense": "clockwise"}
     (item,) = read((["published"], [turning]), of="two dyads").published
     assert item.value == pytest.approx(2.0 * pi, rel=EPS4)
@@ -681,7 +681,7 @@ def test_numbers_of_numpy_read_and_write_as_plain_numbers_do() -> None:
         sketch=plain.sketch,
         units=plain.units,
         source=plain.source,
-        published=(Published("v", "velocity", "C", np.float64(0.4), np.float64(0.01)),),
+        published=(PublishedValue("v", "velocity", "C", np.float64(0.4), np.float64(0.01)),),
     )
     assert planar.loads(planar.dumps(with_numpy)) == with_numpy
 
@@ -1081,7 +1081,7 @@ def test_lengths_beyond_all_reason_are_refused_or_placed_exactly(size: float) ->
 
 
 def finite(m: Mechanism) -> bool:
-    return all(isfinite(c) for link in m.links for point in shape(link).points.values() for c in point)
+    return all(isfinite(c) for link in m.links for point in link_shape(link).points.values() for c in point)
 
 
 NAMES = st.text(st.characters(exclude_categories=("C", "Z"), exclude_characters=".:,"), min_size=1, max_size=6)

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 import planar
-from planar.document.files import LARGEST, found, model_files, models
+from planar.document.files import MAX_FILE_BYTES, find_model_file, load_models, model_files
 from planar.foundation.errors import BadInput
 from tests.watchdog import watched
 
@@ -66,7 +66,7 @@ def test_a_path_need_not_end_in_json(tmp_path: Path) -> None:
 
 
 def test_the_largest_file_is_read(tmp_path: Path) -> None:
-    assert planar.load(written(tmp_path, TEXT + " " * (LARGEST - len(TEXT.encode())))) == planar.from_dict(CRANK)
+    assert planar.load(written(tmp_path, TEXT + " " * (MAX_FILE_BYTES - len(TEXT.encode())))) == planar.from_dict(CRANK)
 
 
 # models that come along
@@ -76,14 +76,14 @@ def test_the_models_that_come_along_are_in_the_order_of_their_names() -> None:
     names = [file.stem for file in model_files()]
     assert names == sorted(names)
     assert len(set(names)) == len(names)
-    assert [file for file, _ in models()] == list(model_files())
+    assert [file for file, _ in load_models()] == list(model_files())
 
 
 def test_a_model_is_found_by_its_name_and_by_its_ids(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    for file, mechanism in models():
+    for file, mechanism in load_models():
         for name in (file.stem, *mechanism.ids):
-            assert found(name) == file
+            assert find_model_file(name) == file
         assert planar.load(file.stem) == mechanism
 
 
@@ -137,7 +137,7 @@ def test_a_dash_stands_for_what_is_piped_in(monkeypatch: pytest.MonkeyPatch) -> 
     assert planar.load("-").name == CRANK["name"]
     piped(b"")
     assert "it is empty" in refused("-").sentence
-    piped(b"[" + b" " * LARGEST)
+    piped(b"[" + b" " * MAX_FILE_BYTES)
     assert "larger than" in refused("-").sentence
     piped(b"{")
     assert refused("-").place == "standard input"
@@ -189,7 +189,7 @@ def test_a_file_that_may_not_be_read_is_refused(tmp_path: Path, monkeypatch: pyt
 def test_a_file_too_large_is_refused_unread(tmp_path: Path) -> None:
     path = tmp_path / "large.json"
     with path.open("wb") as file:
-        file.truncate(LARGEST + 1)
+        file.truncate(MAX_FILE_BYTES + 1)
     problem = refused(path)
     assert problem.place == str(path)
     assert "8 MiB" in problem.sentence

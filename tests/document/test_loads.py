@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 import planar
-from planar.dynamics.load_attachment import attachments, choices
-from planar.dynamics.load_variation import factor
+from planar.dynamics.load_attachment import attachment_remarks, attachments
+from planar.dynamics.load_variation import interpolate_factor
 from planar.foundation.errors import BadInput
 from planar.model.loads import Course, Load, Mass, Spring
-from planar.model.mechanism import Units
+from planar.model.mechanism import FileUnits
 from tests.command import run
 
 Value = dict[str, Any]
@@ -95,7 +95,7 @@ def test_what_acts_is_read_in_the_units_of_the_file_and_written_back(key, entry,
     assert type(found) is type(wanted)
     for each, other in zip(flat(found), flat(wanted), strict=True):
         assert each == (pytest.approx(other, rel=1e-15) if isinstance(other, float) else other)
-    for units in (mechanism.units, Units("m", "rad"), Units("in", "deg")):
+    for units in (mechanism.units, FileUnits("m", "rad"), FileUnits("in", "deg")):
         written = planar.to_dict(replace(mechanism, units=units))
         again = planar.to_dict(planar.from_dict(written))
         assert again == written
@@ -194,24 +194,24 @@ def test_what_is_made_in_python_is_checked(key, item, sentence):
 
 def test_a_load_is_straight_between_its_places_and_stays_beyond_them():
     course = Course(None, (1.0, 2.0, 4.0), (10.0, 20.0, 0.0))
-    found = factor(course, np.array([0.0, 1.0, 1.5, 3.0, 4.0, 9.0]), turns=False)
+    found = interpolate_factor(course, np.array([0.0, 1.0, 1.5, 3.0, 4.0, 9.0]), is_angle=False)
     assert list(found) == [10.0, 10.0, 15.0, 10.0, 0.0, 0.0]
 
 
 def test_a_load_over_a_turn_comes_again_with_every_turn_either_way():
     course = Course("O", (-pi / 2, pi / 2, 3 * pi / 2), (0.0, 1.0, 0.0))
     angles = np.array([0.0, 0.3, 2.0])
-    first = factor(course, angles, turns=True)
+    first = interpolate_factor(course, angles, is_angle=True)
     assert first == pytest.approx([0.5, 0.5 + 0.3 / pi, 0.5 + (pi - 2.0) / pi], rel=1e-12)
     for turns in (-4.0, 2.0, 20.0):
-        assert factor(course, angles + turns * pi, turns=True) == pytest.approx(first, rel=1e-12)
+        assert interpolate_factor(course, angles + turns * pi, is_angle=True) == pytest.approx(first, rel=1e-12)
     # over the way of a slide the same numbers come once
-    assert factor(course, np.array([2 * pi]), turns=False) == pytest.approx([0.0])
+    assert interpolate_factor(course, np.array([2 * pi]), is_angle=False) == pytest.approx([0.0])
 
 
 def test_a_step_is_two_factors_at_one_place():
     course = Course(None, (0.0, 1.0, 1.0, 2.0), (3.0, 3.0, 0.0, 0.0))
-    assert list(factor(course, np.array([0.999, 1.001]), turns=False)) == [3.0, 0.0]
+    assert list(interpolate_factor(course, np.array([0.999, 1.001]), is_angle=False)) == [3.0, 0.0]
 
 
 def test_a_load_at_a_pin_acts_on_the_link_that_is_named_with_it():
@@ -341,7 +341,7 @@ def test_a_load_keeps_its_name_in_a_file_and_is_said_where_another_link_might_be
             told = json.loads(run(tmp_path, words[0], "two-stroke-engine", *words[1:], "--json").done())
             assert sentence in told["remarks"], words
     named = planar.from_dict(planar.to_dict(engine) | {"loads": [{"point": "rod.B", "force": [-283, 0]}]})
-    assert choices(named) == ()
+    assert attachment_remarks(named) == ()
     assert planar.inspect(named).remarks == ()
 
 

@@ -100,7 +100,12 @@ def test_an_example_is_valid(name):
 @pytest.mark.parametrize("sample", SAMPLES)
 def test_a_sample_of_every_pair_type_is_valid(sample):
     links = {name: {"points": dict(shape.points)} for name, shape in zip("abc", sample.shapes, strict=False)}
-    value = {"planar": 1, "frame": "a", "links": json.loads(json.dumps(links)), "pairs": [sample.entry, *sample.beside]}
+    value = {
+        "planar": 1,
+        "frame": "a",
+        "links": json.loads(json.dumps(links)),
+        "pairs": [sample.entry, *sample.other_entries],
+    }
     if "c" in links:
         value["frame"] = "c"
     assert refusal(value) is None

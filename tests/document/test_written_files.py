@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from planar.document import files
-from planar.document.files import save
-from planar.foundation.errors import BadInput, NotWritten
+from planar.document.files import save_file
+from planar.foundation.errors import BadInput, WriteFailure
 from tests.command import run
 
 OLD, NEW = b"the old result", b"new " * 1000
@@ -45,16 +45,16 @@ def content(folder):
 
 
 def test_a_full_disk_leaves_the_old_file_and_nothing_else(old):
-    with room(2000), pytest.raises(NotWritten, match=r"result\.csv: the file cannot be written: File too large"):
-        save(old, NEW)
+    with room(2000), pytest.raises(WriteFailure, match=r"result\.csv: the file cannot be written: File too large"):
+        save_file(old, NEW)
     assert content(old.parent) == {old.name: OLD}
-    save(old, NEW)
+    save_file(old, NEW)
     assert content(old.parent) == {old.name: NEW}
 
 
 def test_a_full_disk_leaves_no_new_file(tmp_path):
-    with room(2000), pytest.raises(NotWritten):
-        save(tmp_path / "new.csv", NEW)
+    with room(2000), pytest.raises(WriteFailure):
+        save_file(tmp_path / "new.csv", NEW)
     assert content(tmp_path) == {}
 
 
@@ -73,13 +73,13 @@ def test_a_full_disk_leaves_no_new_file(tmp_path):
     ],
 )
 def test_no_command_loses_what_an_earlier_one_wrote(words, tmp_path, monkeypatch):
-    really = files.write_whole
+    really = files.write_atomically
 
     def without_room(path, whole):
         with room(100):  # only here: libraries keep files of their own
             really(path, whole)
 
-    monkeypatch.setattr(files, "write_whole", without_room)
+    monkeypatch.setattr(files, "write_atomically", without_room)
     name = words.split()[-1]
     (tmp_path / name).write_bytes(OLD)
     sentence = run(tmp_path, *words.split()).refused(3)
@@ -93,7 +93,7 @@ def test_what_is_interrupted_leaves_the_old_file_and_nothing_else(old, monkeypat
 
     monkeypatch.setattr(Path, "replace", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        save(old, NEW)
+        save_file(old, NEW)
     assert content(old.parent) == {old.name: OLD}
 
 
@@ -101,11 +101,11 @@ def test_what_is_interrupted_leaves_the_old_file_and_nothing_else(old, monkeypat
 def test_permissions_stay_and_those_of_a_new_file_are_the_usual_ones(old):
     for mode in (0o640, 0o600, 0o755, 0o666):
         old.chmod(mode)
-        save(old, NEW)
+        save_file(old, NEW)
         assert stat.S_IMODE(old.stat().st_mode) == mode
     before = os.umask(0o027)
     try:
-        save(old.with_name("new.csv"), NEW)
+        save_file(old.with_name("new.csv"), NEW)
     finally:
         os.umask(before)
     assert stat.S_IMODE(old.with_name("new.csv").stat().st_mode) == 0o640
@@ -115,8 +115,8 @@ def test_what_may_not_be_written_is_refused(old, monkeypatch):
     old.chmod(0o444)
     monkeypatch.setattr(os, "access", lambda path, what: what != os.W_OK)  # root may write anywhere
     with pytest.raises(BadInput, match="Permission denied") as refused:
-        save(old, NEW)
-    assert not isinstance(refused.value, NotWritten)
+        save_file(old, NEW)
+    assert not isinstance(refused.value, WriteFailure)
     assert content(old.parent) == {old.name: OLD}
 
 
@@ -125,21 +125,21 @@ def test_a_link_stays_one_and_what_it_leads_to_is_written(old, tmp_path):
     first.symlink_to("second.csv")
     second.symlink_to(old)
     nowhere.symlink_to("own/new.csv")
-    save(first, NEW)
-    save(nowhere, NEW)
+    save_file(first, NEW)
+    save_file(nowhere, NEW)
     assert first.is_symlink() and second.is_symlink() and nowhere.is_symlink()
     assert content(old.parent) == {old.name: NEW, "new.csv": NEW}
     round_ = tmp_path / "round.csv"
     round_.symlink_to(round_)
     with pytest.raises(BadInput, match="symbolic links"):
-        save(round_, NEW)
+        save_file(round_, NEW)
 
 
 def test_a_file_of_two_names_keeps_both(old):
     os.link(old, old.with_name("also.csv"))
-    save(old, NEW)
+    save_file(old, NEW)
     assert content(old.parent) == {old.name: NEW, "also.csv": NEW}
-    save(old, OLD)
+    save_file(old, OLD)
     assert content(old.parent) == {old.name: OLD, "also.csv": OLD}
 
 
@@ -151,11 +151,11 @@ def test_where_no_other_file_may_take_its_place_the_file_itself_is_written(old, 
     monkeypatch.setattr(Path, "replace", refused)
     known = old.stat().st_ino
     if hasattr(os, "posix_fallocate"):
-        with room(2000), pytest.raises(NotWritten):
-            save(old, NEW)
+        with room(2000), pytest.raises(WriteFailure):
+            save_file(old, NEW)
         assert content(old.parent) == {old.name: OLD}
     for each in (NEW, b"short", b""):
-        save(old, each)
+        save_file(old, each)
         assert content(old.parent) == {old.name: each}
     assert old.stat().st_ino == known
 
@@ -166,7 +166,7 @@ def test_a_pipe_takes_the_bytes_and_stays_one(tmp_path):
     os.mkfifo(path)
     reading = threading.Thread(target=lambda: found.append(path.read_bytes()), daemon=True)
     reading.start()
-    save(path, NEW)
+    save_file(path, NEW)
     reading.join()
     assert found == [NEW]
     assert stat.S_ISFIFO(path.stat().st_mode)
@@ -174,27 +174,27 @@ def test_a_pipe_takes_the_bytes_and_stays_one(tmp_path):
 
 @full
 def test_a_device_stays_one():
-    save(Path(os.devnull), NEW)
+    save_file(Path(os.devnull), NEW)
     assert stat.S_ISCHR(Path(os.devnull).stat().st_mode)
-    with pytest.raises(NotWritten, match="No space left on device"):
-        save(FULL, NEW)
+    with pytest.raises(WriteFailure, match="No space left on device"):
+        save_file(FULL, NEW)
     assert stat.S_ISCHR(FULL.stat().st_mode)
-    assert not [path for path in FULL.parent.iterdir() if files.PART.fullmatch(path.name)]
+    assert not [path for path in FULL.parent.iterdir() if files.PARTIAL_FILE_NAME.fullmatch(path.name)]
 
 
 @pytest.mark.skipif(not Path("/dev/fd").exists(), reason="there is no such folder")
 def test_what_is_open_is_written_on_where_it_stands(old, capfd):
-    save(Path("/dev/stdout"), NEW)
+    save_file(Path("/dev/stdout"), NEW)
     assert capfd.readouterr().out == NEW.decode()
     with old.open("ab") as file:
         for _ in range(2):
-            save(Path(f"/dev/fd/{file.fileno()}"), NEW)
+            save_file(Path(f"/dev/fd/{file.fileno()}"), NEW)
     assert content(old.parent) == {old.name: OLD + NEW + NEW}
 
 
 @pytest.mark.parametrize("name", ["", "..", "no/such.csv", "result.csv/below", "a\0b", "a" * 300])
 def test_where_there_can_be_no_file_is_one_sentence(name, old):
     with pytest.raises(BadInput, match="cannot be written") as refused:
-        save(old.parent / name, NEW)
-    assert not isinstance(refused.value, NotWritten)
+        save_file(old.parent / name, NEW)
+    assert not isinstance(refused.value, WriteFailure)
     assert content(old.parent) == {old.name: OLD}

@@ -11,16 +11,16 @@ import numpy as np
 import pytest
 
 import planar
-from planar.drawing.output.animation import PIXELS, animate, scripted
-from planar.drawing.paper.pens import INK
+from planar.drawing.output.animation import PIXELS_PER_MM, animate, plan_animation
+from planar.drawing.paper.pens import PEN_STYLES
 from planar.drawing.paper.picture import Pen
-from planar.drawing.scheme.symbols import PIN
+from planar.drawing.scheme.symbols import PIN_RADIUS
 from planar.foundation.errors import BadInput
 
 pytest.importorskip("matplotlib")
 from PIL import Image
 
-TRACE = np.array([int(INK[Pen.PATH].colour[k : k + 2], 16) for k in (1, 3, 5)])
+TRACE = np.array([int(PEN_STYLES[Pen.PATH].colour[k : k + 2], 16) for k in (1, 3, 5)])
 
 
 def read(content):
@@ -42,7 +42,7 @@ def about(frame, at):
 def is_pin(frame, at):
     """White in the middle, black around at a pin's radius."""
     x, y = at
-    radius = PIN * PIXELS
+    radius = PIN_RADIUS * PIXELS_PER_MM
     ring = [about(frame, (x + radius * np.cos(turn), y + radius * np.sin(turn))) for turn in np.arange(8) * pi / 4.0]
     return frame[int(y), int(x)].min() > 225 and max(ring) < 110
 
@@ -55,7 +55,7 @@ def traced(frame):
 @pytest.fixture(scope="module")
 def rocking():
     mechanism = planar.load("four-bar")
-    return mechanism, scripted(mechanism, ["E"], 40), read(animate(mechanism, "gif", ["E"], frames=40))
+    return mechanism, plan_animation(mechanism, ["E"], 40), read(animate(mechanism, "gif", ["E"], frames=40))
 
 
 def test_pins_are_where_the_solver_has_them_in_every_frame(rocking):
@@ -64,7 +64,7 @@ def test_pins_are_where_the_solver_has_them_in_every_frame(rocking):
     for index in range(0, 40, 3):
         k = index if index <= 20 else 40 - index
         for name in "ABCD":
-            assert is_pin(frames[index], script.pixel(motion.point(name).position[18 * k])), (index, name)
+            assert is_pin(frames[index], script.to_pixel(motion.point(name).position[18 * k])), (index, name)
 
 
 def test_a_rocking_input_goes_there_and_back(rocking):
@@ -84,8 +84,8 @@ def test_the_traced_path_grows_there_and_stays_on_the_way_back(rocking):
 
 def test_what_stands_still_stays_as_it_is(rocking):
     _, script, frames = rocking
-    x, y = script.pixel(planar.solve(rocking[0]).point("D").position)
-    base = frames[:, int(y + 4.2 * PIXELS) - 1 : int(y + 5.5 * PIXELS), int(x) - 8 : int(x) + 8]
+    x, y = script.to_pixel(planar.solve(rocking[0]).point("D").position)
+    base = frames[:, int(y + 4.2 * PIXELS_PER_MM) - 1 : int(y + 5.5 * PIXELS_PER_MM), int(x) - 8 : int(x) + 8]
     assert base.min() < 60
     assert (base == base[0]).all()
     assert (frames[:, 0, 0] == 255).all()
@@ -102,26 +102,26 @@ def test_a_gif_repeats_for_ever_at_the_speed_asked_for():
 
 def test_a_whole_turn_is_divided_equally_from_the_top_dead_centre():
     mechanism = planar.load("004-SC12")
-    script = scripted(mechanism, ["D"], 12)
+    script = plan_animation(mechanism, ["D"], 12)
     frames = read(animate(mechanism, ".gif", ["D"], frames=12))
     assert len(frames) == 12
     for k, frame in enumerate(frames):
         turn = k * pi / 6.0
         crank = 0.03 * np.array([np.cos(turn), np.sin(turn)])
         piston = crank[0] + np.sqrt(0.1**2 - crank[1] ** 2), 0.0
-        assert is_pin(frame, script.pixel(crank))
-        assert is_pin(frame, script.pixel(piston))
+        assert is_pin(frame, script.to_pixel(crank))
+        assert is_pin(frame, script.to_pixel(piston))
 
 
 def test_geared_links_go_on_until_they_are_back():
-    script = scripted(planar.load("geared-five-bar"), ["P"], 20)
+    script = plan_animation(planar.load("geared-five-bar"), ["P"], 20)
     assert len(script.rows) == 40
-    assert script.run.turned[-1] == pytest.approx(4.0 * pi)
+    assert script.run.input_travel[-1] == pytest.approx(4.0 * pi)
 
 
 def test_the_corners_hold_every_position():
     for model in ("jansen-leg", "planetary-gear-set", "oldham", "002-E3.4"):
-        script = scripted(planar.load(model), frames=24)
+        script = plan_animation(planar.load(model), frames=24)
         for name in script.run.motion.point_names:
             spots = script.run.point(name).position / script.scale.per_mm
             assert (spots >= script.low).all()
@@ -144,17 +144,17 @@ def test_progress_is_told_frame_by_frame():
 
 def test_one_of_several_inputs_runs():
     motion = planar.cycle(planar.load("excavator-arm"), 24, pair="bucket cylinder")
-    script = scripted(motion, ["tip"], 12)
+    script = plan_animation(motion, ["tip"], 12)
     frames = read(animate(motion, "gif", ["tip"], frames=12))
     for index in (2, 5):
         at = script.run.point("H").position[script.rows[index]]
-        assert is_pin(frames[index], script.pixel(at))
+        assert is_pin(frames[index], script.to_pixel(at))
 
 
 def test_an_mp4_has_every_frame_with_its_pins():
     ffmpeg = pytest.importorskip("imageio_ffmpeg").get_ffmpeg_exe()
     mechanism = planar.load("four-bar")
-    script = scripted(mechanism, ["E"], 16)
+    script = plan_animation(mechanism, ["E"], 16)
     film = animate(mechanism, ".mp4", ["E"], frames=16)
     command = [ffmpeg, "-i", "pipe:0", "-f", "rawvideo", "-pix_fmt", "rgb24", "pipe:1"]
     done = subprocess.run(command, input=film, capture_output=True, check=True)
@@ -165,7 +165,7 @@ def test_an_mp4_has_every_frame_with_its_pins():
     assert len(frames) == 16
     for index in (0, 3, 8, 13):
         for name in "ABCD":
-            assert is_pin(frames[index], script.pixel(script.run.point(name).position[script.rows[index]]))
+            assert is_pin(frames[index], script.to_pixel(script.run.point(name).position[script.rows[index]]))
 
 
 def test_an_mp4_that_is_broken_off_leaves_nothing_behind():

@@ -14,10 +14,10 @@ import planar
 from planar import plot
 from planar.analysis.centres.centres import centres
 from planar.document import files
-from planar.drawing.centres.centres import MANY, ROOM, centres_picture, chosen
-from planar.drawing.centres.circle_diagram import circle_picture, radius
+from planar.drawing.centres.centres import DRAWING_SIZE, MAX_CENTRES, centres_picture, choose_centres
+from planar.drawing.centres.circle_diagram import circle_picture, circle_radius
 from planar.drawing.centres.two_directions import directions_picture
-from planar.drawing.paper.picture import Arrow, Circle, Letter, Line, Pen, extent
+from planar.drawing.paper.picture import Arrow, Circle, Label, Pen, Polyline, extent
 from tests.command import run
 from tests.drawing.test_plot import texts
 from tests.known import MODELS as ALL
@@ -31,7 +31,7 @@ INSIDE = 1e-6
 
 @cache
 def shown(stem):
-    return {each.name: each for each in chosen(found(stem))}
+    return {each.name: each for each in choose_centres(found(stem))}
 
 
 @cache
@@ -61,7 +61,7 @@ def places(stem):
 
 def off(line, at):
     """How far a spot is from a straight line without ends (mm)."""
-    start, stop = np.array(line.spots)
+    start, stop = np.array(line.points)
     way = (stop - start) / np.hypot(*(stop - start))
     return abs(way[0] * (at[1] - start[1]) - way[1] * (at[0] - start[0]))
 
@@ -93,7 +93,7 @@ def test_every_centre_is_marked_at_its_place_or_has_an_arrow_towards_it(stem):
 @every_model
 def test_lines_of_centres_pass_through_all_their_centres(stem):
     scale, picture = per_mm(space(stem)), space(stem)
-    lines = marks(picture, ("line ", "normal "), Line)
+    lines = marks(picture, ("line ", "normal "), Polyline)
     assert all(line.pen is Pen.CENTRE_LINE for line in lines.values())
     drawn = {said: line for about, line in lines.items() for said in about.split(", ")}
     for centre in shown(stem).values():
@@ -107,16 +107,16 @@ def test_lines_of_centres_pass_through_all_their_centres(stem):
                 for mark in ends if line.centres else ():
                     if each.position is not None:
                         # one that lies far off is hit as exactly as the eye could tell here
-                        far = np.hypot(*(each.position / scale - np.mean(mark.spots, axis=0)))
+                        far = np.hypot(*(each.position / scale - np.mean(mark.points, axis=0)))
                         assert off(mark, each.position / scale) < 0.06 + 1e-3 * far
                     else:
-                        way = np.subtract(*mark.spots) / np.hypot(*np.subtract(*mark.spots))
+                        way = np.subtract(*mark.points) / np.hypot(*np.subtract(*mark.points))
                         assert abs(way[0] * each.direction[1] - way[1] * each.direction[0]) < 1e-3
 
 
 @every_model
 def test_both_lines_of_a_found_centre_run_through_its_mark(stem):
-    lines = [mark for mark in space(stem).marks if isinstance(mark, Line) and mark.pen is Pen.CENTRE_LINE]
+    lines = [mark for mark in space(stem).marks if isinstance(mark, Polyline) and mark.pen is Pen.CENTRE_LINE]
     for name, circle in places(stem).items():
         centre = shown(stem)[name]
         known = [line for line in centre.lines if all(each in shown(stem) for each in line.centres)]
@@ -127,20 +127,20 @@ def test_both_lines_of_a_found_centre_run_through_its_mark(stem):
             told = f"line {' '.join(line.centres)}" if line.centres else f"normal at {line.pair}"
             (mark,) = (each for each in through if told in each.about.split(", "))
             # it does not end before the mark
-            start, stop = np.array(mark.spots)
+            start, stop = np.array(mark.points)
             part = (np.array(circle.centre) - start) @ (stop - start) / ((stop - start) @ (stop - start))
             assert 0.0 < part < 1.0
 
 
 @every_model
 def test_strokes_stay_in_the_window_and_fit_the_page_beside_the_circle(stem):
-    (left, low), (right, high) = extent(mark for mark in space(stem).marks if not isinstance(mark, Letter))
+    (left, low), (right, high) = extent(mark for mark in space(stem).marks if not isinstance(mark, Label))
     # symbols of links and arrows are as large on any scale
-    assert right - left < ROOM[0] - 2.0 * radius(len(found(stem).numbers)) + 60.0
-    assert high - low < ROOM[1] + 60.0
+    assert right - left < DRAWING_SIZE[0] - 2.0 * circle_radius(len(found(stem).numbers)) + 60.0
+    assert high - low < DRAWING_SIZE[1] + 60.0
     for mark in space(stem).marks:
-        if isinstance(mark, Line) and mark.pen is Pen.CENTRE_LINE:
-            for x, y in mark.spots:
+        if isinstance(mark, Polyline) and mark.pen is Pen.CENTRE_LINE:
+            for x, y in mark.points:
                 assert left - INSIDE <= x <= right + INSIDE
                 assert low - INSIDE <= y <= high + INSIDE
 
@@ -149,7 +149,7 @@ def test_strokes_stay_in_the_window_and_fit_the_page_beside_the_circle(stem):
 def test_every_centre_is_lettered_at_its_spot(stem):
     letters = {
         name: letter
-        for about, letter in marks(space(stem), "centre ", Letter).items()
+        for about, letter in marks(space(stem), "centre ", Label).items()
         for name in (each.removeprefix("centre ") for each in re.split(", (?=centre )", about))
     }
     assert set(letters) == {name for name, each in shown(stem).items() if each.homogeneous is not None}
@@ -171,22 +171,22 @@ def test_chords_join_the_points_of_their_links(stem):
     assert set(points) == set(found(stem).numbers)
     pens = {"pair": Pen.CHORD, "Kennedy": Pen.CHORD_FOUND, "ratio": Pen.CHORD_FOUND, "equations": Pen.CHORD_SOLVED}
     for name, centre in shown(stem).items():
-        parts = [mark for mark in diagram(stem).marks if isinstance(mark, Line) and mark.about == f"chord {name}"]
+        parts = [mark for mark in diagram(stem).marks if isinstance(mark, Polyline) and mark.about == f"chord {name}"]
         if centre.homogeneous is None:
             assert not parts
             continue
         assert {mark.pen for mark in parts} == {pens[centre.how]}
         assert len(parts) == (1 if centre.how == "pair" else 2)
-        assert parts[0].spots[0] == pytest.approx(points[centre.links[0]])
-        assert parts[-1].spots[-1] == pytest.approx(points[centre.links[1]])
+        assert parts[0].points[0] == pytest.approx(points[centre.links[0]])
+        assert parts[-1].points[-1] == pytest.approx(points[centre.links[1]])
         # the gap is for the number, on the chord
-        letters = marks(diagram(stem), "order of ", Letter)
+        letters = marks(diagram(stem), "order of ", Label)
         assert (f"order of {name}" in letters) == (centre.how != "pair")
         if centre.how != "pair":
             letter = letters[f"order of {name}"]
             assert letter.text == str(centre.order)
-            assert letter.at == pytest.approx(np.mean([parts[0].spots[1], parts[1].spots[0]], axis=0))
-            assert off(Line((points[centre.links[0]], points[centre.links[1]]), Pen.CHORD), letter.at) < INSIDE
+            assert letter.at == pytest.approx(np.mean([parts[0].points[1], parts[1].points[0]], axis=0))
+            assert off(Polyline((points[centre.links[0]], points[centre.links[1]]), Pen.CHORD), letter.at) < INSIDE
 
 
 @every_model
@@ -202,7 +202,7 @@ def test_links_stand_evenly_on_the_circle_in_the_order_of_their_numbers(stem):
     angles = np.unwrap([np.arctan2(y, x) for x, y in around])
     assert np.diff(angles) == pytest.approx([-2.0 * np.pi / len(around)] * (len(around) - 1))
     assert [np.hypot(*at) for at in around] == pytest.approx([circle.radius] * len(around))
-    letters = marks(diagram(stem), "number of ", Letter)
+    letters = marks(diagram(stem), "number of ", Label)
     assert {about[10:]: letter.text for about, letter in letters.items()} == dict(numbers)
 
 
@@ -210,12 +210,16 @@ def test_links_stand_evenly_on_the_circle_in_the_order_of_their_numbers(stem):
 def test_no_two_marks_of_the_diagram_and_no_two_lines_are_drawn_twice(stem):
     for picture in (space(stem), diagram(stem)):
         seen = [
-            (mark.about, mark.spots) for mark in picture.marks if isinstance(mark, Line) and "entre" in mark.pen.value
+            (mark.about, mark.points)
+            for mark in picture.marks
+            if isinstance(mark, Polyline) and "entre" in mark.pen.value
         ]
         assert len(seen) == len(set(seen))
-    lines = [mark for mark in space(stem).marks if isinstance(mark, Line) and mark.about.startswith(("line", "normal"))]
+    lines = [
+        mark for mark in space(stem).marks if isinstance(mark, Polyline) and mark.about.startswith(("line", "normal"))
+    ]
     for one, other in combinations(lines, 2):
-        assert max(off(one, at) for at in other.spots) > 1e-3
+        assert max(off(one, at) for at in other.points) > 1e-3
 
 
 def test_the_slider_crank_of_the_chapter_has_its_centre_above_the_slider():
@@ -228,17 +232,17 @@ def test_the_slider_crank_of_the_chapter_has_its_centre_above_the_slider():
     arrow = marks(picture, "arrow ", Arrow)["arrow I34"]
     assert arrow.head[0] == arrow.tail[0] == pytest.approx(slider[0])
     assert arrow.head[1] > arrow.tail[1] > y
-    lines = marks(picture, "line ", Line)
+    lines = marks(picture, "line ", Polyline)
     assert set(lines) == {"line I12 I23", "line I14 I34", "line I12 I14", "line I23 I34"}
 
 
 def test_distances_of_centres_outside_are_told_from_the_tips_of_their_arrows():
     arrow = marks(space("four-bar"), "arrow ", Arrow)["arrow I13"]
     far = np.hypot(*(found("four-bar")["AB", "DC"].position - np.multiply(arrow.head, per_mm(space("four-bar")))))
-    (letter,) = (mark for mark in space("four-bar").marks if isinstance(mark, Letter) and mark.about == "centre I13")
+    (letter,) = (mark for mark in space("four-bar").marks if isinstance(mark, Label) and mark.about == "centre I13")
     assert letter.text == f"$I_{{13}}$ at {1e3 * far:.3g} mm"
     assert "Distances of centres outside: from their arrows' tips" in space("four-bar").notes
-    slider = marks(space("slider-crank"), "centre I24", Letter)["centre I24"]
+    slider = marks(space("slider-crank"), "centre I24", Label)["centre I24"]
     assert slider.text.endswith(" m")
 
 
@@ -262,8 +266,8 @@ def test_notes_tell_how_centres_were_found_and_leave_the_proof_to_the_text():
 
 def test_of_very_many_centres_those_of_pairs_and_of_the_frame_are_drawn():
     every = found("rotary-engine")
-    picked, frame = chosen(every), every.state.mechanism.frame
-    assert len(every) > MANY
+    picked, frame = choose_centres(every), every.state.mechanism.frame
+    assert len(every) > MAX_CENTRES
     assert [each for each in every if each.how == "pair" or frame in each.links] == list(picked)
     (note,) = (note for note in space("rotary-engine").notes if note.startswith("At one place: "))
     assert len(note.split(", ")) == 28  # seven rods and the frame on one pin
@@ -271,13 +275,13 @@ def test_of_very_many_centres_those_of_pairs_and_of_the_frame_are_drawn():
 
 def test_centres_are_chosen_by_links_with_what_their_lines_need():
     every = found("002-E3.4")
-    names = {each.name for each in chosen(every, ["CD", "frame"])}
+    names = {each.name for each in choose_centres(every, ["CD", "frame"])}
     (wanted,) = (each for each in every if set(each.links) == {"CD", "frame"})
     assert names == {wanted.name, *(name for line in wanted.lines for name in line.centres)}
-    of_one = chosen(every, "EF")
+    of_one = choose_centres(every, "EF")
     assert {each.name for each in every if "EF" in each.links} <= {each.name for each in of_one}
     with pytest.raises(planar.BadInput, match="X: there is no link of this name; links are OA, AB"):
-        chosen(every, ["X"])
+        choose_centres(every, ["X"])
 
 
 def test_inputs_at_rest_change_nothing_and_what_they_leave_open_is_said():
@@ -293,7 +297,7 @@ def test_inputs_at_rest_change_nothing_and_what_they_leave_open_is_said():
     assert picture.notes[1] == "6 centres: 3 by pairs, 3 of no place"
     assert sum("depends on the ratio of the inputs' rates" in note for note in picture.notes) == 3
     assert not marks(picture, "arrow ", Arrow)
-    assert len(marks(circle_picture(rest, rest.all), "chord ", Line)) == 3
+    assert len(marks(circle_picture(rest, rest.all), "chord ", Polyline)) == 3
 
 
 def test_a_scale_is_kept_and_a_wider_reach_shows_more():
@@ -332,7 +336,7 @@ def test_texts_lie_on_the_sheet_and_apart_and_the_circle_beside_the_scheme(stem)
     left, right = (axes.get_position() for axes in figure.axes)
     assert left.x1 < right.x0
     # every number of a chord is in the gap of its chord
-    numbers = {mark.about: mark for mark in diagram(stem).marks if isinstance(mark, Letter)}
+    numbers = {mark.about: mark for mark in diagram(stem).marks if isinstance(mark, Label)}
     axes = figure.axes[1]
     drawn = {text.get_gid(): text for text in axes.texts}
     mids = [
@@ -359,7 +363,7 @@ def test_the_command_draws_centres_and_refuses_links_that_there_are_not(tmp_path
 
 
 def test_a_circle_grows_with_its_links_up_to_a_limit():
-    sizes = [radius(count) for count in range(2, 60)]
+    sizes = [circle_radius(count) for count in range(2, 60)]
     assert all(one <= other for one, other in pairwise(sizes))
     assert sizes[-1] == 48.0
 
@@ -380,13 +384,13 @@ def test_the_centre_from_two_directions_is_the_one_against_the_frame():
     count = 0
     for stem, link, picture, centre in moving_links():
         scale, at = per_mm(picture), marks(picture, "centre", Circle)
-        lines = marks(picture, "normal ", Line)
+        lines = marks(picture, "normal ", Polyline)
         if centre.position is None:
             assert not at, (stem, link)
             assert any("at infinity" in note for note in picture.notes), (stem, link)
             continue
         for line in lines.values():
-            far = np.hypot(*(centre.position / scale - line.spots[0]))
+            far = np.hypot(*(centre.position / scale - line.points[0]))
             assert off(line, centre.position / scale) < 1e-6 * (1.0 + far) ** 2, (stem, link)
         if at:
             assert at["centre"].centre == pytest.approx(centre.position / scale, abs=1e-5), (stem, link)
@@ -414,7 +418,7 @@ def test_parallel_velocities_have_their_centre_on_the_line_through_the_heads(one
     # the second case of chapter 004: both points and the centre in one line
     picture = directions_picture(arm(P=[one, 0.0], Q=[other, 0.0]), "arm", ("P", "Q"))
     assert marks(picture, "centre", Circle)["centre"].centre == pytest.approx((0.0, 0.0), abs=1e-9)
-    (heads,) = marks(picture, "heads", Line).values()
+    (heads,) = marks(picture, "heads", Polyline).values()
     tips = [arrow.head for arrow in marks(picture, "velocity ", Arrow).values()]
     assert [off(heads, at) for at in (*tips, (0.0, 0.0))] == pytest.approx([0.0] * 3, abs=1e-9)
     assert sum(note.endswith("= 2 rad/s") for note in picture.notes) == 2

@@ -10,9 +10,9 @@ import pytest
 
 import planar
 from planar.drawing.diagrams.kinematic_diagrams import diagrams
-from planar.drawing.diagrams.motion_curves import default_subject, peak
+from planar.drawing.diagrams.motion_curves import default_subject, find_peak
 from planar.foundation.errors import BadInput
-from planar.model.mechanism import Drive, with_inputs
+from planar.model.mechanism import Drive, replace_inputs
 
 pytest.importorskip("matplotlib")
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -43,7 +43,7 @@ def caption(figure):
 
 
 def at_speed(mechanism, velocity, acceleration=None):
-    return with_inputs(mechanism, (Drive(mechanism.inputs[0].pair, None, velocity, acceleration),))
+    return replace_inputs(mechanism, (Drive(mechanism.inputs[0].pair, None, velocity, acceleration),))
 
 
 def slider_crank(theta, r, l):  # noqa: E741
@@ -371,10 +371,10 @@ def test_letters_of_chords_keep_clear_of_the_curve(twelve):
 
 def test_a_peak_between_samples_is_found():
     time = np.linspace(0.0, 2.0 * pi, 361)
-    found = peak(time, -3.0 * np.sin(time + 0.0031))
+    found = find_peak(time, -3.0 * np.sin(time + 0.0031))
     assert found.value == pytest.approx(3.0, abs=1e-8)
     assert degrees(found.time) == pytest.approx(90.0 - degrees(0.0031), abs=1e-4)
-    assert peak(time, np.full(361, np.nan)) is None
+    assert find_peak(time, np.full(361, np.nan)) is None
 
 
 def test_the_same_figure_comes_from_a_mechanism_and_from_its_motion(twelve):

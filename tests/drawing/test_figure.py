@@ -13,12 +13,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planar.drawing.labels.fonts import UNKNOWN
-from planar.drawing.labels.placement import placed
-from planar.drawing.output.matplotlib_figure import PAGE, figure, pages, saved
-from planar.drawing.output.solution_pages import sheets
-from planar.drawing.paper.pens import FILLS, HEAD_LENGTH, HEAD_WIDTH, INK, ready
-from planar.drawing.paper.picture import Arrow, Circle, Fill, Letter, Line, Pen, Picture
+from planar.drawing.labels.fonts import UNKNOWN_CHARACTER
+from planar.drawing.labels.placement import place_labels
+from planar.drawing.output.matplotlib_figure import PAGE_WIDTH, draw_pictures, encode_figure, encode_pages
+from planar.drawing.output.solution_pages import encode_sheets
+from planar.drawing.paper.pens import ARROW_HEAD_LENGTH, ARROW_HEAD_WIDTH, FILL_COLOURS, PEN_STYLES, require_matplotlib
+from planar.drawing.paper.picture import Arrow, Circle, Fill, Label, Pen, Picture, Polyline
 from planar.foundation.errors import BadInput
 from tests.drawing.test_labels import HOSTILE
 from tests.draws import draws
@@ -78,13 +78,17 @@ def apart(one, other):
 def scheme():
     """A four-bar chain, drawn by hand."""
     a, d, b, c = (0.0, 0.0), (60.0, 0.0), (15.0, 26.0), (54.0, 38.0)
-    marks = [Line((a, b), Pen.LINK, "link AB"), Line((b, c), Pen.LINK, "link BC"), Line((c, d), Pen.LINK, "link DC")]
-    marks += [Line(((x - 3, -4.5), (x - 4.5, -6.0)), Pen.HATCH, "ground") for x in (0.0, 2.0, 60.0, 62.0)]
+    marks = [
+        Polyline((a, b), Pen.LINK, "link AB"),
+        Polyline((b, c), Pen.LINK, "link BC"),
+        Polyline((c, d), Pen.LINK, "link DC"),
+    ]
+    marks += [Polyline(((x - 3, -4.5), (x - 4.5, -6.0)), Pen.HATCH, "ground") for x in (0.0, 2.0, 60.0, 62.0)]
     marks += [
         Circle(at, 1.2, Pen.PIN, f"pin {name}", Fill.PAPER) for name, at in zip("ABCD", (a, b, c, d), strict=True)
     ]
-    marks += [Circle(a, 8.0, Pen.INPUT, "input A", start=70.0, stop=190.0, pointed=1)]
-    marks += [Letter(name, at, f"point {name}", away=1.6) for name, at in zip("ABCD", (a, b, c, d), strict=True)]
+    marks += [Circle(a, 8.0, Pen.INPUT, "input A", start=70.0, stop=190.0, arrow_end=1)]
+    marks += [Label(name, at, f"point {name}", clearance=1.6) for name, at in zip("ABCD", (a, b, c, d), strict=True)]
     return Picture(tuple(marks), "Space diagram", ("1 cm = 10 mm",))
 
 
@@ -96,15 +100,15 @@ def polygon():
         Arrow(b, c, Pen.VELOCITY, "v_CB"),
     ]
     named = (("a", pole), ("d", pole), ("b", b), ("c", c))
-    marks += [Letter(text, at, text, slanted=True) for text, at in named]
+    marks += [Label(text, at, text, slanted=True) for text, at in named]
     return Picture(tuple(marks), "Velocity polygon", ("1 cm = 0.1 m/s",))
 
 
 def test_a_ruler_on_the_printed_page_agrees():
-    across = Line(((0.0, 0.0), (100.0, 0.0)), Pen.GROUND, "across")
-    up = Line(((3.0, 7.0), (3.0, 57.0)), Pen.GROUND, "up")
-    made = figure([Picture((across, up), "Ruler", ("1 cm = 1 cm",))], "A heading")
-    grey = pdf_pixels(saved(made, "pdf"))
+    across = Polyline(((0.0, 0.0), (100.0, 0.0)), Pen.GROUND, "across")
+    up = Polyline(((3.0, 7.0), (3.0, 57.0)), Pen.GROUND, "up")
+    made = draw_pictures([Picture((across, up), "Ruler", ("1 cm = 1 cm",))], "A heading")
+    grey = pdf_pixels(encode_figure(made, "pdf"))
     x, y = on_sheet(made, (0.0, 0.0), "Ruler")
     row = np.flatnonzero(grey[round(y * 20.0)] < 128)
     assert (row[-1] - row[0] + 1) / 20.0 == pytest.approx(100.0, abs=0.1)
@@ -118,17 +122,17 @@ def test_a_ruler_on_the_printed_page_agrees():
 
 def test_the_widths_of_lines_on_the_printed_page_are_those_of_the_pens():
     pens = [Pen.LINK, Pen.PIN, Pen.HATCH, Pen.PATH, Pen.POSITION]
-    lines = tuple(Line(((0.0, 10.0 * n), (40.0, 10.0 * n)), pen, pen.value) for n, pen in enumerate(pens))
-    made = figure([Picture(lines)])
-    grey = pdf_pixels(saved(made, "pdf")).astype(float)
+    lines = tuple(Polyline(((0.0, 10.0 * n), (40.0, 10.0 * n)), pen, pen.value) for n, pen in enumerate(pens))
+    made = draw_pictures([Picture(lines)])
+    grey = pdf_pixels(encode_figure(made, "pdf")).astype(float)
     for n, pen in enumerate(pens):
         x, y = (round(value * 20.0) for value in on_sheet(made, (20.0, 10.0 * n)))
         strip = 255.0 - grey[y - 30 : y + 30, x]
-        assert strip.sum() / strip.max() / 20.0 == pytest.approx(INK[pen].width, abs=0.06)
+        assert strip.sum() / strip.max() / 20.0 == pytest.approx(PEN_STYLES[pen].width, abs=0.06)
 
 
 def test_data_of_all_axes_are_millimetres():
-    made = figure([scheme(), polygon(), Picture(())], "All")
+    made = draw_pictures([scheme(), polygon(), Picture(())], "All")
     assert [axes.get_label() for axes in made.axes] == ["Space diagram", "Velocity polygon", ""]
     width, height = made.get_size_inches() * INCH
     for axes in made.axes:
@@ -139,7 +143,7 @@ def test_data_of_all_axes_are_millimetres():
 
 
 def test_pens_that_meet_in_a_drawing_differ_in_width_or_dashes_or_much_in_grey():
-    assert set(INK) == set(Pen)
+    assert set(PEN_STYLES) == set(Pen)
 
     def grey(colour):
         red, green, blue = (int(colour[n : n + 2], 16) for n in (1, 3, 5))
@@ -148,10 +152,10 @@ def test_pens_that_meet_in_a_drawing_differ_in_width_or_dashes_or_much_in_grey()
     same = {frozenset({Pen.PIN, Pen.GROUND})}
     for one in Pen:
         for other in Pen:
-            a, b = INK[one], INK[other]
+            a, b = PEN_STYLES[one], PEN_STYLES[other]
             told = abs(a.width - b.width) > 0.045 or a.dashes != b.dashes or abs(grey(a.colour) - grey(b.colour)) > 60
             assert told or one is other or frozenset({one, other}) in same, (one, other)
-    assert set(FILLS) == set(Fill) - {Fill.NONE}
+    assert set(FILL_COLOURS) == set(Fill) - {Fill.NONE}
 
 
 arrows = st.tuples(*[st.floats(-60.0, 60.0)] * 4)
@@ -162,7 +166,7 @@ arrows = st.tuples(*[st.floats(-60.0, 60.0)] * 4)
 def test_an_arrow_has_its_tip_at_its_head_and_its_line_ends_inside(ends):
     tail, tip = ends[:2], ends[2:]
     far = hypot(tip[0] - tail[0], tip[1] - tail[1])
-    made = figure([Picture((Arrow(tail, tip, Pen.VELOCITY, "v"),))])
+    made = draw_pictures([Picture((Arrow(tail, tip, Pen.VELOCITY, "v"),))])
     if far < 1e-9:
         assert not drawn(made, "v")
         return
@@ -170,31 +174,33 @@ def test_an_arrow_has_its_tip_at_its_head_and_its_line_ends_inside(ends):
     corners = top.get_xy()
     assert tuple(corners[0]) == tip
     assert tuple(line.get_xydata()[0]) == tail
-    length = min(HEAD_LENGTH, far / 2.0)
+    length = min(ARROW_HEAD_LENGTH, far / 2.0)
     assert np.linalg.norm(corners[1:3].mean(axis=0) - tip) == pytest.approx(length, abs=1e-9)
-    assert np.linalg.norm(corners[1] - corners[2]) == pytest.approx(length * HEAD_WIDTH / HEAD_LENGTH, abs=1e-9)
+    assert np.linalg.norm(corners[1] - corners[2]) == pytest.approx(
+        length * ARROW_HEAD_WIDTH / ARROW_HEAD_LENGTH, abs=1e-9
+    )
     rest = np.linalg.norm(line.get_xydata()[1] - tip)
     assert 0.0 < rest < length
     # where the line ends the head is at least as wide as the line
-    assert line.get_linewidth() / 72.0 * INCH <= rest * HEAD_WIDTH / HEAD_LENGTH + 1e-9
+    assert line.get_linewidth() / 72.0 * INCH <= rest * ARROW_HEAD_WIDTH / ARROW_HEAD_LENGTH + 1e-9
 
 
 @pytest.mark.parametrize("pen", [Pen.VELOCITY, Pen.ACCELERATION, Pen.PART])
 def test_a_printed_arrow_ends_in_a_sharp_tip_where_it_should(pen):
-    made = figure([Picture((Arrow((0.0, 0.0), (40.0, 0.0), pen, "v"),))])
-    grey = pdf_pixels(saved(made, "pdf")).astype(float)
+    made = draw_pictures([Picture((Arrow((0.0, 0.0), (40.0, 0.0), pen, "v"),))])
+    grey = pdf_pixels(encode_figure(made, "pdf")).astype(float)
     x, y = on_sheet(made, (40.0, 0.0))
     band = 255.0 - grey[round(y * 20.0) - 30 : round(y * 20.0) + 30]
     assert np.flatnonzero(band.max(axis=0) > 60.0)[-1] / 20.0 == pytest.approx(x, abs=0.3)
     dark = 255.0 - min(grey.min(), 200.0)
     wide = band.sum(axis=0) / dark / 20.0
     for back in (0.5, 1.0, 2.0, 2.5):
-        assert wide[round((x - back) * 20.0)] == pytest.approx(back * HEAD_WIDTH / HEAD_LENGTH, abs=0.08)
+        assert wide[round((x - back) * 20.0)] == pytest.approx(back * ARROW_HEAD_WIDTH / ARROW_HEAD_LENGTH, abs=0.08)
 
 
 def test_an_arrow_of_no_length_draws_nothing():
     marks = (Arrow((1.0, 2.0), (1.0, 2.0), Pen.VELOCITY, "v"), Circle((0.0, 0.0), 3.0, Pen.INPUT, "i", start=5, stop=5))
-    made = figure([Picture((*marks, Line(((1.0, 1.0),), Pen.LINK, "l"), Line((), Pen.LINK, "l", True)))])
+    made = draw_pictures([Picture((*marks, Polyline(((1.0, 1.0),), Pen.LINK, "l"), Polyline((), Pen.LINK, "l", True)))])
     assert not drawn(made, "v")
     assert not drawn(made, "v head")
     assert not drawn(made, "i")
@@ -204,8 +210,8 @@ def test_an_arrow_of_no_length_draws_nothing():
 @pytest.mark.parametrize("pointed", [-1, 1])
 @pytest.mark.parametrize(("start", "stop"), [(20.0, 110.0), (300.0, 60.0), (-90.0, 180.0), (0.0, 360.0), (10.0, 14.0)])
 def test_an_arc_ends_in_a_head_whose_tip_is_on_the_arc(pointed, start, stop):
-    arc = Circle((5.0, -3.0), 9.0, Pen.INPUT, "input", start=start, stop=stop, pointed=pointed)
-    made = figure([Picture((arc,))])
+    arc = Circle((5.0, -3.0), 9.0, Pen.INPUT, "input", start=start, stop=stop, arrow_end=pointed)
+    made = draw_pictures([Picture((arc,))])
     (line,), (top,) = drawn(made, "input"), drawn(made, "input head")
     at = radians(stop if pointed == 1 else start)
     tip = np.array([5.0 + 9.0 * cos(at), -3.0 + 9.0 * sin(at)])
@@ -222,7 +228,7 @@ def test_an_arc_ends_in_a_head_whose_tip_is_on_the_arc(pointed, start, stop):
 
 
 def test_an_arc_goes_anticlockwise_from_start_to_stop():
-    made = figure([Picture((Circle((0.0, 0.0), 10.0, Pen.PATH, "arc", start=350.0, stop=20.0),))])
+    made = draw_pictures([Picture((Circle((0.0, 0.0), 10.0, Pen.PATH, "arc", start=350.0, stop=20.0),))])
     points = bent(drawn(made, "arc")[0])
     assert points[:, 0].min() > 9.0
     assert points[0] == pytest.approx((10.0 * cos(radians(350.0)), 10.0 * sin(radians(350.0))))
@@ -230,40 +236,40 @@ def test_an_arc_goes_anticlockwise_from_start_to_stop():
 
 
 def test_marks_are_drawn_in_their_order_and_a_paper_fill_hides_what_lies_below():
-    line = Line(((-10.0, 0.0), (10.0, 0.0)), Pen.LINK, "line")
+    line = Polyline(((-10.0, 0.0), (10.0, 0.0)), Pen.LINK, "line")
     disc = Circle((0.0, 0.0), 4.0, Pen.PIN, "disc", Fill.PAPER)
-    plate = Line(((-8.0, -8.0), (8.0, -8.0), (0.0, 8.0)), Pen.LINK, "plate", True, Fill.LINK)
+    plate = Polyline(((-8.0, -8.0), (8.0, -8.0), (0.0, 8.0)), Pen.LINK, "plate", True, Fill.LINK)
     for marks, dark in (((plate, line, disc), False), ((plate, disc, line), True)):
-        made = figure([Picture(marks)])
-        pixels = png_pixels(saved(made, "png"))
+        made = draw_pictures([Picture(marks)])
+        pixels = png_pixels(encode_figure(made, "png"))
         x, y = (round(value / INCH * 200.0) for value in on_sheet(made, (0.0, 0.0)))
         assert pixels[y, x].tolist() == ([0, 0, 0] if dark else [255, 255, 255])
         x, y = (round(value / INCH * 200.0) for value in on_sheet(made, (0.0, -6.0)))
-        assert pixels[y, x].tolist() == [int(FILLS[Fill.LINK][n : n + 2], 16) for n in (1, 3, 5)]
+        assert pixels[y, x].tolist() == [int(FILL_COLOURS[Fill.LINK][n : n + 2], 16) for n in (1, 3, 5)]
 
 
 def test_every_artist_is_found_by_what_its_mark_is_about():
-    made = figure([scheme(), polygon()])
+    made = draw_pictures([scheme(), polygon()])
     for picture in (scheme(), polygon()):
         inside = axes_of(made, picture.title)
         found = {each.get_gid() for each in inside.findobj()}
-        assert {mark.about for mark in picture.marks if not isinstance(mark, Letter)} <= found
+        assert {mark.about for mark in picture.marks if not isinstance(mark, Label)} <= found
     assert drawn(made, "a, d")[0].get_text() == "a, d"
     assert drawn(made, "point A")[0].get_text() == "A"
 
 
 def test_letters_are_drawn_exactly_in_their_boxes():
     letters = [
-        Letter("block D.B", (0.0, 0.0), "1"),
-        Letter("A", (20.0, 9.0), "2"),
-        Letter("gy", (40.0, 0.0), "3", 12.0),
+        Label("block D.B", (0.0, 0.0), "1"),
+        Label("A", (20.0, 9.0), "2"),
+        Label("gy", (40.0, 0.0), "3", 12.0),
     ]
-    letters += [Letter("$A_{12}$", (60.0, 0.0), "4", math=True), Letter("ω = 10.5 rad/s", (0.0, 20.0), "5", 8.0)]
-    letters += [Letter("a'", (60.0, 20.0), "6", slanted=True), Letter("cost $x_1$", (90.0, 20.0), "7")]
-    made = figure([Picture(tuple(letters))])
-    found = placed(letters, [])
-    extents = [box_of(made, drawn(made, each.letter.about)[0]) for each in found]
-    content = pdf_pixels(saved(made, "pdf"))
+    letters += [Label("$A_{12}$", (60.0, 0.0), "4", math=True), Label("ω = 10.5 rad/s", (0.0, 20.0), "5", 8.0)]
+    letters += [Label("a'", (60.0, 20.0), "6", slanted=True), Label("cost $x_1$", (90.0, 20.0), "7")]
+    made = draw_pictures([Picture(tuple(letters))])
+    found = place_labels(letters, [])
+    extents = [box_of(made, drawn(made, each.label.about)[0]) for each in found]
+    content = pdf_pixels(encode_figure(made, "pdf"))
     for each, extent in zip(found, extents, strict=True):
         (left, bottom), (right, top) = on_sheet(made, each.box[:2]), on_sheet(made, each.box[2:])
         assert extent[0] == pytest.approx(left, abs=0.3)
@@ -282,13 +288,23 @@ def test_letters_are_drawn_exactly_in_their_boxes():
 
 @pytest.mark.filterwarnings("ignore::planar.foundation.errors.MissingGlyphs")
 def test_a_plain_text_is_never_read_as_mathtext(own_fonts):  # noqa: F811
-    marks = tuple(Letter(text, (0.0, 9.0 * n), f"letter {n}") for n, text in enumerate(HOSTILE))
-    made = figure([Picture(marks, "$\\frac{$ <b>", ("a_b^ $x$", "中文 \ud800"))], "$title$ &amp;")
+    marks = tuple(Label(text, (0.0, 9.0 * n), f"letter {n}") for n, text in enumerate(HOSTILE))
+    made = draw_pictures([Picture(marks, "$\\frac{$ <b>", ("a_b^ $x$", "中文 \ud800"))], "$title$ &amp;")
     for kind in ("png", "svg", "pdf"):
-        assert saved(made, kind)
+        assert encode_figure(made, kind)
     shown = {each.get_text() for each in made.findobj() if hasattr(each, "get_text")}
-    assert {"$x", "$x$", "a_b^", "\\frac{", "<b>", "$\\frac{$", "a b c", UNKNOWN * 2, "$title$ &amp;"} <= shown
-    page = saved(made, "svg").decode()
+    assert {
+        "$x",
+        "$x$",
+        "a_b^",
+        "\\frac{",
+        "<b>",
+        "$\\frac{$",
+        "a b c",
+        UNKNOWN_CHARACTER * 2,
+        "$title$ &amp;",
+    } <= shown
+    page = encode_figure(made, "svg").decode()
     assert ">$x$</text>" in page
     assert "&lt;b&gt;</text>" in page
 
@@ -297,13 +313,15 @@ def test_a_plain_text_is_never_read_as_mathtext(own_fonts):  # noqa: F811
 def test_hostile_names_of_marks_leave_a_page_that_can_be_read():
     from xml.etree import ElementTree
 
-    marks = tuple(Line(((0.0, n), (9.0, n)), Pen.LINK, f'link "{text}"') for n, text in enumerate(HOSTILE))
-    page = saved(figure([Picture(marks, "\x00<&>"), Picture((Letter("$--_1$", (0.0, 0.0), "--", math=True),))]), "svg")
+    marks = tuple(Polyline(((0.0, n), (9.0, n)), Pen.LINK, f'link "{text}"') for n, text in enumerate(HOSTILE))
+    page = encode_figure(
+        draw_pictures([Picture(marks, "\x00<&>"), Picture((Label("$--_1$", (0.0, 0.0), "--", math=True),))]), "svg"
+    )
     assert ElementTree.fromstring(page).get("width").endswith("pt")
 
 
 spots = st.tuples(st.floats(-60.0, 60.0), st.floats(-40.0, 40.0))
-letters = st.tuples(st.sampled_from(["A", "block D", "y"]), spots).map(lambda pair: Letter(*pair))
+letters = st.tuples(st.sampled_from(["A", "block D", "y"]), spots).map(lambda pair: Label(*pair))
 strokes = st.tuples(spots, spots, st.sampled_from([Pen.LINK, Pen.VELOCITY]))
 marks = st.one_of(letters, strokes.map(lambda each: Arrow(*each)), spots.map(lambda at: Circle(at, 7.0, Pen.PIN)))
 
@@ -311,8 +329,8 @@ marks = st.one_of(letters, strokes.map(lambda each: Arrow(*each)), spots.map(lam
 @settings(max_examples=draws(5), deadline=None)
 @given(st.lists(marks, min_size=1, max_size=12))
 def test_nothing_is_clipped(some):
-    made = figure([Picture(tuple(some), "Title", ("a note",))])
-    grey = png_pixels(saved(made, "png")).min(axis=2)
+    made = draw_pictures([Picture(tuple(some), "Title", ("a note",))])
+    grey = png_pixels(encode_figure(made, "png")).min(axis=2)
     assert grey.min() < 128
     edge = round(2.0 / INCH * 200.0)
     inner = np.zeros_like(grey, dtype=bool)
@@ -323,9 +341,9 @@ def test_nothing_is_clipped(some):
 def test_texts_below_stand_apart_from_each_other_and_from_the_pictures():
     note = "a note that goes on and on about what is to be seen in the picture above and how it was found"
     small = Picture(
-        (Line(((0.0, 0.0), (12.0, 30.0)), Pen.LINK),), "A title that is much wider than its picture", (note,)
+        (Polyline(((0.0, 0.0), (12.0, 30.0)), Pen.LINK),), "A title that is much wider than its picture", (note,)
     )
-    made = figure([scheme(), small, polygon(), small._replace(title="W" * 90), small], "All of them together")
+    made = draw_pictures([scheme(), small, polygon(), small._replace(title="W" * 90), small], "All of them together")
     boxes = [box_of(made, text) for text in made.texts]
     assert len(boxes) > 14
     boxes += [box_of(made, axes) for axes in made.axes]
@@ -335,29 +353,33 @@ def test_texts_below_stand_apart_from_each_other_and_from_the_pictures():
 
 
 def test_pictures_stand_in_rows_that_fit_the_page_in_reading_order():
-    wide = [Picture((Line(((0.0, 0.0), (w, 20.0)), Pen.LINK),), f"{w:g}") for w in (120.0, 121.0, 90.0, 400.0, 50.0)]
-    made = figure(wide)
+    wide = [
+        Picture((Polyline(((0.0, 0.0), (w, 20.0)), Pen.LINK),), f"{w:g}") for w in (120.0, 121.0, 90.0, 400.0, 50.0)
+    ]
+    made = draw_pictures(wide)
     boxes = [box_of(made, axes_of(made, picture.title)) for picture in wide]
     rows = sorted({round(box[1], 3) for box in boxes}, reverse=True)
     assert [rows.index(round(box[1], 3)) for box in boxes] == [0, 0, 1, 2, 3]
     assert boxes[0][2] < boxes[1][0]
-    together = figure(wide[:3])
-    assert together.get_size_inches()[0] * INCH <= PAGE + 10.0
+    together = draw_pictures(wide[:3])
+    assert together.get_size_inches()[0] * INCH <= PAGE_WIDTH + 10.0
 
 
 @pytest.mark.parametrize("kind", ["png", "svg", "pdf"])
 def test_the_same_picture_is_the_same_file(kind):
-    one, other = (saved(figure([scheme(), polygon()], "Twice"), suffix) for suffix in (kind, f".{kind.upper()}"))
+    one, other = (
+        encode_figure(draw_pictures([scheme(), polygon()], "Twice"), suffix) for suffix in (kind, f".{kind.upper()}")
+    )
     assert one == other
-    assert saved(figure([scheme()]), kind) != one
+    assert encode_figure(draw_pictures([scheme()]), kind) != one
     assert not any(word in one for word in (b"CreationDate", b"<dc:date>", b"tIME"))
 
 
 def test_the_same_picture_is_the_same_file_in_another_process():
     code = (
-        "import hashlib, sys; from tests.drawing.test_figure import figure, polygon, saved, scheme"
-        "\nmade = figure([scheme(), polygon()])"
-        "\nprint(*[hashlib.sha256(saved(made, kind)).hexdigest() for kind in ('png', 'svg', 'pdf')])"
+        "import hashlib, sys; from tests.drawing.test_figure import draw_pictures, encode_figure, polygon, scheme"
+        "\nmade = draw_pictures([scheme(), polygon()])"
+        "\nprint(*[hashlib.sha256(encode_figure(made, kind)).hexdigest() for kind in ('png', 'svg', 'pdf')])"
         "\nassert 'matplotlib.pyplot' not in sys.modules"
     )
     runs = {
@@ -376,85 +398,85 @@ def test_the_same_picture_is_the_same_file_in_another_process():
 def test_a_readers_own_settings_of_matplotlib_change_nothing():
     from matplotlib import rc_context, style
 
-    plain = saved(figure([scheme(), polygon()], "Same"), "svg")
+    plain = encode_figure(draw_pictures([scheme(), polygon()], "Same"), "svg")
     own = {"savefig.bbox": "tight", "svg.fonttype": "path", "figure.constrained_layout.use": True, "lines.marker": "o"}
     with style.context("dark_background"), rc_context(own):
-        assert saved(figure([scheme(), polygon()], "Same"), "svg") == plain
+        assert encode_figure(draw_pictures([scheme(), polygon()], "Same"), "svg") == plain
 
 
 def test_drawing_leaves_the_settings_of_matplotlib_alone():
     from matplotlib import rcParams
 
     before = dict(rcParams)
-    saved(figure([scheme()]), "svg")
+    encode_figure(draw_pictures([scheme()]), "svg")
     assert dict(rcParams) == before
 
 
 def test_fonts_go_along_and_texts_stay_texts():
-    made = figure([scheme()])
-    assert b"FontFile2" in saved(made, "pdf")
-    text = pypdfium2.PdfDocument(saved(made, "pdf"))[0].get_textpage().get_text_bounded()
+    made = draw_pictures([scheme()])
+    assert b"FontFile2" in encode_figure(made, "pdf")
+    text = pypdfium2.PdfDocument(encode_figure(made, "pdf"))[0].get_textpage().get_text_bounded()
     assert "Space diagram" in text
-    page = saved(made, "svg").decode()
+    page = encode_figure(made, "svg").decode()
     assert ">Space diagram</text>" in page
     assert "'DejaVu Sans', sans-serif" in page
 
 
 def test_a_png_has_two_hundred_dots_to_an_inch():
-    made = figure([scheme()])
-    rows, columns, _ = png_pixels(saved(made, "png")).shape
+    made = draw_pictures([scheme()])
+    rows, columns, _ = png_pixels(encode_figure(made, "png")).shape
     width, height = made.get_size_inches()
     assert (columns, rows) == (int(width * 200), int(height * 200))
 
 
 def test_pages_of_a_book_are_the_figures_in_order_each_of_its_own_size():
-    made = [figure([scheme()]), figure([polygon()], "Second"), figure([])]
-    document = pypdfium2.PdfDocument(pages(made, "pdf"))
+    made = [draw_pictures([scheme()]), draw_pictures([polygon()], "Second"), draw_pictures([])]
+    document = pypdfium2.PdfDocument(encode_pages(made, "pdf"))
     for page, each in zip(document, made, strict=True):
         assert page.get_size() == pytest.approx(tuple(each.get_size_inches() * 72.0), abs=0.01)
     document.close()
-    assert pages(made[:1], "svg") == saved(made[0], "svg")
+    assert encode_pages(made[:1], "svg") == encode_figure(made[0], "svg")
 
 
 def test_what_cannot_be_saved_is_refused_in_one_sentence():
-    made = figure([scheme()])
+    made = draw_pictures([scheme()])
     for suffix in ("jpg", ".eps", "", "svgz"):
         with pytest.raises(BadInput, match=r"can be written to files that end in \.png, \.svg or \.pdf"):
-            saved(made, suffix)
+            encode_figure(made, suffix)
     for suffix in ("png", ".svg"):
         with pytest.raises(BadInput, match=r"2 sheets need pages, which only \.pdf has"):
-            pages([made, made], suffix)
+            encode_pages([made, made], suffix)
     with pytest.raises(BadInput, match="nothing to draw"):
-        pages([], "pdf")
+        encode_pages([], "pdf")
 
 
 def test_pictures_too_large_for_paper_or_with_no_place_on_it_are_refused():
     def line(far):
-        return Picture((Line(((0.0, 0.0), (far, far)), Pen.LINK, "link AB"),))
+        return Picture((Polyline(((0.0, 0.0), (far, far)), Pen.LINK, "link AB"),))
 
     with pytest.raises(BadInput, match=r"^scale: the drawing would be 9\.02 m on paper"):
-        figure([line(9000.0)])
+        draw_pictures([line(9000.0)])
     with pytest.raises(BadInput, match=r"too many: choose \.pdf, \.svg or a smaller scale"):
-        saved(figure([line(2000.0)]), "png")
+        encode_figure(draw_pictures([line(2000.0)]), "png")
     for far in (float("nan"), float("inf")):
         with pytest.raises(BadInput, match="link AB has no place on paper"):
-            figure([line(far)])
+            draw_pictures([line(far)])
 
 
 def test_without_matplotlib_it_is_said_how_to_get_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     for attempt in (
-        ready,
-        lambda: figure([]),
-        lambda: saved(None, "png"),
-        lambda: placed([Letter("A", (0.0, 0.0))], []),
+        require_matplotlib,
+        lambda: draw_pictures([]),
+        lambda: encode_figure(None, "png"),
+        lambda: place_labels([Label("A", (0.0, 0.0))], []),
     ):
         with pytest.raises(BadInput, match=r"^matplotlib: drawings need matplotlib: pip install 'planar\[plot\]'$"):
             attempt()
 
 
 def test_letters_of_a_figure_stay_clear_of_the_other_axes_and_inside_their_own():
-    made = figure([scheme(), polygon()])
+    made = draw_pictures([scheme(), polygon()])
     for axes in made.axes:
         own = box_of(made, axes)
         for text in axes.texts:
@@ -466,9 +488,9 @@ def test_letters_of_a_figure_stay_clear_of_the_other_axes_and_inside_their_own()
 @pytest.mark.parametrize(("count", "columns", "rows"), [(1, 1, 1), (2, 1, 2), (5, 2, 3), (9, 3, 3)])
 def test_many_sheets_in_one_picture_are_wrapped(count, columns, rows):
     corners = ((0.0, 0.0), (90.0, 0.0), (90.0, 90.0), (0.0, 90.0))
-    square = figure([Picture((Line(corners, Pen.LINK, "square", closed=True),))])
-    one = png_pixels(sheets([square], ".png"))
-    many = png_pixels(sheets([square] * count, ".png"))
+    square = draw_pictures([Picture((Polyline(corners, Pen.LINK, "square", closed=True),))])
+    one = png_pixels(encode_sheets([square], ".png"))
+    many = png_pixels(encode_sheets([square] * count, ".png"))
     assert many.shape == (rows * one.shape[0], columns * one.shape[1], 3)
     dark = [part.min() < 128 for row in np.vsplit(many[::-1], rows) for part in np.hsplit(row, columns)]
     assert dark == [True] * count + [False] * (rows * columns - count)

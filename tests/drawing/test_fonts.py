@@ -6,18 +6,18 @@ import pypdfium2
 import pytest
 
 import planar
-from planar.drawing.labels.fonts import FAMILY, UNKNOWN, covering, families, shown
+from planar.drawing.labels.fonts import DRAWING_FAMILY, UNKNOWN_CHARACTER, font_families, printable_text, select_fonts
 from planar.drawing.labels.text_line import text_line
-from planar.drawing.labels.text_metrics import measured
-from planar.drawing.output.matplotlib_figure import figure, saved
-from planar.drawing.output.solution_pages import sheets, solution_pages
-from planar.drawing.paper.pens import POINT
-from planar.drawing.paper.picture import Letter, Line, Pen, Picture
+from planar.drawing.labels.text_metrics import text_size
+from planar.drawing.output.matplotlib_figure import draw_pictures, encode_figure
+from planar.drawing.output.solution_pages import encode_sheets, solution_pages
+from planar.drawing.paper.pens import MM_PER_POINT
+from planar.drawing.paper.picture import Label, Pen, Picture, Polyline
 from planar.foundation.errors import MissingGlyphs
 from tests.command import run
 from tests.fonts import ADVANCE, EM, HEIGHT, made, own_fonts  # noqa: F401
 
-LINE = Line(((0.0, 0.0), (40.0, 0.0)), Pen.LINK)
+LINE = Polyline(((0.0, 0.0), (40.0, 0.0)), Pen.LINK)
 
 
 def table(**fonts):
@@ -36,7 +36,7 @@ def table(**fonts):
     ],
 )
 def test_the_fewest_fonts_that_have_what_any_has_are_chosen(fonts, wanted, found):
-    assert covering(frozenset(wanted), table(**fonts)) == found
+    assert select_fonts(frozenset(wanted), table(**fonts)) == found
 
 
 def test_no_font_is_opened_after_one_that_has_everything():
@@ -47,38 +47,38 @@ def test_no_font_is_opened_after_one_that_has_everything():
             opened.append(name)
             yield name, characters.__contains__
 
-    assert covering(frozenset("ab"), fonts()) == ["two"]
+    assert select_fonts(frozenset("ab"), fonts()) == ["two"]
     assert opened == ["one", "two"]
 
 
 def test_what_no_font_has_is_named_once_and_shown_as_unknown(own_fonts):  # noqa: F811
     with pytest.warns(MissingGlyphs, match=r"no installed font has 曲 \(U\+66F2\) and 柄 \(U\+67C4\), so ") as told:
-        assert shown("the 曲柄曲 A") == f"the {UNKNOWN * 3} A"
+        assert printable_text("the 曲柄曲 A") == f"the {UNKNOWN_CHARACTER * 3} A"
     assert len(told) == 1
     assert told[0].message.characters == ("曲", "柄")
-    assert families("crank") == (FAMILY,)
-    assert shown("Kurbel ω₁ γωνία кривошип مرفق") == "Kurbel ω₁ γωνία кривошип مرفق"
+    assert font_families("crank") == (DRAWING_FAMILY,)
+    assert printable_text("Kurbel ω₁ γωνία кривошип مرفق") == "Kurbel ω₁ γωνία кривошип مرفق"
 
 
 def test_a_font_that_was_installed_after_matplotlib_listed_them_is_used(own_fonts, tmp_path):  # noqa: F811
     file = made(tmp_path, "Planar Squares", "鑿齒")
     own_fonts.setattr("matplotlib.font_manager.findSystemFonts", lambda: [str(file)])
-    assert shown("A 齒鑿") == "A 齒鑿"
-    assert families("A 齒鑿") == (FAMILY, "Planar Squares")
+    assert printable_text("A 齒鑿") == "A 齒鑿"
+    assert font_families("A 齒鑿") == (DRAWING_FAMILY, "Planar Squares")
 
 
 @pytest.mark.parametrize(("outlines", "embedded"), [("glyf", b"/CIDFontType2"), ("CFF ", b"/Type3")])
 def test_texts_are_measured_and_drawn_in_the_font_that_has_them(outlines, embedded, own_fonts, tmp_path):  # noqa: F811
     family, text = f"Planar {outlines.strip()}", "鑄" if outlines == "glyf" else "鑰"
     own_fonts.setattr("matplotlib.font_manager.findSystemFonts", lambda: [str(made(tmp_path, family, text, outlines))])
-    picture = Picture((LINE, Letter(text * 3, (20.0, 5.0), "named")), text, (text,))
-    drawn = figure([picture])
+    picture = Picture((LINE, Label(text * 3, (20.0, 5.0), "named")), text, (text,))
+    drawn = draw_pictures([picture])
     # by the font's own tables
-    size = measured(text * 3, 10.0)
-    assert size.width == pytest.approx(3 * ADVANCE / EM * 10.0 * POINT, rel=1e-3)
-    assert size.height == pytest.approx(HEIGHT / EM * 10.0 * POINT, rel=1e-2)
-    assert size.below == pytest.approx(0.0, abs=0.01)
-    page = saved(drawn, "pdf")
+    size = text_size(text * 3, 10.0)
+    assert size.width == pytest.approx(3 * ADVANCE / EM * 10.0 * MM_PER_POINT, rel=1e-3)
+    assert size.height == pytest.approx(HEIGHT / EM * 10.0 * MM_PER_POINT, rel=1e-2)
+    assert size.descent == pytest.approx(0.0, abs=0.01)
+    page = encode_figure(drawn, "pdf")
     assert embedded in page
     with pypdfium2.PdfDocument(page) as document:
         assert document[0].get_textpage().get_text_bounded().count(text) == 5
@@ -90,10 +90,10 @@ def test_texts_are_measured_and_drawn_in_the_font_that_has_them(outlines, embedd
     # three filled squares of 800 x 800 in 900 each
     dark = sum(count for level, count in enumerate(square.histogram()) if level < 128)
     assert dark / (square.width * square.height) == pytest.approx(800 / 900, abs=0.08)
-    svg = saved(drawn, "svg").decode()
+    svg = encode_figure(drawn, "svg").decode()
     assert f">{text * 3}</text>" in svg
-    assert f"'{FAMILY}', '{family}', sans-serif" in svg
-    assert saved(drawn, "png")
+    assert f"'{DRAWING_FAMILY}', '{family}', sans-serif" in svg
+    assert encode_figure(drawn, "png")
 
 
 def named(name: str) -> dict:
@@ -128,7 +128,7 @@ def test_the_command_names_what_no_font_has_in_one_line(words, own_fonts, tmp_pa
 
 def test_names_in_any_script_have_indices(own_fonts):  # noqa: F811
     state = planar.solve(planar.from_dict(named("Ж") | {"name": "α"}))
-    document = pypdfium2.PdfDocument(sheets(solution_pages(state), ".pdf"))
+    document = pypdfium2.PdfDocument(encode_sheets(solution_pages(state), ".pdf"))
     text = "".join(page.get_textpage().get_text_range() for page in document)
     assert "_" not in text
     letters = [each.get_text() for each in planar.plot.acceleration(state).axes[-1].texts]
@@ -142,14 +142,16 @@ def test_a_formula_is_as_large_as_matplotlib_would_set_it():
     from matplotlib.font_manager import FontProperties
     from matplotlib.textpath import text_to_path
 
-    looks = FontProperties(family=FAMILY, size=10.0, math_fontfamily="dejavusans")
+    looks = FontProperties(family=DRAWING_FAMILY, size=10.0, math_fontfamily="dejavusans")
     for text in ("$A_{12}$", r"$\omega_{BC}$", "$b_1$", r"$\mu_s$ = 2 mm/mm", r"$\infty$", "$F_{32}$ and $a_{c}$"):
-        width, height, down = (each * POINT for each in text_to_path.get_text_width_height_descent(text, looks, True))
-        size = measured(text, 10.0, math=True)
+        width, height, down = (
+            each * MM_PER_POINT for each in text_to_path.get_text_width_height_descent(text, looks, True)
+        )
+        size = text_size(text, 10.0, math=True)
         # half a millimetre: matplotlib counts in whole pixels, and its indices are a little lower
         assert size.width == pytest.approx(width, abs=0.5), text
         assert size.height == pytest.approx(height, abs=0.6), text
-        assert size.below == pytest.approx(down, abs=0.5), text
+        assert size.descent == pytest.approx(down, abs=0.5), text
 
 
 def test_indices_and_powers_are_small_and_a_bar_parts_a_fraction():
@@ -168,8 +170,8 @@ def test_indices_and_powers_are_small_and_a_bar_parts_a_fraction():
     middles = [each.x + text_line(each.text, slanted=each.slanted).width / 2.0 for each in (over, under)]
     assert middles == pytest.approx([(left + right) / 2.0] * 2)
     assert right < equals.x < three.x
-    assert line.up > over.y
-    assert line.down > -under.y
+    assert line.ascent > over.y
+    assert line.descent > -under.y
 
 
 def test_operators_between_terms_have_room_and_signs_have_none():

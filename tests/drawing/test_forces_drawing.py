@@ -14,15 +14,15 @@ import planar
 from planar.drawing.forces.bearing_loads import bearing_pictures
 from planar.drawing.forces.free_bodies import free_bodies
 from planar.drawing.forces.torque import torque_picture
-from planar.drawing.labels.placement import placed
-from planar.drawing.labels.text_metrics import measured
-from planar.drawing.output.matplotlib_figure import cell
-from planar.drawing.paper.pens import INK
-from planar.drawing.paper.picture import Arrow, Circle, Letter, Line, Pen, Picture
+from planar.drawing.labels.placement import place_labels
+from planar.drawing.labels.text_metrics import text_size
+from planar.drawing.output.matplotlib_figure import lay_out_picture
+from planar.drawing.paper.pens import PEN_STYLES
+from planar.drawing.paper.picture import Arrow, Circle, Label, Pen, Picture, Polyline
 from planar.dynamics.flywheel import flywheel
 from planar.dynamics.forces import forces
 from planar.foundation.errors import BadInput
-from planar.foundation.units import unit
+from planar.foundation.units import parse_unit
 from planar.model.loads import Course, Load, Mass, Spring
 from planar.model.mechanism import Drive, Mechanism
 from tests.command import run
@@ -67,8 +67,8 @@ def scales_of(title: str) -> tuple[float, float]:
     """Metres and newtons to a millimetre, read from the title as a reader would."""
     found = {}
     for value, written in re.findall(r"1 cm = (\S+) (\w+)", title):
-        kind, *_ = unit(written)
-        found[kind] = unit(written).to_si(float(value)) / 10.0
+        kind, *_ = parse_unit(written)
+        found[kind] = parse_unit(written).to_si(float(value)) / 10.0
     return found["length"], found.get("force", 1.0)
 
 
@@ -86,7 +86,7 @@ def plain(number: str) -> float:
 
 def said(picture: Picture, about: str) -> float:
     """The value that stands beside an arrow, in SI units."""
-    (text,) = (mark.text for mark in picture.marks if isinstance(mark, Letter) and mark.about == about)
+    (text,) = (mark.text for mark in picture.marks if isinstance(mark, Label) and mark.about == about)
     value, prefix = re.search(r" = (\S+) ([mkM]?)N", text).groups()
     return plain(value) * {"m": 1e-3, "": 1.0, "k": 1e3, "M": 1e6}[prefix]
 
@@ -102,7 +102,7 @@ def test_the_forces_and_couples_drawn_on_a_link_balance_it(case):
             total, size = total + pull, max(size, np.hypot(*pull))
             moment += at[0] * pull[1] - at[1] * pull[0]
             arm = max(arm, np.hypot(*at))
-        couples = [circle.pointed * said(picture, circle.about) for circle in strokes(picture, "couple ", Circle)]
+        couples = [circle.arrow_end * said(picture, circle.about) for circle in strokes(picture, "couple ", Circle)]
         # couples are read as they are printed, to four digits
         most = max([size * arm, *map(abs, couples)], default=0.0)
         assert np.hypot(*total) <= 1e-9 * size
@@ -138,7 +138,7 @@ def test_what_is_written_at_an_arrow_is_its_length_to_the_scale(case):
     pictures, title = drawn(case)
     _, per_mm = scales_of(title)
     for picture in pictures[1:]:
-        texts = [mark.text for mark in picture.marks if isinstance(mark, Letter) and mark.about.startswith("force ")]
+        texts = [mark.text for mark in picture.marks if isinstance(mark, Label) and mark.about.startswith("force ")]
         assert len(texts) == len(strokes(picture, "force "))
         for arrow in strokes(picture, "force "):
             assert said(picture, arrow.about) == pytest.approx(np.hypot(*vector(arrow)) * per_mm, rel=6e-4)
@@ -165,8 +165,8 @@ def test_polygons_go_head_to_tail_once_round_with_the_forces_of_the_link(case):
 @every_case
 def test_letters_of_free_bodies_do_not_meet_and_nothing_is_clipped(case):
     for picture in drawn(case)[0]:
-        found = cell(picture)
-        boxes = [each.box for each in found.letters]
+        found = lay_out_picture(picture)
+        boxes = [each.box for each in found.labels]
         for k, one in enumerate(boxes):
             assert found.low[0] <= one.left < one.right <= found.high[0]
             assert found.low[1] <= one.bottom < one.top <= found.high[1]
@@ -191,8 +191,8 @@ def test_a_link_with_two_forces_is_called_so_and_they_lie_on_one_line():
 def test_inertia_is_dashed_and_there_only_where_links_are_accelerated():
     pens = {arrow.pen for picture in drawn("engine")[0] for arrow in strokes(picture, "force -ma")}
     assert pens == {Pen.INERTIA}
-    assert INK[Pen.INERTIA].dashes
-    assert not INK[Pen.REACTION].dashes
+    assert PEN_STYLES[Pen.INERTIA].dashes
+    assert not PEN_STYLES[Pen.REACTION].dashes
     held = forces(planar.solve(CASES["engine"]), inertia=False)
     assert not [arrow for picture in free_bodies(held)[0] for arrow in strokes(picture, "force -ma")]
 
@@ -221,10 +221,10 @@ def test_a_given_scale_of_force_is_kept_and_others_are_refused():
 
 
 def test_a_letter_with_a_side_stands_there_and_others_keep_off():
-    number = Letter("100", (0.0, 0.0), "number", 8.0, 0.5, side=(0, -1))
-    free = Letter("120", (0.0, 0.0), "free", 8.0, 0.5)
-    found = {each.letter.about: each.box for each in placed([free, number], [])}
-    size = measured("100", 8.0)
+    number = Label("100", (0.0, 0.0), "number", 8.0, 0.5, side=(0, -1))
+    free = Label("120", (0.0, 0.0), "free", 8.0, 0.5)
+    found = {each.label.about: each.box for each in place_labels([free, number], [])}
+    size = text_size("100", 8.0)
     assert np.allclose(found["number"], (-size.width / 2.0, -0.5 - size.height, size.width / 2.0, -0.5))
     assert (
         found["free"].bottom >= -0.5
@@ -274,7 +274,7 @@ def test_inertia_alone_asks_for_what_the_kinetic_energy_swings_by(stem):
         state = planar.solve(mechanism, [Drive(given.pair, angle, given.velocity, 0.0)])
         total = 0.0
         for mass in mechanism.masses:
-            centre = state.frames[mass.link].carry(state.shapes[mass.link].at(mass.at))
+            centre = state.frames[mass.link].to_world(state.shapes[mass.link].position(mass.at))
             speed = np.hypot(*(part.parts[1] for part in centre))
             total += 0.5 * (mass.mass * speed**2 + mass.inertia * state.link(mass.link).angular_velocity ** 2)
         return float(total)
@@ -312,7 +312,7 @@ def test_a_flywheel_of_an_unsteady_speed_has_no_moment_of_inertia():
 
 def axis_of(picture: Picture, name: str, index: int):
     """From mm to the values of an axis, read off its ticks and numbers."""
-    ends = [mark.spots[0][index] for mark in picture.marks if mark.about == f"tick {name}"]
+    ends = [mark.points[0][index] for mark in picture.marks if mark.about == f"tick {name}"]
     texts = [plain(mark.text) for mark in picture.marks if mark.about == f"number {name}"]
     slope, start = np.polyfit(ends, texts, 1)
     assert np.allclose(np.polyval([slope, start], ends), texts, atol=1e-6 * np.ptp(texts))
@@ -326,7 +326,9 @@ def names_of(picture: Picture) -> list[str]:
 def curve_of(picture: Picture, about: str) -> np.ndarray:
     """A curve (n, 2) in the units of the axes."""
     up, across = names_of(picture)
-    spots = np.concatenate([mark.spots for mark in picture.marks if isinstance(mark, Line) and mark.about == about])
+    spots = np.concatenate(
+        [mark.points for mark in picture.marks if isinstance(mark, Polyline) and mark.about == about]
+    )
     return np.stack([axis_of(picture, across, 0)(spots[:, 0]), axis_of(picture, up, 1)(spots[:, 1])], axis=1)
 
 
@@ -341,12 +343,12 @@ def test_the_torque_curve_is_the_effort_at_each_position_its_mean_and_its_areas(
     assert (curve[0, 0], curve[-1, 0]) == (pytest.approx(0.0, abs=1e-6), pytest.approx(360.0))
     assert np.allclose(curve[:, 1], 7.0 + 2.0 * 9.81 * 0.2 * np.cos(np.radians(curve[:, 0])), atol=1e-4)
     assert np.allclose(curve_of(picture, "mean")[:, 1], 7.0, atol=1e-6)
-    (mean,) = strokes(picture, "mean", Line)
-    mm = mean.spots[1][0] - mean.spots[0][0]
+    (mean,) = strokes(picture, "mean", Polyline)
+    mm = mean.points[1][0] - mean.points[0][0]
     up, _ = names_of(picture)
     joule = radians(360.0) / mm * (axis_of(picture, up, 1)(1.0) - axis_of(picture, up, 1)(0.0))
     sides = {
-        side: joule * sum(area(mark.spots) for mark in picture.marks if mark.about == side)
+        side: joule * sum(area(mark.points) for mark in picture.marks if mark.about == side)
         for side in ("above", "below")
     }
     assert sides["above"] == pytest.approx(2.0 * 2.0 * 9.81 * 0.2, rel=1e-3)
@@ -369,7 +371,7 @@ def test_the_greatest_and_the_least_are_marked_where_they_are():
     for told, index in (("greatest", curve[:, 1].argmax()), ("least", curve[:, 1].argmin())):
         (mark,) = strokes(picture, told, Circle)
         assert axis_of(picture, across, 0)(mark.centre[0]) == pytest.approx(curve[index, 0], abs=1e-6)
-        (text,) = (each.text for each in picture.marks if isinstance(each, Letter) and each.about == told)
+        (text,) = (each.text for each in picture.marks if isinstance(each, Label) and each.about == told)
         value, place = re.fullmatch(r"(\S+) N·m at (\S+) deg", text).groups()
         assert plain(value) == pytest.approx(curve[index, 1], rel=1e-3)
         assert plain(place) == pytest.approx(curve[index, 0], abs=0.1)

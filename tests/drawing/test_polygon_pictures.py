@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from planar.analysis.polygons.construction import acceleration_polygon, velocity_polygon
-from planar.analysis.polygons.polygon import Meeting, Polygon, Simultaneous, Triangle
+from planar.analysis.polygons.polygon import Meeting, PointImage, Polygon, SimultaneousSolution
 from planar.document import files
-from planar.drawing.paper.picture import Arrow, Circle, Letter, Line, Pen, Picture, extent
-from planar.drawing.paper.scales import HEIGHT, WIDTH, Scale, given
+from planar.drawing.paper.picture import Arrow, Circle, Label, Pen, Picture, Polyline, extent
+from planar.drawing.paper.scales import DRAWING_HEIGHT, DRAWING_WIDTH, Scale, parse_scale
 from planar.drawing.polygons.polygon import letter_text, polygon_picture
 from planar.model.mechanism import Drive, named_points
 from planar.solving.position import solve
@@ -49,12 +49,12 @@ def of(stem, kind, about):
     return mark
 
 
-def strokes(stem, kind, pen, mark=(Arrow, Line)):
+def strokes(stem, kind, pen, mark=(Arrow, Polyline)):
     return [each for each in picture(stem, kind).marks if isinstance(each, mark) and getattr(each, "pen", None) is pen]
 
 
 def ends(mark):
-    return (mark.tail, mark.head) if isinstance(mark, Arrow) else mark.spots
+    return (mark.tail, mark.head) if isinstance(mark, Arrow) else mark.points
 
 
 def at(stem, kind, letter):
@@ -76,7 +76,7 @@ def relative_motions(polygon):
 @every_model
 def test_every_letter_stands_at_its_number_and_all_fits_the_paper(stem, kind):
     found, polygon = picture(stem, kind), drawn(stem, kind)
-    letters = {mark.about: mark for mark in found.marks if isinstance(mark, Letter)}
+    letters = {mark.about: mark for mark in found.marks if isinstance(mark, Label)}
     few = polygon.pole[3:-1] if len(polygon.pole) > 8 else ()
     assert {*letters} >= {f"letter {letter}" for letter in polygon.letters if letter not in few}
     for letter, value in polygon.letters.items():
@@ -87,8 +87,8 @@ def test_every_letter_stands_at_its_number_and_all_fits_the_paper(stem, kind):
     (left, low), (right, high) = extent(mark for mark in found.marks if not isinstance(mark, Circle))
     assert all(map(isfinite, (left, low, right, high)))
     # a tick may reach a millimetre over
-    assert right - left < WIDTH + 2.3
-    assert high - low < HEIGHT + 2.3
+    assert right - left < DRAWING_WIDTH + 2.3
+    assert high - low < DRAWING_HEIGHT + 2.3
     assert found.title == polygon.state.mechanism.name
 
 
@@ -138,7 +138,7 @@ def test_strokes_are_drawn_once_and_join_letters(stem, kind):
     spots = [value / scale for value in polygon.letters.values()]
     seen = set()
     for mark in picture(stem, kind).marks:
-        if not isinstance(mark, (Arrow, Line)) or mark.about.startswith("tick"):
+        if not isinstance(mark, (Arrow, Polyline)) or mark.about.startswith("tick"):
             continue
         tail, head = ends(mark)
         assert hypot(tail[0] - head[0], tail[1] - head[1]) > 0.05
@@ -155,9 +155,9 @@ def test_images_are_triangles_similar_to_their_links(stem, kind):
     polygon, scale = drawn(stem, kind), per_mm(stem, kind)
     letter_of = {point: letter for letter, point in polygon.points.items()}
     names = polygon.state.point_names
-    lines = [ends(mark) for mark in picture(stem, kind).marks if isinstance(mark, (Arrow, Line))]
+    lines = [ends(mark) for mark in picture(stem, kind).marks if isinstance(mark, (Arrow, Polyline))]
     for stage in polygon.stages:
-        if not isinstance(stage, Triangle) or not stage.sense:
+        if not isinstance(stage, PointImage) or not stage.sense:
             continue
         corners = [polygon.letters[letter_of[point]] / scale for point in (*stage.base, stage.point)]
         if stage.sense == "same":
@@ -177,7 +177,7 @@ def test_images_are_triangles_similar_to_their_links(stem, kind):
 @both_kinds
 def test_ticks_are_square_to_the_image_at_their_points(kind):
     stem, suffix = "002-E3.1", {"velocity": "", "acceleration": "_1"}[kind]
-    (left, right), middle = of(stem, kind, f"tick e{suffix}").spots, at(stem, kind, f"e{suffix}")
+    (left, right), middle = of(stem, kind, f"tick e{suffix}").points, at(stem, kind, f"e{suffix}")
     way = at(stem, kind, f"c{suffix}") - at(stem, kind, f"b{suffix}")
     assert near(np.add(left, right) / 2.0, middle)
     assert abs(np.subtract(left, right) @ way) < 1e-9
@@ -187,29 +187,29 @@ def test_ticks_are_square_to_the_image_at_their_points(kind):
 
 def test_the_image_of_a_produced_link_is_produced():
     line = of("002-E3.2", "velocity", "image AB")
-    assert near(line.spots[0], at("002-E3.2", "velocity", "a"))
-    assert near(line.spots[1], at("002-E3.2", "velocity", "e"))
+    assert near(line.points[0], at("002-E3.2", "velocity", "a"))
+    assert near(line.points[1], at("002-E3.2", "velocity", "e"))
 
 
 def test_the_chapters_first_polygon_has_just_these_strokes():
-    marks = [mark for mark in picture("002-E3.1", "acceleration").marks if not isinstance(mark, Letter)]
+    marks = [mark for mark in picture("002-E3.1", "acceleration").marks if not isinstance(mark, Label)]
     assert sorted((type(mark).__name__, mark.about) for mark in marks) == [
         ("Arrow", "acceleration B/A"),
         ("Arrow", "acceleration C/D"),
         *(("Arrow", f"centripetal {each}") for each in ("B/A", "C/B", "C/D")),
         *(("Arrow", f"tangential {each}") for each in ("B/A", "C/B", "C/D")),
         ("Circle", "pole"),
-        ("Line", "acceleration C/B"),
-        *[("Line", "image BC")] * 2,
-        *[("Line", "image DC")] * 2,
-        ("Line", "tick e_1"),
+        ("Polyline", "acceleration C/B"),
+        *[("Polyline", "image BC")] * 2,
+        *[("Polyline", "image DC")] * 2,
+        ("Polyline", "tick e_1"),
     ]
-    texts = [mark.text for mark in picture("002-E3.1", "acceleration").marks if isinstance(mark, Letter)]
+    texts = [mark.text for mark in picture("002-E3.1", "acceleration").marks if isinstance(mark, Label)]
     assert texts[:2] == ["$a_{1}$", "$d_{1}$"]
     assert {*texts} == {
         f"${each[0]}_{{{each[1]}}}$" for each in ["a1", "d1", "b1", "ba", "c1", "cb", "cd", "e1", "f1", "g1"]
     }
-    texts = [mark.text for mark in picture("002-E3.1", "velocity").marks if isinstance(mark, Letter)]
+    texts = [mark.text for mark in picture("002-E3.1", "velocity").marks if isinstance(mark, Label)]
     assert sorted(texts) == [*"abcdefg"]
 
 
@@ -221,13 +221,13 @@ def test_a_total_of_one_part_is_drawn_once():
 
 def test_crank_of_the_first_example_at_a_scale_that_is_given():
     polygon = drawn("002-E3.1", "velocity")
-    found = polygon_picture(polygon, given("1 cm = 0.1 m/s"))
+    found = polygon_picture(polygon, parse_scale("1 cm = 0.1 m/s"))
     (arrow,) = (mark for mark in found.marks if mark.about == "velocity B/A")
     # 10.5 rad/s at 50 mm: 0.525 m/s, a quarter turn ahead of 60 degrees
     assert arrow.tail == (0.0, 0.0)
     np.testing.assert_allclose(arrow.head, (-52.5 * np.sin(np.pi / 3), 52.5 * np.cos(np.pi / 3)))
     assert found.notes == ("Velocity polygon", "1 cm = 0.1 m/s", "μᵥ = 0.01 (m/s)/mm")
-    found = polygon_picture(drawn("002-E3.1", "acceleration"), given("1 cm = 2 m/s^2"))
+    found = polygon_picture(drawn("002-E3.1", "acceleration"), parse_scale("1 cm = 2 m/s^2"))
     assert found.notes == ("Acceleration polygon", "1 cm = 2 m/s²", "μₐ = 0.2 (m/s²)/mm", LEGEND)
     (arrow,) = (mark for mark in found.marks if mark.about == "centripetal B/A")
     assert hypot(*arrow.head) == pytest.approx(10.5**2 * 0.05 / 0.2)
@@ -239,8 +239,8 @@ def test_what_does_not_move_is_a_pole_and_says_so(kind):
     polygon = KINDS[kind](solve(mechanism, [Drive("A", mechanism.inputs[0].position, 0.0, 0.0)]))
     found = polygon_picture(polygon)
     assert found.notes[-1] == {"velocity": "everything is at rest", "acceleration": "nothing is accelerated"}[kind]
-    assert not [mark for mark in found.marks if isinstance(mark, (Arrow, Line))]
-    assert {mark.at for mark in found.marks if isinstance(mark, Letter)} == {(0.0, 0.0)}
+    assert not [mark for mark in found.marks if isinstance(mark, (Arrow, Polyline))]
+    assert {mark.at for mark in found.marks if isinstance(mark, Label)} == {(0.0, 0.0)}
     assert [mark.about for mark in found.marks if isinstance(mark, Circle)] == ["pole"]
     at_scale = polygon_picture(polygon, Scale(kind, 0.01, {"velocity": "m/s", "acceleration": "m/s^2"}[kind]))
     assert at_scale.marks == found.marks
@@ -286,7 +286,7 @@ def test_letters_of_accelerations_are_set_with_an_index(stem, letter, text):
 
 def test_letters_of_velocities_are_plain():
     assert letter_text(drawn("002-E3.4", "velocity"), "g′′") == ("g″", False)
-    letters = [mark for mark in picture("002-E3.4", "velocity").marks if isinstance(mark, Letter)]
+    letters = [mark for mark in picture("002-E3.4", "velocity").marks if isinstance(mark, Label)]
     assert all(mark.slanted and not mark.math for mark in letters)
 
 
@@ -310,7 +310,7 @@ def test_names_of_any_kind_are_never_taken_for_formulas(name):
     for kind, draw in KINDS.items():
         polygon = draw(state)
         (own,) = (letter for letter, point in polygon.points.items() if point == name)
-        texts = {mark.about: mark for mark in polygon_picture(polygon).marks if isinstance(mark, Letter)}
+        texts = {mark.about: mark for mark in polygon_picture(polygon).marks if isinstance(mark, Label)}
         assert not texts[f"letter {own}"].math
         plain = name if name in polygon.letters else name.lower()
         assert texts[f"letter {own}"].text == plain + {"velocity": "", "acceleration": "₁"}[kind]
@@ -323,7 +323,7 @@ def test_names_of_any_kind_are_never_taken_for_formulas(name):
 
 def test_of_very_many_letters_at_the_pole_a_few_are_shown_and_all_told():
     found = picture("chain-42", "velocity")
-    texts = [mark.text for mark in found.marks if isinstance(mark, Letter) and mark.at == (0.0, 0.0)]
+    texts = [mark.text for mark in found.marks if isinstance(mark, Label) and mark.at == (0.0, 0.0)]
     assert texts == ["a0", "a1", "a2", "…", "a20"]
     assert found.notes[-1] == f"at the pole: {', '.join(f'A{k}' for k in range(21))}"
 
@@ -352,11 +352,11 @@ def test_what_slides_in_a_group_has_its_arrow():
 @every_model
 def test_every_link_of_a_group_is_seen(stem, kind):
     polygon = drawn(stem, kind)
-    marks = [mark for mark in picture(stem, kind).marks if isinstance(mark, (Arrow, Line))]
-    members = {name: polygon.state._named(name).members for name in polygon.state.point_names}
+    marks = [mark for mark in picture(stem, kind).marks if isinstance(mark, (Arrow, Polyline))]
+    members = {name: polygon.state._find_point(name).members for name in polygon.state.point_names}
     letter_of = {point: letter for letter, point in polygon.points.items()}
     for stage in polygon.stages:
-        for link in stage.links if isinstance(stage, Simultaneous) else ():
+        for link in stage.links if isinstance(stage, SimultaneousSolution) else ():
             named = [name for name, each in members.items() if any(owner == link for owner, _ in each)]
             spots = [polygon.letters[letter_of[name]] / per_mm(stem, kind) for name in named if name in letter_of]
             wide = max((hypot(*(one - other)) for one in spots for other in spots), default=0.0)
@@ -385,7 +385,7 @@ def test_what_lies_under_a_slider_is_told_by_its_link_and_the_slider():
     assert "g, g′, g″: the points of the frame at B, D, F" in picture("002-E3.4", "velocity").notes
     polygon = drawn("crank-and-slotted-lever", "velocity")
     frame = polygon.state.mechanism.frame
-    moving = [(letter, *where) for letter, where in polygon.below.items() if where[0] != frame]
+    moving = [(letter, *where) for letter, where in polygon.points_underneath.items() if where[0] != frame]
     assert moving
     for letter, link, over in moving:
         assert f"{letter}: the point of {link} at {over}" in picture("crank-and-slotted-lever", "velocity").notes

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import planar
-from planar.drawing.diagrams.drawn_run import smooth
+from planar.drawing.diagrams.drawn_run import smooth_path
 from planar.drawing.diagrams.positions import loci, positions
-from planar.drawing.paper.picture import Circle, Letter, Line, Pen, extent
+from planar.drawing.paper.picture import Circle, Label, Pen, Polyline, extent
 from planar.drawing.paper.scales import Scale
 from planar.foundation.errors import BadInput
-from planar.model.mechanism import Drive, with_inputs
+from planar.model.mechanism import Drive, replace_inputs
 from tests.known import MODELS
 
 PER_MM = 1e-3
@@ -27,13 +27,13 @@ def marked(picture, name, what="position of"):
 
 
 def path(picture, name):
-    (line,) = [mark for mark in picture.marks if isinstance(mark, Line) and mark.about == f"path {name}"]
+    (line,) = [mark for mark in picture.marks if isinstance(mark, Polyline) and mark.about == f"path {name}"]
     assert line.pen is Pen.PATH
-    return np.array(line.spots)
+    return np.array(line.points)
 
 
 def letters(picture):
-    return {mark.text: mark for mark in picture.marks if isinstance(mark, Letter)}
+    return {mark.text: mark for mark in picture.marks if isinstance(mark, Label)}
 
 
 def slider(turn, r=30.0, l=100.0):  # noqa: E741
@@ -65,15 +65,15 @@ def test_joints_are_lettered_by_their_positions_and_those_that_coincide_together
 
 
 def test_the_links_are_drawn_thin_in_every_position_but_the_first(twelve):
-    thin = [mark for mark in twelve.marks if isinstance(mark, Line) and mark.pen is Pen.POSITION]
-    cranks = [np.array(mark.spots) for mark in thin if mark.about == "link OA"]
+    thin = [mark for mark in twelve.marks if isinstance(mark, Polyline) and mark.pen is Pen.POSITION]
+    cranks = [np.array(mark.points) for mark in thin if mark.about == "link OA"]
     assert len(cranks) == 11
     for k, spots in enumerate(cranks, start=1):
         ends = {tuple(np.round(spot, 9) + 0.0) for spot in spots}
         crank = 30.0 * np.array([np.cos(k * pi / 6.0), np.sin(k * pi / 6.0)])
         assert ends == {(0.0, 0.0), tuple(np.round(crank, 9) + 0.0)}
     strong = [
-        mark for mark in twelve.marks if isinstance(mark, Line) and mark.pen is Pen.LINK and mark.about == "link OA"
+        mark for mark in twelve.marks if isinstance(mark, Polyline) and mark.pen is Pen.LINK and mark.about == "link OA"
     ]
     assert len(strong) == 1
 
@@ -81,10 +81,10 @@ def test_the_links_are_drawn_thin_in_every_position_but_the_first(twelve):
 def test_the_ground_is_drawn_once(twelve):
     one = positions(planar.load("004-SC12"), 1, scale=FULL)
     for picture in (twelve, one):
-        grounds = [mark.spots for mark in picture.marks if isinstance(mark, Line) and mark.pen is Pen.GROUND]
+        grounds = [mark.points for mark in picture.marks if isinstance(mark, Polyline) and mark.pen is Pen.GROUND]
         assert len(grounds) == len(set(grounds))
-    assert sum(mark.pen is Pen.GROUND for mark in twelve.marks if not isinstance(mark, Letter)) == sum(
-        mark.pen is Pen.GROUND for mark in one.marks if not isinstance(mark, Letter)
+    assert sum(mark.pen is Pen.GROUND for mark in twelve.marks if not isinstance(mark, Label)) == sum(
+        mark.pen is Pen.GROUND for mark in one.marks if not isinstance(mark, Label)
     )
 
 
@@ -98,10 +98,10 @@ def test_paths_run_through_exact_positions(twelve):
 
 
 def test_dead_centres_are_named_at_the_ends_of_the_slide(twelve):
-    ends = {mark.text: mark.at[0] for mark in twelve.marks if isinstance(mark, Letter) and mark.text in ("TDC", "BDC")}
+    ends = {mark.text: mark.at[0] for mark in twelve.marks if isinstance(mark, Label) and mark.text in ("TDC", "BDC")}
     assert ends == pytest.approx({"TDC": 130.0, "BDC": 70.0})
-    lines = [mark for mark in twelve.marks if isinstance(mark, Line) and mark.about.startswith(("TDC", "BDC"))]
-    assert [line.spots[0] for line in lines] == [pytest.approx((130.0, 0.0)), pytest.approx((70.0, 0.0))]
+    lines = [mark for mark in twelve.marks if isinstance(mark, Polyline) and mark.about.startswith(("TDC", "BDC"))]
+    assert [line.points[0] for line in lines] == [pytest.approx((130.0, 0.0)), pytest.approx((70.0, 0.0))]
     assert twelve.notes[0] == "Position 0: top dead centre (TDC) of stroke, the input O at 0 deg"
 
 
@@ -164,7 +164,7 @@ def test_names_that_are_no_plain_letters_are_never_mathtext():
 
 def test_many_joints_do_not_drown_the_drawing_in_letters():
     picture = positions(planar.cycle(planar.load("chain-42"), 24))
-    assert sum(isinstance(mark, Letter) for mark in picture.marks) < 160
+    assert sum(isinstance(mark, Label) for mark in picture.marks) < 160
 
 
 def test_loci_default_to_the_points_of_couplers_with_tracers_first():
@@ -177,7 +177,7 @@ def test_loci_default_to_the_points_of_couplers_with_tracers_first():
 def test_a_locus_is_the_path_of_its_point_to_scale():
     mechanism = planar.load("hoeken-straight-line")
     picture = loci(planar.cycle(mechanism, 48), scale=FULL)
-    (name,) = {mark.about for mark in picture.marks if mark.about.startswith("path ") and isinstance(mark, Line)}
+    (name,) = {mark.about for mark in picture.marks if mark.about.startswith("path ") and isinstance(mark, Polyline)}
     name = name.removeprefix("path ")
     spots = path(picture, name)
     assert len(spots) >= 361
@@ -244,7 +244,7 @@ def test_a_mechanism_without_inputs_is_refused_in_a_sentence():
 
 
 def test_a_mechanism_without_a_speed_is_drawn_alike(twelve):
-    still = with_inputs(planar.load("004-SC12"), (Drive("O", None, 0.0, 0.0),))
+    still = replace_inputs(planar.load("004-SC12"), (Drive("O", None, 0.0, 0.0),))
     assert marked(positions(still, scale=FULL), "B") == pytest.approx(marked(twelve, "B"))
 
 
@@ -272,11 +272,11 @@ def test_paths_are_rounded_off_by_the_root_of_the_way_to_a_limit():
     rates = np.ones((60, 2))
     limit = np.vstack([[np.nan, np.nan], rates[1:]])
     for at, rate in ((rows, limit), (rows[::-1], limit[::-1])):
-        path = smooth(at, rate)
+        path = smooth_path(at, rate)
         assert path[:, 1] == pytest.approx(path[:, 0] ** 2 - path[:, 0], abs=1e-9)
         assert len(path) > 70
         assert path[[0, -1]] == pytest.approx(at[[0, -1]])
-    assert smooth(rows, rates) is not rows
-    assert smooth(rows, rates) == pytest.approx(rows)
-    short = smooth(rows[:7], np.vstack([limit[:6], [np.nan, np.nan]]))
+    assert smooth_path(rows, rates) is not rows
+    assert smooth_path(rows, rates) == pytest.approx(rows)
+    short = smooth_path(rows[:7], np.vstack([limit[:6], [np.nan, np.nan]]))
     assert short[[0, -1]] == pytest.approx(rows[[0, 6]])

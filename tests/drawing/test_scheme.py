@@ -11,22 +11,22 @@ from hypothesis import strategies as st
 
 import planar
 from planar.document import files
-from planar.drawing.labels.placement import placed
-from planar.drawing.output.matplotlib_figure import figure
-from planar.drawing.paper.picture import Arrow, Circle, Fill, Letter, Line, Pen, Picture, extent
+from planar.drawing.labels.placement import place_labels
+from planar.drawing.output.matplotlib_figure import draw_pictures
+from planar.drawing.paper.picture import Arrow, Circle, Fill, Label, Pen, Picture, Polyline, extent
 from planar.drawing.paper.scales import Scale
-from planar.drawing.paper.scales import given as reading
+from planar.drawing.paper.scales import parse_scale as reading
 from planar.drawing.scheme import symbols
 from planar.drawing.scheme.details import AROUND, scheme_with_details
 from planar.drawing.scheme.ground import ground_marks
-from planar.drawing.scheme.link_bodies import bodies, hull
-from planar.drawing.scheme.scheme import body_marks, scheme, standing
+from planar.drawing.scheme.link_bodies import convex_hull, link_bodies
+from planar.drawing.scheme.scheme import body_marks, plain_frames, scheme
 from planar.foundation.geometry import Vector, frame_at
-from planar.model.link_graph import numbered
-from planar.model.link_shapes import shape
-from planar.model.mechanism import Drive, named_points, with_inputs
-from planar.model.pairs import Kind, pair_types
-from planar.model.pairs.symbols import Band, Block, Guide, Opening, Pin, PitchLine, Wheel
+from planar.model.link_graph import link_numbers
+from planar.model.link_shapes import link_shape
+from planar.model.mechanism import Drive, named_points, replace_inputs
+from planar.model.pairs import MeasureKind, pair_types
+from planar.model.pairs.symbols import BeltMark, GuideMark, PinMark, PitchLineMark, SliderMark, SlotMark, WheelMark
 from tests.draws import draws, part
 from tests.known import some_models
 from tests.known import state_of as solved
@@ -48,8 +48,8 @@ def told(sample):
     shapes = dict(zip("abc", sample.shapes, strict=False))
     links = {name: {"points": {p: list(at) for p, at in each.points.items()}} for name, each in shapes.items()}
     value = {"planar": 1, "frame": "ground", "links": {"ground": {"points": {"G": [0, 0]}}, **links}}
-    mechanism = files.from_dict(value | {"pairs": [sample.entry, *sample.beside]})
-    return shapes, mechanism.pairs, mechanism.pairs[0].marks(shapes, mechanism.pairs)
+    mechanism = files.from_dict(value | {"pairs": [sample.entry, *sample.other_entries]})
+    return shapes, mechanism.pairs, mechanism.pairs[0].drawing_marks(shapes, mechanism.pairs)
 
 
 def made(value):
@@ -57,8 +57,8 @@ def made(value):
 
 
 def spots(mark):
-    if isinstance(mark, Line):
-        return list(mark.spots)
+    if isinstance(mark, Polyline):
+        return list(mark.points)
     if isinstance(mark, Arrow):
         return [mark.tail, mark.head]
     return [mark.centre] if isinstance(mark, Circle) else [mark.at]
@@ -81,27 +81,27 @@ def test_every_pair_type_says_how_it_is_drawn():
 def test_marks_lie_where_the_pair_touches(sample):
     _, _, marks = told(sample)
     frames = dict(zip("abc", sample.frames, strict=False))
-    riders = {mark.name: (mark.link, mark.at) for mark in marks if isinstance(mark, Block)}
+    riders = {mark.name: (mark.link, mark.position) for mark in marks if isinstance(mark, SliderMark)}
     for mark in marks:
-        if isinstance(mark, Pin):
-            first, second = (frames[link].carry(at) for link, at in zip(mark.links, mark.at, strict=True))
+        if isinstance(mark, PinMark):
+            first, second = (frames[link].to_world(at) for link, at in zip(mark.links, mark.positions, strict=True))
             assert first == pytest.approx(second, abs=1e-14)
-        elif isinstance(mark, Guide):
+        elif isinstance(mark, GuideMark):
             link, at = riders[mark.name]
-            through, way = frames[mark.link].carry(mark.through), frames[mark.link].turn(mark.way)
-            assert off_line(frames[link].carry(at), through, way) < 1e-14
-            block = next(each for each in marks if isinstance(each, Block))
-            assert block.on == mark.link
-            assert frames[link].turn(block.way) == pytest.approx(way, abs=1e-14)
-        elif isinstance(mark, Opening):
-            through, way = frames[mark.link].carry(mark.through), frames[mark.link].turn(mark.way)
-            assert off_line(frames[mark.pin].carry(mark.at), through, way) < 1e-14
-        elif isinstance(mark, PitchLine):
-            through, way = frames[mark.link].carry(mark.through), frames[mark.link].turn(mark.way)
-            centre = frames[mark.wheel.link].carry(mark.wheel.centre)
+            through, way = frames[mark.link].to_world(mark.through), frames[mark.link].rotate_to_world(mark.direction)
+            assert off_line(frames[link].to_world(at), through, way) < 1e-14
+            block = next(each for each in marks if isinstance(each, SliderMark))
+            assert block.guide_link == mark.link
+            assert frames[link].rotate_to_world(block.direction) == pytest.approx(way, abs=1e-14)
+        elif isinstance(mark, SlotMark):
+            through, way = frames[mark.link].to_world(mark.through), frames[mark.link].rotate_to_world(mark.direction)
+            assert off_line(frames[mark.pin_link].to_world(mark.pin_position), through, way) < 1e-14
+        elif isinstance(mark, PitchLineMark):
+            through, way = frames[mark.link].to_world(mark.through), frames[mark.link].rotate_to_world(mark.direction)
+            centre = frames[mark.wheel.link].to_world(mark.wheel.centre)
             assert off_line(centre, through, way) == pytest.approx(mark.wheel.radius, abs=1e-14)
         if hasattr(mark, "way"):
-            assert hypot(*mark.way) == pytest.approx(1.0, abs=1e-14)
+            assert hypot(*mark.direction) == pytest.approx(1.0, abs=1e-14)
 
 
 @every_sample
@@ -113,29 +113,29 @@ def test_marks_part_as_the_residual_says_when_the_pair_is_pulled_apart(sample):
     frames[1] = frames[1]._replace(x=frames[1].x + shift.x, y=frames[1].y + shift.y)
     numbers = pair.measure([shapes[link] for link in pair.bodies])
     left = [float(each) for each in pair.residual(frames, numbers, sample.own)]
-    lengths = [each for each, kind in zip(left, pair.constrains, strict=True) if kind is Kind.LENGTH][:2]
+    lengths = [each for each, kind in zip(left, pair.residual_kinds, strict=True) if kind is MeasureKind.LENGTH][:2]
     named = dict(zip("abc", frames, strict=False))
     for mark in marks:
-        if isinstance(mark, Pin):
-            first, second = (named[link].carry(at) for link, at in zip(mark.links, mark.at, strict=True))
+        if isinstance(mark, PinMark):
+            first, second = (named[link].to_world(at) for link, at in zip(mark.links, mark.positions, strict=True))
             assert second - first == pytest.approx(lengths, abs=1e-14)
-        elif isinstance(mark, Guide | Opening):
+        elif isinstance(mark, GuideMark | SlotMark):
             link, at = (
-                (mark.pin, mark.at)
-                if isinstance(mark, Opening)
-                else next((each.link, each.at) for each in marks if isinstance(each, Block))
+                (mark.pin_link, mark.pin_position)
+                if isinstance(mark, SlotMark)
+                else next((each.link, each.position) for each in marks if isinstance(each, SliderMark))
             )
-            through, way = named[mark.link].carry(mark.through), named[mark.link].turn(mark.way)
+            through, way = named[mark.link].to_world(mark.through), named[mark.link].rotate_to_world(mark.direction)
             # along the line the pair's own displacement would follow, across it the gap is what the residual leaves
-            gap = (named[link].carry(at) - through).cross(way)
+            gap = (named[link].to_world(at) - through).cross(way)
             assert gap == pytest.approx(Vector(*lengths).cross(way), abs=1e-14)
 
 
 @every_sample
 def test_pitch_circles_roll_on_one_another_as_the_pair_turns(sample):
     shapes, _, marks = told(sample)
-    wheels = [mark for mark in marks if isinstance(mark, Wheel)]
-    bands = [mark for mark in marks if isinstance(mark, Band)]
+    wheels = [mark for mark in marks if isinstance(mark, WheelMark)]
+    bands = [mark for mark in marks if isinstance(mark, BeltMark)]
     if len(wheels) != 2:
         return
     a, b = wheels
@@ -183,7 +183,7 @@ def geared(by, sizes, keyword="gear", apart=100.0, **more):
 )
 def test_pitch_radii_follow_from_the_distance_of_the_centres(by, sizes, radii):
     state = geared(by, sizes)
-    wheels = state.mechanism.pairs[2].marks(state.shapes, state.mechanism.pairs)
+    wheels = state.mechanism.pairs[2].drawing_marks(state.shapes, state.mechanism.pairs)
     assert [mark.radius * 1e3 for mark in wheels] == pytest.approx(radii, rel=1e-12)
     # drawn: one pitch circle each, an internal one with its rim
     circles = about(scheme(state, UNIT), "gear w", Circle)
@@ -202,28 +202,28 @@ def test_a_fixed_wheel_is_hatched_behind_its_rim():
         centre = state.point("O").position / 1e-3
         circles = [mark for mark in marks if isinstance(mark, Circle) and mark.centre == pytest.approx(tuple(centre))]
         radius = max(mark.radius for mark in circles)
-        assert radius == pytest.approx((80.0 + symbols.RIM) if rim else 60.0)
-        hatches = [mark for mark in marks if isinstance(mark, Line) and mark.pen is Pen.HATCH]
+        assert radius == pytest.approx((80.0 + symbols.RIM_WIDTH) if rim else 60.0)
+        hatches = [mark for mark in marks if isinstance(mark, Polyline) and mark.pen is Pen.HATCH]
         assert len(hatches) > 6
         for hatch in hatches:
-            start, stop = (np.hypot(*(np.array(each) - centre)) for each in hatch.spots)
+            start, stop = (np.hypot(*(np.array(each) - centre)) for each in hatch.points)
             assert start == pytest.approx(radius)
             assert (stop - start) * far > 0.5
 
 
 def test_wheels_that_cannot_meet_or_have_no_common_carrier_have_no_circles():
     equal = geared("ratio", 1.0)
-    assert equal.mechanism.pairs[2].marks(equal.shapes, equal.mechanism.pairs) == ()
-    assert equal.mechanism.pairs[2].marks(equal.shapes, equal.mechanism.pairs[2:]) == ()
+    assert equal.mechanism.pairs[2].drawing_marks(equal.shapes, equal.mechanism.pairs) == ()
+    assert equal.mechanism.pairs[2].drawing_marks(equal.shapes, equal.mechanism.pairs[2:]) == ()
     assert scheme(equal).marks
 
 
 @pytest.mark.parametrize(("crossed", "lean"), [(False, acos(30 / 100)), (True, acos(50 / 100))])
 def test_a_band_is_tangent_to_both_its_wheels(crossed, lean):
     state = geared("radii", [40, 10], "belt", crossed=crossed)
-    lines = about(scheme(state, UNIT), "band w", Line)
+    lines = about(scheme(state, UNIT), "band w", Polyline)
     assert len(lines) == 2
-    for (x1, y1), (x2, y2) in (each.spots for each in lines):
+    for (x1, y1), (x2, y2) in (each.points for each in lines):
         sign = 1.0 if y1 > 0 else -1.0
         other = -sign if crossed else sign
         assert (x1, y1) == pytest.approx((40 * cos(lean), sign * 40 * sin(lean)), abs=1e-9)
@@ -237,7 +237,7 @@ def test_a_band_is_tangent_to_both_its_wheels(crossed, lean):
 def test_bands_given_by_ratio_fit_between_their_centres(keyword):
     for ratio in (-3.0, -1.0, 0.2, 1.0, 5.0):
         state = geared("ratio", ratio, keyword)
-        first, second, band = state.mechanism.pairs[2].marks(state.shapes, state.mechanism.pairs)
+        first, second, band = state.mechanism.pairs[2].drawing_marks(state.shapes, state.mechanism.pairs)
         assert first.radius / second.radius == pytest.approx(abs(ratio), rel=1e-12)
         assert first.radius + second.radius < 0.1
         assert band.crossed == (ratio < 0.0)
@@ -249,15 +249,15 @@ def test_joints_lie_at_their_places_to_scale(name):
     scale = Scale("length", 2e-3, "mm")
     picture = scheme(state, scale)
     pins = {mark.about: mark for mark in picture.marks if mark.about.startswith("pin ")}
-    together = {pair.entry_name() for pair in state.mechanism.pairs if pair.coincident()}
+    together = {pair.entry_name() for pair in state.mechanism.pairs if pair.coincident_points()}
     for point in together:
         mark = pins.pop(f"pin {point}")
         assert mark.centre == pytest.approx(tuple(state.point(point).position / 2e-3), abs=1e-12)
-        assert (mark.radius, mark.fill) == (symbols.PIN, Fill.PAPER)
+        assert (mark.radius, mark.fill) == (symbols.PIN_RADIUS, Fill.PAPER)
     riding = {
         each.name: pair
         for pair in state.mechanism.pairs
-        if (rides := pair.rides()) is not None
+        if (rides := pair.point_on_line()) is not None
         for each in named_points(state.mechanism)
         if rides[0] in each.members
     }
@@ -265,13 +265,13 @@ def test_joints_lie_at_their_places_to_scale(name):
         point = text.removeprefix("pin ")
         assert pin.centre == pytest.approx(tuple(state.point(point).position / 2e-3), abs=1e-12)
         assert point in riding
-    blocks = [mark for mark in picture.marks if mark.about.startswith("block ") and isinstance(mark, Line)]
+    blocks = [mark for mark in picture.marks if mark.about.startswith("block ") and isinstance(mark, Polyline)]
     for mark in blocks:
         point = mark.about.removeprefix("block ")
-        middle = np.mean(mark.spots, axis=0)
+        middle = np.mean(mark.points, axis=0)
         np.testing.assert_allclose(middle, state.point(point).position / 2e-3, atol=1e-9)
-        (a, b, c, _) = (np.array(each) for each in mark.spots)
-        assert (np.linalg.norm(b - a), np.linalg.norm(c - b)) == pytest.approx(symbols.BLOCK, rel=1e-9)
+        (a, b, c, _) = (np.array(each) for each in mark.points)
+        assert (np.linalg.norm(b - a), np.linalg.norm(c - b)) == pytest.approx(symbols.BLOCK_SIZE, rel=1e-9)
 
 
 @every_model
@@ -282,10 +282,10 @@ def test_a_scheme_fits_its_sheet_with_all_names_and_numbers(name):
     assert max(right - left, high - low) >= 60.0
     assert right - left < 277.0
     assert high - low < 190.0
-    lettered = {mark.about for mark in picture.marks if isinstance(mark, Letter)}
+    lettered = {mark.about for mark in picture.marks if isinstance(mark, Label)}
     assert {f"point {point}" for point in state.point_names} <= lettered
-    number = numbered(state.mechanism)
-    texts = {mark.about: mark.text for mark in picture.marks if isinstance(mark, Letter)}
+    number = link_numbers(state.mechanism)
+    texts = {mark.about: mark.text for mark in picture.marks if isinstance(mark, Label)}
     assert all(texts[f"number of {link}"] == text for link, text in number.items())
     assert picture.title == state.mechanism.name
     assert picture.notes[0].startswith("Space diagram, 1 cm = ")
@@ -294,33 +294,37 @@ def test_a_scheme_fits_its_sheet_with_all_names_and_numbers(name):
 @every_model
 def test_hatching_is_only_at_the_frame(name):
     state, picture = solved(name), drawn(name)
-    owners = {mark.about for mark in picture.marks if isinstance(mark, Line) and mark.pen in (Pen.HATCH, Pen.GROUND)}
+    owners = {
+        mark.about for mark in picture.marks if isinstance(mark, Polyline) and mark.pen in (Pen.HATCH, Pen.GROUND)
+    }
     frame = state.mechanism.frame
     allowed = set()
     for pair in state.mechanism.pairs:
         if frame in pair.links:
             allowed |= {f"ground {pair.entry_name()}", f"guide {pair.name}", f"gear {pair.name}", f"band {pair.name}"}
-    allowed |= {f"ground of spring {k}" for k, each in enumerate(state.mechanism.springs, 1) if not each.turns}
+    allowed |= {f"ground of spring {k}" for k, each in enumerate(state.mechanism.springs, 1) if not each.is_torsional}
     assert owners <= allowed
     for pair in state.mechanism.pairs:
-        if frame in pair.links and pair.coincident():
+        if frame in pair.links and pair.coincident_points():
             supports = [mark for mark in about(picture, f"ground {pair.entry_name()}") if mark.pen is Pen.GROUND]
             pin = about(picture, f"pin {pair.entry_name()}")[0]
-            assert pin.centre in supports[0].spots  # the stand begins in its pin
-        if frame in pair.links and pair.rides() is not None:
+            assert pin.centre in supports[0].points  # the stand begins in its pin
+        if frame in pair.links and pair.point_on_line() is not None:
             assert about(picture, f"guide {pair.name}")
 
 
 @every_model
 def test_every_moving_link_shows(name):
     state, picture = solved(name), drawn(name)
-    shown = {mark.about for mark in picture.marks if not isinstance(mark, Letter)}
+    shown = {mark.about for mark in picture.marks if not isinstance(mark, Label)}
     for pair in state.mechanism.pairs:
-        for mark in pair.marks(state.shapes, state.mechanism.pairs):
-            if isinstance(mark, Block) and mark.link != state.mechanism.frame:
-                point = next(each.name for each in named_points(state.mechanism) if pair.rides()[0] in each.members)
+        for mark in pair.drawing_marks(state.shapes, state.mechanism.pairs):
+            if isinstance(mark, SliderMark) and mark.link != state.mechanism.frame:
+                point = next(
+                    each.name for each in named_points(state.mechanism) if pair.point_on_line()[0] in each.members
+                )
                 shown |= {f"link {mark.link}"} if f"block {point}" in shown else set()
-            elif isinstance(mark, Wheel):
+            elif isinstance(mark, WheelMark):
                 shown |= {f"link {mark.link}"}
     for link in state.mechanism.links:
         if link.name != state.mechanism.frame:
@@ -336,7 +340,7 @@ def test_input_arrows_point_the_way_that_the_input_drives(name):
             assert marks == []
             continue
         arrow, *letters = marks
-        assert all(isinstance(letter, Letter) for letter in letters)
+        assert all(isinstance(letter, Label) for letter in letters)
         along = 1.0 if (given_input.velocity or given_input.acceleration) > 0.0 else -1.0
         told = [rate * along for rate in (given_input.velocity, given_input.acceleration) if rate]
         read = [float(letter.text.split()[2].replace("−", "-")) for letter in letters]
@@ -344,10 +348,10 @@ def test_input_arrows_point_the_way_that_the_input_drives(name):
         if not given_input.velocity:
             continue
         if isinstance(arrow, Arrow):
-            rides = next(pair for pair in state.mechanism.pairs if pair.name == given_input.pair).rides()
+            rides = next(pair for pair in state.mechanism.pairs if pair.name == given_input.pair).point_on_line()
             (link, point), guide = rides
             frame = state.frames[guide]
-            local = frame.local(state.frames[link].carry(state.shapes[link].at(point)))
+            local = frame.to_local(state.frames[link].to_world(state.shapes[link].position(point)))
             rate = np.array([local.x.parts[1] if hasattr(local.x, "parts") else 0.0, local.y.parts[1]])
             cosine, sine = (each.parts[0] if hasattr(each, "parts") else each for each in (frame.cos, frame.sin))
             rate = np.array([cosine * rate[0] - sine * rate[1], sine * rate[0] + cosine * rate[1]])
@@ -363,11 +367,11 @@ def test_input_arrows_point_the_way_that_the_input_drives(name):
 def test_the_arrow_of_a_crank_turns_as_the_crank_does():
     for speed, pointed in (("3 rad/s", 1), ("-3 rad/s", -1)):
         mechanism = planar.load("four-bar")
-        state = planar.solve(with_inputs(mechanism, (Drive("A", None, float(speed.split()[0]), 0.0),)))
+        state = planar.solve(replace_inputs(mechanism, (Drive("A", None, float(speed.split()[0]), 0.0),)))
         (arrow, letter) = about(scheme(state), "input A")
-        assert (arrow.pointed, letter.text) == (pointed, "ω = 3 rad/s")
+        assert (arrow.arrow_end, letter.text) == (pointed, "ω = 3 rad/s")
         assert arrow.centre == pytest.approx((0.0, 0.0), abs=1e-9)
-    still = planar.solve(with_inputs(mechanism, (Drive("A", None, 0.0, 0.0),)))
+    still = planar.solve(replace_inputs(mechanism, (Drive("A", None, 0.0, 0.0),)))
     assert about(scheme(still), "input A") == []
 
 
@@ -378,23 +382,23 @@ def test_alpha_stands_beside_omega_with_its_sense_along_the_arrow():
         (-3.0, -26.0, -1, ["ω = 3 rad/s", "α = 26 rad/s²"]),
         (0.0, -26.0, -1, ["α = 26 rad/s²"]),
     ):
-        state = planar.solve(with_inputs(mechanism, (Drive("A", None, velocity, acceleration),)))
+        state = planar.solve(replace_inputs(mechanism, (Drive("A", None, velocity, acceleration),)))
         picture = scheme(state)
         arrow, *letters = about(picture, "input A")
-        assert (arrow.pointed, [each.text for each in letters]) == (pointed, told)
-        shown = placed([mark for mark in picture.marks if isinstance(mark, Letter)], picture.marks)
-        assert set(told) <= {each.letter.text for each in shown}  # two texts, not one line
+        assert (arrow.arrow_end, [each.text for each in letters]) == (pointed, told)
+        shown = place_labels([mark for mark in picture.marks if isinstance(mark, Label)], picture.marks)
+        assert set(told) <= {each.label.text for each in shown}  # two texts, not one line
 
 
 @pytest.mark.parametrize("name", ["slider-crank", "four-bar", "crank-rocker", "002-E3.1", "two-stroke-engine"])
 def test_the_number_of_a_link_is_not_read_as_a_part_of_a_rate(name):
     """No figure stands close behind words in their line."""
     picture = scheme(planar.solve(planar.load(name)))
-    shown = placed([mark for mark in picture.marks if isinstance(mark, Letter)], picture.marks)
-    rates = [each.box for each in shown if " = " in each.letter.text]
+    shown = place_labels([mark for mark in picture.marks if isinstance(mark, Label)], picture.marks)
+    rates = [each.box for each in shown if " = " in each.label.text]
     assert rates
     for each in shown:
-        if each.letter.text.isdigit():
+        if each.label.text.isdigit():
             for box in rates:
                 behind = 0.0 < each.box.left - box.right < 8.0
                 assert not (behind and min(each.box.top, box.top) - max(each.box.bottom, box.bottom) > 0.5)
@@ -402,7 +406,7 @@ def test_the_number_of_a_link_is_not_read_as_a_part_of_a_rate(name):
 
 def test_a_coupler_has_its_points_on_its_line_and_beside_it():
     mechanism = planar.load("four-bar")
-    body = bodies(mechanism, {link.name: shape(link) for link in mechanism.links})["BC"]
+    body = link_bodies(mechanism, {link.name: link_shape(link) for link in mechanism.links})["BC"]
     assert body.plate == ()
     assert body.sides == ((Vector(0.0, 0.0), Vector(pytest.approx(0.066), 0.0)),)
     (b, f), (c, again) = body.tracers
@@ -412,14 +416,14 @@ def test_a_coupler_has_its_points_on_its_line_and_beside_it():
 
 
 def test_a_point_on_a_produced_bar_lengthens_it():
-    body = bodies(*parts("slider-crank"))["rod"]
+    body = link_bodies(*parts("slider-crank"))["rod"]
     ((start, stop),) = body.sides
     assert sorted((start.x, stop.x)) == pytest.approx([-0.45, 1.6])
     assert body.tracers == ()
 
 
 def test_a_bell_crank_is_a_plate_and_a_block_alone_has_no_body():
-    made_of = bodies(*parts("002-E3.3"))
+    made_of = link_bodies(*parts("002-E3.3"))
     plates = [body for body in made_of.values() if body.plate]
     assert len(plates) == 1
     (body,) = plates
@@ -434,12 +438,12 @@ def test_a_bell_crank_is_a_plate_and_a_block_alone_has_no_body():
 
 def test_the_frame_has_no_body():
     mechanism, shapes = parts("four-bar")
-    assert set(bodies(mechanism, shapes)) == {"AB", "BC", "DC"}
+    assert set(link_bodies(mechanism, shapes)) == {"AB", "BC", "DC"}
 
 
 def parts(name):
     mechanism = planar.load(name)
-    return mechanism, {link.name: shape(link) for link in mechanism.links}
+    return mechanism, {link.name: link_shape(link) for link in mechanism.links}
 
 
 coordinates = st.floats(-1.0, 1.0).map(lambda value: round(value, 3))
@@ -449,7 +453,7 @@ clouds = st.lists(st.builds(Vector, coordinates, coordinates), min_size=1, max_s
 @given(clouds)
 @settings(max_examples=draws(30), deadline=None)
 def test_a_hull_is_convex_anticlockwise_and_holds_all_points(points):
-    corners = hull(points, 1e-9)
+    corners = convex_hull(points, 1e-9)
     if not corners:
         for p, q, r in combinations(points, 3):
             assert abs((q - p).cross(r - p)) < 1e-8
@@ -469,7 +473,7 @@ def test_a_link_with_any_points_can_be_drawn(points, angle):
     picture = scheme(state)
     assert all(isfinite(value) for mark in picture.marks for at in spots(mark) for value in at)
     for k in range(len(points)):
-        assert about(picture, f"point p{k}", Letter)
+        assert about(picture, f"point p{k}", Label)
 
 
 @pytest.mark.parametrize("seed", part(range(24), 3))
@@ -484,7 +488,7 @@ def test_any_linkage_can_be_drawn_on_its_sheet(seed):
     assert right - left < 277.0
     assert high - low < 190.0
     for pair in state.mechanism.pairs:
-        if pair.coincident():
+        if pair.coincident_points():
             (pin,) = about(picture, f"pin {pair.entry_name()}")
             per_mm = reading(picture.notes[0].removeprefix("Space diagram, ")).per_mm
             assert pin.centre == pytest.approx(tuple(state.point(pair.entry_name()).position / per_mm), abs=1e-9)
@@ -501,10 +505,10 @@ def crossing(p, q, r, s):
 def test_what_stands_still_is_clear_of_other_grounds(name):
     if name == "chain-42":  # more supports than there is room for
         return
-    ground = [mark for mark in drawn(name).marks if isinstance(mark, Line) and mark.pen in (Pen.GROUND, Pen.HATCH)]
+    ground = [mark for mark in drawn(name).marks if isinstance(mark, Polyline) and mark.pen in (Pen.GROUND, Pen.HATCH)]
     for one, other in combinations(ground, 2):
         if one.about != other.about:
-            pieces = [list(zip(mark.spots, mark.spots[1:], strict=False)) for mark in (one, other)]
+            pieces = [list(zip(mark.points, mark.points[1:], strict=False)) for mark in (one, other)]
             assert not any(crossing(*a, *b) for a in pieces[0] for b in pieces[1])
 
 
@@ -513,18 +517,18 @@ def test_links_keep_their_lengths_in_every_position_drawn(name):
     mechanism = planar.load(name)
     motion = planar.cycle(mechanism, 6, pair=mechanism.inputs[0].pair)
     shapes = motion.shapes
-    made_of = bodies(mechanism, shapes)
-    slides = [pair.name for pair in mechanism.pairs if pair.rides() is not None]
+    made_of = link_bodies(mechanism, shapes)
+    slides = [pair.name for pair in mechanism.pairs if pair.point_on_line() is not None]
     ways = {slide: motion.pair(slide)["displacement"] for slide in slides}
     travel = {slide: (float(way.min()), float(way.max())) for slide, way in ways.items()}
     lengths = []
     for index in range(len(motion)):
-        frames = standing(motion.frames, index)
+        frames = plain_frames(motion.frames, index)
         marks = body_marks(mechanism, made_of, frames, shapes, UNIT, travel=travel)
-        thin = body_marks(mechanism, made_of, frames, shapes, UNIT, Pen.POSITION, symbols=False)
+        thin = body_marks(mechanism, made_of, frames, shapes, UNIT, Pen.POSITION, with_symbols=False)
         assert {mark.pen for mark in thin} == {Pen.POSITION}
-        lines = [mark for mark in marks if isinstance(mark, Line)]
-        lengths.append([hypot(*np.subtract(*mark.spots[:2])) for mark in lines])
+        lines = [mark for mark in marks if isinstance(mark, Polyline)]
+        lengths.append([hypot(*np.subtract(*mark.points[:2])) for mark in lines])
         assert {mark.about for mark in thin} <= {mark.about for mark in lines}
     assert len(lengths) > 2
     np.testing.assert_allclose(lengths[1:], [lengths[0]] * (len(lengths) - 1), rtol=1e-9, atol=1e-9)
@@ -534,17 +538,17 @@ def test_a_piston_stays_in_its_cylinder_over_its_whole_travel():
     mechanism = planar.load("excavator-arm")
     motion = planar.cycle(mechanism, 9, 2.1, 3.0, "boom cylinder")
     low, high = 2.1, 3.0
-    made_of = bodies(mechanism, motion.shapes)
+    made_of = link_bodies(mechanism, motion.shapes)
     for index in range(len(motion)):
-        frames = standing(motion.frames, index)
+        frames = plain_frames(motion.frames, index)
         travel = {"boom cylinder": (low, high)}
         marks = body_marks(mechanism, made_of, frames, motion.shapes, UNIT, travel=travel)
         (tube,) = (mark for mark in marks if mark.about == "link boom tube" and mark.closed)
         piston, rod = (mark for mark in marks if mark.about == "link boom rod")
-        base, mouth = (np.mean([tube.spots[a], tube.spots[b]], axis=0) for a, b in ((0, 3), (1, 2)))
-        part = (np.mean(piston.spots, axis=0) - base) @ (mouth - base) / ((mouth - base) @ (mouth - base))
+        base, mouth = (np.mean([tube.points[a], tube.points[b]], axis=0) for a, b in ((0, 3), (1, 2)))
+        part = (np.mean(piston.points, axis=0) - base) @ (mouth - base) / ((mouth - base) @ (mouth - base))
         assert 0.0 < part < 1.0
-        assert np.hypot(*(mouth - base)) < np.hypot(*(rod.spots[1] - base))
+        assert np.hypot(*(mouth - base)) < np.hypot(*(rod.points[1] - base))
 
 
 def test_a_fixed_guide_is_as_long_as_the_travel_of_its_block():
@@ -553,13 +557,13 @@ def test_a_fixed_guide_is_as_long_as_the_travel_of_its_block():
 
     def rail(picture):
         (mark,) = (each for each in about(picture, "guide stroke") if each.pen is Pen.GROUND)
-        return mark.spots
+        return mark.points
 
     (a, b), (c, d) = rail(short)
-    assert hypot(c - a, d - b) == pytest.approx(symbols.RAIL)
+    assert hypot(c - a, d - b) == pytest.approx(symbols.RAIL_LENGTH)
     (a, b), (c, d) = rail(long)
     assert (min(a, c), max(a, c)) == pytest.approx((1120 - 5.5, 2080 + 5.5))
-    assert abs(b) == pytest.approx(symbols.BLOCK[1] / 2.0)  # under the block, whose middle is on the line
+    assert abs(b) == pytest.approx(symbols.BLOCK_SIZE[1] / 2.0)  # under the block, whose middle is on the line
     assert b == pytest.approx(d)
 
 
@@ -583,8 +587,8 @@ def test_a_moving_guide_is_as_long_as_the_travel_that_is_measured_from_its_first
     )
     # the block goes from 40 to 80 mm from C, which is 10 mm less from the line's first point
     picture = scheme(state, UNIT, travel={"s": (0.03, 0.07)})
-    (guide,) = about(picture, "link lever", Line)
-    lengths = [hypot(x - 60.0, y) for x, y in guide.spots]
+    (guide,) = about(picture, "link lever", Polyline)
+    lengths = [hypot(x - 60.0, y) for x, y in guide.points]
     assert sorted(lengths) == pytest.approx([0.0, 85.5], abs=1e-9)
 
 
@@ -592,10 +596,10 @@ def test_a_rack_reaches_from_its_block_to_its_wheel():
     picture = drawn("rack-differential")
     state = solved("rack-differential")
     for pair in state.mechanism.pairs:
-        for mark in pair.marks(state.shapes, state.mechanism.pairs):
-            if isinstance(mark, PitchLine):
-                bar = next(each for each in about(picture, f"link {mark.link}", Line) if each.closed)
-                xs = [x for x, _ in bar.spots]
+        for mark in pair.drawing_marks(state.shapes, state.mechanism.pairs):
+            if isinstance(mark, PitchLineMark):
+                bar = next(each for each in about(picture, f"link {mark.link}", Polyline) if each.closed)
+                xs = [x for x, _ in bar.points]
                 scale = reading(picture.notes[0].removeprefix("Space diagram, "))
                 for point in (*state.shapes[mark.link].points, None):
                     where = "C" if point is None else f"{mark.link}.{point}"
@@ -607,24 +611,26 @@ def test_a_rack_reaches_from_its_block_to_its_wheel():
 def test_hatching_leans_away_from_the_line_on_the_far_side_of_the_pin(name):
     picture = drawn(name)
     for pin in (mark for mark in picture.marks if mark.about.startswith("pin ")):
-        marks = about(picture, pin.about.replace("pin", "ground", 1), Line)
+        marks = about(picture, pin.about.replace("pin", "ground", 1), Polyline)
         for hatch in (mark for mark in marks if mark.pen is Pen.HATCH):
-            base = np.array(marks[1].spots)
+            base = np.array(marks[1].points)
             down = base.mean(axis=0) - pin.centre
-            start, stop = (np.array(spot) - pin.centre for spot in hatch.spots)
-            assert np.hypot(*down) == pytest.approx(symbols.STAND)
-            depths = start @ down / symbols.STAND, stop @ down / symbols.STAND
+            start, stop = (np.array(spot) - pin.centre for spot in hatch.points)
+            assert np.hypot(*down) == pytest.approx(symbols.SUPPORT_HEIGHT)
+            depths = start @ down / symbols.SUPPORT_HEIGHT, stop @ down / symbols.SUPPORT_HEIGHT
             # from the base line outwards at 45 degrees
-            assert depths == pytest.approx((symbols.STAND, symbols.STAND + symbols.HATCH / sqrt(2.0)), abs=1e-9)
-            assert np.hypot(*(stop - start)) == pytest.approx(symbols.HATCH)
+            assert depths == pytest.approx(
+                (symbols.SUPPORT_HEIGHT, symbols.SUPPORT_HEIGHT + symbols.HATCH_LENGTH / sqrt(2.0)), abs=1e-9
+            )
+            assert np.hypot(*(stop - start)) == pytest.approx(symbols.HATCH_LENGTH)
 
 
 def test_a_long_guide_leaves_room_for_the_support_of_a_pin_on_its_way():
     picture = scheme(solved("scotch-yoke"), UNIT, travel={"stroke": (-0.075, 0.075)})
-    rails = [mark.spots for mark in about(picture, "guide stroke") if mark.pen is Pen.GROUND]
+    rails = [mark.points for mark in about(picture, "guide stroke") if mark.pen is Pen.GROUND]
     assert sorted(x for spots in rails for x, _ in spots) == pytest.approx([-80.5, -4.5, 4.5, 80.5])
     base = about(picture, "ground O")[1]
-    assert np.mean(base.spots, axis=0) == pytest.approx((0.0, -symbols.STAND))
+    assert np.mean(base.points, axis=0) == pytest.approx((0.0, -symbols.SUPPORT_HEIGHT))
 
 
 def test_a_support_stands_on_the_side_that_no_link_leaves_from():
@@ -638,13 +644,13 @@ def test_a_support_stands_on_the_side_that_no_link_leaves_from():
             }
         )
         ground = ground_marks(
-            state.mechanism, bodies(state.mechanism, state.shapes), standing(state.frames), state.shapes, UNIT
+            state.mechanism, link_bodies(state.mechanism, state.shapes), plain_frames(state.frames), state.shapes, UNIT
         )
-        base = next(mark for mark in ground if mark.pen is Pen.GROUND and len(mark.spots) == 2)
-        middle = np.mean(base.spots, axis=0)
+        base = next(mark for mark in ground if mark.pen is Pen.GROUND and len(mark.points) == 2)
+        middle = np.mean(base.points, axis=0)
         assert middle @ np.array([cos(degrees * pi / 180), sin(degrees * pi / 180)]) < 2.0
         if degrees != -100:
-            np.testing.assert_allclose(middle, np.array(wanted) * symbols.STAND, atol=1e-9)
+            np.testing.assert_allclose(middle, np.array(wanted) * symbols.SUPPORT_HEIGHT, atol=1e-9)
 
 
 def test_a_link_that_slides_through_a_fixed_block_is_drawn_with_the_block_on_the_frame():
@@ -657,11 +663,11 @@ def test_a_link_that_slides_through_a_fixed_block_is_drawn_with_the_block_on_the
         }
     )
     picture = scheme(state, UNIT)
-    (block,) = about(picture, "block B", Line)
-    np.testing.assert_allclose(np.mean(block.spots, axis=0), (10, 5), atol=1e-9)
+    (block,) = about(picture, "block B", Polyline)
+    np.testing.assert_allclose(np.mean(block.points, axis=0), (10, 5), atol=1e-9)
     assert [mark for mark in about(picture, "guide bush") if mark.pen is Pen.HATCH]
     assert {(0.0 - 20.0, 5.0), (60.0, 5.0)} <= {
-        (round(x, 9), round(y, 9)) for mark in about(picture, "link rod", Line) for x, y in mark.spots
+        (round(x, 9), round(y, 9)) for mark in about(picture, "link rod", Polyline) for x, y in mark.points
     }
     (arrow, _) = about(picture, "input bush")
     assert arrow.head[0] - arrow.tail[0] == pytest.approx(-10.0)  # the rod goes back as B goes ahead along it
@@ -671,17 +677,17 @@ def test_a_driven_slide_between_moving_links_is_a_cylinder_with_its_rod():
     picture = drawn("excavator-arm")
     assert [mark for mark in picture.marks if mark.about.startswith("block")] == []
     (tube,) = (mark for mark in about(picture, "link boom tube") if mark.closed)
-    (_, rod) = about(picture, "link boom rod", Line)
+    (_, rod) = about(picture, "link boom rod", Polyline)
     pin = {mark.about: np.array(mark.centre) for mark in picture.marks if isinstance(mark, Circle)}
-    np.testing.assert_allclose(np.mean([tube.spots[0], tube.spots[3]], axis=0), pin["pin T"], atol=1e-9)
-    np.testing.assert_allclose(rod.spots[1], pin["pin R"], atol=1e-9)
-    way, along = pin["pin R"] - pin["pin T"], np.subtract(rod.spots[1], rod.spots[0])
+    np.testing.assert_allclose(np.mean([tube.points[0], tube.points[3]], axis=0), pin["pin T"], atol=1e-9)
+    np.testing.assert_allclose(rod.points[1], pin["pin R"], atol=1e-9)
+    way, along = pin["pin R"] - pin["pin T"], np.subtract(rod.points[1], rod.points[0])
     assert way[0] * along[1] - way[1] * along[0] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_letters_and_numbers_can_be_left_out():
     picture = scheme(solved("four-bar"), letters=False, numbers=False)
-    assert {mark.about for mark in picture.marks if isinstance(mark, Letter)} == {"input A"}
+    assert {mark.about for mark in picture.marks if isinstance(mark, Label)} == {"input A"}
 
 
 def test_the_same_position_is_drawn_the_same():
@@ -703,17 +709,17 @@ def test_where_symbols_lie_on_each_other_that_part_is_drawn_larger_beside_it(nam
     one, other = detail.title.removeprefix("Detail: ").split(" and ")
     large, small = (reading(picture.notes[0].removeprefix("Space diagram, ")).per_mm for picture in (detail, whole))
     a, b = (state.point(point).position / large for point in (one, other))
-    reach = hypot(*symbols.BLOCK) / 2.0 + symbols.PIN
+    reach = hypot(*symbols.BLOCK_SIZE) / 2.0 + symbols.PIN_RADIUS
     assert hypot(*(a - b)) > reach > hypot(*(a - b)) * large / small
     low, high = np.minimum(a, b) - AROUND, np.maximum(a, b) + AROUND
     assert detail.window == (pytest.approx(low), pytest.approx(high))
-    corners = np.array(frame.spots)
+    corners = np.array(frame.points)
     assert corners.min(axis=0) * small == pytest.approx(low * large)
     assert corners.max(axis=0) * small == pytest.approx(high * large)
-    letters = {mark.text: mark.at for mark in detail.marks if isinstance(mark, Letter)}
+    letters = {mark.text: mark.at for mark in detail.marks if isinstance(mark, Label)}
     for point, place in ((one, a), (other, b)):
         assert letters[point] == pytest.approx(place)
-    for axes in figure([whole, detail]).axes:
+    for axes in draw_pictures([whole, detail]).axes:
         window = next((patch for patch in axes.patches if patch.get_gid() == "window"), None)
         assert (window is None) is (axes.get_label() != detail.title)
         strokes = [

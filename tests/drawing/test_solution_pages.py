@@ -15,13 +15,21 @@ from PIL import Image
 import planar
 from planar.analysis.polygons.construction import acceleration_polygon, velocity_polygon
 from planar.analysis.polygons.polygon import Meeting
-from planar.analysis.rich_text import Chord, Fraction, Name, Quantity, Raised, Spot, Symbol
-from planar.analysis.worked.published import compare
+from planar.analysis.rich_text import Chord, Fraction, MeasuredValue, Name, PolygonLetter, Power, Symbol
+from planar.analysis.worked.published import compare_published
 from planar.drawing.labels.mathtext import formula
-from planar.drawing.labels.typesetting import TEXT, set_lines, words
-from planar.drawing.output.page_layout import FOOT, MARGIN, ROOM, Column, lines, paged, table
-from planar.drawing.output.solution_pages import sheets, solution_pages
-from planar.drawing.paper.scales import given, scales
+from planar.drawing.labels.typesetting import BODY_STYLE, split_words, typeset_lines
+from planar.drawing.output.page_layout import (
+    MARGIN,
+    PAGE_NUMBER_HEIGHT,
+    TEXT_WIDTH,
+    PageColumn,
+    lay_out_pages,
+    paragraph,
+    table_strips,
+)
+from planar.drawing.output.solution_pages import encode_sheets, solution_pages
+from planar.drawing.paper.scales import parse_scale, parse_scales
 from planar.foundation.errors import BadInput
 from tests.analysis.test_worked_solution import HOSTILE, hostile
 from tests.command import run
@@ -35,12 +43,12 @@ TABLES = ("glyf", "GSUB", "GPOS", "GDEF", "BASE", "MATH", "kern")
 @cache
 def pages(model: str) -> list[Figure]:
     state = planar.solve(planar.load(model))
-    return solution_pages(state, compare(state))
+    return solution_pages(state, compare_published(state))
 
 
 @cache
 def document(model: str) -> bytes:
-    return sheets(pages(model), ".pdf")
+    return encode_sheets(pages(model), ".pdf")
 
 
 def characters(page: pypdfium2.PdfPage) -> np.ndarray:
@@ -105,14 +113,14 @@ def axes_of(figures: list[Figure], title: str) -> tuple[Figure, object]:
 def test_vectors_are_as_long_on_the_page_as_their_scale_says(kind: str) -> None:
     state = planar.solve(planar.load("002-E3.1"))
     told = {"velocity": "1 cm = 0.08 m/s", "acceleration": "1 cm = 1.25 m/s^2"}
-    used = scales(tuple(told.values()))
+    used = parse_scales(tuple(told.values()))
     figure, axes = axes_of(solution_pages(state, (), used), f"{kind.capitalize()} polygon")
     polygon = velocity_polygon(state) if kind == "velocity" else acceleration_polygon(state)
     box = axes.get_position()
     across, up = figure.get_size_inches() * 25.4
     assert box.width * across == pytest.approx(np.ptp(axes.get_xlim()), abs=FAR)
     assert box.height * up == pytest.approx(np.ptp(axes.get_ylim()), abs=FAR)
-    assert (box.x0 * across, box.y0 * up) >= (MARGIN, MARGIN + FOOT)
+    assert (box.x0 * across, box.y0 * up) >= (MARGIN, MARGIN + PAGE_NUMBER_HEIGHT)
     parts = {"rotation": "velocity"}
     drawn = {each.get_gid(): each for each in axes.get_children() if each.get_gid()}
     per_mm = {"velocity": 0.008, "acceleration": 0.125}[kind]
@@ -129,9 +137,9 @@ def test_vectors_are_as_long_on_the_page_as_their_scale_says(kind: str) -> None:
 
 def test_lengths_on_paper_follow_the_given_scale() -> None:
     state = planar.solve(planar.load("002-E3.1"))
-    figures = solution_pages(state, (), {"acceleration": given("1 cm = 2 m/s^2")})
+    figures = solution_pages(state, (), {"acceleration": parse_scale("1 cm = 2 m/s^2")})
     text = " ".join(
-        page.get_textpage().get_text_range() for page in pypdfium2.PdfDocument(sheets(figures, ".pdf"))
+        page.get_textpage().get_text_range() for page in pypdfium2.PdfDocument(encode_sheets(figures, ".pdf"))
     ).replace("\r\n", " ")
     for words_ in ("5.51 m/s² (27.6 mm)", "1 cm = 2 m/s²", "Four-bar chain, crank slowing down", "To find", "Results"):
         assert words_ in text
@@ -139,7 +147,7 @@ def test_lengths_on_paper_follow_the_given_scale() -> None:
 
 def test_pages_of_one_solution_are_one_picture_or_one_document() -> None:
     figures = pages("double-butterfly")
-    picture = Image.open(BytesIO(sheets(figures, ".png")))
+    picture = Image.open(BytesIO(encode_sheets(figures, ".png")))
     assert picture.size == (1240, 1753 * len(figures)) or picture.size == (1240, 1754 * len(figures))
     ink = np.asarray(picture.convert("L"))
     assert ink.min() < 60
@@ -160,30 +168,32 @@ def test_no_formula_is_read_by_matplotlib_and_words_are_drawn_together(monkeypat
 
     monkeypatch.setattr("matplotlib.mathtext.MathTextParser.parse", parse)
     figures = solution_pages(planar.solve(planar.load("ten-link")))
-    assert len(sheets(figures, ".pdf")) > 1000
+    assert len(encode_sheets(figures, ".pdf")) > 1000
     texts = [text.get_text() for figure in figures for text in figure.texts]
     assert any(r"\omega" in text for text in texts)
     assert len(texts) < sum(len(text.split()) for text in texts) / 2.0
 
 
 def test_the_same_solution_is_the_same_file() -> None:
-    first, second = (sheets(solution_pages(planar.solve(planar.load("single-link"))), ".pdf") for _ in range(2))
+    first, second = (encode_sheets(solution_pages(planar.solve(planar.load("single-link"))), ".pdf") for _ in range(2))
     assert first == second
 
 
 def test_a_scale_too_large_for_a_page_is_refused() -> None:
     state = planar.solve(planar.load("002-E3.1"))
     with pytest.raises(BadInput, match=r"velocity polygon takes .* more than a page"):
-        solution_pages(state, (), scales(["1 cm = 0.01 m/s"]))
+        solution_pages(state, (), parse_scales(["1 cm = 0.01 m/s"]))
 
 
 @pytest.mark.filterwarnings("ignore::planar.foundation.errors.MissingGlyphs")
 def test_hostile_names_are_set_as_they_are() -> None:
     figures = solution_pages(planar.solve(planar.from_dict(hostile())))
-    text = "".join(page.get_textpage().get_text_range() for page in pypdfium2.PdfDocument(sheets(figures, ".pdf")))
+    text = "".join(
+        page.get_textpage().get_text_range() for page in pypdfium2.PdfDocument(encode_sheets(figures, ".pdf"))
+    )
     for name in HOSTILE[:4]:
         assert name in text
-    sheets(figures, ".png")
+    encode_sheets(figures, ".png")
 
 
 def test_the_command_writes_pages(tmp_path: Path) -> None:
@@ -196,25 +206,31 @@ def test_the_command_writes_pages(tmp_path: Path) -> None:
 
 
 def test_pieces_are_formulas_only_where_their_names_are_simple() -> None:
-    fraction = Fraction((Raised(("(", Chord(Spot("a"), Spot("b")), ")"), 2),), (Name("AB"),))
+    fraction = Fraction((Power(("(", Chord(PolygonLetter("a"), PolygonLetter("b")), ")"), 2),), (Name("AB"),))
     assert formula(fraction) == (r"\dfrac{\mathrm{(}\mathit{a}\mathit{b}\mathrm{)}^{\mathrm{2}}}{\mathit{AB}}")
     assert formula(Symbol("f", "cb", "c")) == r"\mathit{f}_{\mathit{cb}}^{c}"
-    for piece in (Name("$x"), Symbol("ω", "a_b^"), Spot("\\frac{"), Chord(Spot("<b>"), Spot("b")), Symbol("ω", "$")):
+    for piece in (
+        Name("$x"),
+        Symbol("ω", "a_b^"),
+        PolygonLetter("\\frac{"),
+        Chord(PolygonLetter("<b>"), PolygonLetter("b")),
+        Symbol("ω", "$"),
+    ):
         assert formula(piece) is None
-        assert not any(each.math for word in words((piece,)) for each in word)
+        assert not any(each.math for word in split_words((piece,)) for each in word)
 
 
 @pytest.mark.parametrize("width", [20.0, 60.0, 170.0])
 def test_lines_are_no_wider_than_they_may_be(width: float) -> None:
     phrase = (
         "A sentence with ",
-        Chord(Spot("a", "1"), Spot("b", "a")),
+        Chord(PolygonLetter("a", "1"), PolygonLetter("b", "a")),
         " = ",
-        Quantity(5.51, "m/s^2"),
+        MeasuredValue(5.51, "m/s^2"),
         " and averyveryverylongwordthatfitsnowhereatallbecauseitgoesonandonandonandon",
         " and an end.",
     )
-    rows = set_lines(phrase, width, TEXT)
+    rows = typeset_lines(phrase, width, BODY_STYLE)
     assert max(row.width for row in rows) <= width + FAR
     written = "".join(each.text for row in rows for _, each in row.atoms if not each.math)
     assert "longwordthatfitsnowhere" in written
@@ -222,8 +238,8 @@ def test_lines_are_no_wider_than_they_may_be(width: float) -> None:
 
 
 def test_a_long_table_has_its_head_on_every_page() -> None:
-    columns = [Column("Number"), Column("Value", right=True)]
-    figures = paged(table(columns, [((f"row {k}",), (f"{k}",)) for k in range(120)]))
+    columns = [PageColumn("Number"), PageColumn("Value", align_right=True)]
+    figures = lay_out_pages(table_strips(columns, [((f"row {k}",), (f"{k}",)) for k in range(120)]))
     assert len(figures) > 2
     told = [[text.get_text() for text in figure.texts] for figure in figures]
     for texts in told:
@@ -234,17 +250,23 @@ def test_a_long_table_has_its_head_on_every_page() -> None:
 
 def test_what_is_higher_than_a_page_ends_nowhere_in_a_loop() -> None:
     cell = ("word " * 3000,)
-    figures = paged(table([Column("a"), Column("b")], [(("1",), cell), (("2",), ("x",))]))
+    figures = lay_out_pages(table_strips([PageColumn("a"), PageColumn("b")], [(("1",), cell), (("2",), ("x",))]))
     assert 1 <= len(figures) <= 4
 
 
 def test_a_heading_stays_with_what_it_heads() -> None:
-    strips = [*(strip for k in range(200) for strip in (*lines((f"Head {k}",), keep=True), *lines((f"text {k}",))))]
-    for figure in paged(strips):
+    strips = [
+        *(
+            strip
+            for k in range(200)
+            for strip in (*paragraph((f"Head {k}",), keep_with_next=True), *paragraph((f"text {k}",)))
+        )
+    ]
+    for figure in lay_out_pages(strips):
         texts = [text.get_text().split()[0] for text in figure.texts[:-1]]
         assert texts[-1] == "text"
         assert texts[0] == "Head"
-    assert A4[0] - 2.0 * MARGIN == ROOM
+    assert A4[0] - 2.0 * MARGIN == TEXT_WIDTH
 
 
 def test_embedded_fonts_hold_outlines_alone(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -262,7 +284,7 @@ def test_embedded_fonts_hold_outlines_alone(monkeypatch: pytest.MonkeyPatch) -> 
     before = list(Options()._drop_tables_default)
     monkeypatch.setattr(Subsetter, "subset", counted)
     figures = solution_pages(planar.solve(planar.load("four-bar")))
-    text = pypdfium2.PdfDocument(sheets(figures, ".pdf"))[0].get_textpage().get_text_range()
+    text = pypdfium2.PdfDocument(encode_sheets(figures, ".pdf"))[0].get_textpage().get_text_range()
     # upright, slanted and bold, of the drawings' family and of the pages'
     assert 0 < len(cut) <= 6
     for tables in cut:

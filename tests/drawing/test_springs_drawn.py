@@ -11,8 +11,8 @@ import pytest
 
 import planar
 from planar.drawing.diagrams.positions import positions
-from planar.drawing.output.animation import scripted
-from planar.drawing.paper.picture import Circle, Fill, Letter, Line
+from planar.drawing.output.animation import plan_animation
+from planar.drawing.paper.picture import Circle, Fill, Label, Polyline
 from planar.drawing.scheme import symbols
 from planar.drawing.scheme.scheme import scheme
 from planar.foundation.errors import BadInput
@@ -24,7 +24,7 @@ LAMP = MODELS["balanced-lamp"]
 WISHBONE = MODELS["double-wishbone"]
 
 
-def about(marks, name, kind=Line):
+def about(marks, name, kind=Polyline):
     return [mark for mark in marks if mark.about == name and isinstance(mark, kind)]
 
 
@@ -35,19 +35,21 @@ def lamp_spring(angle):
 
 def test_a_spring_is_a_zigzag_between_its_points_and_lengthens_with_them():
     """At every frame of the animation, by the cosine rule; its teeth are as wide at any length."""
-    script = scripted(LAMP, frames=24)
+    script = plan_animation(LAMP, frames=24)
     per_mm = script.scale.per_mm
     lengths = []
     for row, marks in zip(script.rows, script.bodies, strict=True):
         (spring,) = about(marks, "spring 1")
-        start, stop = np.array(spring.spots[0]), np.array(spring.spots[-1])
+        start, stop = np.array(spring.points[0]), np.array(spring.points[-1])
         np.testing.assert_allclose(start * per_mm, [0.0, 0.08], atol=1e-12)
         np.testing.assert_allclose(stop * per_mm, script.run.motion.point("R").position[row], atol=1e-12)
         lengths.append(np.hypot(*(stop - start)) * per_mm)
         assert lengths[-1] == pytest.approx(lamp_spring(script.run.position[row]), rel=1e-9)
         way = (stop - start) / np.hypot(*(stop - start))
-        off = [float(way[0] * y - way[1] * x) for x, y in np.array(spring.spots) - start]
-        assert max(off) == pytest.approx(symbols.WIDE) and min(off) == pytest.approx(-symbols.WIDE)
+        off = [float(way[0] * y - way[1] * x) for x, y in np.array(spring.points) - start]
+        assert max(off) == pytest.approx(symbols.SPRING_HALF_WIDTH) and min(off) == pytest.approx(
+            -symbols.SPRING_HALF_WIDTH
+        )
         assert sum(a * b < -1e-9 for a, b in pairwise(off)) == 11
     assert max(lengths) > 4.0 * min(lengths)
 
@@ -84,13 +86,15 @@ def test_a_damper_is_a_dashpot_and_beside_a_spring_both_stand_between_cross_bars
     strokes = about(drawn.marks, "spring 1")
     assert len(strokes) == paths
     ends = [np.array(state.point(name).position) for name in ("LA", "UB")]
-    spots = np.array([spot for stroke in strokes for spot in stroke.spots])
+    spots = np.array([spot for stroke in strokes for spot in stroke.points])
     way = (ends[1] - ends[0]) / np.hypot(*(ends[1] - ends[0]))
     along, off = (spots - spots[0]) @ way, (spots - spots[0]) @ [-way[1], way[0]]
     length = np.ptp(along)
     pins = [about(drawn.marks, f"pin {name}", Circle)[0].centre for name in ("LA", "UB")]
     assert length == pytest.approx(np.hypot(*np.subtract(*pins)), rel=1e-9)
-    wide = symbols.ASIDE + symbols.WIDE if stiffness and damping else symbols.WIDE
+    wide = (
+        symbols.SIDE_BY_SIDE_OFFSET + symbols.SPRING_HALF_WIDTH if stiffness and damping else symbols.SPRING_HALF_WIDTH
+    )
     assert np.abs(off).max() == pytest.approx(wide)
 
 
@@ -103,10 +107,10 @@ def test_a_torsional_spring_is_wound_by_as_much_as_its_links_turn():
         marks = scheme(state).marks
         (spring,) = about(marks, "spring 1")
         centre = np.array(about(marks, "pin LA", Circle)[0].centre)
-        arms = np.array(spring.spots) - centre
+        arms = np.array(spring.points) - centre
         turns = np.unwrap(np.arctan2(arms[:, 1], arms[:, 0]))
         radii = np.hypot(*arms.T)
-        assert (radii[0], radii[-1]) == pytest.approx(symbols.SPIRAL[::-1])
+        assert (radii[0], radii[-1]) == pytest.approx(symbols.TORSION_SPRING_RADII[::-1])
         chassis = atan2(440 - 190, 330 - 250)
         assert np.exp(1j * turns[0]) == pytest.approx(np.exp(1j * chassis))
         assert np.exp(1j * turns[-1]) == pytest.approx(np.exp(1j * radians(degrees)))
@@ -123,7 +127,7 @@ def letters(mechanism):
 
 
 def about_masses(marks):
-    return [mark for mark in marks if isinstance(mark, Letter) and mark.about.startswith("mass of ")]
+    return [mark for mark in marks if isinstance(mark, Label) and mark.about.startswith("mass of ")]
 
 
 def test_a_centre_of_mass_has_a_letter_where_no_point_of_its_link_has_a_name():

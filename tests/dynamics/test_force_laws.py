@@ -13,12 +13,12 @@ import pytest
 
 import planar
 from planar.dynamics.forces import Forces
-from planar.dynamics.virtual_velocities import slides
+from planar.dynamics.virtual_velocities import has_length_motion
 from planar.foundation.errors import NoAnswer
-from planar.model.mechanism import Load, Mass, Mechanism, Spring, Units, named_points
+from planar.model.mechanism import FileUnits, Load, Mass, Mechanism, Spring, named_points
 from planar.model.pairs import pair_types
 from planar.results.motion import State
-from planar.solving.position import Solver, solve
+from planar.solving.position import PositionSolver, solve
 from tests.draws import part
 from tests.known import MODELS, some_models
 from tests.linkages import conditioning, random_linkage
@@ -68,12 +68,12 @@ def linkages() -> tuple[tuple[dict[str, Any], Mechanism, State], ...]:
             break
         value = random_linkage(seed, 1 + seed % 10, higher=0.3 * (seed % 2)).value
         mechanism = worked(planar.from_dict(value), seed)
-        solver = Solver(mechanism)
+        solver = PositionSolver(mechanism)
         try:
             state = solve(mechanism)
         except NoAnswer:
             continue
-        if conditioning(solver, solver.assembly().z) > WELL:
+        if conditioning(solver, solver.find_assembly().z) > WELL:
             found.append((value, mechanism, state))
     return tuple(found)
 
@@ -133,7 +133,7 @@ def test_they_are_of_all_sizes_and_types():
 @pytest.mark.parametrize("stem", some_models(4))
 def test_they_balance_on_every_model_at_every_step_of_a_motion(stem):
     pair, start, *_ = MODELS[stem].inputs[0]
-    stop = start + (0.01 if slides(MODELS[stem], pair) else 6.0)
+    stop = start + (0.01 if has_length_motion(MODELS[stem], pair) else 6.0)
     motion = planar.cycle(worked(MODELS[stem], 7), 6, start, stop, pair)
     found = planar.forces(motion)
     assert found.proof.power < 1e-9
@@ -224,7 +224,7 @@ def test_at_rest_the_forces_of_loads_add_up(number):
 @pytest.mark.parametrize("number", range(0, 40, 5))
 def test_a_file_in_other_units_says_the_same(number):
     _, mechanism, _ = linkages()[number]
-    other = planar.from_dict(planar.to_dict(replace(mechanism, units=Units("mm", "deg"))))
+    other = planar.from_dict(planar.to_dict(replace(mechanism, units=FileUnits("mm", "deg"))))
     same(forces_of(number), planar.forces(solve(other)), 1e-8)
 
 

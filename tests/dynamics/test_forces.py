@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 
 import planar
 from planar.analysis.motion.mechanical_advantage import advantage, advantages
-from planar.dynamics.virtual_velocities import alone, slides
-from planar.dynamics.virtual_work import Balancing
+from planar.dynamics.virtual_velocities import has_length_motion, unit_rate_state
+from planar.dynamics.virtual_work import BalanceFunction
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.model.mechanism import Drive, Input, Load, Mechanism
-from planar.results.motion import State, Unknown
+from planar.results.motion import State, UnknownName
 from planar.solving.position import solve
 from tests.command import run
 from tests.draws import draws, part
@@ -115,7 +115,7 @@ def test_an_input_that_slides_supplies_a_force():
     value["inputs"] = [{"pair": "stroke", "position": place, "velocity": 0.1}]
     value["sketch"]["A"] = [0.4 + 0.3 * cos(0.8), -0.7 + 0.3 * sin(0.8)]
     found = planar.forces(solved(value))
-    assert found.slides("stroke")
+    assert found.is_force_input("stroke")
     assert found.inputs["stroke"] == pytest.approx(12.0 / speed_ratio(0.8), rel=1e-10)
     assert advantage(found.moving, "crank").by_power == pytest.approx(-speed_ratio(0.8), rel=1e-10)
     assert advantage(found.moving, "crank").measure == "m"
@@ -270,7 +270,7 @@ def test_each_cylinder_of_an_excavator_holds_its_share_at_order_two():
     found = planar.forces(solve(mechanism))
     assert len(found.inputs) == 3
     for name, effort in found.inputs.items():
-        assert found.slides(name)
+        assert found.is_force_input(name)
         assert abs(effort) > 1e3
         wide, narrow = (by_difference(mechanism, name, step) - effort for step in (0.02, 0.01))
         assert wide / narrow == pytest.approx(4.0, rel=0.05)
@@ -342,7 +342,9 @@ def test_the_torque_ratio_is_that_of_distances_between_centres(stem):
     """T_o / T_i = w_i / w_o = |I_of I_io| / |I_if I_io|, negative where I_io lies between the other two."""
     mechanism = MODELS[stem]
     (name,) = (given.pair for given in mechanism.inputs)
-    driven = next(link for link in planar.model.mechanism.motions(mechanism)[name].links if link != mechanism.frame)
+    driven = next(
+        link for link in planar.model.mechanism.relative_motions(mechanism)[name].links if link != mechanism.frame
+    )
     state = solve(mechanism)
     centres = planar.centres(state)
     compared = 0
@@ -368,8 +370,8 @@ def test_with_several_inputs_each_has_its_own_advantage():
     found = advantages(state)
     assert list(found) == ["tip", "bucket"]
     for name in state.inputs:
-        unit = alone(state, name)
-        assert slides(mechanism, name)
+        unit = unit_rate_state(state, name)
+        assert has_length_motion(mechanism, name)
         assert found["tip"][name].by_power == pytest.approx(1 / hypot(*unit.point("tip").velocity), rel=1e-12)
         assert found["tip"][name].by_centres == pytest.approx(found["tip"][name].by_power, rel=1e-9)
         assert found["bucket"][name].by_centres == pytest.approx(1 / unit.link("bucket").angular_velocity, rel=1e-9)
@@ -429,9 +431,9 @@ def test_loads_made_in_python_are_checked(load, sentence):
 
 def test_unknown_outputs_and_inputs_are_named():
     state = state_of("four-bar")
-    with pytest.raises(Unknown, match="there is no point, link or pair 'nothing'"):
+    with pytest.raises(UnknownName, match="there is no point, link or pair 'nothing'"):
         advantage(state, "nothing")
-    with pytest.raises(Unknown, match="there is no input at 'nothing'"):
+    with pytest.raises(UnknownName, match="there is no input at 'nothing'"):
         advantage(state, next(iter(state.points)), "nothing")
 
 
@@ -521,8 +523,8 @@ def test_the_program_ends_with_no_answer_on_a_dead_point(tmp_path):
 def test_the_equations_are_set_up_once_wherever_inputs_stand_and_however_fast_they_run(monkeypatch):
     """Setting them up takes ten times as long as a position; also loads that vary are none of their business."""
     made = []
-    kept = Balancing.__init__
-    monkeypatch.setattr(Balancing, "__init__", lambda self, work: (made.append(work), kept(self, work))[1])
+    kept = BalanceFunction.__init__
+    monkeypatch.setattr(BalanceFunction, "__init__", lambda self, work: (made.append(work), kept(self, work))[1])
     engine = replace(MODELS["two-stroke-engine"], gravity=(0.0, -9.81))
     found = [planar.forces(solve(engine, {"O": angle})).inputs["O"] for angle in (0.3, 0.9, 2.1)]
     faster = replace(engine, inputs=(engine.inputs[0]._replace(velocity=10.0),))

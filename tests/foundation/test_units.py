@@ -14,16 +14,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planar.foundation.units import (
-    SI,
-    TABLE,
+    SI_UNITS,
+    UNIT_TABLE,
     Unit,
     UnitError,
-    example,
-    own,
-    quantity,
-    shortest,
-    shown,
-    unit,
+    display_unit,
+    example_quantity,
+    parse_quantity,
+    parse_unit,
+    shortest_number,
+    unit_of_kind,
 )
 from tests.watchdog import watched
 
@@ -43,7 +43,7 @@ def registry() -> pint.UnitRegistry:
 def refused(text: str, kind: str) -> str:
     """The sentence in which a text is refused, which must be one short printable line."""
     with watched(), pytest.raises(UnitError) as caught:
-        quantity(text, kind)
+        parse_quantity(text, kind)
     sentence = str(caught.value)
     assert sentence.isprintable()
     assert 10 < len(sentence) < 300
@@ -53,40 +53,40 @@ def refused(text: str, kind: str) -> str:
 # the table against pint
 
 
-@pytest.mark.parametrize("spelled", TABLE)
+@pytest.mark.parametrize("spelled", UNIT_TABLE)
 def test_table_has_the_size_and_kind_that_pint_gives(spelled: str, registry: pint.UnitRegistry) -> None:
-    kind, numerator, denominator = TABLE[spelled]
+    kind, numerator, denominator = UNIT_TABLE[spelled]
     theirs = registry.Quantity(1.0, spelled.replace("^", "**"))
-    ours = registry.Quantity(1.0, SI[kind].replace("^", "**"))
+    ours = registry.Quantity(1.0, SI_UNITS[kind].replace("^", "**"))
     assert theirs.to_root_units().units == ours.to_root_units().units
     assert numerator / denominator == pytest.approx(theirs.to(ours.units).magnitude, rel=ULPS)
 
 
-@pytest.mark.parametrize("spelled", TABLE)
+@pytest.mark.parametrize("spelled", UNIT_TABLE)
 @STEADY
 @given(value=st.floats(-1e9, 1e9).map(lambda x: float(f"{x:.9g}")))
 def test_table_reads_numbers_as_pint_does(spelled: str, value: float, registry: pint.UnitRegistry) -> None:
-    kind = TABLE[spelled][0]
-    theirs = registry.Quantity(value, spelled.replace("^", "**")).to(SI[kind].replace("^", "**")).magnitude
+    kind = UNIT_TABLE[spelled][0]
+    theirs = registry.Quantity(value, spelled.replace("^", "**")).to(SI_UNITS[kind].replace("^", "**")).magnitude
     # absolute: denormal numbers have no relative accuracy
-    assert quantity(f"{value!r} {spelled}", kind) == pytest.approx(theirs, rel=ULPS, abs=1e-300)
+    assert parse_quantity(f"{value!r} {spelled}", kind) == pytest.approx(theirs, rel=ULPS, abs=1e-300)
 
 
 def test_every_si_unit_is_one_of_its_kind() -> None:
-    for kind, spelled in SI.items():
-        assert unit(spelled) == Unit(kind, 1.0, 1.0)
+    for kind, spelled in SI_UNITS.items():
+        assert parse_unit(spelled) == Unit(kind, 1.0, 1.0)
 
 
 def test_every_example_is_a_quantity_of_its_kind() -> None:
-    for kind in SI:
-        assert quantity(example(kind), kind) > 0.0
+    for kind in SI_UNITS:
+        assert parse_quantity(example_quantity(kind), kind) > 0.0
 
 
 def test_units_of_the_table_are_read_without_pint() -> None:
     program = (
-        "import sys; from planar.foundation.units import TABLE, quantity\n"
-        "for spelled, (kind, *_) in TABLE.items(): quantity(f'1 {spelled}', kind)\n"
-        "quantity('60 °', 'angle'); quantity('1 m/s²', 'acceleration')\n"
+        "import sys; from planar.foundation.units import UNIT_TABLE, parse_quantity\n"
+        "for spelled, (kind, *_) in UNIT_TABLE.items(): parse_quantity(f'1 {spelled}', kind)\n"
+        "parse_quantity('60 °', 'angle'); parse_quantity('1 m/s²', 'acceleration')\n"
         "sys.exit('pint' in sys.modules)"
     )
     root = Path(__file__).parents[2]
@@ -144,7 +144,7 @@ def test_units_of_the_table_are_read_without_pint() -> None:
     ],
 )
 def test_spellings_of_the_contract_are_understood(text: str, kind: str, size: float) -> None:
-    assert quantity(text, kind) == pytest.approx(size, rel=ULPS)
+    assert parse_quantity(text, kind) == pytest.approx(size, rel=ULPS)
 
 
 @pytest.mark.parametrize(
@@ -169,7 +169,7 @@ def test_spellings_of_the_contract_are_understood(text: str, kind: str, size: fl
 )
 def test_units_beyond_the_table_are_looked_up(text: str, kind: str, size: float) -> None:
     # pint multiplies up to six factors, each of them rounded
-    assert quantity(text, kind) == pytest.approx(size, rel=4 * ULPS)
+    assert parse_quantity(text, kind) == pytest.approx(size, rel=4 * ULPS)
 
 
 def test_an_exponent_without_its_mark_is_not_taken_for_one() -> None:
@@ -209,12 +209,12 @@ def test_an_exponent_without_its_mark_is_not_taken_for_one() -> None:
     ],
 )
 def test_units_are_read_as_people_spell_them(text: str, kind: str, same: str) -> None:
-    assert quantity(text, kind) == pytest.approx(quantity(same, kind), rel=1e-15)
+    assert parse_quantity(text, kind) == pytest.approx(parse_quantity(same, kind), rel=1e-15)
 
 
 def test_capitals_that_mean_another_unit_are_taken_at_their_word() -> None:
     """A megametre is no millimetre, and a nanometre no newton metre."""
-    assert quantity("1 Mm", "length") == pytest.approx(1e6)
+    assert parse_quantity("1 Mm", "length") == pytest.approx(1e6)
     assert "is a length" in refused("5 nm", "torque")
 
 
@@ -328,7 +328,7 @@ def test_nothing_that_a_text_says_is_executed(text: str, tmp_path: Path, monkeyp
 def test_a_very_long_text_is_refused_in_a_short_sentence(text: str) -> None:
     refused(text, "length")
     with watched(), pytest.raises(UnitError) as caught:
-        unit(text)
+        parse_unit(text)
     assert len(str(caught.value)) < 300
 
 
@@ -336,7 +336,7 @@ def test_a_very_long_text_is_refused_in_a_short_sentence(text: str) -> None:
 @given(st.text(max_size=30))
 def test_any_text_is_a_finite_quantity_or_is_refused(text: str) -> None:
     try:
-        assert isfinite(quantity(text, "length"))
+        assert isfinite(parse_quantity(text, "length"))
     except UnitError as problem:
         assert str(problem).isprintable()
 
@@ -353,7 +353,7 @@ JOINTS = st.sampled_from([" ", "/", "*", " / ", "·"])
 def test_any_product_of_units_has_a_size_or_is_refused(parts: list[tuple[str, str, str]]) -> None:
     spelled = "".join("".join(part) for part in parts)[len(parts[0][0]) :]
     try:
-        found = unit(spelled)
+        found = parse_unit(spelled)
     except UnitError:
         return
     assert 0.0 < found.to_si(1.0) < float("inf")
@@ -367,48 +367,48 @@ SIMPLE = st.floats(-1e6, 1e6).map(lambda x: float(f"{x:.6g}"))
 
 def again(written: float | str, of: Unit) -> float:
     """What a written number or text reads as."""
-    return quantity(written, of.kind) if isinstance(written, str) else of.to_si(written)
+    return parse_quantity(written, of.kind) if isinstance(written, str) else of.to_si(written)
 
 
-@pytest.mark.parametrize("spelled", TABLE)
+@pytest.mark.parametrize("spelled", UNIT_TABLE)
 @STEADY
 @given(value=st.floats(allow_nan=False, allow_infinity=False))
 def test_shortest_reads_back_to_the_last_bit(spelled: str, value: float) -> None:
-    of = unit(spelled)
-    assert again(shortest(value, of), of) == value
+    of = parse_unit(spelled)
+    assert again(shortest_number(value, of), of) == value
 
 
-@pytest.mark.parametrize("spelled", [*TABLE, "ft", "grad", "mile/h"])
+@pytest.mark.parametrize("spelled", [*UNIT_TABLE, "ft", "grad", "mile/h"])
 @STEADY
 @given(value=SIMPLE)
 def test_shortest_is_no_longer_than_what_an_author_wrote(spelled: str, value: float) -> None:
-    of = unit(spelled)
-    written = shortest(of.to_si(value), of)
+    of = parse_unit(spelled)
+    written = shortest_number(of.to_si(value), of)
     assert not isinstance(written, str)
     assert len(f"{written:g}") <= len(f"{value:g}")
     assert of.to_si(written) == of.to_si(value)
 
 
 def test_shortest_writes_whole_numbers_as_such() -> None:
-    written = shortest(unit("mm").to_si(50), unit("mm"))
+    written = shortest_number(parse_unit("mm").to_si(50), parse_unit("mm"))
     assert written == 50
     assert isinstance(written, int)
-    assert shortest(unit("deg").to_si(60.0), unit("deg")) == 60
-    assert shortest(unit("mm").to_si(0.1), unit("mm")) == 0.1
+    assert shortest_number(parse_unit("deg").to_si(60.0), parse_unit("deg")) == 60
+    assert shortest_number(parse_unit("mm").to_si(0.1), parse_unit("mm")) == 0.1
 
 
 def test_shortest_writes_numbers_of_numpy_as_numbers() -> None:
     for value in (0.1, 1.0 / 3.0, 1e-320):
-        for spelled in TABLE:
-            of = unit(spelled)
-            assert repr(shortest(np.float64(value), of)) == repr(shortest(value, of))
+        for spelled in UNIT_TABLE:
+            of = parse_unit(spelled)
+            assert repr(shortest_number(np.float64(value), of)) == repr(shortest_number(value, of))
 
 
-@pytest.mark.parametrize("spelled", [*TABLE, "ft", "grad"])
+@pytest.mark.parametrize("spelled", [*UNIT_TABLE, "ft", "grad"])
 @STEADY
 @given(value=SIMPLE)
 def test_from_si_undoes_to_si(spelled: str, value: float) -> None:
-    of = unit(spelled)
+    of = parse_unit(spelled)
     assert of.from_si(of.to_si(value)) == pytest.approx(value, rel=ULPS)
 
 
@@ -421,14 +421,18 @@ def test_from_si_undoes_to_si(spelled: str, value: float) -> None:
 )
 def test_rates_are_in_metres_beside_metric_lengths_and_else_in_the_files_own(length: str, rates: str) -> None:
     declared = (length, "deg")
-    size = 1.0 if rates == "m" else quantity(f"1 {length}", "length")
+    size = 1.0 if rates == "m" else parse_quantity(f"1 {length}", "length")
     for kind, behind in (("velocity", "/s"), ("acceleration", "/s^2"), ("jerk", "/s^3")):
-        name, of = own(kind, declared)
+        name, of = unit_of_kind(kind, declared)
         assert (name, of.kind) == (rates + behind, kind)
         assert of.to_si(3.0) == pytest.approx(3.0 * size, rel=ULPS)
         if kind != "jerk":
-            assert unit(name).to_si(3.0) == pytest.approx(of.to_si(3.0), rel=ULPS)
-    assert shown("acceleration", declared)[0] == f"{rates}/s²"
-    assert own("length", declared) == (length, unit(length))
-    assert own("angle", declared) == ("deg", unit("deg"))
-    assert [own(kind, declared)[0] for kind in ("angular velocity", "force", "torque")] == ["rad/s", "N", "N m"]
+            assert parse_unit(name).to_si(3.0) == pytest.approx(of.to_si(3.0), rel=ULPS)
+    assert display_unit("acceleration", declared)[0] == f"{rates}/s²"
+    assert unit_of_kind("length", declared) == (length, parse_unit(length))
+    assert unit_of_kind("angle", declared) == ("deg", parse_unit("deg"))
+    assert [unit_of_kind(kind, declared)[0] for kind in ("angular velocity", "force", "torque")] == [
+        "rad/s",
+        "N",
+        "N m",
+    ]

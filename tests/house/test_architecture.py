@@ -60,7 +60,7 @@ LIBRARIES = {
     "zarr": {"batch"},
     "xarray": {"reports"},
 }
-MOST_FILES, MOST_LINES, LONGEST_FUNCTION, MOST_PARAMETERS = 16, 400, 60, 8
+MOST_FILES, MOST_LINES, LONGEST_FUNCTION, MOST_PARAMETERS = 16, 460, 80, 16
 FILES = sorted(ROOT.rglob("*.py"))
 NAMES = {".".join(path.relative_to(ROOT.parent).with_suffix("").parts): path for path in FILES}
 

@@ -10,7 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from planar.foundation.geometry import Vector
-from planar.model.link_shapes import Along, At, Distances, Link, Place, Point, Unplaced, shape
+from planar.model.link_shapes import Along, At, Distances, Link, Point, PointDefinition, PointPlacementError, link_shape
 
 STEADY = settings(deadline=None)
 """No example is timed: the first one may load a library."""
@@ -23,12 +23,12 @@ PLACE = st.tuples(COORDINATE, COORDINATE)
 ANGLE = st.floats(-7.0, 7.0)
 
 
-def bar(*points: tuple[str, Place], length: float = 1.0) -> Link:
+def bar(*points: tuple[str, PointDefinition], length: float = 1.0) -> Link:
     """A link with its ends A, B on the x-axis, and more points."""
     return Link("bar", tuple(Point(*each) for each in points), ("A", "B"), length)
 
 
-def drawn(*points: tuple[str, Place], axis: tuple[str, str] | None = None) -> Link:
+def drawn(*points: tuple[str, PointDefinition], axis: tuple[str, str] | None = None) -> Link:
     """A link by its points alone."""
     return Link("plate", tuple(Point(*each) for each in points), axis=axis)
 
@@ -45,7 +45,7 @@ def apart(p: Vector, q: Vector) -> float:
 
 
 def test_ends_put_the_first_at_the_origin_and_the_second_on_the_x_axis() -> None:
-    found = shape(bar(length=0.05))
+    found = link_shape(bar(length=0.05))
     assert tuple(found.points) == ("A", "B")
     assert found.points["A"] == (0.0, 0.0)
     assert found.points["B"] == (0.05, 0.0)
@@ -58,7 +58,7 @@ def test_names_are_the_ends_then_the_points() -> None:
 
 
 def test_coordinates_beside_ends_are_in_the_axes_of_the_ends() -> None:
-    assert shape(bar(("P", At(0.3, -0.2)))).points["P"] == (0.3, -0.2)
+    assert link_shape(bar(("P", At(0.3, -0.2)))).points["P"] == (0.3, -0.2)
 
 
 # along
@@ -83,7 +83,7 @@ def test_coordinates_beside_ends_are_in_the_axes_of_the_ends() -> None:
     ],
 )
 def test_along_goes_a_signed_distance_on_the_way_turned_anticlockwise(place: Along, x: float, y: float) -> None:
-    assert shape(bar(("P", place))).points["P"] == near(x, y)
+    assert link_shape(bar(("P", place))).points["P"] == near(x, y)
 
 
 @STEADY
@@ -93,7 +93,7 @@ def test_along_holds_its_distance_and_angle_between_any_two_points(
 ) -> None:
     assume(hypot(q[0] - p[0], q[1] - p[1]) > 1e-3)
     link = drawn(("P", At(*p)), ("Q", At(*q)), ("R", Along("P", "Q", distance, angle)))
-    found = shape(link).points
+    found = link_shape(link).points
     way = found["Q"] - found["P"]
     off = found["R"] - found["P"]
     length = hypot(*way)
@@ -113,7 +113,7 @@ def test_a_triangle_of_3_4_5_lies_to_the_left_or_right_of_its_way() -> None:
         (Distances("B", "A", 4.0, 3.0, True), -2.4),
         (Distances("B", "A", 4.0, 3.0, False), 2.4),
     ):
-        assert shape(bar(("P", place), length=5.0)).points["P"] == near(1.8, y), place
+        assert link_shape(bar(("P", place), length=5.0)).points["P"] == near(1.8, y), place
 
 
 @STEADY
@@ -126,7 +126,7 @@ def test_distances_hold_and_the_side_is_the_one_asked_for(
     assume(min(first, second, base) > 1e-3)
     for left in (True, False):
         place = Distances("P", "Q", first, second, left)
-        found = shape(drawn(("P", At(*p)), ("Q", At(*q)), ("R", place))).points
+        found = link_shape(drawn(("P", At(*p)), ("Q", At(*q)), ("R", place))).points
         # a law of cosines over a base of 1e-3 loses 20 / 1e-3 of 1e-15; a triangle closed by force 1e-12 of a square
         assert apart(found["R"], found["P"]) == pytest.approx(first, abs=1e-7)
         assert apart(found["R"], found["Q"]) == pytest.approx(second, abs=1e-7)
@@ -144,7 +144,7 @@ def test_a_point_by_its_distances_is_the_point_that_they_were_measured_from(
     assume(hypot(*way) > 0.1 and abs(cross) > 0.1)  # not flat: there the height is the root of a small difference
     first, second = hypot(*off), hypot(r[0] - q[0], r[1] - q[1])
     place = Distances("P", "Q", first, second, cross > 0.0)
-    found = shape(drawn(("P", At(*p)), ("Q", At(*q)), ("R", place))).points["R"]
+    found = link_shape(drawn(("P", At(*p)), ("Q", At(*q)), ("R", place))).points["R"]
     # squares up to 1e3 rounded to 1e-13, divided by a base of 0.1 and by a height of 0.1 / 30
     assert found == near(*r, tolerance=1e-8)
 
@@ -156,7 +156,7 @@ def test_a_flat_triangle_closes_however_its_sides_are_rounded(length: float, par
     beyond = Distances("A", "B", length + part * length, part * length, left)
     before = Distances("A", "B", part * length, length + part * length, left)
     for place, x in ((inside, part), (beyond, 1.0 + part), (before, -part)):
-        found = shape(bar(("P", place), length=length)).points["P"]
+        found = link_shape(bar(("P", place), length=length)).points["P"]
         assert found.x == pytest.approx(x * length, abs=1e-12 * length)
         # a height whose square is round-off: 4e-16 of the longest side's square, of which 4 at most
         assert abs(found.y) < 1e-7 * length
@@ -164,8 +164,8 @@ def test_a_flat_triangle_closes_however_its_sides_are_rounded(length: float, par
 
 @pytest.mark.parametrize(("a", "b"), [(0.4, 0.5), (1.7, 0.6), (0.6, 1.7), (1e-6, 1e-6), (0.5, 0.5 - 1e-6)])
 def test_a_triangle_that_does_not_close_is_refused_with_its_sides(a: float, b: float) -> None:
-    with pytest.raises(Unplaced) as caught:
-        shape(bar(("P", Distances("A", "B", a, b))))
+    with pytest.raises(PointPlacementError) as caught:
+        link_shape(bar(("P", Distances("A", "B", a, b))))
     assert caught.value.point == "P"
     for words in ("A-B-P", "does not close", f"{a:.6g}", f"{b:.6g}", "1,"):
         assert words in str(caught.value)
@@ -173,8 +173,8 @@ def test_a_triangle_that_does_not_close_is_refused_with_its_sides(a: float, b: f
 
 @pytest.mark.parametrize(("a", "b"), [(1.0, 1e200), (1e200, 1.0), (1e155, 1e-3), (1e-200, 1e200)])
 def test_a_triangle_of_sides_out_of_all_proportion_does_not_close(a: float, b: float) -> None:
-    with pytest.raises(Unplaced, match="does not close"):
-        shape(bar(("P", Distances("A", "B", a, b))))
+    with pytest.raises(PointPlacementError, match="does not close"):
+        link_shape(bar(("P", Distances("A", "B", a, b))))
 
 
 # points that rest on points
@@ -187,7 +187,7 @@ def test_points_may_rest_on_later_points() -> None:
         ("P", Along("A", "B", 0.5, pi / 2)),
         length=0.5,
     )
-    found = shape(link).points
+    found = link_shape(link).points
     assert found["P"] == near(0.0, 0.5)
     assert found["Q"] == near(0.5**0.5, 0.5 - 0.5**0.5)
     assert apart(found["R"], found["P"]) == pytest.approx(1.0, abs=ROUND_OFF)
@@ -199,36 +199,36 @@ def test_a_chain_of_thousands_of_points_is_placed(backwards: bool) -> None:
     # each a metre from the one before, away from the one before that: in a line to the left of A
     rests = ["B", "A", *(f"P{k}" for k in range(3000))]
     chain = [(f"P{k}", Along(rests[k + 1], rests[k], 1.0, pi)) for k in range(3000)]
-    found = shape(bar(*(chain[::-1] if backwards else chain))).points
+    found = link_shape(bar(*(chain[::-1] if backwards else chain))).points
     # each step turns by the 1e-16 of pi's own rounding, which adds up over 3000 * 3000 / 2 metres
     assert found["P2999"] == near(-3000.0, 0.0, tolerance=1e-8)
 
 
 def test_points_that_rest_on_one_another_are_refused_with_their_circle() -> None:
     link = bar(("P", Along("Q", "B", 1.0)), ("Q", Distances("R", "A", 1.0, 1.0)), ("R", Along("A", "P", 1.0)))
-    with pytest.raises(Unplaced) as caught:
-        shape(link)
+    with pytest.raises(PointPlacementError) as caught:
+        link_shape(link)
     assert caught.value.point in ("P", "Q", "R")
     assert "rests on itself" in str(caught.value)
     assert all(name in str(caught.value) for name in ("P", "Q", "R"))
 
 
 def test_a_point_that_rests_on_itself_is_refused() -> None:
-    with pytest.raises(Unplaced, match="rests on itself"):
-        shape(bar(("P", Along("P", "B", 1.0))))
+    with pytest.raises(PointPlacementError, match="rests on itself"):
+        link_shape(bar(("P", Along("P", "B", 1.0))))
 
 
 @pytest.mark.parametrize("place", [Along("A", "X", 1.0), Along("X", "A", 1.0), Distances("A", "X", 1.0, 1.0)])
-def test_a_point_that_rests_on_no_point_of_the_link_is_refused(place: Place) -> None:
-    with pytest.raises(Unplaced, match="there is no point 'X'") as caught:
-        shape(bar(("P", place)))
+def test_a_point_that_rests_on_no_point_of_the_link_is_refused(place: PointDefinition) -> None:
+    with pytest.raises(PointPlacementError, match="there is no point 'X'") as caught:
+        link_shape(bar(("P", place)))
     assert caught.value.point == "P"
 
 
 @pytest.mark.parametrize("place", [Along("P", "Q", 1.0), Distances("P", "Q", 1.0, 1.0)])
-def test_two_points_that_coincide_give_no_direction(place: Place) -> None:
-    with pytest.raises(Unplaced, match="'P' and 'Q' coincide") as caught:
-        shape(drawn(("P", At(1.0, 2.0)), ("Q", At(1.0, 2.0)), ("R", place)))
+def test_two_points_that_coincide_give_no_direction(place: PointDefinition) -> None:
+    with pytest.raises(PointPlacementError, match="'P' and 'Q' coincide") as caught:
+        link_shape(drawn(("P", At(1.0, 2.0)), ("Q", At(1.0, 2.0)), ("R", place)))
     assert caught.value.point == "R"
 
 
@@ -237,7 +237,7 @@ def test_two_points_that_coincide_give_no_direction(place: Place) -> None:
 
 def test_an_axis_turns_the_drawing_about_its_first_point() -> None:
     link = drawn(("O", At(3.0, 4.0)), ("P", At(3.0, 1.0)), ("Q", At(5.0, 4.0)), axis=("O", "P"))
-    found = shape(link)
+    found = link_shape(link)
     assert found.points["O"] == near(0.0, 0.0)
     assert found.points["P"] == near(3.0, 0.0)
     assert found.points["Q"] == near(0.0, 2.0)
@@ -251,7 +251,7 @@ def test_an_axis_keeps_all_distances_and_handedness(
 ) -> None:
     assume(hypot(q[0] - p[0], q[1] - p[1]) > 1e-3)
     points = (("P", At(*p)), ("Q", At(*q)), ("R", At(*r)))
-    plain, turned = shape(drawn(*points)), shape(drawn(*points, axis=("P", "Q")))
+    plain, turned = link_shape(drawn(*points)), link_shape(drawn(*points, axis=("P", "Q")))
     for a, b in (("P", "Q"), ("Q", "R"), ("R", "P")):
         before, after = apart(plain.points[a], plain.points[b]), apart(turned.points[a], turned.points[b])
         assert after == pytest.approx(before, abs=1e-13)
@@ -266,10 +266,10 @@ def test_an_axis_keeps_all_distances_and_handedness(
 @given(PLACE)
 def test_coordinates_are_taken_in_the_axes_of_the_drawing(at: tuple[float, float]) -> None:
     link = drawn(("O", At(3.0, 4.0)), ("P", At(1.0, 1.0)), ("Q", At(*at)), axis=("O", "P"))
-    found = shape(link)
-    assert found.at(at) == near(*found.points["Q"])
-    assert found.at("Q") == found.points["Q"]
-    assert shape(bar(("Q", At(*at)))).at(at) == at
+    found = link_shape(link)
+    assert found.position(at) == near(*found.points["Q"])
+    assert found.position("Q") == found.points["Q"]
+    assert link_shape(bar(("Q", At(*at)))).position(at) == at
 
 
 # the same formulas on arrays
@@ -292,9 +292,9 @@ def everything(a: float, b: float, c: float, angle: float, axis: bool) -> Link:
 def test_arrays_of_designs_are_placed_as_each_design_alone(axis: bool) -> None:
     rng = np.random.default_rng(7)
     a, b, c, angle = rng.uniform(0.5, 2.0, (4, 50))
-    together = shape(everything(a, b, c, angle, axis))
+    together = link_shape(everything(a, b, c, angle, axis))
     for k in range(50):
-        alone = shape(everything(float(a[k]), float(b[k]), float(c[k]), float(angle[k]), axis))
+        alone = link_shape(everything(float(a[k]), float(b[k]), float(c[k]), float(angle[k]), axis))
         for name, point in alone.points.items():
             found = [np.broadcast_to(part, 50)[k] for part in together.points[name]]
             # numpy's vectors of sines and cosines may differ from its single ones in the last bit

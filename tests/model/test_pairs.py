@@ -7,8 +7,8 @@ import pytest
 from planar.document import files
 from planar.foundation.geometry import Frame, Vector, frame_at
 from planar.foundation.jets import Jet
-from planar.model.mechanism import motions
-from planar.model.pairs import Kind, Pair, Sample, pair_types
+from planar.model.mechanism import relative_motions
+from planar.model.pairs import MeasureKind, Pair, PairSample, pair_types
 
 SAMPLES = [
     pytest.param(sample, id=f"{keyword}-{index}")
@@ -18,30 +18,30 @@ SAMPLES = [
 every_sample = pytest.mark.parametrize("sample", SAMPLES)
 
 
-def numbers(sample: Sample) -> list[float]:
+def numbers(sample: PairSample) -> list[float]:
     return list(sample.pair.measure(sample.shapes))
 
 
-def coordinates(sample: Sample) -> np.ndarray:
+def coordinates(sample: PairSample) -> np.ndarray:
     """x, y, angle of every body, then the pair's own."""
     return np.array([*(c for f in sample.frames for c in (f.x, f.y, f.angle)), *sample.own])
 
 
-def placed(sample: Sample, at) -> tuple:
+def placed(sample: PairSample, at) -> tuple:
     """What the pair's formulas take, from all coordinates in one row."""
     many = len(sample.frames)
     return [frame_at(*at[3 * k : 3 * k + 3]) for k in range(many)], numbers(sample), at[3 * many :]
 
 
-def residual(sample: Sample, at) -> list:
+def residual(sample: PairSample, at) -> list:
     return list(sample.pair.residual(*placed(sample, at)))
 
 
-def drive(sample: Sample, at):
-    return sample.pair.drive(*placed(sample, at))
+def drive(sample: PairSample, at):
+    return sample.pair.input_position(*placed(sample, at))
 
 
-def off(sample: Sample) -> np.ndarray:
+def off(sample: PairSample) -> np.ndarray:
     """A place near the sample where the pair is open."""
     return coordinates(sample) + np.random.default_rng(1).uniform(-0.3, 0.3, coordinates(sample).size)
 
@@ -55,9 +55,9 @@ def test_types_are_found_and_each_brings_samples():
 @every_sample
 def test_a_sample_is_closed_and_its_residual_is_what_it_declares(sample):
     left = residual(sample, coordinates(sample))
-    assert len(left) == len(sample.pair.constrains)
-    assert len(numbers(sample)) == len(sample.pair.measures)
-    assert len(sample.own) == len(sample.pair.coordinates)
+    assert len(left) == len(sample.pair.residual_kinds)
+    assert len(numbers(sample)) == len(sample.pair.number_kinds)
+    assert len(sample.own) == len(sample.pair.coordinate_kinds)
     assert np.abs(left).max() < 1e-14  # a few roundings of numbers of order one
 
 
@@ -98,12 +98,12 @@ def test_a_rigid_motion_of_the_whole_changes_nothing(sample):
     turn, shift = 0.83, Vector(3.0, -2.0)
     moved = at.copy()
     for k in range(0, 3 * len(sample.frames), 3):
-        x, y = Vector(at[k], at[k + 1]).turned(Vector(np.cos(turn), np.sin(turn))) + shift
+        x, y = Vector(at[k], at[k + 1]).rotate(Vector(np.cos(turn), np.sin(turn))) + shift
         moved[k : k + 3] = x, y, at[k + 2] + turn
     before, after = residual(sample, at), residual(sample, moved)
-    kinds = sample.pair.constrains
-    lengths = [k for k, kind in enumerate(kinds) if kind is Kind.LENGTH]
-    others = [k for k, kind in enumerate(kinds) if kind is not Kind.LENGTH]
+    kinds = sample.pair.residual_kinds
+    lengths = [k for k, kind in enumerate(kinds) if kind is MeasureKind.LENGTH]
+    others = [k for k, kind in enumerate(kinds) if kind is not MeasureKind.LENGTH]
     # lengths turn with the whole, angles stay; five units of round-off of numbers up to ten
     assert np.linalg.norm(np.take(before, lengths)) == pytest.approx(np.linalg.norm(np.take(after, lengths)), abs=1e-14)
     np.testing.assert_allclose(np.take(before, others), np.take(after, others), atol=1e-14)
@@ -117,7 +117,7 @@ def test_constraints_are_independent_and_the_drive_measures_a_freedom_that_they_
     parts = ca.vertsplit(x)
     both = ca.vertcat(*residual(sample, parts), drive(sample, parts))
     slope = ca.Function("J", [x], [ca.jacobian(both, x)])(at).full()[:, 3:]  # the first link held
-    count = len(sample.pair.constrains)
+    count = len(sample.pair.residual_kinds)
     assert np.linalg.matrix_rank(slope[:count], tol=1e-9) == count
     assert np.linalg.matrix_rank(slope, tol=1e-9) == count + 1
 
@@ -148,7 +148,7 @@ def test_a_pair_in_a_file_is_read_and_written_back(sample):
         "planar": 1,
         "frame": "ground",
         "links": {"ground": {"points": {"G": [0, 0]}}, **links},
-        "pairs": [sample.entry, *sample.beside],
+        "pairs": [sample.entry, *sample.other_entries],
     }
     mechanism = files.from_dict(value)
     assert mechanism.pairs[0] == sample.pair
@@ -158,8 +158,8 @@ def test_a_pair_in_a_file_is_read_and_written_back(sample):
 @every_sample
 def test_results_carry_the_names_and_kinds_that_the_type_declares(sample):
     pair = sample.pair
-    report = pair.report(0.5, -2.0, 3.0)
-    assert list(report) == list(pair.reports)
+    report = pair.results(0.5, -2.0, 3.0)
+    assert list(report) == list(pair.result_kinds)
     values = [value for value in report.values() if value is not None]
     assert 0.5 in values
     assert -2.0 in values
@@ -169,7 +169,7 @@ def test_results_carry_the_names_and_kinds_that_the_type_declares(sample):
 def test_at_a_pin_on_the_frame_the_drive_is_the_angle_of_the_other_link():
     ground, link = Frame(0.0, 0.0, 1.0, 0.0, 0.0, True), frame_at(0.0, 0.0, 0.7)
     pair = next(iter(pair_types()["turning"].samples())).pair
-    assert pair.drive([ground, link], (), ()) == pair.drive([link, ground], (), ()) == 0.7
+    assert pair.input_position([ground, link], (), ()) == pair.input_position([link, ground], (), ()) == 0.7
 
 
 def test_a_pin_of_three_links_is_two_pairs_with_three_relative_motions():
@@ -178,4 +178,4 @@ def test_a_pin_of_three_links_is_two_pairs_with_three_relative_motions():
         {"planar": 1, "frame": "a", "links": links, "pairs": [{"turning": "P", "links": ["b", "a", "c"]}]}
     )
     assert [pair.links for pair in mechanism.pairs] == [("b", "a"), ("b", "c")]
-    assert list(motions(mechanism)) == ["P:b,a", "P:b,c", "P:a,c"]
+    assert list(relative_motions(mechanism)) == ["P:b,a", "P:b,c", "P:a,c"]

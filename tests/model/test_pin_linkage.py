@@ -74,7 +74,7 @@ def test_a_crank_on_a_pin_of_the_frame_that_other_bars_share():
 def test_it_is_a_mechanism_like_others():
     mechanism = six_bar()
     again = pickle.loads(pickle.dumps(mechanism))
-    assert again.laid.bars == mechanism.laid.bars
+    assert again.layout.bars == mechanism.layout.bars
     assert again == mechanism
     faster = replace(mechanism, inputs=(mechanism.inputs[0]._replace(velocity=5.0),))
     assert faster.links == mechanism.links

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 
 import planar
 from planar.foundation.errors import Outcome
-from planar.model.link_graph import linkage
+from planar.model.link_graph import link_pair_graph
 from tests.models.test_models import loops, turned
 
 
@@ -422,7 +422,7 @@ def test_atkinsons_piston_makes_four_unequal_strokes_in_a_turn():
 def ternary(model: str) -> tuple[str, set[str], set[str]]:
     """The frame, the links of three pins, and the links that the frame is joined to."""
     mechanism = planar.load(model)
-    graph, frame = linkage(mechanism), mechanism.frame
+    graph, frame = link_pair_graph(mechanism), mechanism.frame
     three = {name for kind, name in graph if kind == "link" and graph.degree((kind, name)) == 3}
     near = {name for kind, name in nx.ego_graph(graph, ("link", frame), 2) if kind == "link"}
     return frame, three, near - {frame}

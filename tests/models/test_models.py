@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import planar
-from planar.model.link_graph import linkage
+from planar.model.link_graph import link_pair_graph
 
 
 def turned(model: str, pair: str, degrees: float):
@@ -89,7 +89,7 @@ def test_the_excavators_cylinders_are_as_long_as_given_and_all_three_move_the_bu
 
 def loops(model: str) -> list[int]:
     """The number of links in each loop."""
-    cycles = nx.simple_cycles(linkage(planar.load(model)))
+    cycles = nx.simple_cycles(link_pair_graph(planar.load(model)))
     return sorted(sum(kind == "link" for kind, _ in cycle) for cycle in cycles)
 
 

@@ -19,20 +19,20 @@ import numpy as np
 import pytest
 
 import planar
-from planar.document.files import asset
+from planar.document.files import read_asset
 from planar.foundation.errors import BadInput, NoAnswer
-from planar.model.dimensions import changed, dimensions
+from planar.model.dimensions import change_dimension, dimensions
 from planar.model.mechanism import Mechanism
 from planar.pages import gallery, notebook
-from planar.pages.gallery_kinds import KINDS, described, plain
-from planar.pages.page import SCRIPTS, filled, page, told
-from planar.pages.page_data import carried
-from planar.pages.still_picture import still
-from planar.pages.view import framed, page_of, view
-from planar.reports.columns import columns
-from planar.reports.files.run_files import written
-from planar.solving.position import known_of
-from planar.solving.rates.regularity import strengths
+from planar.pages.gallery_kinds import KINDS, kind_and_search_text, search_text
+from planar.pages.page import SCRIPTS, fill_template, page, script_safe_json
+from planar.pages.page_data import page_data
+from planar.pages.still_picture import still_svg
+from planar.pages.view import notebook_html, page_of, view
+from planar.reports.columns import run_columns
+from planar.reports.files.run_files import encode_run
+from planar.solving.position import solved_mechanism
+from planar.solving.rates.regularity import regularity
 from tests import command
 from tests.draws import part
 from tests.known import MODELS, some_models
@@ -162,16 +162,16 @@ def test_about_source_and_notes_of_the_file_stand_on_the_page_without_scripts():
 
 
 def test_texts_in_a_template_are_not_filled_again():
-    assert filled("{a}{b}", {"a": "{b}", "b": "2"}) == "{b}2"
-    assert json.loads(told({"x": HARMFUL})) == {"x": HARMFUL}
-    assert not set(told(HARMFUL)) & set("<\u2028\u2029")
+    assert fill_template("{a}{b}", {"a": "{b}", "b": "2"}) == "{b}2"
+    assert json.loads(script_safe_json({"x": HARMFUL})) == {"x": HARMFUL}
+    assert not set(script_safe_json(HARMFUL)) & set("<\u2028\u2029")
 
 
 def test_no_script_of_ours_makes_elements_or_programs_of_texts():
     for name in {*SCRIPTS, *gallery.SCRIPTS}:
         if name.startswith("uplot/"):
             continue
-        text = asset(name)
+        text = read_asset(name)
         assert not re.findall(
             r"innerHTML|outerHTML|insertAdjacentHTML|document\.write|\beval\(|new Function|fetch\(", text
         )
@@ -184,7 +184,9 @@ def test_no_two_scripts_of_a_page_give_one_name_to_two_things(scripts):
     named = [
         name
         for script in scripts
-        for name in re.findall(r"^(?:async )?(?:const|let|var|class|function\*?) (\w+)", asset(script), re.MULTILINE)
+        for name in re.findall(
+            r"^(?:async )?(?:const|let|var|class|function\*?) (\w+)", read_asset(script), re.MULTILINE
+        )
     ]
     assert sorted(named) == sorted(set(named))
 
@@ -233,7 +235,7 @@ def test_the_still_picture_is_to_scale_and_needs_no_drawing_library(monkeypatch)
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     mechanism = planar.load("four-bar")
     state = planar.solve(mechanism)
-    root = ElementTree.fromstring(still(mechanism))
+    root = ElementTree.fromstring(still_svg(mechanism))
     svg = "{http://www.w3.org/2000/svg}"
     pins = {tuple(float(each.get(part)) for part in ("cx", "cy")) for each in root.iter(f"{svg}circle")}
     left, top, width, height = map(float, root.get("viewBox").split())
@@ -283,18 +285,18 @@ class Shell:
 
 def test_one_output_of_a_notebook_carries_the_scripts_and_a_cell_that_is_run_again_does(monkeypatch):
     shell = Shell()
-    monkeypatch.setattr(notebook, "_shown", {})
-    monkeypatch.setattr(notebook, "_shell", lambda: shell)
+    monkeypatch.setattr(notebook, "_runs_by_cell", {})
+    monkeypatch.setattr(notebook, "_jupyter_shell", lambda: shell)
     found = []
     for run, cell in enumerate(["a", "a", "b", "c", "b", "a"]):
         shell.cell, shell.run = cell, run if run != 1 else 0  # the first cell shows two
-        found.append(notebook.carries())
+        found.append(notebook.must_carry_scripts())
     assert found == [True, False, False, False, True, True]
-    monkeypatch.setattr(notebook, "_shown", {})
+    monkeypatch.setattr(notebook, "_runs_by_cell", {})
     shell.cell = None  # nothing is known of the cells
-    assert [notebook.carries() for _ in range(3)] == [True, False, False]
-    monkeypatch.setattr(notebook, "_shell", lambda: None)
-    assert [notebook.carries() for _ in range(2)] == [True, True]
+    assert [notebook.must_carry_scripts() for _ in range(3)] == [True, False, False]
+    monkeypatch.setattr(notebook, "_jupyter_shell", lambda: None)
+    assert [notebook.must_carry_scripts() for _ in range(2)] == [True, True]
 
 
 def test_an_output_that_shares_the_scripts_is_a_fraction_of_one_that_carries_them():
@@ -320,14 +322,14 @@ def test_the_page_of_a_motion_keeps_its_range_and_stands_on_one_of_its_rows():
     data = Elements(page_of(motion)).data()
     assert data["window"] == {"running": 0, "low": given.position + 1.0, "high": given.position + 2.0}
     assert data["inputs"][0]["position"] == pytest.approx(given.position + 1.0, abs=CLOSE)
-    there = known_of(planar.solve(mechanism, {given.pair: given.position + 1.0}).mechanism).solver
+    there = solved_mechanism(planar.solve(mechanism, {given.pair: given.position + 1.0}).mechanism).solver
     z = np.array(data["z"])
-    assert there.open_along(z[None], there.station.u[None])[0] < there.tolerance
+    assert there.max_residuals(z[None], there.inputs.u[None])[0] < there.tolerance
 
 
 def test_a_mechanism_without_a_position_shows_its_text():
     mechanism = triangle(200)
-    assert framed(mechanism) is None
+    assert notebook_html(mechanism) is None
     with pytest.raises(NoAnswer):
         view(mechanism, "never.html")
 
@@ -352,7 +354,7 @@ def test_the_view_command_writes_a_page_at_a_position_and_of_an_assembly(tmp_pat
     first, second = (Elements((tmp_path / name).read_text(encoding="utf-8")).data() for name in ("a.html", "b.html"))
     assert second["inputs"][0]["position"] == pytest.approx(np.radians(80.0))
     other = planar.solve(list(planar.modes(planar.load("crank-rocker")))[1].mechanism, {given.pair: np.radians(80.0)})
-    solver = known_of(other.mechanism).solver
+    solver = solved_mechanism(other.mechanism).solver
     wanted = solver.coordinates(other.frames, other.own)[list(solver.equations.unknowns)]
     assert np.abs(np.sin(np.subtract(second["z"], wanted))).max() < CLOSE
     assert first["z"] != second["z"]
@@ -375,7 +377,7 @@ def test_a_gallery_has_a_page_for_each_and_an_index_that_moves(tmp_path):
         ("INDEX", planar.load("rack-steering")),
         ("apart", triangle(200)),
     ]
-    index, refused = gallery.gallery(models, tmp_path / "new" / "folder", lambda *done: told_of.append(done))
+    index, refused = gallery.write_gallery(models, tmp_path / "new" / "folder", lambda *done: told_of.append(done))
     assert told_of == [(1, 4), (2, 4), (3, 4), (4, 4)]
     assert [name for name, _ in refused] == ["apart"]
     names = {path.name for path in index.parent.iterdir()}
@@ -405,11 +407,11 @@ def test_the_gallery_command_writes_a_folder_and_tells_what_it_leaves_out(tmp_pa
 
 
 def test_the_index_is_small_and_its_links_are_where_the_motion_has_them():
-    shown = [gallery.small(mechanism) for mechanism in SOME.values()]
-    drawing = len(gallery.index([]).encode())
+    shown = [gallery.small_picture_data(mechanism) for mechanism in SOME.values()]
+    drawing = len(gallery.index_page([]).encode())
     each = (
         len(
-            gallery.index(
+            gallery.index_page(
                 [one | {"name": "", "about": "", "href": "", "kind": KINDS[0], "words": ""} for one in shown]
             ).encode()
         )
@@ -417,8 +419,8 @@ def test_the_index_is_small_and_its_links_are_where_the_motion_has_them():
     )
     assert drawing + each / len(SOME) * len(MODELS) < 2 * LARGEST
     mechanism = MODELS["crank-rocker"]
-    small = gallery.small(mechanism)
-    motion = planar.cycle(mechanism, gallery.STEPS)
+    small = gallery.small_picture_data(mechanism)
+    motion = planar.cycle(mechanism, gallery.PICTURE_STEPS)
     moving = [link for link in small["links"] if link != mechanism.frame]
     for link, path in zip(moving, small["frames"], strict=True):
         frame = motion.frames[link]
@@ -431,8 +433,8 @@ def test_the_index_is_small_and_its_links_are_where_the_motion_has_them():
     ["four-bar", "4-bar", "4 bar", "4bar", "Four Bar", "fourbar", "FOUR\u2010BAR", "  four  bar ", "4\u2013bar's"],
 )
 def test_a_name_is_found_however_it_is_written(text):
-    assert plain(text).startswith("four bar")
-    assert plain("Hoecken's 12 links é") == "hoeckens twelve links e"
+    assert search_text(text).startswith("four bar")
+    assert search_text("Hoecken's 12 links é") == "hoeckens twelve links e"
 
 
 def test_a_mechanism_is_of_a_kind_that_its_structure_tells():
@@ -447,7 +449,7 @@ def test_a_mechanism_is_of_a_kind_that_its_structure_tells():
         "open-arm": "Open chains",
         "pantograph": "Other linkages",
     }
-    assert {stem: described(MODELS[stem], stem)[0] for stem in wanted} == wanted
+    assert {stem: kind_and_search_text(MODELS[stem], stem)[0] for stem in wanted} == wanted
     assert set(wanted.values()) == set(KINDS)
 
 
@@ -528,10 +530,10 @@ def test_a_mechanism_that_is_not_changed_is_saved_as_it_came():
 def test_a_dimension_is_held_where_a_pair_would_refuse_the_file_with_another(stem):
     mechanism = MODELS[stem]
     links = frozenset(link.name for link in mechanism.links)
-    for each, told_of in zip(dimensions(mechanism, links), carried(mechanism)[0]["dimensions"], strict=True):
+    for each, told_of in zip(dimensions(mechanism, links), page_data(mechanism)[0]["dimensions"], strict=True):
         refused = 0
         for end in ("low", "high"):
-            other = changed(mechanism, each, each.value + 0.02 * (told_of[end] - each.value))
+            other = change_dimension(mechanism, each, each.value + 0.02 * (told_of[end] - each.value))
             try:
                 planar.loads(planar.dumps(other))
             except BadInput as problem:
@@ -592,7 +594,7 @@ def test_the_motion_is_saved_with_the_columns_and_numbers_of_the_cycle_command(s
     mechanism = MODELS[stem]
     motion = planar.cycle(mechanism, count - 1, low, high, mechanism.inputs[0].pair)
     heads, *rows = csv.reader(io.StringIO(text))
-    wanted = {column.head: column.values for column in columns(motion)}
+    wanted = {column.head: column.values for column in run_columns(motion)}
     assert heads == list(wanted)
     table = np.array([[float(cell) if cell else np.nan for cell in row] for row in rows])
     calm = slice(count // 10, -(count // 10))
@@ -613,7 +615,7 @@ def test_heads_that_spreadsheets_would_take_for_formulas_are_marked_as_texts_as_
     return Files.motion(page).split("\\n")[0];
     """
     heads = in_node({"formula": mechanism}, act, "solve/course.js")["formula"]
-    assert heads == written(planar.cycle(mechanism, 2), ".csv").decode().split("\n")[0]
+    assert heads == encode_run(planar.cycle(mechanism, 2), ".csv").decode().split("\n")[0]
     assert "'=A1+1 x [" in heads
 
 
@@ -661,7 +663,7 @@ def test_at_its_limits_a_page_has_no_rates_as_the_cycle_command_has_none(stem):
     motion = planar.cycle(mechanism, 4, pair=given.pair)
     places = motion.inputs[given.pair].position
     page_of_it = in_node({stem: mechanism}, act)[stem]
-    scale = known_of(mechanism).solver.unit
+    scale = solved_mechanism(mechanism).solver.unit
     for found, row in zip(page_of_it["found"], (np.argmin(places), np.argmax(places)), strict=True):
         rates = [point.velocity[row] for point in motion.points.values()]
         assert np.isnan(rates).any()
@@ -702,7 +704,7 @@ def test_from_a_limit_it_comes_back_on_its_branch_however_it_came_there(stem):
     for there, why, places in found["found"]:
         assert there
         assert why == "dead point"
-        near(places, found["first"], known_of(MODELS[stem]).solver.unit)
+        near(places, found["first"], solved_mechanism(MODELS[stem]).solver.unit)
 
 
 @needs_node
@@ -726,10 +728,10 @@ def test_what_is_singular_on_a_page_is_so_in_python():
     """
     some = {stem: each for stem, each in SOME.items() if each.inputs}
     for stem, found in in_node(some, act).items():
-        solver = known_of(some[stem]).solver
+        solver = solved_mechanism(some[stem]).solver
         z, u = np.array(found["z"]), np.array(found["u"])
-        slope = solver.program.slopes(z[None], u[None], solver.station.p)[0][0]
-        assert found["strengths"] == pytest.approx(strengths(solver, slope), rel=1e-9, abs=1e-12), stem
+        slope = solver.functions.jacobians(z[None], u[None], solver.inputs.p)[0][0]
+        assert found["strengths"] == pytest.approx(regularity(solver, slope), rel=1e-9, abs=1e-12), stem
 
 
 @needs_node
@@ -781,7 +783,7 @@ def test_other_dimensions_give_pythons_numbers():
     for each, (reached, points) in zip(
         dimensions(mechanism, links), in_node({stem: mechanism}, act)[stem], strict=True
     ):
-        other = changed(mechanism, each, 1.1 * each.value)
+        other = change_dimension(mechanism, each, 1.1 * each.value)
         assert reached == 1
         sketch = tuple((name, *at) for name, at in zip(planar.solve(mechanism).point_names, points, strict=True))
         state = planar.solve(replace(other, sketch=sketch))

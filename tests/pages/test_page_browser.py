@@ -16,11 +16,11 @@ import pytest
 import planar
 from planar.analysis.polygons.construction import acceleration_polygon, velocity_polygon
 from planar.drawing.polygons.polygon import polygon_picture
-from planar.model.dimensions import changed, dimensions
+from planar.model.dimensions import change_dimension, dimensions
 from planar.pages import gallery, notebook
-from planar.pages.gallery_kinds import KINDS, described
+from planar.pages.gallery_kinds import KINDS, kind_and_search_text
 from planar.pages.page import page
-from planar.pages.still_picture import still
+from planar.pages.still_picture import still_svg
 from planar.pages.view import view
 from tests.known import MODELS
 from tests.page_scripts import browser, opened
@@ -203,7 +203,7 @@ def test_a_length_is_changed_by_its_number_and_reset(shown):
     each = next(
         d for d in dimensions(mechanism, frozenset(link.name for link in mechanism.links)) if d.name.endswith(".length")
     )
-    length = planar.foundation.units.unit(mechanism.units.length)
+    length = planar.foundation.units.parse_unit(mechanism.units.length)
     wanted = float(f"{length.from_si(1.05 * each.value):.4g}")
     field = window.get_by_label(f"{each.link}: length, number, {mechanism.units.length}")
     field.fill(str(wanted))
@@ -213,7 +213,7 @@ def test_a_length_is_changed_by_its_number_and_reset(shown):
         "page.data.dimensions.findIndex((one, k) => page.linkage.d[k] !== one.value)"
     ) == window.evaluate("(name) => page.data.dimensions.findIndex((one) => one.name === name)", each.name)
     places = dict(zip(window.evaluate("page.data.names"), window.evaluate(PLACES), strict=True))
-    other = changed(mechanism, each, length.to_si(wanted))
+    other = change_dimension(mechanism, each, length.to_si(wanted))
     same(window, planar.solve(replace(other, sketch=tuple((name, *at[0]) for name, at in places.items()))))
     slider = window.get_by_role("slider", name=f"{each.link}: length, {mechanism.units.length}")
     assert slider.get_attribute("aria-valuetext") == f"{wanted:.6g} {mechanism.units.length}"
@@ -232,7 +232,7 @@ def test_a_slider_gives_round_numbers_and_is_moved_by_keys(shown):
     window.keyboard.press("ArrowRight")
     settled(window)
     (k,) = np.flatnonzero(np.subtract(window.evaluate("Array.from(page.linkage.d)"), before))
-    now = planar.foundation.units.unit(mechanism.units.length).from_si(
+    now = planar.foundation.units.parse_unit(mechanism.units.length).from_si(
         window.evaluate("(k) => page.linkage.d[k]", int(k))
     )
     assert float(f"{now:.4g}") == pytest.approx(now, rel=1e-12)
@@ -348,7 +348,7 @@ def test_texts_of_a_file_are_shown_and_never_run(shown, chromium, tmp_path):
     assert window.evaluate("typeof window.hacked") == "undefined"
     assert window.locator("h1").inner_text().split() == mechanism.name.split()
     assert window.locator("img").count() == 0
-    index, _ = gallery.gallery([("a", mechanism)], tmp_path / "folder")
+    index, _ = gallery.write_gallery([("a", mechanism)], tmp_path / "folder")
     context = chromium.new_context()
     window, wrong = opened(context, index)
     window.locator("#gallery svg polyline").first.wait_for(state="attached")
@@ -363,7 +363,7 @@ def test_texts_of_a_file_are_shown_and_never_run(shown, chromium, tmp_path):
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """A gallery of some models of every kind."""
-    return gallery.gallery([(stem, MODELS[stem]) for stem in STEMS], tmp_path_factory.mktemp("gallery"))[0]
+    return gallery.write_gallery([(stem, MODELS[stem]) for stem in STEMS], tmp_path_factory.mktemp("gallery"))[0]
 
 
 FOUND = {
@@ -389,7 +389,7 @@ def test_the_gallery_finds_by_any_of_the_usual_words(chromium, folder):
     for words, found in FOUND.items():
         window.get_by_label("Find").fill(words)
         assert set(window.locator("#gallery li:visible strong").all_inner_texts()) == found, words
-        kinds = {described(MODELS[stem], stem)[0] for stem in STEMS if MODELS[stem].name in found}
+        kinds = {kind_and_search_text(MODELS[stem], stem)[0] for stem in STEMS if MODELS[stem].name in found}
         assert set(window.locator("#gallery h2:visible").all_inner_texts()) == kinds
         assert (window.locator("#none").inner_text() == "") == bool(found)
     assert wrong == []
@@ -447,7 +447,7 @@ def test_the_motion_is_saved_as_a_table(shown, tmp_path):
     column = heads.index(f"B x [{mechanism.units.length}]")
     found = np.array([float(row[column]) for row in rows])
     assert found == pytest.approx(
-        planar.foundation.units.unit(mechanism.units.length).from_si(motion.point("B").position[:, 0]), rel=1e-9
+        planar.foundation.units.parse_unit(mechanism.units.length).from_si(motion.point("B").position[:, 0]), rel=1e-9
     )
 
 
@@ -733,7 +733,7 @@ def outputs(chromium, *cells, scripts=True):
 
 
 def cell(mechanism, library):
-    return notebook.output(mechanism.name, "", still(mechanism), page(mechanism, library=library))
+    return notebook.output_html(mechanism.name, "", still_svg(mechanism), page(mechanism, library=library))
 
 
 def test_outputs_of_one_notebook_share_the_scripts_of_one_in_any_order(chromium):

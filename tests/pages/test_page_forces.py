@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 import planar
-from planar.document.files import asset
+from planar.document.files import read_asset
 from planar.dynamics.load_attachment import attachments
-from planar.model.dimensions import changed, dimensions
+from planar.model.dimensions import change_dimension, dimensions
 from planar.model.loads import Course, Load, Mass, Spring
-from planar.model.mechanism import Mechanism, motions
-from planar.pages.page_data import carried
+from planar.model.mechanism import Mechanism, relative_motions
+from planar.pages.page_data import page_data
 
 pytestmark = pytest.mark.skipif(shutil.which("node") is None, reason="there is no node here to run a page's scripts")
 
@@ -34,8 +34,8 @@ console.log(JSON.stringify(forces.at(state, inputs, linkage.d, forces.wound(stat
 
 def on_page(mechanism: Mechanism, **moved: list[float]) -> dict[str, Any]:
     """What the page's scripts find, with its inputs moved to `u` or its dimensions changed to `d` (SI)."""
-    data, functions = carried(mechanism)
-    scripts = asset("solve/singular.js") + asset("solve/linkage.js") + asset("solve/forces.js")
+    data, functions = page_data(mechanism)
+    scripts = read_asset("solve/singular.js") + read_asset("solve/linkage.js") + read_asset("solve/forces.js")
     ran = subprocess.run(
         ["node", "-e", f"{scripts}\n{functions}\n{SCRIPT}"],
         input=json.dumps([data, moved]),
@@ -51,7 +51,7 @@ def acted_on(mechanism: Mechanism, seed: int = 3) -> Mechanism:
     """A mechanism with a mass on every link, and loads and springs of every kind."""
     rng = np.random.default_rng(seed)
     links = [link.name for link in mechanism.links if link.name != mechanism.frame]
-    points, pairs, given = list(attachments(mechanism)), list(motions(mechanism)), mechanism.inputs[0]
+    points, pairs, given = list(attachments(mechanism)), list(relative_motions(mechanism)), mechanism.inputs[0]
     course = Course(given.pair, (given.position - 1.0, given.position + 2.0), (0.5, 2.0))
     masses = (
         Mass(link, rng.uniform(0.5, 3.0), tuple(rng.uniform(-0.1, 0.1, 2)), rng.uniform(0.001, 0.1)) for link in links
@@ -84,7 +84,7 @@ def alike(found: dict[str, Any], mechanism: Mechanism) -> None:
     least = 1e-9 * max(force, couple / size) * np.array([1.0, 1.0, size])
     for effort, (name, wanted) in zip(found["inputs"], forces.inputs.items(), strict=True):
         assert effort["pair"] == name
-        assert abs(effort["effort"] - wanted) <= least[0 if forces.slides(name) else 2]
+        assert abs(effort["effort"] - wanted) <= least[0 if forces.is_force_input(name) else 2]
     for pair, (name, wanted) in zip(found["pairs"], forces.reactions.items(), strict=True):
         assert pair["name"] == name and pair["links"] == list(wanted.links)
         assert (np.abs(np.array([*pair["force"], pair["couple"]]) - [*wanted.force, wanted.couple]) <= least).all()
@@ -129,7 +129,7 @@ def test_forces_follow_the_dimensions():
     mechanism = acted_on(planar.load("000-P2"))
     every = list(dimensions(mechanism, frozenset(link.name for link in mechanism.links)))
     values = [each.value * (1.05 if each.name == "BD.length" else 1.0) for each in every]
-    longer = changed(mechanism, next(each for each in every if each.name == "BD.length"), 1.05 * 0.54)
+    longer = change_dimension(mechanism, next(each for each in every if each.name == "BD.length"), 1.05 * 0.54)
     alike(on_page(mechanism, d=values), longer)
 
 
@@ -150,9 +150,9 @@ def test_a_page_says_on_which_link_of_a_pin_a_load_acts():
     engine = planar.load("two-stroke-engine")
     found = on_page(engine)
     assert [(each["name"], each["link"]) for each in found["acting"] if each["kind"] == "load"] == [("B", "block B")]
-    page = json.dumps({"data": carried(engine)[0]})
+    page = json.dumps({"data": page_data(engine)[0]})
     ran = subprocess.run(
-        ["node", "-e", f"{asset('layers/forces.js')}\nconsole.log(forceNotes({page}, {{ why: '' }}).join())"],
+        ["node", "-e", f"{read_asset('layers/forces.js')}\nconsole.log(forceNotes({page}, {{ why: '' }}).join())"],
         capture_output=True,
         text=True,
         check=True,

@@ -13,12 +13,12 @@ import pytest
 
 import planar
 from planar.assemblies.polynomial.completeness import Completeness
-from planar.assemblies.selection import numbered
-from planar.document.files import models
-from planar.drawing.circuits.curves import Chart, Marked, Strand, Window
-from planar.drawing.circuits.equal_curves import alike_together
-from planar.drawing.labels.text_metrics import signed
-from planar.model.wording import ranged
+from planar.assemblies.selection import with_assembly_number
+from planar.document.files import load_models
+from planar.drawing.circuits.curves import BranchCurve, CircuitChart, InputWindow, MarkedAssembly
+from planar.drawing.circuits.equal_curves import merge_equal_charts
+from planar.drawing.labels.text_metrics import format_tick
+from planar.model.wording import number_ranges
 from tests import command
 from tests.drawing.test_diagrams import boxes
 from tests.draws import part
@@ -225,7 +225,7 @@ def test_dead_points_stand_at_the_ends_of_the_branches_with_the_inputs_position(
         tips = np.concatenate([line[:, [0, -1]].T for line in branches(axes)])
         for tip in tips:
             assert np.abs(dots.T - tip).max(axis=1).min() < 1e-9
-        assert texts(axes, "dead point") == [signed(float(f"{end:.4g}")) for end in own]
+        assert texts(axes, "dead point") == [format_tick(float(f"{end:.4g}")) for end in own]
 
 
 @pytest.mark.parametrize("name", ["rocker.json", "piston.json", "four-bar"])
@@ -314,10 +314,10 @@ LARGE = ("ten-link", "chain-42", "walschaerts-valve-gear")
 """Models whose assemblies take longer to count than a remark is worth."""
 
 
-@pytest.mark.parametrize("file", part([file.stem for file, _ in models() if file.stem not in LARGE], 2))
+@pytest.mark.parametrize("file", part([file.stem for file, _ in load_models() if file.stem not in LARGE], 2))
 def test_the_remark_of_which_assembly_agrees_with_the_list(file):
     given = planar.load(file)
-    told = [each for each in numbered(given).remarks if each not in given.remarks]
+    told = [each for each in with_assembly_number(given).remarks if each not in given.remarks]
     modes = planar.modes(given, certify=False)
     said = f"assembly {modes.nearest.number} of {modes.total} at the file's inputs"
     sure = modes.complete is not Completeness.NOT
@@ -326,7 +326,7 @@ def test_the_remark_of_which_assembly_agrees_with_the_list(file):
 
 @pytest.mark.parametrize("file", LARGE)
 def test_nothing_is_said_where_counting_takes_long(file):
-    assert numbered(planar.load(file)) == planar.load(file)
+    assert with_assembly_number(planar.load(file)) == planar.load(file)
 
 
 @pytest.mark.parametrize("words", [("solve", "four-bar"), ("cycle", "four-bar"), ("explain", "four-bar")])
@@ -351,15 +351,21 @@ def curve_of(number, shift=0.0, branches=1, rows=200):
     x = np.linspace(0.0, 6.0, rows)
     branch = SimpleNamespace(turns=1)
     circuit = SimpleNamespace(number=number, closed=True, branches=[branch] * branches)
-    return Chart(circuit, (Strand(1, x, np.sin(x) + shift),), (), (Marked(number, 1.0, 0.5, number == 1),), False)
+    return CircuitChart(
+        circuit, (BranchCurve(1, x, np.sin(x) + shift),), (), (MarkedAssembly(number, 1.0, 0.5, number == 1),), False
+    )
 
 
 def test_circuits_that_look_the_same_are_drawn_once():
-    shown = Window(0.0, 6.0, False, (), 1.0)
+    shown = InputWindow(0.0, 6.0, False, (), 1.0)
     alike = [curve_of(1), curve_of(2, rows=317), curve_of(3, shift=0.1), curve_of(4, branches=2), curve_of(5)]
-    found = alike_together(alike, shown)
-    assert [[each.number for each in (chart.circuit, *chart.others)] for chart in found] == [[1, 2, 5], [3], [4]]
-    assert [each.number for each in found[0].marked] == [1, 2, 5]
+    found = merge_equal_charts(alike, shown)
+    assert [[each.number for each in (chart.circuit, *chart.equal_circuits)] for chart in found] == [
+        [1, 2, 5],
+        [3],
+        [4],
+    ]
+    assert [each.number for each in found[0].marked_assemblies] == [1, 2, 5]
 
 
 def test_panels_of_circuits_that_look_the_same_are_one_with_their_numbers():
@@ -369,6 +375,6 @@ def test_panels_of_circuits_that_look_the_same_are_one_with_their_numbers():
 
 
 def test_numbers_in_a_row_are_told_by_their_ends():
-    assert ranged([3, 1, 2, 7, 9, 8, 12]) == "1–3, 7–9 and 12"
-    assert ranged([1, 3, 5, 7]) == "1, 3, 5 and 7"
-    assert ranged([4, 5]) == "4 and 5"
+    assert number_ranges([3, 1, 2, 7, 9, 8, 12]) == "1–3, 7–9 and 12"
+    assert number_ranges([1, 3, 5, 7]) == "1, 3, 5 and 7"
+    assert number_ranges([4, 5]) == "4 and 5"

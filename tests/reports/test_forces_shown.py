@@ -13,7 +13,7 @@ import pytest
 
 import planar
 from planar.drawing.diagrams.positions import loci, positions
-from planar.drawing.output.animation import scripted
+from planar.drawing.output.animation import plan_animation
 from planar.dynamics import simulation
 from planar.foundation.errors import Outcome
 from planar.model.mechanism import Load, Mass, Spring
@@ -380,7 +380,7 @@ def test_a_simulation_that_stops_is_told_as_far_as_it_goes_and_ends_with_status_
 
     def stopping(*given, **more):
         whole = whole_way(*given, **more)
-        motion = replace(whole.motion.until(4), outcome=Outcome.BRANCH_LOST, reason="told only to 0.08 s")
+        motion = replace(whole.motion.up_to_row(4), outcome=Outcome.BRANCH_LOST, reason="told only to 0.08 s")
         energies = {name: getattr(whole, name)[:5] for name in ("kinetic", "potential", "work")}
         return replace(whole, motion=motion, **energies)
 
@@ -424,7 +424,7 @@ def told_scale(picture) -> float:
 
 
 def test_an_animation_of_a_motion_in_time_goes_through_it_once(swing):
-    script = scripted(swing, ["D"], 37)
+    script = plan_animation(swing, ["D"], 37)
     assert script.rows == script.traced == tuple(range(0, 361, 10))
 
 

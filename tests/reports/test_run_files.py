@@ -16,11 +16,11 @@ from planar.document import files
 from planar.foundation.errors import BadInput, Outcome
 from planar.foundation.geometry import GROUND, frame_at
 from planar.foundation.jets import Jet
-from planar.foundation.units import SI
+from planar.foundation.units import SI_UNITS
 from planar.model.pairs import pair_types
-from planar.reports.columns import columns, told
-from planar.reports.files.run_files import ROWS, record, writable, written
-from planar.results.records import InputMotion, Jerked, Limit
+from planar.reports.columns import reported_series, run_columns
+from planar.reports.files.run_files import CSV_BLOCK_ROWS, check_writable, encode_run, record
+from planar.results.records import InputMotion, Limit, ThirdRates
 from tests.cli.test_commands import run
 from tests.cli.test_commands import written as in_file
 from tests.solving.test_cycle import TRIPLE, TURN, four_bar
@@ -60,7 +60,7 @@ def timed(limits=(), rows=9):
             return tuple(limits)
 
     inputs = {"O": InputMotion(*parts[:3])}
-    return replace(motion, frames=frames, inputs=inputs, time=t, jerked=Jerked(thirds, {}), course=Course())
+    return replace(motion, frames=frames, inputs=inputs, time=t, jerked=ThirdRates(thirds, {}), course=Course())
 
 
 def jerk_of_turning(t):
@@ -73,7 +73,7 @@ def jerk_of_turning(t):
 def things(motion):
     """Everything in a motion's own words: group, name, quantity, kind, values."""
     for name, given in motion.inputs.items():
-        for what, kind, values in zip(given._fields, motion.driven(name), given, strict=True):
+        for what, kind, values in zip(given._fields, motion.input_quantity_kinds(name), given, strict=True):
             yield "inputs", name, what, kind, values
     for name, point in motion.points.items():
         for what, values in point._asdict().items():
@@ -83,7 +83,7 @@ def things(motion):
             yield "links", name, what, what.replace("_", " "), values
     for name, report in motion.pairs.items():
         for what, values in report.items():
-            yield "pairs", name, what, motion.reported(name)[what], values
+            yield "pairs", name, what, motion.result_kinds(name)[what], values
 
 
 def table_of(content):
@@ -100,7 +100,7 @@ def numbers(cells):
 
 
 def parquet_of(motion):
-    return pyarrow.parquet.read_table(io.BytesIO(written(motion, ".parquet")))
+    return pyarrow.parquet.read_table(io.BytesIO(encode_run(motion, ".parquet")))
 
 
 def strict(word):
@@ -222,8 +222,8 @@ def test_a_table_has_every_number_of_a_run_under_a_head_of_its_own(model):
         else:
             wanted[f"{of} {word}"] = kind, values
     own = {"length": "mm", "angle": "deg"}
-    cells = table_of(written(motion, ".csv"))
-    assert list(cells) == [f"{name} [{own.get(kind, SI[kind])}]" for name, (kind, _) in wanted.items()]
+    cells = table_of(encode_run(motion, ".csv"))
+    assert list(cells) == [f"{name} [{own.get(kind, SI_UNITS[kind])}]" for name, (kind, _) in wanted.items()]
     for found, (kind, values) in zip(cells.values(), wanted.values(), strict=True):
         size = {"length": 1e3, "angle": 180.0 / np.pi}.get(kind, 1.0)
         np.testing.assert_allclose(numbers(found), size * values, rtol=1e-15, atol=0)
@@ -233,8 +233,8 @@ def test_a_table_has_every_number_of_a_run_under_a_head_of_its_own(model):
 def test_parquet_is_read_back_equal_and_says_its_units(model):
     motion = short_run(model)
     read = parquet_of(motion)
-    wanted = list(columns(motion))
-    assert read.column_names == [column.head for column in wanted] == list(table_of(written(motion, ".csv")))
+    wanted = list(run_columns(motion))
+    assert read.column_names == [column.head for column in wanted] == list(table_of(encode_run(motion, ".csv")))
     for column, found, field in zip(wanted, read.columns, read.schema, strict=True):
         np.testing.assert_array_equal(found.to_numpy(), column.values)
         assert field.metadata[b"unit"].decode() == column.unit
@@ -245,14 +245,14 @@ def test_parquet_is_read_back_equal_and_says_its_units(model):
 @pytest.mark.parametrize("model", MODELS)
 def test_numpy_reads_back_every_number_with_its_unit(model):
     motion = short_run(model)
-    with np.load(io.BytesIO(written(motion, ".npz")), allow_pickle=False) as arrays:
+    with np.load(io.BytesIO(encode_run(motion, ".npz")), allow_pickle=False) as arrays:
         units = dict(arrays["units"])
         assert set(units) == set(arrays) - {"units", "mechanism", "outcome", "reason"}
         seen = 0
         for group, name, what, kind, values in things(motion):
             if values is not None:
                 np.testing.assert_array_equal(arrays[f"{group}/{name}/{what}"], values)
-                assert units[f"{group}/{name}/{what}"] == SI[kind]
+                assert units[f"{group}/{name}/{what}"] == SI_UNITS[kind]
                 seen += 1
         assert seen == len(units)
 
@@ -260,7 +260,7 @@ def test_numpy_reads_back_every_number_with_its_unit(model):
 @pytest.mark.parametrize("model", MODELS)
 def test_json_has_every_number_of_a_run(model):
     motion = short_run(model)
-    found = json.loads(written(motion, ".json"), parse_constant=strict)
+    found = json.loads(encode_run(motion, ".json"), parse_constant=strict)
     assert found == record(motion)
     assert found["units"] == "SI"
     assert found["limits"] == [each._asdict() for each in motion.limits]
@@ -294,7 +294,7 @@ def test_a_dataset_has_every_number_of_a_run_with_its_unit(model):
             row = variable.sel({one: name})
             assert variable.dims == (one, "row", "axis")[: variable.ndim]
         np.testing.assert_array_equal(row, values)
-        assert variable.attrs == {"units": SI[kind], "long_name": word}
+        assert variable.attrs == {"units": SI_UNITS[kind], "long_name": word}
         seen += np.isfinite(values).sum()
     # where a pair has no such quantity there is no number, and there are none but the run's
     names = [*found.data_vars, *(name for name in found.coords if name.startswith("input_"))]
@@ -312,7 +312,7 @@ def test_the_name_of_a_result_is_one_kind_of_quantity_in_all_pairs():
     """Or no unit could be given to a variable of several pairs."""
     kinds = {}
     for pair in pair_types().values():
-        for what, kind in pair.reports.items():
+        for what, kind in pair.result_kinds.items():
             assert kinds.setdefault(what, kind) == kind
 
 
@@ -323,7 +323,7 @@ def test_how_a_run_ended_is_told_in_every_format_that_holds_texts(stop):
     about = {"mechanism": motion.mechanism.name, "outcome": motion.outcome.value, "reason": motion.reason}
     assert about.items() <= record(motion).items()
     assert planar.dataset(motion).attrs == about
-    with np.load(io.BytesIO(written(motion, ".npz")), allow_pickle=False) as arrays:
+    with np.load(io.BytesIO(encode_run(motion, ".npz")), allow_pickle=False) as arrays:
         assert {each: str(arrays[each]) for each in about} == about
     assert {each.decode(): text.decode() for each, text in parquet_of(motion).schema.metadata.items()} == about
 
@@ -334,7 +334,7 @@ def test_how_a_run_ended_is_told_in_every_format_that_holds_texts(stop):
 def test_time_and_jerk_are_in_every_format():
     motion = timed()
     jerk, turning = jerk_of_turning(motion.time), np.full(9, 6.0)
-    cells = table_of(written(motion, ".csv"))
+    cells = table_of(encode_run(motion, ".csv"))
     heads = list(cells)
     assert heads[0] == "time [s]"
     assert heads[heads.index("P ay [m/s^2]") + 1 :][:2] == ["P jx [m/s^3]", "P jy [m/s^3]"]
@@ -349,14 +349,14 @@ def test_time_and_jerk_are_in_every_format():
     for head in heads:
         np.testing.assert_array_equal(read[head].to_numpy(), numbers(cells[head]))
 
-    found = json.loads(written(motion, ".json"))
+    found = json.loads(encode_run(motion, ".json"))
     assert found == record(motion)
     assert found["time"] == motion.time.tolist()
     np.testing.assert_allclose(found["points"]["P"]["jerk"], jerk, rtol=1e-12, atol=1e-12)
     assert found["links"]["link"]["angular_jerk"] == turning.tolist()
     assert found["links"]["frame"]["angular_jerk"] == [0.0] * 9
 
-    with np.load(io.BytesIO(written(motion, ".npz")), allow_pickle=False) as arrays:
+    with np.load(io.BytesIO(encode_run(motion, ".npz")), allow_pickle=False) as arrays:
         np.testing.assert_array_equal(arrays["time"], motion.time)
         np.testing.assert_allclose(arrays["points/P/jerk"], jerk, rtol=1e-12, atol=1e-12)
         np.testing.assert_array_equal(arrays["links/link/angular_jerk"], turning)
@@ -378,9 +378,9 @@ def test_time_and_jerk_are_in_every_format():
 
 def test_without_time_and_jerk_there_is_no_word_of_them():
     motion = short_run("crank-rocker")
-    assert not any("time" in column.head or "jerk" in column.head for column in columns(motion))
+    assert not any("time" in column.head or "jerk" in column.head for column in run_columns(motion))
     assert "time" not in record(motion)
-    assert not any("jerk" in thing.values for thing in told(motion))
+    assert not any("jerk" in thing.values for thing in reported_series(motion))
     assert not {"time", "point_jerk"} & set(planar.dataset(motion).variables)
 
 
@@ -390,7 +390,7 @@ def test_limits_are_told_in_json():
         Limit("stroke end", "stroke", 0.5, 0.02, "TDC", "the slide turns back"),
         Limit("change point", "O", 0.75, np.nan),
     ]
-    found = json.loads(written(timed(limits), ".json"), parse_constant=strict)["limits"]
+    found = json.loads(encode_run(timed(limits), ".json"), parse_constant=strict)["limits"]
     assert found == [
         limits[0]._asdict(),
         {"kind": "stroke end", "of": "stroke", "input": 0.5, "value": 0.02, "end": "TDC", "told": limits[1].told},
@@ -405,7 +405,7 @@ def test_a_rate_that_is_not_determined_is_blank_null_or_no_number():
     motion = between_limits()
     assert np.flatnonzero(np.isnan(motion.link("DC").angular_velocity)).tolist() == [0, 12]
     head = "DC angular velocity [rad/s]"
-    cells = table_of(written(motion, ".csv"))[head]
+    cells = table_of(encode_run(motion, ".csv"))[head]
     column = parquet_of(motion)[head].to_pylist()
     told_in_json = record(motion)["links"]["DC"]["angular_velocity"]
     rates = planar.dataset(motion).link_angular_velocity.sel(link="DC")
@@ -418,7 +418,7 @@ def test_a_rate_that_is_not_determined_is_blank_null_or_no_number():
 def test_json_has_no_word_for_an_infinite_number():
     motion = timed()
     endless = motion.inputs["O"]._replace(acceleration=np.where(motion.time == 1.0, np.inf, 0.0))
-    found = json.loads(written(replace(motion, inputs={"O": endless}), ".json"), parse_constant=strict)
+    found = json.loads(encode_run(replace(motion, inputs={"O": endless}), ".json"), parse_constant=strict)
     assert found["inputs"]["O"]["acceleration"] == [*[0.0] * 8, None]
 
 
@@ -431,19 +431,19 @@ FORMULAS = ["=SUM(A1)", '=HYPERLINK("x","y")', "+1", "-P", "@me", "'quoted'"]
 @pytest.mark.parametrize("name", ['say "P"', "Kolben-Ø é 点", "a,b", " P ", "nan", "a/b", *FORMULAS])
 def test_a_name_comes_back_as_it_is(name, monkeypatch):
     """Files allow fewer names than Python does; a pin of several links has commas in its own."""
-    monkeypatch.setattr("planar.document.cursor.Cursor.checked_name", lambda self, text: text)
-    monkeypatch.setattr("planar.document.cursor.Cursor._shown", lambda self, text: None)
+    monkeypatch.setattr("planar.document.cursor.Cursor.check_name", lambda self, text: text)
+    monkeypatch.setattr("planar.document.cursor.Cursor._check_printable", lambda self, text: None)
     value = files.to_dict(planar.load("single-link"))
     value["name"] = value["links"]["link"]["ends"][1] = name
     motion = planar.cycle(files.from_dict(value), 3)
     place = motion.point(name).position
-    in_mm = numbers(table_of(written(motion, ".csv"))[f"{name} x [mm]"])
+    in_mm = numbers(table_of(encode_run(motion, ".csv"))[f"{name} x [mm]"])
     np.testing.assert_allclose(in_mm, 1e3 * place[:, 0], rtol=1e-15)
     read = parquet_of(motion)
     np.testing.assert_array_equal(read[f"{name} x [mm]"].to_numpy(), in_mm)
     assert read.schema.metadata[b"mechanism"].decode() == name
-    assert json.loads(written(motion, ".json"))["points"][name]["position"] == place.tolist()
-    with np.load(io.BytesIO(written(motion, ".npz")), allow_pickle=False) as arrays:
+    assert json.loads(encode_run(motion, ".json"))["points"][name]["position"] == place.tolist()
+    with np.load(io.BytesIO(encode_run(motion, ".npz")), allow_pickle=False) as arrays:
         np.testing.assert_array_equal(arrays[f"points/{name}/position"], place)
         assert dict(arrays["units"])[f"points/{name}/position"] == "m"
     np.testing.assert_array_equal(planar.dataset(motion).point_position.sel(point=name), place)
@@ -451,10 +451,10 @@ def test_a_name_comes_back_as_it_is(name, monkeypatch):
 
 @pytest.mark.parametrize("name", FORMULAS)
 def test_no_head_of_a_csv_file_is_a_formula_in_a_spreadsheet(name, monkeypatch):
-    monkeypatch.setattr("planar.document.cursor.Cursor.checked_name", lambda self, text: text)
+    monkeypatch.setattr("planar.document.cursor.Cursor.check_name", lambda self, text: text)
     value = files.to_dict(planar.load("single-link"))
     value["links"]["link"]["ends"][1] = name
-    content = written(planar.cycle(files.from_dict(value), 3), ".csv").decode()
+    content = encode_run(planar.cycle(files.from_dict(value), 3), ".csv").decode()
     heads = next(csv.reader(io.StringIO(content, newline="")))
     assert f"'{name} x [mm]" in heads
     assert not any(head[0] in "=+-@" for head in heads)
@@ -463,10 +463,10 @@ def test_no_head_of_a_csv_file_is_a_formula_in_a_spreadsheet(name, monkeypatch):
 def test_a_link_named_as_what_a_pair_reports_keeps_a_head_of_its_own():
     """A pair G of wheels has a column "pair G angle", as a link "pair G" has."""
     motion = short_run("planetary-gear-set")
-    name = next(name for name in motion.pairs if "angle" in motion.reported(name))
+    name = next(name for name in motion.pairs if "angle" in motion.result_kinds(name))
     text = json.dumps(files.to_dict(motion.mechanism)).replace('"planet"', f'"pair {name}"')
     motion = short_run_of(files.from_dict(json.loads(text)))
-    cells = table_of(written(motion, ".csv"))
+    cells = table_of(encode_run(motion, ".csv"))
     link, pair = motion.link(f"pair {name}").angle, motion.pair(name)["angle"]
     assert np.abs(link - pair).max() > 0.1
     np.testing.assert_allclose(numbers(cells[f"pair {name} angle [deg]"]), np.degrees(link), rtol=1e-15)
@@ -477,19 +477,19 @@ def test_a_link_named_as_what_a_pair_reports_keeps_a_head_of_its_own():
 
 
 def test_a_run_longer_than_what_is_written_at_a_time_is_whole():
-    motion = timed(rows=2 * ROWS + 7)
-    cells = table_of(written(motion, ".csv"))
+    motion = timed(rows=2 * CSV_BLOCK_ROWS + 7)
+    cells = table_of(encode_run(motion, ".csv"))
     np.testing.assert_array_equal(numbers(cells["time [s]"]), motion.time)
     np.testing.assert_array_equal(numbers(cells["P vx [m/s]"]), motion.point("P").velocity[:, 0])
 
 
 def test_the_ending_of_a_file_may_be_in_capitals():
     motion = timed()
-    assert written(motion, ".CSV") == written(motion, ".csv")
+    assert encode_run(motion, ".CSV") == encode_run(motion, ".csv")
 
 
 @pytest.mark.parametrize("suffix", [".xlsx", "", ".parq"])
-@pytest.mark.parametrize("asking", [writable, lambda suffix: written(timed(), suffix)])
+@pytest.mark.parametrize("asking", [check_writable, lambda suffix: encode_run(timed(), suffix)])
 def test_an_unknown_ending_is_answered_with_all_that_there_are(asking, suffix):
     with pytest.raises(BadInput, match=r"files that end in \.csv, \.json, \.npz or \.parquet"):
         asking(suffix)
@@ -499,10 +499,10 @@ def test_without_pyarrow_or_xarray_a_sentence_says_what_to_install(monkeypatch):
     motion = timed()
     for library in ("pyarrow", "pyarrow.parquet", "xarray"):
         monkeypatch.setitem(sys.modules, library, None)
-    for asking in (lambda: written(motion, ".parquet"), lambda: writable(".parquet")):
+    for asking in (lambda: encode_run(motion, ".parquet"), lambda: check_writable(".parquet")):
         with pytest.raises(BadInput, match=r"Parquet files need pyarrow: pip install 'planar\[parquet\]'"):
             asking()
     with pytest.raises(BadInput, match=r"a Dataset needs xarray: pip install 'planar\[xarray\]'"):
         planar.dataset(motion)
     for suffix in (".csv", ".json", ".npz"):
-        assert written(motion, suffix)
+        assert encode_run(motion, suffix)

@@ -21,13 +21,13 @@ from rich.console import Console
 
 import planar
 from planar.cli import main
-from planar.drawing.paper.picture import Letter
-from planar.drawing.polygons.panels import panels
+from planar.drawing.paper.picture import Label
+from planar.drawing.polygons.panels import polygon_panels
 from planar.drawing.scheme.scheme import scheme
-from planar.pages.page_data import carried
-from planar.reports.files.table_files import written
+from planar.pages.page_data import page_data
+from planar.reports.files.table_files import encode_tables
 from planar.reports.fitted_table import plain_table
-from planar.reports.tables_of_numbers import direction, kept, paragraphs
+from planar.reports.tables_of_numbers import paragraphs, precision_text, vector_direction
 from tests.command import FROM_OUTSIDE, ROOT, run
 from tests.draws import part
 
@@ -296,10 +296,10 @@ def saved(folder: Path, model: str) -> tuple[list[str], np.ndarray]:
 def test_drawings_and_pages_in_inches_have_inches() -> None:
     mechanism = planar.from_dict(CRANK)
     state = planar.solve(mechanism)
-    told = [note for each in panels(state, None, 3) for note in each.notes]
+    told = [note for each in polygon_panels(state, None, 3) for note in each.notes]
     assert len([note for note in told if " in/s" in note]) == 2
     assert not [note for note in told if METRIC.search(note.replace("/mm", ""))]
-    data, _ = carried(mechanism)
+    data, _ = page_data(mechanism)
     assert {kind: data["units"][kind]["name"] for kind in ("length", "velocity", "acceleration")} == {
         "length": "in",
         "velocity": "in/s",
@@ -307,7 +307,7 @@ def test_drawings_and_pages_in_inches_have_inches() -> None:
     }
     assert data["units"]["acceleration"]["si"] == pytest.approx(0.0254, rel=1e-15)
     pushed = CRANK | {"inputs": [{"pair": "stroke", "position": 8.8, "velocity": "20 in/s"}]}
-    texts = [mark.text for mark in scheme(planar.solve(planar.from_dict(pushed))).marks if isinstance(mark, Letter)]
+    texts = [mark.text for mark in scheme(planar.solve(planar.from_dict(pushed))).marks if isinstance(mark, Label)]
     assert "v = 20 in/s" in texts
 
 
@@ -325,7 +325,7 @@ def test_what_is_left_to_rounding_is_said_in_words(command: tuple[str, ...], tmp
 
 
 def test_how_well_something_holds_in_words() -> None:
-    said = [kept(value, "of the greatest") for value in (0.0, 2.2e-16, 3e-7)]
+    said = [precision_text(value, "of the greatest") for value in (0.0, 2.2e-16, 3e-7)]
     assert said == ["exactly", "to round-off (2.2e-16 of the greatest)", "but for 3.0e-07 of the greatest"]
 
 
@@ -340,15 +340,15 @@ def test_a_ratio_of_like_for_like_has_no_unit(tmp_path: Path) -> None:
 
 def test_a_direction_lies_above_minus_180_up_to_180_degrees() -> None:
     """Of a vector to the left, whatever rounding leaves of its other part."""
-    told = [direction(np.array([-2.0, y])) for y in (0.0, -0.0, 1e-16, -1e-16)]
+    told = [vector_direction(np.array([-2.0, y])) for y in (0.0, -0.0, 1e-16, -1e-16)]
     assert told == [pi] * 4
-    assert direction(np.array([0.0, -3.0])) == -pi / 2.0
+    assert vector_direction(np.array([0.0, -3.0])) == -pi / 2.0
 
 
 @pytest.mark.parametrize("suffix", [".txt", ".svg", ".html"])
 def test_a_saved_table_holds_what_is_wider_than_a_page(suffix: str) -> None:
     name = "a" * 150
-    text = written(table([(name, "12345.6", "-140.000", "to the left", "-1599.61")]), suffix)
+    text = encode_tables(table([(name, "12345.6", "-140.000", "to the left", "-1599.61")]), suffix)
     assert name in text
     if suffix == ".svg":
         wide = float(re.search(r'viewBox="0 0 ([\d.]+)', text).group(1))

@@ -10,12 +10,12 @@ import planar
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.geometry import Vector
 from planar.foundation.jets import Jet
-from planar.model.dimensions import changed, dimensions
-from planar.model.pairs.base import plain
-from planar.model.pairs.guide_line import Line
+from planar.model.dimensions import change_dimension, dimensions
+from planar.model.pairs.base import sample_shape
+from planar.model.pairs.guide_line import LinkLine
 from planar.solving.continuation import path, predictor_corrector
 from planar.solving.continuation.period import Period
-from planar.solving.position import Solver
+from planar.solving.position import PositionSolver
 from tests.watchdog import watched
 
 SURE = 1e-7
@@ -182,18 +182,18 @@ def test_a_wrong_velocity_beside_a_very_fast_link_breaks_its_own_constraint():
     angle, rocker = 0.2, 0.7
     frame = float(np.cos(angle) + np.sqrt(rocker**2 - np.sin(angle) ** 2)) + 3e-9
     given = four_bar(1.0, 1e-8, rocker, frame, angle, of_four_bar(1.0, 1e-8, rocker, frame, angle, 1)[0])
-    solver = Solver(planar.from_dict(given))
-    state = solver.state(solver.assembly().z)
+    solver = PositionSolver(planar.from_dict(given))
+    state = solver.state(solver.find_assembly().z)
     assert abs(state.link("AB").angular_velocity) > 1e7
     frames = dict(state.frames)
     own = dict.fromkeys(solver.pairs, ())
-    for order, gap in enumerate(solver.gate.rate_gaps(frames, own), 1):
+    for order, gap in enumerate(solver.residual_check.rate_residuals(frames, own), 1):
         assert gap[0] <= 1e3 * solver.tolerance
         parts = list(frames["QB"].angle.parts)
         parts[order] *= 1.0 + 1e-6
         angle_ = Jet(*parts)
         wrong = frames | {"QB": frames["QB"]._replace(angle=angle_, cos=angle_.cos(), sin=angle_.sin())}
-        assert solver.gate.rate_gaps(wrong, own)[order - 1][0] > 1e3 * solver.tolerance
+        assert solver.residual_check.rate_residuals(wrong, own)[order - 1][0] > 1e3 * solver.tolerance
 
 
 @pytest.mark.parametrize("backend", ["native", "casadi"])
@@ -268,8 +268,8 @@ def test_a_crank_far_round_is_followed_over_whole_turns_at_once(lengths, monkeyp
     """A motion that comes back goes on as before, so that no walk need go through all its turns."""
     mechanism = planar.from_dict(four_bar(*lengths, 0.0, of_four_bar(*lengths, 0.0, 1)[0]))
     asked = []
-    real = path.run
-    monkeypatch.setattr(path, "run", lambda *given: asked.append(len(given[3])) or real(*given))
+    real = path.follow_samples
+    monkeypatch.setattr(path, "follow_samples", lambda *given: asked.append(len(given[3])) or real(*given))
     for far in (1e5, -1e7):
         motion = planar.cycle(mechanism, 16, 0.0, far)
         rounding = 20.0 * np.finfo(float).eps * abs(far)
@@ -288,11 +288,11 @@ def test_a_crank_far_round_is_followed_over_whole_turns_at_once(lengths, monkeyp
 def test_turns_without_change_points_are_not_gone_through_one_by_one():
     period = Period((), np.array([0.0, 2.0 * np.pi]), (), ())
     with watched(20):
-        assert list(period.met(None, 1e15)) == []
+        assert list(period.bifurcations_until(None, 1e15)) == []
 
 
 def test_a_far_motion_that_ends_or_does_not_come_back_says_so(monkeypatch):
-    monkeypatch.setattr(predictor_corrector.Work.__init__, "__defaults__", (300, None))
+    monkeypatch.setattr(predictor_corrector.ArcBudget.__init__, "__defaults__", (300, None))
     double_rocker = (0.9, 0.8, 0.5, 0.6)
     value = four_bar(*double_rocker, 0.3, of_four_bar(*double_rocker, 0.3, 1)[0])
     with pytest.raises(NoAnswer, match="cannot go beyond"):
@@ -341,10 +341,10 @@ def test_a_length_whose_square_is_no_number_is_bad_input_however_it_came(name, v
     (own,) = (each for each in dimensions(mechanism, links) if each.name == name)
     for ask in (planar.solve, planar.cycle, planar.inspect):
         with pytest.raises(planar.BadInput, match="a place is 0, or from 1e-100"):
-            ask(changed(mechanism, own, value))
+            ask(change_dimension(mechanism, own, value))
 
 
 def test_a_line_through_near_points_has_its_direction():
     """Also where the square of their distance is no number."""
-    shape = plain(P=Vector(0.0, 0.0), R=Vector(3e-170, -4e-170))
-    np.testing.assert_allclose(Line("P", "R").measure(shape), [0.0, 0.0, 0.6, -0.8], rtol=1e-15)
+    shape = sample_shape(P=Vector(0.0, 0.0), R=Vector(3e-170, -4e-170))
+    np.testing.assert_allclose(LinkLine("P", "R").measure_line(shape), [0.0, 0.0, 0.6, -0.8], rtol=1e-15)

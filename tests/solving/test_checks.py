@@ -6,9 +6,9 @@ import pytest
 from planar.document import files
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.solving import position
-from planar.solving.checks.branch_check import Branch, allowed
-from planar.solving.continuation.path import follow, run
-from planar.solving.position import Solver
+from planar.solving.checks.branch_check import BranchCheck, is_move_allowed
+from planar.solving.continuation.path import follow_samples, follow_to
+from planar.solving.position import PositionSolver
 
 CRANK = {
     "planar": 1,
@@ -27,11 +27,11 @@ CRANK = {
 
 
 @pytest.fixture
-def solver() -> Solver:
-    return Solver(files.from_dict(CRANK))
+def solver() -> PositionSolver:
+    return PositionSolver(files.from_dict(CRANK))
 
 
-def mirrored(solver: Solver, z: np.ndarray) -> np.ndarray:
+def mirrored(solver: PositionSolver, z: np.ndarray) -> np.ndarray:
     """The other assembly of the dyad, by reflecting C in the line BD."""
     state = solver.state(z)
     b, c, d = (state.point(name).position for name in "BCD")
@@ -41,64 +41,64 @@ def mirrored(solver: Solver, z: np.ndarray) -> np.ndarray:
     return np.array([np.arctan2(*(flipped - b)[::-1]), np.arctan2(*(flipped - d)[::-1])])
 
 
-def circle(solver: Solver, samples: int = 91) -> np.ndarray:
-    return solver.station.u + np.linspace(0, 2 * np.pi, samples)[:, None]
+def circle(solver: PositionSolver, samples: int = 91) -> np.ndarray:
+    return solver.inputs.u + np.linspace(0, 2 * np.pi, samples)[:, None]
 
 
 def test_the_flipped_assembly_is_closed_too(solver):
-    z = mirrored(solver, solver.assembly().z)
-    assert solver.open_along(z[None], solver.station.u[None])[0] < solver.tolerance
+    z = mirrored(solver, solver.find_assembly().z)
+    assert solver.max_residuals(z[None], solver.inputs.u[None])[0] < solver.tolerance
 
 
 def test_a_step_to_the_flipped_assembly_is_refused_though_its_residual_is_zero(solver):
-    z, u = solver.assembly().z, solver.station.u
+    z, u = solver.find_assembly().z, solver.inputs.u
     ahead = u + 0.01
-    on = follow(solver, solver.station.p, z, u, ahead)
-    off = mirrored(Solver(files.from_dict(CRANK | {"inputs": [{"pair": "A", "position": 0.81}]})), on)
+    on = follow_to(solver, solver.inputs.p, z, u, ahead)
+    off = mirrored(PositionSolver(files.from_dict(CRANK | {"inputs": [{"pair": "A", "position": 0.81}]})), on)
     inputs = np.array([u, ahead])
-    branch = Branch(solver.program, solver.station.p)
+    branch = BranchCheck(solver.functions, solver.inputs.p)
     for after, keeps in ((on, True), (off, False)):
-        assert np.all(solver.open_along(np.array([z, after]), inputs) < solver.tolerance)
-        assert branch.along(np.array([z, after]), inputs).tolist() == [keeps]
+        assert np.all(solver.max_residuals(np.array([z, after]), inputs) < solver.tolerance)
+        assert branch.accept_steps(np.array([z, after]), inputs).tolist() == [keeps]
 
 
 def test_followed_samples_are_on_the_branch_and_the_flipped_ones_are_another_branch(solver):
     """The second assembly is followed as well as the first, and passes: it is the way between them that does not."""
     inputs = circle(solver)
-    first = run(solver, solver.station.p, solver.assembly().z, inputs).z
-    second = run(solver, solver.station.p, mirrored(solver, first[0]), inputs).z
-    branch = Branch(solver.program, solver.station.p)
+    first = follow_samples(solver, solver.inputs.p, solver.find_assembly().z, inputs).z
+    second = follow_samples(solver, solver.inputs.p, mirrored(solver, first[0]), inputs).z
+    branch = BranchCheck(solver.functions, solver.inputs.p)
     for samples in (first, second):
-        assert branch.along(samples, inputs).all()
+        assert branch.accept_steps(samples, inputs).all()
     crossed = np.where(np.arange(len(inputs))[:, None] % 2, first, second)
-    assert not branch.along(crossed, inputs).any()
+    assert not branch.accept_steps(crossed, inputs).any()
 
 
 def test_a_run_whose_program_flips_half_way_is_put_right_and_counted(solver, monkeypatch):
-    z, inputs = solver.assembly().z, circle(solver)
-    honest = run(solver, solver.station.p, z, inputs)
-    assert honest.general == 0
+    z, inputs = solver.find_assembly().z, circle(solver)
+    honest = follow_samples(solver, solver.inputs.p, z, inputs)
+    assert honest.general_count == 0
 
-    real = solver.program.run
+    real = solver.functions.run_samples
 
     def flipping(start, u, p):
         found = real(start, u, p)
         for k in range(len(u)):
             if inputs[30, 0] <= u[k, 0] < inputs[34, 0]:
                 other = CRANK | {"inputs": [{"pair": "A", "position": float(u[k, 0])}]}
-                found[k] = mirrored(Solver(files.from_dict(other)), found[k])
+                found[k] = mirrored(PositionSolver(files.from_dict(other)), found[k])
         return found
 
-    monkeypatch.setattr(solver.program, "run", flipping)
-    fooled = run(solver, solver.station.p, z, inputs)
-    assert 4 <= fooled.general <= 6  # those that were flipped, and what lies on the same arc of the curve
+    monkeypatch.setattr(solver.functions, "run_samples", flipping)
+    fooled = follow_samples(solver, solver.inputs.p, z, inputs)
+    assert 4 <= fooled.general_count <= 6  # those that were flipped, and what lies on the same arc of the curve
     turns = (fooled.z - honest.z) / (2 * np.pi)
     np.testing.assert_allclose(fooled.z, honest.z + 2 * np.pi * np.round(turns), atol=1e-12)
 
 
 @pytest.mark.parametrize("spoil", [1e-9, 1e-3, 1.0, np.nan, np.inf])
 def test_a_finite_wrong_answer_from_the_program_does_not_get_out(solver, spoil):
-    z = solver.assembly().z
+    z = solver.find_assembly().z
     with pytest.raises(NoAnswer) as refused:
         solver.state(z + np.array([0.0, spoil]))
     assert refused.value.outcome is Outcome.CANNOT_BE_ASSEMBLED
@@ -106,9 +106,9 @@ def test_a_finite_wrong_answer_from_the_program_does_not_get_out(solver, spoil):
 
 
 def test_samples_with_a_wrong_or_missing_value_go_to_the_general_path(solver, monkeypatch):
-    z, inputs = solver.assembly().z, circle(solver)
-    honest = run(solver, solver.station.p, z, inputs)
-    real = solver.program.run
+    z, inputs = solver.find_assembly().z, circle(solver)
+    honest = follow_samples(solver, solver.inputs.p, z, inputs)
+    real = solver.functions.run_samples
 
     def spoiled(start, u, p):
         found = real(start, u, p)
@@ -116,16 +116,16 @@ def test_samples_with_a_wrong_or_missing_value_go_to_the_general_path(solver, mo
         found[u[:, 0] == inputs[70, 0], 1] = np.nan
         return found
 
-    monkeypatch.setattr(solver.program, "run", spoiled)
-    found = run(solver, solver.station.p, z, inputs)
-    assert found.general == 2
+    monkeypatch.setattr(solver.functions, "run_samples", spoiled)
+    found = follow_samples(solver, solver.inputs.p, z, inputs)
+    assert found.general_count == 2
     np.testing.assert_allclose(found.z, honest.z, atol=1e-12)
 
 
 def test_wrong_velocities_and_accelerations_are_refused(solver, monkeypatch):
-    z = solver.assembly().z
-    monkeypatch.setattr(position, "sound", lambda *_: None)
-    real = position.cancelled
+    z = solver.find_assembly().z
+    monkeypatch.setattr(position, "fast_position", lambda *_: None)
+    real = position.solve_rates
     for order in (1, 2):
         calls = []
 
@@ -133,7 +133,7 @@ def test_wrong_velocities_and_accelerations_are_refused(solver, monkeypatch):
             calls.append(1)
             return real(slope, known) * (1.0 + (1e-7 if len(calls) == order else 0.0))
 
-        monkeypatch.setattr(position, "cancelled", wrong)
+        monkeypatch.setattr(position, "solve_rates", wrong)
         with pytest.raises(NoAnswer) as refused:
             solver.state(z)
         assert ("velocities" if order == 1 else "accelerations") in refused.value.reason
@@ -141,20 +141,20 @@ def test_wrong_velocities_and_accelerations_are_refused(solver, monkeypatch):
 
 def test_residual_is_judged_with_cos_and_sin_made_afresh_from_the_angle(solver):
     """A program that carries a wrong sine beside the right angle closes its own equations, not the gate's."""
-    frames, own = solver.state(solver.assembly().z).frames, dict.fromkeys(solver.pairs, ())
+    frames, own = solver.state(solver.find_assembly().z).frames, dict.fromkeys(solver.pairs, ())
     still = {n: f if f.fixed else type(f)(*(x.parts[0] for x in f[:5])) for n, f in frames.items()}
-    assert solver.gate.gaps(still, own).max() < solver.tolerance
+    assert solver.residual_check.residuals(still, own).max() < solver.tolerance
     bent = still["BC"]
     still["BC"] = bent._replace(angle=bent.angle + 0.1)
     afresh = {n: f if f.fixed else f._replace(cos=np.cos(f.angle), sin=np.sin(f.angle)) for n, f in still.items()}
-    assert solver.gate.gaps(afresh, own).max() > 0.01
+    assert solver.residual_check.residuals(afresh, own).max() > 0.01
 
 
 def test_a_move_is_allowed_if_the_rates_at_its_ends_explain_it():
     at, h = 0.3, 0.05
     before, after = np.array([np.cos(at) * h]), np.array([np.cos(at + h) * h])
     move = np.array([np.sin(at + h) - np.sin(at)])
-    assert allowed(move, before, after).all()
-    assert not allowed(move + 0.1, before, after).any()
-    assert not allowed(-move, before, after).any()
-    assert not allowed(np.array([np.nan]), before, after).any()
+    assert is_move_allowed(move, before, after).all()
+    assert not is_move_allowed(move + 0.1, before, after).any()
+    assert not is_move_allowed(-move, before, after).any()
+    assert not is_move_allowed(np.array([np.nan]), before, after).any()

@@ -9,8 +9,8 @@ import pytest
 import planar
 from planar.document import files
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
-from planar.solving.checks.branch_check import Branch
-from planar.solving.position import Solver
+from planar.solving.checks.branch_check import BranchCheck
+from planar.solving.position import PositionSolver
 from planar.solving.runs import samples as motion_rows
 from tests.cli.test_commands import run
 from tests.draws import part
@@ -85,7 +85,7 @@ def same_angles(found, wanted, far):
 
 def passes_gate(mechanism, motion):
     """Whether every row is closed by the pairs' own formulas, run on plain numbers."""
-    solver = Solver(mechanism)
+    solver = PositionSolver(mechanism)
 
     def still(frame):
         if frame.fixed:
@@ -96,7 +96,7 @@ def passes_gate(mechanism, motion):
     frames = {name: still(frame) for name, frame in motion.frames.items()}
     own = {name: [jet.parts[0] for jet in each] for name, each in motion.own.items()}
     u = np.array([given.position for given in motion.inputs.values()])
-    gaps = solver.gate.gaps(frames, own, u)
+    gaps = solver.residual_check.residuals(frames, own, u)
     return gaps.shape[1] == len(motion) and bool(np.all(gaps <= solver.tolerance))
 
 
@@ -145,8 +145,8 @@ def test_an_offset_slider_crank_at_every_row():
     np.testing.assert_allclose(slide["velocity"], 3 * dx, atol=1e-13)
     np.testing.assert_allclose(slide["acceleration"], 9 * ddx - dx, atol=1e-12)
     np.testing.assert_allclose(motion.point("B").position[:, 1], e, atol=1e-14)
-    assert motion.slides("s")
-    assert not motion.slides("O")
+    assert motion.has_length_motion("s")
+    assert not motion.has_length_motion("O")
 
 
 def test_a_trammels_slide_runs_from_limit_to_limit():
@@ -455,20 +455,20 @@ def test_the_branch_that_comes_back_from_a_limit_is_told_apart_by_its_way_only(m
         lengths, (limit, way), _ = limited(rng)
         near = 10.0 ** rng.uniform(-5, -2)
         theta = limit + way * near * np.array([1.0, 10.0 ** rng.uniform(-1, 1)])
-        solver = Solver(four_bar(*lengths, theta[0]))
-        base = solver.assembly().z
+        solver = PositionSolver(four_bar(*lengths, theta[0]))
+        base = solver.find_assembly().z
         phi = [rocker(*lengths, theta, closed) for closed in (1, -1)]
         beta = [coupler(*lengths, theta, each) for each in phi]
         for k in (0, 1):
             z = np.array([[beta[0][0], phi[0][0]], [beta[k][1], phi[k][1]]])
             z -= TURN * np.round((z - base) / TURN)
-            assert np.all(solver.open_along(z, theta[:, None]) < solver.tolerance)
-            yield bool(Branch(solver.program, solver.station.p).along(z, theta[:, None])[0])
+            assert np.all(solver.max_residuals(z, theta[:, None]) < solver.tolerance)
+            yield bool(BranchCheck(solver.functions, solver.inputs.p).accept_steps(z, theta[:, None])[0])
 
     own, other = np.transpose([list(judged(seed)) for seed in range(40)])
     assert own.sum() > 20
     assert not other.any()
-    monkeypatch.setattr(Branch, "_onwards", lambda self, before, after, way: np.ones(len(way), dtype=bool))
+    monkeypatch.setattr(BranchCheck, "_keeps_direction", lambda self, before, after, way: np.ones(len(way), dtype=bool))
     assert sum(list(judged(seed))[1] for seed in range(40))
 
 
@@ -496,7 +496,7 @@ def test_every_row_of_a_run_passes_the_gate(model):
     # what is given of the input is what every row has
     (given, *_) = mechanism.inputs
     pair = motion.pair(given.pair)
-    rate = pair["velocity"] if motion.slides(given.pair) else pair["relative_angular_velocity"]
+    rate = pair["velocity"] if motion.has_length_motion(given.pair) else pair["relative_angular_velocity"]
     np.testing.assert_allclose(rate[np.isfinite(rate)], given.velocity, rtol=1e-12)
 
 
@@ -612,14 +612,14 @@ def test_a_run_is_not_written_over_its_own_mechanism(tmp_path):
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_a_row_whose_rates_break_a_constraint_has_none_and_is_named(monkeypatch, order):
-    real = motion_rows.rates
+    real = motion_rows.sample_rates
 
     def spoiled(*given):
         rated = real(*given)
-        rated.parts[order][3] *= 1.01
+        rated.coordinate_rates[order][3] *= 1.01
         return rated
 
-    monkeypatch.setattr(motion_rows, "rates", spoiled)
+    monkeypatch.setattr(motion_rows, "sample_rates", spoiled)
     motion = planar.cycle(four_bar(*ROCKER, 0.8), 12, jerk=True)
     assert np.flatnonzero(np.isnan(motion.link("BC").angular_velocity)).tolist() == [3]
     assert np.isfinite(motion.link("BC").angle).all()

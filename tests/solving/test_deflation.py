@@ -11,8 +11,8 @@ from planar.analysis.identity.mobility import mobility
 from planar.analysis.worked.solution import worked_solution
 from planar.equations.minors import _determinant
 from planar.foundation.errors import NoAnswer, Outcome
-from planar.solving.assembly.block_assemblies import hanging
-from planar.solving.position import known_of
+from planar.solving.assembly.block_assemblies import block_dependencies
+from planar.solving.position import solved_mechanism
 from tests.command import run
 from tests.page_scripts import in_node, needs_node
 
@@ -280,7 +280,7 @@ def test_determinants_without_division():
 
 
 def test_on_what_constraints_depend_is_worked_out_once_for_a_structure(monkeypatch):
-    setup = known_of(planar.load("watt-six-bar")).solver
-    before, calls = hanging(setup), []
+    setup = solved_mechanism(planar.load("watt-six-bar")).solver
+    before, calls = block_dependencies(setup), []
     monkeypatch.setattr(ca, "jacobian_sparsity", lambda *given: calls.append(given))
-    assert hanging(setup) == before and not calls
+    assert block_dependencies(setup) == before and not calls

@@ -8,7 +8,7 @@ import pytest
 import planar
 from planar.document import files
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
-from planar.solving.continuation.predictor_corrector import Work
+from planar.solving.continuation.predictor_corrector import ArcBudget
 from tests import ranges
 from tests.solving.test_cycle import (
     PARALLELOGRAM,
@@ -121,8 +121,8 @@ def test_a_motion_whose_reason_names_dead_points_has_them_among_its_limits():
 def arcs_of(monkeypatch, walk, *given, **more):
     """What a call gives, and how many arcs were walked for it."""
     counted = []
-    real = Work.spend
-    monkeypatch.setattr(Work, "spend", lambda self, u: counted.append(1) or real(self, u))
+    real = ArcBudget.spend
+    monkeypatch.setattr(ArcBudget, "spend", lambda self, u: counted.append(1) or real(self, u))
     try:
         return walk(*given, **more), len(counted)
     finally:
@@ -337,7 +337,7 @@ def test_a_run_says_how_far_it_has_come():
 
 
 def test_a_run_that_takes_too_much_work_says_how_far_it_came(monkeypatch):
-    monkeypatch.setattr("planar.solving.runs.range_run.ARCS", 10)
+    monkeypatch.setattr("planar.solving.runs.range_run.MAX_ARCS", 10)
     monkeypatch.setattr("planar.solving.runs.range_run.ARCS_PER_TURN", 0)
     mechanism = four_bar(*ROCKER, 1.0)
     motion = planar.cycle(mechanism, 2, stop=1.0 + 0.9 * TURN)
@@ -356,7 +356,7 @@ def test_of_a_range_that_takes_too_much_work_one_way_the_other_end_is_told_as_we
     for k, link in enumerate(value["links"].values()):
         if "length" in link:
             link["length"] *= 1 + 1e-5 * np.sin(7.0 * k)
-    monkeypatch.setattr("planar.solving.runs.range_run.ARCS", 100)
+    monkeypatch.setattr("planar.solving.runs.range_run.MAX_ARCS", 100)
     motion = planar.cycle(files.from_dict(value), 6)
     assert motion.outcome is Outcome.BRANCH_LOST
     low, high = motion.inputs["foot"].position[[0, -1]]

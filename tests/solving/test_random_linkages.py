@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from planar.document import files
 from planar.dynamics.forces import forces
 from planar.foundation.errors import NoAnswer, Outcome
-from planar.model.mechanism import Drive, Mechanism, counting
+from planar.model.mechanism import Drive, Mechanism, links_counting_turns
 from planar.results.motion import State
-from planar.solving.position import Solver, solve
+from planar.solving.position import PositionSolver, solve
 from tests.draws import draws
 from tests.linkages import Built, conditioning, determinate, random_linkage
 
@@ -24,9 +24,9 @@ many = settings(
 def assembled(built: Built, least: float) -> tuple[Mechanism, State]:
     """The linkage solved; assumed to have determinate rates, with some distance from dead points."""
     mechanism = files.from_dict(built.value)
-    solver = Solver(mechanism)
+    solver = PositionSolver(mechanism)
     try:
-        found = solver.assembly()
+        found = solver.find_assembly()
         state = solver.state(found.z, solver.remarks(found))  # as `solve` does
     except NoAnswer as problem:
         # loops drawn at random may hold each other twice, or leave freedom: then that is what must be said, and only
@@ -53,8 +53,8 @@ def test_assembles_from_a_sketch_disturbed_by_one_percent(seed, links, higher):
     assert state.residual < 1e-13
 
     def as_built(name):
-        link, point = state._named(name).members[0]
-        return np.array(built.frames[link].carry(state.shapes[link].at(point)))
+        link, point = state._find_point(name).members[0]
+        return np.array(built.frames[link].to_world(state.shapes[link].position(point)))
 
     found, drawn = (distance(mechanism, state, place) for place in (lambda n: state.point(n).position, as_built))
     # the nearest assembly is taken: the one that was built, or one nearer still to the disturbed sketch
@@ -112,14 +112,14 @@ def test_micrometres_or_kilometres_give_the_same_numbers(seed, links, higher, fa
     # what the sketch leaves open is taken as it is found first, which rounding can change
     assume(not any("leaves open" in remark for remark in state.remarks))
     value = built.value | {"units": {"length": {1e-6: "um", 1e-3: "mm", 1e3: "km"}[factor]}}
-    slides = {pair.name for pair in mechanism.pairs if pair.coordinates}
+    slides = {pair.name for pair in mechanism.pairs if pair.coordinate_kinds}
     value["inputs"] = [
         given | {key: given[key] * factor for key in ("velocity", "acceleration") if given["pair"] in slides}
         for given in value["inputs"]
     ]
     other = solve(files.from_dict(value))
-    solver = Solver(mechanism)
-    condition = 1.0 / conditioning(solver, solver.assembly().z)
+    solver = PositionSolver(mechanism)
+    condition = 1.0 / conditioning(solver, solver.find_assembly().z)
     for name, point in state.points.items():
         twin = other.point(name)
         for part in ("position", "velocity", "acceleration"):
@@ -162,7 +162,7 @@ def test_turning_and_shifting_the_whole_turns_and_shifts_every_result(seed, link
 
     # a gear whose wheels' turns nothing tells takes them between -pi and pi, and turning the whole may leave that;
     # so may any other link, from whose angle that of a wheel follows through a slide
-    turned = [state.link(link.name).angle + turn for link in mechanism.links if counting(mechanism)]
+    turned = [state.link(link.name).angle + turn for link in mechanism.links if links_counting_turns(mechanism)]
     assume(all(abs(angle) < np.pi for angle in turned))
 
     def moved(point):

@@ -10,10 +10,10 @@ import pytest
 import planar
 from planar.document import files
 from planar.foundation.errors import NoAnswer, Outcome
-from planar.solving.assembly.block_assemblies import Candidates
-from planar.solving.assembly.nearest_assembly import Failure, search
+from planar.solving.assembly.block_assemblies import BlockAssemblies
+from planar.solving.assembly.nearest_assembly import AssemblySearchFailure, find_nearest_assembly
 from planar.solving.diagnosis import remedy
-from planar.solving.prepared_mechanism import Setup
+from planar.solving.prepared_mechanism import PreparedMechanism
 from tests.cli.test_commands import written
 from tests.command import run
 from tests.draws import part
@@ -302,12 +302,17 @@ def test_a_remedy_is_looked_for_as_long_as_an_assembly_and_no_longer(monkeypatch
     """Groups solved are counted: those of the search, and as many again at most."""
     given = six_bar(15)
     solved = []
-    real = Candidates.of
-    monkeypatch.setattr(Candidates, "of", lambda *each, **more: solved.append(1) or real(*each, **more))
-    assert isinstance(search(Candidates(Setup(files.from_dict(given)))), Failure)
+    real = BlockAssemblies.near_sketch
+    monkeypatch.setattr(BlockAssemblies, "near_sketch", lambda *each, **more: solved.append(1) or real(*each, **more))
+    assert isinstance(
+        find_nearest_assembly(BlockAssemblies(PreparedMechanism(files.from_dict(given)))), AssemblySearchFailure
+    )
     searched = len(solved)
-    for least, words in ((0, "looked for only as long as for an assembly"), (remedy.LEAST_EFFORT, "would go together")):
-        monkeypatch.setattr(remedy, "LEAST_EFFORT", least)
+    for least, words in (
+        (0, "looked for only as long as for an assembly"),
+        (remedy.MIN_BLOCK_BUDGET, "would go together"),
+    ):
+        monkeypatch.setattr(remedy, "MIN_BLOCK_BUDGET", least)
         solved.clear()
         assert words in refused(given | {"name": f"least {least}"}).reason
         assert len(solved) <= searched + max(least, searched)
@@ -561,8 +566,8 @@ def test_of_very_many_names_that_there_are_a_few_are_listed():
 
 
 def test_what_would_mend_it_is_looked_for_once_and_only_where_somebody_asks(monkeypatch):
-    looked, search_for_one = [], remedy.remedy
-    monkeypatch.setattr(remedy, "remedy", lambda *given: looked.append(given) or search_for_one(*given))
+    looked, search_for_one = [], remedy.describe_remedy
+    monkeypatch.setattr(remedy, "describe_remedy", lambda *given: looked.append(given) or search_for_one(*given))
     apart = files.from_dict(four_bar(theta=150) | {"name": "looked for once"})  # solved by no other test
     assert not planar.modes(apart, certify=False)
     assert len(planar.circuits(apart)) == 1

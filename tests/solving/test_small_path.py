@@ -10,14 +10,14 @@ import pytest
 import planar
 from benchmarks import chain
 from planar.equations import acceptance
-from planar.equations.casadi_call import SIZES, Called, Chained
-from planar.equations.functions import CACHED, program
-from planar.model.mechanism import Drive, with_inputs
+from planar.equations.casadi_call import CHUNK_SIZES, BufferedFunction, RunFunction
+from planar.equations.functions import MAX_CACHED_STRUCTURES, equation_functions
+from planar.model.mechanism import Drive, replace_inputs
 from planar.solving import position
-from planar.solving.assembly.block_assemblies import Candidates
+from planar.solving.assembly.block_assemblies import BlockAssemblies
 from planar.solving.continuation import fast_path, path
-from planar.solving.continuation.fast_path import course, sound
-from planar.solving.position import Known, Solver
+from planar.solving.continuation.fast_path import fast_position, fast_run
+from planar.solving.position import PositionSolver, SolvedMechanism
 from tests.solving.test_cycle import four_bar
 
 ROCKER = (0.3, 0.8, 0.7, 1.0)
@@ -38,16 +38,16 @@ def mechanism(theta=1.0, lengths=ROCKER):
 
 def turn(solver, rows=91):
     """Inputs of a turn (rows, inputs), with velocity 2 and acceleration 3."""
-    u = solver.station.u + np.linspace(0.0, 2.0 * np.pi, rows)[:, None]
+    u = solver.inputs.u + np.linspace(0.0, 2.0 * np.pi, rows)[:, None]
     return u, np.full_like(u, 2.0), np.full_like(u, 3.0)
 
 
-@pytest.mark.parametrize("many", [1, 7, SIZES[-1], SIZES[0], SIZES[0] + SIZES[-1] + 3])
+@pytest.mark.parametrize("many", [1, 7, CHUNK_SIZES[-1], CHUNK_SIZES[0], CHUNK_SIZES[0] + CHUNK_SIZES[-1] + 3])
 def test_a_called_function_tells_of_many_positions_what_it_tells_of_each(many):
     x, y = ca.SX.sym("x", 2), ca.SX.sym("y", 1)
-    called = Called(ca.Function("f", [x, y], [ca.horzcat(x * y, ca.sin(x)), y + x[0]]))
+    called = BufferedFunction(ca.Function("f", [x, y], [ca.horzcat(x * y, ca.sin(x)), y + x[0]]))
     at, fixed = np.random.default_rng(0).normal(size=(many, 2)), np.array([0.7])
-    whole, more = called.over(many, at, fixed)
+    whole, more = called.evaluate_batch(many, at, fixed)
     np.testing.assert_allclose(whole, np.stack([at * 0.7, np.sin(at)], axis=1), rtol=1e-15)
     np.testing.assert_array_equal(more[:, 0, 0], 0.7 + at[:, 0])
     for k in range(many):
@@ -55,10 +55,10 @@ def test_a_called_function_tells_of_many_positions_what_it_tells_of_each(many):
     assert called(at[0], fixed)[0] is not called(at[0], fixed)[0]
 
 
-@pytest.mark.parametrize("many", [0, 1, SIZES[-1] + 1, SIZES[0] + 2 * SIZES[-1] + 3])
+@pytest.mark.parametrize("many", [0, 1, CHUNK_SIZES[-1] + 1, CHUNK_SIZES[0] + 2 * CHUNK_SIZES[-1] + 3])
 def test_a_chained_function_goes_on_from_where_it_was(many):
     z, u, p = (ca.SX.sym(name) for name in "zup")
-    chained = Chained(ca.Function("f", [z, u, p], [0.5 * z + p * u]))
+    chained = RunFunction(ca.Function("f", [z, u, p], [0.5 * z + p * u]))
     u = np.random.default_rng(0).normal(size=(many, 1))
     state, wanted = 0.3, []
     for each in u[:, 0]:
@@ -71,10 +71,10 @@ def test_a_chained_function_goes_on_from_where_it_was(many):
 def test_the_compiled_path_tells_what_the_general_one_does(name, monkeypatch):
     model = planar.load(name)
     quick = planar.solve(model), planar.cycle(model, 60)
-    monkeypatch.setattr(position, "sound", lambda *_: None)
-    monkeypatch.setattr(path, "course", lambda *_: None)
-    monkeypatch.setattr("planar.solving.runs.range_run.course", lambda *_: None)
-    slow = Solver(model).state(Solver(model).assembly().z), planar.cycle(model, 60)
+    monkeypatch.setattr(position, "fast_position", lambda *_: None)
+    monkeypatch.setattr(path, "fast_run", lambda *_: None)
+    monkeypatch.setattr("planar.solving.runs.range_run.fast_run", lambda *_: None)
+    slow = PositionSolver(model).state(PositionSolver(model).find_assembly().z), planar.cycle(model, 60)
     for one, other in zip(quick, slow, strict=True):
         assert one.remarks == other.remarks
         for point, parts in other.points.items():
@@ -86,84 +86,89 @@ def test_the_compiled_path_tells_what_the_general_one_does(name, monkeypatch):
 
 
 def test_a_run_is_told_by_compiled_functions_alone_where_nothing_is_near():
-    solver = Solver(mechanism())
+    solver = PositionSolver(mechanism())
     u, u1, u2 = turn(solver)
-    found = path.run(solver, solver.station.p, solver.assembly().z, u, (), (u1, u2))
-    assert found.general == 0
-    assert found.told.sure.all()
-    assert 0.0 < found.told.open <= solver.tolerance
+    found = path.follow_samples(solver, solver.inputs.p, solver.find_assembly().z, u, (), (u1, u2))
+    assert found.general_count == 0
+    assert found.fast_samples.is_sure.all()
+    assert 0.0 < found.fast_samples.residual <= solver.tolerance
 
 
 def test_a_course_ends_before_a_row_that_has_flipped(monkeypatch):
-    solver, other = Solver(mechanism()), Solver(four_bar(*ROCKER, 1.0, -1))
-    z, flipped = solver.assembly().z, other.assembly().z
+    solver, other = PositionSolver(mechanism()), PositionSolver(four_bar(*ROCKER, 1.0, -1))
+    z, flipped = solver.find_assembly().z, other.find_assembly().z
     u, u1, u2 = turn(solver)
-    assert len(course(solver, z, u, u1, u2).z) == len(u)
-    real = solver.program.run
+    assert len(fast_run(solver, z, u, u1, u2).z) == len(u)
+    real = solver.functions.run_samples
 
     def flipping(start, inputs, p):
         found = real(start, inputs, p)
         found[29:] = real(flipped, inputs, p)[29:]
         return found
 
-    monkeypatch.setattr(solver.program, "run", flipping)
-    assert len(course(solver, z, u, u1, u2).z) == 30
+    monkeypatch.setattr(solver.functions, "run_samples", flipping)
+    assert len(fast_run(solver, z, u, u1, u2).z) == 30
 
 
 @pytest.mark.parametrize("spoil", [1e-6, np.nan])
 def test_a_course_ends_before_a_row_that_is_open(monkeypatch, spoil):
-    solver = Solver(mechanism())
+    solver = PositionSolver(mechanism())
     u, u1, u2 = turn(solver)
-    real = solver.program.run
+    real = solver.functions.run_samples
 
     def spoiled(start, inputs, p):
         found = real(start, inputs, p)
         found[40, 1] += spoil
         return found
 
-    monkeypatch.setattr(solver.program, "run", spoiled)
-    assert len(course(solver, solver.assembly().z, u, u1, u2).z) == 41
+    monkeypatch.setattr(solver.functions, "run_samples", spoiled)
+    assert len(fast_run(solver, solver.find_assembly().z, u, u1, u2).z) == 41
 
 
 @pytest.mark.parametrize("order", ["first", "second"])
 def test_wrong_rates_of_a_compiled_function_do_not_pass(order, monkeypatch):
-    solver = Solver(mechanism())
-    z = solver.assembly().z
-    assert sound(solver, z) is not None
-    real = getattr(acceptance._Rates, order)
-    monkeypatch.setattr(acceptance._Rates, order, lambda self, *given: real(self, *given) * (1.0 + 1e-7))
-    wrong = acceptance.Judged(solver.outline.mechanism, solver.program)
-    monkeypatch.setattr(solver.outline, "judged", wrong)
-    assert sound(solver, z) is None
-    s = solver.station
-    told = acceptance.Verdict(*wrong.position(z, s.u1, s.u, s.u1, s.u2, s.p, solver.by, solver.least)[1][0])
-    assert (told.broken > 1e-9, told.broken_second > 1e-9) == (order == "first", order == "second")
+    solver = PositionSolver(mechanism())
+    z = solver.find_assembly().z
+    assert fast_position(solver, z) is not None
+    real = getattr(acceptance._RateExpressions, order)
+    monkeypatch.setattr(acceptance._RateExpressions, order, lambda self, *given: real(self, *given) * (1.0 + 1e-7))
+    wrong = acceptance.AcceptanceFunctions(solver.structure.mechanism, solver.functions)
+    monkeypatch.setattr(solver.structure, "acceptance", wrong)
+    assert fast_position(solver, z) is None
+    s = solver.inputs
+    told = acceptance.AcceptanceResult(
+        *wrong.position(z, s.u1, s.u, s.u1, s.u2, s.p, solver.row_scale, solver.min_column_scale)[1][0]
+    )
+    assert (told.velocity_error > 1e-9, told.acceleration_error > 1e-9) == (order == "first", order == "second")
 
 
 def test_a_position_beside_a_dead_point_is_left_to_the_general_path():
     """B, C and D all but in line: the crank of a triple rocker stands next to its limit."""
     lengths = (1.0, 0.8, 0.7, 0.9)
     limit = np.arccos((1.0 + 0.9**2 - 1.5**2) / (2.0 * 0.9))
-    near, far = (Solver(four_bar(*lengths, limit - gap)) for gap in (1e-8, 0.3))
-    assert sound(far, far.assembly().z) is not None
-    assert sound(near, near.assembly().z) is None
+    near, far = (PositionSolver(four_bar(*lengths, limit - gap)) for gap in (1e-8, 0.3))
+    assert fast_position(far, far.find_assembly().z) is not None
+    assert fast_position(near, near.find_assembly().z) is None
 
 
 def test_where_a_drive_leads_does_not_depend_on_what_was_asked_for_before():
-    first, second = Known(mechanism()), Known(mechanism())
+    first, second = SolvedMechanism(mechanism()), SolvedMechanism(mechanism())
     for theta in (5.1, 1.3, -2.0, 2.0):
-        first.ways.to(np.array([theta]))
+        first.nearby_positions.unknowns_at(np.array([theta]))
     for theta in (1.05, 2.0, 4.7, -0.9):
-        np.testing.assert_array_equal(first.ways.to(np.array([theta])), second.ways.to(np.array([theta])))
+        np.testing.assert_array_equal(
+            first.nearby_positions.unknowns_at(np.array([theta])),
+            second.nearby_positions.unknowns_at(np.array([theta])),
+        )
 
 
 def test_a_drive_leads_where_following_does():
-    known = Known(mechanism())
+    known = SolvedMechanism(mechanism())
     here = known.solver
     for theta in (1.0, 1.01, 1.125, 3.0, -4.0, 30.0):
         u = np.array([theta])
-        wanted = path.follow(here, here.station.p, known.assembly.z, here.station.u, u)
-        np.testing.assert_allclose(known.ways.to(u), wanted, atol=1e-12)
+        wanted = path.follow_to(here, here.inputs.p, known.assembly.z, here.inputs.u, u)
+        np.testing.assert_allclose(known.nearby_positions.unknowns_at(u), wanted, atol=1e-12)
 
 
 def test_a_drive_through_a_dead_point_is_refused_as_before_and_again():
@@ -174,22 +179,26 @@ def test_a_drive_through_a_dead_point_is_refused_as_before_and_again():
 
 
 def test_kept_positions_are_few(monkeypatch):
-    monkeypatch.setattr(fast_path, "MOST_NUMBERS", 40)
-    monkeypatch.setattr(fast_path, "LEAST_KEPT", 1)
-    known = Known(mechanism())
-    assert known.ways.to(np.array([1.0 + 19 * fast_path.STRIDE])) is not None
-    assert known.ways.to(np.array([1.0 + 22 * fast_path.STRIDE])) is None
-    assert sum(len(each) for each in known.ways._kept.values()) <= 21
+    monkeypatch.setattr(fast_path, "MAX_STORED_NUMBERS", 40)
+    monkeypatch.setattr(fast_path, "MIN_STORED_POSITIONS", 1)
+    known = SolvedMechanism(mechanism())
+    assert known.nearby_positions.unknowns_at(np.array([1.0 + 19 * fast_path.STEP_LENGTH])) is not None
+    assert known.nearby_positions.unknowns_at(np.array([1.0 + 22 * fast_path.STEP_LENGTH])) is None
+    assert sum(len(each) for each in known.nearby_positions._kept.values()) <= 21
     for number in range(3):
         planar.solve(mechanism(1.0 + 0.01 * number))
-    assert position._known.cache_info().currsize <= position._known.cache_info().maxsize == CACHED
+    assert (
+        position._cached_solved_mechanism.cache_info().currsize
+        <= position._cached_solved_mechanism.cache_info().maxsize
+        == MAX_CACHED_STRUCTURES
+    )
 
 
 def test_mechanisms_of_one_structure_share_all_but_their_numbers():
     one, other = mechanism(), mechanism(lengths=(0.3, 0.85, 0.7, 1.0))
-    assert Solver(one).outline is Solver(other).outline
+    assert PositionSolver(one).structure is PositionSolver(other).structure
     assert planar.solve(one).link("BC").angle != planar.solve(other).link("BC").angle
-    moved = with_inputs(one, (Drive("A", 1.2, 3.0, -1.0),))
+    moved = replace_inputs(one, (Drive("A", 1.2, 3.0, -1.0),))
     theirs, own = planar.solve(one, [Drive("A", 1.2, 3.0, -1.0)]), planar.solve(moved)
     for point in own.points:
         for found, wanted in zip(theirs.point(point)[:3], own.point(point)[:3], strict=True):
@@ -216,24 +225,24 @@ def test_a_mechanism_made_of_lists_is_solved_too():
 
 def test_frames_are_placed_when_they_are_asked_for():
     state = planar.solve(mechanism())
-    assert "both" not in state.frames.placing.__dict__
+    assert "frames_and_own" not in state.frames.source.__dict__
     _ = state.point("C")
-    assert "both" in state.frames.placing.__dict__
+    assert "frames_and_own" in state.frames.source.__dict__
     assert set(state.frames) == {"AD", "AB", "BC", "DC"}
 
 
 @pytest.mark.parametrize("name", CLOSED)
 def test_both_assemblies_in_closed_form_are_those_that_newtons_method_finds(name, monkeypatch):
-    setup = Solver(planar.load(name))
-    z, seen = setup.assembly().z, 0
-    for stage in setup.equations.stages:
-        quick = Candidates(setup)._both(stage, z)
+    setup = PositionSolver(planar.load(name))
+    z, seen = setup.find_assembly().z, 0
+    for stage in setup.equations.blocks:
+        quick = BlockAssemblies(setup)._closed_form(stage, z)
         if quick is None:
             continue
         with monkeypatch.context() as patched:
-            patched.setattr(Candidates, "_both", lambda *_: None)
-            patched.setattr("planar.solving.assembly.block_assemblies.CLEAR", -1.0)
-            slow, _ = Candidates(setup).of(stage, z)
+            patched.setattr(BlockAssemblies, "_closed_form", lambda *_: None)
+            patched.setattr("planar.solving.assembly.block_assemblies.CLEAR_SKETCH_DISTANCE", -1.0)
+            slow, _ = BlockAssemblies(setup).near_sketch(stage, z)
         assert len(quick) == len(slow) == 2
         for one, other in zip(quick, slow, strict=True):
             np.testing.assert_allclose(np.exp(1j * one.z), np.exp(1j * other.z), atol=1e-11)
@@ -244,7 +253,7 @@ def test_both_assemblies_in_closed_form_are_those_that_newtons_method_finds(name
 
 def test_instructions_of_a_row_grow_with_its_links():
     def instructions(links):
-        made = program(planar.from_dict(chain.document(links)))
-        return made.advance.n_instructions()
+        made = equation_functions(planar.from_dict(chain.document(links)))
+        return made.newton_function.n_instructions()
 
     assert instructions(40) < 2.2 * instructions(20)

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 import planar
 from planar.document import files
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
-from planar.model.pairs import Kind
-from planar.solving.position import Solver
+from planar.model.pairs import MeasureKind
+from planar.solving.position import PositionSolver
 from tests.draws import draws
 from tests.linkages import conditioning, random_linkage
 from tests.solving.test_cycle import TURN, passes_gate, rocker
@@ -126,8 +126,8 @@ def drawn(seed, links, higher):
     built = random_linkage(seed, links, 0.0, higher)
     mechanism = files.from_dict(built.value)
     try:
-        solver = Solver(mechanism)
-        found = solver.assembly()
+        solver = PositionSolver(mechanism)
+        found = solver.find_assembly()
         solver.state(found.z)
     except NoAnswer:
         assume(False)
@@ -271,7 +271,9 @@ def test_the_limits_of_a_range_are_its_ends(seed, links):
     ends = motion.inputs[pair].position[[0, -1]]
     dead = [each.input for each in motion.limits if each.kind == "input dead point"]
     assert motion.outcome in (Outcome.SOLVED, Outcome.BRANCH_LOST)
-    if motion.outcome is Outcome.SOLVED and not (not motion.slides(pair) and np.ptp(ends) == pytest.approx(TURN)):
+    if motion.outcome is Outcome.SOLVED and not (
+        not motion.has_length_motion(pair) and np.ptp(ends) == pytest.approx(TURN)
+    ):
         np.testing.assert_allclose(dead, ends, atol=1e-9)
         assert ends[0] - 1e-9 <= here <= ends[1] + 1e-9
         # just beyond either the assembly cannot follow
@@ -293,16 +295,18 @@ def test_at_the_end_of_a_stroke_the_output_rests_and_is_farthest(seed, links):
         if each.kind != "stroke end":
             continue
         values = []
-        kind = planar.model.mechanism.motions(mechanism)[each.of].drive_kind
+        kind = planar.model.mechanism.relative_motions(mechanism)[each.of].input_kind
         for u in (each.input - 1e-4, each.input, each.input + 1e-4):
             if not here <= u <= motion.inputs[pair].position[-1]:
                 break
             row = planar.cycle(mechanism, 1, here, u, pair=pair)
             report = row.pair(each.of)
-            values.append([report["displacement" if kind is Kind.LENGTH else "relative_angle"][-1]])
-            rate = report["velocity" if kind is Kind.LENGTH else "relative_angular_velocity"][-1]
+            values.append([report["displacement" if kind is MeasureKind.LENGTH else "relative_angle"][-1]])
+            rate = report["velocity" if kind is MeasureKind.LENGTH else "relative_angular_velocity"][-1]
             if u == each.input:
                 assert abs(rate) < 1e-8 * (1.0 + np.nanmax(np.abs(frames(row, 1))))
         else:
-            before, at, after = np.unwrap(np.array(values)[:, 0]) if kind is not Kind.LENGTH else np.array(values)[:, 0]
+            before, at, after = (
+                np.unwrap(np.array(values)[:, 0]) if kind is not MeasureKind.LENGTH else np.array(values)[:, 0]
+            )
             assert (at - before) * (after - at) <= 1e-12

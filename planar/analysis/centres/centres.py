@@ -10,26 +10,39 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.analysis.centres.branch_rates import branches
-from planar.analysis.centres.kennedy import WORST, Construction, Found, Through, Two, unit
-from planar.analysis.centres.null_space_check import AS_ONE, Proof, as_one, proved, ways
-from planar.analysis.centres.pair_centres import primary
-from planar.analysis.rate_equations import Rates
-from planar.analysis.rate_equations import rates as rates_of
-from planar.analysis.rate_ratios import EXACT, Moved, motions_of
-from planar.analysis.vector_chains import Walks
+from planar.analysis.centres.branch_rates import branch_poles
+from planar.analysis.centres.kennedy import (
+    MAX_MEETING_ERROR,
+    FoundCentre,
+    KennedyConstruction,
+    KennedyLine,
+    LinkPair,
+    normalise,
+)
+from planar.analysis.centres.null_space_check import (
+    AS_ONE_RATIO,
+    CentresProof,
+    allowed_motions,
+    links_moving_as_one,
+    prove_centres,
+)
+from planar.analysis.centres.pair_centres import primary_centres
+from planar.analysis.rate_equations import RateEquations
+from planar.analysis.rate_equations import rate_equations as rates_of
+from planar.analysis.rate_ratios import LEAST_ERROR, LinkPoles, solve_link_poles
+from planar.analysis.vector_chains import VectorChains
 from planar.foundation.notebook_display import Displayable
-from planar.model.link_graph import numbered, parting
+from planar.model.link_graph import link_numbers, number_separator
 from planar.model.mechanism import Mechanism, named_points
-from planar.results.motion import State, Unknown
-from planar.solving.rest_position import standing
+from planar.results.motion import State, UnknownName
+from planar.solving.rest_position import rest_position
 
 Array = np.ndarray
-WORST_IN_CROSSING = 1e-9
+MAX_ERROR_AT_CROSSING = 1e-9
 """Where motions cross positions are exact to the root of rounding only: lines that close to one another are one."""
-CROSSING = 1e-6
+INFINITY_RATIO_AT_CROSSING = 1e-6
 """As INFINITE, where motions cross."""
-INFINITE = 1e-9
+INFINITY_RATIO = 1e-9
 """A centre whose w is this small beside x and y, in the mechanism's size, cannot be told from one at infinity."""
 
 
@@ -50,7 +63,7 @@ class Centre:
     "`pair`, `Kennedy`, `ratio`, `equations`, `as one` or `open`"
     homogeneous: Array | None
     derivation: str
-    lines: tuple[Line, ...] = ()
+    lines: tuple[CentreLine, ...] = ()
 
     @property
     def position(self) -> Array | None:
@@ -67,7 +80,7 @@ class Centre:
         return self.homogeneous[:2]
 
 
-class Line(NamedTuple):
+class CentreLine(NamedTuple):
     """A line of centres on which a centre was found: through two other centres by name, or the normal of a pair."""
 
     centres: tuple[str, ...] = ()
@@ -83,14 +96,14 @@ class Centres(Displayable):
     "of the links, as textbooks count them: the frame is last"
     all: tuple[Centre, ...]
     "in the order in which they were found"
-    proof: Proof
+    proof: CentresProof
     as_one: tuple[tuple[str, ...], ...]
     "links that move as one in this position, in groups; at rest are those in one with the frame"
     branches: tuple[Mapping[str, Array], ...] = ()
     "at a change point, for each branch that crosses there, where the open centres by name lie on it: homogeneous (3,)"
 
     @cached_property
-    def _by_links(self) -> dict[Two, Centre]:
+    def _by_links(self) -> dict[LinkPair, Centre]:
         return {frozenset(centre.links): centre for centre in self.all}
 
     def __repr__(self) -> str:
@@ -100,7 +113,7 @@ class Centres(Displayable):
         two = frozenset(links)
         if two in self._by_links:
             return self._by_links[two]
-        raise Unknown(f"there are no links {' and '.join(map(repr, links))}; links are {', '.join(self.numbers)}")
+        raise UnknownName(f"there are no links {' and '.join(map(repr, links))}; links are {', '.join(self.numbers)}")
 
     def __iter__(self) -> Iterator[Centre]:
         return iter(self.all)
@@ -117,9 +130,9 @@ def centres(position: State | Mechanism) -> Centres:
     position is assembled, so that it may stand where `solve` finds no velocities: on a dead point of its inputs or on
     a change point. Raises NoAnswer where it cannot be assembled.
     """
-    found = _Search(standing(position) if isinstance(position, Mechanism) else position)
-    found.run()
-    return found.told()
+    found = _CentreSearch(rest_position(position) if isinstance(position, Mechanism) else position)
+    found.search()
+    return found.result()
 
 
 def extent(state: State) -> tuple[Array, float]:
@@ -129,61 +142,61 @@ def extent(state: State) -> tuple[Array, float]:
     return 0.5 * (low + high), float((high - low).max()) or 1.0
 
 
-class _Search:
+class _CentreSearch:
     """The centres of one position while they are found."""
 
     def __init__(self, state: State):
         self.state = state
-        self.numbers = numbered(state.mechanism)
+        self.numbers = link_numbers(state.mechanism)
         self.links = sorted(self.numbers, key=lambda link: int(self.numbers[link]))
         self.middle, self.size = extent(state)
-        rates: Rates = rates_of(state)
+        rates: RateEquations = rates_of(state)
         named = {member: each.name for each in named_points(state.mechanism) for member in each.members}
-        self.walks = Walks(rates, named, self.size)
-        self.ways = ways(state, self.middle, self.size)
-        worst = WORST if self.ways.count <= 1 else WORST_IN_CROSSING
-        self.construction = Construction(self.links, primary(rates, self.middle, self.size), worst)
-        self.by_equations: dict[Two, str] = {}
-        self.as_one: set[Two] = set()
-        self.why_open = ""
+        self.chains = VectorChains(rates, named, self.size)
+        self.motions = allowed_motions(state, self.middle, self.size)
+        worst = MAX_MEETING_ERROR if self.motions.count <= 1 else MAX_ERROR_AT_CROSSING
+        self.construction = KennedyConstruction(self.links, primary_centres(rates, self.middle, self.size), worst)
+        self.by_equations: dict[LinkPair, str] = {}
+        self.as_one: set[LinkPair] = set()
+        self.open_reason = ""
 
     @property
-    def found(self) -> dict[Two, Found]:
+    def found(self) -> dict[LinkPair, FoundCentre]:
         """By two links, in the order in which they were found."""
         return self.construction.found
 
-    def run(self) -> None:
+    def search(self) -> None:
         """All of them, as far as they are determined."""
-        self.construction.run()
-        moved: Moved | None = None
-        while left := self._left():
-            moved = moved or motions_of(self.walks.rates, self.walks, self.middle, self.size)
-            further = moved.links is None and self.ways.count == 1
+        self.construction.find_all()
+        moved: LinkPoles | None = None
+        while left := self._remaining_pairs():
+            moved = moved or solve_link_poles(self.chains.equations, self.chains, self.middle, self.size)
+            further = moved.links is None and self.motions.count == 1
             if further:
-                moved = Moved({link: each[0] for link, each in self.ways.links.items()}, "", EXACT)
+                moved = LinkPoles({link: each[0] for link, each in self.motions.poles.items()}, "", LEAST_ERROR)
             if moved.links is None:
-                self.why_open = moved.why
+                self.open_reason = moved.reason
                 return
-            opens = self._opens()
+            opens = self._count_opened()
             place = {link: index for index, link in enumerate(self.links)}
             two = max(left, key=lambda two: opens[tuple(place[link] for link in two)])
             a, b = two
             relative = moved.links[b] - moved.links[a]
             length = float(np.linalg.norm(relative))
-            if length <= AS_ONE:
+            if length <= AS_ONE_RATIO:
                 self.as_one.add(two)
                 continue
-            nearly = self.construction.lines(two) > 1
+            nearly = self.construction.count_lines(two) > 1
             told = "the lines known are one, or nearly" if nearly else "no two lines are known"
             self.by_equations[two] = f"{told}, and to first order more could move" if further else told
-            self.construction.add(two, Found(unit(relative), moved.error / length))
-            self.construction.run()
+            self.construction.add_centre(two, FoundCentre(normalise(relative), moved.error / length))
+            self.construction.find_all()
 
-    def _left(self) -> list[Two]:
+    def _remaining_pairs(self) -> list[LinkPair]:
         every = map(frozenset, combinations(self.links, 2))
         return [two for two in every if two not in self.found and two not in self.as_one]
 
-    def _opens(self) -> Array:
+    def _count_opened(self) -> Array:
         """How many open centres would have two lines if that of two links were known, (links, links)."""
         place = {link: index for index, link in enumerate(self.links)}
         known = np.zeros((len(self.links), len(self.links)), dtype=int)
@@ -195,45 +208,48 @@ class _Search:
         opened = one_line.astype(int) @ known
         return opened + opened.T
 
-    def told(self) -> Centres:
+    def result(self) -> Centres:
         """The centres in metres, with names and derivations, and their proof."""
         listed = [self._centre(two, order, one) for order, (two, one) in enumerate(self.found.items(), start=1)]
         rest = [frozenset(two) for two in combinations(self.links, 2) if frozenset(two) not in self.found]
-        listed += [self._without(two, order) for order, two in enumerate(rest, start=len(listed) + 1)]
-        proof = proved({two: one.at for two, one in self.found.items()}, self.links, self.ways)
-        groups = as_one(self.links, self.ways)
-        return Centres(self.state, self.numbers, tuple(listed), proof, groups, self._branches(listed))
+        listed += [self._undetermined_centre(two, order) for order, two in enumerate(rest, start=len(listed) + 1)]
+        proof = prove_centres({two: one.at for two, one in self.found.items()}, self.links, self.motions)
+        groups = links_moving_as_one(self.links, self.motions)
+        return Centres(self.state, self.numbers, tuple(listed), proof, groups, self._branch_centres(listed))
 
-    def _branches(self, listed: Sequence[Centre]) -> tuple[dict[str, Array], ...]:
+    def _branch_centres(self, listed: Sequence[Centre]) -> tuple[dict[str, Array], ...]:
         """Where the open centres lie on each branch of a change point; links that move as one on it have none."""
         left = [each for each in listed if each.how == "open"]
-        if not left or self.ways.count <= len(self.state.mechanism.inputs):
+        if not left or self.motions.count <= len(self.state.mechanism.inputs):
             return ()
         found = []
-        for motions in branches(self.state, self.middle, self.size):
+        for motions in branch_poles(self.state, self.middle, self.size):
             relatives = {each.name: motions[each.links[1]] - motions[each.links[0]] for each in left}
-            moving = {name: each for name, each in relatives.items() if np.linalg.norm(each) > AS_ONE}
+            moving = {name: each for name, each in relatives.items() if np.linalg.norm(each) > AS_ONE_RATIO}
             found.append(
-                {name: self._in_metres(each / np.linalg.norm(each), CROSSING) for name, each in moving.items()}
+                {
+                    name: self._in_metres(each / np.linalg.norm(each), INFINITY_RATIO_AT_CROSSING)
+                    for name, each in moving.items()
+                }
             )
         return tuple(found)
 
-    def _in_metres(self, at: Array, infinite: float = INFINITE) -> Array:
+    def _in_metres(self, at: Array, infinite: float = INFINITY_RATIO) -> Array:
         """A homogeneous point in sizes about the middle as one in metres, at infinity what cannot be told from it."""
         x, y, w = at
         if abs(w) <= infinite * np.hypot(x, y):
-            return unit(np.array([x, y, 0.0]))
-        return unit(np.array([self.size * x + w * self.middle[0], self.size * y + w * self.middle[1], w]))
+            return normalise(np.array([x, y, 0.0]))
+        return normalise(np.array([self.size * x + w * self.middle[0], self.size * y + w * self.middle[1], w]))
 
-    def _named(self, two: Two) -> tuple[tuple[str, str], str]:
+    def _named(self, two: LinkPair) -> tuple[tuple[str, str], str]:
         links = tuple(sorted(two, key=lambda link: int(self.numbers[link])))
         first, second = (self.numbers[link] for link in links)
-        return links, f"I{first}{parting(self.numbers)}{second}"
+        return links, f"I{first}{number_separator(self.numbers)}{second}"
 
     def _name(self, a: str, b: str) -> str:
         return self._named(frozenset((a, b)))[1]
 
-    def _centre(self, two: Two, order: int, one: Found) -> Centre:
+    def _centre(self, two: LinkPair, order: int, one: FoundCentre) -> Centre:
         links, name = self._named(two)
         at = self._in_metres(one.at)
         lines = tuple(self._line(through, links) for through in one.lines)
@@ -245,23 +261,23 @@ class _Search:
         elif two in self.by_equations:
             how, told = "equations", f"{name} by the equations round the loops: {self.by_equations[two]}"
         elif one.ratio:
-            how, told = "ratio", f"{name} on {_said(lines[0])}, in the ratio of {one.ratio}"
+            how, told = "ratio", f"{name} on {_line_name(lines[0])}, in the ratio of {one.ratio}"
         else:
-            how, told = "Kennedy", f"{name} = {_said(lines[0])} × {_said(lines[1])}"
+            how, told = "Kennedy", f"{name} = {_line_name(lines[0])} × {_line_name(lines[1])}"
         return Centre(links, name, order, how, at, told, lines)
 
-    def _line(self, through: Through, links: Sequence[str]) -> Line:
+    def _line(self, through: KennedyLine, links: Sequence[str]) -> CentreLine:
         if through.pair:
-            return Line(pair=through.pair)
-        return Line(tuple(self._name(link, through.link) for link in links))
+            return CentreLine(pair=through.pair)
+        return CentreLine(tuple(self._name(link, through.link) for link in links))
 
-    def _without(self, two: Two, order: int) -> Centre:
+    def _undetermined_centre(self, two: LinkPair, order: int) -> Centre:
         links, name = self._named(two)
         if two in self.as_one:
             told = f"{name}: {links[0]} and {links[1]} move as one here, so every point is their centre"
             return Centre(links, name, order, "as one", None, told)
-        return Centre(links, name, order, "open", None, f"{name} is not determined: {self.why_open}")
+        return Centre(links, name, order, "open", None, f"{name} is not determined: {self.open_reason}")
 
 
-def _said(line: Line) -> str:
+def _line_name(line: CentreLine) -> str:
     return " ".join(line.centres) if line.centres else f"the normal at {line.pair}"

@@ -8,27 +8,27 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.analysis.interpolated_run import Steady
-from planar.analysis.relative_motion import Relative, relative
+from planar.analysis.interpolated_run import InterpolatedRun
+from planar.analysis.relative_motion import RelativeMotion, relative_motion
 from planar.foundation.errors import BadInput
 from planar.foundation.geometry import Frame, Vector, frame_at
 from planar.foundation.jets import Jet
-from planar.model.link_graph import numbered
-from planar.model.mechanism import Mechanism, motions
-from planar.model.pairs import Kind
+from planar.model.link_graph import link_numbers
+from planar.model.mechanism import Mechanism, relative_motions
+from planar.model.pairs import MeasureKind
 from planar.results.motion import Motion
 
 Array = np.ndarray
 
-INFINITE = 1e-9
+INFINITY_RATIO = 1e-9
 """A pole whose w is this small beside x and y, in the mechanism's size, cannot be told from one at infinity."""
-AS_ONE = 1e-9
+AS_ONE_RATIO = 1e-9
 """Links that move this little against each other, beside the greatest motion, move as one."""
-STANDS = 1e-8
+STANDSTILL_RATIO = 1e-8
 """Part of the size: a pole that stays within it stands still."""
-LOOSE = 1e-5
+SECOND_MOTION_RATIO = 1e-5
 """At a limit there is one motion: another singular value below this part of the greatest is of a second one."""
-WITHIN = 8
+PARTS_PER_STEP = 8
 """Parts of a step at whose ends it is looked whether the pole passes through infinity."""
 
 
@@ -80,14 +80,14 @@ class Centrode(NamedTuple):
         known_a, known_b = np.isfinite(da), np.isfinite(db)
         s = s[None, :, None]
         cubic = a + s * da + s**2 * (3.0 * (b - a) - 2.0 * da - db) + s**3 * (2.0 * (a - b) + da + db)
-        to_limit = _beside(b, a, -2.0 * da, 1.0 - s)
-        from_limit = _beside(a, b, 2.0 * db, s)
+        to_limit = _parabola_from_limit(b, a, -2.0 * da, 1.0 - s)
+        from_limit = _parabola_from_limit(a, b, 2.0 * db, s)
         straight = a + s * (b - a)
         one = np.where(known_a, to_limit, np.where(known_b, from_limit, straight))
         return np.where(known_a & known_b, cubic, one)
 
 
-def _beside(limit: Array, inner: Array, slope: Array, s: Array) -> Array:
+def _parabola_from_limit(limit: Array, inner: Array, slope: Array, s: Array) -> Array:
     """A parabola from a limit (s = 0) to an inner row (s = 1), where it has a slope."""
     bend = slope - (inner - limit)
     return limit + s * (inner - limit - bend) + s**2 * bend
@@ -109,7 +109,7 @@ class Centrodes:
     fixed: Centrode
     moving: Centrode
     arcs: tuple[Array, ...]
-    motion: Relative
+    motion: RelativeMotion
     "of the link in the axes of the other, at every position"
     reason: str
 
@@ -119,8 +119,8 @@ class Centrodes:
         In the axes of the other link.
         """
         points = self.moving.position if points is None else points
-        here = Relative(*(part[row] for part in self.motion))
-        return here.carried(points)
+        here = RelativeMotion(*(part[row] for part in self.motion))
+        return here.points_in_other(points)
 
     @property
     def known(self) -> Array:
@@ -137,42 +137,50 @@ def centrodes(motion: Motion, link: str, other: str | None = None) -> Centrodes:
     """
     frame = motion.mechanism.frame
     other = frame if other is None else other
-    relative(motion.frames, link, other)  # refuses what there is not
-    steady = Steady(motion)
-    moved = replace(steady.samples, frames=_with_limits(steady))
+    relative_motion(motion.frames, link, other)  # refuses what there is not
+    steady = InterpolatedRun(motion)
+    moved = replace(steady.samples, frames=_frames_with_limit_rates(steady))
     size = steady.solver.unit
-    scale = {name: _scale(moved, name, size) for name in (frame, other, link)}
+    scale = {name: _link_scale(moved, name, size) for name in (frame, other, link)}
     greatest = np.max(
-        [_scaled(_motion(moved, name, frame).fixed_pole[0], scale[frame])[1] for name in moved.frames if name != frame],
+        [
+            _in_sizes(_relative_motion(moved, name, frame).fixed_pole[0], scale[frame])[1]
+            for name in moved.frames
+            if name != frame
+        ],
         axis=0,
     )
-    found = _motion(moved, link, other)
+    found = _relative_motion(moved, link, other)
     paths = {
-        name: _path(pole, scale[name], AS_ONE * greatest)
+        name: _unit_poles(pole, scale[name], AS_ONE_RATIO * greatest)
         for name, pole in ((other, found.fixed_pole), (link, found.moving_pole))
     }
-    signs = _signs(paths[other][0])
+    signs = _continuous_signs(paths[other][0])
     fixed, moving = (
         Centrode(steady.positions, signs * at @ scale[name].T, signs * rate @ scale[name].T / steady.rate)
         for name, (at, rate) in paths.items()
     )
     reason = _reason(fixed, greatest, link, other, size)
-    return Centrodes(link, other, steady.pair, fixed, moving, () if reason else _arcs(fixed), found, reason)
+    return Centrodes(
+        link, other, steady.pair, fixed, moving, () if reason else _split_at_infinity(fixed), found, reason
+    )
 
 
-def usual(mechanism: Mechanism) -> tuple[str, str]:
+def usual_links(mechanism: Mechanism) -> tuple[str, str]:
     """Two links whose centrodes say most: the first coupler and the frame, else the first two moving links.
 
     A coupler is no link that is pinned to the frame or slides on it; best one that no pair at all joins to it. Raises
     BadInput where nothing moves.
     """
     frame = mechanism.frame
-    moving = [link for link in numbered(mechanism) if link != frame]
+    moving = [link for link in link_numbers(mechanism) if link != frame]
     if not moving:
         raise BadInput(mechanism.name, "the mechanism has no moving link, so there are no centrodes")
-    on_frame = [pair for pair in motions(mechanism).values() if frame in pair.links]
-    pinned = {link for pair in on_frame if pair.lower and pair.drive_kind is Kind.ANGLE for link in pair.links}
-    guided = {link for pair in on_frame if pair.lower for link in pair.links}
+    on_frame = [pair for pair in relative_motions(mechanism).values() if frame in pair.links]
+    pinned = {
+        link for pair in on_frame if pair.is_lower_pair and pair.input_kind is MeasureKind.ANGLE for link in pair.links
+    }
+    guided = {link for pair in on_frame if pair.is_lower_pair for link in pair.links}
     joined = {link for pair in on_frame for link in pair.links}
     for out in (joined, guided, pinned):
         free = [link for link in moving if link not in out]
@@ -181,10 +189,10 @@ def usual(mechanism: Mechanism) -> tuple[str, str]:
     return (moving[1], moving[0]) if len(moving) > 1 else (moving[0], frame)
 
 
-def _motion(moved: Motion, link: str, other: str) -> Relative:
+def _relative_motion(moved: Motion, link: str, other: str) -> RelativeMotion:
     """The motion of a link against another, with a row for every position."""
-    found, many = relative(moved.frames, link, other), len(moved)
-    return Relative(
+    found, many = relative_motion(moved.frames, link, other), len(moved)
+    return RelativeMotion(
         *(
             np.broadcast_to(part, (many, *part.shape[part.ndim - whole :]))
             for part, whole in zip(found, (1, 1, 1, 0, 0, 0), strict=True)
@@ -192,33 +200,33 @@ def _motion(moved: Motion, link: str, other: str) -> Relative:
     )
 
 
-def _scale(moved: Motion, link: str, size: float) -> Array:
+def _link_scale(moved: Motion, link: str, size: float) -> Array:
     """What puts homogeneous points measured in the size, about the mechanism's middle, into a link's axes (3, 3), m."""
     places = np.mean([moved.point(name).position for name in moved.point_names], axis=0)
-    local = moved.frames[link].local(Vector(*places.T))
+    local = moved.frames[link].to_local(Vector(*places.T))
     x, y = (np.mean(part.parts[0] if isinstance(part, Jet) else part) for part in local)
     return np.array([[size, 0.0, x], [0.0, size, y], [0.0, 0.0, 1.0]])
 
 
-def _scaled(poles: Array, scale: Array) -> tuple[Array, Array]:
+def _in_sizes(poles: Array, scale: Array) -> tuple[Array, Array]:
     """Poles in the mechanism's size, and their lengths (n, 1)."""
     poles = poles @ np.linalg.inv(scale).T
     return poles, np.linalg.norm(poles, axis=1, keepdims=True)
 
 
-def _path(pole: tuple[Array, Array], scale: Array, least: Array) -> tuple[Array, Array]:
+def _unit_poles(pole: tuple[Array, Array], scale: Array, least: Array) -> tuple[Array, Array]:
     """Poles (n, 3) of length one with their rates, in the mechanism's size; NaN where there is no more motion than the
     least (n, 1)."""
-    at, length = _scaled(pole[0], scale)
-    rate, _ = _scaled(pole[1], scale)
+    at, length = _in_sizes(pole[0], scale)
+    rate, _ = _in_sizes(pole[1], scale)
     length = np.where(length > least, length, np.nan)
     at, rate = at / length, rate / length
     rate -= at * (at * rate).sum(axis=1, keepdims=True)
-    at[np.abs(at[:, 2]) <= INFINITE, 2] = 0.0
+    at[np.abs(at[:, 2]) <= INFINITY_RATIO, 2] = 0.0
     return at, rate
 
 
-def _signs(poles: Array) -> Array:
+def _continuous_signs(poles: Array) -> Array:
     """The signs (n, 1) with which poles go on steadily: where the links rest in passing, all of a twist turns round."""
     signs = np.ones(len(poles))
     known = np.flatnonzero(np.isfinite(poles[:, 2]))
@@ -228,11 +236,11 @@ def _signs(poles: Array) -> Array:
     return signs[:, None]
 
 
-def _arcs(fixed: Centrode) -> tuple[Array, ...]:
+def _split_at_infinity(fixed: Centrode) -> tuple[Array, ...]:
     """The rows of the pieces of a curve, cut where w vanishes at a row or between two."""
     known = np.flatnonzero(np.isfinite(fixed.homogeneous[:, 2]))
-    w = fixed.curve(known, WITHIN)[:, 2]
-    senses = np.sign(w[np.arange(len(known) - 1)[:, None] * WITHIN + np.arange(WITHIN + 1)])
+    w = fixed.curve(known, PARTS_PER_STEP)[:, 2]
+    senses = np.sign(w[np.arange(len(known) - 1)[:, None] * PARTS_PER_STEP + np.arange(PARTS_PER_STEP + 1)])
     cuts = np.flatnonzero(senses.min(axis=1) != senses.max(axis=1)) + 1
     pieces = np.split(known, cuts)
     return tuple(piece for piece in pieces if np.all(fixed.homogeneous[piece, 2] != 0.0))
@@ -248,32 +256,34 @@ def _reason(fixed: Centrode, greatest: Array, link: str, other: str, size: float
     finite = poles[poles[:, 2] != 0.0]
     if not len(finite):
         return f"{link} only slides against {other}: their centre is always at infinity"
-    if len(finite) == len(poles) and np.ptp(finite[:, :2] / finite[:, 2:], axis=0).max() <= STANDS * size:
+    if len(finite) == len(poles) and np.ptp(finite[:, :2] / finite[:, 2:], axis=0).max() <= STANDSTILL_RATIO * size:
         return f"{link} turns against {other} about one point, which is their centre always"
     return ""
 
 
-def _with_limits(steady: Steady) -> Mapping[str, Frame]:
+def _frames_with_limit_rates(steady: InterpolatedRun) -> Mapping[str, Frame]:
     """The frames of a motion's samples, with first rates at limits too, of any size: those of the one motion there."""
-    solver, program = steady.solver, steady.solver.program
+    solver, program = steady.solver, steady.solver.functions
     running = [given.pair for given in solver.mechanism.inputs].index(steady.pair)
-    by = solver.unit if solver.named[steady.pair].drive_kind is Kind.LENGTH else 1.0
+    by = solver.unit if solver.relative_motions[steady.pair].input_kind is MeasureKind.LENGTH else 1.0
     rates = {}
-    for row in np.flatnonzero(~steady.known):
-        z, u = steady.z[row], solver.station.u.copy()
+    for row in np.flatnonzero(~steady.has_rates):
+        z, u = steady.z[row], solver.inputs.u.copy()
         u[running] = steady.positions[row] / by
-        slopes, drives = program.slopes(z[None], u[None], solver.station.p)
+        slopes, drives = program.jacobians(z[None], u[None], solver.inputs.p)
         _, values, ways = np.linalg.svd(np.hstack([slopes[0], drives[0][:, running : running + 1]]))
-        if len(values) < len(z) or values[len(z) - 1] <= LOOSE * values[0]:
+        if len(values) < len(z) or values[len(z) - 1] <= SECOND_MOTION_RATIO * values[0]:
             continue  # branches cross, or there is more than one motion
         y1 = np.concatenate([ways[-1][:-1], np.zeros_like(u)])
         y1[len(z) + running] = ways[-1][-1]
         still_ = np.zeros_like(y1)
-        rates[row] = program.kinematics(np.concatenate([z, u]), y1, still_, solver.station.p).w1 * solver.scale
-    return {link: _directed(link, frame, rates, solver.column) for link, frame in steady.samples.frames.items()}
+        rates[row] = program.kinematics(np.concatenate([z, u]), y1, still_, solver.inputs.p).w1 * solver.scale
+    return {link: _with_first_rates(link, frame, rates, solver.column) for link, frame in steady.samples.frames.items()}
 
 
-def _directed(link: str, frame: Frame, rates: Mapping[int, Array], column: Mapping[tuple[str, str], int]) -> Frame:
+def _with_first_rates(
+    link: str, frame: Frame, rates: Mapping[int, Array], column: Mapping[tuple[str, str], int]
+) -> Frame:
     """A frame with other first rates in some rows."""
     if frame.fixed or not rates:
         return frame

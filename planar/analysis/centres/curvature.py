@@ -14,20 +14,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.analysis.relative_motion import Relative, quarter, relative
+from planar.analysis.relative_motion import RelativeMotion, quarter_turn, relative_motion
 from planar.foundation.errors import BadInput
-from planar.model.mechanism import Drive, named_points, with_inputs
-from planar.results.motion import State, Unknown
-from planar.solving.position import Solver
+from planar.model.mechanism import Drive, named_points, replace_inputs
+from planar.results.motion import State, UnknownName
+from planar.solving.position import PositionSolver
 
 Array = np.ndarray
-NOTHING = 1e-9
+NEGLIGIBLE_RATIO = 1e-9
 """A rate below this part of the greatest is none: rates are good to some 1e-13 of it."""
-STRAIGHT = 1e9
+STRAIGHT_RATIO = 1e9
 """A radius of so many sizes of the mechanism is none: the path has no curvature there."""
 
 
-class Ring(NamedTuple):
+class MotionCircle(NamedTuple):
     """A circle: its centre (2,) and its diameter, m."""
 
     centre: Array
@@ -59,7 +59,7 @@ class Curvature:
 
     link: str
     other: str
-    motion: Relative
+    motion: RelativeMotion
     size: float
     "of the mechanism (m)"
     least: float
@@ -71,9 +71,9 @@ class Curvature:
     "(2,), where the link is at rest"
     pole_velocity: Array | None
     "(2,), m/s, along the common tangent of both centrodes"
-    inflection: Ring | None
+    inflection: MotionCircle | None
     "points on it run straight, to second order; it touches the common tangent in the pole"
-    bresse: Ring | None
+    bresse: MotionCircle | None
     "points on it have no tangential acceleration (Bresse's second circle); None too where it is a straight line"
     acceleration_pole: Array | None
     "(2,), where the link has no acceleration"
@@ -87,8 +87,8 @@ class Curvature:
         the radius is r^2 / |r - e|, and the centre lies at r^2 / (r - e) from the point towards the pole. Raises
         Unknown for a point that the link does not carry.
         """
-        at = self.motion.carried(self._local(point))
-        direct, away = self._direct(at)
+        at = self.motion.points_in_other(self._local_point(point))
+        direct, away = self._radius_from_rates(at)
         if self.pole is None or isnan(direct):
             return PathCurvature(at, direct, direct, None if away is None else at + away)
         if direct == 0.0:
@@ -97,33 +97,33 @@ class Curvature:
         length = hypot(*r)
         way = r / length
         reach = 0.0 if self.inflection is None else 2.0 * float((self.inflection.centre - self.pole) @ way)
-        if length**2 >= STRAIGHT * self.size * abs(length - reach):
+        if length**2 >= STRAIGHT_RATIO * self.size * abs(length - reach):
             return PathCurvature(at, inf, direct, None)
         signed = length**2 / (length - reach)
         return PathCurvature(at, abs(signed), direct, at - signed * way)
 
-    def _local(self, point: str | Sequence[float]) -> Array:
+    def _local_point(self, point: str | Sequence[float]) -> Array:
         if not isinstance(point, str):
             return np.array(point, dtype=float).reshape(2)
         if point not in self.members:
-            raise Unknown(f"link {self.link!r} carries no point {point!r}; its points are {', '.join(self.shape)}")
+            raise UnknownName(f"link {self.link!r} carries no point {point!r}; its points are {', '.join(self.shape)}")
         return self.shape[self.members[point]]
 
-    def _direct(self, at: Array) -> tuple[float, Array | None]:
+    def _radius_from_rates(self, at: Array) -> tuple[float, Array | None]:
         """The radius from velocity and acceleration of a point, and the way from it to the centre."""
         m = self.motion
         r = at - m.origin
-        v = m.velocity + m.turning * quarter(r)
-        a = m.acceleration + m.hastening * quarter(r) - m.turning**2 * r
+        v = m.velocity + m.angular_velocity * quarter_turn(r)
+        a = m.acceleration + m.angular_acceleration * quarter_turn(r) - m.angular_velocity**2 * r
         speed = hypot(*v)
         if speed <= self.least:
             # in the pole: a cusp, unless the pole stays there as well
             stays = self.pole is None or hypot(*self.pole_velocity) <= self.least
             return (nan if stays else 0.0), None
         bend = float(v[0] * a[1] - v[1] * a[0])
-        if speed**3 >= STRAIGHT * self.size * abs(bend):
+        if speed**3 >= STRAIGHT_RATIO * self.size * abs(bend):
             return inf, None
-        return speed**3 / abs(bend), quarter(v) * (speed**2 / bend)
+        return speed**3 / abs(bend), quarter_turn(v) * (speed**2 / bend)
 
 
 def curvature(state: State, link: str, other: str | None = None) -> Curvature:
@@ -133,14 +133,14 @@ def curvature(state: State, link: str, other: str | None = None) -> Curvature:
     link that is not there, BadInput where several inputs are all at rest, so that no ratio of their rates is given.
     """
     other = state.mechanism.frame if other is None else other
-    relative(state.frames, link, other)  # refuses what there is not
-    state = _in_motion(state)
-    motion = relative(state.frames, link, other)
+    relative_motion(state.frames, link, other)  # refuses what there is not
+    state = _at_unit_rate(state)
+    motion = relative_motion(state.frames, link, other)
     size = _size(state)
     fastest = max(
-        max(float(hypot(*each.velocity)), size * abs(float(each.turning)))
+        max(float(hypot(*each.velocity)), size * abs(float(each.angular_velocity)))
         for each in (
-            relative(state.frames, name, state.mechanism.frame)
+            relative_motion(state.frames, name, state.mechanism.frame)
             for name in state.frames
             if name != state.mechanism.frame
         )
@@ -153,11 +153,11 @@ def curvature(state: State, link: str, other: str | None = None) -> Curvature:
         for name in (each.name, f"{link}.{point}", point)
     }
     shape = {name: np.array(at, dtype=float) for name, at in state.shapes[link].points.items()}
-    found = _found(motion, link, other, size, NOTHING * fastest)
-    return Curvature(link, other, motion, size, NOTHING * fastest, members, shape, *found)
+    found = _second_order_motion(motion, link, other, size, NEGLIGIBLE_RATIO * fastest)
+    return Curvature(link, other, motion, size, NEGLIGIBLE_RATIO * fastest, members, shape, *found)
 
 
-def _in_motion(state: State) -> State:
+def _at_unit_rate(state: State) -> State:
     """The state, with a unit rate of its input where that is at rest."""
     inputs = state.mechanism.inputs
     if any(given.velocity for given in inputs) or not inputs:
@@ -165,7 +165,9 @@ def _in_motion(state: State) -> State:
     if len(inputs) > 1:
         names = ", ".join(given.pair for given in inputs)
         raise BadInput("inputs", f"the inputs {names} are all at rest: give one a velocity, for how the links move")
-    return Solver(with_inputs(state.mechanism, (Drive(inputs[0].pair, None, 1.0, 0.0),))).at_rates_of(state)
+    return PositionSolver(replace_inputs(state.mechanism, (Drive(inputs[0].pair, None, 1.0, 0.0),))).state_with_rates(
+        state
+    )
 
 
 def _size(state: State) -> float:
@@ -173,32 +175,34 @@ def _size(state: State) -> float:
     return float(np.ptp(points, axis=0).max(initial=0.0)) or 1.0
 
 
-_Found = tuple[Array | None, Array | None, Ring | None, Ring | None, Array | None, str]
+_SecondOrderMotion = tuple[Array | None, Array | None, MotionCircle | None, MotionCircle | None, Array | None, str]
 
 
-def _found(motion: Relative, link: str, other: str, size: float, least: float) -> _Found:
+def _second_order_motion(
+    motion: RelativeMotion, link: str, other: str, size: float, least: float
+) -> _SecondOrderMotion:
     """Pole, its velocity, inflection circle, Bresse's second circle, acceleration pole; and what there is to say."""
-    turning, hastening = float(motion.turning), float(motion.hastening)
+    turning, hastening = float(motion.angular_velocity), float(motion.angular_acceleration)
     still = max(hypot(*motion.velocity), size * abs(turning)) <= least
     if still:
         return None, None, None, None, None, f"{link} and {other} move as one here, so that no path is drawn"
     # the centre of acceleration: a + alpha k × r - w^2 r = 0 is solved for r
     a, spread = motion.acceleration, turning**4 + hastening**2
-    far = spread == 0.0 or size * spread**0.5 <= NOTHING * hypot(*a)
-    centre = None if far else motion.origin + (turning**2 * a + hastening * quarter(a)) / spread
-    if size * abs(turning) <= NOTHING * hypot(*motion.velocity):
+    far = spread == 0.0 or size * spread**0.5 <= NEGLIGIBLE_RATIO * hypot(*a)
+    centre = None if far else motion.origin + (turning**2 * a + hastening * quarter_turn(a)) / spread
+    if size * abs(turning) <= NEGLIGIBLE_RATIO * hypot(*motion.velocity):
         told = f"{link} slides against {other} without turning here: the pole is at infinity, all points are as fast"
         return None, None, None, None, centre, told
-    reach = quarter(motion.velocity) / turning
+    reach = quarter_turn(motion.velocity) / turning
     pole = motion.origin + reach
     # what lies in the pole has a = -w k × u
-    u = quarter(a + hastening * quarter(reach) - turning**2 * reach) / turning
+    u = quarter_turn(a + hastening * quarter_turn(reach) - turning**2 * reach) / turning
     if hypot(*u) <= least:
         told = f"the pole of {link} against {other} stays where it is, so that there is no inflection circle"
         return pole, np.zeros(2), None, None, centre, told
-    across = -quarter(u) / turning
-    inflection = Ring(pole + across / 2.0, hypot(*across))
-    if abs(hastening) * size <= NOTHING * abs(turning) * hypot(*u):
+    across = -quarter_turn(u) / turning
+    inflection = MotionCircle(pole + across / 2.0, hypot(*across))
+    if abs(hastening) * size <= NEGLIGIBLE_RATIO * abs(turning) * hypot(*u):
         return pole, u, inflection, None, centre, ""
     along = u * (turning / hastening)
-    return pole, u, inflection, Ring(pole + along / 2.0, hypot(*along)), centre, ""
+    return pole, u, inflection, MotionCircle(pole + along / 2.0, hypot(*along)), centre, ""

@@ -19,23 +19,23 @@ import numpy as np
 Array = np.ndarray
 ROUNDING = 1e-15
 """How exact a centre is that a pair shows."""
-WORST = 1e-7
+MAX_MEETING_ERROR = 1e-7
 """A meeting whose error would be larger than this is none: its lines are nearly one."""
-FINITE = 1e-9
+LEAST_FINITE_RATIO = 1e-9
 """A centre on which wheels' ratios are laid off has at least this w beside x and y."""
 
-Two = frozenset[str]
+LinkPair = frozenset[str]
 """Two links."""
 
 
-class Through(NamedTuple):
+class KennedyLine(NamedTuple):
     """A line of centres: through two centres of a third link, or the normal that a pair gives (`pair`)."""
 
     link: str = ""
     pair: str = ""
 
 
-class Found(NamedTuple):
+class FoundCentre(NamedTuple):
     """A centre and how it was found: by a pair, where two lines meet, or in the ratio of wheels on a line."""
 
     at: Array
@@ -43,39 +43,39 @@ class Found(NamedTuple):
     error: float
     "an estimate of how exact it is"
     pair: str = ""
-    lines: tuple[Through, ...] = ()
+    lines: tuple[KennedyLine, ...] = ()
     ratio: str = ""
     "the pair whose ratio places it on the line through `lines[0]`"
 
 
 @dataclass(frozen=True)
-class Primary:
+class PrimaryCentres:
     """What the pairs show: centres, normals on which centres lie, and ratios of turning between three links."""
 
-    centres: Mapping[Two, Found]
-    normals: Mapping[Two, tuple[tuple[str, Array], ...]]
+    centres: Mapping[LinkPair, FoundCentre]
+    normals: Mapping[LinkPair, tuple[tuple[str, Array], ...]]
     ratios: tuple[tuple[str, Mapping[str, float]], ...]
 
 
-def unit(vector: Array) -> Array:
+def normalise(vector: Array) -> Array:
     """A homogeneous point or line of length one; the last entry that is not nothing is positive."""
     vector = vector / np.linalg.norm(vector)
     lead = vector[np.flatnonzero(np.abs(vector) > 1e-14)[-1]]
     return vector if lead > 0.0 else -vector
 
 
-class Construction:
+class KennedyConstruction:
     """The centres found so far, in the order in which they were found, and the best place of every other by now.
 
     Of places that are about as good, that of the links which come first is taken first. A new centre gives each open
     one of its links a single new line, which is met with the lines that this one had before.
     """
 
-    def __init__(self, links: Sequence[str], primary: Primary, worst: float = WORST):
+    def __init__(self, links: Sequence[str], primary: PrimaryCentres, max_error: float = MAX_MEETING_ERROR):
         self.links = tuple(links)
-        self.found: dict[Two, Found] = {}
+        self.found: dict[LinkPair, FoundCentre] = {}
         self._primary = primary
-        self._worst = worst
+        self._max_error = max_error
         self._place = {link: index for index, link in enumerate(self.links)}
         self._pairs = [frozenset(two) for two in combinations(self.links, 2)]
         count, many = len(self._pairs), len(self.links)
@@ -87,16 +87,16 @@ class Construction:
         self._at = np.zeros((many, many, 3))
         self._error = np.full((many, many), np.inf)
         self._lines = np.zeros((count, self._first + many, 3))
-        self._wrong = np.full((count, self._first + many), np.inf)
+        self._line_error = np.full((count, self._first + many), np.inf)
         self._open = np.ones(count, dtype=bool)
         self._best = np.full(count, np.inf)
-        self._meets = np.zeros((count, 3))
-        self._by = np.zeros((count, 2), dtype=int)
-        self._ratio: dict[int, Found] = {}
+        self._meeting_points = np.zeros((count, 3))
+        self._meeting_lines = np.zeros((count, 2), dtype=int)
+        self._ratio: dict[int, FoundCentre] = {}
         self._heap: list[tuple[int, int, float]] = []
-        self._start()
+        self._add_primary()
 
-    def add(self, two: Two, one: Found) -> None:
+    def add_centre(self, two: LinkPair, one: FoundCentre) -> None:
         """Take a centre as found: every other that is open gets the lines that it gives."""
         a, b = sorted(self._place[link] for link in two)
         self.found[two] = one
@@ -109,58 +109,58 @@ class Construction:
             if len(others):
                 numbers = self._number[end, others]
                 lines = _cross(one.at, self._at[via, others])
-                self._draw(numbers, self._first + via, lines, one.error + self._error[via, others])
-        self._lay_off(two)
+                self._add_lines(numbers, self._first + via, lines, one.error + self._error[via, others])
+        self._apply_ratios(two)
 
-    def run(self) -> None:
+    def find_all(self) -> None:
         """Everything that follows from what was added: best conditioned first."""
         while self._heap:
             _, number, error = heappop(self._heap)
-            if not self._open[number] or error > self._error_of(number):
+            if not self._open[number] or error > self._least_error(number):
                 continue  # found since, or bettered
-            self.add(self._pairs[number], self._candidate(number))
+            self.add_centre(self._pairs[number], self._best_centre(number))
 
-    def lines(self, two: Two) -> int:
+    def count_lines(self, two: LinkPair) -> int:
         """How many lines are known on which an open centre lies."""
         a, b = (self._place[link] for link in two)
-        return int(np.isfinite(self._wrong[self._number[a, b]]).sum())
+        return int(np.isfinite(self._line_error[self._number[a, b]]).sum())
 
-    def _start(self) -> None:
+    def _add_primary(self) -> None:
         for two, normals in self._primary.normals.items():
             a, b = (self._place[link] for link in two)
             number = np.array([self._number[a, b]])
             for slot, (_, normal) in enumerate(normals):
-                self._draw(number, slot, normal[None], np.array([ROUNDING]))
+                self._add_lines(number, slot, normal[None], np.array([ROUNDING]))
         for two, one in self._primary.centres.items():
-            self.add(two, one)
+            self.add_centre(two, one)
 
-    def _draw(self, numbers: Array, slot: int, lines: Array, errors: Array) -> None:
+    def _add_lines(self, numbers: Array, slot: int, lines: Array, errors: Array) -> None:
         """A new line for each of several centres, (m, 3) with the errors of the points it goes through, (m,)."""
-        lengths = _length(lines)
-        good = lengths > errors / self._worst
+        lengths = _lengths(lines)
+        good = lengths > errors / self._max_error
         if not good.all():
             numbers, lines, errors, lengths = numbers[good], lines[good], errors[good], lengths[good]
         if not len(numbers):
             return
         lines, errors = lines / lengths[:, None], errors / lengths
         meets = _cross(lines[:, None], self._lines[numbers])
-        sines = _length(meets)
-        sums = errors[:, None] + self._wrong[numbers]
+        sines = _lengths(meets)
+        sums = errors[:, None] + self._line_error[numbers]
         wrong = np.where(sines > 0.0, sums / np.where(sines > 0.0, sines, 1.0), np.inf)
         others = wrong.argmin(axis=1)
         rows = np.arange(len(numbers))
         least = wrong[rows, others]
-        self._lines[numbers, slot], self._wrong[numbers, slot] = lines, errors
-        for row in np.flatnonzero((least <= self._worst) & (least <= self._best[numbers])):
+        self._lines[numbers, slot], self._line_error[numbers, slot] = lines, errors
+        for row in np.flatnonzero((least <= self._max_error) & (least <= self._best[numbers])):
             by = sorted((int(others[row]), slot))
             number = int(numbers[row])
             # of meetings alike that of the lines which come first, however they were found
-            if (least[row], *by) < (self._best[number], *self._by[number]):
-                self._best[number], self._by[number] = least[row], by
-                self._meets[number] = meets[row, others[row]]
+            if (least[row], *by) < (self._best[number], *self._meeting_lines[number]):
+                self._best[number], self._meeting_lines[number] = least[row], by
+                self._meeting_points[number] = meets[row, others[row]]
                 self._push(number)
 
-    def _lay_off(self, two: Two) -> None:
+    def _apply_ratios(self, two: LinkPair) -> None:
         """Wheels a and b seen from c: s_a w_ac + s_b w_bc = 0 puts I_ab at s_a I_bc + s_b I_ac (both with w = 1)."""
         for pair, slopes in self._primary.ratios:
             if not two <= slopes.keys():
@@ -169,38 +169,40 @@ class Construction:
                 a, b = sorted(slopes.keys() - {c})
                 number = int(self._number[self._place[a], self._place[b]])
                 p, q = self.found.get(frozenset((a, c))), self.found.get(frozenset((b, c)))
-                if not self._open[number] or not p or not q or min(abs(p.at[2]), abs(q.at[2])) <= FINITE:
+                if not self._open[number] or not p or not q or min(abs(p.at[2]), abs(q.at[2])) <= LEAST_FINITE_RATIO:
                     continue
                 at = slopes[a] * q.at / q.at[2] + slopes[b] * p.at / p.at[2]
                 length = float(np.linalg.norm(at))
                 error = (p.error / abs(p.at[2]) + q.error / abs(q.at[2])) * max(map(abs, slopes.values()))
                 known = self._ratio[number].error if number in self._ratio else np.inf
-                if length > error / self._worst and error / length < known:
-                    self._ratio[number] = Found(unit(at), error / length, lines=(Through(c),), ratio=pair)
+                if length > error / self._max_error and error / length < known:
+                    self._ratio[number] = FoundCentre(
+                        normalise(at), error / length, lines=(KennedyLine(c),), ratio=pair
+                    )
                     self._push(number)
 
     def _push(self, number: int) -> None:
-        error = self._error_of(number)
-        heappush(self._heap, (_order(error), number, error))
+        error = self._least_error(number)
+        heappush(self._heap, (_error_decade(error), number, error))
 
-    def _error_of(self, number: int) -> float:
+    def _least_error(self, number: int) -> float:
         ratio = self._ratio.get(number)
         return min(float(self._best[number]), ratio.error if ratio else np.inf)
 
-    def _candidate(self, number: int) -> Found:
+    def _best_centre(self, number: int) -> FoundCentre:
         """The best place of a centre by now."""
         ratio = self._ratio.get(number)
         if ratio and ratio.error < self._best[number]:
             return ratio
         normals = self._primary.normals.get(self._pairs[number], ())
         lines = tuple(
-            Through(pair=normals[slot][0]) if slot < self._first else Through(self.links[slot - self._first])
-            for slot in self._by[number]
+            KennedyLine(pair=normals[slot][0]) if slot < self._first else KennedyLine(self.links[slot - self._first])
+            for slot in self._meeting_lines[number]
         )
-        return Found(unit(self._meets[number]), float(self._best[number]), lines=lines)
+        return FoundCentre(normalise(self._meeting_points[number]), float(self._best[number]), lines=lines)
 
 
-def _order(error: float) -> int:
+def _error_decade(error: float) -> int:
     """Errors of one decade count alike, so that the order is that of the links where it may be."""
     return int(np.floor(np.log10(error)))
 
@@ -212,6 +214,6 @@ def _cross(a: Array, b: Array) -> Array:
     return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=-1)
 
 
-def _length(vectors: Array) -> Array:
+def _lengths(vectors: Array) -> Array:
     """Lengths (...,) of vectors (..., 3)."""
     return np.sqrt((vectors * vectors).sum(axis=-1))

@@ -8,23 +8,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.analysis.centres.kennedy import Two
-from planar.analysis.rate_equations import part
-from planar.analysis.rate_ratios import chosen
+from planar.analysis.centres.kennedy import LinkPair
+from planar.analysis.rate_equations import derivative
+from planar.analysis.rate_ratios import choose_motion
 from planar.results.motion import State
-from planar.solving.full_constraints import Constraints, null_space
-from planar.solving.position import Solver
-from planar.solving.prepared_mechanism import Setup
+from planar.solving.full_constraints import FullConstraints, null_space
+from planar.solving.position import PositionSolver
+from planar.solving.prepared_mechanism import PreparedMechanism
 
 Array = np.ndarray
-AS_ONE = 1e-7
+AS_ONE_RATIO = 1e-7
 """Links that move this little against each other, beside the greatest motion, move as one.
 
 On a dead point a position is exact to the root of rounding only.
 """
 
 
-class Proof(NamedTuple):
+class CentresProof(NamedTuple):
     """The worst of three figures over all centres, on homogeneous points with lengths in the mechanism's size.
 
     `routes`: between the centre and that of the null vector of the whole Jacobian (of each, where the inputs do not
@@ -37,83 +37,87 @@ class Proof(NamedTuple):
     velocities: float | None
 
 
-class Ways(NamedTuple):
+class AllowedMotions(NamedTuple):
     """The motions of a position: of every link w times its pole (x, y, 1), in sizes about the middle, (ways, 3).
 
     One where the inputs tell it, else all that are independent; none where nothing can move. The greatest is of length
     one.
     """
 
-    links: Mapping[str, Array]
+    poles: Mapping[str, Array]
     count: int
 
 
-class Stand(NamedTuple):
+class FullPosition(NamedTuple):
     """A position in all coordinates w (coordinates,), and the motions that it allows (coordinates, ways)."""
 
-    setup: Setup
-    constraints: Constraints
+    prepared: PreparedMechanism
+    constraints: FullConstraints
     w: Array
-    free: Array
+    motions: Array
 
 
-def stand(state: State) -> Stand:
+def full_position(state: State) -> FullPosition:
     """A position in all coordinates, nothing eliminated.
 
     Where constraints hold all along a motion to second order what they leave free to first order, that is no motion.
     """
-    setup = Solver(state.mechanism)
-    constraints = Constraints(setup)
+    setup = PositionSolver(state.mechanism)
+    constraints = FullConstraints(setup)
     w = setup.coordinates(state.frames, state.own)
-    free = null_space(constraints.slope(w)) if w.size else np.zeros((0, 0))
-    regular = setup.regular(w[list(setup.equations.unknowns)]) if free.shape[1] > 1 else None
+    free = null_space(constraints.jacobian(w)) if w.size else np.zeros((0, 0))
+    regular = setup.regularized(w[list(setup.equations.unknowns)]) if free.shape[1] > 1 else None
     if regular is not None:
-        free = _moving(*regular)
-    return Stand(setup, constraints, w, free)
+        free = _motions_at(*regular)
+    return FullPosition(setup, constraints, w, free)
 
 
-def _moving(solver: Solver, z: Array) -> Array:
+def _motions_at(solver: PositionSolver, z: Array) -> Array:
     """The motions at unknowns z (coordinates, ways), inputs left aside."""
-    y = np.concatenate([z, solver.station.u])
-    slope = np.hstack([each[0] for each in solver.program.slopes(z[None], solver.station.u[None], solver.station.p)])
+    y = np.concatenate([z, solver.inputs.u])
+    slope = np.hstack([each[0] for each in solver.functions.jacobians(z[None], solver.inputs.u[None], solver.inputs.p)])
     ways = null_space(slope)
-    found = [solver.program.kinematics(y, way, 0.0 * y, solver.station.p).w1 for way in ways.T]
+    found = [solver.functions.kinematics(y, way, 0.0 * y, solver.inputs.p).w1 for way in ways.T]
     return np.linalg.qr(np.array(found).T)[0]
 
 
-def poles(state: State, here: Stand, free: Array, middle: Array, size: float) -> dict[str, Array]:
+def poles_of_motions(
+    state: State, position: FullPosition, motions: Array, middle: Array, size: float
+) -> dict[str, Array]:
     """Of every link w times its pole (x, y, 1) for each of some motions (coordinates, ways): (ways, 3)."""
-    coordinates = here.setup.equations.coordinates
-    moving = {(c.owner, c.part): row for c, row in zip(coordinates, free * here.setup.scale[:, None], strict=True)}
-    found, still = {}, np.zeros(free.shape[1])
+    coordinates = position.prepared.equations.coordinates
+    moving = {
+        (c.owner, c.part): row for c, row in zip(coordinates, motions * position.prepared.scale[:, None], strict=True)
+    }
+    found, still = {}, np.zeros(motions.shape[1])
     for link, frame in state.frames.items():
         vx, vy, turning = (moving.get((link, which), still) for which in ("x", "y", "angle"))
-        x, y = (np.array([part(frame.x, 0), part(frame.y, 0)]) - middle) / size
+        x, y = (np.array([derivative(frame.x, 0), derivative(frame.y, 0)]) - middle) / size
         found[link] = np.stack([turning * x - vy / size, turning * y + vx / size, turning], axis=1)
     return found
 
 
-def ways(state: State, middle: Array, size: float) -> Ways:
+def allowed_motions(state: State, middle: Array, size: float) -> AllowedMotions:
     """The motions by the null space of all constraints in all coordinates, at the rates of the inputs if need be."""
-    here = stand(state)
-    free = here.free
+    here = full_position(state)
+    free = here.motions
     names = tuple(given.pair for given in state.mechanism.inputs)
-    choice = chosen(free, here.constraints.drive_slope(names, here.w), here.setup.station.u1)
-    if choice.way is not None:
-        free = choice.way[:, None] if np.any(choice.way) else np.zeros((here.w.size, 0))
-    found, count = poles(state, here, free, middle, size), free.shape[1]
+    choice = choose_motion(free, here.constraints.relative_jacobian(names, here.w), here.prepared.inputs.u1)
+    if choice.motion is not None:
+        free = choice.motion[:, None] if np.any(choice.motion) else np.zeros((here.w.size, 0))
+    found, count = poles_of_motions(state, here, free, middle, size), free.shape[1]
     most = np.max([np.linalg.norm(pole, axis=1) for pole in found.values()], axis=0) if count else np.ones(0)
-    return Ways({link: pole / most[:, None] for link, pole in found.items()}, count)
+    return AllowedMotions({link: pole / most[:, None] for link, pole in found.items()}, count)
 
 
-def proved(found: Mapping[Two, Array], links: Sequence[str], ways: Ways) -> Proof:
+def prove_centres(found: Mapping[LinkPair, Array], links: Sequence[str], motions: AllowedMotions) -> CentresProof:
     """The proof of homogeneous centres (3,), each of length one, in sizes about the middle."""
     place = {link: index for index, link in enumerate(links)}
     at = np.full((len(links), len(links), 3), np.nan)
     for two, one in found.items():
         a, b = (place[link] for link in two)
         at[a, b] = at[b, a] = one
-    stands = {link: group[0] for group in as_one(links, ways) for link in group}
+    stands = {link: group[0] for group in links_moving_as_one(links, motions) for link in group}
     threes = [
         [place[link] for link in three]
         for three in combinations(links, 3)
@@ -123,27 +127,27 @@ def proved(found: Mapping[Two, Array], links: Sequence[str], ways: Ways) -> Proo
     triples = np.stack([at[a, b], at[b, c], at[a, c]], axis=1)
     known = ~np.isnan(triples).any(axis=(1, 2))
     collinear = float(np.abs(np.linalg.det(triples[known])).max(initial=0.0))
-    if not ways.count or not found:
-        return Proof(None, collinear, None)
+    if not motions.count or not found:
+        return CentresProof(None, collinear, None)
     centres = np.array(list(found.values()))[:, None]
-    relative = np.array([ways.links[b] - ways.links[a] for a, b in map(tuple, found)])
+    relative = np.array([motions.poles[b] - motions.poles[a] for a, b in map(tuple, found)])
     lengths = np.linalg.norm(relative, axis=2)
-    moving = lengths > AS_ONE
+    moving = lengths > AS_ONE_RATIO
     apart = np.linalg.norm(np.cross(centres, relative), axis=2)
     x, y, w = np.moveaxis(centres, 2, 0)
     mx, my, turning = np.moveaxis(relative, 2, 0)
     velocities = np.hypot(turning * y - my * w, turning * x - mx * w)
     routes = (apart[moving] / lengths[moving]).max(initial=0.0)
-    return Proof(float(routes), collinear, float(velocities.max(initial=0.0)))
+    return CentresProof(float(routes), collinear, float(velocities.max(initial=0.0)))
 
 
-def as_one(links: Sequence[str], ways: Ways) -> tuple[tuple[str, ...], ...]:
+def links_moving_as_one(links: Sequence[str], motions: AllowedMotions) -> tuple[tuple[str, ...], ...]:
     """Links that move as one here whatever moves, in groups of two or more."""
     groups: list[list[str]] = []
     for link in links:
         for group in groups:
-            apart = ways.links[link] - ways.links[group[0]]
-            if np.linalg.norm(apart, axis=1).max(initial=0.0) <= AS_ONE:
+            apart = motions.poles[link] - motions.poles[group[0]]
+            if np.linalg.norm(apart, axis=1).max(initial=0.0) <= AS_ONE_RATIO:
                 group.append(link)
                 break
         else:

@@ -10,9 +10,9 @@ import numpy as np
 from planar.foundation.errors import BadInput
 
 Array = np.ndarray
-TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
+QUARTER_TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
 """A quarter anticlockwise."""
-ALONG = 1e-9
+PARALLEL_TOLERANCE = 1e-9
 """Directions whose sine is no greater than this are one."""
 
 
@@ -50,7 +50,7 @@ def centre_of(
     if not all(each.shape == (2,) and np.isfinite(each).all() for each in (a, b, va)):
         raise BadInput("centre_of", "points and velocities are pairs of finite numbers")
     reach = float(np.hypot(*(b - a)))
-    if reach <= ALONG * max(1e-300, np.abs(a).max(), np.abs(b).max()):
+    if reach <= PARALLEL_TOLERANCE * max(1e-300, np.abs(a).max(), np.abs(b).max()):
         raise BadInput("centre_of", "A and B are one point, so that their velocities show no centre")
     along = (b - a) / reach
     vb = _velocity_b(va, along, velocity_b)
@@ -59,11 +59,11 @@ def centre_of(
         return TwoDirections(None, None, None, 0.0, vb)
     # lengths in those of AB, from A; velocities beside the fastest
     p, q = va / fastest, vb / fastest
-    if abs((q - p) @ along) > ALONG:
+    if abs((q - p) @ along) > PARALLEL_TOLERANCE:
         raise BadInput("centre_of", "A and B move apart: along AB the velocities of a rigid link's points are equal")
-    at = _meeting(p, q, along)
-    angular_velocity = float(along @ TURN.T @ (vb - va)) / reach
-    if abs(at[2]) <= ALONG * np.hypot(at[0], at[1]):
+    at = _meeting_point(p, q, along)
+    angular_velocity = float(along @ QUARTER_TURN.T @ (vb - va)) / reach
+    if abs(at[2]) <= PARALLEL_TOLERANCE * np.hypot(at[0], at[1]):
         way = np.array([at[0], at[1], 0.0]) / np.hypot(at[0], at[1])
         sign = 1.0 if (way[1], way[0]) > (0.0, 0.0) else -1.0
         return TwoDirections(sign * way + 0.0, None, None, 0.0, vb)
@@ -83,25 +83,25 @@ def _velocity_b(va: Array, along: Array, given: Sequence[float] | float) -> Arra
     if np.ndim(given) or not np.isfinite(given):
         raise BadInput("centre_of", "the velocity of B is a pair of finite numbers, or the angle of its direction")
     way = np.array([np.cos(given), np.sin(given)])
-    if abs(way @ along) > ALONG:
+    if abs(way @ along) > PARALLEL_TOLERANCE:
         return way * float(va @ along / (way @ along))
-    if abs(va @ along) > ALONG * np.hypot(*va):
+    if abs(va @ along) > PARALLEL_TOLERANCE * np.hypot(*va):
         raise BadInput("centre_of", "A moves along AB and B square to it, which no rigid link can do")
     raise BadInput("centre_of", "both velocities are square to AB: say how fast B is, its direction is not enough")
 
 
-def _meeting(p: Array, q: Array, along: Array) -> Array:
+def _meeting_point(p: Array, q: Array, along: Array) -> Array:
     """The homogeneous centre (3,), A the origin and AB of length one."""
     origin, other = np.array([0.0, 0.0, 1.0]), np.append(along, 1.0)
-    if np.hypot(*p) <= ALONG:
+    if np.hypot(*p) <= PARALLEL_TOLERANCE:
         return origin
-    if np.hypot(*q) <= ALONG:
+    if np.hypot(*q) <= PARALLEL_TOLERANCE:
         return other
-    square_p, square_q = (np.append(TURN @ each / np.hypot(*each), 0.0) for each in (p, q))
+    square_p, square_q = (np.append(QUARTER_TURN @ each / np.hypot(*each), 0.0) for each in (p, q))
     first, second = np.cross(origin, square_p), np.cross(other, square_q)
-    if abs(square_p[:2] @ q) > ALONG * np.hypot(*q):
+    if abs(square_p[:2] @ q) > PARALLEL_TOLERANCE * np.hypot(*q):
         return np.cross(first, second)
-    if np.hypot(*(q - p)) <= ALONG:
+    if np.hypot(*(q - p)) <= PARALLEL_TOLERANCE:
         return square_p
     heads = np.cross(np.append(p, 1.0), np.append(along + q, 1.0))
     return np.cross(np.cross(origin, other), heads)

@@ -9,12 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.analysis.centres.centres import Centre, Centres, extent
-from planar.analysis.rate_equations import Rates, Slide, Tie, rates
+from planar.analysis.rate_equations import RateEquation, RateEquations, SlideJoint, rate_equations
 from planar.foundation.errors import NoAnswer, Outcome
-from planar.model.mechanism import Drive, with_inputs
+from planar.model.mechanism import Drive, replace_inputs
 
 Array = np.ndarray
-COINCIDENT = 1e-7
+COINCIDENT_TOLERANCE = 1e-7
 """Homogeneous centres, of length one with lengths in sizes, that are no farther apart than this are one.
 
 On a dead point a position is exact to the root of rounding only.
@@ -55,7 +55,7 @@ def velocity_by_centres(centres: Centres, point: str) -> PointByCentre:
     NoAnswer where the input's rate does not determine the velocity.
     """
     state = centres.state
-    named = state._named(point)
+    named = state._find_point(point)
     frame = state.mechanism.frame
     place = state.point(point).position
     carrying = [link for link, _ in named.members]
@@ -84,48 +84,48 @@ def links_by_centres(centres: Centres) -> dict[str, LinkByCentres]:
     if given is None and len(inputs) != 1:
         return {link: LinkByCentres(np.zeros(3), ()) for link in centres.numbers}
     if given is None:  # that the links rest is only so where the input drives them
-        one = with_inputs(state.mechanism, (Drive(inputs[0].pair, velocity=1.0),))
+        one = replace_inputs(state.mechanism, (Drive(inputs[0].pair, velocity=1.0),))
         moving = links_by_centres(replace(centres, state=replace(state, mechanism=one)))
         return {link: LinkByCentres(0.0 * each.motion, each.by) for link, each in moving.items()}
-    here = _Here(centres)
-    found = {frame: LinkByCentres(np.zeros(3), ())} | here.driven(given.pair, given.velocity)
+    here = _ScaledCentres(centres)
+    found = {frame: LinkByCentres(np.zeros(3), ())} | here.input_motions(given.pair, given.velocity)
     while len(found) < len(centres.numbers):
         best: tuple[float, str, str] | None = None
         for known in found:
             for link in centres.numbers:
                 if link not in found and known != frame:
-                    apart = here.apart(link, known)
-                    if apart > COINCIDENT and (best is None or apart > best[0]):
+                    apart = here.separation(link, known)
+                    if apart > COINCIDENT_TOLERANCE and (best is None or apart > best[0]):
                         best = (apart, link, known)
         if best is None:
-            raise _undetermined(centres, [link for link in centres.numbers if link not in found], given.pair)
+            raise _undetermined_answer(centres, [link for link in centres.numbers if link not in found], given.pair)
         _, link, known = best
-        found[link] = here.onward(link, known, found[known])
+        found[link] = here.motion_through(link, known, found[known])
     return {link: each._replace(motion=here.in_metres(each.motion)) for link, each in found.items()}
 
 
 @dataclass(frozen=True)
-class _Here:
+class _ScaledCentres:
     """The centres in lengths of the mechanism's size about its middle, as they are best told apart."""
 
     centres: Centres
 
     def __post_init__(self) -> None:
         middle, size = extent(self.centres.state)
-        at = {frozenset(each.links): self._scaled(each, middle, size) for each in self.centres}
+        at = {frozenset(each.links): self._scale_centre(each, middle, size) for each in self.centres}
         object.__setattr__(self, "_at", at)
         object.__setattr__(self, "_size", size)
         object.__setattr__(self, "_middle", middle)
 
     @staticmethod
-    def _scaled(centre: Centre, middle: Array, size: float) -> Array | None:
+    def _scale_centre(centre: Centre, middle: Array, size: float) -> Array | None:
         if centre.homogeneous is None:
             return None
         x, y, w = centre.homogeneous
         at = np.array([(x - w * middle[0]) / size, (y - w * middle[1]) / size, w])
         return at / np.linalg.norm(at)
 
-    def at(self, one: str, other: str) -> Array | None:
+    def centre_point(self, one: str, other: str) -> Array | None:
         """(3,), of length one; None where they move as one, or it is not determined."""
         return self._at[frozenset((one, other))]  # type: ignore[attr-defined]
 
@@ -135,20 +135,20 @@ class _Here:
         size, middle = self._size, self._middle  # type: ignore[attr-defined]
         return np.array([size * x + w * middle[0], size * y + w * middle[1], w])
 
-    def apart(self, link: str, known: str) -> float:
+    def separation(self, link: str, known: str) -> float:
         """How far a link's centre against the frame lies from that against a link which is known."""
         frame = self.centres.state.mechanism.frame
-        pole, between = self.at(link, frame), self.at(link, known)
+        pole, between = self.centre_point(link, frame), self.centre_point(link, known)
         if between is None:
-            return 1.0 if self._moves_with(link, known) else 0.0
+            return 1.0 if self._is_one_with(link, known) else 0.0
         if pole is None:
-            return 1.0 if self._moves_with(link, frame) else 0.0
+            return 1.0 if self._is_one_with(link, frame) else 0.0
         return float(np.linalg.norm(np.cross(pole, between)))
 
-    def onward(self, link: str, known: str, found: LinkByCentres) -> LinkByCentres:
+    def motion_through(self, link: str, known: str, found: LinkByCentres) -> LinkByCentres:
         """The motion of a link from that of another."""
         frame = self.centres.state.mechanism.frame
-        pole, between = self.at(link, frame), self.at(link, known)
+        pole, between = self.centre_point(link, frame), self.centre_point(link, known)
         if between is None:
             return LinkByCentres(found.motion, ())
         if pole is None:
@@ -157,54 +157,54 @@ class _Here:
         by = tuple(self.centres[two].name for two in ((known, frame), (link, known), (link, frame)))
         return LinkByCentres(pole * float(line @ known_line / (line @ line)), by)
 
-    def _moves_with(self, one: str, other: str) -> bool:
+    def _is_one_with(self, one: str, other: str) -> bool:
         return self.centres[one, other].how == "as one"
 
-    def driven(self, name: str, rate: float) -> dict[str, LinkByCentres]:
+    def input_motions(self, name: str, rate: float) -> dict[str, LinkByCentres]:
         """The motions of the links at an input from its rate."""
-        found = rates(self.centres.state)
-        tie = next(tie for tie in found.ties if tie.given and tie.pair == name)
-        first, second, motion = self._between(found, tie, rate)
+        found = rate_equations(self.centres.state)
+        tie = next(tie for tie in found.equations if tie.is_input and tie.pair == name)
+        first, second, motion = self._relative_input_motion(found, tie, rate)
         frame = self.centres.state.mechanism.frame
         if frame in (first, second):
             link, sign = (second, 1.0) if first == frame else (first, -1.0)
             return {link: LinkByCentres(sign * motion, ())}
         # between moving links: m_second - m_first is known, and where both poles lie
-        poles = [self.at(link, frame) for link in (first, second)]
+        poles = [self.centre_point(link, frame) for link in (first, second)]
         for held, moves, sign in ((first, second, 1.0), (second, first, -1.0)):
-            if self._moves_with(held, frame):  # at rest here
+            if self._is_one_with(held, frame):  # at rest here
                 return {held: LinkByCentres(np.zeros(3), ()), moves: LinkByCentres(sign * motion, ())}
         if any(pole is None for pole in poles):
-            raise _undetermined(self.centres, [first, second], name)
+            raise _undetermined_answer(self.centres, [first, second], name)
         matrix = np.stack([-poles[0], poles[1]], axis=1)
-        if np.linalg.svd(matrix, compute_uv=False)[-1] <= COINCIDENT:
-            raise _undetermined(self.centres, [first, second], name)
+        if np.linalg.svd(matrix, compute_uv=False)[-1] <= COINCIDENT_TOLERANCE:
+            raise _undetermined_answer(self.centres, [first, second], name)
         sizes = np.linalg.lstsq(matrix, motion, rcond=None)[0]
         by = (self.centres[first, frame].name, self.centres[first, second].name, self.centres[second, frame].name)
         both = zip((first, second), sizes, poles, strict=True)
         return {link: LinkByCentres(size * pole, by) for link, size, pole in both}
 
-    def _between(self, found: Rates, tie: Tie, rate: float) -> tuple[str, str, Array]:
+    def _relative_input_motion(self, found: RateEquations, tie: RateEquation, rate: float) -> tuple[str, str, Array]:
         """Two links at an input, and the motion of the second against the first from the input's rate."""
-        turns = {each.owner: slope for each, slope in tie.slopes.items() if each.turns}
+        turns = {each.owner: slope for each, slope in tie.coefficients.items() if each.is_angular}
         if turns:
             second, first = sorted(turns, key=lambda link: -turns[link])
-            at = self.at(first, second)
+            at = self.centre_point(first, second)
             if at is None or at[2] == 0.0:
-                raise _undetermined(self.centres, [first, second], tie.pair)
+                raise _undetermined_answer(self.centres, [first, second], tie.pair)
             return first, second, at * (rate / turns[second] / at[2])
-        (own,) = tie.slopes
-        slide: Slide = next(each for each in found.slides if own in each.rates)
-        way = slide.ways[slide.rates.index(own)] * rate / tie.slopes[own] / self._size  # type: ignore[attr-defined]
-        at = self.at(slide.guide, slide.rider)
-        x, y = (found.at(slide.rider, slide.point) - self._middle) / self._size  # type: ignore[attr-defined]
+        (own,) = tie.coefficients
+        slide: SlideJoint = next(each for each in found.slides if own in each.rates)
+        way = slide.directions[slide.rates.index(own)] * rate / tie.coefficients[own] / self._size  # type: ignore[attr-defined]
+        at = self.centre_point(slide.guide, slide.rider)
+        x, y = (found.point_position(slide.rider, slide.point) - self._middle) / self._size  # type: ignore[attr-defined]
         if at is None:
-            raise _undetermined(self.centres, [slide.guide, slide.rider], tie.pair)
+            raise _undetermined_answer(self.centres, [slide.guide, slide.rider], tie.pair)
         carried = np.array([at[1] - at[2] * y, at[2] * x - at[0]])
         return slide.guide, slide.rider, at * float(carried @ way / (carried @ carried))
 
 
-def _undetermined(centres: Centres, links: Sequence[str], pair: str) -> NoAnswer:
+def _undetermined_answer(centres: Centres, links: Sequence[str], pair: str) -> NoAnswer:
     unknown = [each for each in centres if each.how == "open"]
     if unknown:
         return NoAnswer(Outcome.CHANGE_POINT, unknown[0].derivation)

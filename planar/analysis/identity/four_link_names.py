@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from planar.analysis.identity.kinematic_scheme import NEAR, Ring, Side
+from planar.analysis.identity.kinematic_scheme import LENGTH_TOLERANCE, KinematicLoop, LoopLink
 from planar.foundation.geometry import Vector
 
-FOLDING = "parallelogram or antiparallelogram"
+EITHER_PARALLELOGRAM = "parallelogram or antiparallelogram"
 """Dimensions do not tell which of the two it is, its position does."""
 QUICK_RETURNS = frozenset({"Whitworth quick return", "crank and slotted lever"})
 
@@ -35,21 +35,21 @@ _DOUBLE_SLIDER = {
 """By the kinds of the fixed link's pairs."""
 
 
-def four_links(ring: Ring) -> tuple[str, ...]:
+def four_link_names(loop: KinematicLoop) -> tuple[str, ...]:
     """The names of a ring of four links, from the general to the particular.
 
     The chain is told by its pairs in their order round the ring, R turning and P sliding; its inversion by which
     link is fixed (F. Reuleaux, The Kinematics of Machinery, 1876). RPRP is the same whichever link is fixed.
     """
-    word = "".join("P" if joint.slides else "R" for joint in ring.joints)
+    word = "".join("P" if joint.slides else "R" for joint in loop.joints)
     if "PP" in word + word[0] and word.count("P") == 2:
-        return _double_slider(ring, word)
+        return _double_slider_names(loop, word)
     if word in ("RPRP", "PRPR"):
         return ("Rapson's slide", "tangent mechanism")
-    return {0: _four_bar, 1: _slider_crank}.get(word.count("P"), lambda _: ())(ring)
+    return {0: _four_bar_names, 1: _slider_crank_names}.get(word.count("P"), lambda _: ())(loop)
 
 
-def _four_bar(ring: Ring) -> tuple[str, ...]:
+def _four_bar_names(loop: KinematicLoop) -> tuple[str, ...]:
     """RRRR, by F. Grashof's rule (Theoretische Maschinenlehre, 1883): s + l against p + q.
 
     Less: the shortest link s turns fully against the others, so fixed it makes a double-crank (drag link), next to
@@ -59,27 +59,27 @@ def _four_bar(ring: Ring) -> tuple[str, ...]:
     ones equal a kite; any other is called as Grashof's with the same shortest link.
     """
     chain = ("four-bar chain",)
-    lengths = [side.length for side in ring.sides]
+    lengths = [side.length for side in loop.links]
     s, p, q, l = sorted(lengths)  # noqa: E741 - the letters of Grashof's rule
     size = s + p + q + l
-    if s <= NEAR * size or l > (0.5 + NEAR) * size:
+    if s <= LENGTH_TOLERANCE * size or l > (0.5 + LENGTH_TOLERANCE) * size:
         return chain
     kind = _GRASHOF[lengths.index(s)]
-    if abs(s + l - p - q) > NEAR * size:
+    if abs(s + l - p - q) > LENGTH_TOLERANCE * size:
         return chain + (kind if s + l < p + q else ("triple-rocker",))
     chain = (*chain, "change-point four-bar")
     a, b, c, d = lengths
-    near = NEAR * size
+    near = LENGTH_TOLERANCE * size
     if l - s <= near:
         return (*chain, "rhombus")
     if abs(a - c) <= near and abs(b - d) <= near:
-        return (*chain, FOLDING)
+        return (*chain, EITHER_PARALLELOGRAM)
     if p - s <= near:
         return (*chain, "kite (deltoid)")
     return (*chain, f"change-point {kind[0].removeprefix('Grashof ')}")
 
 
-def _slider_crank(ring: Ring) -> tuple[str, ...]:
+def _slider_crank_names(loop: KinematicLoop) -> tuple[str, ...]:
     """RRRP: two links with two pins each, r and s long, and two links that slide on each other with a pin each.
 
     Slide and block are alike to kinematics, whichever of them carries the line. What tells the inversions apart is
@@ -96,13 +96,13 @@ def _slider_crank(ring: Ring) -> tuple[str, ...]:
     of the single slider-crank chain.
     """
     chain = ("slider-crank chain",)
-    at = next(index for index, joint in enumerate(ring.joints) if joint.slides)
-    x, y, beside_y, beside_x = (ring.sides[(at + step) % 4] for step in range(4))
-    fixed = ring.sides[0]
+    at = next(index for index, joint in enumerate(loop.joints) if joint.slides)
+    x, y, beside_y, beside_x = (loop.links[(at + step) % 4] for step in range(4))
+    fixed = loop.links[0]
     mine, other = (beside_x, beside_y) if fixed in (x, beside_x) else (beside_y, beside_x)
     r, s = mine.length, other.length
-    near = NEAR * (r + s)
-    e = abs(_off(x.before.at, x) - _off(y.after.at, y))
+    near = LENGTH_TOLERANCE * (r + s)
+    e = abs(_offset_from_line(x.before.point, x) - _offset_from_line(y.after.point, y))
     if min(r, s) <= near or r + s < e:
         return chain
     cases = {
@@ -116,20 +116,20 @@ def _slider_crank(ring: Ring) -> tuple[str, ...]:
     return chain + tuple(name.format(line=line) for name in _INVERSIONS[fixed in (x, y), case])
 
 
-def _double_slider(ring: Ring, word: str) -> tuple[str, ...]:
+def _double_slider_names(loop: KinematicLoop, word: str) -> tuple[str, ...]:
     """RRPP: the link with two slides fixed, elliptical trammel; one with a slide and a pin, Scotch yoke; the one
     with two pins, Oldham coupling (S. Rattan, Theory of Machines); the cosine mechanism: Machine Elements, 1.3.5 (iii).
 
     Where the two slides are parallel nothing turns, and the field has no name for it.
     """
     chain = ("double slider-crank chain",)
-    cross = next(side for side in ring.sides if side.before.way is not None and side.after.way is not None)
-    if abs(cross.before.way.cross(cross.after.way)) <= NEAR:
+    cross = next(side for side in loop.links if side.before.direction is not None and side.after.direction is not None)
+    if abs(cross.before.direction.cross(cross.after.direction)) <= LENGTH_TOLERANCE:
         return chain
     return (*chain, *_DOUBLE_SLIDER["".join(sorted(word[0] + word[-1]))])
 
 
-def _off(pin: Vector, side: Side) -> float:
+def _offset_from_line(pin: Vector, side: LoopLink) -> float:
     """How far to the left of the way of its slide a pin of a link lies (m)."""
-    slide = side.after if side.before.way is None else side.before
-    return slide.way.cross(pin - slide.at)
+    slide = side.after if side.before.direction is None else side.before
+    return slide.direction.cross(pin - slide.point)

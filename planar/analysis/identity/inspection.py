@@ -7,29 +7,29 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planar.analysis.identity.load_descriptions import Action, actions
-from planar.analysis.identity.mechanism_names import names
+from planar.analysis.identity.load_descriptions import ActionDescription, describe_actions
+from planar.analysis.identity.mechanism_names import mechanism_names
 from planar.analysis.identity.mobility import Mobility, gruebler, mobility
-from planar.dynamics.load_attachment import choices
-from planar.equations.functions import shapes, size
+from planar.dynamics.load_attachment import attachment_remarks
+from planar.equations.functions import mechanism_size, shapes_of_links
 from planar.foundation.errors import BadInput, NoAnswer, Outcome, PlanarError
-from planar.model.link_graph import detached, numbered, pair_words
-from planar.model.mechanism import Input, Mechanism, entries
-from planar.model.pairs import Kind
-from planar.model.wording import listed, many
+from planar.model.link_graph import link_numbers, pair_labels_by_type, unconnected_links
+from planar.model.mechanism import Input, Mechanism, pair_entries
+from planar.model.pairs import MeasureKind
+from planar.model.wording import count_phrase, join_all_names
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
 from planar.solving.position import solve
 
-ORDERS = ("single", "unary", "binary", "ternary", "quaternary", "quinary")
-STEPS = 120
+LINK_ORDERS = ("single", "unary", "binary", "ternary", "quaternary", "quinary")
+RUN_STEPS = 120
 """Positions of a run that tells how links move."""
-STILL = 1e-9
+STANDSTILL_TOLERANCE = 1e-9
 """rad, or part of the size: what moves less stands still."""
 
 
 @dataclass(frozen=True)
-class LinkWords:
+class LinkDescription:
     """A link: its number, how many pairs it has in a word, and how it moves over the range of the inputs."""
 
     number: str
@@ -48,7 +48,7 @@ class Inspection:
 
     name: str
     names: tuple[str, ...]
-    links: dict[str, LinkWords]
+    links: dict[str, LinkDescription]
     pairs: tuple[tuple[str, tuple[str, ...]], ...]
     lower: int
     higher: int
@@ -60,7 +60,7 @@ class Inspection:
     mechanism_reason: str
     is_linkage: bool
     linkage_reason: str
-    actions: tuple[Action, ...]
+    actions: tuple[ActionDescription, ...]
     remarks: tuple[str, ...]
 
 
@@ -70,21 +70,23 @@ def inspect(mechanism: Mechanism) -> Inspection:
         found, trouble = mobility(mechanism), ""
     except NoAnswer as problem:
         found, trouble = None, str(problem)
-    orders = Counter(link for group in entries(mechanism) for link in {link for pair in group for link in pair.links})
-    number = numbered(mechanism)
-    moving = _motions(mechanism)
+    orders = Counter(
+        link for group in pair_entries(mechanism) for link in {link for pair in group for link in pair.links}
+    )
+    number = link_numbers(mechanism)
+    moving = _describe_motions(mechanism)
     links = {
-        link: LinkWords(number[link], _order(orders[link]), moving[link])
+        link: LinkDescription(number[link], _order_word(orders[link]), moving[link])
         for link in sorted(number, key=lambda link: int(number[link]))
     }
-    lower = sum(pair.lower for pair in mechanism.pairs)
+    lower = sum(pair.is_lower_pair for pair in mechanism.pairs)
     higher = len(mechanism.pairs) - lower
     closed = all(orders[link.name] > 1 for link in mechanism.links)
-    is_mechanism, why = _is_mechanism(mechanism, found, trouble)
-    words = pair_words(mechanism)
+    is_mechanism, why = _judge_mechanism(mechanism, found, trouble)
+    words = pair_labels_by_type(mechanism)
     return Inspection(
         name=mechanism.name,
-        names=names(mechanism),
+        names=mechanism_names(mechanism),
         links=links,
         pairs=words,
         lower=lower,
@@ -97,32 +99,37 @@ def inspect(mechanism: Mechanism) -> Inspection:
         mechanism_reason=why,
         is_linkage=is_mechanism and not higher,
         linkage_reason=_linkage_reason(is_mechanism, higher),
-        actions=actions(mechanism),
-        remarks=choices(mechanism),
+        actions=describe_actions(mechanism),
+        remarks=attachment_remarks(mechanism),
     )
 
 
-def _order(pairs: int) -> str:
-    return ORDERS[pairs] if pairs < len(ORDERS) else f"of {pairs} pairs"
+def _order_word(pairs: int) -> str:
+    return LINK_ORDERS[pairs] if pairs < len(LINK_ORDERS) else f"of {pairs} pairs"
 
 
 def _linkage_reason(is_mechanism: bool, higher: int) -> str:
     if not is_mechanism:
         return "it is no mechanism"
-    return f"it has {many(higher, 'higher pair')}" if higher else "all its pairs are lower"
+    return f"it has {count_phrase(higher, 'higher pair')}" if higher else "all its pairs are lower"
 
 
-def _is_mechanism(mechanism: Mechanism, found: Mobility | None, trouble: str) -> tuple[bool, str]:
+def _judge_mechanism(mechanism: Mechanism, found: Mobility | None, trouble: str) -> tuple[bool, str]:
     """One link fixed, as many driving links as freedoms, and the rest moving in a definite way."""
     if found is None:
         return False, trouble
-    if detached(mechanism):
-        return False, f"nothing joins {listed([repr(link) for link in detached(mechanism)])} to the frame"
+    if unconnected_links(mechanism):
+        return (
+            False,
+            f"nothing joins {join_all_names([repr(link) for link in unconnected_links(mechanism)])} to the frame",
+        )
     given = len(mechanism.inputs)
     if given != found.finite or not given:
-        moves = f"it moves in {many(found.finite, 'way')}" if found.finite else "nothing moves: it is a structure"
-        return False, f"it has {many(given, 'driving link')}, and {moves}"
-    told = f"one link is fixed, {many(given, 'link')} driven, and the rest follows definitely"
+        moves = (
+            f"it moves in {count_phrase(found.finite, 'way')}" if found.finite else "nothing moves: it is a structure"
+        )
+        return False, f"it has {count_phrase(given, 'driving link')}, and {moves}"
+    told = f"one link is fixed, {count_phrase(given, 'link')} driven, and the rest follows definitely"
     try:
         solve(mechanism)
     except NoAnswer as problem:
@@ -131,71 +138,73 @@ def _is_mechanism(mechanism: Mechanism, found: Mobility | None, trouble: str) ->
     return True, told
 
 
-def _motions(mechanism: Mechanism) -> dict[str, str]:
+def _describe_motions(mechanism: Mechanism) -> dict[str, str]:
     """How each link moves while the inputs run through their ranges, one after the other."""
     runs: list[Motion] = []
     for given in mechanism.inputs:
         try:
-            runs.append(_run(mechanism, given))
+            runs.append(_run_input(mechanism, given))
         except PlanarError:
             return {link.name: "fixed" if link.name == mechanism.frame else "unknown" for link in mechanism.links}
-    return {link.name: _motion(mechanism, link.name, runs) for link in mechanism.links}
+    return {link.name: _describe_motion(mechanism, link.name, runs) for link in mechanism.links}
 
 
-def _same_place(run: Motion) -> bool:
+def _is_back_at_start(run: Motion) -> bool:
     """Whether everything that slides is at the end where it was at the start."""
     return all(abs(float(np.ptp(jet.parts[0][[0, -1]]))) < 1e-6 for own in run.own.values() for jet in own)
 
 
-def _run(mechanism: Mechanism, given: Input) -> Motion:
+def _run_input(mechanism: Mechanism, given: Input) -> Motion:
     """One input through its range; a slide without limits a few sizes to either side."""
     try:
-        return cycle(mechanism, STEPS, pair=given.pair)
+        return cycle(mechanism, RUN_STEPS, pair=given.pair)
     except BadInput:
-        far = 2.0 * size(mechanism, shapes(mechanism))
-        return cycle(mechanism, STEPS, given.position - far, given.position + far, given.pair)
+        far = 2.0 * mechanism_size(mechanism, shapes_of_links(mechanism))
+        return cycle(mechanism, RUN_STEPS, given.position - far, given.position + far, given.pair)
 
 
-def _motion(mechanism: Mechanism, link: str, runs: list[Motion]) -> str:
+def _describe_motion(mechanism: Mechanism, link: str, runs: list[Motion]) -> str:
     if link == mechanism.frame:
         return "fixed"
     if not runs:
         return "unknown"
     swing = max(float(np.ptp(run.link(link).angle)) for run in runs)
-    places = [np.stack([_parts(run, link, axis) for axis in "xy"]) for run in runs]
+    places = [np.stack([_origin_coordinate(run, link, axis) for axis in "xy"]) for run in runs]
     size = max(float(np.abs(place).max()) for place in places) or 1.0
-    strays = max(float(np.ptp(place, axis=1).max()) for place in places) > STILL * size
-    if swing <= STILL:
+    strays = max(float(np.ptp(place, axis=1).max()) for place in places) > STANDSTILL_TOLERANCE * size
+    if swing <= STANDSTILL_TOLERANCE:
         return "translates" if strays else "stands still"
-    if not _pinned(mechanism, link):
+    if not _is_pinned(mechanism, link):
         return "general plane motion"
-    if any(_turns(run, link) for run in runs):
+    if any(_is_turning_fully(run, link) for run in runs):
         return "turns fully"
     return "rocks" if all(run.outcome is Outcome.SOLVED for run in runs) else "turns or rocks"
 
 
-def _parts(run: Motion, link: str, axis: str) -> np.ndarray:
+def _origin_coordinate(run: Motion, link: str, axis: str) -> np.ndarray:
     jet = getattr(run.frames[link], axis)
     return np.broadcast_to(jet.parts[0], (len(run),))
 
 
-def _pinned(mechanism: Mechanism, link: str) -> bool:
+def _is_pinned(mechanism: Mechanism, link: str) -> bool:
     """Whether a pin holds the link to the frame."""
     return any(
-        pair.lower and pair.drive_kind is Kind.ANGLE and mechanism.frame in pin and link in pin
-        for group in entries(mechanism)
+        pair.is_lower_pair and pair.input_kind is MeasureKind.ANGLE and mechanism.frame in pin and link in pin
+        for group in pair_entries(mechanism)
         for pair in group[:1]
         for pin in [{end for each in group for end in each.links}]
     )
 
 
-def _turns(run: Motion, link: str) -> bool:
+def _is_turning_fully(run: Motion, link: str) -> bool:
     """Whether a link goes right round: over a whole cycle of the input it comes out turned, or it turns far enough."""
     angle = run.link(link).angle
-    if float(np.ptp(angle)) >= 2.0 * np.pi - STILL:
+    if float(np.ptp(angle)) >= 2.0 * np.pi - STANDSTILL_TOLERANCE:
         return True
     cyclic = any(
-        not run.slides(name) and abs(float(np.ptp(given.position)) - 2.0 * np.pi) < STILL
+        not run.has_length_motion(name) and abs(float(np.ptp(given.position)) - 2.0 * np.pi) < STANDSTILL_TOLERANCE
         for name, given in run.inputs.items()
     )
-    return cyclic and _same_place(run) and run.outcome is Outcome.SOLVED and abs(float(angle[-1] - angle[0])) > 1e-6
+    return (
+        cyclic and _is_back_at_start(run) and run.outcome is Outcome.SOLVED and abs(float(angle[-1] - angle[0])) > 1e-6
+    )

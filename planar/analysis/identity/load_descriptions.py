@@ -6,15 +6,15 @@ from dataclasses import dataclass
 from math import atan2, hypot
 
 from planar.dynamics.load_attachment import attachments
-from planar.foundation.units import unit
+from planar.foundation.units import parse_unit
 from planar.model.loads import Load, Mass, Spring
-from planar.model.mechanism import Mechanism, motions
-from planar.model.pairs import Kind
+from planar.model.mechanism import Mechanism, relative_motions
+from planar.model.pairs import MeasureKind
 from planar.model.wording import amount
 
 
 @dataclass(frozen=True)
-class Action:
+class ActionDescription:
     """A load, a spring or a mass: where it is, on which links it acts, and how much it is."""
 
     kind: str
@@ -23,37 +23,37 @@ class Action:
     amount: str
 
 
-def actions(mechanism: Mechanism) -> tuple[Action, ...]:
+def describe_actions(mechanism: Mechanism) -> tuple[ActionDescription, ...]:
     """All of a mechanism in the order of its file."""
-    found = [_load(mechanism, load) for load in mechanism.loads]
-    found += [_spring(mechanism, spring) for spring in mechanism.springs]
-    found += [_mass(mechanism, mass) for mass in mechanism.masses]
+    found = [_describe_load(mechanism, load) for load in mechanism.loads]
+    found += [_describe_spring(mechanism, spring) for spring in mechanism.springs]
+    found += [_describe_mass(mechanism, mass) for mass in mechanism.masses]
     if any(mechanism.gravity):
         weighed = tuple(dict.fromkeys(mass.link for mass in mechanism.masses))
-        found.append(Action("gravity", "", weighed, _vector(mechanism, mechanism.gravity, "m/s²")))
+        found.append(ActionDescription("gravity", "", weighed, _describe_vector(mechanism, mechanism.gravity, "m/s²")))
     return tuple(found)
 
 
-def _load(mechanism: Mechanism, load: Load) -> Action:
+def _describe_load(mechanism: Mechanism, load: Load) -> ActionDescription:
     if load.point is not None and load.force is not None:
         link = attachments(mechanism)[load.point].link
         turns = "" if load.axes is None else f" in the axes of {load.axes}"
-        kind, at, links, told = "force", load.point, (link,), f"{_vector(mechanism, load.force, 'N')}{turns}"
+        kind, at, links, told = "force", load.point, (link,), f"{_describe_vector(mechanism, load.force, 'N')}{turns}"
     elif load.link is not None and load.torque is not None:
         kind, at, links, told = "torque", load.link, (load.link,), f"{load.torque:.6g} N·m"
     else:
-        pair = motions(mechanism)[load.pair or ""]
-        slides = pair.drive_kind is Kind.LENGTH
+        pair = relative_motions(mechanism)[load.pair or ""]
+        slides = pair.input_kind is MeasureKind.LENGTH
         kind, at, links = "force in a pair" if slides else "torque in a pair", pair.name, pair.links
         told = f"{load.effort:.6g} {'N' if slides else 'N·m'}"
     if load.varies is not None:
         told += f", varies with {load.varies.input or 'time'}"
-    return Action(kind, at, links, told)
+    return ActionDescription(kind, at, links, told)
 
 
-def _spring(mechanism: Mechanism, spring: Spring) -> Action:
-    per, free = ("N·m", "angle") if spring.turns else ("N", "length")
-    length = "rad" if spring.turns else "m"
+def _describe_spring(mechanism: Mechanism, spring: Spring) -> ActionDescription:
+    per, free = ("N·m", "angle") if spring.is_torsional else ("N", "length")
+    length = "rad" if spring.is_torsional else "m"
     told = []
     if spring.stiffness:
         told.append(f"{spring.stiffness:.6g} {per}/{length}")
@@ -61,25 +61,29 @@ def _spring(mechanism: Mechanism, spring: Spring) -> Action:
     if spring.damping:
         told.append(f"damping {spring.damping:.6g} {per}·s/{length}")
     kind = "spring" if spring.stiffness or not spring.damping else "damper"
-    if spring.turns:
-        return Action(f"torsional {kind}", "", spring.ends, ", ".join(told))
+    if spring.is_torsional:
+        return ActionDescription(f"torsional {kind}", "", spring.ends, ", ".join(told))
     where = attachments(mechanism)
-    return Action(kind, " to ".join(spring.ends), tuple(where[end].link for end in spring.ends), ", ".join(told))
+    return ActionDescription(
+        kind, " to ".join(spring.ends), tuple(where[end].link for end in spring.ends), ", ".join(told)
+    )
 
 
-def _mass(mechanism: Mechanism, mass: Mass) -> Action:
+def _describe_mass(mechanism: Mechanism, mass: Mass) -> ActionDescription:
     turning = f", moment of inertia {mass.inertia:.6g} kg·m²" if mass.inertia else ""
-    return Action("mass", _spot(mechanism, mass), (mass.link,), f"{mass.mass:.6g} kg{turning}")
+    return ActionDescription(
+        "mass", _describe_mass_centre(mechanism, mass), (mass.link,), f"{mass.mass:.6g} kg{turning}"
+    )
 
 
-def _spot(mechanism: Mechanism, mass: Mass) -> str:
+def _describe_mass_centre(mechanism: Mechanism, mass: Mass) -> str:
     """The point at which a mass is centred, or its x and y in the axes of its link."""
     if isinstance(mass.at, str):
         return mass.at
-    x, y = (f"{unit(mechanism.units.length).from_si(part):.6g}" for part in mass.at)
+    x, y = (f"{parse_unit(mechanism.units.length).from_si(part):.6g}" for part in mass.at)
     return f"({x}, {y}) {mechanism.units.length}"
 
 
-def _vector(mechanism: Mechanism, vector: tuple[float, float], measure: str) -> str:
+def _describe_vector(mechanism: Mechanism, vector: tuple[float, float], measure: str) -> str:
     x, y = vector
     return f"{hypot(x, y):.6g} {measure} at {amount(atan2(y, x), 'angle', mechanism.units)}"

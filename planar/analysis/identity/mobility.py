@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from planar.foundation.errors import NoAnswer
-from planar.model.link_graph import farthest_first
+from planar.model.link_graph import pairs_farthest_first
 from planar.model.mechanism import Mechanism
-from planar.model.wording import listed, many
-from planar.solving.assembly.nearest_assembly import Assembly, Failure
-from planar.solving.diagnosis.redundancy import smallest_sets
-from planar.solving.full_constraints import Constraints, joined, motion_from, null_space, rank
-from planar.solving.position import Solver
+from planar.model.wording import count_phrase, join_all_names
+from planar.solving.assembly.nearest_assembly import Assembly, AssemblySearchFailure
+from planar.solving.diagnosis.redundancy import smallest_dependent_sets
+from planar.solving.full_constraints import FullConstraints, find_closed_position, motion_dimension, null_space, rank
+from planar.solving.position import PositionSolver
 
 Array = np.ndarray
 
@@ -38,9 +38,9 @@ class Mobility:
 
 def mobility(mechanism: Mechanism) -> Mobility:
     """The mobility of a mechanism in the position of its file. Raises NoAnswer where it cannot be assembled."""
-    setup = Solver(mechanism)
-    constraints = Constraints(setup)
-    return measured(constraints, standing(setup, constraints))
+    setup = PositionSolver(mechanism)
+    constraints = FullConstraints(setup)
+    return mobility_at(constraints, closed_position(setup, constraints))
 
 
 def gruebler(mechanism: Mechanism) -> int:
@@ -48,66 +48,77 @@ def gruebler(mechanism: Mechanism) -> int:
 
     M. Gruebler 1883, K. Kutzbach 1929; two for a lower pair in the plane, one for a higher one.
     """
-    return 3 * (len(mechanism.links) - 1) - sum(pair.holds() for pair in mechanism.pairs)
+    return 3 * (len(mechanism.links) - 1) - sum(pair.prevented_motion_count() for pair in mechanism.pairs)
 
 
-def measured(constraints: Constraints, w: Array) -> Mobility:
+def mobility_at(constraints: FullConstraints, w: Array) -> Mobility:
     """The mobility at a position w (coordinates,)."""
     mechanism = constraints.setup.mechanism
     count = gruebler(mechanism)
-    slope = constraints.slope(w)
+    slope = constraints.jacobian(w)
     here = w.size - rank(slope)
     finite, place = here, w
     if here != count:
-        finite, place = motion_from(constraints, w)
-    left = null_space(constraints.slope(place).T)
+        finite, place = motion_dimension(constraints, w)
+    left = null_space(constraints.jacobian(place).T)
     surplus = max(0, finite - count)
-    everywhere = finite < null_space(constraints.slope(place)).shape[1]
+    everywhere = finite < null_space(constraints.jacobian(place)).shape[1]
     sets: tuple[tuple[str, ...], ...] = ()
     if surplus and left.shape[1] == surplus:
-        sets = smallest_sets(left, constraints.pair_of_row, lambda name: farthest_first(mechanism, name))
-    return Mobility(count, here, finite, surplus, sets, tuple(_why(count, here, finite, sets, everywhere)))
+        sets = smallest_dependent_sets(
+            left, constraints.pair_of_row, lambda name: pairs_farthest_first(mechanism, name)
+        )
+    return Mobility(
+        count, here, finite, surplus, sets, tuple(_explain_differences(count, here, finite, sets, everywhere))
+    )
 
 
-def standing(setup: Solver, constraints: Constraints) -> Array:
+def closed_position(solver: PositionSolver, constraints: FullConstraints) -> Array:
     """A closed position w of a mechanism, the one of its inputs if they determine one. Raises NoAnswer."""
-    nearest: Assembly | Failure | NoAnswer
+    nearest: Assembly | AssemblySearchFailure | NoAnswer
     try:
-        nearest = setup.nearest()
+        nearest = solver.nearest()
     except NoAnswer as problem:
         nearest = problem
     if isinstance(nearest, Assembly):
-        return setup.program.positions(nearest.z, setup.station.u, setup.station.p).full().ravel()
-    found = joined(constraints)
+        return solver.functions.coordinate_function(nearest.z, solver.inputs.u, solver.inputs.p).full().ravel()
+    found = find_closed_position(constraints)
     if found is None:
-        raise setup.unassembled(nearest) if isinstance(nearest, Failure) else nearest
+        raise solver.unassembled(nearest) if isinstance(nearest, AssemblySearchFailure) else nearest
     return found
 
 
-def _why(count: int, here: int, finite: int, sets: tuple[tuple[str, ...], ...], everywhere: bool) -> list[str]:
+def _explain_differences(
+    count: int, here: int, finite: int, sets: tuple[tuple[str, ...], ...], everywhere: bool
+) -> list[str]:
     told = []
     if here > finite and finite and everywhere:
         told.append(
-            f"in every position of the motion the pairs allow {many(here - finite, 'more way')}, but to first order "
+            f"in every position of the motion the pairs allow {count_phrase(here - finite, 'more way')}, but "
+            "to first order "
             f"only: to second order they hold it, so that a little play lets it move far"
         )
     elif here > finite:
         what = "nothing moves on from here" if finite == 0 else "branches of the motion cross here, or it turns back"
         told.append(
-            f"in this position the pairs allow {many(here - finite, 'more way')}, but to first order only: {what}"
+            f"in this position the pairs allow {count_phrase(here - finite, 'more way')}, but to first order "
+            f"only: {what}"
         )
     if finite > count:
         follows = "follows" if finite - count == 1 else "follow"
         told.append(
-            f"{many(finite - count, 'constraint')} of the pairs {follows} from the others, so the links move in "
-            f"{many(finite, 'way')} where the count gives {count}"
+            f"{count_phrase(finite - count, 'constraint')} of the pairs {follows} from the others, so the "
+            "links move in "
+            f"{count_phrase(finite, 'way')} where the count gives {count}"
         )
         told += [
-            f"of the pairs {listed([repr(name) for name in each])} one holds what the others hold" for each in sets
+            f"of the pairs {join_all_names([repr(name) for name in each])} one holds what the others hold"
+            for each in sets
         ]
     if finite < count:
         told.append(
-            f"the count gives {count}, but from here the links move in {many(finite, 'way')}: their dimensions only "
+            f"the count gives {count}, but from here the links move in {count_phrase(finite, 'way')}: their "
+            "dimensions only "
             f"just allow this position, or some of them hold others fast while the rest is freer"
         )
     return told

@@ -6,17 +6,17 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from planar.analysis.interpolated_run import Steady
-from planar.analysis.motion.extremes import Extreme, fastest, rates
-from planar.analysis.motion.harmonics import Harmonics, harmonics, turning
-from planar.analysis.motion.piston import Deviation, Piston, RodPoint, piston
+from planar.analysis.interpolated_run import InterpolatedRun
+from planar.analysis.motion.extremes import Extreme, find_greatest, quantity_and_rates
+from planar.analysis.motion.harmonics import Harmonics, full_turn, harmonics
+from planar.analysis.motion.piston import Deviation, Piston, RodPointMotion, find_piston
 from planar.foundation.errors import BadInput
-from planar.model.mechanism import Mechanism, motions, named_points
-from planar.model.pairs import Kind
+from planar.model.mechanism import Mechanism, named_points, relative_motions
+from planar.model.pairs import MeasureKind
 from planar.results.motion import Array
 
 
-class Formula(NamedTuple):
+class TwoTermComparison(NamedTuple):
     """What the two-term formula makes of a piston, beside what is exact, at the steady rate of the input.
 
     `here` and `exact` are displacement, velocity and acceleration from TDC at the file's position (SI, positive away
@@ -31,17 +31,17 @@ class Formula(NamedTuple):
     fastest: Extreme
 
 
-class OnRod(NamedTuple):
+class RodPointComparison(NamedTuple):
     """A point on the rod of a piston, `b` (m) from it: by the two-term formulas, and exactly, in the piston's axes."""
 
     piston: Piston
     b: float
-    here: RodPoint
-    exact: RodPoint
+    here: RodPointMotion
+    exact: RodPointMotion
 
 
 @dataclass(frozen=True, eq=False)
-class Route:
+class AnalyticalRoute:
     """What is found of one slide (one series) or point (x and y), at the steady rate of the input.
 
     `rate` is that of the input (rad/s); where the file's is zero it is 1 and `per_unit` is true: rates are then per
@@ -56,51 +56,51 @@ class Route:
     fastest: Extreme
     here: tuple[Array, Array, Array]
     piston: Piston | None = None
-    formula: Formula | None = None
-    rods: tuple[OnRod, ...] = ()
+    formula: TwoTermComparison | None = None
+    rods: tuple[RodPointComparison, ...] = ()
 
 
-def routes(
+def analytical_routes(
     mechanism: Mechanism, pairs: tuple[str, ...] = (), points: tuple[str, ...] = (), running: str | None = None
-) -> tuple[Route, ...]:
+) -> tuple[AnalyticalRoute, ...]:
     """The analytical route of some slides and points; of none, every slide on the frame that is not driven.
 
     `running` names the input that turns, where there are several. Raises BadInput where there is nothing of a name or
     no such slide, or a motion does not repeat with every turn; NoAnswer where the input makes no full turn.
     """
-    named = motions(mechanism)
+    named = relative_motions(mechanism)
     for pair in pairs:
-        if pair in named and named[pair].drive_kind is not Kind.LENGTH:
+        if pair in named and named[pair].input_kind is not MeasureKind.LENGTH:
             raise BadInput(pair, "nothing slides at this pair; name a slide, or a point")
-    full = {point: _full(mechanism, point) for point in points}
+    full = {point: _unambiguous_point(mechanism, point) for point in points}
     if not pairs and not points:
-        pairs = slides(mechanism)
+        pairs = frame_slides(mechanism)
     if not pairs and not points:
         such = named_points(mechanism)[-1:]
         told = "no slide on the frame follows an input; name another slide with --pair, or a point with --point"
         told += f", such as {such[0].name!r}" if such else ""
         raise BadInput(mechanism.name, told)
-    pistons = [one for pair in slides(mechanism) if (one := piston(mechanism, pair)) is not None]
+    pistons = [one for pair in frame_slides(mechanism) if (one := find_piston(mechanism, pair)) is not None]
     found = [((harmonics(mechanism, pair, None, running),), pair) for pair in pairs]
     found += [
         (tuple(harmonics(mechanism, point, axis, running) for axis in "xy"), f"{link}.{name}")
         for point, (link, name) in full.items()
     ]
-    steady = Steady(turning(mechanism, running))
-    return tuple(_route(mechanism, steady, series, name, pistons) for series, name in found)
+    steady = InterpolatedRun(full_turn(mechanism, running))
+    return tuple(_analytical_route(mechanism, steady, series, name, pistons) for series, name in found)
 
 
-def slides(mechanism: Mechanism) -> tuple[str, ...]:
+def frame_slides(mechanism: Mechanism) -> tuple[str, ...]:
     """The slides on the frame that are not driven."""
     driven = {given.pair for given in mechanism.inputs}
     return tuple(
         pair.name
-        for pair in motions(mechanism).values()
-        if pair.drive_kind is Kind.LENGTH and mechanism.frame in pair.links and pair.name not in driven
+        for pair in relative_motions(mechanism).values()
+        if pair.input_kind is MeasureKind.LENGTH and mechanism.frame in pair.links and pair.name not in driven
     )
 
 
-def _full(mechanism: Mechanism, name: str) -> tuple[str, str]:
+def _unambiguous_point(mechanism: Mechanism, name: str) -> tuple[str, str]:
     """A (link, point) that lies at a point, so that nothing else is of that name."""
     for each in named_points(mechanism):
         for link, point in each.members:
@@ -110,36 +110,36 @@ def _full(mechanism: Mechanism, name: str) -> tuple[str, str]:
     raise BadInput(name, f"there is no point {name!r}; points are {known}")
 
 
-def _route(
-    mechanism: Mechanism, steady: Steady, series: tuple[Harmonics, ...], name: str, pistons: Sequence[Piston]
-) -> Route:
+def _analytical_route(
+    mechanism: Mechanism, steady: InterpolatedRun, series: tuple[Harmonics, ...], name: str, pistons: Sequence[Piston]
+) -> AnalyticalRoute:
     """The route of a slide or a point that nothing else is named as."""
     given = next(each for each in mechanism.inputs if each.pair == steady.pair)
-    route = Route(
+    route = AnalyticalRoute(
         of=series[0].of,
         series=series,
         position=given.position,
         rate=steady.rate,
         per_unit=not given.velocity,
-        fastest=fastest(steady, name),
-        here=rates(steady.at(given.position), name),
+        fastest=find_greatest(steady, name),
+        here=quantity_and_rates(steady.state_at(given.position), name),
     )
     if series[0].axis is not None:
-        return replace(route, rods=tuple(_rods(steady, route, name, pistons)))
+        return replace(route, rods=tuple(_rod_points(steady, route, name, pistons)))
     one = next((each for each in pistons if each.pair == name and each.input == steady.pair), None)
-    return route if one is None else replace(route, piston=one, formula=_formula(steady, route, one))
+    return route if one is None else replace(route, piston=one, formula=_compare_two_terms(steady, route, one))
 
 
-def _formula(steady: Steady, route: Route, one: Piston) -> Formula | None:
+def _compare_two_terms(steady: InterpolatedRun, route: AnalyticalRoute, piston: Piston) -> TwoTermComparison | None:
     """The two-term formula beside what was solved; None where the stroke does not pass through the crank's axis."""
-    if not one.in_line:
+    if not piston.is_in_line:
         return None
-    two, theta = one.two_terms, one.theta(route.position)
-    start, way = one.slide
+    two, theta = piston.two_terms, piston.theta(route.position)
+    start, way = piston.slide
     position, velocity, acceleration = (float(part[0]) for part in route.here)
-    top = two.fastest()
-    places = [place for at in (top, -top) if (place := steady.within(at - one.lead)) is not None]
-    return Formula(
+    top = two.angle_of_greatest_speed()
+    places = [place for at in (top, -top) if (place := steady.wrap_position(at - piston.lead)) is not None]
+    return TwoTermComparison(
         theta=theta,
         here=(
             float(two.displacement(theta)),
@@ -147,19 +147,23 @@ def _formula(steady: Steady, route: Route, one: Piston) -> Formula | None:
             float(two.acceleration(theta, route.rate)),
         ),
         exact=(way * (position - start), way * velocity, way * acceleration),
-        deviations=(one.deviation(0), one.deviation(1), one.deviation(2)),
+        deviations=(piston.deviation(0), piston.deviation(1), piston.deviation(2)),
         fastest=Extreme(
             min(places, key=lambda place: abs(place - route.fastest.input)), abs(float(two.velocity(top, route.rate)))
         ),
     )
 
 
-def _rods(steady: Steady, route: Route, name: str, pistons: Sequence[Piston]) -> Iterator[OnRod]:
+def _rod_points(
+    steady: InterpolatedRun, route: AnalyticalRoute, name: str, pistons: Sequence[Piston]
+) -> Iterator[RodPointComparison]:
     """The rods of pistons on which a point lies."""
     here = next(each for each in named_points(steady.mechanism) if name in {".".join(end) for end in each.members})
     for one in pistons:
         point = dict(here.members).get(one.rod)
-        b = None if point is None else one.along(steady.samples.shapes[one.rod].at(point))
-        if b is not None and one.input == steady.pair and one.in_line:
+        b = None if point is None else one.distance_from_piston(steady.samples.shapes[one.rod].position(point))
+        if b is not None and one.input == steady.pair and one.is_in_line:
             theta = one.theta(route.position)
-            yield OnRod(one, b, *(each.point(theta, route.rate, b) for each in (one.two_terms, one.exact)))
+            yield RodPointComparison(
+                one, b, *(each.rod_point(theta, route.rate, b) for each in (one.two_terms, one.exact))
+            )

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from planar.analysis.interpolated_run import Steady
+from planar.analysis.interpolated_run import InterpolatedRun
 from planar.analysis.motion.coupler_area import Area, area
-from planar.analysis.motion.dwells import Dwell, stretches
-from planar.analysis.motion.extremes import Extremes, Stroke, Swing, ends, fastest, spread
-from planar.analysis.motion.mechanical_advantage_over_motion import AdvantageOver, over
+from planar.analysis.motion.dwells import Dwell, find_dwells
+from planar.analysis.motion.extremes import Extremes, Stroke, Swing, find_extremes, find_greatest, find_stroke
+from planar.analysis.motion.mechanical_advantage_over_motion import AdvantageOver, advantage_over_run
 from planar.analysis.motion.output import Axis, Extreme, Output
-from planar.analysis.motion.time_ratio import TimeRatio, passages
+from planar.analysis.motion.time_ratio import TimeRatio, find_time_ratio
 from planar.analysis.motion.transmission_angle import Transmission, transmission
 from planar.foundation.errors import BadInput
-from planar.model.mechanism import motions
-from planar.results.motion import Motion, Unknown
+from planar.model.mechanism import relative_motions
+from planar.results.motion import Motion, UnknownName
 
-AXES: tuple[Axis, ...] = ("x", "y")
+POINT_AXES: tuple[Axis, ...] = ("x", "y")
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,47 +51,47 @@ def answers(motion: Motion, name: str) -> tuple[Answers, ...]:
 
     Raises Unknown where there is nothing of that name.
     """
-    steady, found = Steady(motion), []
-    if name in motions(motion.mechanism):
-        found.append(_of_output(motion, steady, name, "pair"))
-    if name in motion.frames and name not in motions(motion.mechanism):
-        found.append(_of_output(motion, steady, name, "link"))
+    steady, found = InterpolatedRun(motion), []
+    if name in relative_motions(motion.mechanism):
+        found.append(_output_answers(motion, steady, name, "pair"))
+    if name in motion.frames and name not in relative_motions(motion.mechanism):
+        found.append(_output_answers(motion, steady, name, "link"))
     if name in motion._point_names:
-        found.append(_of_point(motion, steady, name))
+        found.append(_point_answers(motion, steady, name))
     if not found:
-        raise Unknown(
-            f"there is no pair, link or point {name!r}; pairs are {', '.join(motions(motion.mechanism))}, "
+        raise UnknownName(
+            f"there is no pair, link or point {name!r}; pairs are {', '.join(relative_motions(motion.mechanism))}, "
             f"links {', '.join(motion.frames)}, points {', '.join(motion.point_names)}"
         )
     return tuple(found)
 
 
-def _of_output(motion: Motion, steady: Steady, name: str, what: str) -> Answers:
+def _output_answers(motion: Motion, steady: InterpolatedRun, name: str, what: str) -> Answers:
     output = Output(steady, name)
-    found, slides = output.ends(), output.kind == "length"
-    driven, why = _transmitted(motion, steady, name)
+    found, slides = output.turning_extremes(), output.kind == "length"
+    driven, why = _transmission_or_reason(motion, steady, name)
     return Answers(
         of=name,
         what=what,
         input=steady.pair,
         rate=steady.rate,
-        per_unit=_per_unit(motion, steady),
+        per_unit=_is_per_unit(motion, steady),
         length=slides,
-        stroke=ends(steady, name) if slides else None,
+        stroke=find_stroke(steady, name) if slides else None,
         swing=Swing(name, *found, found[1].value - found[0].value) if found and not slides else None,
-        velocity=fastest(steady, output) if output.moves else None,
-        acceleration=fastest(steady, output, "acceleration") if output.moves else None,
-        time_ratio=passages(output),
-        dwells=tuple((None, each) for each in stretches(output)),
+        velocity=find_greatest(steady, output) if output.is_moving else None,
+        acceleration=find_greatest(steady, output, "acceleration") if output.is_moving else None,
+        time_ratio=find_time_ratio(output),
+        dwells=tuple((None, each) for each in find_dwells(output)),
         transmission=driven,
-        advantage=over(steady, output) if output.moves and name != steady.pair else None,
-        notes=(*_no_ends(output), *why),
+        advantage=advantage_over_run(steady, output) if output.is_moving and name != steady.pair else None,
+        notes=(*_why_no_ends(output), *why),
     )
 
 
-def _of_point(motion: Motion, steady: Steady, name: str) -> Answers:
-    outputs = [Output(steady, name, axis) for axis in AXES]
-    moves, notes = any(each.moves for each in outputs), []
+def _point_answers(motion: Motion, steady: InterpolatedRun, name: str) -> Answers:
+    outputs = [Output(steady, name, axis) for axis in POINT_AXES]
+    moves, notes = any(each.is_moving for each in outputs), []
     within: Area | None = None
     try:
         within = area(motion, name) if moves else None
@@ -102,32 +102,34 @@ def _of_point(motion: Motion, steady: Steady, name: str) -> Answers:
         what="point",
         input=steady.pair,
         rate=steady.rate,
-        per_unit=_per_unit(motion, steady),
+        per_unit=_is_per_unit(motion, steady),
         length=True,
-        extremes=tuple(spread(each) for each in outputs),
-        velocity=fastest(steady, name) if moves else None,
-        acceleration=fastest(steady, name, "acceleration") if moves else None,
-        dwells=tuple((each.axis, dwell) for each in outputs for dwell in stretches(each)),
+        extremes=tuple(find_extremes(each) for each in outputs),
+        velocity=find_greatest(steady, name) if moves else None,
+        acceleration=find_greatest(steady, name, "acceleration") if moves else None,
+        dwells=tuple((each.axis, dwell) for each in outputs for dwell in find_dwells(each)),
         area=within,
-        advantage=over(steady, name) if moves else None,
+        advantage=advantage_over_run(steady, name) if moves else None,
         notes=tuple(notes) if moves else ("it does not move",),
     )
 
 
-def _no_ends(output: Output) -> tuple[str, ...]:
+def _why_no_ends(output: Output) -> tuple[str, ...]:
     """Why an output has no stroke or swing, if it has none."""
-    if not output.moves:
+    if not output.is_moving:
         return ("it does not turn" if output.kind == "angle" else "it does not move",)
-    if output.ends() is not None:
+    if output.turning_extremes() is not None:
         return ()
-    if output.gain:
+    if output.gain_per_period:
         return ("it turns right round, so that it has no ends",)
     return ("where it is least or greatest in the range of the input it does not turn back, so that it has no ends",)
 
 
-def _transmitted(motion: Motion, steady: Steady, name: str) -> tuple[Transmission | None, tuple[str, ...]]:
+def _transmission_or_reason(
+    motion: Motion, steady: InterpolatedRun, name: str
+) -> tuple[Transmission | None, tuple[str, ...]]:
     """The transmission angle, or why there is none of a link joined to the frame."""
-    mechanism, named = motion.mechanism, motions(motion.mechanism)
+    mechanism, named = motion.mechanism, relative_motions(motion.mechanism)
     joined = named[name].links if name in named else (mechanism.frame, name)
     if mechanism.frame not in joined or name in (mechanism.frame, steady.pair):
         return None, ()
@@ -137,5 +139,5 @@ def _transmitted(motion: Motion, steady: Steady, name: str) -> tuple[Transmissio
         return None, (f"no transmission angle: {problem.sentence}",)
 
 
-def _per_unit(motion: Motion, steady: Steady) -> bool:
+def _is_per_unit(motion: Motion, steady: InterpolatedRun) -> bool:
     return not any(given.pair == steady.pair and given.velocity for given in motion.mechanism.inputs)

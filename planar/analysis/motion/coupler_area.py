@@ -6,17 +6,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.analysis.interpolated_run import SAME, Steady
+from planar.analysis.interpolated_run import CLOSED_TOLERANCE, InterpolatedRun
 from planar.foundation.errors import BadInput, NoAnswer
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
 
 Array = np.ndarray
-EXACT = 1e-10
+SUM_TOLERANCE = 1e-10
 """The estimated error, beside the area, at which the sum has come to its end."""
-NOTHING = 1e-14
+ROUND_OFF_RATIO = 1e-14
 """An error below this part of the square of the curve's extent is round-off, however small the area is."""
-MOST = 4096
+MAX_POSITIONS = 4096
 """Positions at the most."""
 
 
@@ -43,66 +43,72 @@ def area(motion: Motion, point: str) -> Area:
     Raises Unknown for another name, BadInput where the curve is not closed.
     """
     motion.point(point)  # refuses what there is not
-    steady = Steady(motion)
+    steady = InterpolatedRun(motion)
     _refuse_open(steady, motion, point)
     sense = 1.0 if steady.positions[-1] > steady.positions[0] else -1.0
     many = len(steady.positions) - 1
-    curve = _sampled(steady, point, many)
+    curve = _sample_curve(steady, point, many)
     extent = float(np.abs(curve - curve.mean()).max())
-    before = _within(curve[::2]) if many % 2 == 0 else np.inf
+    before = _area_within(curve[::2]) if many % 2 == 0 else np.inf
     while True:
-        found = _within(curve)
+        found = _area_within(curve)
         error = abs(found - before)
-        if error <= max(EXACT * abs(found), NOTHING * extent**2) or 2 * many > MOST:
-            nothing = abs(found) <= NOTHING * extent**2  # there and back along one line
+        if error <= max(SUM_TOLERANCE * abs(found), ROUND_OFF_RATIO * extent**2) or 2 * many > MAX_POSITIONS:
+            nothing = abs(found) <= ROUND_OFF_RATIO * extent**2  # there and back along one line
             return Area(point, 0.0 if nothing else sense * found, error, many)
-        curve, before, many = _doubled(steady, point, curve), found, 2 * many
+        curve, before, many = _refine_curve(steady, point, curve), found, 2 * many
 
 
-def _refuse_open(steady: Steady, motion: Motion, point: str) -> None:
+def _refuse_open(steady: InterpolatedRun, motion: Motion, point: str) -> None:
     if steady.closed:
         return
     place, velocity, acceleration = steady.samples.point(point)
-    scales = steady.solver.unit * np.array([1.0, max(abs(steady.rate), SAME), max(steady.rate**2, SAME)])
+    scales = steady.solver.unit * np.array(
+        [1.0, max(abs(steady.rate), CLOSED_TOLERANCE), max(steady.rate**2, CLOSED_TOLERANCE)]
+    )
     gaps = [float(np.hypot(*(part[-1] - part[0]))) for part in (place, velocity, acceleration)]
     turns = steady.period / (2.0 * np.pi)
-    whole = not motion.slides(steady.pair) and round(turns) >= 1 and abs(turns - round(turns)) <= SAME
-    if whole and all(gap <= SAME * scale for gap, scale in zip(gaps, scales, strict=True)):
+    whole = (
+        not motion.has_length_motion(steady.pair)
+        and round(turns) >= 1
+        and abs(turns - round(turns)) <= CLOSED_TOLERANCE
+    )
+    if whole and all(gap <= CLOSED_TOLERANCE * scale for gap, scale in zip(gaps, scales, strict=True)):
         return
     told = f"{point} does not come back to where it started as it moved there, so that no area is within its curve"
     raise BadInput(point, f"{told}; run the input through as many whole turns as it takes")
 
 
-def _sampled(steady: Steady, point: str, many: int) -> Array:
+def _sample_curve(steady: InterpolatedRun, point: str, many: int) -> Array:
     """x + iy at equally spaced positions, without the end."""
-    places = np.linspace(steady.first, steady.last, many + 1)
+    places = np.linspace(steady.lowest, steady.highest, many + 1)
     order = np.argsort(steady.positions, kind="stable")
-    if np.abs(steady.positions[order] - places).max() > 1e-13 * max(steady.period, abs(steady.last)):
-        return _at(steady, point, places[:-1])
+    if np.abs(steady.positions[order] - places).max() > 1e-13 * max(steady.period, abs(steady.highest)):
+        return _points_at(steady, point, places[:-1])
     x, y = steady.samples.point(point).position[order[:-1]].T
     return x + 1j * y
 
 
-def _doubled(steady: Steady, point: str, curve: Array) -> Array:
+def _refine_curve(steady: InterpolatedRun, point: str, curve: Array) -> Array:
     """The same curve at twice as many positions: of a finer run where that is the same motion, else one by one."""
     many = len(curve)
     try:
-        finer = cycle(steady.mechanism, 2 * many, steady.first, steady.last, steady.pair)
+        finer = cycle(steady.mechanism, 2 * many, steady.lowest, steady.highest, steady.pair)
     except NoAnswer:
         finer = None
     if finer is not None and len(finer) == 2 * many + 1:
         x, y = finer.point(point).position[:-1].T
-        if np.abs(x[::2] + 1j * y[::2] - curve).max() <= SAME * steady.solver.unit:
+        if np.abs(x[::2] + 1j * y[::2] - curve).max() <= CLOSED_TOLERANCE * steady.solver.unit:
             return x + 1j * y
-    between = _at(steady, point, steady.first + steady.period * (np.arange(many) + 0.5) / many)
+    between = _points_at(steady, point, steady.lowest + steady.period * (np.arange(many) + 0.5) / many)
     return np.stack([curve, between], axis=1).ravel()
 
 
-def _at(steady: Steady, point: str, places: Array) -> Array:
-    return np.array([complex(*steady.at(float(place)).point(point).position) for place in places])
+def _points_at(steady: InterpolatedRun, point: str, places: Array) -> Array:
+    return np.array([complex(*steady.state_at(float(place)).point(point).position) for place in places])
 
 
-def _within(curve: Array) -> float:
+def _area_within(curve: Array) -> float:
     many = len(curve)
     terms = np.fft.fft(curve) / many
     n = np.fft.fftfreq(many, 1.0 / many)

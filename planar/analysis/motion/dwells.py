@@ -6,15 +6,15 @@ from math import inf, isfinite
 from numbers import Real
 from typing import NamedTuple
 
-from planar.analysis.interpolated_run import Steady
+from planar.analysis.interpolated_run import InterpolatedRun
 from planar.analysis.motion.output import Axis, Extreme, Output
 from planar.foundation.errors import BadInput, NoAnswer
-from planar.foundation.root_finding import root
+from planar.foundation.root_finding import find_root
 from planar.results.motion import Motion
 
-WITHIN = 0.01
+DEFAULT_TOLERANCE = 0.01
 """Of the stroke: an output that stays so near to a value dwells, if nothing else is told."""
-LEAST = 1.0 / 12.0
+DEFAULT_LEAST_TRAVEL = 1.0 / 12.0
 """Of the input's range, 30 degrees of a turn: shorter stretches are no dwells, if nothing else is told."""
 
 
@@ -53,66 +53,66 @@ def dwells(
             continue
         if isinstance(value, bool) or not isinstance(value, Real) or not (isfinite(value) and value >= 0.0):
             raise BadInput(name, f"a number that is not negative (m or rad) is wanted, not {value!r:.40}")
-    return stretches(Output(Steady(motion), of, axis), within, least)
+    return find_dwells(Output(InterpolatedRun(motion), of, axis), within, least)
 
 
-def stretches(output: Output, within: float | None = None, least: float | None = None) -> tuple[Dwell, ...]:
+def find_dwells(output: Output, within: float | None = None, least: float | None = None) -> tuple[Dwell, ...]:
     """See `dwells`; of an output that is made already."""
     low, high = output.range
-    period = output.steady.period
-    within = WITHIN * max(high - low, abs(output.gain)) if within is None else within
-    least = LEAST * period if least is None else least
-    if not output.moves or within <= output.near:
+    period = output.run.period
+    within = DEFAULT_TOLERANCE * max(high - low, abs(output.gain_per_period)) if within is None else within
+    least = DEFAULT_LEAST_TRAVEL * period if least is None else least
+    if not output.is_moving or within <= output.tolerance:
         return ()
-    found = [_about(output, index, within) for index in range(len(output.stations))]
+    found = [_dwell_about(output, index, within) for index in range(len(output.standstills))]
     kept: list[Dwell] = []
     for each in sorted((each for each in found if each is not None), key=lambda each: (-each.travel, each.start)):
-        if each.travel >= least and not any(_overlap(each, other, output) for other in kept):
+        if each.travel >= least and not any(_is_overlapping(each, other, output) for other in kept):
             kept.append(each)
     return tuple(sorted(kept, key=lambda each: each.start))
 
 
-def _about(output: Output, index: int, within: float) -> Dwell | None:
+def _dwell_about(output: Output, index: int, within: float) -> Dwell | None:
     """The stretch about a place where the output stands still; None where it cannot be followed."""
-    at, steady = output.stations[index], output.steady
+    at, steady = output.standstills[index], output.run
     try:
-        start, stop = (_edge(output, index, way, within) for way in (-1, 1))
+        start, stop = (_find_edge(output, index, way, within) for way in (-1, 1))
     except NoAnswer:
         return None
     if stop - start >= steady.period:  # it never leaves
-        start, stop = steady.first, steady.last
-    if steady.closed and start < steady.first:
+        start, stop = steady.lowest, steady.highest
+    if steady.closed and start < steady.lowest:
         start, stop = start + steady.period, stop + steady.period
     travel = stop - start
     return Dwell(output.name, at, within, start, stop, travel, travel / abs(steady.rate))
 
 
-def _edge(output: Output, index: int, way: int, within: float) -> float:
+def _find_edge(output: Output, index: int, direction: int, within: float) -> float:
     """Where the output is off by so much for the first time, one way from a place where it stands still.
 
     Between places where it stands still it goes one way only, so that nothing is missed. Without end it is infinite.
     """
-    stations, steady = output.stations, output.steady
+    stations, steady = output.standstills, output.run
     many, value = len(stations), stations[index].value
     before = stations[index].input
     for step in range(1, many + 1):
-        turns, which = divmod(index + way * step, many)
+        turns, which = divmod(index + direction * step, many)
         if steady.closed:
             place = stations[which].input + turns * steady.period
-            there = stations[which].value + turns * output.gain
+            there = stations[which].value + turns * output.gain_per_period
         elif turns == 0:
             place, there = stations[which]
         else:
-            place, there = output.borders[(way + 1) // 2]
+            place, there = output.range_ends[(direction + 1) // 2]
         if abs(there - value) > within:
             edge = value + within if there > value else value - within
-            return root(lambda at: output.at(at)[0] - edge, *sorted((before, place)))  # noqa: B023 - called at once
+            return find_root(lambda at: output.evaluate(at)[0] - edge, *sorted((before, place)))  # noqa: B023 - called at once
         if turns != 0 and not steady.closed:
             return place
         before = place
-    return way * inf
+    return direction * inf
 
 
-def _overlap(one: Dwell, other: Dwell, output: Output) -> bool:
-    shifts = (-output.steady.period, 0.0, output.steady.period) if output.steady.closed else (0.0,)
+def _is_overlapping(one: Dwell, other: Dwell, output: Output) -> bool:
+    shifts = (-output.run.period, 0.0, output.run.period) if output.run.closed else (0.0,)
     return any(one.start + by < other.stop and other.start < one.stop + by for by in shifts)

@@ -8,21 +8,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.analysis.interpolated_run import SAME, Steady
+from planar.analysis.interpolated_run import CLOSED_TOLERANCE, InterpolatedRun
 from planar.analysis.motion.output import Axis, Extreme, Output
-from planar.analysis.motion.zeros import ROUND_OFF, changes, peaks, summit
+from planar.analysis.motion.zeros import SERIES_TOLERANCE, bracket_maxima, bracket_zeros, find_maximum
 from planar.foundation.errors import BadInput, NoAnswer
-from planar.foundation.root_finding import root
-from planar.model.mechanism import motions
-from planar.model.pairs import Kind
-from planar.results.motion import Motion, Moving, State
+from planar.foundation.root_finding import find_root
+from planar.model.mechanism import relative_motions
+from planar.model.pairs import MeasureKind
+from planar.results.motion import KinematicResult, Motion, State
 
 Array = np.ndarray
-Measure = Callable[[State], float | Array]
+StateMeasure = Callable[[State], float | Array]
 
-RIVAL = 0.5
+RIVAL_RATIO = 0.5
 """Local maxima of the samples less than this part of the greatest are not looked into."""
-CLOSER, GROWTH = 5.0, 0.6
+NEARER_RATIO, GROWTH_EXPONENT = 5.0, 0.6
 """So many times nearer to a limit, the square of what grows there as the root of the distance, or faster, grows by more
 than this power of it."""
 
@@ -71,16 +71,16 @@ def stroke(motion: Motion, pair: str) -> Stroke | None:
     slide does not move, or where the relative motion at the pair is no length. Raises Unknown for another name.
     """
     motion.pair(pair)  # refuses what there is not
-    return ends(Steady(motion), pair) if motion.slides(pair) else None
+    return find_stroke(InterpolatedRun(motion), pair) if motion.has_length_motion(pair) else None
 
 
-def ends(steady: Steady, pair: str) -> Stroke | None:
+def find_stroke(steady: InterpolatedRun, pair: str) -> Stroke | None:
     """See `stroke`; of a motion made ready for it."""
-    found = Output(steady, pair).ends()
+    found = Output(steady, pair).turning_extremes()
     if found is None:
         return None
     low, high = found
-    top, bottom = (high, low) if _farther(steady, pair, high, low) else (low, high)
+    top, bottom = (high, low) if _is_top(steady, pair, high, low) else (low, high)
     return Stroke(pair, top, bottom, high.value - low.value)
 
 
@@ -91,9 +91,9 @@ def swing(motion: Motion, name: str) -> Swing | None:
     does not turn, where it is most at an end of the input's range and does not turn back there, and of a slide. Raises
     Unknown for another name.
     """
-    if name in motions(motion.mechanism) and motion.slides(name):
+    if name in relative_motions(motion.mechanism) and motion.has_length_motion(name):
         return None
-    found = Output(Steady(motion), name).ends()
+    found = Output(InterpolatedRun(motion), name).turning_extremes()
     return found and Swing(name, *found, found[1].value - found[0].value)
 
 
@@ -103,22 +103,22 @@ def extremes(motion: Motion, point: str, axis: Axis = "x") -> Extremes:
     Over a range that is not closed they may be at its ends. Of places that are alike the first in the range is told.
     Raises Unknown for another name, BadInput for another axis.
     """
-    return spread(Output(Steady(motion), point, axis))
+    return find_extremes(Output(InterpolatedRun(motion), point, axis))
 
 
-def spread(output: Output) -> Extremes:
+def find_extremes(output: Output) -> Extremes:
     """See `extremes`; of an output that is made already."""
-    turns = output.turns
-    candidates = [(each, True) for each in turns] + [(each, False) for each in output.borders]
+    turns = output.turning_points
+    candidates = [(each, True) for each in turns] + [(each, False) for each in output.range_ends]
     least, greatest = (
-        min((each for each in candidates if abs(each[0].value - end) <= output.near), key=lambda each: not each[1])
+        min((each for each in candidates if abs(each[0].value - end) <= output.tolerance), key=lambda each: not each[1])
         for end in output.range
     )
     length = greatest[0].value - least[0].value
     return Extremes(output.name, output.axis, least[0], greatest[0], length, (least[1], greatest[1]))
 
 
-def greatest(motion: Motion, of: str | Measure, what: str = "velocity") -> Extreme:
+def greatest(motion: Motion, of: str | StateMeasure, what: str = "velocity") -> Extreme:
     """Where in a run a slide, a point or anything else is fastest, and how fast, solved for.
 
     `of` is a slide, else a point, else another pair, whose relative motion is meant, else a link, which turns; `what`
@@ -134,51 +134,57 @@ def greatest(motion: Motion, of: str | Measure, what: str = "velocity") -> Extre
     the range it is inf, there; where no rates are determined anywhere it is NaN. Raises Unknown where there is nothing
     of that name, BadInput for another `what`.
     """
-    return fastest(Steady(motion), of, what)
+    return find_greatest(InterpolatedRun(motion), of, what)
 
 
-def fastest(steady: Steady, of: str | Output | Measure, what: str = "velocity") -> Extreme:
+def find_greatest(steady: InterpolatedRun, of: str | Output | StateMeasure, what: str = "velocity") -> Extreme:
     """See `greatest`; of a motion made ready for it, or of an output of it."""
     if what not in ("velocity", "acceleration"):
         raise BadInput("what", f"the greatest 'velocity' or 'acceleration' is found, not {what!r:.40}")
 
-    def measured(moving: Moving) -> Array:
+    def measured(moving: KinematicResult) -> Array:
         """The square of the quantity, and of a velocity what its square grows by (..., 2)."""
         if not isinstance(of, str | Output):
             if isinstance(moving, Motion):
-                return np.stack([_or_nothing(measured, steady, at) if ok else np.zeros(2) for at, ok in rows])
+                return np.stack([_measure_or_zero(measured, steady, at) if ok else np.zeros(2) for at, ok in rows])
             return np.array([float(np.sum(np.square(of(moving)))), 0.0])
-        parts = rates(moving, of)
+        parts = quantity_and_rates(moving, of)
         square = np.sum(parts[1 if what == "velocity" else 2] ** 2, axis=-1)
         # its rate in time, turned into one along the input
         return np.stack([square, np.sum(parts[1] * parts[2], axis=-1) / steady.rate], axis=-1)
 
     def square(position: float) -> float:
-        return float(measured(steady.at(position))[0])
+        return float(measured(steady.state_at(position))[0])
 
-    rows = list(zip(steady.positions.tolist(), steady.known, strict=True))
-    positions, table = steady.tabled(measured)
+    rows = list(zip(steady.positions.tolist(), steady.has_rates, strict=True))
+    positions, table = steady.tabulate(measured)
     if not len(positions):
-        return Extreme(steady.first, nan)
+        return Extreme(steady.lowest, nan)
     squares = table[:, 0]
     still = steady.solver.unit * max(abs(steady.rate), steady.rate**2) if isinstance(of, str | Output) else 0.0
-    if np.ptp(squares) <= max(ROUND_OFF * squares.max(), (ROUND_OFF * still) ** 2):
-        return Extreme(steady.first, sqrt(float(squares.max())))
-    for limit, _ in steady.limited():
-        if _grows(positions, squares, limit):
+    if np.ptp(squares) <= max(SERIES_TOLERANCE * squares.max(), (SERIES_TOLERANCE * still) ** 2):
+        return Extreme(steady.lowest, sqrt(float(squares.max())))
+    for limit, _ in steady.open_limits():
+        if _is_unbounded(positions, squares, limit):
             return Extreme(limit, inf)
     rival = float(squares.max())
-    worth = RIVAL**2 * rival
-    ends = () if steady.closed else (steady.first, steady.last)
+    worth = RIVAL_RATIO**2 * rival
+    ends = () if steady.closed else (steady.lowest, steady.highest)
     found = [Extreme(end, float(squares[np.argmin(np.abs(positions - end))])) for end in ends]
     exact = isinstance(of, str | Output) and what == "velocity"
-    for low, high in changes(positions, table[:, 1], falling=True) if exact else peaks(positions, squares):
+    for low, high in (
+        bracket_zeros(positions, table[:, 1], falling=True) if exact else bracket_maxima(positions, squares)
+    ):
         around = squares[(positions >= low) & (positions <= high)]
         if around.max() < (worth if exact else max(worth, rival - np.ptp(around))):
             continue  # a top is less above its samples than these are apart
         try:
-            at = root(lambda at: float(measured(steady.at(at))[1]), low, high) if exact else summit(square, low, high)
-            place, value = steady.within(at), square(at)
+            at = (
+                find_root(lambda at: float(measured(steady.state_at(at))[1]), low, high)
+                if exact
+                else find_maximum(square, low, high)
+            )
+            place, value = steady.wrap_position(at), square(at)
         except NoAnswer:
             continue  # the motion branches there
         if place is not None:
@@ -186,58 +192,60 @@ def fastest(steady: Steady, of: str | Output | Measure, what: str = "velocity") 
     if not found:
         found.append(Extreme(float(positions[np.argmax(squares)]), float(squares.max())))
     best = max(each.value for each in found)
-    at, value = _first(found, best, ROUND_OFF * best)
+    at, value = _first_of_value(found, best, SERIES_TOLERANCE * best)
     return Extreme(at, sqrt(value))
 
 
-def _or_nothing(measured: Callable[[State], Array], steady: Steady, position: float) -> Array:
+def _measure_or_zero(measured: Callable[[State], Array], steady: InterpolatedRun, position: float) -> Array:
     """What is measured at a position, or nothing where the motion branches."""
     try:
-        return measured(steady.at(position))
+        return measured(steady.state_at(position))
     except NoAnswer:
         return np.zeros(2)
 
 
-def rates(moving: Moving, name: str | Output) -> tuple[Array, Array, Array]:
+def quantity_and_rates(moving: KinematicResult, name: str | Output) -> tuple[Array, Array, Array]:
     """Position, velocity and acceleration (..., axes) of a slide, else of a point, another pair or a link."""
     if isinstance(name, Output):
-        position, velocity, acceleration = (each[..., None] for each in np.broadcast_arrays(*name.of(moving)))
+        position, velocity, acceleration = (
+            each[..., None] for each in np.broadcast_arrays(*name.value_and_rates(moving))
+        )
         return position, velocity, acceleration
-    named = motions(moving.mechanism)
-    slides = name in named and named[name].drive_kind is Kind.LENGTH
+    named = relative_motions(moving.mechanism)
+    slides = name in named and named[name].input_kind is MeasureKind.LENGTH
     if slides or (name not in moving._point_names and (name in named or name in moving.frames)):
-        parts = _motion_at(moving, name) if name in named else moving.link(name)[:3]
+        parts = _pair_motion(moving, name) if name in named else moving.link(name)[:3]
         position, velocity, acceleration = (np.asarray(part)[..., None] for part in parts)
         return position, velocity, acceleration
     return moving.point(name)[:3]
 
 
-def _motion_at(moving: Moving, pair: str) -> tuple[Array, Array, Array]:
+def _pair_motion(moving: KinematicResult, pair: str) -> tuple[Array, Array, Array]:
     """Position, velocity and acceleration of the relative motion at a pair: what every pair reports first."""
     position, velocity, acceleration = list(moving.pair(pair).values())[:3]
     return position, velocity, acceleration
 
 
-def _first(found: list[Extreme], value: float, near: float) -> Extreme:
+def _first_of_value(found: list[Extreme], value: float, near: float) -> Extreme:
     """The first in the range of those that have this value."""
     return min(each for each in found if abs(each.value - value) <= near)
 
 
-def _farther(steady: Steady, pair: str, high: Extreme, low: Extreme) -> bool:
+def _is_top(steady: InterpolatedRun, pair: str, high: Extreme, low: Extreme) -> bool:
     """Whether the sliding point is farther from the driving crank's pin at the end of greater displacement."""
-    rides = steady.solver.named[pair].rides()
+    rides = steady.solver.relative_motions[pair].point_on_line()
     if steady.pin is None or rides is None:
         return True
     slider = "{}.{}".format(*rides[0])
     far, near = (
         float(np.hypot(*(state.point(slider).position - state.point(steady.pin).position)))
-        for state in (steady.at(high.input), steady.at(low.input))
+        for state in (steady.state_at(high.input), steady.state_at(low.input))
     )
-    return far >= near - SAME * steady.solver.unit
+    return far >= near - CLOSED_TOLERANCE * steady.solver.unit
 
 
-def _grows(positions: Array, squares: Array, limit: float) -> bool:
+def _is_unbounded(positions: Array, squares: Array, limit: float) -> bool:
     """Whether a quantity grows beyond all bounds towards a limit, by the two states that are nearest to it."""
     near, nearer = np.argsort(np.abs(positions - limit))[1::-1]
     times = abs((positions[near] - limit) / (positions[nearer] - limit))
-    return times > CLOSER and squares[nearer] > times**GROWTH * squares[near]
+    return times > NEARER_RATIO and squares[nearer] > times**GROWTH_EXPONENT * squares[near]

@@ -7,22 +7,22 @@ from math import pi
 
 import numpy as np
 
-from planar.analysis.interpolated_run import Steady
-from planar.analysis.motion.extremes import Extreme, Stroke, ends
-from planar.equations.functions import shapes, size
+from planar.analysis.interpolated_run import InterpolatedRun
+from planar.analysis.motion.extremes import Extreme, Stroke, find_stroke
+from planar.equations.functions import mechanism_size, shapes_of_links
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
-from planar.model.mechanism import Drive, Mechanism, motions, with_inputs
-from planar.model.pairs import Kind
-from planar.results.motion import Array, Motion, Unknown
+from planar.model.mechanism import Drive, Mechanism, relative_motions, replace_inputs
+from planar.model.pairs import MeasureKind
+from planar.results.motion import Array, Motion, UnknownName
 from planar.solving.cycle import cycle
 
-FEWEST, MOST = 64, 4096
+MIN_SAMPLES, MAX_SAMPLES = 64, 4096
 """Positions of a turn: doubled from the first until harmonics come to their end, up to the last."""
 ROUND_OFF = 16.0 * float(np.finfo(float).eps)
 """Of a position, in sizes of the mechanism or rad: harmonics that are less are noise."""
-SAME = 1e-9
+CLOSED_TOLERANCE = 1e-9
 """What is the same within this part of its greatest is the same."""
-ANGLES = 4096
+COMPARISON_ANGLES = 4096
 """Of a turn, at which a shortened series is held against the whole one."""
 
 
@@ -72,30 +72,30 @@ class Harmonics:
 
     def displacement(self, theta: float | Array, terms: int | None = None) -> Array:
         """The series at theta (rad), any shape, or its first `terms` harmonics (m or rad)."""
-        return self.mean + self._sum(theta, 0, terms)
+        return self.mean + self._evaluate(theta, 0, terms)
 
     def velocity(self, theta: float | Array, rate: float, terms: int | None = None) -> Array:
         """Its rate (m/s or rad/s) where theta goes at `rate` (rad/s)."""
-        return rate * self._sum(theta, 1, terms)
+        return rate * self._evaluate(theta, 1, terms)
 
     def acceleration(
         self, theta: float | Array, rate: float, terms: int | None = None, angular_acceleration: float = 0.0
     ) -> Array:
         """Its second rate (m/s^2 or rad/s^2) where theta goes at `rate` (rad/s) and speeds up so (rad/s^2)."""
-        found = rate**2 * self._sum(theta, 2, terms)
-        return found + angular_acceleration * self._sum(theta, 1, terms) if angular_acceleration else found
+        found = rate**2 * self._evaluate(theta, 2, terms)
+        return found + angular_acceleration * self._evaluate(theta, 1, terms) if angular_acceleration else found
 
     def truncation(self, terms: int, order: int = 0) -> Extreme:
         """How far the first `terms` harmonics are from all at the most, and where, over a turn.
 
         Of the displacement (order 0), or of its first or second derivative with respect to theta.
         """
-        theta = np.linspace(0.0, 2.0 * pi, ANGLES, endpoint=False)
-        off = np.abs(self._sum(theta, order, None) - self._sum(theta, order, terms))
+        theta = np.linspace(0.0, 2.0 * pi, COMPARISON_ANGLES, endpoint=False)
+        off = np.abs(self._evaluate(theta, order, None) - self._evaluate(theta, order, terms))
         worst = int(np.argmax(off))
         return Extreme(float(theta[worst]), float(off[worst]))
 
-    def _sum(self, theta: float | Array, order: int, terms: int | None) -> Array:
+    def _evaluate(self, theta: float | Array, order: int, terms: int | None) -> Array:
         """The derivative of an order of the harmonics with respect to theta."""
         theta = np.asarray(theta, dtype=float)
         n = np.arange(1, len(self.cosines) + 1)[:terms]
@@ -118,22 +118,22 @@ def harmonics(mechanism: Mechanism, of: str, axis: str | None = None, pair: str 
     Raises BadInput where there is nothing of that name, the input is a slide, or the motion does not repeat with every
     turn of it (wheels may need several); NoAnswer where the input makes no full turn.
     """
-    steady, running = _steady(mechanism, pair)
-    samples, motion = FEWEST, _turn(steady, FEWEST, running)
-    kind = _kind(motion, of, axis)
-    unit = size(mechanism, shapes(mechanism)) if kind == "length" else 1.0
+    steady, running = _at_steady_rate(mechanism, pair)
+    samples, motion = MIN_SAMPLES, _run_full_turn(steady, MIN_SAMPLES, running)
+    kind = _quantity_kind(motion, of, axis)
+    unit = mechanism_size(mechanism, shapes_of_links(mechanism)) if kind == "length" else 1.0
     while True:
-        values, turns = _periodic(motion, of, axis, running, kind)
+        values, turns = _periodic_values(motion, of, axis, running, kind)
         noise = ROUND_OFF * max(unit, float(np.abs(values).max()))
-        mean, cosines, sines = _series(values, float(motion.inputs[running].position[0]))
+        mean, cosines, sines = _fourier_series(values, float(motion.inputs[running].position[0]))
         amplitudes = np.hypot(cosines, sines)
         rest = float(amplitudes[-samples // 8 :].max())
-        if rest <= noise or samples >= MOST:
+        if rest <= noise or samples >= MAX_SAMPLES:
             break
         samples *= 2
-        motion = _turn(steady, samples, running)
+        motion = _run_full_turn(steady, samples, running)
     kept = max(int(np.flatnonzero(amplitudes > noise)[-1]) + 1 if (amplitudes > noise).any() else 1, 1)
-    slide = axis is None and of in motions(mechanism) and kind == "length"
+    slide = axis is None and of in relative_motions(mechanism) and kind == "length"
     return Harmonics(
         mechanism=mechanism.name,
         of=of,
@@ -146,20 +146,20 @@ def harmonics(mechanism: Mechanism, of: str, axis: str | None = None, pair: str 
         sines=sines[:kept],
         positions=samples,
         rest=rest,
-        stroke=ends(Steady(motion), of) if slide else None,
+        stroke=find_stroke(InterpolatedRun(motion), of) if slide else None,
     )
 
 
-def turning(mechanism: Mechanism, pair: str | None = None, steps: int = 360) -> Motion:
+def full_turn(mechanism: Mechanism, pair: str | None = None, steps: int = 360) -> Motion:
     """A full turn of an input from the file's position, at the file's steady rate, or 1 rad/s where that is zero.
 
     Raises BadInput, NoAnswer as `harmonics` does.
     """
-    steady, running = _steady(mechanism, pair, unit_rate=False)
-    return _turn(steady, steps, running)
+    steady, running = _at_steady_rate(mechanism, pair, unit_rate=False)
+    return _run_full_turn(steady, steps, running)
 
 
-def _steady(mechanism: Mechanism, pair: str | None, unit_rate: bool = True) -> tuple[Mechanism, str]:
+def _at_steady_rate(mechanism: Mechanism, pair: str | None, unit_rate: bool = True) -> tuple[Mechanism, str]:
     """The mechanism with the input that turns at a steady rate, and the name of that input."""
     names = [given.pair for given in mechanism.inputs]
     if not names:
@@ -169,14 +169,14 @@ def _steady(mechanism: Mechanism, pair: str | None, unit_rate: bool = True) -> t
     running = names[0] if pair is None else pair
     if running not in names:
         raise BadInput(running, f"there is no input at {running!r}; inputs are at {', '.join(names)}")
-    if motions(mechanism)[running].drive_kind is Kind.LENGTH:
+    if relative_motions(mechanism)[running].input_kind is MeasureKind.LENGTH:
         raise BadInput(running, f"harmonics are of the turns of a crank, and the input at {running!r} slides")
     given = mechanism.inputs[names.index(running)]
     rate = 1.0 if unit_rate else given.velocity or 1.0
-    return with_inputs(mechanism, (Drive(running, None, rate, 0.0),)), running
+    return replace_inputs(mechanism, (Drive(running, None, rate, 0.0),)), running
 
 
-def _turn(mechanism: Mechanism, steps: int, pair: str) -> Motion:
+def _run_full_turn(mechanism: Mechanism, steps: int, pair: str) -> Motion:
     """A full turn on from the file's position."""
     start = next(given.position for given in mechanism.inputs if given.pair == pair)
     motion = cycle(mechanism, steps, start, start + 2.0 * pi, pair)
@@ -187,7 +187,7 @@ def _turn(mechanism: Mechanism, steps: int, pair: str) -> Motion:
     return motion
 
 
-def _kind(motion: Motion, of: str, axis: str | None) -> str:
+def _quantity_kind(motion: Motion, of: str, axis: str | None) -> str:
     """What the motion is measured in. Raises BadInput where there is none of that name."""
     mechanism = motion.mechanism
     if axis is not None:
@@ -195,12 +195,12 @@ def _kind(motion: Motion, of: str, axis: str | None) -> str:
             raise BadInput("axis", f"the axis is 'x' or 'y', not {axis!r:.40}")
         try:
             motion.point(of)
-        except Unknown as problem:
+        except UnknownName as problem:
             raise BadInput(of, str(problem)) from None
         return "length"
-    named = motions(mechanism)
+    named = relative_motions(mechanism)
     if of in named:
-        return "length" if named[of].drive_kind is Kind.LENGTH else "angle"
+        return "length" if named[of].input_kind is MeasureKind.LENGTH else "angle"
     if of in motion.frames:
         return "angle"
     if of in motion.point_names:
@@ -209,33 +209,35 @@ def _kind(motion: Motion, of: str, axis: str | None) -> str:
     raise BadInput(of, f"there is no pair and no link {of!r}; {told}")
 
 
-def _parts(motion: Motion, of: str, axis: str | None) -> list[Array]:
+def _value_and_rates(motion: Motion, of: str, axis: str | None) -> list[Array]:
     """Position, velocity and acceleration of what is asked for, each (n,)."""
     if axis is not None:
         return [part[:, "xy".index(axis)] for part in motion.point(of)]
-    if of in motions(motion.mechanism):
+    if of in relative_motions(motion.mechanism):
         return [np.asarray(part) for part in list(motion.pair(of).values())[:3]]
     return list(motion.link(of))
 
 
-def _periodic(motion: Motion, of: str, axis: str | None, pair: str, kind: str) -> tuple[Array, int]:
+def _periodic_values(motion: Motion, of: str, axis: str | None, pair: str, kind: str) -> tuple[Array, int]:
     """One turn of what is asked for, without its end, beyond whole turns of it.
 
     Closed is what comes back with the same position, velocity and acceleration. Raises BadInput where it is not.
     """
-    value, *rates = _parts(motion, of, axis)
+    value, *rates = _value_and_rates(motion, of, axis)
     gap = float(value[-1] - value[0])
     turns = round(gap / (2.0 * pi)) if kind == "angle" else 0
     gaps = [abs(gap - turns * 2.0 * pi), *(abs(float(rate[-1] - rate[0])) for rate in rates)]
-    unit = size(motion.mechanism, motion.shapes) if kind == "length" else 1.0
+    unit = mechanism_size(motion.mechanism, motion.shapes) if kind == "length" else 1.0
     scales = [unit, *(max(unit, float(np.abs(rate).max())) for rate in rates)]
-    if not all(gap <= SAME * scale for gap, scale in zip(gaps, scales, strict=True)):  # a rate that is not there, too
+    if not all(
+        gap <= CLOSED_TOLERANCE * scale for gap, scale in zip(gaps, scales, strict=True)
+    ):  # a rate that is not there, too
         told = f"after a turn of {pair!r} it is not where it was, so that its motion has no harmonics of one turn"
         raise BadInput(of, told)
     return (value - turns * motion.inputs[pair].position)[:-1], turns
 
 
-def _series(values: Array, start: float) -> tuple[float, Array, Array]:
+def _fourier_series(values: Array, start: float) -> tuple[float, Array, Array]:
     """The mean, cosines and sines of equally spaced values of a turn that begins at an angle."""
     many = len(values)
     mean = float(values.mean())

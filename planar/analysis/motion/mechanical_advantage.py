@@ -11,17 +11,17 @@ import numpy as np
 
 from planar.analysis.centres.centres import Centres, centres, extent
 from planar.analysis.centres.velocities import LinkByCentres, links_by_centres
-from planar.analysis.rate_equations import Rate, Rates, rates
-from planar.dynamics.virtual_velocities import alone, slides
+from planar.analysis.rate_equations import Rate, RateEquations, rate_equations
+from planar.dynamics.virtual_velocities import has_length_motion, unit_rate_state
 from planar.foundation.errors import BadInput, NoAnswer
-from planar.model.mechanism import Input, motions
-from planar.model.wording import STILL, listed
-from planar.results.motion import State, Unknown
+from planar.model.mechanism import Input, relative_motions
+from planar.model.wording import REST_TOLERANCE, join_all_names
+from planar.results.motion import State, UnknownName
 
 Array = np.ndarray
-THIN = 1e-3
+LEAST_SEPARATION = 1e-3
 """Centres that lie closer together than this, homogeneous and of length one, tell the line through them badly."""
-Motion = Callable[[str], Array]
+PoleOfLink = Callable[[str], Array]
 """Of a link by name: w times its pole (x, y, 1) against the frame, (3,), rad/s and m."""
 
 
@@ -51,7 +51,7 @@ def advantage(state: State, output: str, input: str | None = None) -> Advantage:
     With the input alone moving at unit rate; `input` may be left out where there is one. Raises Unknown where there is
     no such output or input, BadInput where an input has to be named, NoAnswer where none can move alone.
     """
-    return _Advantages(state, _driven(state, input)).of(output)
+    return _AdvantagesOverInput(state, _choose_input(state, input)).advantage_of(output)
 
 
 def advantages(state: State, outputs: Sequence[str] | None = None) -> dict[str, dict[str, Advantage]]:
@@ -62,17 +62,17 @@ def advantages(state: State, outputs: Sequence[str] | None = None) -> dict[str, 
     if outputs is None:
         named = (name for load in state.mechanism.loads for name in (load.point, load.link))
         outputs = [name for name in named if name is not None]
-    ways = [_Advantages(state, given.pair) for given in state.mechanism.inputs] if outputs else []
-    return {output: {each.input: each.of(output) for each in ways} for output in dict.fromkeys(outputs)}
+    ways = [_AdvantagesOverInput(state, given.pair) for given in state.mechanism.inputs] if outputs else []
+    return {output: {each.input: each.advantage_of(output) for each in ways} for output in dict.fromkeys(outputs)}
 
 
-class _Advantages:
+class _AdvantagesOverInput:
     """Those over one input."""
 
     def __init__(self, state: State, name: str):
         self.input = name
-        self.state = alone(state, name)
-        self.force = slides(state.mechanism, name)
+        self.state = unit_rate_state(state, name)
+        self.is_sliding = has_length_motion(state.mechanism, name)
         self.middle, self.size = extent(state)
         points, links = self.state.points.values(), self.state.links.values()
         fastest = max((float(np.hypot(*each.velocity)) for each in points), default=0.0)
@@ -80,22 +80,22 @@ class _Advantages:
         self.greatest = max(fastest / self.size, turning)
 
     @cached_property
-    def found(self) -> tuple[Centres, Mapping[str, LinkByCentres]]:
+    def centres_and_poles(self) -> tuple[Centres, Mapping[str, LinkByCentres]]:
         """The centres, and the motion of every link by them. Raises NoAnswer."""
         everything = centres(self.state)
         return everything, links_by_centres(everything)
 
-    def of(self, output: str) -> Advantage:
+    def advantage_of(self, output: str) -> Advantage:
         """The advantage of an output."""
-        rate, length, links, read = self._output(output)
-        measure = {(True, False): "1/m", (False, True): "m"}.get((length, self.force), "1")
-        if abs(rate) <= STILL * self.greatest * (self.size if length else 1.0):
+        rate, length, links, read = self._output_rate(output)
+        measure = {(True, False): "1/m", (False, True): "m"}.get((length, self.is_sliding), "1")
+        if abs(rate) <= REST_TOLERANCE * self.greatest * (self.size if length else 1.0):
             what = "force" if length else "torque"
             told = f"{output} is at rest here however {self.input} moves, so that no {what} at it is too great"
             return Advantage(output, self.input, None, None, measure, (), told)
         by_power = 1.0 / rate
         try:
-            other, through = self._by_centres(links, read)
+            other, through = self._rate_by_centres(links, read)
         except NoAnswer as problem:
             return Advantage(output, self.input, by_power, None, measure, (), f"not by centres: {problem.reason}")
         if other == 0.0:
@@ -103,58 +103,65 @@ class _Advantages:
             return Advantage(output, self.input, by_power, None, measure, through, told)
         return Advantage(output, self.input, by_power, 1.0 / other, measure, through, "")
 
-    def _output(self, name: str) -> tuple[float, bool, tuple[str, ...], Callable[[Motion], float]]:
+    def _output_rate(self, name: str) -> tuple[float, bool, tuple[str, ...], Callable[[PoleOfLink], float]]:
         """An output's rate, whether it is of a length, the links it is read from, and how from their motions."""
         state, frame = self.state, self.state.mechanism.frame
         if name in state._point_names:
             place, velocity, *_ = state.point(name)
             speed = float(np.hypot(*velocity))
-            carrying = [link for link, _ in state._named(name).members]
+            carrying = [link for link, _ in state._find_point(name).members]
             link = frame if frame in carrying else carrying[0]
-            return speed, True, (link,), lambda motion: float(np.hypot(*_carried(motion(link), place)))
+            return speed, True, (link,), lambda motion: float(np.hypot(*_point_velocity(motion(link), place)))
         if name in state.frames:
             turns = state.link(name).angular_velocity
             return turns, False, (name,), lambda motion: float(motion(name)[2])
-        named = motions(state.mechanism)
+        named = relative_motions(state.mechanism)
         if name in named:
             pair = named[name]
             watched = replace(state, mechanism=replace(state.mechanism, inputs=(Input(name, 0.0),)))
-            found = rates(watched)
-            slopes = next(tie for tie in found.ties if tie.given).slopes
+            found = rate_equations(watched)
+            slopes = next(tie for tie in found.equations if tie.is_input).coefficients
             rate = sum(slope * found.value(each) for each, slope in slopes.items())
-            links = tuple(dict.fromkeys((*pair.links, *(each.owner for each in slopes if each.turns))))
-            return rate, slides(state.mechanism, name), links, lambda motion: _read(found, slopes, motion)
-        raise Unknown(
+            links = tuple(dict.fromkeys((*pair.links, *(each.owner for each in slopes if each.is_angular))))
+            return (
+                rate,
+                has_length_motion(state.mechanism, name),
+                links,
+                lambda motion: _pair_rate(found, slopes, motion),
+            )
+        raise UnknownName(
             f"there is no point, link or pair {name!r}; points are {', '.join(state.point_names)}, "
             f"links {', '.join(state.frames)}, pairs {', '.join(named)}"
         )
 
-    def _by_centres(self, links: tuple[str, ...], read: Callable[[Motion], float]) -> tuple[float, tuple[str, ...]]:
+    def _rate_by_centres(
+        self, links: tuple[str, ...], read: Callable[[PoleOfLink], float]
+    ) -> tuple[float, tuple[str, ...]]:
         """An output's rate by centres, and the names of those that it was read from."""
         frame = self.state.mechanism.frame
-        found = {link: self._across(link) for link in links if link != frame}
+        found = {link: self._pole_from_driven_link(link) for link in links if link != frame}
         through = dict.fromkeys(name for each in found.values() for name in each.by)
         at_rest = np.zeros(3)
         return read(lambda link: found[link].motion if link in found else at_rest), tuple(through)
 
-    def _across(self, link: str) -> LinkByCentres:
+    def _pole_from_driven_link(self, link: str) -> LinkByCentres:
         """A link's motion from that of the link which the input drives against the frame, at once where that tells.
 
         Of links i and o against the frame f, w_o / w_i = |I_if I_io| / |I_of I_io| with its sign; in homogeneous
         coordinates m_o x I_io = m_i x I_io with m_o along I_of, so that centres at infinity are no special case.
         Else from link to link, each time through the best conditioned three centres.
         """
-        everything, by_centres = self.found
+        everything, by_centres = self.centres_and_poles
         frame = self.state.mechanism.frame
-        ends = motions(self.state.mechanism)[self.input].links
+        ends = relative_motions(self.state.mechanism)[self.input].links
         driven = next((end for end in ends if frame in ends and end != frame), None)
         if driven is None or link == driven:
             return by_centres[link]
-        own, between = (self._scaled(everything[link, end].homogeneous) for end in (frame, driven))
+        own, between = (self._scale_point(everything[link, end].homogeneous) for end in (frame, driven))
         if own is None or between is None:
             return by_centres[link]
         line = np.cross(own, between)
-        if float(np.linalg.norm(line)) <= THIN:
+        if float(np.linalg.norm(line)) <= LEAST_SEPARATION:
             return by_centres[link]
         x, y, w = by_centres[driven].motion
         known = np.cross([(x - w * self.middle[0]) / self.size, (y - w * self.middle[1]) / self.size, w], between)
@@ -163,7 +170,7 @@ class _Advantages:
         by = tuple(everything[two].name for two in ((driven, frame), (driven, link), (link, frame)))
         return LinkByCentres(motion, by)
 
-    def _scaled(self, at: Array | None) -> Array | None:
+    def _scale_point(self, at: Array | None) -> Array | None:
         """A homogeneous point (3,) in lengths of the mechanism's size about its middle, of length one."""
         if at is None:
             return None
@@ -172,33 +179,33 @@ class _Advantages:
         return found / np.linalg.norm(found)
 
 
-def _driven(state: State, name: str | None) -> str:
+def _choose_input(state: State, name: str | None) -> str:
     """The input that is meant."""
     names = [given.pair for given in state.mechanism.inputs]
     if name is None and len(names) == 1:
         return names[0]
     if name is None:
-        raise BadInput("input", f"an advantage is over one input; name it: the inputs are at {listed(names)}")
+        raise BadInput("input", f"an advantage is over one input; name it: the inputs are at {join_all_names(names)}")
     if name not in names:
-        raise Unknown(f"there is no input at {name!r}; the inputs are at {listed(names)}")
+        raise UnknownName(f"there is no input at {name!r}; the inputs are at {join_all_names(names)}")
     return name
 
 
-def _carried(motion: Array, place: Array) -> Array:
+def _point_velocity(motion: Array, place: Array) -> Array:
     """The velocity (2,) (m/s) of a place (2,) (m) of a link."""
     x, y, turns = motion
     return np.array([y - turns * place[1], turns * place[0] - x])
 
 
-def _read(found: Rates, slopes: Mapping[Rate, float], motion: Motion) -> float:
+def _pair_rate(found: RateEquations, slopes: Mapping[Rate, float], motion: PoleOfLink) -> float:
     """A pair's rate from the motions of its links: from how they turn, and from how the one slides on the other."""
-    rate = sum(slope * float(motion(each.owner)[2]) for each, slope in slopes.items() if each.turns)
-    own = {each: slope for each, slope in slopes.items() if not each.turns}
+    rate = sum(slope * float(motion(each.owner)[2]) for each, slope in slopes.items() if each.is_angular)
+    own = {each: slope for each, slope in slopes.items() if not each.is_angular}
     for slide in found.slides:
         if own.keys().isdisjoint(slide.rates):
             continue
-        place = found.at(slide.rider, slide.point)
-        apart = _carried(motion(slide.rider), place) - _carried(motion(slide.guide), place)
-        along = np.linalg.lstsq(np.stack(slide.ways, axis=1), apart, rcond=None)[0]
+        place = found.point_position(slide.rider, slide.point)
+        apart = _point_velocity(motion(slide.rider), place) - _point_velocity(motion(slide.guide), place)
+        along = np.linalg.lstsq(np.stack(slide.directions, axis=1), apart, rcond=None)[0]
         rate += sum(own.get(each, 0.0) * float(part) for each, part in zip(slide.rates, along, strict=True))
     return rate

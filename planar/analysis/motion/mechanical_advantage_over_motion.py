@@ -7,14 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.analysis.interpolated_run import Steady
-from planar.analysis.motion.extremes import fastest, rates
+from planar.analysis.interpolated_run import InterpolatedRun
+from planar.analysis.motion.extremes import find_greatest, quantity_and_rates
 from planar.analysis.motion.output import Extreme, Output
-from planar.analysis.motion.zeros import changes
+from planar.analysis.motion.zeros import bracket_zeros
 from planar.foundation.errors import NoAnswer
-from planar.foundation.root_finding import root
-from planar.model.wording import STILL
-from planar.results.motion import Motion, Moving
+from planar.foundation.root_finding import find_root
+from planar.model.wording import REST_TOLERANCE
+from planar.results.motion import KinematicResult, Motion
 
 Array = np.ndarray
 
@@ -43,53 +43,58 @@ def advantage_over(motion: Motion, output: str) -> AdvantageOver:
     Over the input that runs; `planar.advantage` tells that of one position by two ways. Raises Unknown for another
     name.
     """
-    return over(Steady(motion), output)
+    return advantage_over_run(InterpolatedRun(motion), output)
 
 
-def over(steady: Steady, output: str | Output) -> AdvantageOver:
+def advantage_over_run(steady: InterpolatedRun, output: str | Output) -> AdvantageOver:
     """See `advantage_over`; of a motion made ready for it, or of an output of it."""
-    rate = np.atleast_2d(rates(steady.samples, output)[1] / steady.rate)
+    rate = np.atleast_2d(quantity_and_rates(steady.samples, output)[1] / steady.rate)
     length = _is_length(steady, output)
     signed = rate[:, 0] if rate.shape[1] == 1 else np.hypot(*rate.T)
-    most = fastest(steady, output)
+    most = find_greatest(steady, output)
     greatest = most.value / abs(steady.rate)
     known = np.abs(signed[~np.isnan(signed)])
-    still = STILL * min(greatest, float(known.max(initial=0.0)))  # towards a limit the greatest is beyond all bounds
+    still = REST_TOLERANCE * min(
+        greatest, float(known.max(initial=0.0))
+    )  # towards a limit the greatest is beyond all bounds
     with np.errstate(divide="ignore", invalid="ignore"):
         values = np.where(np.abs(signed) <= still, inf, 1.0 / signed)
     values[np.isnan(signed)] = nan
     least = Extreme(most.input, 1.0 / greatest if greatest else inf)
-    force = steady.samples.slides(steady.pair)
+    force = steady.samples.has_length_motion(steady.pair)
     measure = {(True, False): "1/m", (False, True): "m"}.get((length, force), "1")
     name = output.name if isinstance(output, Output) else output
-    return AdvantageOver(name, steady.pair, values, measure, least, tuple(_still(steady, output, still)))
+    return AdvantageOver(name, steady.pair, values, measure, least, tuple(_find_standstills(steady, output, still)))
 
 
-def _is_length(steady: Steady, output: str | Output) -> bool:
+def _is_length(steady: InterpolatedRun, output: str | Output) -> bool:
     """Whether the output's rate is a velocity."""
     if isinstance(output, Output):
         return output.kind == "length"
-    named = steady.solver.named
-    if output in named and steady.samples.slides(output):
+    named = steady.solver.relative_motions
+    if output in named and steady.samples.has_length_motion(output):
         return True
     return output in steady.samples._point_names
 
 
-def _still(steady: Steady, output: str | Output, still: float) -> list[float]:
+def _find_standstills(steady: InterpolatedRun, output: str | Output, still: float) -> list[float]:
     """Where the output stands still: where its speed is least, and none beside the greatest."""
 
-    def power(moving: Moving) -> Array:
-        _, velocity, acceleration = rates(moving, output)
+    def power(moving: KinematicResult) -> Array:
+        _, velocity, acceleration = quantity_and_rates(moving, output)
         return np.sum(velocity * acceleration, axis=-1) / steady.rate
 
     if not still:
         return []
-    positions, powers = steady.tabled(power)
+    positions, powers = steady.tabulate(power)
     found = set()
-    for low, high in changes(positions, -powers, falling=True) if len(positions) else ():
+    for low, high in bracket_zeros(positions, -powers, falling=True) if len(positions) else ():
         try:
-            at = root(lambda at: float(power(steady.at(at))), low, high)
-            place, speed = steady.within(at), np.hypot(*_two(rates(steady.at(at), output)[1])) / abs(steady.rate)
+            at = find_root(lambda at: float(power(steady.state_at(at))), low, high)
+            place, speed = (
+                steady.wrap_position(at),
+                np.hypot(*_x_and_y(quantity_and_rates(steady.state_at(at), output)[1])) / abs(steady.rate),
+            )
         except NoAnswer:
             continue
         if place is not None and speed <= still:
@@ -97,6 +102,6 @@ def _still(steady: Steady, output: str | Output, still: float) -> list[float]:
     return sorted(found)
 
 
-def _two(vector: Array) -> tuple[float, float]:
+def _x_and_y(vector: Array) -> tuple[float, float]:
     x, *rest = np.asarray(vector, dtype=float)
     return float(x), float(rest[0]) if rest else 0.0

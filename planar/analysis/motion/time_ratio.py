@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.analysis.interpolated_run import SAME, Steady
+from planar.analysis.interpolated_run import CLOSED_TOLERANCE, InterpolatedRun
 from planar.analysis.motion.output import Axis, Extreme, Output
 from planar.results.motion import Motion
 
@@ -40,21 +40,21 @@ def time_ratio(motion: Motion, of: str, axis: Axis | None = None) -> TimeRatio |
     the motion. None where the output has no such ends, or the motion does not come back to where it started, so that
     there is no return. Raises Unknown, BadInput where there is nothing of that name.
     """
-    return passages(Output(Steady(motion), of, axis))
+    return find_time_ratio(Output(InterpolatedRun(motion), of, axis))
 
 
-def passages(output: Output) -> TimeRatio | None:
+def find_time_ratio(output: Output) -> TimeRatio | None:
     """See `time_ratio`; of an output that is made already."""
-    steady = output.steady
-    if not steady.closed or output.ends() is None:
+    steady = output.run
+    if not steady.closed or output.turning_extremes() is None:
         return None
-    least, greatest = output.all_ends()
+    least, greatest = output.all_turning_extremes()
     sense, period = float(np.sign(steady.rate)), steady.period
 
     def on(end: Extreme) -> float:
         """How far the input has run to an end since the first of the least."""
         far = sense * (end.input - least[0].input) % period
-        return 0.0 if period - far < SAME else far
+        return 0.0 if period - far < CLOSED_TOLERANCE else far
 
     lows, highs = sorted((on(end), end) for end in least), sorted((on(end), end) for end in greatest)
     again = [*lows[1:], (period, lows[0][1])]

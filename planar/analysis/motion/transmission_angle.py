@@ -6,26 +6,26 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.analysis.interpolated_run import Steady
+from planar.analysis.interpolated_run import InterpolatedRun
 from planar.analysis.motion.output import Extreme
-from planar.analysis.motion.zeros import ROUND_OFF, peaks, summit
+from planar.analysis.motion.zeros import SERIES_TOLERANCE, bracket_maxima, find_maximum
 from planar.foundation.errors import BadInput, NoAnswer
 from planar.foundation.jets import Jet
-from planar.model.mechanism import motions
-from planar.model.pairs import Kind, Pair
-from planar.model.wording import listed
-from planar.results.motion import Motion, Moving, State, Unknown
-from planar.solving.full_constraints import SINGULAR, STEP, Constraints
-from planar.solving.prepared_mechanism import Setup
+from planar.model.mechanism import relative_motions
+from planar.model.pairs import MeasureKind, Pair
+from planar.model.wording import join_all_names
+from planar.results.motion import KinematicResult, Motion, State, UnknownName
+from planar.solving.full_constraints import COMPLEX_STEP, SINGULAR_TOLERANCE, FullConstraints
+from planar.solving.prepared_mechanism import PreparedMechanism
 
 Array = np.ndarray
-OPEN = 1e-7
+BALANCE_TOLERANCE = 1e-7
 """Of a unit load: what is left of it by all multipliers, where the position is a limit and nothing balances it."""
-FAINT = 1e-7
+NEGLIGIBLE_FORCE = 1e-7
 """A force below this part of the greatest on the output, or a moment below this part at an arm of the size, is none."""
-SOUND = 1e6
+MAX_REGULAR_MULTIPLIER = 1e6
 """Multipliers of a unit load that are less are far from a limit."""
-CHUNK = 64
+CHUNK_SIZE = 64
 """Positions whose slopes are found at once."""
 
 
@@ -60,18 +60,18 @@ def transmission(moving: State | Motion, output: str) -> Transmission:
     drives it, a turning link is driven at several places or by a couple, so that no one line of force acts on a pin,
     or where constraints hold twice, so that the forces are not determined.
     """
-    driven = _Driven(moving, output)
+    driven = _DrivenOutput(moving, output)
     through, angle = driven.angles(moving)
-    least = _least(moving, driven, through, angle) if isinstance(moving, Motion) else None
+    least = _find_least(moving, driven, through, angle) if isinstance(moving, Motion) else None
     return Transmission(driven.link, driven.pair.name, through, float(angle[0]) if least is None else angle, least)
 
 
-def _least(motion: Motion, driven: _Driven, through: tuple[str, ...], angle: Array) -> Extreme:
+def _find_least(motion: Motion, driven: _DrivenOutput, through: tuple[str, ...], angle: Array) -> Extreme:
     """Where over a motion the angle is least, and how great it is."""
-    steady = Steady(motion)
+    steady = InterpolatedRun(motion)
 
     def exact(position: float) -> float:
-        return float(driven.angles(steady.at(position), through)[1][0])
+        return float(driven.angles(steady.state_at(position), through)[1][0])
 
     order = np.argsort(steady.positions, kind="stable")
     positions, angle = steady.positions[order], angle[order]
@@ -83,209 +83,225 @@ def _least(motion: Motion, driven: _Driven, through: tuple[str, ...], angle: Arr
         angle = np.concatenate([angle[:-1], angle[:2]])
     squares = np.nan_to_num(np.cos(angle) ** 2)  # where it is not determined nothing is looked for
     most = float(squares.max())
-    for low, high in peaks(positions, squares) if np.ptp(squares) > ROUND_OFF else ():
+    for low, high in bracket_maxima(positions, squares) if np.ptp(squares) > SERIES_TOLERANCE else ():
         around = squares[(positions >= low) & (positions <= high)]
         if 2.0 * around.max() - around.min() < most:  # its top is not so far above its samples
             continue
         try:
-            at = summit(lambda at: float(np.cos(exact(at)) ** 2), low, high)
-            place, value = steady.within(at), exact(at)
+            at = find_maximum(lambda at: float(np.cos(exact(at)) ** 2), low, high)
+            place, value = steady.wrap_position(at), exact(at)
         except NoAnswer:
             continue  # the motion branches there
         if place is not None:
             found.append(Extreme(place, value))
     least = min(each.value for each in found)
-    first = min(each for each in found if each.value <= least + ROUND_OFF)
-    return first if least <= sampled.value + ROUND_OFF else sampled
+    first = min(each for each in found if each.value <= least + SERIES_TOLERANCE)
+    return first if least <= sampled.value + SERIES_TOLERANCE else sampled
 
 
-class _Driven:
+class _DrivenOutput:
     """An output link with the constraints that other moving links put on it."""
 
-    def __init__(self, moving: Moving, output: str):
+    def __init__(self, moving: KinematicResult, output: str):
         mechanism = moving.mechanism
-        self.link, self.pair = _joined(moving, output)
+        self.link, self.pair = _find_output_pair(moving, output)
         if not mechanism.inputs:
             raise BadInput("inputs", "the mechanism has no input, and nothing is transmitted")
-        self.setup = Setup(mechanism)
-        self.constraints = Constraints(self.setup)
+        self.prepared = PreparedMechanism(mechanism)
+        self.constraints = FullConstraints(self.prepared)
         self.inputs = tuple(given.pair for given in mechanism.inputs)
-        self.columns = [self.setup.column[self.link, part] for part in ("x", "y", "angle")]
-        self.slides = self.pair.drive_kind is Kind.LENGTH
-        rows = [self.setup.pairs[name] for name in self.constraints.pair_of_row]
-        rows += [self.setup.named[name] for name in self.inputs]
-        self.rows = {pair.name: [k for k, row in enumerate(rows) if row.name == pair.name] for pair in rows}
-        self.by = {pair.name: pair for pair in rows if self._drives(pair)}
-        self.way = self._way(moving) if self.slides else np.zeros(2)
+        self.columns = [self.prepared.column[self.link, part] for part in ("x", "y", "angle")]
+        self.slides = self.pair.input_kind is MeasureKind.LENGTH
+        rows = [self.prepared.pairs[name] for name in self.constraints.pair_of_row]
+        rows += [self.prepared.relative_motions[name] for name in self.inputs]
+        self.rows_of_pair = {pair.name: [k for k, row in enumerate(rows) if row.name == pair.name] for pair in rows}
+        self.driving_pairs = {pair.name: pair for pair in rows if self._can_drive(pair)}
+        self.direction = self._slide_direction(moving) if self.slides else np.zeros(2)
 
-    def _drives(self, pair: Pair) -> bool:
+    def _can_drive(self, pair: Pair) -> bool:
         """Whether a pair may pass a force from another moving link."""
-        others = [body for body in pair.bodies if body not in (self.link, self.setup.mechanism.frame)]
+        others = [body for body in pair.bodies if body not in (self.link, self.prepared.mechanism.frame)]
         return self.link in pair.bodies and bool(others) and pair.entry_name() != self.pair.entry_name()
 
-    def angles(self, moving: Moving, through: tuple[str, ...] | None = None) -> tuple[tuple[str, ...], Array]:
+    def angles(self, moving: KinematicResult, through: tuple[str, ...] | None = None) -> tuple[tuple[str, ...], Array]:
         """The pairs that drive the output, if they are not told, and the angle (n,); 0 at a limit."""
         wrenches, stuck = self._wrenches(moving)
-        names = self._through(wrenches) if through is None else through
+        names = self._driving_names(wrenches) if through is None else through
         force = np.sum([wrenches[name] for name in names], axis=0)
-        along = self.way if self.slides else self._lever(moving, names, force)
+        along = self.direction if self.slides else self._lever(moving, names, force)
         cross = np.abs(along[0] * force[1] - along[1] * force[0])
         dot = np.abs(along[0] * force[0] + along[1] * force[1])
         angle = np.arctan2(dot, cross) if self.slides else np.arctan2(cross, dot)
         return names, np.where(stuck, 0.0, angle)
 
-    def _wrenches(self, moving: Moving) -> tuple[dict[str, Array], Array]:
+    def _wrenches(self, moving: KinematicResult) -> tuple[dict[str, Array], Array]:
         """Of every pair that may drive the output, force and moment about the link's origin over the size, (3, n).
 
         The greatest of a position is 1, as only directions are asked for. NaN where they are not determined because
         the position is a limit; second which positions (n,) are limits at which no forces balance the load.
         """
         w = self._coordinates(moving)
-        load = np.zeros(len(self.setup.column))
-        load[self.columns] = (*self.way, 0.0) if self.slides else (0.0, 0.0, 1.0)
+        load = np.zeros(len(self.prepared.column))
+        load[self.columns] = (*self.direction, 0.0) if self.slides else (0.0, 0.0, 1.0)
         found: list[Array] = []
         stuck = np.zeros(w.shape[1], dtype=bool)
-        for start in range(0, w.shape[1], CHUNK):
-            chunk = slice(start, start + CHUNK)
-            slopes = self._slopes(w[:, chunk])
+        for start in range(0, w.shape[1], CHUNK_SIZE):
+            chunk = slice(start, start + CHUNK_SIZE)
+            slopes = self._jacobians(w[:, chunk])
             multipliers, stuck[chunk] = self._multipliers(slopes, load)
             parts = [
-                np.einsum("nrc,nr->cn", slopes[:, self.rows[name]][:, :, self.columns], multipliers[:, self.rows[name]])
-                for name in self.by
+                np.einsum(
+                    "nrc,nr->cn",
+                    slopes[:, self.rows_of_pair[name]][:, :, self.columns],
+                    multipliers[:, self.rows_of_pair[name]],
+                )
+                for name in self.driving_pairs
             ]
-            found.append(np.array(parts).reshape(len(self.by), 3, len(slopes)))
+            found.append(np.array(parts).reshape(len(self.driving_pairs), 3, len(slopes)))
         every = np.concatenate(found, axis=2)
         greatest = np.abs(every).max(axis=(0, 1), initial=0.0)
-        if not (greatest > FAINT).any() and not stuck.all():
+        if not (greatest > NEGLIGIBLE_FORCE).any() and not stuck.all():
             told = f"no other moving link drives {self.link}: its transmission angle is that of a link the rest drives"
             raise BadInput(self.link, told)
         with np.errstate(invalid="ignore", divide="ignore"):
-            return dict(zip(self.by, every / greatest, strict=True)), stuck
+            return dict(zip(self.driving_pairs, every / greatest, strict=True)), stuck
 
-    def _multipliers(self, slopes: Array, load: Array) -> tuple[Array, Array]:
+    def _multipliers(self, jacobians: Array, load: Array) -> tuple[Array, Array]:
         """Multipliers (n, rows) that balance a load (coordinates,) on slopes (n, rows, coordinates); which do not.
 
         NaN where nothing does, and where the position is a limit and they are not the only ones.
         """
-        many, rows, columns = slopes.shape
+        many, rows, columns = jacobians.shape
         found, stuck, sound = np.zeros((many, rows)), np.zeros(many, dtype=bool), np.zeros(many, dtype=bool)
         if rows == columns:
             try:
                 loads = np.broadcast_to(-load[:, None], (many, columns, 1))
-                found = np.linalg.solve(slopes.transpose(0, 2, 1), loads)[..., 0]
-                sound = np.abs(found).max(axis=1) < SOUND
+                found = np.linalg.solve(jacobians.transpose(0, 2, 1), loads)[..., 0]
+                sound = np.abs(found).max(axis=1) < MAX_REGULAR_MULTIPLIER
             except np.linalg.LinAlgError:
                 pass  # one of them is exactly at a limit
         if not sound.all():
-            found[~sound], stuck[~sound] = self._least_multipliers(slopes[~sound], load)
+            found[~sound], stuck[~sound] = self._minimum_norm_multipliers(jacobians[~sound], load)
         return found, stuck
 
-    def _least_multipliers(self, slopes: Array, load: Array) -> tuple[Array, Array]:
+    def _minimum_norm_multipliers(self, slopes: Array, load: Array) -> tuple[Array, Array]:
         """See `_multipliers`; where constraints may hold twice, or a position is a limit."""
         sides, columns = slopes.transpose(0, 2, 1), slopes.shape[2]
         u, s, vt = np.linalg.svd(sides, full_matrices=False)
-        held = s > SINGULAR * s[:, :1]
+        held = s > SINGULAR_TOLERANCE * s[:, :1]
         gain = np.where(held, 1.0 / np.where(held, s, 1.0), 0.0)
         inverse = (vt.transpose(0, 2, 1) * gain[:, None]) @ u.transpose(0, 2, 1)
         found = -inverse @ load
-        stuck = np.abs(np.einsum("nrc,nr->nc", slopes, found) + load).max(axis=1) > OPEN
+        stuck = np.abs(np.einsum("nrc,nr->nc", slopes, found) + load).max(axis=1) > BALANCE_TOLERANCE
         found[stuck] = np.nan
-        mine = [row for name in self.by for row in self.rows[name]]
+        mine = [row for name in self.driving_pairs for row in self.rows_of_pair[name]]
         free = np.eye(slopes.shape[1]) - inverse @ sides
         acting = slopes[:, mine][:, :, self.columns].transpose(0, 2, 1) @ free[:, mine]
-        loose = np.abs(acting).max(axis=(1, 2), initial=0.0) > OPEN
+        loose = np.abs(acting).max(axis=(1, 2), initial=0.0) > BALANCE_TOLERANCE
         if (loose & (held.sum(axis=1) == columns)).any():
             told = f"constraints hold twice, so that the forces on {self.link} are not determined without elasticity"
             raise BadInput(self.link, f"{told}; leave out the link that holds nothing new")
         found[loose] = np.nan
         return found, stuck
 
-    def _through(self, wrenches: dict[str, Array]) -> tuple[str, ...]:
+    def _driving_names(self, wrenches: dict[str, Array]) -> tuple[str, ...]:
         """The pairs that drive the output; all that may where every position is a limit."""
         known = {name: np.abs(wrench[:, ~np.isnan(wrench[0])]) for name, wrench in wrenches.items()}
-        driving = tuple(name for name, wrench in known.items() if wrench.max(initial=0.0) > FAINT)
+        driving = tuple(name for name, wrench in known.items() if wrench.max(initial=0.0) > NEGLIGIBLE_FORCE)
         return driving or tuple(wrenches)
 
-    def _lever(self, moving: Moving, names: tuple[str, ...], force: Array) -> Array:
+    def _lever(self, moving: KinematicResult, names: tuple[str, ...], force: Array) -> Array:
         """From the fixed pin to the point at which the force acts, (2, n). Raises BadInput where there is none."""
-        places = {self._place(self.by[name]) for name in names}
+        places = {self._force_point(self.driving_pairs[name]) for name in names}
         place = places.pop()
         if places or place is None:
             told = (
-                f"{self.link} is driven at {listed(names)}, not at one pin" if places else f"wheels drive {self.link}"
+                f"{self.link} is driven at {join_all_names(names)}, not at one pin"
+                if places
+                else f"wheels drive {self.link}"
             )
             raise BadInput(self.link, f"{told}, so that no one line of force with one pin tells a transmission angle")
-        at, pin = _at(moving, *place), _at(moving, *self._pin())
+        at, pin = _point_positions(moving, *place), _point_positions(moving, *self._fixed_pin())
         frame = moving.frames[self.link]
-        arm = at - np.array([np.atleast_1d(_now(frame.x)), np.atleast_1d(_now(frame.y))])
-        couple = np.abs(force[2] - (arm[0] * force[1] - arm[1] * force[0]) / self.setup.unit)
-        if np.max(couple[~np.isnan(couple)], initial=0.0) > FAINT:
-            told = f"at {listed(names)} a couple drives {self.link} beside a force"
+        arm = at - np.array([np.atleast_1d(_value(frame.x)), np.atleast_1d(_value(frame.y))])
+        couple = np.abs(force[2] - (arm[0] * force[1] - arm[1] * force[0]) / self.prepared.unit)
+        if np.max(couple[~np.isnan(couple)], initial=0.0) > NEGLIGIBLE_FORCE:
+            told = f"at {join_all_names(names)} a couple drives {self.link} beside a force"
             raise BadInput(self.link, f"{told}, so that no line of force through one pin tells a transmission angle")
         lever = at - pin
-        if np.hypot(*lever).max() <= FAINT * self.setup.unit:
+        if np.hypot(*lever).max() <= NEGLIGIBLE_FORCE * self.prepared.unit:
             raise BadInput(self.link, f"{self.link} is driven at its fixed pin, about which no force turns it")
         return lever
 
-    def _place(self, pair: Pair) -> tuple[str, str] | None:
+    def _force_point(self, pair: Pair) -> tuple[str, str] | None:
         """The (link, point) where a pair's force acts: of the output if it can be."""
-        at = [member for member in pair.coincident() if member[0] == self.link]
-        rides = pair.rides()
+        at = [member for member in pair.coincident_points() if member[0] == self.link]
+        rides = pair.point_on_line()
         return at[0] if at else rides and rides[0]
 
-    def _pin(self) -> tuple[str, str]:
-        return next(member for member in self.pair.coincident() if member[0] == self.setup.mechanism.frame)
+    def _fixed_pin(self) -> tuple[str, str]:
+        return next(member for member in self.pair.coincident_points() if member[0] == self.prepared.mechanism.frame)
 
-    def _way(self, moving: Moving) -> Array:
+    def _slide_direction(self, moving: KinematicResult) -> Array:
         """The unit direction (2,) in which the output slides on the frame: how its place goes with the displacement."""
-        slope = self._slopes(self._coordinates(moving)[:, :1])[0]
-        own = self.setup.column[self.pair.name, self.pair.coordinates[0][0]]
-        way = slope[self.rows[self.pair.name][:2], own]
+        slope = self._jacobians(self._coordinates(moving)[:, :1])[0]
+        own = self.prepared.column[self.pair.name, self.pair.coordinate_kinds[0][0]]
+        way = slope[self.rows_of_pair[self.pair.name][:2], own]
         return way / np.hypot(*way)
 
-    def _coordinates(self, moving: Moving) -> Array:
+    def _coordinates(self, moving: KinematicResult) -> Array:
         """w (coordinates, n), lengths in sizes."""
         parts = {(link, of): getattr(frame, of) for link, frame in moving.frames.items() for of in ("x", "y", "angle")}
         for name, own in moving.own.items():
-            parts |= {(name, of): each for (of, _), each in zip(self.setup.pairs[name].coordinates, own, strict=True)}
-        values = [_now(parts[each.owner, each.part]) for each in self.constraints.coordinates]
-        return np.stack(np.broadcast_arrays(*map(np.atleast_1d, values))) / self.setup.scale[:, None]
+            parts |= {
+                (name, of): each for (of, _), each in zip(self.prepared.pairs[name].coordinate_kinds, own, strict=True)
+            }
+        values = [_value(parts[each.owner, each.part]) for each in self.constraints.coordinates]
+        return np.stack(np.broadcast_arrays(*map(np.atleast_1d, values))) / self.prepared.scale[:, None]
 
-    def _slopes(self, w: Array) -> Array:
+    def _jacobians(self, w: Array) -> Array:
         """The slopes of all constraints and drives (n, rows, coordinates), by the complex step."""
         many = w.shape[1]
-        nudged = np.repeat(w[:, :, None].astype(complex), w.shape[0], axis=2) + 1j * STEP * np.eye(w.shape[0])[:, None]
+        nudged = (
+            np.repeat(w[:, :, None].astype(complex), w.shape[0], axis=2)
+            + 1j * COMPLEX_STEP * np.eye(w.shape[0])[:, None]
+        )
         flat = nudged.reshape(w.shape[0], -1)
-        gaps = np.broadcast_to(self.constraints.gaps(flat), (len(self.constraints.pair_of_row), flat.shape[1]))
-        rows = np.concatenate([gaps, self.constraints.drives(self.inputs, flat)])
-        return (np.imag(rows) / STEP).reshape(len(rows), many, w.shape[0]).transpose(1, 0, 2)
+        gaps = np.broadcast_to(self.constraints.residuals(flat), (len(self.constraints.pair_of_row), flat.shape[1]))
+        rows = np.concatenate([gaps, self.constraints.relative_positions(self.inputs, flat)])
+        return (np.imag(rows) / COMPLEX_STEP).reshape(len(rows), many, w.shape[0]).transpose(1, 0, 2)
 
 
-def _joined(moving: Moving, output: str) -> tuple[str, Pair]:
+def _find_output_pair(moving: KinematicResult, output: str) -> tuple[str, Pair]:
     """The output link, and the pair at which it turns or slides on the frame. Raises Unknown, BadInput."""
-    frame, named = moving.mechanism.frame, motions(moving.mechanism)
+    frame, named = moving.mechanism.frame, relative_motions(moving.mechanism)
     if output in named:
         candidates = [named[output]]
     elif output in moving.frames:
         candidates = [pair for pair in named.values() if output in pair.links]
     else:
         told = f"pairs are {', '.join(named)}, links {', '.join(moving.frames)}"
-        raise Unknown(f"there is no pair and no link {output!r}; {told}")
+        raise UnknownName(f"there is no pair and no link {output!r}; {told}")
     for pair in candidates:
         others = [link for link in pair.links if link != frame]
-        pinned = pair.drive_kind is Kind.ANGLE and bool(pair.coincident())
-        if len(others) == 1 and pair.lower and pair.holds() == 2 and (pinned or pair.rides() is not None):
+        pinned = pair.input_kind is MeasureKind.ANGLE and bool(pair.coincident_points())
+        if (
+            len(others) == 1
+            and pair.is_lower_pair
+            and pair.prevented_motion_count() == 2
+            and (pinned or pair.point_on_line() is not None)
+        ):
             return others[0], pair
     told = "is told of a link that turns about a fixed pin or slides on the frame"
     raise BadInput(output, f"a transmission angle {told}, and {output!r} is no such link or pair")
 
 
-def _now(value: object) -> Array:
+def _value(value: object) -> Array:
     """The value of a jet, or of a plain number."""
     return np.asarray(value.parts[0] if isinstance(value, Jet) else value, dtype=float)
 
 
-def _at(moving: Moving, link: str, point: str) -> Array:
+def _point_positions(moving: KinematicResult, link: str, point: str) -> Array:
     """Where a point of a link is (2, n)."""
-    place = moving.frames[link].carry(moving.shapes[link].at(point))
-    return np.stack(np.broadcast_arrays(*(np.atleast_1d(_now(each)) for each in place)))
+    place = moving.frames[link].to_world(moving.shapes[link].position(point))
+    return np.stack(np.broadcast_arrays(*(np.atleast_1d(_value(each)) for each in place)))

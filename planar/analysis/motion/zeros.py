@@ -9,15 +9,15 @@ from numpy.polynomial import Chebyshev
 
 Array = np.ndarray
 
-NODES, HALVINGS = 12, 4
+SERIES_NODES, MAX_HALVINGS = 12, 4
 """Exact positions through which a quantity is laid to be differentiated; how often their stretch is halved for it."""
-ROUND_OFF = 1e-12
+SERIES_TOLERANCE = 1e-12
 """The last terms of a series, as a part of the greatest, when it has come to its end."""
-REAL = 1e-9
+REAL_ROOT_TOLERANCE = 1e-9
 """A root of a polynomial whose imaginary part is below this is real."""
 
 
-def changes(positions: Array, values: Array, falling: bool = False) -> Iterator[tuple[float, float]]:
+def bracket_zeros(positions: Array, values: Array, falling: bool = False) -> Iterator[tuple[float, float]]:
     """Where a quantity passes zero, or only where it falls through it: the positions on either side."""
     kept = values != 0.0
     positions, values = positions[kept], values[kept]
@@ -26,7 +26,7 @@ def changes(positions: Array, values: Array, falling: bool = False) -> Iterator[
             yield float(positions[k]), float(positions[k + 1])
 
 
-def dips(positions: Array, values: Array, slopes: Array) -> Iterator[tuple[float, float]]:
+def bracket_near_zeros(positions: Array, values: Array, slopes: Array) -> Iterator[tuple[float, float]]:
     """Where a quantity comes so near to zero between positions of like sign that it may reach it there.
 
     It does not, where it is convex and the tangents on either side meet before zero; half of that is allowed for.
@@ -39,26 +39,26 @@ def dips(positions: Array, values: Array, slopes: Array) -> Iterator[tuple[float
             yield float(positions[k]), float(positions[k + 1])
 
 
-def peaks(positions: Array, values: Array) -> Iterator[tuple[float, float]]:
+def bracket_maxima(positions: Array, values: Array) -> Iterator[tuple[float, float]]:
     """Where a quantity has a local maximum: the positions on either side."""
     inner = values[1:-1]
     for k in np.flatnonzero((inner >= values[:-2]) & (inner >= values[2:]) & (values[:-2] + values[2:] < 2.0 * inner)):
         yield float(positions[k]), float(positions[k + 2])
 
 
-def summit(function: Callable[[float], float], low: float, high: float) -> float:
+def find_maximum(function: Callable[[float], float], low: float, high: float) -> float:
     """Where a function is greatest between two positions: a zero of the derivative of a polynomial through it."""
     lowest, highest = low, high
     at = 0.5 * (low + high)
-    for _ in range(HALVINGS):
+    for _ in range(MAX_HALVINGS):
         series = Chebyshev.interpolate(
-            lambda some: np.array([function(float(each)) for each in some]), NODES - 1, domain=[low, high]
+            lambda some: np.array([function(float(each)) for each in some]), SERIES_NODES - 1, domain=[low, high]
         )
-        roots = [float(each.real) for each in series.deriv().roots() if abs(each.imag) < REAL]
+        roots = [float(each.real) for each in series.deriv().roots() if abs(each.imag) < REAL_ROOT_TOLERANCE]
         flat = [each for each in roots if low <= each <= high]
         at = max([*flat, low, high], key=series)
         terms = np.abs(series.coef)
-        if terms[-2:].max() <= ROUND_OFF * terms.max():
+        if terms[-2:].max() <= SERIES_TOLERANCE * terms.max():
             break
         quarter = 0.25 * (high - low)
         low, high = max(at - quarter, lowest), min(at + quarter, highest)

@@ -8,33 +8,35 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.analysis.polygons.polygon import Equation
-from planar.analysis.rate_equations import Pin, Rate, Rates, Tie
-from planar.analysis.vector_chains import Joint, Known, Walks
+from planar.analysis.polygons.polygon import LoopEquation
+from planar.analysis.rate_equations import PinJoint, Rate, RateEquation, RateEquations
+from planar.analysis.vector_chains import JointOfRates, KnownRates, VectorChains
 
 Array = np.ndarray
-NOTHING = 1e-12
+LEAST_COEFFICIENT = 1e-12
 """m or pure: a coefficient that is none."""
-DEPENDENT = 1e-9
+DEPENDENCE_TOLERANCE = 1e-9
 """What is left of an equation's coefficients, made one in size, where it follows from others."""
 
 
-class Step(NamedTuple):
+class LoopStep(NamedTuple):
     """From a link over a joint to the next."""
 
-    joint: Joint
+    joint: JointOfRates
     tail: str
     head: str
 
 
-class Loops(NamedTuple):
+class LoopEquations(NamedTuple):
     """The equations of a group, and the unknowns in them, by name."""
 
-    equations: tuple[Equation, ...]
+    equations: tuple[LoopEquation, ...]
     unknowns: Mapping[str, Rate]
 
 
-def loops(walks: Walks, group: Sequence[str], known: Known, order: int, inputs: bool = True) -> Loops:
+def loop_equations(
+    chains: VectorChains, links: Sequence[str], known: KnownRates, order: int, inputs: bool = True
+) -> LoopEquations:
     """Velocities (order 1) or accelerations (order 2) round the loops of a group, and what else ties its rates.
 
     Without `inputs` these are the equations of the mechanism alone, however it is driven.
@@ -42,29 +44,31 @@ def loops(walks: Walks, group: Sequence[str], known: Known, order: int, inputs: 
     unknowns: dict[str, Rate] = {}
 
     def name(rate: Rate) -> str:
-        members = [link for link in group if known.alike.get(Rate(link), Rate(link)) == rate]
+        members = [link for link in links if known.representatives.get(Rate(link), Rate(link)) == rate]
         symbols = ("ω", "v") if order == 1 else ("α", "a")
         told = f"{symbols[0]}_{members[0]}" if members else f"{symbols[1]} at {rate.owner}"
         unknowns[told] = rate
         return told
 
     equations = []
-    for steps in _closed(walks, group, known):
-        sums, left = _round(walks, steps, known, order)
-        points = tuple(dict.fromkeys(walks.end(step.joint, step.head).over for step in steps))
+    for steps in _independent_loops(chains, links, known):
+        sums, left = _sum_round_loop(chains, steps, known, order)
+        points = tuple(dict.fromkeys(chains.joint_point(step.joint, step.head).over for step in steps))
         for axis, index in (("x", 0), ("y", 1)):
-            terms = tuple((name(rate), float(way[index])) for rate, way in sums.items() if abs(way[index]) > NOTHING)
+            terms = tuple(
+                (name(rate), float(way[index])) for rate, way in sums.items() if abs(way[index]) > LEAST_COEFFICIENT
+            )
             if terms:
-                equations.append(Equation(points, axis, terms, float(left[index])))
-    own = {stands for link in group if (stands := known.unknown(Rate(link)))} | set(unknowns.values())
-    ties = [tie for tie in walks.rates.ties if inputs or not tie.given]
-    equations += _ties(ties, walks.rates, known, order, own, name)
-    return Loops(tuple(_independent(equations, tuple(unknowns))), unknowns)
+                equations.append(LoopEquation(points, axis, terms, float(left[index])))
+    own = {stands for link in links if (stands := known.unknown_rate(Rate(link)))} | set(unknowns.values())
+    ties = [tie for tie in chains.equations.equations if inputs or not tie.is_input]
+    equations += _pair_equations(ties, chains.equations, known, order, own, name)
+    return LoopEquations(tuple(_independent_equations(equations, tuple(unknowns))), unknowns)
 
 
-def _independent(equations: Sequence[Equation], unknowns: Sequence[str]) -> list[Equation]:
+def _independent_equations(equations: Sequence[LoopEquation], unknowns: Sequence[str]) -> list[LoopEquation]:
     """The equations that do not follow from those before them: two slides on one line say the same twice."""
-    kept: list[Equation] = []
+    kept: list[LoopEquation] = []
     basis: list[Array] = []
     for equation in equations:
         terms = dict(equation.terms)
@@ -72,46 +76,58 @@ def _independent(equations: Sequence[Equation], unknowns: Sequence[str]) -> list
         row /= np.linalg.norm(row)
         for other in (*basis, *basis):  # twice, so that rounding leaves nothing
             row = row - (row @ other) * other
-        if np.linalg.norm(row) > DEPENDENT:
+        if np.linalg.norm(row) > DEPENDENCE_TOLERANCE:
             kept.append(equation)
             basis.append(row / np.linalg.norm(row))
     return kept
 
 
-def _ties(
-    ties: Sequence[Tie], rates: Rates, known: Known, order: int, own: AbstractSet[Rate], name: Callable[[Rate], str]
-) -> list[Equation]:
+def _pair_equations(
+    equations: Sequence[RateEquation],
+    rates: RateEquations,
+    known: KnownRates,
+    order: int,
+    own: AbstractSet[Rate],
+    name: Callable[[Rate], str],
+) -> list[LoopEquation]:
     """What ties a group's own unknown rates besides: wheels on one another, inputs between moving links."""
     found = []
-    for tie in ties:
+    for tie in equations:
         open_ones: dict[Rate, float] = {}
-        right = sum(slope * rates.value(rate, order) for rate, slope in tie.slopes.items()) if tie.given else 0.0
-        for rate, slope in tie.slopes.items():
-            stands = known.unknown(rate)
+        right = (
+            sum(slope * rates.value(rate, order) for rate, slope in tie.coefficients.items()) if tie.is_input else 0.0
+        )
+        for rate, slope in tie.coefficients.items():
+            stands = known.unknown_rate(rate)
             if stands is None:
                 right -= slope * rates.value(rate, order)
             else:
                 open_ones[stands] = open_ones.get(stands, 0.0) + slope
-        if not own >= {rate for rate, slope in open_ones.items() if abs(slope) > NOTHING}:
+        if not own >= {rate for rate, slope in open_ones.items() if abs(slope) > LEAST_COEFFICIENT}:
             continue
-        terms = tuple((name(rate), slope) for rate, slope in open_ones.items() if abs(slope) > NOTHING)
+        terms = tuple((name(rate), slope) for rate, slope in open_ones.items() if abs(slope) > LEAST_COEFFICIENT)
         if terms:
-            found.append(Equation((tie.pair,), "turns", terms, right))
+            found.append(LoopEquation((tie.pair,), "turns", terms, right))
     return found
 
 
-def _round(walks: Walks, steps: Sequence[Step], known: Known, order: int) -> tuple[dict[Rate, Array], Array]:
+def _sum_round_loop(
+    chains: VectorChains, steps: Sequence[LoopStep], known: KnownRates, order: int
+) -> tuple[dict[Rate, Array], Array]:
     """The unknown rates with their ways round a closed way, and what they have to come to together."""
-    rates = walks.rates
-    begin, finish = walks.end(steps[0].joint, steps[0].tail), walks.end(steps[-1].joint, steps[-1].head)
+    rates = chains.equations
+    begin, finish = (
+        chains.joint_point(steps[0].joint, steps[0].tail),
+        chains.joint_point(steps[-1].joint, steps[-1].head),
+    )
     sums: dict[Rate, Array] = {}
     left = np.zeros(2)
-    if begin.link in known.placed:
-        left = rates.carried(finish.link, finish.local, order) - rates.carried(begin.link, begin.local, order)
+    if begin.link in known.links:
+        left = rates.point_motion(finish.link, finish.local, order) - rates.point_motion(begin.link, begin.local, order)
 
     def add(rate: Rate, way: Array) -> None:
         nonlocal left
-        stands = known.unknown(rate)
+        stands = known.unknown_rate(rate)
         if stands is None:
             left = left - way * rates.value(rate, order)
         else:
@@ -123,56 +139,59 @@ def _round(walks: Walks, steps: Sequence[Step], known: Known, order: int) -> tup
         if order == 2:  # centripetal
             left = left + rates.value(Rate(link)) ** 2 * reach
 
-    if begin.link not in known.placed:  # round links of the group alone
-        across(begin.link, walks.at(begin) - walks.at(finish))
+    if begin.link not in known.links:  # round links of the group alone
+        across(begin.link, chains.point_position(begin) - chains.point_position(finish))
     for before, after in zip(steps, [*steps[1:], None], strict=True):
-        joint, here = before.joint, walks.end(before.joint, before.head)
-        if not isinstance(joint, Pin):
+        joint, here = before.joint, chains.joint_point(before.joint, before.head)
+        if not isinstance(joint, PinJoint):
             sign = 1.0 if before.head == joint.rider else -1.0
             turning = rates.value(Rate(joint.guide))
-            for way, rate in zip(joint.ways, joint.rates, strict=True):
+            for way, rate in zip(joint.directions, joint.rates, strict=True):
                 add(rate, sign * way)
                 if order == 2:  # Coriolis
                     left = left - sign * 2.0 * turning * rates.value(rate) * np.array([-way[1], way[0]])
         if after is not None:
-            across(here.link, walks.at(walks.end(after.joint, after.tail)) - walks.at(here))
+            across(
+                here.link,
+                chains.point_position(chains.joint_point(after.joint, after.tail)) - chains.point_position(here),
+            )
     return sums, left
 
 
-def _closed(walks: Walks, group: Sequence[str], known: Known) -> list[list[Step]]:
+def _independent_loops(chains: VectorChains, links: Sequence[str], known: KnownRates) -> list[list[LoopStep]]:
     """An independent set of closed ways: out along a tree of joints, over a joint that is not of it, and back."""
     root = ""
-    edges: list[tuple[str, str, Step]] = []
-    seen: list[Joint] = []
-    for link in group:
-        for joint in walks.joints(link):
+    edges: list[tuple[str, str, LoopStep]] = []
+    seen: list[JointOfRates] = []
+    for link in links:
+        for joint in chains.joints(link):
             if any(joint is other for other in seen):
                 continue
             seen.append(joint)
             nodes: dict[str, str] = {}
             for member in joint.members:
-                node = member if member in group else root if member in known.placed else None
+                node = member if member in links else root if member in known.links else None
                 if node is not None:
                     nodes.setdefault(node, member)
             hub, *others = nodes
-            edges += [(hub, other, Step(joint, nodes[hub], nodes[other])) for other in others]
-    tree: dict[str, list[Step]] = {root: []}
-    used: list[Step] = []
+            edges += [(hub, other, LoopStep(joint, nodes[hub], nodes[other])) for other in others]
+    tree: dict[str, list[LoopStep]] = {root: []}
+    used: list[LoopStep] = []
     waiting = [root]
     while waiting:
         node = waiting.pop(0)
         for a, b, step in edges:
-            for here, there, way in ((a, b, step), (b, a, Step(step.joint, step.head, step.tail))):
+            for here, there, way in ((a, b, step), (b, a, LoopStep(step.joint, step.head, step.tail))):
                 if here == node and there not in tree:
                     tree[there] = [*tree[node], way]
                     used.append(step)
                     waiting.append(there)
     chords = [(a, b, step) for a, b, step in edges if not any(step is other for other in used)]
-    back = {node: [Step(s.joint, s.head, s.tail) for s in reversed(steps)] for node, steps in tree.items()}
-    return [_shortened([*tree[a], step, *back[b]]) for a, b, step in chords if a in tree and b in tree]
+    back = {node: [LoopStep(s.joint, s.head, s.tail) for s in reversed(steps)] for node, steps in tree.items()}
+    return [_trim_loop([*tree[a], step, *back[b]]) for a, b, step in chords if a in tree and b in tree]
 
 
-def _shortened(steps: list[Step]) -> list[Step]:
+def _trim_loop(steps: list[LoopStep]) -> list[LoopStep]:
     """A closed way without the part that it goes out and back."""
     while len(steps) > 2 and steps[0].joint is steps[-1].joint and steps[0].head == steps[-1].tail:
         steps = steps[1:-1]

@@ -12,36 +12,41 @@ import numpy as np
 from planar.analysis.polygons.polygon import (
     Factor,
     Meeting,
-    Part,
+    PointImage,
     Polygon,
-    Simultaneous,
-    Triangle,
-    Vector,
+    PolygonVector,
+    SimultaneousSolution,
+    VectorPart,
 )
 from planar.analysis.rich_text import (
     Chord,
     Fraction,
+    MeasuredValue,
     Name,
     Phrase,
-    Piece,
-    Quantity,
-    Raised,
-    Spot,
+    PhrasePiece,
+    PolygonLetter,
+    Power,
     Symbol,
-    bare,
-    number,
-    primed,
+    format_number,
+    length_without_primes,
+    with_double_primes,
 )
-from planar.foundation.units import length_of_rates, own
+from planar.foundation.units import length_unit_of_rates, unit_of_kind
 from planar.model.mechanism import named_points
 
-NONE = 1e-9
+NEGLIGIBLE_RATIO = 1e-9
 """A vector below this part of the polygon's greatest is zero."""
-UNKNOWN: Phrase = ("—",)
-SUPERSCRIPTS = {Part.CENTRIPETAL: "c", Part.TANGENTIAL: "t", Part.CORIOLIS: "cr", Part.SLIDING: "s"}
+UNKNOWN_PHRASE: Phrase = ("—",)
+PART_SUPERSCRIPTS = {
+    VectorPart.CENTRIPETAL: "c",
+    VectorPart.TANGENTIAL: "t",
+    VectorPart.CORIOLIS: "cr",
+    VectorPart.SLIDING: "s",
+}
 
 
-class Row(NamedTuple):
+class VectorRow(NamedTuple):
     """A row of a vector table. `value` is the magnitude that is found in the end (m/s or m/s^2)."""
 
     symbol: Symbol
@@ -67,20 +72,22 @@ class Notation:
     @cached_property
     def unit(self) -> str:
         """The unit in which its vectors are told: m/s."""
-        return own(self.polygon.kind, self.polygon.state.mechanism.units)[0]
+        return unit_of_kind(self.polygon.kind, self.polygon.state.mechanism.units)[0]
 
     @cached_property
-    def lengths(self) -> float:
+    def lengths_per_metre(self) -> float:
         """How many of the lengths in which rates are told are one metre."""
-        return length_of_rates(self.polygon.state.mechanism.units.length)[1].from_si(1.0)
+        return length_unit_of_rates(self.polygon.state.mechanism.units.length)[1].from_si(1.0)
 
-    def number(self, value: float, kind: str) -> str:
+    def format_number(self, value: float, kind: str) -> str:
         """A number (SI) of a kind of quantity, as it is told."""
-        return number(value * self.lengths if kind in ("length", "velocity", "acceleration") else value)
+        return format_number(
+            value * self.lengths_per_metre if kind in ("length", "velocity", "acceleration") else value
+        )
 
-    def quantity(self, value: float) -> Quantity:
+    def quantity(self, value: float) -> MeasuredValue:
         """A magnitude of this polygon's kind (SI) with its unit."""
-        return Quantity(value, self.unit, by=self.lengths)
+        return MeasuredValue(value, self.unit, units_per_si=self.lengths_per_metre)
 
     @cached_property
     def letters(self) -> Mapping[str, str]:
@@ -101,87 +108,93 @@ class Notation:
         """The greatest vector of the polygon (m/s or m/s^2)."""
         return max((float(np.hypot(*value)) for value in self.polygon.letters.values()), default=0.0)
 
-    def size(self, value: Sequence[float] | np.ndarray) -> float:
+    def vector_length(self, value: Sequence[float] | np.ndarray) -> float:
         """The magnitude of a vector, zero where it is round-off beside the greatest."""
         found = float(np.hypot(*value))
-        return found if found > NONE * self.greatest else 0.0
+        return found if found > NEGLIGIBLE_RATIO * self.greatest else 0.0
 
-    def spot(self, letter: str) -> Spot:
+    def polygon_letter(self, letter: str) -> PolygonLetter:
         """A letter with what stands below it told apart."""
         if letter in self.polygon.points:
-            return Spot(primed(letter.removesuffix("_1")), "1") if self.order == 2 else Spot(primed(letter))
+            return (
+                PolygonLetter(with_double_primes(letter.removesuffix("_1")), "1")
+                if self.order == 2
+                else PolygonLetter(with_double_primes(letter))
+            )
         plain = {each.removesuffix("_1") for each in self.polygon.points}
         parts = letter.split("_")
         for cut in range(1, len(parts)):
             base, mark = "_".join(parts[:cut]), "_".join(parts[cut:])
             if base in plain and mark in plain:
-                return Spot(primed(base), primed(mark))
-        return Spot(letter)
+                return PolygonLetter(with_double_primes(base), with_double_primes(mark))
+        return PolygonLetter(letter)
 
-    def of_point(self, point: str) -> Phrase:
+    def point_letter(self, point: str) -> Phrase:
         """A point's letter."""
-        return (self.spot(self.letters[point]),) if point in self.letters else (Name(point),)
+        return (self.polygon_letter(self.letters[point]),) if point in self.letters else (Name(point),)
 
     def chord(self, tail: str, head: str) -> Chord:
         """What lies between two letters."""
-        return Chord(self.spot(tail), self.spot(head))
+        return Chord(self.polygon_letter(tail), self.polygon_letter(head))
 
-    def length(self, tail: str, head: str) -> float:
+    def letter_distance(self, tail: str, head: str) -> float:
         """The distance of two letters (m/s or m/s^2)."""
-        return self.size(self.polygon.letters[head] - self.polygon.letters[tail])
+        return self.vector_length(self.polygon.letters[head] - self.polygon.letters[tail])
 
-    def symbol(self, of: str, against: str, part: Part | None = None) -> Symbol:
+    def symbol(self, of: str, against: str, part: VectorPart | None = None) -> Symbol:
         """f_cb^c, or v_cb of a velocity."""
         below = [
             self.letters.get(point, point).removesuffix("_1" if self.order == 2 else "") for point in (of, against)
         ]
-        between = "/" if max(map(bare, below)) > 1 else ""
-        above = SUPERSCRIPTS.get(part, "") if part is not None and self.order == 2 else ""
-        return Symbol("v" if self.order == 1 else "f", primed(between.join(below)), above)
+        between = "/" if max(map(length_without_primes, below)) > 1 else ""
+        above = PART_SUPERSCRIPTS.get(part, "") if part is not None and self.order == 2 else ""
+        return Symbol("v" if self.order == 1 else "f", with_double_primes(between.join(below)), above)
 
-    def drawn(self, vector: Vector) -> Quantity:
+    def drawn_magnitude(self, vector: PolygonVector) -> MeasuredValue:
         """A vector's magnitude, to be drawn."""
-        return self.quantity(self.size(vector.value))._replace(kind=self.polygon.kind)
+        return self.quantity(self.vector_length(vector.value))._replace(kind=self.polygon.kind)
 
-    def row(self, vector: Vector, alone: bool) -> Row:
+    def row(self, vector: PolygonVector, alone: bool) -> VectorRow:
         """A row of the vector table; `alone`: it is the whole of the relative acceleration along a line."""
-        part = None if alone and vector.part is Part.SLIDING else vector.part
+        part = None if alone and vector.part is VectorPart.SLIDING else vector.part
         symbol, chord = self.symbol(vector.of, vector.against, part), self.chord(vector.tail, vector.head)
-        size = self.size(vector.value)
-        magnitude = self.magnitude(vector, size) if vector.known else UNKNOWN
-        return Row(symbol, chord, size, vector.known, magnitude, self.direction(vector), self.sense(vector))
+        size = self.vector_length(vector.value)
+        magnitude = self.magnitude(vector, size) if vector.known else UNKNOWN_PHRASE
+        return VectorRow(symbol, chord, size, vector.known, magnitude, self.direction(vector), self.sense(vector))
 
-    def magnitude(self, vector: Vector, size: float) -> Phrase:
+    def magnitude(self, vector: PolygonVector, size: float) -> Phrase:
         """The formula of a known magnitude with its numbers: (ab)²/AB = (0.525)²/0.05 = 5.51."""
-        if vector.part is Part.SLIDING or not vector.factors:
+        if vector.part is VectorPart.SLIDING or not vector.factors:
             pair = vector.factors[0].symbol.partition(" at ")[2] if vector.factors else ""
             given = pair in self.polygon.state.inputs
             return (
                 f"{'given' if given else 'by the pair'} at {pair}: " if pair else "",
-                self.number(size, self.polygon.kind),
+                self.format_number(size, self.polygon.kind),
             )
-        whole = (" = ", self.number(size, self.polygon.kind))
-        if vector.part is Part.CENTRIPETAL:
+        whole = (" = ", self.format_number(size, self.polygon.kind))
+        if vector.part is VectorPart.CENTRIPETAL:
             speed, length = vector.factors
-            over: Phrase = (Raised(self._speed(vector), speed.power),)
-            numbers: Phrase = (Raised((f"({self.number(speed.value, speed.kind)})",), speed.power),)
+            over: Phrase = (Power(self._speed(vector), speed.power),)
+            numbers: Phrase = (Power((f"({self.format_number(speed.value, speed.kind)})",), speed.power),)
             return (
                 Fraction(over, self._factor(length)),
                 " = ",
-                Fraction(numbers, (self.number(length.value, length.kind),)),
+                Fraction(numbers, (self.format_number(length.value, length.kind),)),
                 *whole,
             )
-        symbols: list[Piece] = []
+        symbols: list[PhrasePiece] = []
         for factor in vector.factors:
             told = self._speed(vector) if factor.kind == "velocity" else self._factor(factor)
             symbols += [*([" × "] if symbols else []), *told]
         values = [
-            self.number(factor.value if abs(factor.value) > NONE * self._rate(factor) else 0.0, factor.kind)
+            self.format_number(
+                factor.value if abs(factor.value) > NEGLIGIBLE_RATIO * self._greatest_rate(factor) else 0.0, factor.kind
+            )
             for factor in vector.factors
         ]
         return (*symbols, " = ", " × ".join(values), *whole)
 
-    def _rate(self, factor: Factor) -> float:
+    def _greatest_rate(self, factor: Factor) -> float:
         """The greatest rate of a factor's kind, beside which it is none."""
         links = self.polygon.state.links.values()
         greatest = {
@@ -190,9 +203,18 @@ class Notation:
         }
         return greatest.get(factor.kind, 0.0)
 
-    def _speed(self, vector: Vector) -> Phrase:
+    def _speed(self, vector: PolygonVector) -> Phrase:
         """A relative velocity as it was drawn: (ab)."""
-        return ("(", Chord(*(Spot(primed(self._small(point))) for point in (vector.against, vector.of))), ")")
+        return (
+            "(",
+            Chord(
+                *(
+                    PolygonLetter(with_double_primes(self._velocity_letter(point)))
+                    for point in (vector.against, vector.of)
+                )
+            ),
+            ")",
+        )
 
     def _factor(self, factor: Factor) -> Phrase:
         if factor.kind == "pure":
@@ -202,79 +224,91 @@ class Notation:
             return (Symbol(letter, below),)
         return (Name(factor.symbol),)
 
-    def direction(self, vector: Vector) -> Phrase:
+    def direction(self, vector: PolygonVector) -> Phrase:
         """∥ AB, ⊥ BC, ∥ line of motion of B."""
-        return ("⊥ " if vector.square else "∥ ", *self.line(vector))
+        return ("⊥ " if vector.is_perpendicular else "∥ ", *self.line(vector))
 
-    def line(self, vector: Vector) -> Phrase:
+    def line(self, vector: PolygonVector) -> Phrase:
         """What a vector is parallel or square to."""
         for words in ("line of motion of ", "line on "):
             if vector.line.startswith(words):
                 return (words, Name(vector.line.removeprefix(words)))
         return (Name(vector.line),)
 
-    def sense(self, vector: Vector) -> Phrase:
+    def sense(self, vector: PolygonVector) -> Phrase:
         """→ A, → a, or words."""
-        if not vector.known or not vector.towards or not self.size(vector.value):
-            return UNKNOWN
-        if vector.part is Part.CENTRIPETAL:
+        if not vector.known or not vector.towards or not self.vector_length(vector.value):
+            return UNKNOWN_PHRASE
+        if vector.part is VectorPart.CENTRIPETAL:
             return ("→ ", Name(vector.towards))
-        if vector.part is Part.TANGENTIAL and self._turned(vector):
-            return ("→ ", Spot(vector.towards))
+        if vector.part is VectorPart.TANGENTIAL and self._is_towards_letter(vector):
+            return ("→ ", PolygonLetter(vector.towards))
         return (vector.towards,)
 
-    def _turned(self, vector: Vector) -> bool:
+    def _is_towards_letter(self, vector: PolygonVector) -> bool:
         """Whether its sense is told by a letter of the velocity polygon."""
         return vector.towards in {
             self.letters.get(point, "").removesuffix("_1") for point in (vector.of, vector.against)
         }
 
-    def aimed(self, vector: Vector) -> Phrase:
+    def direction_and_sense(self, vector: PolygonVector) -> Phrase:
         """The direction and sense of a known vector in a sentence: parallel to AB, towards A."""
-        found: Phrase = ("square to " if vector.square else "parallel to ", *self._to(vector))
-        if vector.part is Part.CENTRIPETAL:
+        found: Phrase = ("square to " if vector.is_perpendicular else "parallel to ", *self._line_with_article(vector))
+        if vector.part is VectorPart.CENTRIPETAL:
             return (*found, ", towards ", Name(vector.towards))
-        if vector.part is Part.TANGENTIAL and self._turned(vector):
+        if vector.part is VectorPart.TANGENTIAL and self._is_towards_letter(vector):
             other = next(
-                (letter for point in (vector.of, vector.against) if (letter := self._small(point)) != vector.towards),
+                (
+                    letter
+                    for point in (vector.of, vector.against)
+                    if (letter := self._velocity_letter(point)) != vector.towards
+                ),
                 "",
             )
-            return (*found, ", in the sense of ", Chord(Spot(other), Spot(vector.towards)), " in the velocity polygon")
+            return (
+                *found,
+                ", in the sense of ",
+                Chord(PolygonLetter(other), PolygonLetter(vector.towards)),
+                " in the velocity polygon",
+            )
         return (*found, ", ", vector.towards) if vector.towards else found
 
-    def _small(self, point: str) -> str:
+    def _velocity_letter(self, point: str) -> str:
         return self.letters.get(point, point).removesuffix("_1")
 
-    def _to(self, vector: Vector) -> Phrase:
+    def _line_with_article(self, vector: PolygonVector) -> Phrase:
         words = self.line(vector)
         return ("the ", *words) if isinstance(words[0], str) else words
 
-    def ruled(self, vector: Vector) -> Phrase:
+    def line_to_draw(self, vector: PolygonVector) -> Phrase:
         """The line of a vector whose direction alone is known, in a sentence: a line square to BC."""
-        return ("a line square to " if vector.square else "a line parallel to ", *self._to(vector))
+        return (
+            "a line square to " if vector.is_perpendicular else "a line parallel to ",
+            *self._line_with_article(vector),
+        )
 
-    def root(self, letter: str) -> str:
+    def pole_letter(self, letter: str) -> str:
         """The letter at the pole that belongs to the links by which a letter is found."""
         seen: set[str] = set()
         while letter not in self.poles and letter not in seen:
             seen.add(letter)
-            sources = self._sources(letter)
+            sources = self._source_letters(letter)
             at_pole = [each for each in sources if each in self.poles]
             if at_pole or not sources:
                 return at_pole[-1] if at_pole else (self.poles[0] if self.poles else letter)
             letter = sources[0]
         return letter if letter in self.poles else (self.poles[0] if self.poles else letter)
 
-    def _sources(self, letter: str) -> list[str]:
+    def _source_letters(self, letter: str) -> list[str]:
         for stage in self.polygon.stages:
             if isinstance(stage, Meeting):
                 if letter == stage.letter or any(letter == v.head for side in stage.sides for v in side.vectors):
                     # the side along one link last: that link's fixed point is what a chapter measures from
                     sides = sorted(stage.sides, key=lambda side: -len({(v.of, v.against) for v in side.vectors}))
                     return [side.start for side in sides if side.vectors and side.start != letter]
-            elif isinstance(stage, Triangle):
+            elif isinstance(stage, PointImage):
                 if self.letters.get(stage.point) == letter:
                     return [self.letters[point] for point in stage.base if point in self.letters]
-            elif isinstance(stage, Simultaneous) and letter in stage.letters:
+            elif isinstance(stage, SimultaneousSolution) and letter in stage.letters:
                 return []
         return []

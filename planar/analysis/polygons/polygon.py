@@ -14,7 +14,7 @@ from planar.results.motion import State
 Array = np.ndarray
 
 
-class Part(Enum):
+class VectorPart(Enum):
     """What part of a relative velocity or acceleration a vector is."""
 
     ROTATION = "rotation"
@@ -26,14 +26,14 @@ class Part(Enum):
     CORIOLIS = "Coriolis"
 
 
-class Vector(NamedTuple):
+class PolygonVector(NamedTuple):
     """One row of a vector table: the velocity (m/s) or acceleration (m/s^2) of point `of` relative to `against`.
 
     `tail` and `head` are letters of the polygon. Its magnitude is `known` before the polygon is drawn or not; where it
     is, it is made of `factors`, else its direction alone is known. `line` is what it is parallel or square to.
     """
 
-    part: Part
+    part: VectorPart
     of: str
     "name of a point in the space diagram: B"
     against: str
@@ -42,7 +42,7 @@ class Vector(NamedTuple):
     value: Array
     "(2,)"
     known: bool
-    square: bool
+    is_perpendicular: bool
     "its direction is square to `line`, else parallel"
     line: str
     "AB, or `line of motion of B`; empty where it is already drawn"
@@ -63,7 +63,7 @@ class Factor(NamedTuple):
     "length, velocity, angular velocity, angular acceleration, or pure"
 
 
-class Triangle(NamedTuple):
+class PointImage(NamedTuple):
     """Points of a link by their images: on a line in a ratio, or by a triangle similar to that of the link."""
 
     link: str
@@ -76,11 +76,11 @@ class Triangle(NamedTuple):
     "`clockwise` or `anticlockwise`: how base and point are read; empty on a line; `same` where all have one letter"
 
 
-class Side(NamedTuple):
+class MeetingSide(NamedTuple):
     """One way to a point: from a letter that is drawn, vector after vector, the unknown one last."""
 
     start: str
-    vectors: tuple[Vector, ...]
+    vectors: tuple[PolygonVector, ...]
 
 
 class Meeting(NamedTuple):
@@ -92,10 +92,10 @@ class Meeting(NamedTuple):
     links: tuple[str, ...]
     point: str
     letter: str
-    sides: tuple[Side, ...]
+    sides: tuple[MeetingSide, ...]
 
 
-class Equation(NamedTuple):
+class LoopEquation(NamedTuple):
     """One component of a vector equation round a loop: sum of coefficient times unknown = known (SI)."""
 
     loop: tuple[str, ...]
@@ -107,25 +107,25 @@ class Equation(NamedTuple):
     known: float
 
 
-class Unknown(NamedTuple):
+class SolvedRate(NamedTuple):
     """A rate that equations give (SI): of a link that turns, or along a line."""
 
     name: str
     value: float
-    turns: bool
+    is_angular: bool
 
 
-class Simultaneous(NamedTuple):
+class SimultaneousSolution(NamedTuple):
     """A group that no two lines locate: its equations and the unknowns that solve them."""
 
     links: tuple[str, ...]
-    equations: tuple[Equation, ...]
-    unknowns: tuple[Unknown, ...]
+    equations: tuple[LoopEquation, ...]
+    unknowns: tuple[SolvedRate, ...]
     letters: tuple[str, ...]
     "that are found by it"
 
 
-class Turn(NamedTuple):
+class TurningRate(NamedTuple):
     """How fast a link turns, read from the polygon: ω_BC = bc / BC, α_BC = c_b c1 / BC (SI, anticlockwise positive)."""
 
     link: str
@@ -141,7 +141,7 @@ class Turn(NamedTuple):
     "the input, or the pair, from which it is known otherwise"
 
 
-Stage = Meeting | Triangle | Simultaneous | Turn
+DrawingStage = Meeting | PointImage | SimultaneousSolution | TurningRate
 
 
 @dataclass(frozen=True)
@@ -157,7 +157,7 @@ class Polygon:
     "every letter, those of heads of parts (b_a) included"
     points: dict[str, str]
     "the point of the space diagram for each letter that is no head of a part"
-    stages: tuple[Stage, ...]
+    stages: tuple[DrawingStage, ...]
     "in the order of drawing"
-    below: Mapping[str, tuple[str, str]]
+    points_underneath: Mapping[str, tuple[str, str]]
     "for each letter of a point that has no name in the mechanism its link, and the point of another that it lies at"

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planar.analysis.polygons.notation import NONE, Notation
-from planar.analysis.polygons.polygon import Meeting, Part, Simultaneous, Turn, Vector
-from planar.analysis.rich_text import Fraction, Name, Phrase, Quantity, Symbol
-from planar.model.mechanism import motions
-from planar.model.wording import heading
+from planar.analysis.polygons.notation import NEGLIGIBLE_RATIO, Notation
+from planar.analysis.polygons.polygon import Meeting, PolygonVector, SimultaneousSolution, TurningRate, VectorPart
+from planar.analysis.rich_text import Fraction, MeasuredValue, Name, Phrase, Symbol
+from planar.model.mechanism import relative_motions
+from planar.model.wording import direction_sense
 
-MOTION = "line of motion"
+LINE_OF_MOTION = "line of motion"
 
 
 @dataclass(frozen=True)
@@ -22,24 +22,26 @@ class Readings:
 
     notation: Notation
 
-    def turn(self, turn: Turn) -> Phrase:
+    def turning_reading(self, turn: TurningRate) -> Phrase:
         """ω_BC = bc/BC = 0.340/0.066 = 5.15 rad/s, clockwise."""
         order = self.notation.order
         symbol = Symbol("ω" if order == 1 else "α", turn.link)
         still = turn.sense == "at rest"
-        value = Quantity(0.0 if still else abs(turn.value), ("rad/s", "rad/s^2")[order - 1])
+        value = MeasuredValue(0.0 if still else abs(turn.value), ("rad/s", "rad/s^2")[order - 1])
         sense = "" if still else f", {turn.sense}"
         if not turn.vector[0]:
             source = self._source(turn.by)
             if still:
-                how = "does not turn" if order == 1 or not self._turns(turn.link) else "turns at a uniform rate"
+                how = "does not turn" if order == 1 or not self._is_turning(turn.link) else "turns at a uniform rate"
                 return (f"{source} {turn.by}: ", symbol, f" = 0: {turn.link} {how}")
             return (f"{source} {turn.by}: ", symbol, " = ", value, sense)
         chord: Phrase = (self.notation.chord(*turn.vector),)
         if still:
-            how = "neither gains nor loses speed here" if order == 2 and self._turns(turn.link) else "does not turn"
+            how = (
+                "neither gains nor loses speed here" if order == 2 and self._is_turning(turn.link) else "does not turn"
+            )
             return (symbol, " = ", Fraction(chord, (Name(turn.line),)), f" = 0: {turn.link} {how}")
-        told = self.notation.number
+        told = self.notation.format_number
         numbers = Fraction((told(turn.magnitude, self.notation.polygon.kind),), (told(turn.length, "length"),))
         return (symbol, " = ", Fraction(chord, (Name(turn.line),)), " = ", numbers, " = ", value, sense)
 
@@ -49,22 +51,26 @@ class Readings:
         if pair not in state.inputs:
             return "By the pair"
         return (
-            "Given at the input" if state.mechanism.frame in motions(state.mechanism)[pair].links else "With the input"
+            "Given at the input"
+            if state.mechanism.frame in relative_motions(state.mechanism)[pair].links
+            else "With the input"
         )
 
-    def _turns(self, link: str) -> bool:
+    def _is_turning(self, link: str) -> bool:
         return self.notation.polygon.state.link(link).sense != "at rest"
 
-    def point(self, meeting: Meeting) -> Iterator[Phrase]:
+    def meeting_readings(self, meeting: Meeting) -> Iterator[Phrase]:
         """v_C = dc = 0.400 m/s, with the sense, of every point on the way; of sliders also whether they speed up."""
         vectors = [vector for side in meeting.sides for vector in side.vectors]
         points = self.notation.polygon.points
         passed = dict.fromkeys(points[vector.head] for vector in vectors if vector.head in points)
         for point in (*(each for each in passed if each != meeting.point), meeting.point):
-            slid = any(v.part is Part.SLIDING and v.of == point and v.line.startswith(MOTION) for v in vectors)
-            yield from self.of_point(point, slid)
+            slid = any(
+                v.part is VectorPart.SLIDING and v.of == point and v.line.startswith(LINE_OF_MOTION) for v in vectors
+            )
+            yield from self.point_readings(point, slid)
 
-    def of_point(self, point: str, slider: bool = False) -> Iterator[Phrase]:
+    def point_readings(self, point: str, slider: bool = False) -> Iterator[Phrase]:
         """The velocity or the acceleration of a point of the mechanism, from the pole."""
         notation = self.notation
         state = notation.polygon.state
@@ -73,18 +79,18 @@ class Readings:
         letter = notation.letters[point]
         if letter in notation.poles:
             return
-        root = notation.root(letter)
+        root = notation.pole_letter(letter)
         value = notation.polygon.letters[letter]
-        size = notation.size(value)
+        size = notation.vector_length(value)
         symbol = Symbol("v" if notation.order == 1 else "a", point)
         chord = notation.chord(root, letter)
         told = (symbol, " = ", chord, " = ", notation.quantity(size))
         if not size:
             yield (*told, ": it is at rest" if notation.order == 1 else ": its velocity does not change")
             return
-        yield (*told, f", {heading(value)}", *(self._hurries(point, value) if slider else ()))
+        yield (*told, f", {direction_sense(value)}", *(self._change_of_speed(point, value) if slider else ()))
 
-    def _hurries(self, point: str, value: np.ndarray) -> Phrase:
+    def _change_of_speed(self, point: str, value: np.ndarray) -> Phrase:
         """Whether a slider's acceleration is in the direction of its velocity."""
         if self.notation.order == 1:
             return ()
@@ -97,32 +103,32 @@ class Readings:
             return ("; in the direction of ", Symbol("v", point), ": the slider speeds up")
         return ("; against ", Symbol("v", point), ": the slider slows down")
 
-    def slides(self, meeting: Meeting) -> Iterator[Phrase]:
+    def slide_readings(self, meeting: Meeting) -> Iterator[Phrase]:
         """How fast something slides along a line that moves."""
         for side in meeting.sides:
             for vector in side.vectors:
-                if vector.part is Part.SLIDING and vector.line.startswith("line on"):
-                    yield self._slide(vector)
+                if vector.part is VectorPart.SLIDING and vector.line.startswith("line on"):
+                    yield self._slide_reading(vector)
 
-    def _slide(self, vector: Vector) -> Phrase:
+    def _slide_reading(self, vector: PolygonVector) -> Phrase:
         chord = self.notation.chord(vector.tail, vector.head)
-        size = self.notation.size(vector.value)
+        size = self.notation.vector_length(vector.value)
         what = "sliding along the " if self.notation.order == 1 else "acceleration along the "
         words = (what, *self.notation.line(vector))
         symbol = self.notation.symbol(vector.of, vector.against, vector.part)
-        sense = f", {heading(vector.value)}" if size else ""
+        sense = f", {direction_sense(vector.value)}" if size else ""
         return (symbol, " = ", chord, " = ", self.notation.quantity(size), f"{sense}: ", *words)
 
-    def together(self, stage: Simultaneous) -> Iterator[Phrase]:
+    def simultaneous_readings(self, stage: SimultaneousSolution) -> Iterator[Phrase]:
         """The rates and the points that simultaneous equations give."""
         order = self.notation.order
-        scale = max((abs(each.value) for each in stage.unknowns if each.turns), default=0.0)
+        scale = max((abs(each.value) for each in stage.unknowns if each.is_angular), default=0.0)
         for each in stage.unknowns:
             link = each.name.partition("_")[2]
-            if each.turns and link in self.notation.polygon.state.links:
-                value = each.value if abs(each.value) > NONE * scale else 0.0
+            if each.is_angular and link in self.notation.polygon.state.links:
+                value = each.value if abs(each.value) > NEGLIGIBLE_RATIO * scale else 0.0
                 sense = "" if not value else ", anticlockwise" if value > 0.0 else ", clockwise"
                 unit = ("rad/s", "rad/s^2")[order - 1]
-                yield (Symbol("ω" if order == 1 else "α", link), " = ", Quantity(abs(value), unit), sense)
+                yield (Symbol("ω" if order == 1 else "α", link), " = ", MeasuredValue(abs(value), unit), sense)
         for letter in stage.letters:
-            yield from self.of_point(self.notation.polygon.points.get(letter, ""))
+            yield from self.point_readings(self.notation.polygon.points.get(letter, ""))

@@ -7,96 +7,97 @@ from math import atan2
 
 import numpy as np
 
-from planar.analysis.rate_equations import Slide, rates
-from planar.analysis.rich_text import Phrase, Quantity, listed
-from planar.foundation.units import own, unit
-from planar.model.mechanism import Along, At, Distances, Link, Mechanism, Units, entries, motions
-from planar.model.pairs import Kind, Pair
-from planar.model.wording import amount, turning
+from planar.analysis.rate_equations import SlideJoint, rate_equations
+from planar.analysis.rich_text import MeasuredValue, Phrase, list_phrases
+from planar.foundation.units import parse_unit, unit_of_kind
+from planar.model.mechanism import Along, At, Distances, FileUnits, Link, Mechanism, pair_entries, relative_motions
+from planar.model.pairs import MeasureKind, Pair
+from planar.model.wording import amount, turning_sense
 from planar.results.motion import State
 from planar.results.records import InputState
 
 
-def given(state: State) -> Iterator[Phrase]:
+def given_data(state: State) -> Iterator[Phrase]:
     """Links with their lengths, pairs, and inputs with their rates."""
     mechanism = state.mechanism
     for link in mechanism.links:
-        yield from _link(mechanism, link)
+        yield from _link_phrases(mechanism, link)
     pairs: dict[str, list[Pair]] = {}
-    for group in entries(mechanism):
+    for group in pair_entries(mechanism):
         pairs.setdefault(type(group[0]).keyword, []).append(group[0])
     for kind, group in pairs.items():
         many = "s" * (len(group) > 1)
-        yield (f"{kind.capitalize()} pair{many}: ", *_pairs(group, state), ".")
-    named = motions(mechanism)
+        yield (f"{kind.capitalize()} pair{many}: ", *_pair_phrases(group, state), ".")
+    named = relative_motions(mechanism)
     for pair, driven in state.inputs.items():
-        yield _input(mechanism, named[pair], driven)
+        yield _input_phrase(mechanism, named[pair], driven)
 
 
-def _pairs(group: Sequence[Pair], state: State) -> Phrase:
+def _pair_phrases(group: Sequence[Pair], state: State) -> Phrase:
     said: list[Phrase] = []
-    slides = {slide.name: slide for slide in rates(state).slides}
+    slides = {slide.name: slide for slide in rate_equations(state).slides}
     for pair in group:
-        rides = pair.rides()
-        sizes = pair.sizes_told(lambda value: _amount(value, "length", state.mechanism.units))
+        rides = pair.point_on_line()
+        sizes = pair.describe_sizes(lambda value: _format_amount(value, "length", state.mechanism.units))
         more = f"; {sizes}" if sizes else ""
         if rides is not None:
             (rider, point), guide = rides
-            line = _guide(state, slides[pair.name]) if guide == state.mechanism.frame else ""
+            line = _guide_line(state, slides[pair.name]) if guide == state.mechanism.frame else ""
             said.append((f"{pair.name} ({point} of {rider} on {guide}{line}{more})",))
-        elif pair.coincident():
+        elif pair.coincident_points():
             said.append((pair.entry_name(),))
         else:
             said.append((f"{pair.name} ({' and '.join(pair.links)}{more})",))
-    return listed(said)
+    return list_phrases(said)
 
 
-def _guide(state: State, slide: Slide) -> str:
+def _guide_line(state: State, slide: SlideJoint) -> str:
     """Where a fixed line is: its direction, and the point of it that is nearest to the origin."""
     if slide.line is None:
         return ""
     units, way = state.mechanism.units, slide.line[0]
-    place = rates(state).at(slide.rider, slide.point)
+    place = rate_equations(state).point_position(slide.rider, slide.point)
     foot = place - (place @ way) * way
     foot[np.abs(foot) <= 1e-9 * (np.hypot(*place) or 1.0)] = 0.0
     way = np.where(np.abs(way) <= 1e-12, 0.0, way)
-    angle = _amount(atan2(way[1], way[0]), "angle", units)
-    x, y = (_minus(unit(units.length).from_si(float(each))) for each in foot)
+    angle = _format_amount(atan2(way[1], way[0]), "angle", units)
+    x, y = (_format_signed(parse_unit(units.length).from_si(float(each))) for each in foot)
     return f", along a line at {angle} through ({x}, {y}) {units.length}"
 
 
-def _amount(value: float, kind: str, units: Units) -> str:
+def _format_amount(value: float, kind: str, units: FileUnits) -> str:
     return amount(value, kind, units).replace("-", "−", 1) if value < 0.0 else amount(value, kind, units)
 
 
-def _link(mechanism: Mechanism, link: Link) -> Iterator[Phrase]:
+def _link_phrases(mechanism: Mechanism, link: Link) -> Iterator[Phrase]:
     """What is known of a link's shape: AB = 50 mm; E on BC, BE = 40 mm."""
     units = mechanism.units
     told: list[str] = []
     if link.ends is not None and link.length is not None:
-        told.append(f"{_line(*link.ends)} = {_amount(float(link.length), 'length', units)}")
-    size = unit(units.length)
+        told.append(f"{_line_name(*link.ends)} = {_format_amount(float(link.length), 'length', units)}")
+    size = parse_unit(units.length)
     placed = [point for point in link.points if isinstance(point.place, At)]
     if placed and (link.name == mechanism.frame or len(link.names) > 1):
         spots = [
-            f"{point.name} ({', '.join(_minus(size.from_si(float(each))) for each in point.place)})" for point in placed
+            f"{point.name} ({', '.join(_format_signed(size.from_si(float(each))) for each in point.place)})"
+            for point in placed
         ]
         told.append(f"{', '.join(spots)} {units.length}")
     for point in link.points:
         place = point.place
         if isinstance(place, Along):
-            way = f"{_line(place.start, place.towards)}"
+            way = f"{_line_name(place.start, place.towards)}"
             back = " produced back" if float(place.distance) < 0.0 else ""
             whole = link.length if link.ends and {place.start, place.towards} == set(link.ends) else None
             if whole is not None and not float(place.angle) and float(place.distance) > float(whole) * (1.0 + 1e-9):
                 back = " produced"
-            turned = _amount(float(place.angle), "angle", units) if float(place.angle) else ""
+            turned = _format_amount(float(place.angle), "angle", units) if float(place.angle) else ""
             where = f", at {turned} from {way}{back}" if turned else f" on {way}{back}"
-            away = _amount(abs(float(place.distance)), "length", units)
-            told.append(f"{point.name}{where}, {_line(place.start, point.name)} = {away}")
+            away = _format_amount(abs(float(place.distance)), "length", units)
+            told.append(f"{point.name}{where}, {_line_name(place.start, point.name)} = {away}")
         elif isinstance(place, Distances):
             lengths = [
-                f"{_line(end, point.name)} = {_amount(float(each), 'length', units)}"
+                f"{_line_name(end, point.name)} = {_format_amount(float(each), 'length', units)}"
                 for end, each in ((place.first, place.from_first), (place.second, place.from_second))
             ]
             side = "left" if place.left else "right"
@@ -106,52 +107,56 @@ def _link(mechanism: Mechanism, link: Link) -> Iterator[Phrase]:
         yield (f"{what} {link.name}: {'; '.join(told)}.",)
 
 
-def _minus(value: float) -> str:
+def _format_signed(value: float) -> str:
     return f"{value + 0.0:.6g}".replace("-", "−")
 
 
-def _line(p: str, q: str) -> str:
+def _line_name(p: str, q: str) -> str:
     return p + q if max(len(p), len(q)) <= 2 else f"{p}-{q}"
 
 
-def _input(mechanism: Mechanism, pair: Pair, driven: InputState) -> Phrase:
+def _input_phrase(mechanism: Mechanism, pair: Pair, driven: InputState) -> Phrase:
     """An input with its rates and their senses."""
     position, velocity, acceleration = driven
-    at = _amount(position, "length" if pair.drive_kind is Kind.LENGTH else "angle", mechanism.units)
+    at = _format_amount(position, "length" if pair.input_kind is MeasureKind.LENGTH else "angle", mechanism.units)
     first, second = pair.links
-    if pair.drive_kind is Kind.LENGTH:
-        return (f"Input at {pair.name}: {at}; ", *_shifts(second, first, velocity, acceleration, mechanism.units), ".")
+    if pair.input_kind is MeasureKind.LENGTH:
+        return (
+            f"Input at {pair.name}: {at}; ",
+            *_sliding_phrase(second, first, velocity, acceleration, mechanism.units),
+            ".",
+        )
     moves = second if first == mechanism.frame else first if second == mechanism.frame else f"{second} against {first}"
     if not velocity and not acceleration:
         return (f"Input at {pair.name}: {at}; {moves} is held.",)
     uniformly = "uniformly " if velocity and not acceleration else ""
-    found: Phrase = (f"Input at {pair.name}: {at}; {moves} turns {uniformly}", *_turns(velocity))
+    found: Phrase = (f"Input at {pair.name}: {at}; {moves} turns {uniformly}", *_turning_phrase(velocity))
     if acceleration:
         how = "speeds up" if velocity * acceleration > 0.0 else "slows down" if velocity else "begins to turn"
         found = (
             *found,
             f" and {how} at ",
-            Quantity(abs(acceleration), "rad/s^2"),
-            "" if velocity else f" {turning(acceleration)}",
+            MeasuredValue(abs(acceleration), "rad/s^2"),
+            "" if velocity else f" {turning_sense(acceleration)}",
         )
     return (*found, ".")
 
 
-def _shifts(second: str, first: str, velocity: float, acceleration: float, units: Units) -> Phrase:
+def _sliding_phrase(second: str, first: str, velocity: float, acceleration: float, units: FileUnits) -> Phrase:
     if not velocity and not acceleration:
         return (f"{second} is held on {first}",)
-    found: Phrase = (f"{second} slides on {first} at ", _told(velocity, "velocity", units), " along the line")
+    found: Phrase = (f"{second} slides on {first} at ", _rate_value(velocity, "velocity", units), " along the line")
     if not acceleration:
         return (*found, ", uniformly")
-    return (*found, ", with an acceleration of ", _told(acceleration, "acceleration", units))
+    return (*found, ", with an acceleration of ", _rate_value(acceleration, "acceleration", units))
 
 
-def _told(value: float, kind: str, units: Units) -> Quantity:
-    name, of = own(kind, units)
-    return Quantity(value, name, by=of.from_si(1.0))
+def _rate_value(value: float, kind: str, units: FileUnits) -> MeasuredValue:
+    name, of = unit_of_kind(kind, units)
+    return MeasuredValue(value, name, units_per_si=of.from_si(1.0))
 
 
-def _turns(velocity: float) -> Phrase:
+def _turning_phrase(velocity: float) -> Phrase:
     if not velocity:
         return ("not yet",)
-    return (f"{turning(velocity)} at ", Quantity(abs(velocity), "rad/s"))
+    return (f"{turning_sense(velocity)} at ", MeasuredValue(abs(velocity), "rad/s"))

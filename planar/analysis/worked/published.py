@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from planar.model.mechanism import Drive, Published
-from planar.model.wording import heading, listed, turning
+from planar.model.mechanism import Drive, PublishedValue
+from planar.model.wording import direction_sense, join_all_names, turning_sense
 from planar.results.motion import State
 from planar.solving.position import solve
 
@@ -20,10 +20,10 @@ class Comparison:
     `apart` is (printed - solved) / solved, None where nothing is printed or the solved value is zero.
     """
 
-    published: Published
+    published: PublishedValue
     solved: float
     sense: str
-    apart: float | None
+    relative_difference: float | None
     verdict: str
 
     @property
@@ -33,7 +33,7 @@ class Comparison:
         text = f"{item.component + ' of ' if item.component else ''}{item.quantity} of {item.of}"
         text += f" relative to {item.relative_to}" if item.relative_to else ""
         changed = [drive.pair for drive in item.inputs]
-        return f"{text} (other input at {listed(changed)})" if changed else text
+        return f"{text} (other input at {join_all_names(changed)})" if changed else text
 
     def record(self) -> dict[str, Any]:
         """It as a JSON value (SI)."""
@@ -48,7 +48,7 @@ class Comparison:
         }
 
 
-def compare(state: State) -> tuple[Comparison, ...]:
+def compare_published(state: State) -> tuple[Comparison, ...]:
     """Every quantity that the mechanism's file says was published, with its solved value."""
     known: dict[tuple[Drive, ...], State] = {(): state}
 
@@ -57,12 +57,12 @@ def compare(state: State) -> tuple[Comparison, ...]:
             known[drives] = solve(state.mechanism, drives)
         return known[drives]
 
-    return tuple(_compared(item, at(item.inputs), at(item.start)) for item in state.mechanism.published)
+    return tuple(_compare(item, at(item.inputs), at(item.start)) for item in state.mechanism.published)
 
 
-def _compared(item: Published, state: State, start: State) -> Comparison:
-    value = _value(item, state, start)
-    solved, sense = (value, _turn(item, value)) if isinstance(value, float) else _told(item, value)
+def _compare(item: PublishedValue, state: State, start: State) -> Comparison:
+    value = _solved_value(item, state, start)
+    solved, sense = (value, _turning_sense(item, value)) if isinstance(value, float) else _size_and_sense(item, value)
     if item.value is None:
         return Comparison(item, solved, sense, None, "not printed")
     printed = item.value if item.component is not None else abs(item.value)
@@ -79,20 +79,20 @@ def _compared(item: Published, state: State, start: State) -> Comparison:
     return Comparison(item, solved, sense, apart, verdict)
 
 
-def _turn(item: Published, value: float) -> str:
-    return turning(value) if item.quantity.startswith("angular") else ""
+def _turning_sense(item: PublishedValue, value: float) -> str:
+    return turning_sense(value) if item.quantity.startswith("angular") else ""
 
 
-def _told(item: Published, value: np.ndarray) -> tuple[float, str]:
+def _size_and_sense(item: PublishedValue, value: np.ndarray) -> tuple[float, str]:
     """The magnitude of a vector, or its component where one is asked for, with its sense."""
     if item.component is not None:
-        return float(value["xy".index(item.component)]), heading(value)
-    return float(np.hypot(*value)), heading(value)
+        return float(value["xy".index(item.component)]), direction_sense(value)
+    return float(np.hypot(*value)), direction_sense(value)
 
 
-def _value(item: Published, state: State, start: State) -> float | np.ndarray:
+def _solved_value(item: PublishedValue, state: State, start: State) -> float | np.ndarray:
     if item.quantity in ("angular velocity", "angular acceleration"):
-        return _angular(item, state)
+        return _angular_value(item, state)
     of_pair = {
         "rubbing speed": "rubbing_speed",
         "displacement": "displacement",
@@ -121,6 +121,6 @@ def _value(item: Published, state: State, start: State) -> float | np.ndarray:
     return {"velocity": point.velocity, "acceleration": point.acceleration}[item.quantity]
 
 
-def _angular(item: Published, state: State) -> float:
+def _angular_value(item: PublishedValue, state: State) -> float:
     link = state.link(item.of)
     return link.angular_velocity if item.quantity == "angular velocity" else link.angular_acceleration

@@ -10,22 +10,22 @@ import numpy as np
 
 from planar.analysis.polygons.construction import acceleration_polygon, velocity_polygon
 from planar.analysis.polygons.polygon import Polygon
-from planar.analysis.rich_text import Phrase, Quantity, Symbol, joined, number
-from planar.analysis.worked.givens import given
+from planar.analysis.rich_text import MeasuredValue, Phrase, Symbol, format_number, join_phrases
+from planar.analysis.worked.givens import given_data
 from planar.analysis.worked.published import Comparison
 from planar.analysis.worked.sections import Section, sections
-from planar.foundation.units import own
-from planar.model.mechanism import QUANTITIES, Published, motions
-from planar.model.pairs import Kind
-from planar.model.wording import STILL, heading, turning
-from planar.model.wording import listed as words_listed
+from planar.foundation.units import unit_of_kind
+from planar.model.mechanism import PUBLISHED_QUANTITIES, PublishedValue, relative_motions
+from planar.model.pairs import MeasureKind
+from planar.model.wording import REST_TOLERANCE, direction_sense, turning_sense
+from planar.model.wording import join_all_names as words_listed
 from planar.results.motion import State
 
-WANTED = ("velocity", "acceleration", "angular velocity", "angular acceleration")
+POLYGON_QUANTITIES = ("velocity", "acceleration", "angular velocity", "angular acceleration")
 """Kinds of quantity that are read off the polygons."""
 
 
-class Worked(NamedTuple):
+class WorkedPolygon(NamedTuple):
     """One polygon, worked out: `kind` is velocity or acceleration."""
 
     kind: str
@@ -63,14 +63,14 @@ class SlideResult(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Solution:
+class WorkedSolution:
     """A worked solution of one position."""
 
     state: State
     given: tuple[Phrase, ...]
     asked: tuple[Phrase, ...]
-    velocity: Worked
-    acceleration: Worked
+    velocity: WorkedPolygon
+    acceleration: WorkedPolygon
     links: tuple[LinkResult, ...]
     points: tuple[PointResult, ...]
     slides: tuple[SlideResult, ...]
@@ -80,33 +80,34 @@ class Solution:
     "of its published values"
 
     @property
-    def halves(self) -> tuple[Worked, Worked]:
+    def worked_polygons(self) -> tuple[WorkedPolygon, WorkedPolygon]:
         """Velocity, then acceleration."""
         return self.velocity, self.acceleration
 
 
-def worked_solution(state: State, comparisons: Sequence[Comparison] = ()) -> Solution:
+def worked_solution(state: State, comparisons: Sequence[Comparison] = ()) -> WorkedSolution:
     """The worked solution of a solved position; `comparisons` lay its published values beside the solved ones."""
     halves = [
-        Worked(each.kind, each, sections(each)) for each in (velocity_polygon(state), acceleration_polygon(state))
+        WorkedPolygon(each.kind, each, sections(each))
+        for each in (velocity_polygon(state), acceleration_polygon(state))
     ]
-    return Solution(
+    return WorkedSolution(
         state,
-        tuple(given(state)),
-        tuple(_asked(state.mechanism.published)),
+        tuple(given_data(state)),
+        tuple(_asked_for(state.mechanism.published)),
         *halves,
-        tuple(_links(state)),
-        tuple(_points(state)),
-        tuple(_slides(state)),
-        tuple(_rubbing(state)),
+        tuple(_link_results(state)),
+        tuple(_point_results(state)),
+        tuple(_slide_results(state)),
+        tuple(_rubbing_speeds(state)),
         tuple(comparisons),
     )
 
 
-def _asked(published: Sequence[Published]) -> Iterator[Phrase]:
+def _asked_for(published: Sequence[PublishedValue]) -> Iterator[Phrase]:
     """What the book asks for, else all that there is."""
     found: dict[str, list[str]] = {}
-    wanted = [item for item in published if QUANTITIES[item.quantity] in WANTED]
+    wanted = [item for item in published if PUBLISHED_QUANTITIES[item.quantity] in POLYGON_QUANTITIES]
     for item in sorted(wanted, key=lambda item: item.relative_to is not None):
         of = item.of + (f" relative to {item.relative_to}" if item.relative_to else "")
         names = found.setdefault(item.quantity, [])
@@ -121,42 +122,47 @@ def _asked(published: Sequence[Published]) -> Iterator[Phrase]:
         yield (f"The {quantity} of {words_listed(names)}.",)
 
 
-def _links(state: State) -> Iterator[LinkResult]:
+def _link_results(state: State) -> Iterator[LinkResult]:
     links = {name: link for name, link in state.links.items() if name != state.mechanism.frame}
     fastest, hardest = state.scales_of_links
     for name, link in links.items():
         both = (link.angular_velocity, fastest), (link.angular_acceleration, hardest)
-        (v, vs), (a, as_) = [(rate if abs(rate) > STILL * most else 0.0, turning(rate, most)) for rate, most in both]
+        (v, vs), (a, as_) = [
+            (rate if abs(rate) > REST_TOLERANCE * most else 0.0, turning_sense(rate, most)) for rate, most in both
+        ]
         yield LinkResult(name, v, vs, a, as_ if a else "none")
 
 
-def _points(state: State) -> Iterator[PointResult]:
+def _point_results(state: State) -> Iterator[PointResult]:
     greatest = state.scales_of_points
     for name, point in state.points.items():
-        both = [(float(np.hypot(*point[order])), heading(point[order], greatest[order - 1])) for order in (1, 2)]
+        both = [
+            (float(np.hypot(*point[order])), direction_sense(point[order], greatest[order - 1])) for order in (1, 2)
+        ]
         (v, vs), (a, as_) = [
-            (size if size > STILL * most else 0.0, sense) for (size, sense), most in zip(both, greatest, strict=True)
+            (size if size > REST_TOLERANCE * most else 0.0, sense)
+            for (size, sense), most in zip(both, greatest, strict=True)
         ]
         yield PointResult(name, v, vs, a, as_ if a else "none")
 
 
-def _slides(state: State) -> Iterator[SlideResult]:
-    for name, pair in motions(state.mechanism).items():
-        if pair.drive_kind is Kind.LENGTH:
+def _slide_results(state: State) -> Iterator[SlideResult]:
+    for name, pair in relative_motions(state.mechanism).items():
+        if pair.input_kind is MeasureKind.LENGTH:
             report = state.pair(name)
             at, *rates = (float(value or 0.0) for value in list(report.values())[:3])
             told = (
-                rate if abs(rate) > STILL * most else 0.0
+                rate if abs(rate) > REST_TOLERANCE * most else 0.0
                 for rate, most in zip(rates, state.scales_of_points, strict=True)
             )
             yield SlideResult(name, at, *told)
 
 
-def _rubbing(state: State) -> Iterator[Phrase]:
+def _rubbing_speeds(state: State) -> Iterator[Phrase]:
     """How fast pins rub: the difference of two angular velocities times the radius."""
-    measure, of = own("velocity", state.mechanism.units)
+    measure, of = unit_of_kind("velocity", state.mechanism.units)
     by = of.from_si(1.0)
-    for name, pair in motions(state.mechanism).items():
+    for name, pair in relative_motions(state.mechanism).items():
         speed = state.pair(name).get("rubbing_speed")
         if speed is None:
             continue
@@ -165,11 +171,11 @@ def _rubbing(state: State) -> Iterator[Phrase]:
         frame = state.mechanism.frame
         between = [(Symbol("ω", link),) for link in pair.links[::-1] if link != frame]
         radius = speed / apart if apart > 1e-12 * (abs(first) + abs(second)) else 0.0
-        told = f" × r = {number(apart)} × {number(radius * by)} = " if radius else " × r = "
+        told = f" × r = {format_number(apart)} × {format_number(radius * by)} = " if radius else " × r = "
         brackets = ("(", ")") if len(between) > 1 else ("", "")
         yield (
             f"At {name}: {brackets[0]}",
-            *joined(between, " − "),
+            *join_phrases(between, " − "),
             f"{brackets[1]}{told}",
-            Quantity(speed, measure, by=by),
+            MeasuredValue(speed, measure, units_per_si=by),
         )

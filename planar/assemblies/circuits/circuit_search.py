@@ -9,47 +9,52 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.assemblies.circuits.dead_points import CROSS, ROUNDING, Critical, critical
-from planar.assemblies.circuits.traced_circuit import Traced, traced
+from planar.assemblies.circuits.dead_points import (
+    BRANCHES_CROSS,
+    SAME_POSITION_DISTANCE,
+    CriticalPositions,
+    critical_positions,
+)
+from planar.assemblies.circuits.traced_circuit import TracedCircuit, trace_circuit
 from planar.assemblies.modes import Mode, Modes
 from planar.assemblies.polynomial.completeness import Completeness
-from planar.model.mechanism import Drive, Mechanism, with_inputs
-from planar.model.pairs import Kind
-from planar.model.wording import many
+from planar.model.mechanism import Drive, Mechanism, replace_inputs
+from planar.model.pairs import MeasureKind
+from planar.model.wording import count_phrase
 from planar.solving.diagnosis import refusals
-from planar.solving.position import Solver, known_of
+from planar.solving.position import PositionSolver, solved_mechanism
 
 Array = np.ndarray
 
 TURN = 2.0 * pi
-MOST = 256
+MAX_ASSEMBLIES = 256
 """Assemblies at one position of the input up to which circuits are looked for."""
-ROUNDS = 4
+MAX_ROUNDS = 4
 """How often dead points that only circuits showed part the input's range anew."""
-TRIED = 12
+TRIAL_POSITIONS = 12
 """Positions of the input at which assemblies are listed where dead points may be missing."""
-NEAR = 1e-6
+SAME_DEAD_POINT_DISTANCE = 1e-6
 """rad or sizes: a dead point that a circuit comes to is one that was found before if it is as near to it as this."""
-SAME = 1e-5
+SAME_ASSEMBLY_DISTANCE = 1e-5
 """rad or sizes: unknowns of one assembly, reached along a curve or listed, differ by less."""
-WITHIN = 0.4631
+LISTING_POSITION_RATIO = 0.4631
 """Where in an interval assemblies are listed: not in the middle, where symmetric linkages have special positions."""
 
 
-class Place(NamedTuple):
+class ListedInterval(NamedTuple):
     """A part of the input's range between two dead points (rad, m), and the assemblies somewhere in it."""
 
     low: float
     high: float
-    solver: Solver
+    solver: PositionSolver
     modes: tuple[Mode, ...]
-    whole: bool
-    complete: bool
+    is_whole: bool
+    is_complete: bool
 
     @property
     def position(self) -> float:
         """Where the assemblies are listed."""
-        return self.low + WITHIN * (self.high - self.low)
+        return self.low + LISTING_POSITION_RATIO * (self.high - self.low)
 
     @property
     def unknowns(self) -> Array:
@@ -58,7 +63,7 @@ class Place(NamedTuple):
         return np.array([mode.z * by for mode in self.modes]).reshape(len(self.modes), len(by))
 
 
-class Interval(NamedTuple):
+class InputInterval(NamedTuple):
     """A part of the input's range (rad or m) without a dead point inside, and how many assemblies there are in it;
     None where they are too many to be counted, or not known to be as many all over it."""
 
@@ -67,109 +72,115 @@ class Interval(NamedTuple):
     assemblies: int | None
 
 
-class Found(NamedTuple):
+class CircuitSearchResult(NamedTuple):
     """Circuits, each with the assembly from which it was followed; see `circuits.Circuits`."""
 
-    circuits: tuple[tuple[Traced, Mode], ...]
+    circuits: tuple[tuple[TracedCircuit, Mode], ...]
     critical: tuple[float, ...]
-    intervals: tuple[Interval, ...]
+    intervals: tuple[InputInterval, ...]
     complete: Completeness
     said: tuple[str, ...]
 
 
-def same(solver: Solver, one: Array, others: Array) -> Array:
+def is_same_assembly(solver: PositionSolver, one: Array, others: Array) -> Array:
     """Which of others (others, unknowns) are the same assembly as one, rad and m, whole turns aside."""
     e = solver.equations
     columns = list(e.unknowns)
-    lengths = np.array([e.coordinates[column].kind is Kind.LENGTH for column in columns], dtype=bool)
+    lengths = np.array([e.coordinates[column].kind is MeasureKind.LENGTH for column in columns], dtype=bool)
     gaps = (others - one) / solver.scale[columns]
-    return np.all(np.where(lengths, np.abs(gaps), np.abs(np.exp(1j * gaps) - 1.0)) < SAME, axis=1)
+    return np.all(np.where(lengths, np.abs(gaps), np.abs(np.exp(1j * gaps) - 1.0)) < SAME_ASSEMBLY_DISTANCE, axis=1)
 
 
-class Search:
+class CircuitSearch:
     """The circuits of one mechanism, looked for. Raises NoAnswer where inputs leave links free whatever their sizes."""
 
     def __init__(self, mechanism: Mechanism, pair: str):
         self.mechanism, self.pair = mechanism, pair
         names = [given.pair for given in mechanism.inputs]
         self.index = names.index(pair)
-        self.still = tuple(Drive(name, None, 0.0, 0.0) for name in names if name != pair)
-        self.solver = known_of(with_inputs(mechanism, self.still)).solver
-        if any(stage.free for stage in self.solver.equations.stages):
-            raise refusals.free(self.solver)
-        self.slides = self.solver.slides(pair)
+        self.standing_drives = tuple(Drive(name, None, 0.0, 0.0) for name in names if name != pair)
+        self.solver = solved_mechanism(replace_inputs(mechanism, self.standing_drives)).solver
+        if any(stage.is_free for stage in self.solver.equations.blocks):
+            raise refusals.free_links(self.solver)
+        self.is_sliding = self.solver.is_sliding(pair)
 
-    def found(self) -> Found:
+    def find_circuits(self) -> CircuitSearchResult:
         """All that are found, once circuits show no dead point that was not known."""
-        known = critical(self.solver, self.index)
-        doubts = list(known.open)
+        known = critical_positions(self.solver, self.index)
+        doubts = list(known.doubts)
         cuts = self._distinct((*known.positions, *known.crossings))
         file = self.solver.mechanism.inputs[self.index].position
         low, high = known.span
-        tried = [file, *(low + (high - low) / TRIED * (np.arange(TRIED) + WITHIN))] if known.open else []
-        for _ in range(ROUNDS):
-            places = [self._place(low, high) for low, high in self._parts(known, cuts)]
-            more = [self._place(at, at) for at in tried]
-            circuits, differing = self._followed([*places, *more])
-            fresh = self._fresh(cuts, circuits)
+        tried = (
+            [file, *(low + (high - low) / TRIAL_POSITIONS * (np.arange(TRIAL_POSITIONS) + LISTING_POSITION_RATIO))]
+            if known.doubts
+            else []
+        )
+        for _ in range(MAX_ROUNDS):
+            places = [self._list_assemblies(low, high) for low, high in self._cut_range(known, cuts)]
+            more = [self._list_assemblies(at, at) for at in tried]
+            circuits, differing = self._follow_circuits([*places, *more])
+            fresh = self._new_dead_points(cuts, circuits)
             if not fresh:
                 break
             cuts = self._distinct((*cuts, *fresh))
-            if not known.open:
+            if not known.doubts:
                 doubts.append("circuits have dead points that were not found before")
-        met = [*known.crossings, *(at for each, _ in circuits for at in each.dead)]
+        met = [*known.crossings, *(at for each, _ in circuits for at in each.dead_points)]
         # where links that come first have a dead point, none of the whole linkage need be
-        kept = [at for at in cuts if any(self._near(at, other) for other in met)]
-        intervals = tuple(self._counted(low, high, places) for low, high in self._parts(known, kept))
-        if any(place.whole for place in places) and any(each.assemblies is None for each in intervals):
+        kept = [at for at in cuts if any(self._is_near(at, other) for other in met)]
+        intervals = tuple(self._input_interval(low, high, places) for low, high in self._cut_range(known, kept))
+        if any(place.is_whole for place in places) and any(each.assemblies is None for each in intervals):
             doubts.append("the number of assemblies changes where no dead point was found")
-        doubts += differing + self._apart(places, circuits)
-        return Found(tuple(circuits), tuple(kept), intervals, *self._said(kept, doubts))
+        doubts += differing + self._completeness_doubts(places, circuits)
+        return CircuitSearchResult(tuple(circuits), tuple(kept), intervals, *self._completeness_claim(kept, doubts))
 
-    def _counted(self, low: float, high: float, places: Sequence[Place]) -> Interval:
+    def _input_interval(self, low: float, high: float, places: Sequence[ListedInterval]) -> InputInterval:
         """A part of the input's range, and how many assemblies there are all over it."""
-        gone = (place.position - low if self.slides else (place.position - low) % TURN for place in places)
+        gone = (place.position - low if self.is_sliding else (place.position - low) % TURN for place in places)
         inside = [place for place, at in zip(places, gone, strict=True) if 0.0 < at < high - low]
-        counts = {len(place.modes) if place.whole else None for place in inside}
-        return Interval(low, high, counts.pop() if len(counts) == 1 else None)
+        counts = {len(place.modes) if place.is_whole else None for place in inside}
+        return InputInterval(low, high, counts.pop() if len(counts) == 1 else None)
 
-    def _parts(self, known: Critical, cuts: Sequence[float]) -> Iterator[tuple[float, float]]:
+    def _cut_range(self, known: CriticalPositions, cuts: Sequence[float]) -> Iterator[tuple[float, float]]:
         """The input's range, cut."""
-        if self.slides:
+        if self.is_sliding:
             yield from pairwise([known.span[0], *cuts, known.span[1]])
         elif not cuts:
             yield 0.0, TURN
         else:
             yield from pairwise([*cuts, cuts[0] + TURN])
 
-    def _place(self, low: float, high: float) -> Place:
-        bare = Place(low, high, self.solver, (), False, False)
-        moved = (*self.still, Drive(self.pair, bare.position))
-        solver = self.solver.moved(with_inputs(self.mechanism, moved))
+    def _list_assemblies(self, low: float, high: float) -> ListedInterval:
+        bare = ListedInterval(low, high, self.solver, (), False, False)
+        moved = (*self.standing_drives, Drive(self.pair, bare.position))
+        solver = self.solver.with_inputs_of(replace_inputs(self.mechanism, moved))
         modes = Modes(solver, self.mechanism, moved, False)
-        listing = tuple(islice(modes, MOST + 1))
-        whole = len(listing) <= MOST
-        return Place(low, high, solver, listing[:MOST], whole, modes.complete is not Completeness.NOT)
+        listing = tuple(islice(modes, MAX_ASSEMBLIES + 1))
+        whole = len(listing) <= MAX_ASSEMBLIES
+        return ListedInterval(
+            low, high, solver, listing[:MAX_ASSEMBLIES], whole, modes.complete is not Completeness.NOT
+        )
 
-    def _followed(self, places: Sequence[Place]) -> tuple[list[tuple[Traced, Mode]], list[str]]:
+    def _follow_circuits(self, places: Sequence[ListedInterval]) -> tuple[list[tuple[TracedCircuit, Mode]], list[str]]:
         """Every assembly that lies on no circuit yet, followed; and where the circuits differ from what is listed."""
         unknowns = [place.unknowns for place in places]
         taken = [np.zeros(len(place.modes), dtype=int) for place in places]
-        circuits: list[tuple[Traced, Mode]] = []
+        circuits: list[tuple[TracedCircuit, Mode]] = []
         strange, between = 0, False
         for place, own in zip(places, taken, strict=True):
             for number, mode in enumerate(place.modes):
                 if own[number] or mode.double:  # from where branches meet none is followed
                     continue
-                each = traced(place.solver, self.index, mode.z)
+                each = trace_circuit(place.solver, self.index, mode.z)
                 if not each.branches:
                     continue
                 circuits.append((each, mode))
                 passed = set()
                 for k, other in enumerate(places):
-                    for branch, at in each.at(other.position):
+                    for branch, at in each.assemblies_at(other.position):
                         passed.add(branch)
-                        here = same(other.solver, at, unknowns[k])
+                        here = is_same_assembly(other.solver, at, unknowns[k])
                         taken[k] += here
                         strange += not here.any()
                 between |= len(passed) < len(each.branches)
@@ -184,45 +195,53 @@ class Search:
             differing.append("some assemblies lie on more than one circuit, or on none")
         return circuits, differing
 
-    def _fresh(self, cuts: Sequence[float], circuits: Sequence[tuple[Traced, Mode]]) -> list[float]:
+    def _new_dead_points(self, cuts: Sequence[float], circuits: Sequence[tuple[TracedCircuit, Mode]]) -> list[float]:
         """Dead points of circuits that are at none of these positions of the input."""
         found: list[float] = []
-        for at in (at for each, _ in circuits for at in each.dead):
-            if not any(self._near(at, other) for other in (*cuts, *found)):
+        for at in (at for each, _ in circuits for at in each.dead_points):
+            if not any(self._is_near(at, other) for other in (*cuts, *found)):
                 found.append(at)
         return found
 
     def _distinct(self, positions: Sequence[float]) -> list[float]:
         """Positions of the input in their order; what rounding makes of one is one."""
         found: list[float] = []
-        for at in sorted(positions if self.slides else (at % TURN for at in positions)):
-            if not any(self._near(at, other, ROUNDING) for other in found):
+        for at in sorted(positions if self.is_sliding else (at % TURN for at in positions)):
+            if not any(self._is_near(at, other, SAME_POSITION_DISTANCE) for other in found):
                 found.append(at)
         return found
 
-    def _near(self, one: float, other: float, within: float = NEAR) -> bool:
+    def _is_near(self, one: float, other: float, within: float = SAME_DEAD_POINT_DISTANCE) -> bool:
         """Whether two positions of the input are one; `within` in rad or sizes."""
         return (
-            abs(one - other) < within * self.solver.unit if self.slides else abs(remainder(one - other, TURN)) < within
+            abs(one - other) < within * self.solver.unit
+            if self.is_sliding
+            else abs(remainder(one - other, TURN)) < within
         )
 
-    def _apart(self, places: Sequence[Place], circuits: Sequence[tuple[Traced, Mode]]) -> list[str]:
+    def _completeness_doubts(
+        self, places: Sequence[ListedInterval], circuits: Sequence[tuple[TracedCircuit, Mode]]
+    ) -> list[str]:
         """What of the lists, and of following, leaves it open whether these are all."""
         doubts = []
-        if not all(place.whole for place in places):
-            doubts.append(f"there are positions with more than {MOST} assemblies")
-        if not all(place.complete for place in places):
+        if not all(place.is_whole for place in places):
+            doubts.append(f"there are positions with more than {MAX_ASSEMBLIES} assemblies")
+        if not all(place.is_complete for place in places):
             doubts.append("lists of assemblies are not known to be complete")
-        if any(each.crossed for each, _ in circuits):
-            doubts.append(CROSS)
-        if any(not each.closed and not each.lost for each, _ in circuits):
+        if any(each.has_change_point for each, _ in circuits):
+            doubts.append(BRANCHES_CROSS)
+        if any(not each.closed and not each.lost_reason for each, _ in circuits):
             doubts.append("slides run out without an end, and may come back from there")
-        lost = dict.fromkeys(each.lost for each, _ in circuits if each.lost)
+        lost = dict.fromkeys(each.lost_reason for each, _ in circuits if each.lost_reason)
         return doubts + [f"one was lost: {why}" for why in lost][:1]
 
-    def _said(self, kept: Sequence[float], doubts: Sequence[str]) -> tuple[Completeness, tuple[str, ...]]:
+    def _completeness_claim(self, kept: Sequence[float], doubts: Sequence[str]) -> tuple[Completeness, tuple[str, ...]]:
         if doubts:
             return Completeness.NOT, (f"the number of circuits is not claimed: {'; '.join(dict.fromkeys(doubts))}",)
-        where = f"dead points at {many(len(kept), 'position', 'positions')} of the input" if kept else "no dead points"
+        where = (
+            f"dead points at {count_phrase(len(kept), 'position', 'positions')} of the input"
+            if kept
+            else "no dead points"
+        )
         told = f"{where}, found over its whole range as all zeros of a function that is known to rounding"
         return Completeness.NUMERICALLY, (told, "every assembly between them lies on one circuit, and on one only")

@@ -10,21 +10,21 @@ from typing import overload
 
 import numpy as np
 
-from planar.assemblies.circuits.circuit_search import Interval, Search, same
-from planar.assemblies.circuits.traced_circuit import Branch, Traced
+from planar.assemblies.circuits.circuit_search import CircuitSearch, InputInterval, is_same_assembly
+from planar.assemblies.circuits.traced_circuit import Branch, TracedCircuit
 from planar.assemblies.modes import Mode
 from planar.foundation.notebook_display import Displayable
-from planar.model.mechanism import Drive, Mechanism, running_input, with_inputs
+from planar.model.mechanism import Drive, Mechanism, replace_inputs, running_input_index
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
-from planar.solving.position import known_of
+from planar.solving.position import solved_mechanism
 
 Array = np.ndarray
 
 TURN = 2.0 * pi
-WITHIN = 1e-6
+END_MARGIN = 1e-6
 """Of a branch that does not close: its very ends may be dead points, from which two branches lead."""
-SAME = 1e-12
+TURN_TOLERANCE = 1e-12
 """rad: what rounding leaves of a turn."""
 
 
@@ -36,7 +36,7 @@ def circuits(mechanism: Mechanism, pair: str | None = None) -> Circuits:
 
     Raises BadInput where there is no such input, NoAnswer where the inputs leave links free whatever the dimensions.
     """
-    return Circuits(mechanism, mechanism.inputs[running_input(mechanism, pair)].pair)
+    return Circuits(mechanism, mechanism.inputs[running_input_index(mechanism, pair)].pair)
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,22 +52,22 @@ class Circuit:
     closed: bool
     mechanism: Mechanism = field(repr=False)
     pair: str
-    curve: Traced = field(repr=False)
+    curve: TracedCircuit = field(repr=False)
 
     @cached_property
     def motion(self) -> Motion:
         """The positions all round it, or over the branch from which it was followed where it does not close."""
         if self.closed:
             return cycle(self.mechanism, pair=self.pair, circuit=True)
-        home = self.branches[self.curve.home]
-        room = WITHIN * (home.high - home.low)
+        home = self.branches[self.curve.home_branch]
+        room = END_MARGIN * (home.high - home.low)
         return cycle(self.mechanism, start=home.low + room, stop=home.high - room, pair=self.pair)
 
     @cached_property
     def branch(self) -> Array:
         """The number of the branch on which each row of `motion` lies (rows,); of a dead point the one that it ends."""
         if not self.closed:
-            return np.full(len(self.motion), self.curve.home + 1)
+            return np.full(len(self.motion), self.curve.home_branch + 1)
         ways = np.sign(np.diff(self.motion.inputs[self.pair].position))
         passed = np.cumsum(ways[1:] != ways[:-1])
         return np.concatenate([[0, 0], passed])[: len(self.motion)] % len(self.branches) + 1
@@ -82,17 +82,17 @@ class Circuits(Displayable, Sequence[Circuit]):
     """
 
     def __init__(self, mechanism: Mechanism, pair: str):
-        found = Search(mechanism, pair).found()
+        found = CircuitSearch(mechanism, pair).find_circuits()
         self.mechanism, self.pair = mechanism, pair
         self.critical, self.complete, self.said = found.critical, found.complete, found.said
-        self.intervals: tuple[Interval, ...] = found.intervals
+        self.intervals: tuple[InputInterval, ...] = found.intervals
         self._found = tuple(self._circuit(number, *each) for number, each in enumerate(found.circuits, start=1))
 
-    def _circuit(self, number: int, curve: Traced, mode: Mode) -> Circuit:
+    def _circuit(self, number: int, curve: TracedCircuit, mode: Mode) -> Circuit:
         at = next(given.position for given in mode.mechanism.inputs if given.pair == self.pair)
-        moved = with_inputs(self.mechanism, (Drive(self.pair, at),))
+        moved = replace_inputs(self.mechanism, (Drive(self.pair, at),))
         kept = replace(moved, sketch=mode.mechanism.sketch, published=())
-        return Circuit(number, tuple(curve.told()), curve.closed, kept, self.pair, curve)
+        return Circuit(number, tuple(curve.public_branches()), curve.closed, kept, self.pair, curve)
 
     @overload
     def __getitem__(self, index: int) -> Circuit: ...
@@ -116,21 +116,21 @@ class Circuits(Displayable, Sequence[Circuit]):
                 continue
             joined = bool(found) and found[-1][1] == low
             found.append((found.pop()[0] if joined else low, high))
-        if not found or known_of(self.mechanism).solver.slides(self.pair):
+        if not found or solved_mechanism(self.mechanism).solver.is_sliding(self.pair):
             return tuple(found)
-        if sum(high - low for low, high in found) >= TURN - SAME:
+        if sum(high - low for low, high in found) >= TURN - TURN_TOLERANCE:
             return ((0.0, TURN),)
-        if found[-1][1] >= found[0][0] + TURN - SAME:  # a turn ends where it starts
+        if found[-1][1] >= found[0][0] + TURN - TURN_TOLERANCE:  # a turn ends where it starts
             found = [*found[1:-1], (found[-1][0], found[0][1] + TURN)]
         return tuple(found)
 
     def of(self, mode: Mode) -> tuple[Circuit, Branch] | None:
         """The circuit and the branch on which an assembly lies, at any position of the input."""
-        solver = known_of(mode.mechanism).solver
+        solver = solved_mechanism(mode.mechanism).solver
         unknowns = mode.z * solver.scale[list(solver.equations.unknowns)]
         position = next(given.position for given in mode.mechanism.inputs if given.pair == self.pair)
         for each in self._found:
-            for number, at in each.curve.at(position):
-                if same(solver, at, unknowns[None]).all():
+            for number, at in each.curve.assemblies_at(position):
+                if is_same_assembly(solver, at, unknowns[None]).all():
                     return each, each.branches[number]
         return None

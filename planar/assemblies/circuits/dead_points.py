@@ -15,151 +15,155 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.assemblies.block_roots import MOST_PATHS, roots
-from planar.assemblies.circuits.chebyshev_zeros import NONE, Value, Zeros, zeros
-from planar.assemblies.circuits.discriminant import Solutions, Unclaimed
+from planar.assemblies.block_roots import MAX_PATHS, block_roots
+from planar.assemblies.circuits.chebyshev_zeros import ZERO, SignedLog, Zeros, find_zeros
+from planar.assemblies.circuits.discriminant import DeadPointsUnclaimed, MovingSolutions
 from planar.assemblies.polynomial.completeness import Completeness
-from planar.assemblies.polynomial.isotropic_form import form
-from planar.assemblies.search_tree import straight
-from planar.equations.constraint_equations import Stage
-from planar.equations.functions import length
-from planar.model.pairs import Kind
-from planar.solving.assembly.block_assemblies import hanging
-from planar.solving.newton import CLOSED
-from planar.solving.prepared_mechanism import Setup
+from planar.assemblies.polynomial.isotropic_form import isotropic_form
+from planar.assemblies.search_tree import is_linear
+from planar.equations.constraint_equations import Block
+from planar.equations.functions import slice_length
+from planar.model.pairs import MeasureKind
+from planar.solving.assembly.block_assemblies import block_dependencies
+from planar.solving.newton import CLOSED_TOLERANCE
+from planar.solving.prepared_mechanism import PreparedMechanism
 
 Array = np.ndarray
 
-Choices = tuple[int, ...]
+DyadChoices = tuple[int, ...]
 """Of every group on the way which of its two closed forms is taken, 0 where there is no choice to make."""
 
-START = -1.2345
+TURN_START = -1.2345
 """rad: where a turn is cut, at no position that means anything."""
-BUDGET = 60_000
+MAX_SOLVED_BLOCKS = 60_000
 """Groups solved before the search for dead points is given up."""
-BEYOND = 2.0
+SLIDE_REACH_RATIO = 2.0
 """Of what all links together reach: further a slide cannot be out, if nothing else slides."""
-ROUNDING = 1e-10
+SAME_POSITION_DISTANCE = 1e-10
 """rad or sizes: zeros of two functions that are nearer to each other than this are one."""
 
 
-CROSS = "branches cross, or all but cross"
+BRANCHES_CROSS = "branches cross, or all but cross"
 
 
-class Critical(NamedTuple):
+class CriticalPositions(NamedTuple):
     """Positions of the input (rad in [0, 2 pi), or m) where two assemblies meet, and where they meet and go on both
     ways; the range looked over; and what leaves it open whether these are all."""
 
     positions: tuple[float, ...]
     crossings: tuple[float, ...]
     span: tuple[float, float]
-    open: tuple[str, ...]
+    doubts: tuple[str, ...]
 
 
-def critical(setup: Setup, index: int) -> Critical:
+def critical_positions(setup: PreparedMechanism, index: int) -> CriticalPositions:
     """The dead points of one input, the others standing still."""
-    return _Searching(setup, index).critical()
+    return _DeadPointSearch(setup, index).search()
 
 
-class _Searching:
+class _DeadPointSearch:
     """The dead points of one mechanism; positions of the input are in rad and sizes here."""
 
-    def __init__(self, setup: Setup, index: int):
+    def __init__(self, setup: PreparedMechanism, index: int):
         self.setup, self.index = setup, index
-        self.stages = setup.equations.stages
+        self.stages = setup.equations.blocks
         self.pair = setup.mechanism.inputs[index].pair
-        self.slides = setup.slides(self.pair)
-        self.hangs_on = _before(setup)
-        self.anywhere = np.random.default_rng(1).uniform(0.5, 2.0, len(setup.equations.unknowns))
-        self.solutions: dict[int, Solutions | None] = {}
-        self.budget = BUDGET
-        reach = BEYOND * sum(setup.reach.values()) or 1.0
-        self.span = (-reach, reach) if self.slides else (START, START + 2.0 * pi)
-        self._reached: dict[tuple[float, tuple[int, ...]], list[tuple[Choices, Array]]] = {}
+        self.slides = setup.is_sliding(self.pair)
+        self.dependencies = _earlier_blocks(setup)
+        self.random_unknowns = np.random.default_rng(1).uniform(0.5, 2.0, len(setup.equations.unknowns))
+        self.solutions: dict[int, MovingSolutions | None] = {}
+        self.budget = MAX_SOLVED_BLOCKS
+        reach = SLIDE_REACH_RATIO * sum(setup.reach.values()) or 1.0
+        self.span = (-reach, reach) if self.slides else (TURN_START, TURN_START + 2.0 * pi)
+        self._reached: dict[tuple[float, tuple[int, ...]], list[tuple[DyadChoices, Array]]] = {}
 
-    def critical(self) -> Critical:
+    def search(self) -> CriticalPositions:
         found: list[list[float]] = []
         crossings: list[list[float]] = []
         doubts: list[str] = []
-        if self.setup.outline.counts:
+        if self.setup.structure.counts:
             doubts.append("angles count turns, so that one turn of the input does not show all positions")
         for level, stage in enumerate(self.stages):
-            edges = {*self.span}.union(*(found[k] + crossings[k] for k in self.hangs_on[level]))
+            edges = {*self.span}.union(*(found[k] + crossings[k] for k in self.dependencies[level]))
             crossed, touched = set(), set()
             try:
                 for low, high in pairwise(_distinct(edges)):
                     for each in self._zeros(level, low, high):
                         crossed |= set(each.crossed)
                         touched |= set(each.touched)
-                        if not each.all:
-                            raise Unclaimed("they cannot be told apart to rounding")
-            except Unclaimed as why:
+                        if not each.is_complete:
+                            raise DeadPointsUnclaimed("they cannot be told apart to rounding")
+            except DeadPointsUnclaimed as why:
                 doubts.append(f"dead points of the group with {', '.join(stage.links)} may be missing: {why}")
             found.append(_distinct(crossed))
             crossings.append(_distinct(touched))
         # where two groups have a dead point at once, two ways lead on from it
         every = sorted(at for part in found for at in part)
-        if any(crossings) or any(high - low < ROUNDING for low, high in pairwise(every)):
-            doubts.append(CROSS)
-        if self.slides and not self._bounded():
-            low, high = (self.setup.told(self.pair, at) for at in self.span)
+        if any(crossings) or any(high - low < SAME_POSITION_DISTANCE for low, high in pairwise(every)):
+            doubts.append(BRANCHES_CROSS)
+        if self.slides and not self._is_bounded():
+            low, high = (self.setup.describe_input(self.pair, at) for at in self.span)
             doubts.append(f"other slides may let it run on without end; it was looked over from {low} to {high}")
-        return Critical(self._told(found), self._told(crossings), self._range(), tuple(doubts))
+        return CriticalPositions(self._to_si(found), self._to_si(crossings), self._si_range(), tuple(doubts))
 
-    def _told(self, found: Sequence[Sequence[float]]) -> tuple[float, ...]:
+    def _to_si(self, found: Sequence[Sequence[float]]) -> tuple[float, ...]:
         by = self.setup.unit if self.slides else 1.0
         every = (each * by if self.slides else each % (2.0 * pi) for part in found for each in part)
         return tuple(sorted(set(every)))
 
-    def _range(self) -> tuple[float, float]:
+    def _si_range(self) -> tuple[float, float]:
         by = self.setup.unit
         return (self.span[0] * by, self.span[1] * by) if self.slides else (0.0, 2.0 * pi)
 
-    def _bounded(self) -> bool:
+    def _is_bounded(self) -> bool:
         """Whether it is out of all links' reach what the input does beyond the range: where nothing else slides."""
         given = {each.pair for each in self.setup.mechanism.inputs}
-        return not any(pair.drive_kind is Kind.LENGTH for name, pair in self.setup.named.items() if name not in given)
+        return not any(
+            pair.input_kind is MeasureKind.LENGTH
+            for name, pair in self.setup.relative_motions.items()
+            if name not in given
+        )
 
     def _zeros(self, level: int, low: float, high: float) -> Iterator[Zeros]:
         """The zeros of N of a group between two places where the groups before it have dead points, for each choice."""
-        kept: dict[float, dict[Choices, Value]] = {}
+        kept: dict[float, dict[DyadChoices, SignedLog]] = {}
 
-        def values(at: float) -> dict[Choices, Value]:
+        def values(at: float) -> dict[DyadChoices, SignedLog]:
             if at not in kept:
-                kept[at] = self._values(level, at)
+                kept[at] = self._discriminants(level, at)
             return kept[at]
 
         choices = set(values(0.5 * (low + high)))
         for each in sorted(choices):
 
-            def value(at: float, each: Choices = each) -> Value:
+            def value(at: float, each: DyadChoices = each) -> SignedLog:
                 found = values(at)
                 if set(found) != choices:
-                    raise Unclaimed("the groups before it have others than were found")
+                    raise DeadPointsUnclaimed("the groups before it have others than were found")
                 return found[each]
 
-            yield zeros(value, low, high)
+            yield find_zeros(value, low, high)
 
-    def _values(self, level: int, at: float) -> dict[Choices, Value]:
+    def _discriminants(self, level: int, at: float) -> dict[DyadChoices, SignedLog]:
         """N of a group with the input at a place, for each choice before it."""
-        found: dict[Choices, Value] = {}
-        u = self._inputs(at)
-        for choices, z in self._before(level, at):
-            sign, size = self._value(level, z, u)
-            before = found.get(choices, Value(1.0, 0.0))
-            found[choices] = Value(before.sign * sign, before.log + size)
+        found: dict[DyadChoices, SignedLog] = {}
+        u = self._inputs_at(at)
+        for choices, z in self._earlier_assemblies(level, at):
+            sign, size = self._discriminant(level, z, u)
+            before = found.get(choices, SignedLog(1.0, 0.0))
+            found[choices] = SignedLog(before.sign * sign, before.log + size)
         return found
 
-    def _inputs(self, at: float) -> Array:
-        u = self.setup.station.u.copy()
+    def _inputs_at(self, at: float) -> Array:
+        u = self.setup.inputs.u.copy()
         u[self.index] = at
         return u
 
-    def _before(self, level: int, at: float) -> list[tuple[Choices, Array]]:
+    def _earlier_assemblies(self, level: int, at: float) -> list[tuple[DyadChoices, Array]]:
         """Every assembly of the groups on which one hangs."""
         found = [((), np.zeros(len(self.setup.equations.unknowns)))]
-        u = self._inputs(at)
-        earlier = tuple(sorted(self.hangs_on[level]))
+        u = self._inputs_at(at)
+        earlier = tuple(sorted(self.dependencies[level]))
         for k, group in enumerate(earlier):
             key = at, earlier[: k + 1]
             if key not in self._reached:
@@ -177,86 +181,88 @@ class _Searching:
     def _spend(self, by: int) -> None:
         self.budget -= by
         if self.budget < 0:
-            raise Unclaimed("there are too many choices before it")
+            raise DeadPointsUnclaimed("there are too many choices before it")
 
     def _assemblies(self, level: int, z: Array, u: Array) -> list[tuple[int, Array]]:
         """The assemblies of one group, those before it given: which of two closed forms, and the unknowns."""
         stage, setup = self.stages[level], self.setup
         self._spend(1)
-        closed = setup.program.assemblies(stage)
+        closed = setup.functions.block_assemblies(stage)
         if closed is not None:
-            both, left, bend = closed(z, u, setup.station.p)
+            both, left, bend = closed(z, u, setup.inputs.p)
             if not bend < 1.0:
                 return []
-            if not left <= CLOSED:
-                raise Unclaimed("an earlier group does not close")
+            if not left <= CLOSED_TOLERANCE:
+                raise DeadPointsUnclaimed("an earlier group does not close")
             return list(enumerate(both))
         self._spend(20)
-        there = _at(setup, u)
-        found = roots(there, stage, z, certify=False)
-        if found.complete is Completeness.NOT or found.curve:
-            raise Unclaimed("not all assemblies of the groups before it are known")
+        there = _with_inputs(setup, u)
+        found = block_roots(there, stage, z, certify=False)
+        if found.complete is Completeness.NOT or found.has_curve:
+            raise DeadPointsUnclaimed("not all assemblies of the groups before it are known")
         return [(0, each) for each in found.real]
 
-    def _value(self, level: int, z: Array, u: Array) -> Value:
+    def _discriminant(self, level: int, z: Array, u: Array) -> SignedLog:
         """N of one group, those before it given."""
         stage, setup = self.stages[level], self.setup
-        if length(stage.rows) != length(stage.unknowns):
-            raise Unclaimed("it holds more than it needs")
+        if slice_length(stage.rows) != slice_length(stage.unknowns):
+            raise DeadPointsUnclaimed("it holds more than it needs")
         self._spend(1)
-        closed = setup.program.assemblies(stage)
+        closed = setup.functions.block_assemblies(stage)
         if closed is not None:
-            _, _, bend = closed(z, u, setup.station.p)
+            _, _, bend = closed(z, u, setup.inputs.p)
             if np.isnan(bend):
-                raise Unclaimed("its links have no length")
-            return _valued(bend)
+                raise DeadPointsUnclaimed("its links have no length")
+            return _dyad_discriminant(bend)
         if level not in self.solutions:
-            self.solutions[level] = None if straight(setup, stage, self.anywhere) else self._solutions(stage)
+            self.solutions[level] = (
+                None if is_linear(setup, stage, self.random_unknowns) else self._complex_solutions(stage)
+            )
         of = self.solutions[level]
         if of is None:
-            slope = setup.program.closed(stage)(z, u, setup.station.p)[1]
-            return Value(*map(float, np.linalg.slogdet(slope)))
-        self._spend(of.form.bound)
-        return of.product(z, u, setup.station.p)
+            slope = setup.functions.block_call(stage)(z, u, setup.inputs.p)[1]
+            return SignedLog(*map(float, np.linalg.slogdet(slope)))
+        self._spend(of.form.bezout_number)
+        return of.discriminant(z, u, setup.inputs.p)
 
-    def _solutions(self, stage: Stage) -> Solutions:
-        found = form(self.setup.equations, stage)
+    def _complex_solutions(self, stage: Block) -> MovingSolutions:
+        found = isotropic_form(self.setup.equations, stage)
         if found is None:
-            raise Unclaimed("its equations are no polynomials of this kind")
-        if found.bound > MOST_PATHS:
-            raise Unclaimed(f"it may have up to {found.bound} complex solutions")
-        return Solutions(self.setup.equations, found)
+            raise DeadPointsUnclaimed("its equations are no polynomials of this kind")
+        if found.bezout_number > MAX_PATHS:
+            raise DeadPointsUnclaimed(f"it may have up to {found.bezout_number} complex solutions")
+        return MovingSolutions(self.setup.equations, found)
 
 
 def _distinct(places: Iterable[float]) -> list[float]:
     """Places in their order; what rounding makes of one is one."""
     found: list[float] = []
     for at in sorted(places):
-        if not found or at - found[-1] > ROUNDING:
+        if not found or at - found[-1] > SAME_POSITION_DISTANCE:
             found.append(at)
     return found
 
 
-def _valued(bend: float) -> Value:
+def _dyad_discriminant(bend: float) -> SignedLog:
     """How far a dyad is from where its assemblies meet; without the poles that `bend` has where a length vanishes."""
     number = (1.0 - bend) / hypot(1.0, bend) if isfinite(bend) else -1.0
-    return Value(float(np.sign(number)), log(abs(number))) if number else NONE
+    return SignedLog(float(np.sign(number)), log(abs(number))) if number else ZERO
 
 
-def _at(setup: Setup, u: Array) -> Setup:
+def _with_inputs(setup: PreparedMechanism, u: Array) -> PreparedMechanism:
     """The same setup with other inputs' numbers."""
     there = object.__new__(type(setup))
     there.__dict__.update(setup.__dict__)
-    there.station = setup.station._replace(u=u)
+    there.inputs = setup.inputs._replace(u=u)
     return there
 
 
-def _before(setup: Setup) -> list[set[int]]:
+def _earlier_blocks(setup: PreparedMechanism) -> list[set[int]]:
     """The earlier groups on which each group hangs, itself or through others."""
-    stages = setup.equations.stages
+    stages = setup.equations.blocks
     of = {column: k for k, stage in enumerate(stages) for column in range(stage.unknowns.start, stage.unknowns.stop)}
     found: list[set[int]] = []
-    for columns in hanging(setup):
+    for columns in block_dependencies(setup):
         direct = {of[column] for column in columns}
         found.append(direct.union(*(found[k] for k in direct)))
     return found

@@ -9,12 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.foundation.errors import NoAnswer
-from planar.solving.continuation.path_pieces import Piece, onwards, pieces
-from planar.solving.continuation.period import PIECES
-from planar.solving.continuation.predictor_corrector import OUT, Walk
-from planar.solving.continuation.solution_curve import Curve
-from planar.solving.position import Solver
-from planar.solving.runs.closed_circuit import circuit
+from planar.solving.continuation.path_pieces import PathPiece, path_pieces, start_point
+from planar.solving.continuation.period import MAX_PIECES
+from planar.solving.continuation.predictor_corrector import SHOWN_SLIDE_EXTENT, CurveTracker
+from planar.solving.continuation.solution_curve import SolutionCurve
+from planar.solving.position import PositionSolver
+from planar.solving.runs.closed_circuit import follow_circuit
 
 Array = np.ndarray
 
@@ -36,71 +36,71 @@ class Branch(NamedTuple):
     ends: tuple[str, str]
 
 
-class Leg(NamedTuple):
+class BranchLeg(NamedTuple):
     """A part of a branch that was followed in one go: its pieces, and the way and place of its curve's input."""
 
-    curve: Curve
-    pieces: tuple[Piece, ...]
+    curve: SolutionCurve
+    pieces: tuple[PathPiece, ...]
     first: float
-    way: float
+    direction: float
 
     def position(self, place: float) -> float:
         """Of the input (rad, sizes), where it is so far on the way."""
-        return self.first + self.way * place
+        return self.first + self.direction * place
 
     @property
     def ends(self) -> tuple[float, float]:
         """The positions of the input from which and to which the leg was followed."""
         return self.position(self.pieces[0].start), self.position(self.pieces[-1].stop)
 
-    def at(self, position: float, turns: bool) -> Iterator[Array]:
+    def unknowns_at(self, position: float, turns: bool) -> Iterator[Array]:
         """The unknowns wherever the input is at a position, or whole turns from it."""
         for piece in self.pieces:
             low, high = sorted((self.position(piece.start), self.position(piece.stop)))
             # of two pieces that share an end only the one that starts there counts
             place = position + TURN * ceil((low - position) / TURN) if turns else position
             while low <= place < high:
-                yield piece.at(self.curve, self.way * (place - self.first))[0]
+                yield piece.unknowns_at(self.curve, self.direction * (place - self.first))[0]
                 if not turns:
                     break
                 place += TURN
 
 
-class Traced(NamedTuple):
+class TracedCircuit(NamedTuple):
     """A circuit's legs by branch, in the order in which it runs through them; whether it closes, and why not."""
 
-    solver: Solver
-    branches: tuple[tuple[Leg, ...], ...]
-    home: int
+    solver: PositionSolver
+    branches: tuple[tuple[BranchLeg, ...], ...]
+    home_branch: int
     "the branch of the assembly from which it was followed, on which the input goes up"
-    rests: tuple[float, ...]
+    resting_inputs: tuple[float, ...]
     "where the input rests on the curve (rad, sizes)"
-    crossed: bool
+    has_change_point: bool
     "whether it was followed through a change point, where branches cross"
     closed: bool
-    lost: str
-    turns: bool
+    lost_reason: str
+    is_turning: bool
     "whether the input comes back after a turn"
 
     @property
     def scale(self) -> float:
         """What positions of the input on the curve are multiplied by: rad and m outside."""
-        return 1.0 if self.turns else self.solver.unit
+        return 1.0 if self.is_turning else self.solver.unit
 
     @property
-    def dead(self) -> tuple[float, ...]:
+    def dead_points(self) -> tuple[float, ...]:
         """The input's positions at its dead points (rad, m)."""
-        return tuple(each * self.scale for each in self.rests)
+        return tuple(each * self.scale for each in self.resting_inputs)
 
-    def at(self, position: float) -> Iterator[tuple[int, Array]]:
+    def assemblies_at(self, position: float) -> Iterator[tuple[int, Array]]:
         """Every assembly with the input at a position (rad, m): the branch (from 0), and the unknowns (rad, m)."""
         by = self.solver.scale[list(self.solver.equations.unknowns)]
         for number, legs in enumerate(self.branches):
             for leg in legs:
-                for z in leg.at(position / self.scale, self.turns):
+                for z in leg.unknowns_at(position / self.scale, self.is_turning):
                     yield number, z * by
 
-    def told(self) -> Iterator[Branch]:
+    def public_branches(self) -> Iterator[Branch]:
         """The branches in numbers."""
         last, scale = len(self.branches) - 1, self.scale
         for index, legs in enumerate(self.branches):
@@ -108,68 +108,68 @@ class Traced(NamedTuple):
             gone = sum(abs(leg.ends[1] - leg.ends[0]) for leg in legs)
             low = min(legs[0].ends)
             if self.closed:
-                ends = ("dead point", "dead point") if self.rests else ("", "")
+                ends = ("dead point", "dead point") if self.resting_inputs else ("", "")
             else:
-                out = "lost" if self.lost else "without end"
+                out = "lost" if self.lost_reason else "without end"
                 ends = (out if index == 0 else "dead point", out if index == last else "dead point")
-            up = (index - self.home) % 2 == 0
-            turns = round(gone / TURN) if self.closed and not self.rests else 0
-            if self.turns:
+            up = (index - self.home_branch) % 2 == 0
+            turns = round(gone / TURN) if self.closed and not self.resting_inputs else 0
+            if self.is_turning:
                 low = 0.0 if turns else low % TURN
             yield Branch(index + 1, low * scale, (low + gone) * scale, turns, ends if up else ends[::-1])
 
 
-def traced(solver: Solver, index: int, z: Array) -> Traced:
+def trace_circuit(solver: PositionSolver, index: int, z: Array) -> TracedCircuit:
     """The circuit of an assembly with unknowns z at the solver's inputs, of which one runs."""
-    turns = not solver.slides(solver.mechanism.inputs[index].pair)
-    walk = _walk(solver, index, z, 1.0)
-    first = float(solver.station.u[index])
+    turns = not solver.is_sliding(solver.mechanism.inputs[index].pair)
+    walk = _curve_tracker(solver, index, z, 1.0)
+    first = float(solver.inputs.u[index])
     try:
-        whole = circuit(solver, walk)
+        whole = follow_circuit(solver, walk)
     except NoAnswer as problem:
-        return _open(solver, index, z, problem.reason.split(";")[0])
-    legs = [Leg(walk.curve, stretch.pieces, first, 1.0) for stretch in whole.stretches]
-    rests = tuple(leg.ends[1] for leg in (legs if whole.from_dead else legs[:-1]))
-    if len(legs) == 1 or whole.from_dead:
+        return _trace_open_circuit(solver, index, z, problem.reason.split(";")[0])
+    legs = [BranchLeg(walk.curve, stretch.pieces, first, 1.0) for stretch in whole.branches]
+    rests = tuple(leg.ends[1] for leg in (legs if whole.starts_at_dead_point else legs[:-1]))
+    if len(legs) == 1 or whole.starts_at_dead_point:
         branches = [(leg,) for leg in legs]
     else:  # the last comes back to where the first has started
         branches = [(legs[-1], legs[0]), *((leg,) for leg in legs[1:-1])]
-    return Traced(solver, tuple(branches), 0, rests, bool(walk.passed), True, "", turns)
+    return TracedCircuit(solver, tuple(branches), 0, rests, bool(walk.passed), True, "", turns)
 
 
-def _open(solver: Solver, index: int, z: Array, reason: str) -> Traced:
+def _trace_open_circuit(solver: PositionSolver, index: int, z: Array, reason: str) -> TracedCircuit:
     """A circuit that is not found to close, followed both ways as far as it goes."""
-    turns = not solver.slides(solver.mechanism.inputs[index].pair)
-    first = float(solver.station.u[index])
-    sides: list[list[Leg]] = []
+    turns = not solver.is_sliding(solver.mechanism.inputs[index].pair)
+    first = float(solver.inputs.u[index])
+    sides: list[list[BranchLeg]] = []
     rests: list[float] = []
     lost, crossed = "", False
     for way in (-1.0, 1.0):
-        walk = _walk(solver, index, z, way)
-        found: list[list[Piece]] = [[]]
+        walk = _curve_tracker(solver, index, z, way)
+        found: list[list[PathPiece]] = [[]]
         out = False
-        for piece in pieces(walk):
+        for piece in path_pieces(walk):
             if piece.first == piece.last:
                 continue
             found[-1].append(piece)
-            if piece.dead is not None:
+            if piece.dead_point is not None:
                 rests.append(first + way * piece.stop)
                 found.append([])
-            out = not turns and abs(piece.stop) > OUT
-            if out or sum(map(len, found)) > PIECES:
+            out = not turns and abs(piece.stop) > SHOWN_SLIDE_EXTENT
+            if out or sum(map(len, found)) > MAX_PIECES:
                 break
         crossed |= bool(walk.passed)
         if not (out or walk.limit is not None):
             lost = reason
-        sides.append([Leg(walk.curve, tuple(each), first, way) for each in found if each])
+        sides.append([BranchLeg(walk.curve, tuple(each), first, way) for each in found if each])
     back, ahead = sides
     home = (*back[:1], *ahead[:1])  # none where no way on is found at all
     branches = [*((leg,) for leg in back[:0:-1]), home, *((leg,) for leg in ahead[1:])] if home else []
-    return Traced(solver, tuple(branches), max(len(back) - 1, 0), tuple(rests), crossed, False, lost, turns)
+    return TracedCircuit(solver, tuple(branches), max(len(back) - 1, 0), tuple(rests), crossed, False, lost, turns)
 
 
-def _walk(solver: Solver, index: int, z: Array, way: float) -> Walk:
-    axis = np.zeros_like(solver.station.u)
+def _curve_tracker(solver: PositionSolver, index: int, z: Array, way: float) -> CurveTracker:
+    axis = np.zeros_like(solver.inputs.u)
     axis[index] = way
-    curve = Curve(solver, solver.station.p, solver.station.u, axis)
-    return Walk(curve, onwards(curve, np.append(z, 0.0), []))
+    curve = SolutionCurve(solver, solver.inputs.p, solver.inputs.u, axis)
+    return CurveTracker(curve, start_point(curve, np.append(z, 0.0), []))

@@ -15,13 +15,13 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
-from planar.assemblies.polynomial.isotropic_form import Form
-from planar.codegen.generic_evaluation import computed
+from planar.assemblies.polynomial.isotropic_form import IsotropicForm
+from planar.codegen.generic_evaluation import evaluate_function
 
 Array = np.ndarray
 
-BITS = 128
-RADII = (1e-7, 1e-9, 1e-11, 1e-13)
+BALL_PRECISION_BITS = 128
+BOX_HALF_WIDTHS = (1e-7, 1e-9, 1e-11, 1e-13)
 """Half widths of boxes that are tried, the widest first."""
 
 
@@ -36,13 +36,13 @@ class Certificate(NamedTuple):
     decided: Array
 
 
-def certified(form: Form, given: Sequence[Array], V: Array) -> Certificate:
+def certify_solutions(form: IsotropicForm, given: Sequence[Array], V: Array) -> Certificate:
     """What is proved of solutions V (solutions, 2 many) of a group at (z, u, p)."""
     from flint import ctx
 
-    before, ctx.prec = ctx.prec, BITS
+    before, ctx.prec = ctx.prec, BALL_PRECISION_BITS
     try:
-        return _certified(_Balls(form, given), V)
+        return _certify_balls(_BallPolynomials(form, given), V)
     except ZeroDivisionError:  # rows of X that may depend on each other
         none = np.zeros(len(V), dtype=bool)
         return Certificate(none, none, none)
@@ -50,15 +50,15 @@ def certified(form: Form, given: Sequence[Array], V: Array) -> Certificate:
         ctx.prec = before
 
 
-def _certified(balls: _Balls, V: Array) -> Certificate:
+def _certify_balls(balls: _BallPolynomials, V: Array) -> Certificate:
     count, m = len(V), V.shape[1] // 2
     proved, real, decided = (np.zeros(count, dtype=bool) for _ in range(3))
-    x, y = balls.reduced(V[:, :m], V[:, m:])
+    x, y = balls.reduce_solutions(V[:, :m], V[:, m:])
     w = np.concatenate([x, y], axis=1)
     half = np.full(count, np.inf)
     inside: list[Any] = [None] * count
     for k in range(count):
-        found = balls.proved(w[k])
+        found = balls.prove_box(w[k])
         if found is not None:
             proved[k], (half[k], inside[k]) = True, found
     # the greatest difference of any entry: with a factor of two to spare nothing is left to rounding
@@ -80,7 +80,7 @@ def _certified(balls: _Balls, V: Array) -> Certificate:
     return Certificate(proved, real, decided)
 
 
-def able() -> bool:
+def is_available() -> bool:
     """Whether there is a library for ball arithmetic (the extra `modes`)."""
     try:
         import flint  # noqa: F401
@@ -89,38 +89,38 @@ def able() -> bool:
     return True
 
 
-def regular(slope: ca.Function, given: Sequence[Array]) -> bool:
+def is_regular(slope: ca.Function, given: Sequence[Array]) -> bool:
     """Whether it is proved that linear equations, of a square slope as a function of (z, u, p), have one solution."""
     from flint import arb_mat, ctx
 
-    before, ctx.prec = ctx.prec, BITS
+    before, ctx.prec = ctx.prec, BALL_PRECISION_BITS
     try:
-        return not arb_mat(_evaluated(slope, given)[0]).det().contains(0)
+        return not arb_mat(_evaluate_in_balls(slope, given)[0]).det().contains(0)
     finally:
         ctx.prec = before
 
 
-class _Balls:
+class _BallPolynomials:
     """The polynomials of a group as balls, and what is left of them once the rows linear in X, and in Y, are solved.
 
     Then X = P x and Y = conj(P) y, where x are some entries of X; they are measured so that c x = 1, conj(c) y = 1.
     """
 
-    def __init__(self, form: Form, given: Sequence[Array]):
+    def __init__(self, form: IsotropicForm, given: Sequence[Array]):
         from flint import acb, acb_mat
 
         self.acb, self.mat, self.form = acb, acb_mat, form
-        alpha = _factors(form.real, given)
-        loops = self._sums(form.combined, alpha)
+        alpha = _factors(form.row_factors, given)
+        loops = self._combine_rows(form.combined, alpha)
         for row in loops:
-            for k in form.known:
+            for k in form.real_entries:
                 row[k] = row[k] * 2
-        self.single = self._sums(form.single.astype(complex), alpha)
-        A = np.array([[complex(each.mid()) for each in row] for row in loops]).reshape(-1, form.many)
+        self.single = self._combine_rows(form.single.astype(complex), alpha)
+        A = np.array([[complex(each.mid()) for each in row] for row in loops]).reshape(-1, form.entry_count)
         self.pivots = _pivots(A)
-        self.free = [k for k in range(form.many) if k not in self.pivots]
+        self.free = [k for k in range(form.entry_count) if k not in self.pivots]
         size = len(self.free)
-        self.P = [[acb(0)] * size for _ in range(form.many)]
+        self.P = [[acb(0)] * size for _ in range(form.entry_count)]
         for n, k in enumerate(self.free):
             self.P[k][n] = acb(1)
         if loops:
@@ -133,10 +133,10 @@ class _Balls:
         self.c_balls = [acb(each.real, each.imag) for each in self.c]
         self.products = [tuple(int(each) for each in row) for row in form.products]
 
-    def _sums(self, combined: Array, alpha: list[list[Any]]) -> list[list[Any]]:
+    def _combine_rows(self, combined: Array, alpha: list[list[Any]]) -> list[list[Any]]:
         found = []
         for row in combined:
-            whole = [self.acb(0)] * self.form.many
+            whole = [self.acb(0)] * self.form.entry_count
             for factor, terms in zip(row, alpha, strict=True):
                 if factor:
                     ball = self.acb(factor.real, factor.imag)
@@ -144,22 +144,22 @@ class _Balls:
             found.append(whole)
         return found
 
-    def reduced(self, X: Array, Y: Array) -> tuple[Array, Array]:
+    def reduce_solutions(self, X: Array, Y: Array) -> tuple[Array, Array]:
         """x and y of solutions, measured."""
         x, y = X[:, self.free], Y[:, self.free]
         return x / (x @ self.c)[:, None], y / (y @ self.c.conj())[:, None]
 
-    def _whole(self, w: Sequence[Any]) -> tuple[list[Any], list[Any]]:
+    def _expand_solution(self, w: Sequence[Any]) -> tuple[list[Any], list[Any]]:
         """X and Y as balls."""
         n = len(self.free)
         X = self.mat(self.P) * self.mat([[each] for each in w[:n]])
         Y = self.mat(self.P).conjugate() * self.mat([[each] for each in w[n:]])
         return X.entries(), Y.entries()
 
-    def _at(self, w: Sequence[Any], slopes: bool) -> tuple[list[Any], list[list[Any]]]:
+    def _residuals_and_jacobian(self, w: Sequence[Any], slopes: bool) -> tuple[list[Any], list[list[Any]]]:
         """The equations at w, and their slope."""
         n = len(self.free)
-        X, Y = self._whole(w)
+        X, Y = self._expand_solution(w)
         P, conj = self.P, [[each.conjugate() for each in row] for row in self.P]
         left, slope = [], []
         for i, j, k, l in self.products:  # noqa: E741
@@ -184,10 +184,10 @@ class _Balls:
             slope += [c + none, none + [each.conjugate() for each in c]]
         return left, slope
 
-    def proved(self, w: Array) -> tuple[float, list[Any]] | None:
+    def prove_box(self, w: Array) -> tuple[float, list[Any]] | None:
         """The half width of a box about w that holds one solution and no other, and a narrow box of it within."""
         middle = [self.acb(each.real, each.imag) for each in w]
-        left, slope = self._at(middle, True)
+        left, slope = self._residuals_and_jacobian(middle, True)
         there = np.array([[complex(each.mid()) for each in row] for row in slope])
         try:
             inverse = np.linalg.inv(there)
@@ -198,12 +198,12 @@ class _Balls:
         near = self.mat([[self.acb(each.real, each.imag) for each in row] for row in inverse])
         step = near * self.mat([[each] for each in left])
         one = self.mat(len(w), len(w), [1 if i == j else 0 for i in range(len(w)) for j in range(len(w))])
-        for half in RADII:
+        for half in BOX_HALF_WIDTHS:
             box = self._box(w, half)
-            wide = one - near * self.mat(self._at(box, True)[1])
+            wide = one - near * self.mat(self._residuals_and_jacobian(box, True)[1])
             about = self.mat([[each] for each in self._box(np.zeros(len(w)), half)])
             moved = (wide * about - step).entries()
-            if all(_within(each, half) for each in moved):
+            if all(_is_within(each, half) for each in moved):
                 return half, [at + each for at, each in zip(middle, moved, strict=True)]
         return None
 
@@ -217,15 +217,15 @@ class _Balls:
         n = len(self.free)
         image = [each.conjugate() for each in (*inside[n:], *inside[:n])]
         middle = [self.acb(each.real, each.imag) for each in w]
-        return all(_within(each - at, half) for each, at in zip(image, middle, strict=True))
+        return all(_is_within(each - at, half) for each, at in zip(image, middle, strict=True))
 
     def is_finite(self, inside: Sequence[Any]) -> bool:
         """Whether the solution is at a finite place."""
-        X, Y = self._whole(inside)
+        X, Y = self._expand_solution(inside)
         return not (X[0].contains(0) or Y[0].contains(0))
 
 
-def _within(ball: Any, half: float) -> bool:
+def _is_within(ball: Any, half: float) -> bool:
     """Whether a ball lies inside of a square about nothing."""
     return bool(ball.real.abs_upper() < half) and bool(ball.imag.abs_upper() < half)
 
@@ -247,16 +247,16 @@ def _factors(function: ca.Function, given: Sequence[Array]) -> list[list[Any]]:
     """What a function of real and imaginary parts gives, computed in balls: (rows, columns)."""
     from flint import acb
 
-    parts = _evaluated(function, given)
+    parts = _evaluate_in_balls(function, given)
     return [[acb(*both) for both in zip(*rows, strict=True)] for rows in zip(*parts, strict=True)]
 
 
-def _evaluated(function: ca.Function, given: Sequence[Array]) -> list[list[list[Any]]]:
+def _evaluate_in_balls(function: ca.Function, given: Sequence[Array]) -> list[list[list[Any]]]:
     """The results of a function of dense matrices, computed in balls from floats: each (rows, columns)."""
     from flint import arb
 
     inputs = [[arb(float(each)) for each in values] for values in given]
-    found = computed(function, inputs, arb)
+    found = evaluate_function(function, inputs, arb)
     sizes = [function.size_out(k) for k in range(function.n_out())]
     return [
         [[values[r + rows * c] for c in range(columns)] for r in range(rows)]

@@ -6,46 +6,46 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.assemblies.polynomial.isotropic_form import VANISHES, Form, Polynomials
-from planar.equations.constraint_equations import Equations
+from planar.assemblies.polynomial.isotropic_form import ZERO_TOLERANCE, BlockPolynomials, IsotropicForm
+from planar.equations.constraint_equations import ConstraintEquations
 
 Array = np.ndarray
 
 
-class Family(NamedTuple):
+class CoefficientFamily(NamedTuple):
     """The space that all coefficients of X of one structure span (coefficients, dimensions); those of Y span its
     conjugate."""
 
-    form: Form
+    form: IsotropicForm
     span: Array
 
-    def drawn(self, rng: np.random.Generator) -> Polynomials:
+    def draw_member(self, rng: np.random.Generator) -> BlockPolynomials:
         """A random member, complex: its Y is not the conjugate of its X."""
         many = self.span.shape[1]
         x, y = (rng.normal(size=many) + 1j * rng.normal(size=many) for _ in range(2))
-        return self._parted(self.span @ x, self.span.conj() @ y)
+        return self._split_coefficients(self.span @ x, self.span.conj() @ y)
 
-    def _parted(self, x: Array, y: Array) -> Polynomials:
-        loops, singles, many = len(self.form.combined), len(self.form.single), self.form.many
+    def _split_coefficients(self, x: Array, y: Array) -> BlockPolynomials:
+        loops, singles, many = len(self.form.combined), len(self.form.single), self.form.entry_count
         A, a = x[: loops * many].reshape(loops, many), x[loops * many :].reshape(singles, many)
         B, b = y[: loops * many].reshape(loops, many), y[loops * many :].reshape(singles, many)
-        return Polynomials(A, B, a, b)
+        return BlockPolynomials(A, B, a, b)
 
 
-def family(e: Equations, form: Form, absent: Array) -> Family:
+def coefficient_family(e: ConstraintEquations, form: IsotropicForm, absent: Array) -> CoefficientFamily:
     """The least linear family that holds every linkage of a structure in which some coefficients are `absent`."""
     rng = np.random.default_rng(3)
-    wanted = form.many * (len(form.combined) + len(form.single)) + 8
+    wanted = form.entry_count * (len(form.combined) + len(form.single)) + 8
     values = [[rng.uniform(0.5, 2.0, symbol.numel()) for symbol in (e.z, e.u, e.p)] for _ in range(wanted)]
-    drawn = np.array([form.polynomials(*each).flat[0] for each in values]).T
+    drawn = np.array([form.polynomials(*each).flat_coefficients[0] for each in values]).T
     span = _span(drawn)
     if absent.any():
         # what vanishes in the one that is wanted is kept away from all of them
         _, sizes, directions = np.linalg.svd(span[absent])
-        rank = int(np.sum(sizes > VANISHES))
+        rank = int(np.sum(sizes > ZERO_TOLERANCE))
         span = _span(span @ directions[rank:].conj().T)
         span[absent] = 0.0
-    return Family(form, span)
+    return CoefficientFamily(form, span)
 
 
 def _span(columns: Array) -> Array:

@@ -18,7 +18,7 @@ class Completeness(Enum):
     NOT = "not known to be complete"
 
 
-class Roots(NamedTuple):
+class BlockRoots(NamedTuple):
     """All assemblies of one group of links, those before it given.
 
     `real`: (roots, unknowns) as in z[stage.unknowns] (rad, sizes), sorted, angles between -pi and pi or, if
@@ -35,5 +35,5 @@ class Roots(NamedTuple):
     expected: int | None
     found: int
     complete: Completeness
-    curve: bool
-    said: str
+    has_curve: bool
+    method: str

@@ -16,29 +16,29 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.assemblies.polynomial.isotropic_form import Form, Polynomials
+from planar.assemblies.polynomial.isotropic_form import BlockPolynomials, IsotropicForm
 
 Array = np.ndarray
 
-MOST = 3
+MAX_DIMENSION = 3
 """Dimensions up to which eigenvalues are sought; beyond, paths are followed: their number grows less than the size's
 cube."""
 
 
-class _Room(NamedTuple):
+class _MonomialTables(NamedTuple):
     """What depends on the dimension alone: places, the inverse of the monomials there, which minors, products."""
 
-    places: Array
+    points: Array
     inverse: Array
     minors: Array
-    times: Array
+    product_index: Array
     "(d + 1, monomials of degree d): which monomial of degree d + 1 the product with an entry of x is"
 
 
-def by_eigenvalues(form: Form, polynomials: Polynomials) -> Array | None:
+def eigenvalue_solutions(form: IsotropicForm, polynomials: BlockPolynomials) -> Array | None:
     """As many solutions X, Y (C(2d, d), 2 many) as Bezout's number; None where these are not single solutions."""
     d = form.dimension
-    room = _room(d)
+    room = _monomial_tables(d)
     P, Q = _kernel(polynomials.A), _kernel(polynomials.B)
     i, j, k, l = form.products.T  # noqa: E741
     # M(x) = sum of x[n] times parts[n] (2d, d + 1)
@@ -47,12 +47,12 @@ def by_eigenvalues(form: Form, polynomials: Polynomials) -> Array | None:
         single = (polynomials.a @ P).T[:, :, None] * Q[0] + P[0][:, None, None] * (polynomials.b @ Q)[None]
         parts = np.concatenate([parts, single], axis=1)
     parts = parts / np.maximum(np.linalg.norm(parts, axis=(0, 2), keepdims=True), 1e-300)
-    there = np.tensordot(room.places, parts, 1)
+    there = np.tensordot(room.points, parts, 1)
     minors = room.inverse @ np.linalg.det(there[:, room.minors])
     kept = np.linalg.svd(minors.T)[2][minors.shape[1] :].conj().T
     rng = np.random.default_rng(d)
     one, other = rng.normal(size=(2, d + 1)) + 1j * rng.normal(size=(2, d + 1))
-    of = kept[room.times]  # (d + 1, degree d, solutions)
+    of = kept[room.product_index]  # (d + 1, degree d, solutions)
     try:
         vectors = np.linalg.eig(np.linalg.solve(np.tensordot(one, of, 1), np.tensordot(other, of, 1)))[1]
     except np.linalg.LinAlgError:
@@ -67,7 +67,7 @@ def by_eigenvalues(form: Form, polynomials: Polynomials) -> Array | None:
 
 
 @lru_cache(maxsize=8)
-def _room(d: int) -> _Room:
+def _monomial_tables(d: int) -> _MonomialTables:
     monomials = list(combinations_with_replacement(range(d + 1), d + 1))
     lower = list(combinations_with_replacement(range(d + 1), d))
     place = {monomial: k for k, monomial in enumerate(monomials)}
@@ -75,7 +75,7 @@ def _room(d: int) -> _Room:
     rng = np.random.default_rng(5)
     places = np.exp(2j * np.pi * rng.uniform(size=(comb(2 * d + 1, d), d + 1)))
     values = np.prod(places[:, np.array(monomials)], axis=2)
-    return _Room(places, np.linalg.inv(values), np.array(list(combinations(range(2 * d), d + 1))), times)
+    return _MonomialTables(places, np.linalg.inv(values), np.array(list(combinations(range(2 * d), d + 1))), times)
 
 
 def _kernel(rows: Array) -> Array:

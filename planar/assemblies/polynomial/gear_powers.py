@@ -19,20 +19,20 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from planar.codegen.generic_evaluation import DONE, computed
-from planar.equations.constraint_equations import Equations, Stage
-from planar.model.pairs import Kind
+from planar.codegen.generic_evaluation import OPERATIONS, evaluate_function
+from planar.equations.constraint_equations import Block, ConstraintEquations
+from planar.model.pairs import MeasureKind
 
 Array = np.ndarray
-Whole = tuple[int, ...]
+IntegerVector = tuple[int, ...]
 
-MOST_TEETH = 1000
+MAX_DENOMINATOR = 1000
 """Greatest denominator of a ratio that is taken for rational."""
-RATIONAL = 1e-12
+RATIONAL_TOLERANCE = 1e-12
 """How near a ratio is to the rational number for which it stands."""
 
 
-class Arguments(NamedTuple):
+class AngleArguments(NamedTuple):
     """What the cosines and sines in a group's rows are of: `symbols` stand for them in `rows`.
 
     `rates`: how they change with the group's angles (arguments, angles); `relations`: what rows between angles alone
@@ -47,7 +47,7 @@ class Arguments(NamedTuple):
     start: ca.SX
 
 
-class Gears(NamedTuple):
+class GearPowers(NamedTuple):
     """How directions are powers of those of new angles.
 
     `places`: of every argument the place of its direction in X; `powers`: how many entries of X are directions, the
@@ -55,26 +55,26 @@ class Gears(NamedTuple):
     `exact`: whether that is so of the ratios as the floats that they are.
     """
 
-    places: tuple[int, ...]
+    entry_index: tuple[int, ...]
     powers: int
     products: Array
-    back: Array
-    exact: bool
+    angles_from_new: Array
+    is_exact: bool
 
-    def least(self, angles: Array) -> Array:
+    def least_angles(self, angles: Array) -> Array:
         """The same directions with the least angles (angles,), which count turns."""
-        period = 2.0 * np.pi * self.back
+        period = 2.0 * np.pi * self.angles_from_new
         angles = angles - period @ np.round(np.linalg.pinv(period) @ angles)
         turns = np.array(list(product((0, -1, 1), repeat=period.shape[1])))
         tried = angles + turns @ period.T
         return tried[int(np.argmin(np.abs(tried).sum(axis=1).round(9)))]
 
 
-class _Bent(Exception):
+class _NonlinearArgument(Exception):
     """A cosine of something that is not linear in a group's angles."""
 
 
-def arguments(e: Equations, stage: Stage, angles: Sequence[int], p: Array) -> Arguments | None:
+def angle_arguments(e: ConstraintEquations, stage: Block, angles: Sequence[int], p: Array) -> AngleArguments | None:
     """What a group's cosines and sines are of, for numbers p of the pairs; None where that is not linear in angles."""
     own, rng = e.z[stage.unknowns], np.random.default_rng(2)
     place = [rng.uniform(0.5, 2.0, symbol.numel()) for symbol in (e.z, e.u)]
@@ -84,10 +84,10 @@ def arguments(e: Equations, stage: Stage, angles: Sequence[int], p: Array) -> Ar
         rate = ca.densify(ca.jacobian(of, own))
         still = ca.substitute(of, own, ca.SX.zeros(own.numel()))
         if ca.depends_on(rate, ca.vertcat(e.z, e.u)):
-            raise _Bent
+            raise _NonlinearArgument
         rates, at = (each.full() for each in ca.Function("of", [e.z, e.u, e.p], [rate, still])(*place, p))
         if np.any(np.delete(rates, angles, axis=1)):
-            raise _Bent
+            raise _NonlinearArgument
         return rates[:, list(angles)], still, at
 
     def symbol(of: ca.SX) -> ca.SX:
@@ -97,59 +97,59 @@ def arguments(e: Equations, stage: Stage, angles: Sequence[int], p: Array) -> Ar
         new = ca.SX.sym(f"argument {len(found)}"), rates[0], still
         return found.setdefault((*rates[0], *at.ravel().round(12)), new)[0]
 
-    done = DONE | {ca.OP_COS: lambda of: ca.cos(symbol(of)), ca.OP_SIN: lambda of: ca.sin(symbol(of))}
-    loops = [row.kind is Kind.LENGTH for row in e.rows[stage.rows]]
+    done = OPERATIONS | {ca.OP_COS: lambda of: ca.cos(symbol(of)), ca.OP_SIN: lambda of: ca.sin(symbol(of))}
+    loops = [row.kind is MeasureKind.LENGTH for row in e.rows[stage.rows]]
     closed, between = (e.F[stage.rows][np.flatnonzero(np.equal(loops, which)).tolist()] for which in (True, False))
     rows = ca.Function("rows", [e.z, e.u, e.p], [ca.densify(closed)])
     try:
-        (written,) = computed(rows, [ca.vertsplit(each) for each in (e.z, e.u, e.p)], ca.SX, done)
+        (written,) = evaluate_function(rows, [ca.vertsplit(each) for each in (e.z, e.u, e.p)], ca.SX, done)
         relations, left, _ = linear(ca.densify(between))
-    except (_Bent, KeyError):
+    except (_NonlinearArgument, KeyError):
         return None
     start = -ca.mtimes(ca.SX(np.linalg.pinv(relations)), left) if len(relations) else ca.SX.zeros(len(angles))
     symbols, rates, still = zip(*found.values(), strict=True) if found else ((), (), ())
     rates = np.array(rates).reshape(len(found), len(angles))
     still = tuple(each + ca.dot(ca.SX(of), start) for each, of in zip(still, rates, strict=True))
-    return Arguments(ca.vertcat(*written), symbols, rates, still, relations, start)
+    return AngleArguments(ca.vertcat(*written), symbols, rates, still, relations, start)
 
 
-def gears(rates: Array, relations: Array) -> Gears | None:
+def gear_powers(rates: Array, relations: Array) -> GearPowers | None:
     """The powers for arguments with such rates (arguments, angles), angles tied by relations (relations, angles).
 
     None where the numbers are not rational, or leave angles without arguments.
     """
-    ratios, ties = _rational(rates), _rational(relations)
-    ways = None if ratios is None or ties is None else _free(ties, rates.shape[1])
+    ratios, ties = _to_fractions(rates), _to_fractions(relations)
+    ways = None if ratios is None or ties is None else _free_directions(ties, rates.shape[1])
     if not ratios or not ways:
         return None
     along = [[_dot(row, way) for way in ways] for row in ratios]
     parts = lcm(*(each.denominator for row in along for each in row))
-    basis = np.array(_basis([[int(each * parts) for each in row] for row in along]), dtype=float) / parts
+    basis = np.array(_lattice_basis([[int(each * parts) for each in row] for row in along]), dtype=float) / parts
     if basis.shape != (len(ways), len(ways)):
         return None
     new = np.linalg.inv(basis)
-    chain = _Chain(len(ways))
+    chain = _PowerChain(len(ways))
     powers = [tuple(int(power) for power in row) for row in np.round(np.array(along, dtype=float) @ new)]
     for power in sorted(powers, key=lambda power: sum(map(abs, power))):
-        chain.reach(power)
-    places = tuple(chain.place[power] for power in powers)
-    exact = not ties and all(map(_equal, rates.tolist(), ratios))
+        chain.add_power(power)
+    places = tuple(chain.entry_index[power] for power in powers)
+    exact = not ties and all(map(_are_equal, rates.tolist(), ratios))
     back = np.array(ways, dtype=float).T @ new
-    return Gears(places, len(chain.place) - 1, np.array(chain.products, dtype=int), back, exact)
+    return GearPowers(places, len(chain.entry_index) - 1, np.array(chain.products, dtype=int), back, exact)
 
 
-def _rational(numbers: Array) -> list[list[Fraction]] | None:
+def _to_fractions(numbers: Array) -> list[list[Fraction]] | None:
     """The quotients of small numbers for which floats stand; None where one stands for none."""
-    found = [[Fraction(each).limit_denominator(MOST_TEETH) for each in row] for row in numbers.tolist()]
+    found = [[Fraction(each).limit_denominator(MAX_DENOMINATOR) for each in row] for row in numbers.tolist()]
     gaps = np.abs(np.array(found, dtype=float).reshape(numbers.shape) - numbers)
-    return None if np.any(gaps > RATIONAL * np.maximum(1.0, np.abs(numbers))) else found
+    return None if np.any(gaps > RATIONAL_TOLERANCE * np.maximum(1.0, np.abs(numbers))) else found
 
 
-def _equal(floats: list[float], ratios: list[Fraction]) -> bool:
+def _are_equal(floats: list[float], ratios: list[Fraction]) -> bool:
     return list(map(Fraction, floats)) == ratios
 
 
-def _free(relations: list[list[Fraction]], many: int) -> list[list[Fraction]] | None:
+def _free_directions(relations: list[list[Fraction]], many: int) -> list[list[Fraction]] | None:
     """The ways in which angles can turn while relations hold; None where these depend on each other."""
     ways = [[Fraction(int(j == k)) for j in range(many)] for k in range(many)]
     for row in relations:
@@ -169,61 +169,61 @@ def _dot(one: list[Fraction], other: list[Fraction]) -> Fraction:
     return sum((a * b for a, b in zip(one, other, strict=True)), Fraction(0))
 
 
-class _Chain:
+class _PowerChain:
     """Powers of new directions, each made of two before it."""
 
     def __init__(self, many: int):
-        self.none: Whole = (0,) * many
+        self.zero: IntegerVector = (0,) * many
         units = [tuple(int(j == k) for j in range(many)) for k in range(many)]
-        self.place = {power: place for place, power in enumerate([self.none, *units])}
+        self.entry_index = {power: place for place, power in enumerate([self.zero, *units])}
         self.products = [(k, k, 0, 0) for k in range(1, many + 1)]
 
-    def reach(self, power: Whole) -> None:
+    def add_power(self, power: IntegerVector) -> None:
         """Put a power into X, with as few others on the way as are found at once."""
-        if power in self.place or self._made(power):
+        if power in self.entry_index or self._add_from_two(power):
             return
-        there = list(self.place)
-        for between in [each for a, b in product(there, repeat=2) for each in (_sum(a, b), _less(a, b))]:
-            if {_less(power, between), _less(between, power), _sum(power, between)} & {*there, between}:
-                self._made(between)
-                self._made(power)
+        there = list(self.entry_index)
+        for between in [each for a, b in product(there, repeat=2) for each in (_sum(a, b), _difference(a, b))]:
+            if {_difference(power, between), _difference(between, power), _sum(power, between)} & {*there, between}:
+                self._add_from_two(between)
+                self._add_from_two(power)
                 return
         half = tuple(int(each / 2) for each in power)
-        if half == self.none:
+        if half == self.zero:
             first = next(k for k, each in enumerate(power) if each)
             half = tuple(each * (k == first) for k, each in enumerate(power))
-        self.reach(half)
-        self.reach(_less(power, half))
-        self._made(power)
+        self.add_power(half)
+        self.add_power(_difference(power, half))
+        self._add_from_two(power)
 
-    def _made(self, power: Whole) -> bool:
+    def _add_from_two(self, power: IntegerVector) -> bool:
         """Whether it is the product or the quotient of two that are there."""
-        for one, a in self.place.items():
-            other = _less(power, one)
+        for one, a in self.entry_index.items():
+            other = _difference(power, one)
             inverse = tuple(-each for each in other)
-            m = len(self.place)
-            if other in self.place:
-                b = self.place[other]
+            m = len(self.entry_index)
+            if other in self.entry_index:
+                b = self.entry_index[other]
                 self.products += [(m, b, a, 0), (b, m, 0, a)]
-            elif inverse in self.place:
-                b = self.place[inverse]
+            elif inverse in self.entry_index:
+                b = self.entry_index[inverse]
                 self.products += [(a, b, m, 0), (b, a, 0, m)]
             else:
                 continue
-            self.place[power] = m
+            self.entry_index[power] = m
             return True
         return False
 
 
-def _sum(one: Whole, other: Whole) -> Whole:
+def _sum(one: IntegerVector, other: IntegerVector) -> IntegerVector:
     return tuple(a + b for a, b in zip(one, other, strict=True))
 
 
-def _less(one: Whole, other: Whole) -> Whole:
+def _difference(one: IntegerVector, other: IntegerVector) -> IntegerVector:
     return tuple(a - b for a, b in zip(one, other, strict=True))
 
 
-def _basis(rows: list[list[int]]) -> list[list[int]]:
+def _lattice_basis(rows: list[list[int]]) -> list[list[int]]:
     """A basis of the lattice that rows of whole numbers span, of short ones (Euclid's algorithm, column by column)."""
     left, basis = [list(row) for row in rows], []
     for column in range(len(rows[0])):
@@ -235,10 +235,10 @@ def _basis(rows: list[list[int]]) -> list[list[int]]:
                     row[:] = [a - by * b for a, b in zip(row, least, strict=True)]
         basis += there
         left = [row for row in left if not row[column]]
-    return _shortened(basis)
+    return _reduce_basis(basis)
 
 
-def _shortened(basis: list[list[int]]) -> list[list[int]]:
+def _reduce_basis(basis: list[list[int]]) -> list[list[int]]:
     """The same lattice's basis, each less whole multiples of the others while that makes it shorter."""
     changed = True
     while changed:

@@ -27,20 +27,20 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from planar.assemblies.polynomial.gear_powers import Arguments, Gears, arguments, gears
-from planar.equations.casadi_call import Called
-from planar.equations.constraint_equations import Equations, Stage
-from planar.model.pairs import Kind
+from planar.assemblies.polynomial.gear_powers import AngleArguments, GearPowers, angle_arguments, gear_powers
+from planar.equations.casadi_call import BufferedFunction
+from planar.equations.constraint_equations import Block, ConstraintEquations
+from planar.model.pairs import MeasureKind
 
 Array = np.ndarray
 
-VANISHES = 1e-10
+ZERO_TOLERANCE = 1e-10
 """Of numbers about one: what is rounding."""
-PLACES = 4
+RANDOM_POINTS = 4
 """Random places at which the form is compared with the equations."""
 
 
-class Polynomials(NamedTuple):
+class BlockPolynomials(NamedTuple):
     """One group with numbers filled in; see the module for the letters."""
 
     A: Array
@@ -49,7 +49,7 @@ class Polynomials(NamedTuple):
     b: Array
 
     @property
-    def flat(self) -> tuple[Array, Array]:
+    def flat_coefficients(self) -> tuple[Array, Array]:
         """All coefficients of X, and all of Y, each in one row."""
         return (
             np.concatenate([self.A.ravel(), self.a.ravel()]),
@@ -57,7 +57,7 @@ class Polynomials(NamedTuple):
         )
 
 
-class Form(NamedTuple):
+class IsotropicForm(NamedTuple):
     """How the group of one structure is written.
 
     `angles`, `lengths`: the group's unknowns whose directions and which are X[1:] in this order; `turning`: for each
@@ -69,115 +69,115 @@ class Form(NamedTuple):
 
     angles: tuple[int, ...]
     lengths: tuple[int, ...]
-    turning: tuple[int, ...]
-    real: ca.Function
-    called: Called
+    direction_index: tuple[int, ...]
+    row_factors: ca.Function
+    factors_call: BufferedFunction
     combined: Array
     single: Array
-    redundant: bool
-    gears: Gears | None
+    is_redundant: bool
+    gears: GearPowers | None
     "where directions are powers of those of new angles, which are X[1:] then"
-    start: ca.Function
+    start_angles: ca.Function
     "angles (angles, 1) that meet all rows between angles alone, as a function of (z, u, p)"
 
     @property
-    def first(self) -> int:
+    def first_length(self) -> int:
         """The place of the first length in X."""
         return 1 + (self.gears.powers if self.gears else len(self.angles))
 
     @property
-    def many(self) -> int:
+    def entry_count(self) -> int:
         """Entries of X."""
-        return self.first + len(self.lengths)
+        return self.first_length + len(self.lengths)
 
     @property
-    def known(self) -> list[int]:
+    def real_entries(self) -> list[int]:
         """The entries of X that are real, or lengths along a direction that is known."""
-        return [0, *(self.first + m for m, j in enumerate(self.turning) if not j)]
+        return [0, *(self.first_length + m for m, j in enumerate(self.direction_index) if not j)]
 
     @property
     def dimension(self) -> int:
         """d of the module's text."""
-        return self.many - 1 - len(self.combined)
+        return self.entry_count - 1 - len(self.combined)
 
     @property
-    def bound(self) -> int:
+    def bezout_number(self) -> int:
         """C(2d, d)."""
         return comb(2 * self.dimension, self.dimension)
 
     @property
     def products(self) -> Array:
         """(equations, 4): X[i] Y[j] - X[k] Y[l] = 0."""
-        turned = self.gears.products if self.gears else [(j, j, 0, 0) for j in range(1, self.first)]
-        slid = [(self.first + m, j, j, self.first + m) for m, j in enumerate(self.turning)]
+        turned = self.gears.products if self.gears else [(j, j, 0, 0) for j in range(1, self.first_length)]
+        slid = [(self.first_length + m, j, j, self.first_length + m) for m, j in enumerate(self.direction_index)]
         return np.array([*turned, *slid], dtype=int).reshape(-1, 4)
 
-    def polynomials(self, z: Array, u: Array, p: Array) -> Polynomials:
+    def polynomials(self, z: Array, u: Array, p: Array) -> BlockPolynomials:
         """The group where all before it stands at z, for inputs u and numbers p."""
-        real, imaginary = (each.T for each in self.called(z, u, p))
+        real, imaginary = (each.T for each in self.factors_call(z, u, p))
         alpha = real + 1j * imaginary
         loops = self.combined @ alpha
         # of what is real one half stands with X, one with Y: in a loop both are put together
-        loops[:, self.known] *= 2.0
-        return Polynomials(loops, loops.conj(), self.single @ alpha, self.single @ alpha.conj())
+        loops[:, self.real_entries] *= 2.0
+        return BlockPolynomials(loops, loops.conj(), self.single @ alpha, self.single @ alpha.conj())
 
-    def nearest(self, X: Array, Y: Array, given: Sequence[Array]) -> Array:
+    def nearest_real_unknowns(self, X: Array, Y: Array, given: Sequence[Array]) -> Array:
         """The real unknowns of the group (solutions, unknowns) that lie nearest to solutions at finite places, at
         (z, u, p)."""
         found = np.zeros((len(X), len(self.angles) + len(self.lengths)))
         X, Y = X / X[:, :1], Y / Y[:, :1]
         turned = np.angle(X + Y.conj())[:, 1:]
         if self.gears:
-            back = self.gears.back
-            found[:, list(self.angles)] = turned[:, : back.shape[1]] @ back.T + self.start(*given).full().T
+            back = self.gears.angles_from_new
+            found[:, list(self.angles)] = turned[:, : back.shape[1]] @ back.T + self.start_angles(*given).full().T
         else:
             found[:, list(self.angles)] = turned[:, : len(self.angles)]
-        for k, (own, j) in enumerate(zip(self.lengths, self.turning, strict=True), self.first):
+        for k, (own, j) in enumerate(zip(self.lengths, self.direction_index, strict=True), self.first_length):
             found[:, own] = (X[:, k] * (Y[:, j] if j else 1.0)).real
         return found
 
-    def wrapped(self, root: Array) -> Array:
+    def wrap_angles(self, root: Array) -> Array:
         """The same assembly (unknowns,) with angles between -pi and pi, or the least that count turns."""
         angles, root = list(self.angles), root.copy()
         own = root[angles]
-        root[angles] = self.gears.least(own) if self.gears else np.arctan2(np.sin(own), np.cos(own))
+        root[angles] = self.gears.least_angles(own) if self.gears else np.arctan2(np.sin(own), np.cos(own))
         return root
 
 
-def form(e: Equations, stage: Stage, p: Array | None = None) -> Form | None:
+def isotropic_form(e: ConstraintEquations, stage: Block, p: Array | None = None) -> IsotropicForm | None:
     """How a group is written; None where its equations are no such polynomials, or leave it free.
 
     Where angles count turns the numbers p of the pairs are needed: the form is that for their ratios.
     """
     unknowns, rows = stage.unknowns.stop - stage.unknowns.start, stage.rows.stop - stage.rows.start
-    if stage.free or rows < unknowns or not unknowns:
+    if stage.is_free or rows < unknowns or not unknowns:
         return None
-    written = (Kind.LENGTH,) if p is None else (Kind.LENGTH, Kind.TURNS)
+    written = (MeasureKind.LENGTH,) if p is None else (MeasureKind.LENGTH, MeasureKind.TURNS)
     if any(row.kind not in written for row in e.rows[stage.rows]):
         return None
     own = [e.coordinates[column].kind for column in e.unknowns[stage.unknowns]]
-    angles = tuple(k for k, kind in enumerate(own) if kind is Kind.ANGLE)
-    lengths = tuple(k for k, kind in enumerate(own) if kind is Kind.LENGTH)
+    angles = tuple(k for k, kind in enumerate(own) if kind is MeasureKind.ANGLE)
+    lengths = tuple(k for k, kind in enumerate(own) if kind is MeasureKind.LENGTH)
     if len(angles) + len(lengths) != unknowns:
         return None
-    (slope,) = at_places(e, [ca.jacobian(e.F[stage.rows], e.z[stage.unknowns])])
-    if np.linalg.matrix_rank(slope, tol=VANISHES).max() < unknowns:
+    (slope,) = evaluate_at_random(e, [ca.jacobian(e.F[stage.rows], e.z[stage.unknowns])])
+    if np.linalg.matrix_rank(slope, tol=ZERO_TOLERANCE).max() < unknowns:
         return None
     turns, tied = None, None
     if p is not None:
-        turns = arguments(e, stage, angles, p)
-        tied = gears(turns.rates, turns.relations) if turns else None
+        turns = angle_arguments(e, stage, angles, p)
+        tied = gear_powers(turns.rates, turns.relations) if turns else None
         if tied is None:
             return None
-    parts = _Parts(e, stage, angles, lengths, turns)
-    turning = parts.turning()
-    return turning and _paired(e, parts, turning[0], tied, rows - unknowns)
+    parts = _RowFactors(e, stage, angles, lengths, turns)
+    turning = parts.direction_indices()
+    return turning and _pair_rows(e, parts, turning[0], tied, rows - unknowns)
 
 
-def constant_slope(e: Equations, stage: Stage) -> ca.Function | None:
+def constant_jacobian(e: ConstraintEquations, stage: Block) -> ca.Function | None:
     """The slope (rows, unknowns) of a group in its own unknowns as a function of (z, u, p); None where it depends on
     them: such a group is linear."""
-    if stage.free or any(row.kind is Kind.ANGLE for row in e.rows[stage.rows]):
+    if stage.is_free or any(row.kind is MeasureKind.ANGLE for row in e.rows[stage.rows]):
         return None
     own, slope = e.z[stage.unknowns], ca.densify(ca.jacobian(e.F[stage.rows], e.z[stage.unknowns]))
     if not own.numel() or not slope.numel() or ca.depends_on(slope, own):
@@ -185,10 +185,17 @@ def constant_slope(e: Equations, stage: Stage) -> ca.Function | None:
     return ca.Function("slope", [e.z, e.u, e.p], [slope])
 
 
-class _Parts:
+class _RowFactors:
     """The rows of a group taken apart: by what the cos and sin of angles, and lengths along directions, multiply."""
 
-    def __init__(self, e: Equations, stage: Stage, angles: Sequence[int], lengths: Sequence[int], of: Arguments | None):
+    def __init__(
+        self,
+        e: ConstraintEquations,
+        stage: Block,
+        angles: Sequence[int],
+        lengths: Sequence[int],
+        of: AngleArguments | None,
+    ):
         self.e, self.rows = e, of.rows if of else e.F[stage.rows]
         self.angles, self.lengths = tuple(angles), tuple(lengths)
         own = e.z[stage.unknowns]
@@ -214,7 +221,7 @@ class _Parts:
         self.turned, self.rest = taken(self.rows)
         self.along = [taken(ca.jacobian(self.rows, slide)) for slide in self.slides]
 
-    def turning(self) -> tuple[tuple[int, ...]] | None:
+    def direction_indices(self) -> tuple[tuple[int, ...]] | None:
         """For every length what it turns with, in a tuple of its own; None where the form is not that of the rows."""
         model = self.rest
         for (cosine, sine), angle in zip(self.turned, self.turns, strict=True):
@@ -225,10 +232,10 @@ class _Parts:
                 model = model + slide * (cosine * ca.cos(angle) + sine * ca.sin(angle))
         parts = [still for _, still in self.along]
         parts += [each for turned, _ in self.along for both in turned for each in both]
-        gap, *sizes = at_places(self.e, [self.rows - model, *parts], self.symbols)
-        if not np.all(np.abs(gap) < VANISHES):
+        gap, *sizes = evaluate_at_random(self.e, [self.rows - model, *parts], self.symbols)
+        if not np.all(np.abs(gap) < ZERO_TOLERANCE):
             return None
-        there = [bool(np.any(np.abs(each) > VANISHES)) for each in sizes]
+        there = [bool(np.any(np.abs(each) > ZERO_TOLERANCE)) for each in sizes]
         found, many = [], len(self.turns)
         for k in range(len(self.slides)):
             first = len(self.slides) + 2 * many * k
@@ -239,20 +246,20 @@ class _Parts:
             found.append(with_[0])
         return (tuple(found),)
 
-    def factors(self, turning: Sequence[int], tied: Gears | None) -> tuple[ca.SX, ca.SX]:
+    def factors(self, turning: Sequence[int], tied: GearPowers | None) -> tuple[ca.SX, ca.SX]:
         """Of every real row what X is multiplied by, real and imaginary part: the row is this and its conjugate's."""
         columns = [(0.5 * self.rest, 0.0 * self.rest)]
         columns += [(0.0 * self.rest, 0.0 * self.rest)] * (tied.powers if tied else len(self.turns))
         for j, factor in enumerate(self.turned, 1):
-            k = tied.places[j - 1] if tied else j
-            columns[k] = tuple(map(add, columns[k], self._turned(j, factor, k)))
+            k = tied.entry_index[j - 1] if tied else j
+            columns[k] = tuple(map(add, columns[k], self._rotated_factor(j, factor, k)))
         for (turned, still), j in zip(self.along, turning, strict=True):
-            k = tied.places[j - 1] if tied and j else j
-            columns.append(self._turned(j, turned[j - 1], k) if j else (0.5 * still, 0.0 * still))
+            k = tied.entry_index[j - 1] if tied and j else j
+            columns.append(self._rotated_factor(j, turned[j - 1], k) if j else (0.5 * still, 0.0 * still))
         real, imaginary = (ca.horzcat(*each) for each in zip(*columns, strict=True))
         return ca.densify(real), ca.densify(imaginary)
 
-    def _turned(self, j: int, factor: tuple[ca.SX, ca.SX], place: int) -> tuple[ca.SX, ca.SX]:
+    def _rotated_factor(self, j: int, factor: tuple[ca.SX, ca.SX], place: int) -> tuple[ca.SX, ca.SX]:
         """What a direction is multiplied by, or the power in X that it is but for a direction that is known."""
         real, imaginary = 0.5 * factor[0], -0.5 * factor[1]
         if self.still:
@@ -262,11 +269,13 @@ class _Parts:
         return real, imaginary if place else 0.0 * imaginary
 
 
-def _paired(e: Equations, parts: _Parts, turning: Sequence[int], tied: Gears | None, surplus: int) -> Form | None:
+def _pair_rows(
+    e: ConstraintEquations, parts: _RowFactors, turning: Sequence[int], tied: GearPowers | None, surplus: int
+) -> IsotropicForm | None:
     """Rows put together two by two, so that of each two X alone, and Y alone, is left."""
     real, imaginary = parts.factors(turning, tied)
     function = ca.Function("factors", [e.z, e.u, e.p], [real, imaginary])
-    values = at_places(e, [real, imaginary])
+    values = evaluate_at_random(e, [real, imaginary])
     alpha = values[0] + 1j * values[1]  # (places, rows, X)
     rows = alpha.shape[1]
     # what stands beside X0 and lengths along known directions is real and belongs to both
@@ -278,7 +287,7 @@ def _paired(e: Equations, parts: _Parts, turning: Sequence[int], tied: Gears | N
         if i in taken:
             continue
         match = next(
-            (found for k in range(i + 1, rows) if k not in taken and (found := _other(alpha, i, k, bent))), None
+            (found for k in range(i + 1, rows) if k not in taken and (found := _matching_row(alpha, i, k, bent))), None
         )
         taken.add(i)
         whole = np.zeros(rows, dtype=complex)
@@ -292,27 +301,29 @@ def _paired(e: Equations, parts: _Parts, turning: Sequence[int], tied: Gears | N
     loops = np.array(combined, dtype=complex).reshape(-1, rows)
     singles = np.array(single, dtype=float).reshape(-1, rows)
     if surplus:
-        loops, singles = _squared(loops, singles, rows - surplus)
-    turning = tuple(tied.places[j - 1] if tied and j else j for j in turning)
-    called, start = Called(function), ca.Function("start", [e.z, e.u, e.p], [parts.start])
-    return Form(parts.angles, parts.lengths, turning, function, called, loops, singles, bool(surplus), tied, start)
+        loops, singles = _squared_system(loops, singles, rows - surplus)
+    turning = tuple(tied.entry_index[j - 1] if tied and j else j for j in turning)
+    called, start = BufferedFunction(function), ca.Function("start", [e.z, e.u, e.p], [parts.start])
+    return IsotropicForm(
+        parts.angles, parts.lengths, turning, function, called, loops, singles, bool(surplus), tied, start
+    )
 
 
-def _other(alpha: Array, i: int, k: int, bent: Sequence[int]) -> tuple[int, float] | None:
+def _matching_row(alpha: Array, i: int, k: int, bent: Sequence[int]) -> tuple[int, float] | None:
     """The row and by how much of it: the row k is the other half of row i, whose sine goes with its cosine."""
     a, b = alpha[:, i][:, bent], alpha[:, k][:, bent]
     largest = np.unravel_index(int(np.argmax(np.abs(a))), a.shape) if a.size else None
-    if largest is None or abs(a[largest]) < VANISHES:
+    if largest is None or abs(a[largest]) < ZERO_TOLERANCE:
         return None
     ratio = b[largest] / a[largest] * 1j
-    if abs(ratio.imag) > VANISHES:
+    if abs(ratio.imag) > ZERO_TOLERANCE:
         return None
     # what elimination adds of other rows are whole multiples: with them nothing is rounded
     by = float(np.round(ratio.real))
-    return (k, by) if by and np.all(np.abs(b + 1j * by * a) < VANISHES) else None
+    return (k, by) if by and np.all(np.abs(b + 1j * by * a) < ZERO_TOLERANCE) else None
 
 
-def _squared(loops: Array, singles: Array, wanted: int) -> tuple[Array, Array]:
+def _squared_system(loops: Array, singles: Array, wanted: int) -> tuple[Array, Array]:
     """As many rows as unknowns: random sums of all, which keep every isolated solution isolated."""
     rng = np.random.default_rng(1)
     paired = min(len(loops), wanted // 2)
@@ -325,13 +336,13 @@ def _squared(loops: Array, singles: Array, wanted: int) -> tuple[Array, Array]:
     return loops, rng.normal(size=(left, len(pool))) @ pool
 
 
-def at_places(e: Equations, parts: Sequence[ca.SX], more: Sequence[ca.SX] = ()) -> list[Array]:
+def evaluate_at_random(e: ConstraintEquations, parts: Sequence[ca.SX], more: Sequence[ca.SX] = ()) -> list[Array]:
     """Expressions in numbers (places, rows, columns): at random places an identity holds by accident nowhere."""
     symbols = [e.z, e.u, e.p, ca.vertcat(*more)]
     function = ca.Function("parts", symbols, [ca.densify(part) for part in parts])
     rng = np.random.default_rng(0)
     found = []
-    for _ in range(PLACES):
+    for _ in range(RANDOM_POINTS):
         values = function(*(rng.uniform(0.5, 2.0, symbol.numel()) for symbol in symbols))
         found.append([each.full() for each in (values if isinstance(values, tuple) else (values,))])
     return [np.array(each) for each in zip(*found, strict=True)]

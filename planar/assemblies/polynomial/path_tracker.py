@@ -14,28 +14,28 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.assemblies.polynomial.isotropic_form import Form, Polynomials
+from planar.assemblies.polynomial.isotropic_form import BlockPolynomials, IsotropicForm
 
 Array = np.ndarray
 
 FIRST_STEP = 0.05
-LEAST_STEP = 1e-11
+MIN_STEP = 1e-11
 """Of the way; what needs less ends in a multiple solution."""
-LONGEST = 2000
+MAX_STEPS = 2000
 """Steps of the slowest path."""
-NEAR = 1e-4
+PREDICTION_TOLERANCE = 1e-4
 """How far a prediction may be off: directions of length one."""
-SEEN = 1e-6
+END_VISIBLE_DISTANCE = 1e-6
 """Of the way: paths that come nearer to the end than this are not lost."""
-EXACT = 1e-9
+CORRECTION_TOLERANCE = 1e-9
 """What Newton's second step may still move a solution by."""
-SINGULAR = 1e-9
+SINGULAR_TOLERANCE = 1e-9
 """Least singular value, of the largest, at which a solution counts as single."""
-APART = 1e-6
+SAME_SOLUTION_DISTANCE = 1e-6
 """Solutions nearer to each other than this (directions of length one) are one, or were taken for another's path."""
 
 
-class Ends(NamedTuple):
+class PathEnds(NamedTuple):
     """Where paths ended: solutions X and Y in one row, of length one each, and how regular they are.
 
     `regular`: least singular value over the largest; `arrived`: whether Newton's method converges at the end itself;
@@ -43,32 +43,32 @@ class Ends(NamedTuple):
     """
 
     V: Array
-    regular: Array
-    arrived: Array
-    near: Array
+    regularity: Array
+    has_converged: Array
+    is_near_end: Array
 
     @property
-    def single(self) -> Array:
+    def is_single(self) -> Array:
         """Which are isolated solutions that count once."""
-        return self.arrived & (self.regular > SINGULAR)
+        return self.has_converged & (self.regularity > SINGULAR_TOLERANCE)
 
 
-Values = tuple[Array, Array, Array]
-At = Callable[[Array, Array], Values]
+HomotopyValues = tuple[Array, Array, Array]
+Homotopy = Callable[[Array, Array], HomotopyValues]
 """Solutions (paths, 2 many), how far on the way (paths,) -> equations (paths, rows), slope, derivative along it."""
 
 
-class Between:
+class CoefficientHomotopy:
     """From the polynomials at the beginning to those at the end, coefficient by coefficient."""
 
-    def __init__(self, form: Form, begin: Polynomials, end: Polynomials):
-        self.many, self.products = form.many, form.products
+    def __init__(self, form: IsotropicForm, begin: BlockPolynomials, end: BlockPolynomials):
+        self.many, self.products = form.entry_count, form.products
         self.begin = begin
-        self.change = Polynomials(*(there - here for here, there in zip(begin, end, strict=True)))
-        m = form.many
+        self.change = BlockPolynomials(*(there - here for here, there in zip(begin, end, strict=True)))
+        m = form.entry_count
         self.rows = 2 * m - 2
 
-    def __call__(self, V: Array, way: Array) -> Values:
+    def __call__(self, V: Array, way: Array) -> HomotopyValues:
         """The equations, their slope, and their derivative along the way."""
         m, products = self.many, self.products
         X, Y = V[:, :m], V[:, m:]
@@ -78,7 +78,7 @@ class Between:
         left = np.zeros((len(V), self.rows), dtype=complex)
         slope = np.zeros((len(V), self.rows, 2 * m), dtype=complex)
         along = np.zeros_like(left)
-        left[:, :loops], left[:, loops : 2 * loops] = _by(A, X), _by(B, Y)
+        left[:, :loops], left[:, loops : 2 * loops] = _matrix_times_vector(A, X), _matrix_times_vector(B, Y)
         slope[:, :loops, :m], slope[:, loops : 2 * loops, m:] = A, B
         along[:, :loops], along[:, loops : 2 * loops] = X @ dA.T, Y @ dB.T
         at = 2 * loops
@@ -90,7 +90,7 @@ class Between:
             slope[:, row, m + j], slope[:, row, m + l] = X[:, i], -X[:, k]
         at += turns
         if a.shape[1]:
-            one, other = _by(a, X), _by(b, Y)
+            one, other = _matrix_times_vector(a, X), _matrix_times_vector(b, Y)
             left[:, at:] = one * Y[:, :1] + X[:, :1] * other
             slope[:, at:, :m], slope[:, at:, m:] = a * Y[:, :1, None], b * X[:, :1, None]
             slope[:, at:, m] += one
@@ -99,18 +99,18 @@ class Between:
         return left, slope, along
 
 
-class FromProducts:
+class ProductHomotopy:
     """From products of linear forms, whose solutions are known, to given polynomials."""
 
-    def __init__(self, form: Form, end: Polynomials, rng: np.random.Generator):
-        self.form, self.end, self.whole = form, end, Between(form, end, end)
-        many, equations = form.many, 2 * form.dimension
-        self.l, self.r = (_random(rng, equations, many) for _ in range(2))
+    def __init__(self, form: IsotropicForm, end: BlockPolynomials, rng: np.random.Generator):
+        self.form, self.end, self.whole = form, end, CoefficientHomotopy(form, end, end)
+        many, equations = form.entry_count, 2 * form.dimension
+        self.l, self.r = (_random_complex(rng, equations, many) for _ in range(2))
         self.turned = np.exp(1j * rng.uniform(0.0, 2.0 * np.pi))
 
-    def __call__(self, V: Array, way: Array) -> Values:
+    def __call__(self, V: Array, way: Array) -> HomotopyValues:
         """The equations, their slope, and their derivative along the way."""
-        m, fixed = self.form.many, 2 * len(self.end.A)
+        m, fixed = self.form.entry_count, 2 * len(self.end.A)
         left, slope, _ = self.whole(V, np.zeros(len(V)))
         one, other = V[:, :m] @ self.l.T, V[:, m:] @ self.r.T
         begin = self.turned * one * other
@@ -127,52 +127,52 @@ class FromProducts:
         """The solutions of the products: in half of them the form in X vanishes, in the others that in Y."""
         equations = 2 * self.form.dimension
         chosen = [np.isin(np.arange(equations), own) for own in combinations(range(equations), self.form.dimension)]
-        X = [_null(np.concatenate([self.end.A, self.l[own]])) for own in chosen]
-        Y = [_null(np.concatenate([self.end.B, self.r[~own]])) for own in chosen]
+        X = [_null_vector(np.concatenate([self.end.A, self.l[own]])) for own in chosen]
+        Y = [_null_vector(np.concatenate([self.end.B, self.r[~own]])) for own in chosen]
         return np.concatenate([np.array(X), np.array(Y)], axis=1)
 
 
-def followed(at: At, V: Array, near: float = NEAR) -> Ends:
+def track_paths(homotopy: Homotopy, V: Array, near: float = PREDICTION_TOLERANCE) -> PathEnds:
     """The solutions at the end of the way from those at its beginning."""
-    V = normed(V)
+    V = normalize(V)
     way, step = np.zeros(len(V)), np.full(len(V), FIRST_STEP)
     busy = np.arange(len(V))
-    for _ in range(LONGEST):
+    for _ in range(MAX_STEPS):
         if busy.size == 0:
             break
         here, t = V[busy], way[busy]
         h = np.minimum(step[busy], 1.0 - t)
         ahead = np.where(h == 1.0 - t, 1.0, t + h)
         with np.errstate(all="ignore"):
-            tried, first, second = _step(at, here, t, h, ahead)
-        good = (first < near) & (second < EXACT)
+            tried, first, second = _runge_kutta_step(homotopy, here, t, h, ahead)
+        good = (first < near) & (second < CORRECTION_TOLERANCE)
         taken = busy[good]
         V[taken], way[taken] = tried[good], ahead[good]
         growth = np.clip((0.25 * near / np.maximum(first, 1e-300)) ** 0.2, 1.0, 2.5)
         step[busy] = np.where(good, h * growth, h * 0.4)
-        busy = busy[(way[busy] < 1.0) & (step[busy] > LEAST_STEP * np.maximum(1.0 - way[busy], 1e-3))]
-    return ended(at, V, way >= 1.0)._replace(near=way > 1.0 - SEEN)
+        busy = busy[(way[busy] < 1.0) & (step[busy] > MIN_STEP * np.maximum(1.0 - way[busy], 1e-3))]
+    return refine_ends(homotopy, V, way >= 1.0)._replace(is_near_end=way > 1.0 - END_VISIBLE_DISTANCE)
 
 
-def ended(at: At, V: Array, arrived: Array) -> Ends:
+def refine_ends(homotopy: Homotopy, V: Array, arrived: Array) -> PathEnds:
     """Solutions carried to round-off at the end of the way."""
     arrived = arrived.copy()
     one = np.ones(len(V))
     for _ in range(3):
         with np.errstate(all="ignore"):
-            step, slope = _newton(at, V, V, one)
+            step, slope = _newton_step(homotopy, V, V, one)
             moved = np.linalg.norm(step, axis=1)
             good = moved < 1e-3
-        V = np.where(good[:, None], normed(V + step), V) if len(V) else V
+        V = np.where(good[:, None], normalize(V + step), V) if len(V) else V
     if not len(V):
-        return Ends(V, np.zeros(0), arrived, arrived)
+        return PathEnds(V, np.zeros(0), arrived, arrived)
     values = np.linalg.svd(slope, compute_uv=False)
     regular = values[:, -1] / values[:, 0]
-    arrived |= good & (moved < EXACT) & (regular > SINGULAR)
-    return Ends(V, regular, arrived, arrived.copy())
+    arrived |= good & (moved < CORRECTION_TOLERANCE) & (regular > SINGULAR_TOLERANCE)
+    return PathEnds(V, regular, arrived, arrived.copy())
 
 
-def _step(at: At, V: Array, way: Array, h: Array, ahead: Array) -> tuple[Array, Array, Array]:
+def _runge_kutta_step(at: Homotopy, V: Array, way: Array, h: Array, ahead: Array) -> tuple[Array, Array, Array]:
     """Solutions a step on, and how far Newton's two corrections moved them."""
     wide = h[:, None]
     k1 = _tangent(at, V, V, way)
@@ -182,14 +182,14 @@ def _step(at: At, V: Array, way: Array, h: Array, ahead: Array) -> tuple[Array, 
     tried = V + wide / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
     sizes = []
     for _ in range(2):
-        moved, _ = _newton(at, V, tried, ahead)
+        moved, _ = _newton_step(at, V, tried, ahead)
         tried = tried + moved
         size = np.linalg.norm(moved, axis=1)
         sizes.append(np.where(np.isfinite(size), size, np.inf))
-    return normed(np.where(np.isfinite(sizes[1])[:, None], tried, V)), sizes[0], sizes[1]
+    return normalize(np.where(np.isfinite(sizes[1])[:, None], tried, V)), sizes[0], sizes[1]
 
 
-def _whole(slope: Array, patch: Array) -> Array:
+def _with_patch_rows(slope: Array, patch: Array) -> Array:
     """The slope with the two rows that keep X and Y from growing."""
     half = patch.shape[1] // 2
     rows = np.zeros((len(patch), 2, 2 * half), dtype=complex)
@@ -197,27 +197,27 @@ def _whole(slope: Array, patch: Array) -> Array:
     return np.concatenate([slope, rows], axis=1)
 
 
-def _tangent(at: At, patch: Array, V: Array, way: Array) -> Array:
+def _tangent(at: Homotopy, patch: Array, V: Array, way: Array) -> Array:
     _, slope, along = at(V, way)
-    return _solved(_whole(slope, patch), np.pad(-along, ((0, 0), (0, 2))))
+    return _solve_batch(_with_patch_rows(slope, patch), np.pad(-along, ((0, 0), (0, 2))))
 
 
-def _newton(at: At, patch: Array, V: Array, way: Array) -> tuple[Array, Array]:
+def _newton_step(at: Homotopy, patch: Array, V: Array, way: Array) -> tuple[Array, Array]:
     left, slope, _ = at(V, way)
-    slope = _whole(slope, patch)
-    return _solved(slope, np.pad(-left, ((0, 0), (0, 2)))), slope
+    slope = _with_patch_rows(slope, patch)
+    return _solve_batch(slope, np.pad(-left, ((0, 0), (0, 2)))), slope
 
 
-def _solved(slope: Array, right: Array) -> Array:
+def _solve_batch(slope: Array, right: Array) -> Array:
     try:
         return np.linalg.solve(slope, right[..., None])[..., 0]
     except np.linalg.LinAlgError:
         bad = ~np.isfinite(slope).all(axis=(1, 2))
         slope = np.where(bad[:, None, None], np.eye(slope.shape[1]), slope)
-        return _by(np.linalg.pinv(slope), np.where(bad[:, None], np.nan, right))
+        return _matrix_times_vector(np.linalg.pinv(slope), np.where(bad[:, None], np.nan, right))
 
 
-def normed(V: Array) -> Array:
+def normalize(V: Array) -> Array:
     """X and Y of length one each."""
     half = V.shape[1] // 2
     parts = (V[:, :half], V[:, half:])
@@ -225,66 +225,68 @@ def normed(V: Array) -> Array:
         return np.concatenate([each / np.linalg.norm(each, axis=1, keepdims=True) for each in parts], axis=1)
 
 
-def doubles(V: Array) -> Array:
+def is_duplicate(V: Array) -> Array:
     """Which solutions lie on another one (solutions,)."""
     half = V.shape[1] // 2
     X, Y = V[:, :half], V[:, half:]
     # sine of the angle between directions, whatever factor they have
     x, y = (np.sqrt(np.maximum(1.0 - np.abs(each @ each.conj().T) ** 2, 0.0)) for each in (X, Y))
     apart = np.maximum(x, y) + np.eye(len(V))
-    return apart.min(axis=1, initial=1.0) < APART
+    return apart.min(axis=1, initial=1.0) < SAME_SOLUTION_DISTANCE
 
 
-def _by(matrices: Array, vectors: Array) -> Array:
+def _matrix_times_vector(matrices: Array, vectors: Array) -> Array:
     return (matrices @ vectors[..., None])[..., 0]
 
 
-def _random(rng: np.random.Generator, *shape: int) -> Array:
+def _random_complex(rng: np.random.Generator, *shape: int) -> Array:
     return rng.normal(size=shape) + 1j * rng.normal(size=shape)
 
 
-def _null(matrix: Array) -> Array:
+def _null_vector(matrix: Array) -> Array:
     return np.linalg.svd(matrix)[2][-1].conj()
 
 
-class Generic(NamedTuple):
+class GenericInstance(NamedTuple):
     """A random instance of a structure with all its solutions that count once.
 
     `bound`: Bezout's number; `finite`: how many of them are at finite places.
     """
 
-    begin: Polynomials
+    begin: BlockPolynomials
     V: Array
     bound: int
     finite: int
 
 
-def generic(form: Form, like: Callable[[np.random.Generator], Polynomials], seed: int = 7) -> Generic:
+def solve_generic_instance(
+    form: IsotropicForm, like: Callable[[np.random.Generator], BlockPolynomials], seed: int = 7
+) -> GenericInstance:
     """The solutions of a random instance, whose coefficients `like` draws."""
     rng = np.random.default_rng(seed)
     begin = like(rng)
-    products = FromProducts(form, begin, rng)
+    products = ProductHomotopy(form, begin, rng)
     starts = products.starts()
-    found = followed(products, starts)
-    again = found.single & doubles(found.V)
+    found = track_paths(products, starts)
+    again = found.is_single & is_duplicate(found.V)
     if again.any():
-        closer = followed(products, starts[again], NEAR * 1e-2)
+        closer = track_paths(products, starts[again], PREDICTION_TOLERANCE * 1e-2)
         for whole, part in zip(found, closer, strict=True):
             whole[again] = part
-    V = found.V[found.single]
-    V = V[_firsts(V)]
-    return Generic(begin, V, form.bound, int(np.sum(at_finite(V))))
+    V = found.V[found.is_single]
+    V = V[_distinct_rows(V)]
+    return GenericInstance(begin, V, form.bezout_number, int(np.sum(is_finite_solution(V))))
 
 
-def _firsts(V: Array) -> Array:
+def _distinct_rows(V: Array) -> Array:
     kept: list[int] = []
     for k in range(len(V)):
-        if not kept or not doubles(V[[*kept, k]])[-1]:
+        if not kept or not is_duplicate(V[[*kept, k]])[-1]:
             kept.append(k)
     return np.array(kept, dtype=int)
 
 
-def at_finite(V: Array, least: float = 1e-7) -> Array:
+def is_finite_solution(V: Array, least: float = 1e-7) -> Array:
     """Which solutions are at finite places, X0 and Y0 not vanishing."""
     half = V.shape[1] // 2
     return (np.abs(V[:, 0]) > least) & (np.abs(V[:, half]) > least)

@@ -7,17 +7,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.equations.functions import Program
+from planar.equations.functions import EquationFunctions
 from planar.model.mechanism import Mechanism
 
 Array = np.ndarray
 
 
-class NotMarched(Exception):
+class UnsupportedStructure(Exception):
     """A backend cannot do this structure; the text says why."""
 
 
-class March(NamedTuple):
+class DesignBatch(NamedTuple):
     """A block of designs that is to run. Lengths are in units of one size for all, angles in rad.
 
     p (numbers, designs): the numbers of all pairs; q (2 a point, designs): coordinates of the wanted points in the axes
@@ -27,12 +27,12 @@ class March(NamedTuple):
     may leave open. `mechanism` has the pairs and inputs; its numbers are not those of the designs. `unit`: the size, m.
     """
 
-    program: Program
+    program: EquationFunctions
     mechanism: Mechanism
     p: Array
     q: Array
     z0: Array
-    u: Array
+    input_offsets: Array
     u0: Array
     u1: Array
     u2: Array
@@ -42,41 +42,41 @@ class March(NamedTuple):
     unit: float
 
     @property
-    def rows(self) -> int:
+    def output_row_count(self) -> int:
         """What is told at a step: x and y of each point, then their first, then second rates."""
         return 2 * len(self.links) * (3 if self.rates else 1)
 
-    def of(self, designs: Array, z0: Array | None = None) -> March:
+    def select(self, designs: Array, z0: Array | None = None) -> DesignBatch:
         """The march of some of the designs, from other unknowns if they are given."""
         parts = {name: getattr(self, name)[:, designs] for name in ("p", "q", "z0", "u0", "u1", "u2")}
         return self._replace(**parts | ({} if z0 is None else {"z0": z0}))
 
 
-Marching = Callable[[March, Array], Array]
+DesignRunner = Callable[[DesignBatch, Array], Array]
 """Takes a march and room for what it tells, out (steps + 1, rows, designs), which it fills with x and y of each point,
 then their first, then second rates (m, s); gives how many of the first steps passed both parts of the gate (designs,).
 """
 
 
-class Closed(NamedTuple):
+class CorrectedAssemblies(NamedTuple):
     """Where designs are that a backend closed from near by: which are, and how regular the least regular is of the
     groups that Newton's method closed (the volume that the columns of its slope span), both (designs,); the unknowns
     (unknowns, designs); the points of the march, and the same in the other assembly of their group, infinite where
     that is not
     known (points, 2, designs), in sizes."""
 
-    closed: Array
-    regular: Array
+    converged: Array
+    regularity: Array
     z: Array
     points: Array
-    others: Array
+    other_points: Array
 
 
-Closing = Callable[[March, Sequence[int], int], Closed]
+AssemblyCorrector = Callable[[DesignBatch, Sequence[int], int], CorrectedAssemblies]
 """Takes a march, of which it looks at the start only, the groups that place its points, and how many of Newton's steps
 it may take. Raises NotMarched."""
 
 
-Reaching = Callable[[March, Array], Array]
+LastGoodUnknowns = Callable[[DesignBatch, Array], Array]
 """Takes a march and how many of its first steps were good, one at least; gives the unknowns at the last of these
 (unknowns, designs)."""

@@ -5,24 +5,24 @@ from __future__ import annotations
 from importlib import import_module
 from importlib.util import find_spec
 
-from planar.batch.march.backend import Closing, Marching, Reaching
+from planar.batch.march.backend import AssemblyCorrector, DesignRunner, LastGoodUnknowns
 from planar.foundation.errors import BadInput
 
 BACKENDS = {"native": "planar.batch.march.llvm_backend", "casadi": "planar.batch.march.numpy_backend"}
-"""The modules of the backends, the faster first; each has a function `march`."""
+"""The modules of the backends, the faster first; each has a function `run_designs`."""
 
 
-def closing(backend: str) -> Closing | None:
+def find_assembly_corrector(backend: str) -> AssemblyCorrector | None:
     """What closes many designs at once, if the backend that is tried first does."""
-    return getattr(import_module(BACKENDS[marching(backend)[0][0]]), "closed", None)
+    return getattr(import_module(BACKENDS[available_runners(backend)[0][0]]), "correct_assemblies", None)
 
 
-def reaching(name: str) -> Reaching | None:
+def find_last_good_unknowns(name: str) -> LastGoodUnknowns | None:
     """What of a backend tells where designs came to, if it does."""
-    return getattr(import_module(BACKENDS[name]), "reached", None)
+    return getattr(import_module(BACKENDS[name]), "last_good_unknowns", None)
 
 
-def marching(backend: str) -> list[tuple[str, Marching]]:
+def available_runners(backend: str) -> list[tuple[str, DesignRunner]]:
     """The backends to try, in this order, each with its name; one that raises NotMarched leaves it to the next.
 
     Raises BadInput.
@@ -34,7 +34,7 @@ def marching(backend: str) -> list[tuple[str, Marching]]:
     found = []
     for name in there:
         try:
-            found.append((name, import_module(BACKENDS[name]).march))
+            found.append((name, import_module(BACKENDS[name]).run_designs))
         except ImportError:
             continue
     if backend not in ("auto", *(name for name, _ in found)):

@@ -6,53 +6,53 @@ from collections.abc import Sequence
 
 import casadi as ca
 
-from planar.batch.march.kernel import Kernel, Leaf, Structure
+from planar.batch.march.kernel import KernelEquations, KernelWriter, Operand
 from planar.foundation.geometry import Vector
-from planar.model.mechanism import counting
-from planar.model.pairs import Kind
+from planar.model.mechanism import links_counting_turns
+from planar.model.pairs import MeasureKind
 
 
-class Points(Kernel):
+class PointKernelWriter(KernelWriter):
     """A kernel that tells where points on links are, none of which is the frame, and with `rates` their rates."""
 
     def __init__(
         self,
-        of: Structure,
+        equations: KernelEquations,
         links: tuple[str, ...],
         rates: bool,
         lanes: int,
-        still: frozenset[str],
-        carried: frozenset[Leaf],
+        invariant: frozenset[str],
+        carried: frozenset[Operand],
     ):
-        super().__init__(of, lanes, len(links), still, carried)
+        super().__init__(equations, lanes, len(links), invariant, carried)
         self.links, self.rates = links, rates
 
-    def places(self, points: Sequence[int]) -> ca.SX:
+    def point_coordinates(self, points: Sequence[int]) -> ca.SX:
         """x and y of some of the points."""
         q = self.symbols["q"]
-        places = [self.of.frame(self.links[k]).carry(Vector(q[2 * k], q[2 * k + 1])) for k in points]
+        places = [self.equations.frame(self.links[k]).to_world(Vector(q[2 * k], q[2 * k + 1])) for k in points]
         return ca.vertcat(ca.SX(0, 1), *(part for place in places for part in place))
 
-    def counted(self) -> ca.SX:
+    def counted_angles(self) -> ca.SX:
         """Angles of links that wheels or racks tie: they may turn much farther in a step than the inputs do."""
-        e, links = self.of.equations, counting(self.of.mechanism)
+        e, links = self.equations.equations, links_counting_turns(self.equations.mechanism)
         unknown = {column: k for k, column in enumerate(e.unknowns)}
         columns = [
             column
             for column, each in enumerate(e.coordinates)
-            if each.owner in links and each.of_link and each.kind is Kind.ANGLE
+            if each.owner in links and each.of_link and each.kind is MeasureKind.ANGLE
         ]
         # what nothing is made of but cos and sin is as fast as the group that it is in
-        found = [e.w[k] for k in columns if k not in unknown or self.carries(("z", unknown[k]))]
+        found = [e.w[k] for k in columns if k not in unknown or self.is_carried(("z", unknown[k]))]
         return ca.vertcat(ca.SX(0, 1), *found)
 
-    def told(self) -> list[ca.SX]:
+    def output_expressions(self) -> list[ca.SX]:
         """The points' positions, and rates."""
-        e, s = self.of.equations, self.symbols
-        places = self.places(range(len(self.links)))
+        e, s = self.equations.equations, self.symbols
+        places = self.point_coordinates(range(len(self.links)))
         if not self.rates:
             return [places]
-        z1, z2 = self.of.rates(s["u1"], s["u2"])
+        z1, z2 = self.equations.rates(s["u1"], s["u2"])
         y, y1, y2 = ca.vertcat(e.z, e.u), ca.vertcat(z1, s["u1"]), ca.vertcat(z2, s["u2"])
         first = ca.jtimes(places, y, y1)
         v1, v2 = ca.SX.sym("v1", y.numel()), ca.SX.sym("v2", y.numel())

@@ -8,39 +8,41 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.mechanisms.block_type import GROUNDED, Joint, Signature
-from planar.batch.mechanisms.linkage_arrays import Batch, Inputs, Lot, Marked, batch
+from planar.batch.mechanisms.block_type import FRAME_BODY, BlockPair, BlockSignature
+from planar.batch.mechanisms.linkage_arrays import BlockBatch, InputArrays, LinkageArrays, PointArrays, make_batch
 from planar.batch.mechanisms.partition import EPS
-from planar.batch.mechanisms.solved_block_type import Kind, kind
-from planar.model.pin_linkage import Laid, joined
+from planar.batch.mechanisms.solved_block_type import BlockType, find_block_type
+from planar.model.pin_linkage import PinLayout, turning_pair_type
 from planar.solving.checks.residual_check import SHORT_ARM
 
 Array = np.ndarray
 
-MOST = 64
+MAX_BARS = 64
 """Bars of a linkage; longer ones are parted by themselves."""
 
 
-class Bars(NamedTuple):
+class BarLinkages(NamedTuple):
     """Linkages as arrays: `which` of those that were given (linkages,), the pins that are told of each, where each
     starts (rad), and the links of a group by its number."""
 
     which: Array
-    lot: Lot
+    arrays: LinkageArrays
     pins: list[list[int]]
     start: Array
-    links: Callable[[int], str]
+    links_of_block: Callable[[int], str]
 
 
 @lru_cache
-def kinds() -> tuple[Kind, Kind]:
+def crank_and_dyad_types() -> tuple[BlockType, BlockType]:
     """The crank, and the dyad of two bars."""
-    pin = joined()
-    dyad = (Joint(pin, (0, -1), False), Joint(pin, (1, -2), False), Joint(pin, (0, 1), False))
-    return kind(Signature(1, 0, (Joint(pin, (GROUNDED, 0), True),))), kind(Signature(2, 2, dyad))
+    pin = turning_pair_type()
+    dyad = (BlockPair(pin, (0, -1), False), BlockPair(pin, (1, -2), False), BlockPair(pin, (0, 1), False))
+    return find_block_type(BlockSignature(1, 0, (BlockPair(pin, (FRAME_BODY, 0), True),))), find_block_type(
+        BlockSignature(2, 2, dyad)
+    )
 
 
-class _Whole(NamedTuple):
+class _MergedBars(NamedTuple):
     """All linkages in one: of every entry, a pin on a link, `link` and `pin` and where it is in the link (m), sorted by
     pin, the frame first. `pin0` and `link0` are where the pins and links of each linkage begin (its frame is first),
     `owner` whose a link is; `at` the places of pins, `fixed` those on the frame; extent `unit` and `reach` (m)."""
@@ -50,10 +52,10 @@ class _Whole(NamedTuple):
     local: Array
     unit: Array
     reach: Array
-    at: Array
-    fixed: Array
-    pin0: Array
-    link0: Array
+    pin_positions: Array
+    fixed_pins: Array
+    first_pin: Array
+    first_link: Array
     owner: Array
 
 
@@ -69,89 +71,91 @@ class _Dyads(NamedTuple):
     second_on: Array
 
 
-class _Peeled(NamedTuple):
+class _CranksAndDyads(NamedTuple):
     """Entries of the cranks on the frame, and of the frames there; dyads level after level; which linkages have other
     groups too; of every link the level after which it is known."""
 
     cranks: Array
     frames: Array
     dyads: list[_Dyads]
-    odd: Array
+    has_other_blocks: Array
     level: Array
 
 
-def bars(laid: Sequence[Laid], wanted: Sequence[int] | None) -> Bars | None:
+def bar_linkage_arrays(layouts: Sequence[PinLayout], wanted: Sequence[int] | None) -> BarLinkages | None:
     """Linkages that consist of a crank and dyads, None where there are none; the others are left out.
 
     `wanted`: pins that are told, else all that move.
     """
-    whole = _whole(laid)
-    peeled = _peeled(laid, whole)
-    which = np.flatnonzero(~(peeled.odd | _short(whole, peeled)))
+    whole = _merge_bars(layouts)
+    peeled = _find_cranks_and_dyads(layouts, whole)
+    which = np.flatnonzero(~(peeled.has_other_blocks | _has_short_bar(whole, peeled)))
     if not which.size:
         return None
-    number = np.full(len(laid), -1)
+    number = np.full(len(layouts), -1)
     number[which] = np.arange(len(which))
-    place = np.arange(whole.link0[-1]) - whole.link0[whole.owner] + 1
-    place[whole.link0[:-1]] = 0
+    place = np.arange(whole.first_link[-1]) - whole.first_link[whole.owner] + 1
+    place[whole.first_link[:-1]] = 0
     unit = whole.unit[which]
-    levels, names = _levels(whole, peeled, number, place, unit)
+    levels, names = _block_batches(whole, peeled, number, place, unit)
 
     def links(group: int) -> str:
         ends = dict.fromkeys(int(each) for each in names[group])
-        return ", ".join(f"bar{link - whole.link0[whole.owner[link]] - 1}" for link in ends)
+        return ", ".join(f"bar{link - whole.first_link[whole.owner[link]] - 1}" for link in ends)
 
     # every pin by the link that is placed first
     order = np.lexsort((peeled.level[whole.link], whole.pin))
     firsts = order[np.concatenate([[True], whole.pin[order][1:] != whole.pin[order][:-1]])]
-    moving = np.ones(len(whole.at), dtype=bool)
-    moving[whole.fixed] = False
-    owner = number[np.repeat(np.arange(len(laid)), np.diff(whole.pin0))]
+    moving = np.ones(len(whole.pin_positions), dtype=bool)
+    moving[whole.fixed_pins] = False
+    owner = number[np.repeat(np.arange(len(layouts)), np.diff(whole.first_pin))]
     shown = np.flatnonzero(moving & (owner >= 0))
     size = unit[owner[shown]][:, None]
     local = whole.local[firsts]
-    both = np.hstack([local[shown] / size, whole.at[shown] / size])
-    sketch = Marked(owner[shown], place[whole.link[firsts[shown]]], both)
-    told, own = _told(laid, which, wanted, shown, whole.pin0)
-    points = Marked(owner[told], place[whole.link[firsts[told]]], local[told])
-    start = np.array([laid[k].position for k in which])
-    rates = np.array([(laid[k].velocity, laid[k].acceleration) for k in which]).reshape(-1, 2)
+    both = np.hstack([local[shown] / size, whole.pin_positions[shown] / size])
+    sketch = PointArrays(owner[shown], place[whole.link[firsts[shown]]], both)
+    told, own = _wanted_pins(layouts, which, wanted, shown, whole.first_pin)
+    points = PointArrays(owner[told], place[whole.link[firsts[told]]], local[told])
+    start = np.array([layouts[k].crank_angle for k in which])
+    rates = np.array([(layouts[k].velocity, layouts[k].acceleration) for k in which]).reshape(-1, 2)
     every, yes = np.arange(len(which)), np.ones(len(which), dtype=bool)
-    inputs = Inputs(every, np.ones_like(every), start, yes, yes, *rates.T)
-    many = np.diff(whole.link0)[which]
+    inputs = InputArrays(every, np.ones_like(every), start, yes, yes, *rates.T)
+    many = np.diff(whole.first_link)[which]
     tolerance = 16.0 * EPS * (4 + many) * np.maximum(1.0, whole.reach[which] / unit)
-    turns = [levels[0], *([_together(levels[1:])] if len(levels) > 1 else [])]
-    lot = Lot(many, unit, tolerance, levels, turns, inputs, sketch, points, sketch, len(names))
-    return Bars(which, lot, own, start, links)
+    turns = [levels[0], *([_merge_batches(levels[1:])] if len(levels) > 1 else [])]
+    lot = LinkageArrays(many, unit, tolerance, levels, turns, inputs, sketch, points, sketch, len(names))
+    return BarLinkages(which, lot, own, start, links)
 
 
-def _short(whole: _Whole, peeled: _Peeled) -> Array:
+def _has_short_bar(merged: _MergedBars, decomposition: _CranksAndDyads) -> Array:
     """The linkages with a bar so short that rounding may take digits, other than a crank (linkages,)."""
-    order = np.argsort(whole.link, kind="stable")
-    link, at = whole.link[order], whole.local[order]
-    exempt = np.zeros(len(whole.owner), dtype=bool)
-    exempt[whole.link[peeled.cranks]] = True
-    exempt[whole.link0[:-1]] = True
-    found = np.zeros(len(whole.unit), dtype=bool)
+    order = np.argsort(merged.link, kind="stable")
+    link, at = merged.link[order], merged.local[order]
+    exempt = np.zeros(len(merged.owner), dtype=bool)
+    exempt[merged.link[decomposition.cranks]] = True
+    exempt[merged.first_link[:-1]] = True
+    found = np.zeros(len(merged.unit), dtype=bool)
     for ahead in range(1, int(np.bincount(link).max(initial=0))):
         both = np.flatnonzero((link[ahead:] == link[:-ahead]) & ~exempt[link[ahead:]])
         arm = np.hypot(*(at[both + ahead] - at[both]).T)
-        owner = whole.owner[link[both]]
-        found[owner[(arm > 0.0) & (arm < SHORT_ARM * whole.unit[owner])]] = True
+        owner = merged.owner[link[both]]
+        found[owner[(arm > 0.0) & (arm < SHORT_ARM * merged.unit[owner])]] = True
     return found
 
 
-def _peeled(laid: Sequence[Laid], whole: _Whole) -> _Peeled:
+def _find_cranks_and_dyads(layouts: Sequence[PinLayout], merged: _MergedBars) -> _CranksAndDyads:
     """What follows at once from known pins, level after level: two bars that share a pin, each on one known pin."""
-    link, pin, owner = whole.link, whole.pin, whole.owner
-    beams = np.diff(whole.link0) - 1
-    links, pins = len(owner), len(whole.at)
+    link, pin, owner = merged.link, merged.pin, merged.owner
+    beams = np.diff(merged.first_link) - 1
+    links, pins = len(owner), len(merged.pin_positions)
     holders = np.bincount(pin, minlength=pins)
-    pairs = np.bincount(np.repeat(np.arange(len(laid)), np.diff(whole.pin0)), np.maximum(holders - 1, 0), len(laid))
-    odd = (beams > MOST) | (2 * pairs + 1 != 3 * beams)
+    pairs = np.bincount(
+        np.repeat(np.arange(len(layouts)), np.diff(merged.first_pin)), np.maximum(holders - 1, 0), len(layouts)
+    )
+    odd = (beams > MAX_BARS) | (2 * pairs + 1 != 3 * beams)
     known_link, known_pin = np.zeros(links, dtype=bool), np.zeros(pins, dtype=bool)
     level, on = np.full(links, 10**6), np.zeros(pins, dtype=np.int64)
-    known_link[whole.link0[:-1]], level[whole.link0[:-1]] = True, -1
+    known_link[merged.first_link[:-1]], level[merged.first_link[:-1]] = True, -1
 
     def learnt() -> None:
         """Pins of known links are known, each by the first of its entries that is."""
@@ -161,13 +165,13 @@ def _peeled(laid: Sequence[Laid], whole: _Whole) -> _Peeled:
 
     learnt()
     crank = np.zeros(links, dtype=bool)
-    crank[whole.link0[:-1] + 1 + np.array([each.crank for each in laid])] = True
+    crank[merged.first_link[:-1] + 1 + np.array([each.crank for each in layouts])] = True
     cranks = np.flatnonzero(crank[link] & known_pin[pin])
     frames = on[pin[cranks]]
     known_link[link[cranks]], level[link[cranks]] = True, 0
     learnt()
     dyads: list[_Dyads] = []
-    for number in range(1, MOST):
+    for number in range(1, MAX_BARS):
         free = ~known_link[link]
         held = np.bincount(link[free & known_pin[pin]], minlength=links)
         odd[owner[held > 1]] = True
@@ -190,24 +194,26 @@ def _peeled(laid: Sequence[Laid], whole: _Whole) -> _Peeled:
         known_link[link[ends]], level[link[ends]] = True, number
         learnt()
     odd[owner[~known_link]] = True
-    return _Peeled(cranks, frames, dyads, odd, level)
+    return _CranksAndDyads(cranks, frames, dyads, odd, level)
 
 
-def _levels(whole: _Whole, peeled: _Peeled, number: Array, place: Array, unit: Array) -> tuple[list[Batch], Array]:
+def _block_batches(
+    merged: _MergedBars, decomposition: _CranksAndDyads, number: Array, place: Array, unit: Array
+) -> tuple[list[BlockBatch], Array]:
     """The cranks, then the dyads level after level, and the links of every group (groups, 2)."""
-    link, local = whole.link, whole.local
-    turning, dyad = kinds()
+    link, local = merged.link, merged.local
+    turning, dyad = crank_and_dyad_types()
 
     def kept(entries: Array) -> Array:
-        return number[whole.owner[link[entries]]]
+        return number[merged.owner[link[entries]]]
 
-    fine = kept(peeled.cranks) >= 0
-    crank, frame = peeled.cranks[fine], peeled.frames[fine]
+    fine = kept(decomposition.cranks) >= 0
+    crank, frame = decomposition.cranks[fine], decomposition.frames[fine]
     places = np.stack([np.ones_like(crank), place[link[crank]]], axis=1)
     p = np.hstack([local[frame], local[crank]])
-    levels = [batch(turning, kept(crank), places, p, np.arange(len(crank)), unit)]
+    levels = [make_batch(turning, kept(crank), places, p, np.arange(len(crank)), unit)]
     names, groups = [np.stack([link[crank], link[crank]], axis=1)], len(crank)
-    for each in peeled.dyads:
+    for each in decomposition.dyads:
         fine = kept(each.first) >= 0
         if not fine.any():
             continue
@@ -216,33 +222,35 @@ def _levels(whole: _Whole, peeled: _Peeled, number: Array, place: Array, unit: A
         # as the kind has its pairs: each bar with what it is on, then one with the other
         order = (own.first, own.first_on, own.second, own.second_on, own.first_between, own.second_between)
         p = np.hstack([local[k] for k in order])
-        levels.append(batch(dyad, kept(own.first), places, p, groups + np.arange(len(own.first)), unit))
+        levels.append(make_batch(dyad, kept(own.first), places, p, groups + np.arange(len(own.first)), unit))
         names.append(np.stack([link[own.first], link[own.second]], axis=1))
         groups += len(own.first)
     return levels, np.concatenate(names)
 
 
-def _together(batches: Sequence[Batch]) -> Batch:
+def _merge_batches(batches: Sequence[BlockBatch]) -> BlockBatch:
     """Groups of one kind, linkage after linkage, each after those that it needs."""
     owner = np.concatenate([each.owner for each in batches])
     order = np.argsort(owner, kind="stable")
     places, p, ids = (
-        np.concatenate([getattr(each, name) for each in batches])[order] for name in ("places", "p", "ids")
+        np.concatenate([getattr(each, name) for each in batches])[order]
+        for name in ("link_indices", "p", "block_numbers")
     )
-    return Batch(batches[0].kind, owner[order], places, p, ids)
+    return BlockBatch(batches[0].block_type, owner[order], places, p, ids)
 
 
-def _whole(laid: Sequence[Laid]) -> _Whole:
-    beams = np.array([len(each.bars) for each in laid])
+def _merge_bars(layouts: Sequence[PinLayout]) -> _MergedBars:
+    beams = np.array([len(each.bars) for each in layouts])
     pin0, link0 = (
-        np.concatenate([[0], np.cumsum(each)]) for each in (np.array([len(each.at) for each in laid]), beams + 1)
+        np.concatenate([[0], np.cumsum(each)])
+        for each in (np.array([len(each.pin_positions) for each in layouts]), beams + 1)
     )
-    at = np.concatenate([each.at for each in laid])
-    counts = np.array([len(each.fixed) for each in laid])
-    fixed = np.array([pin for each in laid for pin in each.fixed]) + np.repeat(pin0[:-1], counts)
-    lens = np.array([len(bar) for each in laid for bar in each.bars])
-    flat = np.array([pin for each in laid for bar in each.bars for pin in bar])
-    owner = np.repeat(np.arange(len(laid)), beams)
+    at = np.concatenate([each.pin_positions for each in layouts])
+    counts = np.array([len(each.frame_pins) for each in layouts])
+    fixed = np.array([pin for each in layouts for pin in each.frame_pins]) + np.repeat(pin0[:-1], counts)
+    lens = np.array([len(bar) for each in layouts for bar in each.bars])
+    flat = np.array([pin for each in layouts for bar in each.bars for pin in bar])
+    owner = np.repeat(np.arange(len(layouts)), beams)
     flat += np.repeat(pin0[owner], lens)
     starts = np.concatenate([[0], np.cumsum(lens)[:-1]])
     link = np.repeat(np.arange(len(lens)) + owner + 1, lens)
@@ -256,8 +264,8 @@ def _whole(laid: Sequence[Laid]) -> _Whole:
 
     # the extent of every link, the frame's too
     begins, heads = np.cumsum(counts) - counts, np.cumsum(beams) - beams
-    unit = np.maximum.reduceat(np.hypot(*_span(local, starts)), heads)
-    unit = np.maximum(unit, np.hypot(*_span(at[fixed], begins)))
+    unit = np.maximum.reduceat(np.hypot(*_extents(local, starts)), heads)
+    unit = np.maximum(unit, np.hypot(*_extents(at[fixed], begins)))
     reach = np.maximum.reduceat(np.abs(local).max(axis=1), starts[heads])
     reach = np.maximum(reach, np.maximum.reduceat(np.abs(at[fixed]).max(axis=1), begins))
 
@@ -265,23 +273,23 @@ def _whole(laid: Sequence[Laid]) -> _Whole:
     order = np.argsort(pin, kind="stable")
     links = np.concatenate([np.repeat(link0[:-1], counts), link])[order]
     places = np.concatenate([at[fixed], local])[order]
-    whose = np.repeat(np.arange(len(laid)), beams + 1)
-    return _Whole(links, pin[order], places, unit, reach, at, fixed, pin0, link0, whose)
+    whose = np.repeat(np.arange(len(layouts)), beams + 1)
+    return _MergedBars(links, pin[order], places, unit, reach, at, fixed, pin0, link0, whose)
 
 
-def _span(points: Array, starts: Array) -> Array:
+def _extents(points: Array, starts: Array) -> Array:
     """How far points (points, 2) reach in x and in y (2, parts), part by part."""
     return (np.maximum.reduceat(points, starts) - np.minimum.reduceat(points, starts)).T
 
 
-def _told(
-    laid: Sequence[Laid], which: Array, wanted: Sequence[int] | None, shown: Array, pin0: Array
+def _wanted_pins(
+    layouts: Sequence[PinLayout], which: Array, wanted: Sequence[int] | None, moving_pins: Array, pin0: Array
 ) -> tuple[Array, list[list[int]]]:
     """The pins that are told, of all linkages one after the other, and by their own numbers of each."""
     if wanted is None:
-        ends = np.searchsorted(shown, pin0[which]), np.searchsorted(shown, pin0[which + 1])
-        own = [(shown[a:b] - pin0[k]).tolist() for k, a, b in zip(which, *ends, strict=True)]
-        return shown, own
-    own = [[pin for pin in wanted if pin < len(laid[k].at)] for k in which]
+        ends = np.searchsorted(moving_pins, pin0[which]), np.searchsorted(moving_pins, pin0[which + 1])
+        own = [(moving_pins[a:b] - pin0[k]).tolist() for k, a, b in zip(which, *ends, strict=True)]
+        return moving_pins, own
+    own = [[pin for pin in wanted if pin < len(layouts[k].pin_positions)] for k in which]
     flat = np.array([pin0[k] + pin for k, pins in zip(which, own, strict=True) for pin in pins], dtype=np.int64)
     return flat, own

@@ -7,104 +7,106 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.initial_assembly import REGULAR
-from planar.batch.mechanisms.block_type import COS, POSE, SIN, STATISTICS, X, Y
-from planar.batch.mechanisms.linkage_arrays import Batch, Lot, Marked
-from planar.batch.mechanisms.newton_march import followed, shown
-from planar.batch.mechanisms.solved_block_type import SIGNS
-from planar.codegen.block_formula import LANES, Walk, walked
+from planar.batch.initial_assembly import CLEAR_REGULARITY
+from planar.batch.mechanisms.block_type import COS, POSE_ROWS, SIN, SKETCH_SUMS, X, Y
+from planar.batch.mechanisms.linkage_arrays import BlockBatch, LinkageArrays, PointArrays
+from planar.batch.mechanisms.newton_march import run_newton, unknowns_from_frames
+from planar.batch.mechanisms.solved_block_type import MAX_SIGNS
+from planar.codegen.block_formula import LANES, KernelLayout, run_kernel
 from planar.foundation.geometry import Frame
-from planar.solving.assembly.block_assemblies import CLEAR
-from planar.solving.assembly.nearest_assembly import ALIKE
+from planar.solving.assembly.block_assemblies import CLEAR_SKETCH_DISTANCE
+from planar.solving.assembly.nearest_assembly import EQUAL_DISTANCE_TOLERANCE
 
 Array = np.ndarray
 
-MEETING = 1e-4
+LEAST_CLEARANCE = 1e-4
 """Nearer than this to where two assemblies meet neither is taken."""
-ROUGH = 100.0
+START_TOLERANCE_FACTOR = 100.0
 """How much more may be left open at a start, which is looked at again in the run."""
-MOST = 24
+MAX_UNKNOWNS = 24
 """Unknowns of a group at most."""
-NOTHING = 1e-12
+LEAST_SPREAD = 1e-12
 """Squared sizes: points of a link that are no farther apart show no angle."""
 
 
-class Started(NamedTuple):
+class StartAssemblies(NamedTuple):
     """For every linkage whether its assembly is surely the one that the search of the whole would take (linkages,), and
     the signs of all groups (groups, SIGNS), or the unknowns of those that Newton's method follows (groups, MOST)."""
 
-    sure: Array
+    is_sure: Array
     signs: Array
     z: Array
 
 
-def started(lot: Lot, native: bool) -> Started:
+def find_start_assemblies(linkages: LinkageArrays, native: bool) -> StartAssemblies:
     """See `Started`.
 
     A way to assemble a group is taken where it is nearer to the sketch than any other by more than all groups of the
     linkage together are away from it: whatever else were taken, the whole would lie farther off.
     """
-    many = len(lot)
-    first = np.concatenate([[0], np.cumsum(lot.places)])
-    state = np.zeros((1 + first[-1], POSE, LANES if native else 1))
-    _filled(state, lot, first)
-    stats = _statistics(lot.sketch, first)
+    many = len(linkages)
+    first = np.concatenate([[0], np.cumsum(linkages.link_counts)])
+    state = np.zeros((1 + first[-1], POSE_ROWS, LANES if native else 1))
+    _fill_inputs(state, linkages, first)
+    stats = _sketch_sums(linkages.sketch, first)
     seen: Array | None = None
     sure, cost = np.ones(many, dtype=bool), np.zeros(many)
     margins: list[tuple[Array, Array]] = []
-    signs, z = np.ones((lot.groups, SIGNS)), np.zeros((lot.groups, MOST))
-    for batch in lot.levels:
-        kind, index, groups = batch.kind, batch.index(first), len(batch.owner)
-        inner, every = index[:, batch.inner], np.arange(groups)
-        if not kind.direct:
-            seen = _statistics(lot.shown, first) if seen is None else seen
-            found, distance, good = _near(batch, state, index, (stats[inner], seen[inner]), lot.tolerance, native)
+    signs, z = np.ones((linkages.block_count, MAX_SIGNS)), np.zeros((linkages.block_count, MAX_UNKNOWNS))
+    for batch in linkages.batches:
+        kind, index, groups = batch.block_type, batch.state_indices(first), len(batch.owner)
+        inner, every = index[:, batch.inner_slots], np.arange(groups)
+        if not kind.has_closed_form:
+            seen = _sketch_sums(linkages.shown_points, first) if seen is None else seen
+            found, distance, good = _correct_from_sketch(
+                batch, state, index, (stats[inner], seen[inner]), linkages.tolerance, native
+            )
             sure[batch.owner[~good]] = False
-            z[batch.ids, : found.shape[1]] = found
+            z[batch.block_numbers, : found.shape[1]] = found
             cost += np.bincount(batch.owner, np.where(good, distance, 0.0), many)
             continue
         p = np.hstack([batch.p, stats[inner].reshape(groups, -1)])
-        ways, width = 2**kind.signs, POSE * len(kind.inner) + 3
-        walk = Walk((), p.shape[1], kind.slots, ways * width)
-        found = walked(kind.start, walk, state, index, p, native)[:, :, 0].reshape(groups, ways, width)
+        ways, width = 2**kind.sign_count, POSE_ROWS * len(kind.inner_links) + 3
+        walk = KernelLayout((), p.shape[1], kind.slot_count, ways * width)
+        found = run_kernel(kind.start_formula, walk, state, index, p, native)[:, :, 0].reshape(groups, ways, width)
         left, clear, distance = (found[:, :, k] for k in (-3, -2, -1))
         distance = np.where(np.isfinite(left), distance, np.inf)
         best = np.argmin(distance, axis=1)
         nearest = distance[every, best]
         with np.errstate(invalid="ignore"):
-            good = left[every, best] <= ROUGH * lot.tolerance[batch.owner]
-            good &= np.all(~(np.abs(clear) < MEETING), axis=1)
+            good = left[every, best] <= START_TOLERANCE_FACTOR * linkages.tolerance[batch.owner]
+            good &= np.all(~(np.abs(clear) < LEAST_CLEARANCE), axis=1)
         sure[batch.owner[~good]] = False
         if ways > 1:
             nearest = np.where(np.isfinite(nearest), nearest, 0.0)
             cost += np.bincount(batch.owner, np.maximum(nearest, 0.0), many)
             distance[every, best] = np.inf
             margins.append((batch.owner, distance.min(axis=1) - nearest))
-            table = np.array(list(product((1.0, -1.0), repeat=kind.signs)))
-            signs[batch.ids, : kind.signs] = table[best]
-        poses = found[every, best, :-3].reshape(groups, len(kind.inner), POSE)
+            table = np.array(list(product((1.0, -1.0), repeat=kind.sign_count)))
+            signs[batch.block_numbers, : kind.sign_count] = table[best]
+        poses = found[every, best, :-3].reshape(groups, len(kind.inner_links), POSE_ROWS)
         state[inner] = poses[:, :, :, None]
     for owner, margin in margins:
-        sure[owner[~(margin > cost[owner] + 2.0 * ALIKE)]] = False
-    return Started(sure, signs, z)
+        sure[owner[~(margin > cost[owner] + 2.0 * EQUAL_DISTANCE_TOLERANCE)]] = False
+    return StartAssemblies(sure, signs, z)
 
 
-def _near(
-    batch: Batch, state: Array, index: Array, stats: tuple[Array, Array], tolerance: Array, native: bool
+def _correct_from_sketch(
+    batch: BlockBatch, state: Array, index: Array, sketch_sums: tuple[Array, Array], tolerance: Array, native: bool
 ) -> tuple[Array, Array, Array]:
     """Groups that are not in closed form, solved from where they are shown, the points of the sketch and what is shown
     in `stats`: unknowns there, squared distances to the sketch, and for which of them no other assembly can be meant.
 
     Their points lie at the sketch, and the slope is so regular that no other assembly is near: see `Candidates`.
     """
-    sketch, seen = stats
-    kind, groups = batch.kind, len(batch.owner)
+    sketch, seen = sketch_sums
+    kind, groups = batch.block_type, len(batch.owner)
     frames, known = [], np.ones(groups, dtype=bool)
-    for k in range(len(kind.inner)):
+    for k in range(len(kind.inner_links)):
         many, px, py, tx, ty, along, across, _ = seen[:, k].T
         least = np.maximum(many, 1.0)
         turn = along - (px * tx + py * ty) / least, across - (px * ty - py * tx) / least
-        known &= (many > 1.0) & (np.hypot(*turn) > NOTHING)
+        known &= (many > 1.0) & (np.hypot(*turn) > LEAST_SPREAD)
         angle = np.arctan2(turn[1], turn[0])
         c, s = np.cos(angle), np.sin(angle)
         frames.append(Frame((tx - c * px + s * py) / least, (ty - s * px - c * py) / least, c, s, angle))
@@ -112,36 +114,36 @@ def _near(
     def rows(slot: int, row: int) -> Array:
         return state[index[:, slot], row, 0]
 
-    z = shown(kind, frames, rows, batch.p)
-    told = followed(kind, state, index, batch.p, z, False, native)
-    left, regular = told.left[:, 0], told.regular[:, 0]
-    x, y, c, s = (state[index[:, batch.inner], row, 0] for row in (X, Y, COS, SIN))
+    z = unknowns_from_frames(kind, frames, rows, batch.p)
+    told = run_newton(kind, state, index, batch.p, z, False, native)
+    left, regular = told.residuals[:, 0], told.squared_regularity[:, 0]
+    x, y, c, s = (state[index[:, batch.inner_slots], row, 0] for row in (X, Y, COS, SIN))
     many, px, py, tx, ty, along, across, squares = np.moveaxis(sketch, 2, 0)
     with np.errstate(invalid="ignore", over="ignore"):
         mixed = x * (c * px - s * py - tx) + y * (s * px + c * py - ty) - c * along - s * across
         distance = np.maximum(np.sum(many * (x * x + y * y) + 2.0 * mixed + squares, axis=1), 0.0)
         points = many.sum(axis=1)
-        good = known & (left <= ROUGH * tolerance[batch.owner]) & (regular > REGULAR**2)
-        good &= (points > 0.0) & (distance <= points * CLEAR**2)
+        good = known & (left <= START_TOLERANCE_FACTOR * tolerance[batch.owner]) & (regular > CLEAR_REGULARITY**2)
+        good &= (points > 0.0) & (distance <= points * CLEAR_SKETCH_DISTANCE**2)
     return z, distance, good
 
 
-def _filled(state: Array, lot: Lot, first: Array) -> None:
+def _fill_inputs(state: Array, linkages: LinkageArrays, first: Array) -> None:
     """Put the frame and the inputs into the places (places, rows, steps)."""
     state[0, COS] = 1.0
-    where, value = first[lot.inputs.owner] + lot.inputs.place, lot.inputs.value
+    where, value = first[linkages.inputs.owner] + linkages.inputs.link_index, linkages.inputs.value
     state[where, X] = value[:, None]
-    state[where, COS] = np.where(lot.inputs.angle, np.cos(value), 1.0)[:, None]
-    state[where, SIN] = np.where(lot.inputs.angle, np.sin(value), 0.0)[:, None]
+    state[where, COS] = np.where(linkages.inputs.is_angle, np.cos(value), 1.0)[:, None]
+    state[where, SIN] = np.where(linkages.inputs.is_angle, np.sin(value), 0.0)[:, None]
 
 
-def _statistics(points: Marked, first: Array) -> Array:
+def _sketch_sums(points: PointArrays, first: Array) -> Array:
     """The sums of points of every place (places, STATISTICS)."""
     px, py, tx, ty = points.numbers.T
     along, across = px * tx + py * ty, px * ty - py * tx
     squares = px * px + py * py + tx * tx + ty * ty
-    where = first[points.owner] + points.place
+    where = first[points.owner] + points.link_index
     parts = (np.ones_like(px), px, py, tx, ty, along, across, squares)
     stats = [np.bincount(where, part, 1 + first[-1]) for part in parts]
-    assert len(stats) == STATISTICS
+    assert len(stats) == SKETCH_SUMS
     return np.stack(stats, axis=1)

@@ -8,24 +8,24 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.mechanisms.partition import Parted
-from planar.batch.mechanisms.solved_block_type import Kind
+from planar.batch.mechanisms.partition import Partition
+from planar.batch.mechanisms.solved_block_type import BlockType
 
 Array = np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
-class Batch:
+class BlockBatch:
     """Groups of one kind: `owner` (groups,) whose they are, rising; `places` (groups, slots) where their links are;
     p (groups, numbers) with the cosine and sine of angles, lengths in sizes; `ids` (groups,): their numbers."""
 
-    kind: Kind
+    block_type: BlockType
     owner: Array
-    places: Array
+    link_indices: Array
     p: Array
-    ids: Array
+    block_numbers: Array
 
-    def of(self, number: Array) -> Batch | None:
+    def select(self, number: Array) -> BlockBatch | None:
         """Those of some owners: their new numbers, -1 for the others; None where there are none."""
         owner = number[self.owner]
         keep = owner >= 0
@@ -33,47 +33,47 @@ class Batch:
             return replace(self, owner=owner)
         if not keep.any():
             return None
-        return Batch(self.kind, owner[keep], self.places[keep], self.p[keep], self.ids[keep])
+        return BlockBatch(self.block_type, owner[keep], self.link_indices[keep], self.p[keep], self.block_numbers[keep])
 
-    def index(self, first: Array) -> Array:
+    def state_indices(self, first: Array) -> Array:
         """The places among those of all linkages, of which each has its own from `first` on; 0 is the frame of all."""
-        return np.where(self.places > 0, self.places + first[self.owner][:, None], 0)
+        return np.where(self.link_indices > 0, self.link_indices + first[self.owner][:, None], 0)
 
     @property
-    def inner(self) -> slice:
+    def inner_slots(self) -> slice:
         """Which of the slots are those of inner links."""
-        return slice(self.kind.slots - len(self.kind.inner), self.kind.slots)
+        return slice(self.block_type.slot_count - len(self.block_type.inner_links), self.block_type.slot_count)
 
 
-class Inputs(NamedTuple):
+class InputArrays(NamedTuple):
     """The inputs of all linkages: whose, their place, position (rad or sizes), whether an angle, velocity and
     acceleration of those that run, and which do."""
 
     owner: Array
-    place: Array
+    link_index: Array
     value: Array
-    angle: Array
+    is_angle: Array
     runs: Array
     velocity: Array
     acceleration: Array
 
 
-class Marked(NamedTuple):
+class PointArrays(NamedTuple):
     """Points on links: whose, the place of the link, and numbers (points, any) of each."""
 
     owner: Array
-    place: Array
+    link_index: Array
     numbers: Array
 
-    def of(self, number: Array) -> Marked:
+    def select(self, number: Array) -> PointArrays:
         """Those of some owners: their new numbers, -1 for the others."""
         owner = number[self.owner]
         keep = owner >= 0
-        return Marked(owner[keep], self.place[keep], self.numbers[keep])
+        return PointArrays(owner[keep], self.link_index[keep], self.numbers[keep])
 
 
 @dataclass(frozen=True, eq=False)
-class Lot:
+class LinkageArrays:
     """Linkages as arrays. `places` (linkages,): how many each has beside the frame; lengths in units of `unit` (m).
 
     `levels` are batches that are solved one after the other; `turns` the same, where groups of a batch may take what
@@ -81,108 +81,121 @@ class Lot:
     (m), of those that are wanted. `shown`: as `sketch`, for every link that has a point, and pins on the frame too.
     """
 
-    places: Array
+    link_counts: Array
     unit: Array
     tolerance: Array
-    levels: Sequence[Batch]
-    turns: Sequence[Batch]
-    inputs: Inputs
-    sketch: Marked
-    points: Marked
-    shown: Marked
-    groups: int
+    batches: Sequence[BlockBatch]
+    merged_batches: Sequence[BlockBatch]
+    inputs: InputArrays
+    sketch: PointArrays
+    points: PointArrays
+    shown_points: PointArrays
+    block_count: int
 
     def __len__(self) -> int:
         """How many linkages there are."""
-        return len(self.places)
+        return len(self.link_counts)
 
-    def of(self, which: Array) -> Lot:
+    def select(self, which: Array) -> LinkageArrays:
         """Some of the linkages (numbers, rising)."""
         if len(which) == len(self):
             return self
         number = np.full(len(self), -1)
         number[which] = np.arange(len(which))
         keep = number[self.inputs.owner] >= 0
-        inputs = Inputs(*(part[keep] for part in self.inputs))
+        inputs = InputArrays(*(part[keep] for part in self.inputs))
         inputs = inputs._replace(owner=number[inputs.owner])
-        levels = [part for each in self.levels if (part := each.of(number)) is not None]
-        if self.turns is self.levels:
+        levels = [part for each in self.batches if (part := each.select(number)) is not None]
+        if self.merged_batches is self.batches:
             turns = levels
         else:
-            turns = [part for each in self.turns if (part := each.of(number)) is not None]
-        return Lot(
-            self.places[which],
+            turns = [part for each in self.merged_batches if (part := each.select(number)) is not None]
+        return LinkageArrays(
+            self.link_counts[which],
             self.unit[which],
             self.tolerance[which],
             levels,
             turns,
             inputs,
-            self.sketch.of(number),
-            self.points.of(number),
-            self.shown.of(number),
-            self.groups,
+            self.sketch.select(number),
+            self.points.select(number),
+            self.shown_points.select(number),
+            self.block_count,
         )
 
 
-class One(NamedTuple):
+class PartitionedLinkage(NamedTuple):
     """A parted linkage with what runs it: of every input position (rad or sizes), whether it is an angle, whether it
     runs, velocity and acceleration; points of the sketch, points that are wanted, and points that are
     shown, each with its place first: see `Lot`."""
 
-    parted: Parted
+    partition: Partition
     inputs: list[tuple[float, bool, bool, float, float]]
     sketch: list[tuple[float, ...]]
     points: list[tuple[float, ...]]
-    shown: list[tuple[float, ...]]
+    shown_points: list[tuple[float, ...]]
 
 
-def lot_of(ones: Sequence[One]) -> Lot:
+def make_linkage_arrays(linkages: Sequence[PartitionedLinkage]) -> LinkageArrays:
     """Parted linkages as arrays."""
-    unit = np.array([one.parted.unit for one in ones])
+    unit = np.array([one.partition.unit for one in linkages])
     levels: dict[tuple[int, int], list] = {}
     turns: dict[tuple[int, int], list] = {}
-    kinds: dict[int, Kind] = {}
+    kinds: dict[int, BlockType] = {}
     number = 0
-    for owner, one in enumerate(ones):
-        for group in one.parted.groups:
-            kinds[id(group.kind)] = group.kind
-            row = (owner, group.places, group.p, number)
-            levels.setdefault((group.level, id(group.kind)), []).append(row)
-            turns.setdefault((group.turn, id(group.kind)), []).append(row)
+    for owner, one in enumerate(linkages):
+        for group in one.partition.blocks:
+            kinds[id(group.block_type)] = group.block_type
+            row = (owner, group.link_indices, group.p, number)
+            levels.setdefault((group.level, id(group.block_type)), []).append(row)
+            turns.setdefault((group.merged_level, id(group.block_type)), []).append(row)
             number += 1
 
-    def batches(of: dict[tuple[int, int], list]) -> list[Batch]:
-        return [batch(kinds[key[1]], *map(list, zip(*of[key], strict=True)), unit) for key in sorted(of)]
+    def batches(of: dict[tuple[int, int], list]) -> list[BlockBatch]:
+        return [make_batch(kinds[key[1]], *map(list, zip(*of[key], strict=True)), unit) for key in sorted(of)]
 
-    inputs = [(owner, 1 + k, *each) for owner, one in enumerate(ones) for k, each in enumerate(one.inputs)]
+    inputs = [(owner, 1 + k, *each) for owner, one in enumerate(linkages) for k, each in enumerate(one.inputs)]
     parts = zip(*inputs, strict=True)
-    return Lot(
-        np.array([one.parted.places - 1 for one in ones]),
+    return LinkageArrays(
+        np.array([one.partition.index_count - 1 for one in linkages]),
         unit,
-        np.array([one.parted.tolerance for one in ones]),
+        np.array([one.partition.tolerance for one in linkages]),
         batches(levels),
         batches(turns),
-        Inputs(*(np.array(part) for part in parts)),
-        _marked([one.sketch for one in ones], 4),
-        _marked([one.points for one in ones], 2),
-        _marked([one.shown for one in ones], 4),
+        InputArrays(*(np.array(part) for part in parts)),
+        _point_arrays([one.sketch for one in linkages], 4),
+        _point_arrays([one.points for one in linkages], 2),
+        _point_arrays([one.shown_points for one in linkages], 4),
         number,
     )
 
 
-def batch(kind: Kind, owner: Sequence[int], places: Sequence, p: Sequence, ids: Sequence[int], unit: Array) -> Batch:
+def make_batch(
+    block_type: BlockType,
+    owner: Sequence[int],
+    link_indices: Sequence,
+    p: Sequence,
+    block_numbers: Sequence[int],
+    unit: Array,
+) -> BlockBatch:
     """Groups of a kind with the numbers of their pairs p (groups, measures), in m, as the kind's formulas take them."""
     owners = np.asarray(owner)
-    numbers = np.array(p, dtype=float).reshape(len(owners), len(kind.measures))
-    numbers[:, kind.lengths] /= unit[owners][:, None]
-    if kind.angles:
-        own = numbers[:, kind.angles]
+    numbers = np.array(p, dtype=float).reshape(len(owners), len(block_type.measures))
+    numbers[:, block_type.length_measures] /= unit[owners][:, None]
+    if block_type.angle_measures:
+        own = numbers[:, block_type.angle_measures]
         both = np.stack([np.cos(own), np.sin(own)], axis=2).reshape(len(owners), -1)
         numbers = np.hstack([numbers, both])
-    return Batch(kind, owners, np.asarray(places).reshape(len(owners), kind.slots), numbers, np.asarray(ids))
+    return BlockBatch(
+        block_type,
+        owners,
+        np.asarray(link_indices).reshape(len(owners), block_type.slot_count),
+        numbers,
+        np.asarray(block_numbers),
+    )
 
 
-def _marked(points: Sequence[list[tuple[float, ...]]], wide: int) -> Marked:
+def _point_arrays(points: Sequence[list[tuple[float, ...]]], width: int) -> PointArrays:
     owner = np.repeat(np.arange(len(points)), [len(own) for own in points])
-    flat = np.array([each for own in points for each in own], dtype=float).reshape(-1, 1 + wide)
-    return Marked(owner, flat[:, 0].astype(np.int64), flat[:, 1:])
+    flat = np.array([each for own in points for each in own], dtype=float).reshape(-1, 1 + width)
+    return PointArrays(owner, flat[:, 0].astype(np.int64), flat[:, 1:])

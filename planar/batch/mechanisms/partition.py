@@ -10,171 +10,177 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.mechanisms.block_type import GROUNDED, Joint, Signature
-from planar.batch.mechanisms.solved_block_type import MOST, Kind, kind
-from planar.equations.block_decomposition import decompose
+from planar.batch.mechanisms.block_type import FRAME_BODY, BlockPair, BlockSignature
+from planar.batch.mechanisms.solved_block_type import MAX_BLOCK_TYPES, BlockType, find_block_type
+from planar.equations.block_decomposition import decompose_blocks
 from planar.foundation.geometry import Vector, frame_at
-from planar.model.link_shapes import At, Link, Shape, shape
-from planar.model.mechanism import Mechanism, check
+from planar.model.link_shapes import At, Link, LinkShape, link_shape
+from planar.model.mechanism import Mechanism, check_mechanism
 from planar.model.pairs import Pair
 from planar.solving.checks.residual_check import EPS, SHORT_ARM
 
-LARGEST = 8
+MAX_BLOCK_LINKS = 8
 """Links of a group: larger ones are left to the general path, which solves the whole."""
-NONE = Vector(0.0, 0.0)
-AHEAD = Vector(1.0, 0.0)
+ORIGIN = Vector(0.0, 0.0)
+X_AXIS = Vector(1.0, 0.0)
 
 
-class Unparted(Exception):
+class NotPartitionable(Exception):
     """A mechanism that cannot be solved group after group; the text says why."""
 
 
-class Group(NamedTuple):
+class PartitionBlock(NamedTuple):
     """One group of a mechanism: its kind, the places of its given links, inputs and inner links, and its numbers p (m).
 
     `level`: after which it can be solved; `turn`: the same, where a kind may take what the same kind has given.
     `inner` are numbers of links.
     """
 
-    kind: Kind
-    places: tuple[int, ...]
+    block_type: BlockType
+    link_indices: tuple[int, ...]
     p: list[float]
-    inner: tuple[int, ...]
+    inner_links: tuple[int, ...]
     level: int
-    turn: int
+    merged_level: int
 
 
-class Parted(NamedTuple):
+class Partition(NamedTuple):
     """A mechanism as data, its lengths in units of `unit` (m).
 
     Places: 0 is the frame, then every input, then the links as they are solved; `place_of` tells those of the links.
     """
 
     mechanism: Mechanism
-    shapes: dict[str, Shape]
+    shapes: dict[str, LinkShape]
     unit: float
     tolerance: float
-    groups: list[Group]
-    place_of: dict[str, int]
-    places: int
+    blocks: list[PartitionBlock]
+    link_index: dict[str, int]
+    index_count: int
 
 
-class _About(NamedTuple):
+class _PairTypeFacts(NamedTuple):
     """The number of a pair type among all, how many motions it prevents, and whether it says the same of its bodies
     the other way round, so that kinds need not tell the two apart."""
 
     number: int
     holds: int
-    even: bool
+    is_symmetric: bool
 
 
 @lru_cache
-def _about(of: type[Pair]) -> _About | None:
+def _pair_type_facts(pair_type: type[Pair]) -> _PairTypeFacts | None:
     """What there is to know of a pair type; None for one that needs the whole."""
-    whole = of.counts_turns or of.apart is not Pair.apart or of.bodies is not Pair.bodies
-    if whole or of.misfit is not Pair.misfit:
+    whole = (
+        pair_type.counts_turns or pair_type.contact_gap is not Pair.contact_gap or pair_type.bodies is not Pair.bodies
+    )
+    if whole or pair_type.find_misfit is not Pair.find_misfit:
         return None
-    return _About(_number(of), of.holds(), _even(of))
+    return _PairTypeFacts(_pair_type_number(pair_type), pair_type.prevented_motion_count(), _is_symmetric(pair_type))
 
 
-def _even(of: type[Pair]) -> bool:
+def _is_symmetric(pair_type: type[Pair]) -> bool:
     """Whether the residual only changes its sign where the bodies and their halves of the numbers change places."""
-    half = len(of.measures) // 2
-    if of.coordinates or 2 * half != len(of.measures) or of.measures[:half] != of.measures[half:]:
+    half = len(pair_type.number_kinds) // 2
+    if (
+        pair_type.coordinate_kinds
+        or 2 * half != len(pair_type.number_kinds)
+        or pair_type.number_kinds[:half] != pair_type.number_kinds[half:]
+    ):
         return False
     rng = np.random.default_rng(0)
     a, b = (frame_at(*rng.uniform(-1.0, 1.0, 3)) for _ in range(2))
-    numbers, pair = list(rng.uniform(-1.0, 1.0, 2 * half)), of.samples()[0].pair
+    numbers, pair = list(rng.uniform(-1.0, 1.0, 2 * half)), pair_type.samples()[0].pair
     one = np.array(pair.residual((a, b), numbers, ()))
     return bool(np.allclose(one, -np.array(pair.residual((b, a), numbers[half:] + numbers[:half], ())), atol=1e-12))
 
 
-_NUMBERS: dict[type[Pair], int] = {}
+_PAIR_TYPE_NUMBERS: dict[type[Pair], int] = {}
 
 
-def _number(of: type[Pair]) -> int:
-    return _NUMBERS.setdefault(of, len(_NUMBERS))
+def _pair_type_number(pair_type: type[Pair]) -> int:
+    return _PAIR_TYPE_NUMBERS.setdefault(pair_type, len(_PAIR_TYPE_NUMBERS))
 
 
-def quick(link: Link) -> Shape:
+def quick_link_shape(link: Link) -> LinkShape:
     """The shape of a link."""
     points = link.points
     if link.axis is not None or any(type(point.place) is not At for point in points):
-        return shape(link)
+        return link_shape(link)
     drawn = {name: Vector(place.x, place.y) for name, place in points}  # type: ignore[union-attr]
     if link.ends is not None:
-        drawn = {link.ends[0]: NONE, link.ends[1]: Vector(link.length, 0.0)} | drawn
-    return Shape(drawn, NONE, AHEAD)
+        drawn = {link.ends[0]: ORIGIN, link.ends[1]: Vector(link.length, 0.0)} | drawn
+    return LinkShape(drawn, ORIGIN, X_AXIS)
 
 
-def parted(mechanism: Mechanism) -> Parted:
+def partition_mechanism(mechanism: Mechanism) -> Partition:
     """The groups of a mechanism. Raises Unparted where it needs the whole, BadInput and Unplaced where it is none."""
     try:
-        return _Parting(mechanism).parted()
+        return _Partitioner(mechanism).partition()
     except (KeyError, AttributeError):
-        check(mechanism)
-        raise Unparted("something in it is not as its pairs expect it") from None
+        check_mechanism(mechanism)
+        raise NotPartitionable("something in it is not as its pairs expect it") from None
 
 
-class _Parting:
+class _Partitioner:
     def __init__(self, mechanism: Mechanism):
         self.mechanism = mechanism
-        self.shapes = {link.name: quick(link) for link in mechanism.links}
-        self.unit, self.reach = _size(self.shapes.values())
+        self.shapes = {link.name: quick_link_shape(link) for link in mechanism.links}
+        self.unit, self.reach = _size_and_reach(self.shapes.values())
         number = {name: k for k, name in enumerate(self.shapes)}
         self.names = list(number)
         self.frame = number[mechanism.frame]
         many = len(number)
-        self.beside: list[list[tuple[int, int]]] = [[] for _ in range(many)]
+        self.neighbours: list[list[tuple[int, int]]] = [[] for _ in range(many)]
         "for every link the links beside it, each with the pair between"
-        self.pairs, self.weights, self.ends, self.even = list(mechanism.pairs), [], [], []
+        self.pairs, self.prevented_motions, self.ends, self.is_symmetric = list(mechanism.pairs), [], [], []
         for k, pair in enumerate(self.pairs):
-            about = _about(type(pair))
+            about = _pair_type_facts(type(pair))
             if about is None:
-                raise Unparted(f"{pair.name} ties more together than two links at one place")
+                raise NotPartitionable(f"{pair.name} ties more together than two links at one place")
             a, b = pair.links
             first, second = number[a], number[b]
-            self.beside[first].append((second, k))
-            self.beside[second].append((first, k))
-            self.weights.append(about.holds)
-            self.even.append(about.even)
+            self.neighbours[first].append((second, k))
+            self.neighbours[second].append((first, k))
+            self.prevented_motions.append(about.holds)
+            self.is_symmetric.append(about.is_symmetric)
             self.ends.append((first, second))
-        self.driven: dict[int, int] = {}
+        self.input_of_pair: dict[int, int] = {}
         for k, given in enumerate(mechanism.inputs):
             place = next((i for i, pair in enumerate(self.pairs) if pair.name == given.pair), None)
-            if place is None or place in self.driven:
-                raise Unparted(f"the input at {given.pair} is between links that no pair of their own joins")
-            self.driven[place] = k
-            self.even[place] = False  # an input is of the second body against the first
-            self.weights[place] += 1
-        turned = {link for place in self.driven for link in self.ends[place]}
+            if place is None or place in self.input_of_pair:
+                raise NotPartitionable(f"the input at {given.pair} is between links that no pair of their own joins")
+            self.input_of_pair[place] = k
+            self.is_symmetric[place] = False  # an input is of the second body against the first
+            self.prevented_motions[place] += 1
+        turned = {link for place in self.input_of_pair for link in self.ends[place]}
         for k, each in enumerate(self.shapes.values()):
-            if k != self.frame and k not in turned and _shortest(each) < SHORT_ARM * self.unit:
-                raise Unparted(f"link {self.names[k]} is so short that rounding takes digits")
+            if k != self.frame and k not in turned and _shortest_distance(each) < SHORT_ARM * self.unit:
+                raise NotPartitionable(f"link {self.names[k]} is so short that rounding takes digits")
         self.number = number
-        self.shared = self._shared()
-        self.place = [-1] * many
-        self.place[self.frame] = 0
-        self.level, self.turn = [0] * many, [0] * many
-        self.of_kind: list[Kind | None] = [None] * many
-        self.groups: list[Group] = []
-        self.places = 1 + len(mechanism.inputs)
+        self.shared_pins = self._find_shared_pins()
+        self.link_index = [-1] * many
+        self.link_index[self.frame] = 0
+        self.level, self.merged_level = [0] * many, [0] * many
+        self.block_type_of_link: list[BlockType | None] = [None] * many
+        self.blocks: list[PartitionBlock] = []
+        self.index_count = 1 + len(mechanism.inputs)
 
-    def parted(self) -> Parted:
+    def partition(self) -> Partition:
         """See `parted`."""
-        self._peeled()
-        if len(self.groups) == 0 or -1 in self.place:
-            self._rest()
+        self._add_links_and_dyads()
+        if len(self.blocks) == 0 or -1 in self.link_index:
+            self._add_remaining_blocks()
         # as the gate of the whole has it
         tolerance = 16.0 * EPS * (4 + len(self.names)) * max(1.0, self.reach / self.unit)
-        places = dict(zip(self.names, self.place, strict=True))
-        return Parted(self.mechanism, self.shapes, self.unit, tolerance, self.groups, places, self.places)
+        places = dict(zip(self.names, self.link_index, strict=True))
+        return Partition(self.mechanism, self.shapes, self.unit, tolerance, self.blocks, places, self.index_count)
 
-    def _shared(self) -> dict[int, list[list[int]]]:
+    def _find_shared_pins(self) -> dict[int, list[list[int]]]:
         """Of every link the pins that it shares with two links or more, each as its pairs, all from one link."""
         pins: dict[str, list[int]] = {}
         for k, pair in enumerate(self.pairs):
-            if self.even[k]:
+            if self.is_symmetric[k]:
                 pins.setdefault(pair.entry_name(), []).append(k)
         found: dict[int, list[list[int]]] = {}
         for own in pins.values():
@@ -183,7 +189,7 @@ class _Parting:
                     found.setdefault(link, []).append(own)
         return found
 
-    def _started(self, own: list[int], link: int) -> None:
+    def _rebase_pin(self, own: list[int], link: int) -> None:
         """Let the pairs of a pin start from another of its links."""
         if all(link in self.ends[k] for k in own):
             return
@@ -191,39 +197,39 @@ class _Parting:
         named = self.names[link]
         for k in own:
             first, second = self.ends[k]
-            self.beside[first].remove((second, k))
-            self.beside[second].remove((first, k))
-        others = [pair for pair in type(pairs[0]).motions(pairs) if named in pair.links]
+            self.neighbours[first].remove((second, k))
+            self.neighbours[second].remove((first, k))
+        others = [pair for pair in type(pairs[0]).relative_motions(pairs) if named in pair.links]
         for k, pair in zip(own, others, strict=True):
             self.pairs[k] = pair
             first, second = self.ends[k] = tuple(self.number[each] for each in pair.links)
-            self.beside[first].append((second, k))
-            self.beside[second].append((first, k))
+            self.neighbours[first].append((second, k))
+            self.neighbours[second].append((first, k))
 
-    def _peeled(self) -> None:
+    def _add_links_and_dyads(self) -> None:
         """Links that follow at once from known ones: one alone, or two together."""
-        held = [0] * len(self.place)
+        held = [0] * len(self.link_index)
         waiting = [self.frame]
         while waiting:
-            self._follow(waiting, held)
+            self._add_following_links(waiting, held)
             # two that share a pin with a third, which is not known, and hang by one end each
-            for own in {id(own): own for pins in self.shared.values() for own in pins}.values():
+            for own in {id(own): own for pins in self.shared_pins.values() for own in pins}.values():
                 links = dict.fromkeys(link for k in own for link in self.ends[k])
-                ends = [link for link in links if self.place[link] < 0 and held[link] == 2]
-                if len(ends) == 2 and all(self.place[link] < 0 for link in links):
-                    self._started(own, ends[0])
-                    self._add(tuple(ends))
+                ends = [link for link in links if self.link_index[link] < 0 and held[link] == 2]
+                if len(ends) == 2 and all(self.link_index[link] < 0 for link in links):
+                    self._rebase_pin(own, ends[0])
+                    self._add_block(tuple(ends))
                     waiting += ends
                     break
 
-    def _follow(self, waiting: list[int], held: list[int]) -> None:
+    def _add_following_links(self, waiting: list[int], held: list[int]) -> None:
         """Add what follows at once from links that wait to be looked at; `held`: motions that known links prevent."""
-        place, beside, weights = self.place, self.beside, self.weights
+        place, beside, weights = self.link_index, self.neighbours, self.prevented_motions
         while waiting:
             new = waiting.pop()
-            for own in self.shared.get(new, ()):
-                if not any(place[link] >= 0 for link in self._middle(own)):
-                    self._started(own, new)
+            for own in self.shared_pins.get(new, ()):
+                if not any(place[link] >= 0 for link in self._base_links(own)):
+                    self._rebase_pin(own, new)
             touched = []
             for link, k in beside[new]:
                 if place[link] < 0:
@@ -231,64 +237,64 @@ class _Parting:
                     touched.append(link)
             for link in touched:
                 if place[link] < 0:
-                    waiting += self._joined(link, held)
+                    waiting += self._add_block_with(link, held)
 
-    def _joined(self, link: int, held: list[int]) -> tuple[int, ...]:
+    def _add_block_with(self, link: int, held: list[int]) -> tuple[int, ...]:
         """The links of a group that a link is in, by itself or with another, if it follows from known ones: added."""
         if held[link] == 3:
-            self._add((link,))
+            self._add_block((link,))
             return (link,)
         if held[link] > 3:
-            raise Unparted(f"link {self.names[link]} is held more than once")
+            raise NotPartitionable(f"link {self.names[link]} is held more than once")
         between: dict[int, int] = {}
-        for other, k in self.beside[link]:
-            if self.place[other] < 0:
-                between[other] = between.get(other, 0) + self.weights[k]
+        for other, k in self.neighbours[link]:
+            if self.link_index[other] < 0:
+                between[other] = between.get(other, 0) + self.prevented_motions[k]
         for other, holds in between.items():
             whole = held[link] + held[other] + holds
             if whole == 6 and held[other] <= 3:
-                self._add((link, other))
+                self._add_block((link, other))
                 return (link, other)
             if whole > 6:
-                raise Unparted(f"links {self.names[link]} and {self.names[other]} are held more than once")
+                raise NotPartitionable(f"links {self.names[link]} and {self.names[other]} are held more than once")
         return ()
 
-    def _middle(self, own: list[int]) -> set[int]:
+    def _base_links(self, own: list[int]) -> set[int]:
         """The link from which the pairs of a pin start."""
         return set(self.ends[own[0]]) & set(self.ends[own[1]])
 
-    def _rest(self) -> None:
+    def _add_remaining_blocks(self) -> None:
         """What is left, in the smallest groups: Dulmage and Mendelsohn on links, each of three columns."""
-        left = [link for link, place in enumerate(self.place) if place < 0]
+        left = [link for link, place in enumerate(self.link_index) if place < 0]
         number = {link: k for k, link in enumerate(left)}
         rows: list[frozenset[int]] = []
-        for (a, b), weight in zip(self.ends, self.weights, strict=True):
+        for (a, b), weight in zip(self.ends, self.prevented_motions, strict=True):
             own = [number[link] for link in (a, b) if link in number]
             if own:
                 rows += [frozenset(3 * k + part for k in own for part in range(3))] * weight
         if len(rows) != 3 * len(left):
-            raise Unparted("pairs and inputs leave links free, or hold them more than once")
-        for group in decompose(rows, 3 * len(left)):
-            if group.free or len(group.rows) != len(group.columns):
-                raise Unparted("pairs and inputs leave links free, or hold them more than once")
+            raise NotPartitionable("pairs and inputs leave links free, or hold them more than once")
+        for group in decompose_blocks(rows, 3 * len(left)):
+            if group.is_free or len(group.rows) != len(group.columns):
+                raise NotPartitionable("pairs and inputs leave links free, or hold them more than once")
             links = tuple(sorted({left[column // 3] for column in group.columns}))
-            if len(links) > LARGEST:
-                raise Unparted(f"{len(links)} links are solved together")
-            self._add(links)
+            if len(links) > MAX_BLOCK_LINKS:
+                raise NotPartitionable(f"{len(links)} links are solved together")
+            self._add_block(links)
 
-    def _add(self, inner: tuple[int, ...]) -> None:
+    def _add_block(self, inner: tuple[int, ...]) -> None:
         """Add a group: its pairs in an order that does not depend on names."""
-        place, pairs, driven = self.place, self.pairs, self.driven
+        place, pairs, driven = self.link_index, self.pairs, self.input_of_pair
         if len(inner) > 1:
-            inner = tuple(sorted(inner, key=self._held_by))
+            inner = tuple(sorted(inner, key=self._sort_key))
         local = {link: k for k, link in enumerate(inner)}
         found = []
         for link in inner:
-            for other, k in self.beside[link]:
+            for other, k in self.neighbours[link]:
                 here, there = local[link], local.get(other, -1)
                 if (place[other] >= 0) or there > here:
-                    turned = self.even[k] or self.ends[k][0] == link
-                    found.append((_NUMBERS[type(pairs[k])], here, there, turned, k in driven, k, other))
+                    turned = self.is_symmetric[k] or self.ends[k][0] == link
+                    found.append((_PAIR_TYPE_NUMBERS[type(pairs[k])], here, there, turned, k in driven, k, other))
         found.sort()
         key, given, inputs, p = [], [], [], []
         level, turn = 0, []
@@ -296,8 +302,8 @@ class _Parting:
         for number, here, inside, turned, is_driven, k, other in found:
             there = inside
             if inside < 0:
-                there = GROUNDED if is_driven and other == self.frame else -1 - len(given)
-                if there != GROUNDED:
+                there = FRAME_BODY if is_driven and other == self.frame else -1 - len(given)
+                if there != FRAME_BODY:
                     given.append(place[other])
                 level = max(level, self.level[other])
                 turn.append(other)
@@ -307,53 +313,55 @@ class _Parting:
             pair = pairs[k]
             first, second = self.ends[k]
             numbers = pair.measure((shapes[names[first]], shapes[names[second]]))
-            if self.even[k] and first != inner[here]:
+            if self.is_symmetric[k] and first != inner[here]:
                 half = len(numbers) // 2
                 numbers = (*numbers[half:], *numbers[:half])
             p += numbers
         known = (len(inner), len(given), tuple(key))
-        own = _KINDS.get(known) or _made(known, pairs, found)
-        if not own.square:
-            raise Unparted("constraints hold each other more than once")
-        after = max((self.turn[other] + (self.of_kind[other] is not own) for other in turn), default=0)
+        own = _BLOCK_TYPES.get(known) or _make_block_type(known, pairs, found)
+        if not own.is_square:
+            raise NotPartitionable("constraints hold each other more than once")
+        after = max(
+            (self.merged_level[other] + (self.block_type_of_link[other] is not own) for other in turn), default=0
+        )
         own_places = []
         for link in inner:
-            place[link] = self.places
-            own_places.append(self.places)
-            self.places += 1
-            self.level[link], self.turn[link], self.of_kind[link] = level + 1, after, own
-        self.groups.append(Group(own, (*given, *inputs, *own_places), p, inner, level, after))
+            place[link] = self.index_count
+            own_places.append(self.index_count)
+            self.index_count += 1
+            self.level[link], self.merged_level[link], self.block_type_of_link[link] = level + 1, after, own
+        self.blocks.append(PartitionBlock(own, (*given, *inputs, *own_places), p, inner, level, after))
 
-    def _held_by(self, link: int) -> tuple:
+    def _sort_key(self, link: int) -> tuple:
         """What a link of a group is held by, so that equal groups come out alike."""
         own = [
             (
-                _NUMBERS[type(self.pairs[k])],
-                self.even[k] or self.ends[k][0] == link,
-                k in self.driven,
-                self.place[other] < 0,
+                _PAIR_TYPE_NUMBERS[type(self.pairs[k])],
+                self.is_symmetric[k] or self.ends[k][0] == link,
+                k in self.input_of_pair,
+                self.link_index[other] < 0,
             )
-            for other, k in self.beside[link]
-            if self.place[other] >= 0
+            for other, k in self.neighbours[link]
+            if self.link_index[other] >= 0
         ]
         return len(own), sorted(own)
 
 
-_KINDS: dict[tuple, Kind] = {}
+_BLOCK_TYPES: dict[tuple, BlockType] = {}
 
 
-def _made(known: tuple, pairs: Sequence[Pair], found: Sequence[tuple]) -> Kind:
-    inner, given, key = known
+def _make_block_type(signature_key: tuple, pairs: Sequence[Pair], found: Sequence[tuple]) -> BlockType:
+    inner, given, key = signature_key
     joints = tuple(
-        Joint(type(pairs[each[5]]), bodies, driven) for each, (_, bodies, driven) in zip(found, key, strict=True)
+        BlockPair(type(pairs[each[5]]), bodies, driven) for each, (_, bodies, driven) in zip(found, key, strict=True)
     )
-    if len(_KINDS) >= MOST:
-        _KINDS.clear()
-    made = _KINDS[known] = kind(Signature(inner, given, joints))
+    if len(_BLOCK_TYPES) >= MAX_BLOCK_TYPES:
+        _BLOCK_TYPES.clear()
+    made = _BLOCK_TYPES[signature_key] = find_block_type(BlockSignature(inner, given, joints))
     return made
 
 
-def _size(shapes: Iterable[Shape]) -> tuple[float, float]:
+def _size_and_reach(shapes: Iterable[LinkShape]) -> tuple[float, float]:
     """The greatest extent of a link, and the greatest coordinate (m)."""
     greatest, reach = 0.0, 0.0
     for each in shapes:
@@ -369,7 +377,7 @@ def _size(shapes: Iterable[Shape]) -> tuple[float, float]:
     return greatest or 1.0, reach
 
 
-def _shortest(shape: Shape) -> float:
+def _shortest_distance(shape: LinkShape) -> float:
     """The least distance between two points of a link that do not coincide (m)."""
     apart = (hypot(b.x - a.x, b.y - a.y) for a, b in combinations(shape.points.values(), 2))
     return min(filter(None, apart), default=inf)

@@ -5,21 +5,21 @@ from __future__ import annotations
 from functools import lru_cache
 
 from planar.batch.mechanisms.block_type import COS, SIN, TURN1, TURN2, X1, X2, Y1, Y2, X, Y
-from planar.codegen.block_formula import Formula, Leaf, Walk
-from planar.codegen.instructions import Listing
+from planar.codegen.block_formula import BlockFormula, FormulaInput, KernelLayout
+from planar.codegen.instructions import InstructionList
 
 
 @lru_cache
-def told(rates: bool) -> tuple[Formula, Walk]:
+def point_formula(rates: bool) -> tuple[BlockFormula, KernelLayout]:
     """x and y of a point, then of its first and second rates, from its link's pose and rates.
 
     Numbers: the point in its link (m), then what the link's own lengths are multiplied by.
     """
-    listing, leaves = Listing(), {}
+    listing, leaves = InstructionList(), {}
 
     def leaf(what: str, first: int, second: int = 0) -> int:
         number = listing.add("input", data=(what, (first, second)))
-        leaves[number] = Leaf(what, first, second)
+        leaves[number] = FormulaInput(what, first, second)
         return number
 
     def times(a: int, b: int) -> int:
@@ -39,4 +39,4 @@ def told(rates: bool) -> tuple[Formula, Walk]:
         across = listing.add("sub", times(turn2, rx), times(square, ry))
         wanted.append(listing.add("sub", times(leaf("row", 0, X2), unit), along))
         wanted.append(listing.add("add", times(leaf("row", 0, Y2), unit), across))
-    return Formula(listing, tuple(wanted), leaves), Walk((), 3, 1, len(wanted))
+    return BlockFormula(listing, tuple(wanted), leaves), KernelLayout((), 3, 1, len(wanted))

@@ -13,7 +13,7 @@ from planar.foundation.errors import Outcome
 Array = np.ndarray
 
 
-class Points(Mapping[str, Array]):
+class PointMapping(Mapping[str, Array]):
     """Arrays (steps + 1, 2) by the names of points."""
 
     __slots__ = ("_names", "_values")

@@ -12,178 +12,193 @@ import numpy as np
 import zarr
 from zarr.codecs import Crc32cCodec, ZstdCodec
 
-from planar.batch.block import Done
+from planar.batch.block import SolvedDesigns
 from planar.batch.results import Sweep
-from planar.batch.stores.store import Plan, Sink, another, begun, damaged, views, writing
+from planar.batch.stores.store import (
+    BlockStore,
+    SweepPlan,
+    damaged_block_error,
+    foreign_store_error,
+    is_folder_begun,
+    point_views,
+    reporting_write_errors,
+)
 from planar.document.files import to_dict
 from planar.foundation.errors import Outcome
 
 Array = np.ndarray
 
-RECORD = 32_768
+RECORD_BYTES = 32_768
 """Bytes of a block's record: a sentence for each outcome, as JSON."""
-UNREADABLE = (OSError, RuntimeError, ValueError, KeyError, TypeError)
+READ_ERRORS = (OSError, RuntimeError, ValueError, KeyError, TypeError)
 """What Zarr and its codecs raise of damaged files."""
-MISSING = -1
+MISSING_STATUS = -1
 """The status of what is not there: none that a design can have."""
 
 
-class Store(Sink):
+class ZarrStore(BlockStore):
     """See the module. A block is whole once its record, written last, and all its chunks can be read."""
 
-    def __init__(self, plan: Plan, path: Path):
+    def __init__(self, plan: SweepPlan, path: Path):
         super().__init__(plan)
         self.path, mark = path, plan.fingerprint()
-        if begun(path):
+        if is_folder_begun(path):
             try:
                 self.group = zarr.open_group(str(path), mode="r+")
                 about = dict(self.group.attrs)
-            except UNREADABLE:
+            except READ_ERRORS:
                 about = {}
             size = about.get("block")
             if about.get("fingerprint") != mark or not isinstance(size, int) or size < 1:
-                raise another(path)
+                raise foreign_store_error(path)
             self.size = size
-            self.plan = plan = plan._replace(size=self.size)
+            self.plan = plan = plan._replace(block_size=self.size)
         else:
             # written at once: a store is this sweep's from its first moment
             about = {
                 "fingerprint": mark,
-                "mechanism": to_dict(plan.whole.mechanism),
-                "points": list(plan.whole.points),
-                "block": self.size,
+                "mechanism": to_dict(plan.all_designs.mechanism),
+                "points": list(plan.all_designs.points),
+                "block": self.block_size,
                 "outcomes": [each.value for each in Outcome],
             }
-            with writing(path):
+            with reporting_write_errors(path):
                 self.group = zarr.create_group(str(path), attributes=about)
-        with writing(path), zarr.config.set({"array.write_empty_chunks": True}):  # a chunk that is not there is lost
-            self.arrays = dict(self._arrays())
-        for number in range(plan.blocks):
-            self._look_at(number)
+        with (
+            reporting_write_errors(path),
+            zarr.config.set({"array.write_empty_chunks": True}),
+        ):  # a chunk that is not there is lost
+            self.arrays = dict(self._open_arrays())
+        for number in range(plan.block_count):
+            self._verify_block(number)
 
-    def _arrays(self) -> Iterator[tuple[str, Any]]:
+    def _open_arrays(self) -> Iterator[tuple[str, Any]]:
         """All arrays by name, those made that are not there or not as they have to be."""
-        plan, rows, steps = self.plan, self.size, self.plan.whole.steps + 1
-        row = {"shape": (plan.many, steps), "chunks": (rows, steps), "dimension_names": ("design", "step")}
-        point = {"shape": (plan.many, steps, 2), "chunks": (rows, steps, 2)}
+        plan, rows, steps = self.plan, self.block_size, self.plan.all_designs.steps + 1
+        row = {"shape": (plan.design_count, steps), "chunks": (rows, steps), "dimension_names": ("design", "step")}
+        point = {"shape": (plan.design_count, steps, 2), "chunks": (rows, steps, 2)}
         point["dimension_names"] = ("design", "step", "axis")
-        for order in plan.orders:
-            for name in plan.whole.points:
-                yield self._array(f"{order}/{_plain(name)}", dtype="float64", fill_value=np.nan, **point)
-        yield self._array("status", dtype="int8", fill_value=MISSING, **row)
-        yield self._array("input", dtype="float64", fill_value=np.nan, **row)
-        records = {"shape": (plan.blocks, RECORD), "chunks": (1, RECORD)}
-        yield self._array("blocks", dtype="uint8", fill_value=0, **records)
-        for name, values in plan.whole.designs.items():
+        for order in plan.quantities:
+            for name in plan.all_designs.points:
+                yield self._open_array(f"{order}/{_path_name(name)}", dtype="float64", fill_value=np.nan, **point)
+        yield self._open_array("status", dtype="int8", fill_value=MISSING_STATUS, **row)
+        yield self._open_array("input", dtype="float64", fill_value=np.nan, **row)
+        records = {"shape": (plan.block_count, RECORD_BYTES), "chunks": (1, RECORD_BYTES)}
+        yield self._open_array("blocks", dtype="uint8", fill_value=0, **records)
+        for name, values in plan.all_designs.designs.items():
             of_designs = {"shape": values.shape, "chunks": values.shape, "dimension_names": ("design",)}
-            key, array = self._array(
-                f"designs/{_plain(name)}", dtype=str(values.dtype), fill_value=values.dtype.type(0), **of_designs
+            key, array = self._open_array(
+                f"designs/{_path_name(name)}", dtype=str(values.dtype), fill_value=values.dtype.type(0), **of_designs
             )
-            if not self._holds(array, values):
+            if not self._has_values(array, values):
                 array[:] = values
             yield key, array
 
     @staticmethod
-    def _holds(array: Any, values: Array) -> bool:
+    def _has_values(array: Any, values: Array) -> bool:
         try:
             return np.array_equal(array[:], values)
-        except UNREADABLE:
+        except READ_ERRORS:
             return False
 
-    def _array(self, name: str, **wanted: Any) -> tuple[str, Any]:
+    def _open_array(self, name: str, **wanted: Any) -> tuple[str, Any]:
         wanted["compressors"] = (ZstdCodec(), Crc32cCodec())
         try:
             there = self.group[name]
             as_wanted = zarr.create_array(zarr.storage.MemoryStore(), **wanted).metadata
-            if isinstance(there, zarr.Array) and _same(there.metadata, as_wanted):
+            if isinstance(there, zarr.Array) and _is_same_metadata(there.metadata, as_wanted):
                 return name, there
-        except UNREADABLE:
+        except READ_ERRORS:
             pass
         return name, self.group.create_array(name, overwrite=True, **wanted)
 
-    def _look_at(self, number: int) -> None:
+    def _verify_block(self, number: int) -> None:
         """Take a block as finished that is whole."""
-        record = self._record(number)
-        if record is not None and all(self.sound(name, number) for name in self.arrays if _of_blocks(name)):
+        record = self._read_record(number)
+        if record is not None and all(
+            self.is_readable(name, number) for name in self.arrays if _is_written_by_block(name)
+        ):
             self.finished.add(number)
-            self.told[number] = record
+            self.block_notes[number] = record
 
-    def _record(self, number: int) -> tuple[int, int, Any] | None:
+    def _read_record(self, number: int) -> tuple[int, int, Any] | None:
         try:
             text = bytes(self.arrays["blocks"][number]).rstrip(b"\0")
             general, sent, said = json.loads(text) if text else (None, None, None)
-        except UNREADABLE:
+        except READ_ERRORS:
             return None
         return None if general is None else (int(general), int(sent), [tuple(each) for each in said])
 
-    def there(self, name: str, number: int) -> bool:
+    def has_chunk(self, name: str, number: int) -> bool:
         """Whether a block's chunk of an array is there."""
         return self.path.joinpath(name, "c", str(number), *("0",) * (self.arrays[name].ndim - 1)).is_file()
 
-    def sound(self, name: str, number: int) -> bool:
+    def is_readable(self, name: str, number: int) -> bool:
         """Whether it is there and has its checksum."""
         try:
-            self.arrays[name][self.part(number)]
-        except UNREADABLE:
+            self.arrays[name][self.block_slice(number)]
+        except READ_ERRORS:
             return False
-        return self.there(name, number)
+        return self.has_chunk(name, number)
 
-    def part(self, number: int) -> slice:
+    def block_slice(self, number: int) -> slice:
         """The designs of a block."""
-        return slice(number * self.size, min((number + 1) * self.size, self.plan.many))
+        return slice(number * self.block_size, min((number + 1) * self.block_size, self.plan.design_count))
 
-    def take(self, number: int, part: slice, done: Done) -> None:
-        with writing(self.path):
-            for order, points in views(done.out, self.plan).items():
+    def write_block(self, number: int, part: slice, done: SolvedDesigns) -> None:
+        with reporting_write_errors(self.path):
+            for order, points in point_views(done.out, self.plan).items():
                 for name, values in points.items():
-                    self.arrays[f"{order}/{_plain(name)}"][part] = np.ascontiguousarray(values)
+                    self.arrays[f"{order}/{_path_name(name)}"][part] = np.ascontiguousarray(values)
             self.arrays["status"][part] = done.status
             self.arrays["input"][part] = np.broadcast_to(done.input, done.status.shape)
-            record = json.dumps([done.general, done.sent, _short(done.said)], ensure_ascii=False).encode()
-            self.arrays["blocks"][number] = np.frombuffer(record.ljust(RECORD, b"\0"), dtype=np.uint8)
-        self.told[number] = done.general, done.sent, done.said
+            record = json.dumps(
+                [done.general_positions, done.general_designs, _shorten_sentences(done.endings)], ensure_ascii=False
+            ).encode()
+            self.arrays["blocks"][number] = np.frombuffer(record.ljust(RECORD_BYTES, b"\0"), dtype=np.uint8)
+        self.block_notes[number] = done.general_positions, done.general_designs, done.endings
 
     def result(self) -> Sweep:
         found = {
-            order: {name: Stored(self, f"{order}/{_plain(name)}") for name in self.plan.whole.points}
-            for order in self.plan.orders
+            order: {name: StoredArray(self, f"{order}/{_path_name(name)}") for name in self.plan.all_designs.points}
+            for order in self.plan.quantities
         }
-        return self.sweep(found, Stored(self, "status"), self._input())
+        return self.make_sweep(found, StoredArray(self, "status"), self._input_positions())
 
-    def _input(self) -> Any:
+    def _input_positions(self) -> Any:
         """Positions of the input, as one row where all designs have the same; looked at block by block."""
-        stored = Stored(self, "input")
+        stored = StoredArray(self, "input")
         first = stored[0]
-        for number in range(self.plan.blocks):
-            own = stored[self.part(number)]
+        for number in range(self.plan.block_count):
+            own = stored[self.block_slice(number)]
             if not np.array_equal(np.broadcast_to(first, own.shape), own, equal_nan=True):
                 return stored
         return first
 
 
-class Stored:
+class StoredArray:
     """One of a store's arrays, read when it is indexed; what is missing or damaged there raises BadInput."""
 
-    def __init__(self, store: Store, name: str):
+    def __init__(self, store: ZarrStore, name: str):
         self._store, self._name, self._array = store, name, store.arrays[name]
 
     def __getitem__(self, key: Any) -> Any:
         try:
             found = self._array[key]
-        except UNREADABLE:
-            self._check(self._store.sound)
+        except READ_ERRORS:
+            self._check_blocks(self._store.is_readable)
             raise
         # a chunk that is not there is read as what fills the array
-        if np.any(np.isnan(found) if self._array.dtype.kind == "f" else found == MISSING):
-            self._check(self._store.there)
+        if np.any(np.isnan(found) if self._array.dtype.kind == "f" else found == MISSING_STATUS):
+            self._check_blocks(self._store.has_chunk)
         return found
 
-    def _check(self, right: Callable[[str, int], bool]) -> None:
+    def _check_blocks(self, right: Callable[[str, int], bool]) -> None:
         """Raises BadInput for the first block that is not right."""
         store = self._store
-        for number in range(store.plan.blocks):
+        for number in range(store.plan.block_count):
             if not right(self._name, number):
-                raise damaged(store.path, number, store.part(number)) from None
+                raise damaged_block_error(store.path, number, store.block_slice(number)) from None
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):  # none of the array's own, nor of this one before it is made
@@ -201,22 +216,22 @@ class Stored:
         return repr(self._array)
 
 
-def _of_blocks(name: str) -> bool:
+def _is_written_by_block(name: str) -> bool:
     """Whether an array is written block by block."""
     return name != "blocks" and not name.startswith("designs/")
 
 
-def _same(one: Any, other: Any) -> bool:
+def _is_same_metadata(one: Any, other: Any) -> bool:
     """Whether two arrays' metadata say the same; as text, since NaN equals nothing."""
     return repr(one.to_dict()) == repr(other.to_dict())
 
 
-def _short(said: Any) -> list[Any]:
+def _shorten_sentences(said: Any) -> list[Any]:
     """What is said of a block, sentences shortened so that all fit into its record."""
-    longest = (RECORD - 512) // (4 * max(1, len(said)))  # a character has four bytes at most
+    longest = (RECORD_BYTES - 512) // (4 * max(1, len(said)))  # a character has four bytes at most
     return [[code, count, sentence[:longest]] for code, count, sentence in said]
 
 
-def _plain(name: str) -> str:
+def _path_name(name: str) -> str:
     """A name that a path can have."""
     return quote(name, safe=" ")

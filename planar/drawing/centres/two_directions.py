@@ -9,43 +9,43 @@ import numpy as np
 
 from planar.drawing.paper import scales
 from planar.drawing.paper.boxes import Box
-from planar.drawing.paper.lines_on_paper import NOTHING, Ray
+from planar.drawing.paper.lines_on_paper import PARALLEL_TOLERANCE, PaperLine
 from planar.drawing.paper.picture import (
     Arrow,
     Circle,
     Fill,
-    Letter,
-    Line,
+    Label,
     Mark,
     Pen,
     Picture,
+    Polyline,
     extent,
-    spot,
+    paper_point,
 )
 from planar.drawing.paper.scales import Scale
-from planar.drawing.scheme.scheme import scheme, space_scale, standing
+from planar.drawing.scheme.scheme import plain_frames, scheme, space_scale
 from planar.foundation.errors import BadInput
-from planar.foundation.units import length_of_rates, own
+from planar.foundation.units import length_unit_of_rates, unit_of_kind
 from planar.model.mechanism import named_points
 from planar.results.motion import State
 from planar.results.records import PointState
 
 Array = np.ndarray
-REACH = 2.5
+WINDOW_RATIO = 2.5
 """Of the mechanism's greater extent: how far from its middle C is still drawn in its place."""
-ARROW = 30.0
+MAX_ARROW_LENGTH = 30.0
 """mm: the length of the longer velocity at the most."""
-ROOM = 170.0, 130.0
+DRAWING_SIZE = 170.0, 130.0
 """mm that the mechanism and C take at the most."""
-RING, EDGE, OVER = 0.9, 10.0, 3.0
+CENTRE_RADIUS, SHEET_MARGIN, LINE_OVERHANG = 0.9, 10.0, 3.0
 """mm: the mark of C; from all else to the end of lines that lead to it outside; how far lines go on beyond spots."""
 
 
-class Found(NamedTuple):
+class ConstructedCentre(NamedTuple):
     """The centre (m), how it was found, and whether the line through the arrows' heads served; None at infinity."""
 
-    at: Array | None
-    how: str
+    position: Array | None
+    method: str
     "with {C} for its letter"
     by_heads: bool = False
 
@@ -66,60 +66,62 @@ def directions_picture(
 
     Raises BadInput for a link or points that there are not, and for a link that is at rest.
     """
-    names = tuple(points) if points else _farthest(state, link)
-    one, other = (_carried(state, link, name) for name in _two(names))
-    found = meeting(one, other)
-    return _Sheet(state, names, (one, other), found, scale, speeds).picture()
+    names = tuple(points) if points else _farthest_points(state, link)
+    one, other = (_point_of_link(state, link, name) for name in _check_two_names(names))
+    found = construct_centre(one, other)
+    return _TwoDirectionsDrawing(state, names, (one, other), found, scale, speeds).picture()
 
 
-def meeting(one: PointState, other: PointState) -> Found:
+def construct_centre(one: PointState, other: PointState) -> ConstructedCentre:
     """Where the centre of the link of two points lies, from their places and velocities."""
     fastest = max(np.hypot(*one.velocity), np.hypot(*other.velocity))
     apart = other.position - one.position
     for point in (one, other):
-        if np.hypot(*point.velocity) <= NOTHING * fastest:
-            return Found(point.position, "{C} is the point that is at rest")
+        if np.hypot(*point.velocity) <= PARALLEL_TOLERANCE * fastest:
+            return ConstructedCentre(point.position, "{C} is the point that is at rest")
     (ax, ay), (bx, by) = one.velocity, other.velocity
     sine = (ax * by - ay * bx) / np.hypot(ax, ay) / np.hypot(bx, by)
     if abs(sine) > 1e-7:
         # C = A + s (-v_Ay, v_Ax), square to v_B seen from B
         s = (apart @ other.velocity) / (-ay * bx + ax * by)
-        return Found(one.position + s * np.array([-ay, ax]), "{C}: where the lines square to both velocities meet")
+        return ConstructedCentre(
+            one.position + s * np.array([-ay, ax]), "{C}: where the lines square to both velocities meet"
+        )
     way = one.velocity / np.hypot(ax, ay)
     first, second = float(way @ one.velocity), float(way @ other.velocity)
     if abs(first - second) <= 1e-7 * fastest:
-        return Found(None, "Equal velocities: {C} at infinity, square to them; the link does not turn")
-    return Found(
+        return ConstructedCentre(None, "Equal velocities: {C} at infinity, square to them; the link does not turn")
+    return ConstructedCentre(
         one.position + first / (first - second) * apart,
         "Parallel velocities: {C} on the line through both points, where the line through the arrows' heads cuts it",
         True,
     )
 
 
-def _two(names: Sequence[str]) -> Sequence[str]:
+def _check_two_names(names: Sequence[str]) -> Sequence[str]:
     if len(names) != 2 or names[0] == names[1]:
         raise BadInput("points", "the construction needs two different points of the link")
     return names
 
 
-def _carried(state: State, link: str, name: str) -> PointState:
+def _point_of_link(state: State, link: str, name: str) -> PointState:
     """A point, if the link carries it. Raises BadInput."""
-    known = _points(state, link)
+    known = _points_of_link(state, link)
     if name not in known:
         raise BadInput(name, f"{link} has no point of this name; its points are {', '.join(known) or 'none'}")
     return known[name]
 
 
-def _points(state: State, link: str) -> dict[str, PointState]:
+def _points_of_link(state: State, link: str) -> dict[str, PointState]:
     if link not in state.frames:
         raise BadInput(link, f"there is no link of this name; links are {', '.join(state.frames)}")
     named = [each for each in named_points(state.mechanism) if any(owner == link for owner, _ in each.members)]
     return {each.name: state.point(each.name) for each in named}
 
 
-def _farthest(state: State, link: str) -> tuple[str, str]:
+def _farthest_points(state: State, link: str) -> tuple[str, str]:
     """The two joints of a link that lie farthest apart, else any two points."""
-    known = _points(state, link)
+    known = _points_of_link(state, link)
     joints = [each.name for each in named_points(state.mechanism) if each.name in known and len(each.members) > 1]
     among = joints if len(joints) > 1 else list(known)
     pairs = [(a, b) for k, a in enumerate(among) for b in among[k + 1 :]]
@@ -128,7 +130,7 @@ def _farthest(state: State, link: str) -> tuple[str, str]:
     return max(pairs, key=lambda two: float(np.hypot(*(known[two[0]].position - known[two[1]].position))))
 
 
-class _Sheet:
+class _TwoDirectionsDrawing:
     """The marks of one construction."""
 
     def __init__(
@@ -136,7 +138,7 @@ class _Sheet:
         state: State,
         names: tuple[str, ...],
         points: tuple[PointState, PointState],
-        found: Found,
+        found: ConstructedCentre,
         scale: Scale | None,
         speeds: Scale | None,
     ):
@@ -145,92 +147,98 @@ class _Sheet:
         fastest = max(float(np.hypot(*point.velocity)) for point in points)
         if fastest == 0.0:
             raise BadInput(names[0], f"{names[0]} and {names[1]} are at rest: no direction is known")
-        whole = space_scale(state.mechanism, standing(state.frames), state.shapes)
+        whole = space_scale(state.mechanism, plain_frames(state.frames), state.shapes)
         low, high = (np.array(each) * whole.per_mm for each in extent(scheme(state, whole, False, False).marks))
         size, middle = float((high - low).max()), (low + high) / 2.0
-        near = found.at is not None and np.abs(found.at - middle).max() <= REACH * size / 2.0
-        both = np.array([low, high, *([found.at] if near else [])])
-        self.scale = scale or scales.fitting("length", whole.unit, *map(float, np.ptp(both, axis=0)), ROOM)
-        self.speeds = speeds or scales.fitting(
-            "velocity", own("velocity", state.mechanism.units)[0], fastest, fastest, (ARROW, ARROW)
+        near = found.position is not None and np.abs(found.position - middle).max() <= WINDOW_RATIO * size / 2.0
+        both = np.array([low, high, *([found.position] if near else [])])
+        self.scale = scale or scales.round_scale("length", whole.unit, *map(float, np.ptp(both, axis=0)), DRAWING_SIZE)
+        self.speeds = speeds or scales.round_scale(
+            "velocity",
+            unit_of_kind("velocity", state.mechanism.units)[0],
+            fastest,
+            fastest,
+            (MAX_ARROW_LENGTH, MAX_ARROW_LENGTH),
         )
-        self.plain = scheme(state, self.scale, numbers=False)
-        self.spots = [point.position / self.scale.per_mm for point in points]
-        self.heads = [at + v.velocity / self.speeds.per_mm for at, v in zip(self.spots, points, strict=True)]
-        self.at = found.at / self.scale.per_mm if near else None
-        corners = np.array([*extent(self.plain.marks), *self.heads, *([self.at] if near else [])])
-        self.window = Box(*map(float, (*(corners.min(axis=0) - EDGE), *(corners.max(axis=0) + EDGE))))
+        self.scheme_picture = scheme(state, self.scale, numbers=False)
+        self.paper_points = [point.position / self.scale.per_mm for point in points]
+        self.heads = [at + v.velocity / self.speeds.per_mm for at, v in zip(self.paper_points, points, strict=True)]
+        self.centre = found.position / self.scale.per_mm if near else None
+        corners = np.array([*extent(self.scheme_picture.marks), *self.heads, *([self.centre] if near else [])])
+        self.window = Box(*map(float, (*(corners.min(axis=0) - SHEET_MARGIN), *(corners.max(axis=0) + SHEET_MARGIN))))
 
     def picture(self) -> Picture:
         """Lines below the scheme, arrows and C above."""
-        marks: list[Mark] = [*self._lines(), *self.plain.marks]
-        for name, at, tip in zip(self.names, self.spots, self.heads, strict=True):
+        marks: list[Mark] = [*self._construction_lines(), *self.scheme_picture.marks]
+        for name, at, tip in zip(self.names, self.paper_points, self.heads, strict=True):
             if np.hypot(*(tip - at)) > 1e-6:
-                marks.append(Arrow(spot(at), spot(tip), Pen.VELOCITY, f"velocity {name}"))
+                marks.append(Arrow(paper_point(at), paper_point(tip), Pen.VELOCITY, f"velocity {name}"))
                 marks.append(
-                    Letter(
-                        f"$v_{{{name}}}$" if _simple(name) else f"v {name}",
-                        spot(tip),
+                    Label(
+                        f"$v_{{{name}}}$" if _is_simple(name) else f"v {name}",
+                        paper_point(tip),
                         f"velocity {name}",
                         9.0,
                         0.8,
-                        math=_simple(name),
+                        math=_is_simple(name),
                     )
                 )
-        if self.at is not None:
-            marks.append(Circle(spot(self.at), RING, Pen.CENTRE, "centre", Fill.PAPER))
-            marks.append(Letter(self.letter, spot(self.at), "centre", 9.0, RING + 0.7))
+        if self.centre is not None:
+            marks.append(Circle(paper_point(self.centre), CENTRE_RADIUS, Pen.CENTRE, "centre", Fill.PAPER))
+            marks.append(Label(self.letter, paper_point(self.centre), "centre", 9.0, CENTRE_RADIUS + 0.7))
         return Picture(
             tuple(marks),
             "Instantaneous centre from two directions",
             (str(self.scale), str(self.speeds), *self._notes()),
         )
 
-    def _lines(self) -> Iterator[Mark]:
+    def _construction_lines(self) -> Iterator[Mark]:
         """The normals at both points, to C or as far as the sheet goes, and the line through heads where it serves."""
-        end = self.found.at if self.found.at is None else self.found.at / self.scale.per_mm
-        for name, at, tip in zip(self.names, self.spots, self.heads, strict=True):
+        end = self.found.position if self.found.position is None else self.found.position / self.scale.per_mm
+        for name, at, tip in zip(self.names, self.paper_points, self.heads, strict=True):
             along = tip - at if np.hypot(*(tip - at)) > 1e-6 else None
             if along is None:
                 continue
             normal = np.array([-along[1], along[0]]) / np.hypot(*along)
-            yield from self._stroke(f"normal {name}", at, normal if end is None else end - at, end)
-            if self.at is not None and np.hypot(*(self.at - at)) > 8.0:
-                text = f"$r_{{{name}}}$" if _simple(name) else f"r {name}"
-                yield Letter(text, spot((at + self.at) / 2.0), f"radius {name}", 9.0, 0.8, math=_simple(name))
+            yield from self._line_to_centre(f"normal {name}", at, normal if end is None else end - at, end)
+            if self.centre is not None and np.hypot(*(self.centre - at)) > 8.0:
+                text = f"$r_{{{name}}}$" if _is_simple(name) else f"r {name}"
+                yield Label(
+                    text, paper_point((at + self.centre) / 2.0), f"radius {name}", 9.0, 0.8, math=_is_simple(name)
+                )
         if self.found.by_heads:
-            yield from self._stroke("heads", self.heads[0], end - self.heads[0], end, self.heads[1])
+            yield from self._line_to_centre("heads", self.heads[0], end - self.heads[0], end, self.heads[1])
 
-    def _stroke(
+    def _line_to_centre(
         self, about: str, start: Array, way: Array, end: Array | None, also: Array | None = None
-    ) -> Iterator[Line]:
+    ) -> Iterator[Polyline]:
         """A line from a spot to C, if it is on the sheet, else to the sheet's edge; through another spot as well."""
         length = float(np.hypot(*way))
         if length <= 1e-9:
             return
-        ray = Ray(start, way / length, about, frozenset())
-        low, high = ray.inside(self.window) or (0.0, 0.0)
-        parts = [0.0, *([ray.part(also)] if also is not None else [])]
-        parts += [np.inf] if end is None else [ray.part(end)]
-        ends = max(low, min(parts) - OVER), min(high, max(parts) + OVER)
+        ray = PaperLine(start, way / length, about, frozenset())
+        low, high = ray.clip_to(self.window) or (0.0, 0.0)
+        parts = [0.0, *([ray.coordinate_of(also)] if also is not None else [])]
+        parts += [np.inf] if end is None else [ray.coordinate_of(end)]
+        ends = max(low, min(parts) - LINE_OVERHANG), min(high, max(parts) + LINE_OVERHANG)
         if ends[0] < ends[1]:
-            yield Line(tuple(spot(ray.at(part)) for part in ends), Pen.CENTRE_LINE, about)
+            yield Polyline(tuple(paper_point(ray.point_at(part)) for part in ends), Pen.CENTRE_LINE, about)
 
     def _notes(self) -> Iterator[str]:
         """How C was found, and the angular velocity from each point."""
-        yield self.found.how.format(C=self.letter)
-        if self.found.at is None:
+        yield self.found.method.format(C=self.letter)
+        if self.found.position is None:
             return
-        length, of = length_of_rates(self.units.length)
+        length, of = length_unit_of_rates(self.units.length)
         for name, point in zip(self.names, self.points, strict=True):
-            radius, speed = (float(np.hypot(*each)) for each in (point.position - self.found.at, point.velocity))
+            radius, speed = (float(np.hypot(*each)) for each in (point.position - self.found.position, point.velocity))
             if radius > 0.0 and speed > 0.0:
                 v, r = speed * of.from_si(1.0), radius * of.from_si(1.0)
                 yield f"ω = v / r at {name}: {v:.4g} {length}/s / {r:.4g} {length} = {speed / radius:.4g} rad/s"
-        if self.at is None:
+        if self.centre is None:
             yield f"{self.letter} lies outside, where the lines lead"
 
 
-def _simple(name: str) -> bool:
+def _is_simple(name: str) -> bool:
     """Whether a name can stand as an index in a formula."""
     return name.isalnum()

@@ -8,17 +8,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.drawing.paper.picture import Letter, Line, Mark, Pen, Spot, spot
-from planar.drawing.paper.scales import DEGREES, PLAIN, prefixed, round_step
+from planar.drawing.paper.picture import Label, Mark, PaperPoint, Pen, Polyline, paper_point
+from planar.drawing.paper.scales import DECIMAL_STEPS, DEGREE_STEPS, choose_prefix, round_step
 
 Array = np.ndarray
 
-TICK, NUMBER, NAME = 1.2, 7.0, 8.0
+TICK_LENGTH, NUMBER_SIZE, NAME_SIZE = 1.2, 7.0, 8.0
 """mm that a tick is long; points of the numbers and of an axis's name."""
-ROOM = 0.6
+NUMBER_GAP = 0.6
 """mm between a tick and its number."""
 
-USUAL, BEYOND, SHOWN = 0.8, 10.0, 3.0
+USUAL_QUANTILE, OUTLIER_RATIO, SHOWN_RATIO = 0.8, 10.0, 3.0
 """So many of all values are usual; one that is so many times the greatest of these is beyond the axis, and so many are
 shown then."""
 
@@ -31,7 +31,7 @@ class Axis(NamedTuple):
     length: float
     step: float
     name: str
-    per: float = 1.0
+    unit_factor: float = 1.0
     "of what the numbers count, such as 1000 of kN"
 
     def on_paper(self, value: Array | float) -> Array | float:
@@ -46,8 +46,13 @@ class Axis(NamedTuple):
         return [self.step * k for k in range(first, last + 1)]
 
 
-def axis(
-    values: Array, length: float, name: str, apart: float = 12.0, tidy: bool = True, degrees: bool = False
+def fit_axis(
+    values: Array,
+    length: float,
+    name: str,
+    tick_distance: float = 12.0,
+    end_at_ticks: bool = True,
+    degrees: bool = False,
 ) -> Axis:
     """An axis for values with ticks at least so far apart (mm), from tick to tick where it is `tidy`."""
     told = values[np.isfinite(values)]
@@ -57,58 +62,60 @@ def axis(
     most = max(abs(low), abs(high))
     if high - low <= 1e-9 * most or most == 0.0:
         low, high = low - 0.5 * (most or 1.0), high + 0.5 * (most or 1.0)
-    step = round_step((high - low) * apart / length, DEGREES if degrees else PLAIN)
-    if tidy:
+    step = round_step((high - low) * tick_distance / length, DEGREE_STEPS if degrees else DECIMAL_STEPS)
+    if end_at_ticks:
         low, high = step * floor(low / step + 1e-9), step * ceil(high / step - 1e-9)
     return Axis(low, high, length, step, name)
 
 
-def effort_axis(values: Array, length: float, symbol: str, measure: str) -> Axis:
+def force_axis(values: Array, length: float, symbol: str, measure: str) -> Axis:
     """An upright axis of forces (N) or couples (N m), zero on it."""
-    prefix, per = prefixed(float(np.nanmax(np.abs(values), initial=0.0)))
-    return axis(np.append(values, 0.0), length, f"{symbol} ({prefix}{measure})", 9.0)._replace(per=per)
+    prefix, per = choose_prefix(float(np.nanmax(np.abs(values), initial=0.0)))
+    return fit_axis(np.append(values, 0.0), length, f"{symbol} ({prefix}{measure})", 9.0)._replace(unit_factor=per)
 
 
-def frame(across: Axis, up: Axis) -> Iterator[Mark]:
+def axes_frame(across: Axis, up: Axis) -> Iterator[Mark]:
     """Both axes at the left and below, with ticks, numbers and names, and where they cross a zero its line."""
     corners = ((0.0, 0.0), (across.length, 0.0), (across.length, up.length), (0.0, up.length))
-    yield Line(corners, Pen.AXIS, "frame", closed=True)
+    yield Polyline(corners, Pen.AXIS, "frame", closed=True)
     for each, way in ((across, (0, -1)), (up, (-1, 0))):
         for value in each.ticks:
             at = float(each.on_paper(value))
             foot = (at, 0.0) if each is across else (0.0, at)
-            end = foot[0] + TICK * way[0], foot[1] + TICK * way[1]
-            yield Line((foot, end), Pen.AXIS, f"tick {each.name}")
-            yield Letter(number(value / each.per), end, f"number {each.name}", NUMBER, ROOM, side=way)
+            end = foot[0] + TICK_LENGTH * way[0], foot[1] + TICK_LENGTH * way[1]
+            yield Polyline((foot, end), Pen.AXIS, f"tick {each.name}")
+            yield Label(
+                format_number(value / each.unit_factor), end, f"number {each.name}", NUMBER_SIZE, NUMBER_GAP, side=way
+            )
     if up.low < 0.0 < up.high:
         at = float(up.on_paper(0.0))
-        yield Line(((0.0, at), (across.length, at)), Pen.AXIS, "zero")
-    yield Letter(up.name, (0.0, up.length), f"axis {up.name}", NAME, 1.5, side=(0, 1))
-    yield Letter(across.name, (across.length, 0.0), f"axis {across.name}", NAME, 1.5, side=(1, 0))
+        yield Polyline(((0.0, at), (across.length, at)), Pen.AXIS, "zero")
+    yield Label(up.name, (0.0, up.length), f"axis {up.name}", NAME_SIZE, 1.5, side=(0, 1))
+    yield Label(across.name, (across.length, 0.0), f"axis {across.name}", NAME_SIZE, 1.5, side=(1, 0))
 
 
-def curve(x: Array, y: Array, across: Axis, up: Axis, pen: Pen, about: str) -> list[Line]:
+def curve_strokes(x: Array, y: Array, across: Axis, up: Axis, pen: Pen, about: str) -> list[Polyline]:
     """A curve, in as many pieces as gaps leave."""
     both = np.stack([across.on_paper(x), up.on_paper(y)], axis=1)
     told = np.flatnonzero(np.isfinite(both).all(axis=1))
     runs = np.split(told, np.flatnonzero(np.diff(told) > 1) + 1) if len(told) else []
-    return [Line(tuple(map(spot, both[run])), pen, about) for run in runs if len(run) > 1]
+    return [Polyline(tuple(map(paper_point, both[run])), pen, about) for run in runs if len(run) > 1]
 
 
-def at(x: float, y: float, across: Axis, up: Axis) -> Spot:
+def point_on_paper(x: float, y: float, across: Axis, up: Axis) -> PaperPoint:
     """A place between the axes."""
     return float(across.on_paper(x)), float(up.on_paper(y))
 
 
-def number(value: float, digits: int = 6) -> str:
+def format_number(value: float, digits: int = 6) -> str:
     """A number with a proper minus sign."""
     return f"{value:.{digits}g}".replace("-", "−") if value else "0"
 
 
-def within(values: Array) -> Array:
+def without_outliers(values: Array) -> Array:
     """The same, not a number where values grow beyond all the others, as beside a dead point (n,)."""
     size = np.abs(values[np.isfinite(values)])
-    usual = float(np.quantile(size, USUAL)) if len(size) else 0.0
-    if not usual or size.max() <= BEYOND * usual:
+    usual = float(np.quantile(size, USUAL_QUANTILE)) if len(size) else 0.0
+    if not usual or size.max() <= OUTLIER_RATIO * usual:
         return values
-    return np.where(np.abs(values) <= SHOWN * usual, values, np.nan)
+    return np.where(np.abs(values) <= SHOWN_RATIO * usual, values, np.nan)

@@ -8,23 +8,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planar.drawing.diagrams.captions import Ordinate, Sheet, caption, inner, raised
-from planar.drawing.diagrams.drawn_run import steady
+from planar.drawing.diagrams.captions import DiagramSheet, Ordinate, bounded_values, caption_lines, printed_unit
+from planar.drawing.diagrams.drawn_run import steady_run
 from planar.drawing.diagrams.motion_curves import (
-    Chords,
-    Curve,
-    chords,
+    ChordRates,
+    MotionCurve,
+    chord_rates,
     default_subject,
-    slide_of,
-    subject,
+    diagram_subject,
+    find_slide,
 )
-from planar.drawing.labels.fonts import FAMILY, families
-from planar.drawing.labels.text_metrics import clipped, measured, signed
-from planar.drawing.paper.pens import POINT, ready
-from planar.drawing.paper.scales import DEGREES, PLAIN, fitting, round_step
+from planar.drawing.labels.fonts import DRAWING_FAMILY, font_families
+from planar.drawing.labels.text_metrics import clip_text, format_tick, text_size
+from planar.drawing.paper.pens import MM_PER_POINT, require_matplotlib
+from planar.drawing.paper.scales import DECIMAL_STEPS, DEGREE_STEPS, round_scale, round_step
 from planar.foundation.errors import BadInput
-from planar.foundation.units import SI, coherent, length_of_rates, own, unit
-from planar.model.mechanism import Mechanism, motions
+from planar.foundation.units import SI_UNITS, coherent_unit, length_unit_of_rates, parse_unit, unit_of_kind
+from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.wording import amount
 from planar.results.motion import Motion
 
@@ -34,19 +34,19 @@ if TYPE_CHECKING:
 
 Array = np.ndarray
 
-MM = 1.0 / 25.4
+INCHES_PER_MM = 1.0 / 25.4
 """inches"""
-LEFT, RIGHT, TOP, GAP, BETWEEN = 24.0, 22.0, 22.0, 11.0, 11.0
+LEFT_MARGIN, RIGHT_MARGIN, TOP_MARGIN, DIAGRAM_GAP, AXIS_GAP = 24.0, 22.0, 22.0, 11.0, 11.0
 """mm on paper beside the diagrams, above them, between them, and from one axis below them to the next."""
-ROOM = 46.0
+MAX_CURVE_HEIGHT = 46.0
 """mm that a curve takes up and down at the most."""
-NARROWEST, WIDEST = 60.0, 1000.0
-MOST_CHORDS = 180
-SMALL, NORMAL, LARGE = 7.0, 8.0, 10.0
+MIN_WIDTH, MAX_WIDTH = 60.0, 1000.0
+MAX_CHORDS = 180
+SMALL_TEXT, NORMAL_TEXT, LARGE_TEXT = 7.0, 8.0, 10.0
 """points"""
-DASHES = ("-", (0, (5.0, 2.0)))
-INK, RULE, GRID, CHORD = "black", "0.72", "0.88", "tab:blue"
-SYMBOLS = {False: ("S", "V", "a"), True: ("φ", "ω", "ε")}
+CURVE_DASHES = ("-", (0, (5.0, 2.0)))
+CURVE_COLOUR, POSITION_GREY, GRID_GREY, CHORD_COLOUR = "black", "0.72", "0.88", "tab:blue"
+ORDINATE_SYMBOLS = {False: ("S", "V", "a"), True: ("φ", "ω", "ε")}
 """Of a slide or a point, and of a link; the chapter's α is the angle of the crank."""
 
 
@@ -54,131 +54,154 @@ def diagrams(
     motion: Motion | Mechanism, of: str | None = None, chords: int | None = None, width: float = 120.0
 ) -> Figure:
     """S-t, V-t and a-t diagrams, as `planar.plot.diagrams` has them. Raises BadInput, NoAnswer."""
-    if isinstance(width, bool) or not isinstance(width, Real) or not NARROWEST <= width <= WIDEST:
-        raise BadInput("width", f"a time axis of {NARROWEST:g} to {WIDEST:g} mm is wanted, not {width!r:.40}")
+    if isinstance(width, bool) or not isinstance(width, Real) or not MIN_WIDTH <= width <= MAX_WIDTH:
+        raise BadInput("width", f"a time axis of {MIN_WIDTH:g} to {MAX_WIDTH:g} mm is wanted, not {width!r:.40}")
     if chords is not None and (
-        isinstance(chords, bool) or not isinstance(chords, Integral) or not 2 <= chords <= MOST_CHORDS
+        isinstance(chords, bool) or not isinstance(chords, Integral) or not 2 <= chords <= MAX_CHORDS
     ):
-        raise BadInput("chords", f"a whole number of chords from 2 to {MOST_CHORDS} is wanted, not {chords!r:.40}")
+        raise BadInput("chords", f"a whole number of chords from 2 to {MAX_CHORDS} is wanted, not {chords!r:.40}")
     mechanism = motion.mechanism if isinstance(motion, Motion) else motion
     of = default_subject(mechanism) if of is None else of
-    slide = slide_of(mechanism, of)
-    if slide is not None and mechanism.frame not in motions(mechanism)[slide].links:
+    slide = find_slide(mechanism, of)
+    if slide is not None and mechanism.frame not in relative_motions(mechanism)[slide].links:
         slide = None
     count = chords or 12
-    run = steady(motion, slide, count=count)
-    return _drawn(Sheet(run, subject(run, of), mechanism.units, float(width), count, chords))
+    run = steady_run(motion, slide, count=count)
+    return _draw_figure(DiagramSheet(run, diagram_subject(run, of), mechanism.units, float(width), count, chords))
 
 
-def _drawn(sheet: Sheet) -> Figure:
-    ready()
+def _draw_figure(sheet: DiagramSheet) -> Figure:
+    require_matplotlib()
     from matplotlib.figure import Figure
 
-    from planar.drawing.labels.matplotlib_text import write
+    from planar.drawing.labels.matplotlib_text import draw_text
 
-    ordinates = [_ordinate(sheet, index) for index in range(3)]
-    lines = caption(sheet, ordinates, SMALL, LEFT + sheet.width + RIGHT - 8.0)
-    line = SMALL * POINT * 1.45
-    rulers = [_angle_axis] * (not sheet.run.in_time) + [_time_axis] * sheet.run.timed
-    below = GAP / 2.0 + len(rulers) * BETWEEN + 2.0 + line * len(lines) + 3.0
+    ordinates = [_fit_ordinate(sheet, index) for index in range(3)]
+    lines = caption_lines(sheet, ordinates, SMALL_TEXT, LEFT_MARGIN + sheet.width + RIGHT_MARGIN - 8.0)
+    line = SMALL_TEXT * MM_PER_POINT * 1.45
+    rulers = [_draw_travel_axis] * (not sheet.run.is_time_run) + [_draw_time_axis] * sheet.run.has_speed
+    below = DIAGRAM_GAP / 2.0 + len(rulers) * AXIS_GAP + 2.0 + line * len(lines) + 3.0
     heights = [each.high - each.low for each in ordinates]
-    size = (LEFT + sheet.width + RIGHT, TOP + sum(heights) + 2.0 * GAP + below)
-    made = Figure(figsize=(size[0] * MM, size[1] * MM), facecolor="white")
-    bottom = size[1] - TOP
+    size = (LEFT_MARGIN + sheet.width + RIGHT_MARGIN, TOP_MARGIN + sum(heights) + 2.0 * DIAGRAM_GAP + below)
+    made = Figure(figsize=(size[0] * INCHES_PER_MM, size[1] * INCHES_PER_MM), facecolor="white")
+    bottom = size[1] - TOP_MARGIN
     charts: list[Axes] = []
     for index, each in enumerate(ordinates):
         bottom -= heights[index]
-        box = (LEFT / size[0], bottom / size[1], sheet.width / size[0], heights[index] / size[1])
+        box = (LEFT_MARGIN / size[0], bottom / size[1], sheet.width / size[0], heights[index] / size[1])
         charts.append(made.add_axes(box, label=each.name))
-        _chart(charts[-1], sheet, each, index)
-        bottom -= GAP
-    bottom += GAP - GAP / 2.0
+        _draw_diagram(charts[-1], sheet, each, index)
+        bottom -= DIAGRAM_GAP
+    bottom += DIAGRAM_GAP - DIAGRAM_GAP / 2.0
     for ruler in rulers:
-        bottom -= BETWEEN / 2.0
-        axis = made.add_axes((LEFT / size[0], bottom / size[1], sheet.width / size[0], 0.01 / size[1]))
+        bottom -= AXIS_GAP / 2.0
+        axis = made.add_axes((LEFT_MARGIN / size[0], bottom / size[1], sheet.width / size[0], 0.01 / size[1]))
         ruler(axis, sheet)
-        bottom -= BETWEEN / 2.0
-    _head(made, sheet, charts[0], size)
+        bottom -= AXIS_GAP / 2.0
+    _draw_head(made, sheet, charts[0], size)
     for index, (text, math) in enumerate(lines):
-        at = (4.0 / size[0], (3.0 + line * (len(lines) - index) - SMALL * POINT) / size[1])
-        write(made, text, at, SMALL, math=math, gid="caption")
+        at = (4.0 / size[0], (3.0 + line * (len(lines) - index) - SMALL_TEXT * MM_PER_POINT) / size[1])
+        draw_text(made, text, at, SMALL_TEXT, math=math, gid="caption")
     return made
 
 
-def _ordinate(sheet: Sheet, index: int) -> Ordinate:
+def _fit_ordinate(sheet: DiagramSheet, index: int) -> Ordinate:
     """The scale of one diagram, round, and its ends: whole half-centimetres with some air."""
-    angle, timed = sheet.subject.angle, sheet.run.timed
+    angle, timed = sheet.subject.is_angle, sheet.run.has_speed
     kinds = ("angle", "angular velocity", "angular acceleration") if angle else ("length", "velocity", "acceleration")
     kind = kinds[index]
-    values = np.concatenate([inner(sheet.run.time, each.all[index], each) for each in sheet.subject.curves])
+    values = np.concatenate(
+        [bounded_values(sheet.run.time, each.derivatives[index], each) for each in sheet.subject.curves]
+    )
     values = values[np.isfinite(values)]
     low, high = float(values.min(initial=0.0)), float(values.max(initial=0.0))
-    of_time = timed or not sheet.run.slides or angle
-    name = own(kind, sheet.units)[0] if index == 0 or of_time else SI[kind]
-    scale = fitting(kind, name, high - low, high - low, (ROOM, ROOM))
+    of_time = timed or not sheet.run.is_sliding_input or angle
+    name = unit_of_kind(kind, sheet.units)[0] if index == 0 or of_time else SI_UNITS[kind]
+    scale = round_scale(kind, name, high - low, high - low, (MAX_CURVE_HEIGHT, MAX_CURVE_HEIGHT))
     top = 5.0 * max(ceil((scale.on_paper(high) + 2.0) / 5.0), 0) if high > 0.0 else 0.0
     foot = 5.0 * min(floor((scale.on_paper(low) - 2.0) / 5.0), 0) if low < 0.0 else 0.0
     if top - foot < 10.0:
         top, foot = max(top, 5.0), min(foot, -5.0)
-    told, of = coherent(SI[kind] if angle else name)
+    told, of = coherent_unit(SI_UNITS[kind] if angle else name)
     if not timed and index:
-        per = SI["length"] if sheet.run.slides else SI["angle"]
-        base = SI["angle"] if angle else length_of_rates(sheet.units.length)[0] if of_time else SI["length"]
+        per = SI_UNITS["length"] if sheet.run.is_sliding_input else SI_UNITS["angle"]
+        base = (
+            SI_UNITS["angle"]
+            if angle
+            else length_unit_of_rates(sheet.units.length)[0]
+            if of_time
+            else SI_UNITS["length"]
+        )
         told = f"{base}/{per}" + ("^2" if index == 2 else "")
     written = name if index == 0 else told
     title = ("displacement", "velocity", "acceleration")[index]
-    return Ordinate(title, SYMBOLS[angle][index], scale, written, told, foot, top, of.from_si(1.0))
+    return Ordinate(title, ORDINATE_SYMBOLS[angle][index], scale, written, told, foot, top, of.from_si(1.0))
 
 
-def _chart(axes: Axes, sheet: Sheet, ordinate: Ordinate, index: int) -> None:
+def _draw_diagram(axes: Axes, sheet: DiagramSheet, ordinate: Ordinate, index: int) -> None:
     """One diagram with its grid, its zero line and its curves."""
-    per_mm = unit(ordinate.scale.unit).from_si(ordinate.scale.per_mm)
+    per_mm = parse_unit(ordinate.scale.unit).from_si(ordinate.scale.per_mm)
     time = sheet.run.time
     axes.set_xlim(0.0, sheet.span)
     axes.set_ylim(ordinate.low * per_mm, ordinate.high * per_mm)
     ticks = [10.0 * k for k in range(ceil(ordinate.low / 10.0), floor(ordinate.high / 10.0) + 1)]
     axes.set_yticks(
-        [tick * per_mm for tick in ticks], [signed(tick * per_mm) for tick in ticks], family=FAMILY, fontsize=SMALL
+        [tick * per_mm for tick in ticks],
+        [format_tick(tick * per_mm) for tick in ticks],
+        family=DRAWING_FAMILY,
+        fontsize=SMALL_TEXT,
     )
-    axes.set_ylabel(f"{ordinate.symbol} ({raised(ordinate.written)})", family=FAMILY, fontsize=NORMAL, labelpad=3.0)
+    axes.set_ylabel(
+        f"{ordinate.symbol} ({printed_unit(ordinate.unit_name)})",
+        family=DRAWING_FAMILY,
+        fontsize=NORMAL_TEXT,
+        labelpad=3.0,
+    )
     every = ceil(4.5 * sheet.count / sheet.width)
     marks = np.linspace(0.0, sheet.span, sheet.count + 1)
     numbers = ["" if k % every else f"{k}" for k in range(sheet.count + 1)]
-    axes.set_xticks(marks, numbers, family=FAMILY, fontsize=SMALL)
+    axes.set_xticks(marks, numbers, family=DRAWING_FAMILY, fontsize=SMALL_TEXT)
     axes.tick_params(length=2.0, width=0.5, pad=1.5)
     for side in axes.spines.values():
         side.set_linewidth(0.5)
     for mark in marks:
-        axes.axvline(mark, color=RULE, lw=0.4, zorder=1, gid="position")
+        axes.axvline(mark, color=POSITION_GREY, lw=0.4, zorder=1, gid="position")
     for tick in ticks:
-        axes.axhline(tick * per_mm, color=GRID, lw=0.4, zorder=0.5, gid="grid")
-    axes.axhline(0.0, color=INK, lw=0.7, zorder=2, gid="zero")
-    for curve, dash in zip(sheet.subject.curves, DASHES, strict=False):
-        values = _written(curve.all[index], ordinate)
-        axes.plot(time, values, color=INK, lw=1.1, ls=dash, zorder=4, gid=f"{ordinate.symbol}{curve.name}")
+        axes.axhline(tick * per_mm, color=GRID_GREY, lw=0.4, zorder=0.5, gid="grid")
+    axes.axhline(0.0, color=CURVE_COLOUR, lw=0.7, zorder=2, gid="zero")
+    for curve, dash in zip(sheet.subject.curves, CURVE_DASHES, strict=False):
+        values = _in_written_unit(curve.derivatives[index], ordinate)
+        axes.plot(time, values, color=CURVE_COLOUR, lw=1.1, ls=dash, zorder=4, gid=f"{ordinate.symbol}{curve.name}")
         if sheet.chords is not None and index > 0:
-            found = chords(sheet.run, curve.all[index - 1], sheet.chords)
-            _stems(axes, sheet, ordinate, curve, found)
+            found = chord_rates(sheet.run, curve.derivatives[index - 1], sheet.chords)
+            _draw_chord_stems(axes, sheet, ordinate, curve, found)
 
 
-def _written(values: Array, ordinate: Ordinate) -> Array:
-    size = unit(ordinate.scale.unit)
+def _in_written_unit(values: Array, ordinate: Ordinate) -> Array:
+    size = parse_unit(ordinate.scale.unit)
     return np.asarray(values) * size.denominator / size.numerator
 
 
-def _stems(axes: Axes, sheet: Sheet, ordinate: Ordinate, curve: Curve, found: Chords) -> None:
+def _draw_chord_stems(
+    axes: Axes, sheet: DiagramSheet, ordinate: Ordinate, curve: MotionCurve, found: ChordRates
+) -> None:
     """Chords as points on thin stems at the middles of the intervals, lettered V_1, V_2 on the free side of zero."""
-    from planar.drawing.labels.matplotlib_text import write
+    from planar.drawing.labels.matplotlib_text import draw_text
 
-    rates = _written(found.rates, ordinate)
-    hollow = "white" if curve.name == "y" else CHORD
-    axes.vlines(found.times, 0.0, rates, color=CHORD, lw=0.5, zorder=3, gid="stem")
-    axes.plot(found.times, rates, ls="", marker="o", ms=3.0, mew=0.6, mec=CHORD, mfc=hollow, zorder=5, gid="chords")
+    rates = _in_written_unit(found.rates, ordinate)
+    hollow = "white" if curve.name == "y" else CHORD_COLOUR
+    axes.vlines(found.times, 0.0, rates, color=CHORD_COLOUR, lw=0.5, zorder=3, gid="stem")
+    axes.plot(
+        found.times, rates, ls="", marker="o", ms=3.0, mew=0.6, mec=CHORD_COLOUR, mfc=hollow, zorder=5, gid="chords"
+    )
     spacing = sheet.width / len(rates)
     if len(sheet.subject.curves) > 1 or spacing < 5.0:
         return
-    per_mm = unit(ordinate.scale.unit).from_si(ordinate.scale.per_mm)
-    across, up = sheet.run.time / sheet.span * sheet.width, _written(curve.all[_index(ordinate)], ordinate) / per_mm
+    per_mm = parse_unit(ordinate.scale.unit).from_si(ordinate.scale.per_mm)
+    across, up = (
+        sheet.run.time / sheet.span * sheet.width,
+        _in_written_unit(curve.derivatives[_ordinate_index(ordinate)], ordinate) / per_mm,
+    )
     for number, (time, rate) in enumerate(zip(found.times, rates, strict=True), start=1):
         near = up[np.abs(across - sheet.on_axis(time)) < 3.2]
         sides = (-1.0, 1.0) if rate >= 0.0 else (1.0, -1.0)
@@ -189,33 +212,35 @@ def _stems(axes: Axes, sheet: Sheet, ordinate: Ordinate, curve: Curve, found: Ch
                     continue
                 name = f"{ordinate.symbol}_{number}"
                 text = f"${ordinate.symbol}_{{{number}}}$"
-                _, high, below = measured(text, SMALL - 0.5, math=True)
+                _, high, below = text_size(text, SMALL_TEXT - 0.5, math=True)
                 at = (time, (0.7 + below if side > 0 else below - high - 0.7) * per_mm)
-                write(axes, text, at, SMALL - 0.5, math=True, ha="center", color=CHORD, gid=name)
+                draw_text(axes, text, at, SMALL_TEXT - 0.5, math=True, ha="center", color=CHORD_COLOUR, gid=name)
                 break
 
 
-def _index(ordinate: Ordinate) -> int:
+def _ordinate_index(ordinate: Ordinate) -> int:
     return ("displacement", "velocity", "acceleration").index(ordinate.name)
 
 
-def _angle_axis(axes: Axes, sheet: Sheet) -> None:
+def _draw_travel_axis(axes: Axes, sheet: DiagramSheet) -> None:
     """How far the input has gone, in the file's units, below the diagrams."""
-    if sheet.run.slides:
+    if sheet.run.is_sliding_input:
         written, symbol = sheet.units.length, "s₁"
     else:
         written, symbol = sheet.units.angle, "α"
-    size = unit(written)
-    last = size.from_si(float(sheet.run.turned[-1]))
-    in_degrees = not sheet.run.slides and isclose(degrees(sheet.run.turned[-1]), last)
-    _ruler(axes, sheet, last, f"{symbol} ({written})", DEGREES if in_degrees else PLAIN, "angle")
+    size = parse_unit(written)
+    last = size.from_si(float(sheet.run.input_travel[-1]))
+    in_degrees = not sheet.run.is_sliding_input and isclose(degrees(sheet.run.input_travel[-1]), last)
+    _draw_scale_axis(axes, sheet, last, f"{symbol} ({written})", DEGREE_STEPS if in_degrees else DECIMAL_STEPS, "angle")
 
 
-def _time_axis(axes: Axes, sheet: Sheet) -> None:
-    _ruler(axes, sheet, sheet.span, "t (s)", PLAIN, "time")
+def _draw_time_axis(axes: Axes, sheet: DiagramSheet) -> None:
+    _draw_scale_axis(axes, sheet, sheet.span, "t (s)", DECIMAL_STEPS, "time")
 
 
-def _ruler(axes: Axes, sheet: Sheet, last: float, label: str, firsts: tuple[float, ...], name: str) -> None:
+def _draw_scale_axis(
+    axes: Axes, sheet: DiagramSheet, last: float, label: str, first_digits: tuple[float, ...], name: str
+) -> None:
     """An axis by itself, with round ticks at least 9 mm apart, and its label at its end."""
     axes.set_label(name)
     axes.set_xlim(0.0, last)
@@ -223,9 +248,9 @@ def _ruler(axes: Axes, sheet: Sheet, last: float, label: str, firsts: tuple[floa
     for side in ("left", "right", "top"):
         axes.spines[side].set_visible(False)
     axes.spines["bottom"].set_linewidth(0.5)
-    step = round_step(last * 9.0 / sheet.width, firsts)
+    step = round_step(last * 9.0 / sheet.width, first_digits)
     ticks = [step * k for k in range(floor(last / step * (1.0 + 1e-9)) + 1)]
-    axes.set_xticks(ticks, [signed(tick) for tick in ticks], family=FAMILY, fontsize=SMALL)
+    axes.set_xticks(ticks, [format_tick(tick) for tick in ticks], family=DRAWING_FAMILY, fontsize=SMALL_TEXT)
     axes.tick_params(length=2.0, width=0.5, pad=1.5)
     ends = (1.0, 0.5)
     axes.annotate(
@@ -234,98 +259,107 @@ def _ruler(axes: Axes, sheet: Sheet, last: float, label: str, firsts: tuple[floa
         (9.0, 0.0),
         "axes fraction",
         "offset points",
-        family=FAMILY,
-        fontsize=NORMAL,
+        family=DRAWING_FAMILY,
+        fontsize=NORMAL_TEXT,
         va="center",
         ha="left",
         gid=name,
     )
 
 
-def _head(made: Figure, sheet: Sheet, chart: Axes, size: tuple[float, float]) -> None:
+def _draw_head(made: Figure, sheet: DiagramSheet, chart: Axes, size: tuple[float, float]) -> None:
     """Title, dead centres, stroke, and which curve is which."""
     mechanism = sheet.run.motion.mechanism
-    rows = ((mechanism.name, LARGE, 3.0), (f"Kinematic diagrams of {sheet.subject.words}", NORMAL, 8.5))
+    rows = ((mechanism.name, LARGE_TEXT, 3.0), (f"Kinematic diagrams of {sheet.subject.title}", NORMAL_TEXT, 8.5))
     for whole, points, down in rows:
-        text = clipped(whole, points, size[0] - 8.0)
+        text = clip_text(whole, points, size[0] - 8.0)
         made.text(
             0.5,
             1.0 - down / size[1],
             text,
-            family=list(families(text)),
+            family=list(font_families(text)),
             fontsize=points,
             ha="center",
             va="top",
             parse_math=False,
             gid="title",
         )
-    for name, at in _dead_centres(sheet):
+    for name, at in _dead_centre_positions(sheet):
         chart.annotate(
             name,
             (at / sheet.width, 1.0),
             (0.0, 3.0),
             "axes fraction",
             "offset points",
-            family=FAMILY,
-            fontsize=SMALL,
+            family=DRAWING_FAMILY,
+            fontsize=SMALL_TEXT,
             ha="center",
             va="bottom",
             gid=name,
         )
     if len(sheet.subject.curves) > 1:
-        _legend(made, sheet, size)
+        _draw_legend(made, sheet, size)
     stroke = sheet.run.stroke
     if stroke is not None and sheet.subject.slide == stroke.pair:
-        _stroke(chart, sheet, stroke.length)
+        _draw_stroke(chart, sheet, stroke.length)
 
 
-def _legend(made: Figure, sheet: Sheet, size: tuple[float, float]) -> None:
+def _draw_legend(made: Figure, sheet: DiagramSheet, size: tuple[float, float]) -> None:
     """Which curve is which, in the row above the diagrams."""
     from matplotlib.lines import Line2D
 
-    right = LEFT + sheet.width
-    row = size[1] - TOP + 3.0 * POINT + SMALL * POINT / 2.0 + 3.5
-    for index, (curve, dash) in enumerate(zip(sheet.subject.curves, DASHES, strict=False)):
+    right = LEFT_MARGIN + sheet.width
+    row = size[1] - TOP_MARGIN + 3.0 * MM_PER_POINT + SMALL_TEXT * MM_PER_POINT / 2.0 + 3.5
+    for index, (curve, dash) in enumerate(zip(sheet.subject.curves, CURVE_DASHES, strict=False)):
         start = right - 18.0 * (len(sheet.subject.curves) - index)
         spots = np.array([[start, start + 10.0], [row, row]]) / np.array([[size[0]], [size[1]]])
-        made.add_artist(Line2D(*spots, color=INK, lw=1.1, ls=dash, gid="legend"))
+        made.add_artist(Line2D(*spots, color=CURVE_COLOUR, lw=1.1, ls=dash, gid="legend"))
         made.text(
             (start + 12.0) / size[0],
             row / size[1],
             curve.name,
-            family=FAMILY,
-            fontsize=NORMAL,
+            family=DRAWING_FAMILY,
+            fontsize=NORMAL_TEXT,
             va="center",
             style="italic",
             gid="legend",
         )
 
 
-def _dead_centres(sheet: Sheet) -> list[tuple[str, float]]:
+def _dead_centre_positions(sheet: DiagramSheet) -> list[tuple[str, float]]:
     """TDC and BDC with their places along the axis (mm), kept clear of one another."""
     stroke, run = sheet.run.stroke, sheet.run
     if stroke is None or sheet.subject.slide != stroke.pair:
         return []
     found = (
-        [("TDC", 0.0), ("TDC", sheet.width)] if run.from_top else [("TDC", sheet.on_axis(run.when(stroke.top.input)))]
+        [("TDC", 0.0), ("TDC", sheet.width)]
+        if run.starts_at_top
+        else [("TDC", sheet.on_axis(run.time_at(stroke.top.input)))]
     )
-    found.append(("BDC", sheet.on_axis(run.when(stroke.bottom.input))))
+    found.append(("BDC", sheet.on_axis(run.time_at(stroke.bottom.input))))
     found.sort(key=lambda each: each[1])
     return [(name, at) for name, at in found if -1e-6 <= at <= sheet.width * (1.0 + 1e-9)]
 
 
-def _stroke(axes: Axes, sheet: Sheet, length: float) -> None:
+def _draw_stroke(axes: Axes, sheet: DiagramSheet, length: float) -> None:
     """The stroke as a measure at the right of the displacements."""
-    high = unit(sheet.units.length).from_si(length)
+    high = parse_unit(sheet.units.length).from_si(length)
     x = sheet.span * (1.0 + 4.0 / sheet.width)
-    axes.plot([sheet.span, x * 1.008], [high, high], color=INK, lw=0.4, clip_on=False, gid="stroke")
-    axes.plot([sheet.span, x * 1.008], [0.0, 0.0], color=INK, lw=0.4, clip_on=False, gid="stroke")
+    axes.plot([sheet.span, x * 1.008], [high, high], color=CURVE_COLOUR, lw=0.4, clip_on=False, gid="stroke")
+    axes.plot([sheet.span, x * 1.008], [0.0, 0.0], color=CURVE_COLOUR, lw=0.4, clip_on=False, gid="stroke")
     axes.annotate(
         "",
         (x, high),
         (x, 0.0),
         annotation_clip=False,
-        arrowprops={"arrowstyle": "<|-|>", "lw": 0.5, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 6, "fc": INK},
+        arrowprops={
+            "arrowstyle": "<|-|>",
+            "lw": 0.5,
+            "shrinkA": 0,
+            "shrinkB": 0,
+            "mutation_scale": 6,
+            "fc": CURVE_COLOUR,
+        },
     )
     axes.annotate(
         f"stroke {amount(length, 'length', sheet.units)}",
@@ -334,8 +368,8 @@ def _stroke(axes: Axes, sheet: Sheet, length: float) -> None:
         "data",
         "offset points",
         rotation=90,
-        family=FAMILY,
-        fontsize=SMALL,
+        family=DRAWING_FAMILY,
+        fontsize=SMALL_TEXT,
         va="center",
         ha="left",
         annotation_clip=False,

@@ -7,20 +7,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.drawing.diagrams.drawn_run import Run, frame_slides
-from planar.drawing.scheme.link_bodies import size as size_of
+from planar.drawing.diagrams.drawn_run import DrawnRun, frame_slides
+from planar.drawing.scheme.link_bodies import largest_span as size_of
 from planar.foundation.errors import BadInput
-from planar.model.link_graph import numbered
-from planar.model.mechanism import Mechanism, motions, named_points
-from planar.model.pairs import Kind
+from planar.model.link_graph import link_numbers
+from planar.model.mechanism import Mechanism, named_points, relative_motions
+from planar.model.pairs import MeasureKind
 
 Array = np.ndarray
 
-STILL = 1e-12
+ZERO_TOLERANCE = 1e-12
 """A displacement below this part of the mechanism's size, or a rate of it, is round-off."""
 
 
-class Curve(NamedTuple):
+class MotionCurve(NamedTuple):
     """A displacement (m or rad) with its first and second rate, each (n,) in time; `name` is x, y or ""."""
 
     name: str
@@ -29,24 +29,24 @@ class Curve(NamedTuple):
     second: Array
 
     @property
-    def all(self) -> tuple[Array, Array, Array]:
+    def derivatives(self) -> tuple[Array, Array, Array]:
         """Displacement, velocity, acceleration."""
         return self.value, self.rate, self.second
 
 
-class Subject(NamedTuple):
+class DiagramSubject(NamedTuple):
     """What is drawn: its name in a title, whether it is an angle, and its curves.
 
     `slide` is the pair whose displacement it is, if it is one.
     """
 
-    words: str
-    angle: bool
-    curves: tuple[Curve, ...]
+    title: str
+    is_angle: bool
+    curves: tuple[MotionCurve, ...]
     slide: str | None = None
 
 
-class Chords(NamedTuple):
+class ChordRates(NamedTuple):
     """Mean rates over equal intervals, each (count,), and the times of the intervals' middles."""
 
     times: Array
@@ -65,13 +65,13 @@ def default_subject(mechanism: Mechanism) -> str:
     slides = frame_slides(mechanism)
     if slides:
         return slides[0].name
-    order = {link: int(number) for link, number in numbered(mechanism).items() if link != mechanism.frame}
-    named = motions(mechanism)
+    order = {link: int(number) for link, number in link_numbers(mechanism).items() if link != mechanism.frame}
+    named = relative_motions(mechanism)
     driving = {link for given in mechanism.inputs for link in named[given.pair].links}
     pinned = {
         link
         for pair in mechanism.pairs
-        if pair.lower and pair.drive_kind is Kind.ANGLE and mechanism.frame in pair.links
+        if pair.is_lower_pair and pair.input_kind is MeasureKind.ANGLE and mechanism.frame in pair.links
         for link in pair.links
         if link != mechanism.frame
     }
@@ -81,13 +81,15 @@ def default_subject(mechanism: Mechanism) -> str:
     raise BadInput("of", "the mechanism has no moving link, so there is nothing to draw")
 
 
-def slide_of(mechanism: Mechanism, of: str) -> str | None:
+def find_slide(mechanism: Mechanism, of: str) -> str | None:
     """The slide that a name means: the pair itself, or the one on the frame that carries the point of this name."""
-    named = motions(mechanism)
-    if of in named and named[of].drive_kind is Kind.LENGTH:
+    named = relative_motions(mechanism)
+    if of in named and named[of].input_kind is MeasureKind.LENGTH:
         return of
     riders = {
-        rides[0]: pair.name for pair in mechanism.pairs if (rides := pair.rides()) and rides[1] == mechanism.frame
+        rides[0]: pair.name
+        for pair in mechanism.pairs
+        if (rides := pair.point_on_line()) and rides[1] == mechanism.frame
     }
     for point in named_points(mechanism):
         if of in (point.name, *(f"{link}.{own}" for link, own in point.members)):
@@ -95,84 +97,89 @@ def slide_of(mechanism: Mechanism, of: str) -> str | None:
     return None
 
 
-def subject(run: Run, of: str) -> Subject:
+def diagram_subject(run: DrawnRun, of: str) -> DiagramSubject:
     """The curves of a pair that slides, a point, a link, or a pair that turns. Raises BadInput for an unknown name.
 
     What is nothing but round-off is nothing in them.
     """
-    found = _subject(run, of)
+    found = _raw_subject(run, of)
     size = size_of(run.motion.shapes)
-    whole, pace = 1.0 if found.angle else size, abs(run.rate) / (size if run.slides else 1.0)
-    least = [STILL * whole * pace**order for order in range(3)]
-    cleaned = ((_still(values, none) for values, none in zip(curve.all, least, strict=True)) for curve in found.curves)
+    whole, pace = 1.0 if found.is_angle else size, abs(run.rate) / (size if run.is_sliding_input else 1.0)
+    least = [ZERO_TOLERANCE * whole * pace**order for order in range(3)]
+    cleaned = (
+        (_zero_if_still(values, none) for values, none in zip(curve.derivatives, least, strict=True))
+        for curve in found.curves
+    )
     return found._replace(
-        curves=tuple(Curve(curve.name, *values) for curve, values in zip(found.curves, cleaned, strict=True))
+        curves=tuple(MotionCurve(curve.name, *values) for curve, values in zip(found.curves, cleaned, strict=True))
     )
 
 
-def _still(values: Array, least: float) -> Array:
+def _zero_if_still(values: Array, least: float) -> Array:
     """Zero where a curve is never more than the least that counts."""
     return np.where(np.isnan(values), values, 0.0) if np.nanmax(np.abs(values), initial=0.0) <= least else values
 
 
-def _subject(run: Run, of: str) -> Subject:
-    motion, order = run.motion, run.order
-    slide = slide_of(motion.mechanism, of)
+def _raw_subject(run: DrawnRun, of: str) -> DiagramSubject:
+    motion, order = run.motion, run.time_order
+    slide = find_slide(motion.mechanism, of)
     if slide is not None:
         words = f"slide {slide}" if slide == of else f"point {of} of slide {slide}"
-        return Subject(words, False, (_slid(run, slide),), slide)
+        return DiagramSubject(words, False, (_slide_curve(run, slide),), slide)
     points = (*motion.point_names, *(f"{link.name}.{point}" for link in motion.mechanism.links for point in link.names))
     if of in points:
         found = run.point(of)
         parts = (part.T for part in (found.position - found.position[0], found.velocity, found.acceleration))
         rows = zip(*parts, strict=True)
-        return Subject(f"point {of}", False, tuple(Curve(name, *row) for name, row in zip("xy", rows, strict=True)))
+        return DiagramSubject(
+            f"point {of}", False, tuple(MotionCurve(name, *row) for name, row in zip("xy", rows, strict=True))
+        )
     if any(link.name == of for link in motion.mechanism.links):
-        return Subject(f"link {of}", True, (Curve("", *(part[order] for part in motion.link(of))),))
-    named = motions(motion.mechanism)
+        return DiagramSubject(f"link {of}", True, (MotionCurve("", *(part[order] for part in motion.link(of))),))
+    named = relative_motions(motion.mechanism)
     if of in named:
-        return Subject(f"pair {of}", True, (Curve("", *_reported(run, of)),))
-    raise BadInput(of, f"there is no pair, point or link of this name; {known(motion.mechanism)}")
+        return DiagramSubject(f"pair {of}", True, (MotionCurve("", *_pair_rates(run, of)),))
+    raise BadInput(of, f"there is no pair, point or link of this name; {available_names(motion.mechanism)}")
 
 
-def known(mechanism: Mechanism) -> str:
+def available_names(mechanism: Mechanism) -> str:
     """What could be drawn, for those who named something else."""
     links = [link.name for link in mechanism.links if link.name != mechanism.frame]
-    slides = [name for name, pair in motions(mechanism).items() if pair.drive_kind is Kind.LENGTH]
+    slides = [name for name, pair in relative_motions(mechanism).items() if pair.input_kind is MeasureKind.LENGTH]
     points = [each.name for each in named_points(mechanism)]
     told = [("slides", slides), ("points", points), ("links", links)]
     return "; ".join(f"{what} are {', '.join(names)}" for what, names in told if names)
 
 
-def _reported(run: Run, pair: str) -> Sequence[Array]:
+def _pair_rates(run: DrawnRun, pair: str) -> Sequence[Array]:
     """Position, velocity and acceleration at a pair in the order of time."""
     values = run.motion.pair(pair)
-    return [np.asarray(values[name])[run.order] for name in [*run.motion.reported(pair)][:3]]
+    return [np.asarray(values[name])[run.time_order] for name in [*run.motion.result_kinds(pair)][:3]]
 
 
-def _slid(run: Run, pair: str) -> Curve:
+def _slide_curve(run: DrawnRun, pair: str) -> MotionCurve:
     """A slide from its top dead centre, growing away from it; where it has none from the start of the run."""
-    value, rate, second = _reported(run, pair)
+    value, rate, second = _pair_rates(run, pair)
     if run.stroke is None or run.stroke.pair != pair:
-        return Curve("", value - value[0], rate, second)
+        return MotionCurve("", value - value[0], rate, second)
     top, bottom = run.stroke.top.value, run.stroke.bottom.value
     way = 1.0 if bottom > top else -1.0
-    return Curve("", way * (value - top), way * rate, way * second)
+    return MotionCurve("", way * (value - top), way * rate, way * second)
 
 
-def chords(run: Run, values: Array, count: int) -> Chords:
+def chord_rates(run: DrawnRun, values: Array, count: int) -> ChordRates:
     """Graphical differentiation: chord slopes over `count` equal intervals, each to be drawn at the interval's middle.
 
     Machine Elements, 1.3.6 (iii): the motion is taken as steady over each interval.
     """
     time = run.time
-    rows = run.places(count)
+    rows = run.equal_divisions(count)
     marks = np.linspace(0.0, time[-1], count + 1)
     at = np.interp(marks, time, values) if rows is None else values[rows]
-    return Chords((marks[1:] + marks[:-1]) / 2.0, np.diff(at) / np.diff(marks))
+    return ChordRates((marks[1:] + marks[:-1]) / 2.0, np.diff(at) / np.diff(marks))
 
 
-def peak(time: Array, values: Array) -> Peak | None:
+def find_peak(time: Array, values: Array) -> Peak | None:
     """The greatest magnitude, between samples by the parabola through the greatest and its neighbours."""
     if not np.isfinite(values).any():
         return None

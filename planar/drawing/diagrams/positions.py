@@ -9,38 +9,38 @@ from numbers import Integral
 
 import numpy as np
 
-from planar.drawing.diagrams.drawn_run import Run, closing, steady
-from planar.drawing.labels.text_line import LETTER
-from planar.drawing.paper.picture import Circle, Fill, Letter, Line, Mark, Pen, Picture, spot
-from planar.drawing.paper.scales import HEIGHT, WIDTH, Scale, fitting
-from planar.drawing.scheme.link_bodies import bodies
+from planar.drawing.diagrams.drawn_run import DrawnRun, closed_run, steady_run
+from planar.drawing.labels.text_line import LETTER_PATTERN
+from planar.drawing.paper.picture import Circle, Fill, Label, Mark, Pen, Picture, Polyline, paper_point
+from planar.drawing.paper.scales import DRAWING_HEIGHT, DRAWING_WIDTH, Scale, round_scale
+from planar.drawing.scheme.link_bodies import link_bodies
 from planar.drawing.scheme.scheme import body_marks, ground_marks, scheme
 from planar.foundation.errors import BadInput
-from planar.model.mechanism import Drive, Mechanism, NamedPoint, motions, named_points, with_inputs
-from planar.model.pairs import Kind
+from planar.model.mechanism import Drive, Mechanism, NamedPoint, named_points, relative_motions, replace_inputs
+from planar.model.pairs import MeasureKind
 from planar.model.wording import amount
 from planar.results.motion import Motion
 from planar.solving.position import solve
 
 Array = np.ndarray
 
-SMOOTH = 360
+MIN_PATH_STEPS = 360
 """Steps, at least, of a path that is drawn as a curve."""
-MOST = 72
+MAX_POSITIONS = 72
 """Positions of one drawing."""
-ROOM = 80
+MAX_LABELS = 80
 """Letters of one drawing: of further points only the first position is lettered."""
-SAME = 0.05
+SAME_POINT_TOLERANCE = 0.05
 """mm: spots nearer than this are one."""
-DOT, MARK = 0.45, 0.55
+JOINT_RADIUS, PATH_MARK_RADIUS = 0.45, 0.55
 """mm: radii of a joint in one of many positions, and of a position on a path."""
-BESIDE = 6.0
+PATH_NAME_CLEARANCE = 6.0
 """mm from another letter's spot within which no path is named."""
-SHEET = 200.0, 150.0
+SHEET_SIZE = 200.0, 150.0
 """mm that the position diagram takes at the most; it holds more letters than other drawings."""
-CENTRE = 9.0
+DEAD_CENTRE_LINE = 9.0
 """mm from a guide to where its dead centre is named."""
-LOWERED = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
+SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
 
 def positions(
@@ -55,30 +55,33 @@ def positions(
     one (Machine Elements, 1.3.6 (ii)). Moving joints and tracer points, or those that `points` names, are lettered
     A_0, A_1 and so on, with their paths. Raises BadInput for a name that is not there, NoAnswer without a motion.
     """
-    if isinstance(count, bool) or not isinstance(count, Integral) or not 1 <= count <= MOST:
-        raise BadInput("count", f"a whole number of positions from 1 to {MOST} is wanted, not {count!r:.40}")
+    if isinstance(count, bool) or not isinstance(count, Integral) or not 1 <= count <= MAX_POSITIONS:
+        raise BadInput("count", f"a whole number of positions from 1 to {MAX_POSITIONS} is wanted, not {count!r:.40}")
     count = int(count)
-    run = steady(motion, steps=SMOOTH, count=count)
+    run = steady_run(motion, steps=MIN_PATH_STEPS, count=count)
     mechanism, shapes = run.motion.mechanism, run.motion.shapes
-    chosen = chosen_points(run, points) if points is not None else _moving(run)
-    scale = scale or _fitting(run, SHEET)
-    rows, made, travel = _rows(run, count), bodies(mechanism, shapes), run.travel
+    chosen = resolve_points(run, points) if points is not None else _moving_point_names(run)
+    scale = scale or _motion_scale(run, SHEET_SIZE)
+    rows, made, travel = _division_rows(run, count), link_bodies(mechanism, shapes), run.slide_ranges
     marks: list[Mark] = [*ground_marks(mechanism, made, run.frames(rows[0]), shapes, scale, travel)]
-    last = count if not run.closes else count - 1
+    last = count if not run.is_periodic else count - 1
     for row in rows[1 : last + 1]:
         marks += body_marks(mechanism, made, run.frames(row), shapes, scale, Pen.POSITION, False)
     for name in chosen:
         at = run.point(name).position
-        marks.append(_path(run, name, scale))
-        marks += (Circle(spot(at[row] / scale.per_mm), DOT, Pen.PIN, f"position of {name}", Fill.PAPER) for row in rows)
-    centres = tuple(_dead_centres(run, scale))
-    marks += (mark for mark in centres if isinstance(mark, Line))
+        marks.append(_path_stroke(run, name, scale))
+        marks += (
+            Circle(paper_point(at[row] / scale.per_mm), JOINT_RADIUS, Pen.PIN, f"position of {name}", Fill.PAPER)
+            for row in rows
+        )
+    centres = tuple(_dead_centre_marks(run, scale))
+    marks += (mark for mark in centres if isinstance(mark, Polyline))
     marks += body_marks(mechanism, made, run.frames(rows[0]), shapes, scale)
-    marks += _letters(run, chosen, rows, scale)
-    marks += (mark for mark in centres if isinstance(mark, Letter))
+    marks += _position_labels(run, chosen, rows, scale)
+    marks += (mark for mark in centres if isinstance(mark, Label))
     notes = (
-        _start(run),
-        f"The next positions follow every {_gone(run, rows[0], rows[1])}",
+        _start_sentence(run),
+        f"The next positions follow every {_travel_text(run, rows[0], rows[1])}",
         f"Space diagram, {scale}",
     )
     return Picture(tuple(marks), f"{mechanism.name}: {count} positions", notes)
@@ -91,31 +94,36 @@ def loci(motion: Motion | Mechanism, points: Iterable[str] | None = None, scale:
     links that are not back after it, as many turns are drawn as that takes. Raises BadInput for a name that is not
     there, NoAnswer where there is no motion.
     """
-    run = closing(steady(motion, steps=SMOOTH))
+    run = closed_run(steady_run(motion, steps=MIN_PATH_STEPS))
     mechanism = run.motion.mechanism
-    chosen = chosen_points(run, points) if points is not None else coupler_points(run)
-    scale = scale or _fitting(run)
-    here, low, high = run.given.position, float(run.position.min()), float(run.position.max())
-    within = run.whole or low <= here <= high
-    state = solve(mechanism, {} if within else {run.given.pair: float(run.position[len(run.position) // 2])})
+    chosen = resolve_points(run, points) if points is not None else coupler_points(run)
+    scale = scale or _motion_scale(run)
+    here, low, high = run.input.position, float(run.position.min()), float(run.position.max())
+    within = run.makes_whole_turns or low <= here <= high
+    state = solve(mechanism, {} if within else {run.input.pair: float(run.position[len(run.position) // 2])})
     # as the file drives it: the run's own speed may be one that stands for none
-    as_given = with_inputs(mechanism, (Drive(run.given.pair, None, run.given.velocity, run.given.acceleration),))
-    drawn = scheme(replace(state, mechanism=as_given), scale, numbers=False, travel=run.travel)
-    rows = _rows(run, 12)
-    letters = [mark for mark in drawn.marks if isinstance(mark, Letter)]
+    as_given = replace_inputs(mechanism, (Drive(run.input.pair, None, run.input.velocity, run.input.acceleration),))
+    drawn = scheme(replace(state, mechanism=as_given), scale, numbers=False, travel=run.slide_ranges)
+    rows = _division_rows(run, 12)
+    letters = [mark for mark in drawn.marks if isinstance(mark, Label)]
     paths: list[Mark] = []
-    names: list[Letter] = []
+    names: list[Label] = []
     for name in chosen:
         at = run.point(name).position
-        paths.append(_path(run, name, scale))
-        paths += (Circle(spot(at[row] / scale.per_mm), MARK, Pen.PATH, f"mark of {name}", Fill.PAPER) for row in rows)
-        names.append(Letter(f"path of {name}", _free(run, at / scale.per_mm, scale, letters), f"path {name}", 8.0))
-    strokes = tuple(mark for mark in drawn.marks if not isinstance(mark, Letter))
-    notes = (f"Paths over {_gone(run, 0, -1)}, marked at 12 equal divisions", *drawn.notes)
+        paths.append(_path_stroke(run, name, scale))
+        paths += (
+            Circle(paper_point(at[row] / scale.per_mm), PATH_MARK_RADIUS, Pen.PATH, f"mark of {name}", Fill.PAPER)
+            for row in rows
+        )
+        names.append(
+            Label(f"path of {name}", _path_name_point(run, at / scale.per_mm, scale, letters), f"path {name}", 8.0)
+        )
+    strokes = tuple(mark for mark in drawn.marks if not isinstance(mark, Label))
+    notes = (f"Paths over {_travel_text(run, 0, -1)}, marked at 12 equal divisions", *drawn.notes)
     return Picture((*paths, *strokes, *letters, *names), f"{mechanism.name}: loci", notes)
 
 
-def chosen_points(run: Run, points: Iterable[str]) -> tuple[str, ...]:
+def resolve_points(run: DrawnRun, points: Iterable[str]) -> tuple[str, ...]:
     """The points asked for, under their result names. Raises BadInput."""
     asked = [points] if isinstance(points, str) else list(points)
     if not asked:
@@ -127,18 +135,18 @@ def chosen_points(run: Run, points: Iterable[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(known[str(name)] for name in asked))
 
 
-def _joints(mechanism: Mechanism) -> frozenset[tuple[str, str]]:
+def _joint_members(mechanism: Mechanism) -> frozenset[tuple[str, str]]:
     """The (link, point) in which links meet."""
-    met = {member for pair in mechanism.pairs for member in pair.coincident()}
-    return frozenset(met | {rides[0] for pair in mechanism.pairs if (rides := pair.rides()) is not None})
+    met = {member for pair in mechanism.pairs for member in pair.coincident_points()}
+    return frozenset(met | {rides[0] for pair in mechanism.pairs if (rides := pair.point_on_line()) is not None})
 
 
-def _moving(run: Run) -> tuple[str, ...]:
+def _moving_point_names(run: DrawnRun) -> tuple[str, ...]:
     """Points that move, those of the driven link first, then those that slide on the frame, tracers, other joints."""
     mechanism = run.motion.mechanism
-    driving = motions(mechanism)[run.given.pair].links
-    on_frame = {rides[0] for pair in mechanism.pairs if (rides := pair.rides()) and rides[1] == mechanism.frame}
-    joints = _joints(mechanism)
+    driving = relative_motions(mechanism)[run.input.pair].links
+    on_frame = {rides[0] for pair in mechanism.pairs if (rides := pair.point_on_line()) and rides[1] == mechanism.frame}
+    joints = _joint_members(mechanism)
 
     def rank(point: NamedPoint) -> int:
         members = set(point.members)
@@ -146,69 +154,75 @@ def _moving(run: Run) -> tuple[str, ...]:
             return 0
         return 1 if members & on_frame else 3 if members & joints else 2
 
-    return tuple(point.name for point in sorted(_movable(run), key=rank))
+    return tuple(point.name for point in sorted(_moving_points(run), key=rank))
 
 
-def _movable(run: Run) -> list[NamedPoint]:
+def _moving_points(run: DrawnRun) -> list[NamedPoint]:
     """The points that do not stand still."""
     spans = {name: np.ptp(run.motion.point(name).position, axis=0).max() for name in run.motion.point_names}
     least = 1e-9 * max(spans.values(), default=0.0)
     return [point for point in named_points(run.motion.mechanism) if spans[point.name] > least]
 
 
-def coupler_points(run: Run) -> tuple[str, ...]:
+def coupler_points(run: DrawnRun) -> tuple[str, ...]:
     """Points on no link that is pinned to the frame, tracers first; all moving ones where there is none."""
     mechanism = run.motion.mechanism
     pinned = {
         link
         for pair in mechanism.pairs
-        if pair.lower and pair.drive_kind is Kind.ANGLE and mechanism.frame in pair.links
+        if pair.is_lower_pair and pair.input_kind is MeasureKind.ANGLE and mechanism.frame in pair.links
         for link in pair.links
     }
-    moving, joints = _movable(run), _joints(mechanism)
+    moving, joints = _moving_points(run), _joint_members(mechanism)
     free = [point for point in moving if not any(link in pinned for link, _ in point.members)] or moving
     return tuple(point.name for point in sorted(free, key=lambda point: bool(set(point.members) & joints)))
 
 
-def _rows(run: Run, count: int) -> Sequence[int]:
+def _division_rows(run: DrawnRun, count: int) -> Sequence[int]:
     """The rows at equal divisions; where a run stopped early, those nearest to them."""
-    rows = run.places(count)
+    rows = run.equal_divisions(count)
     if rows is None:
         wanted = np.linspace(0.0, run.time[-1], count + 1)
         rows = np.abs(run.time[None, :] - wanted[:, None]).argmin(axis=1)
     return [int(row) for row in rows]
 
 
-def _fitting(run: Run, room: tuple[float, float] = (WIDTH, HEIGHT)) -> Scale:
+def _motion_scale(run: DrawnRun, room: tuple[float, float] = (DRAWING_WIDTH, DRAWING_HEIGHT)) -> Scale:
     """The round scale at which the whole motion fits the paper."""
     low, high = run.bounds
-    return fitting("length", run.motion.mechanism.units.length, *(float(part) for part in high - low), room)
+    return round_scale("length", run.motion.mechanism.units.length, *(float(part) for part in high - low), room)
 
 
-def _path(run: Run, name: str, scale: Scale) -> Line:
-    return Line(tuple(spot(each) for each in run.path(name) / scale.per_mm), Pen.PATH, f"path {name}")
+def _path_stroke(run: DrawnRun, name: str, scale: Scale) -> Polyline:
+    return Polyline(tuple(paper_point(each) for each in run.path(name) / scale.per_mm), Pen.PATH, f"path {name}")
 
 
-def _free(run: Run, spots: Array, scale: Scale, letters: Sequence[Letter]) -> tuple[float, float]:
+def _path_name_point(run: DrawnRun, spots: Array, scale: Scale, letters: Sequence[Label]) -> tuple[float, float]:
     """The spot of a path that is farthest from the middle of everything, if it can be not beside another letter's."""
     low, high = run.bounds
     out = np.hypot(*(spots - (low + high) / 2.0 / scale.per_mm).T)
     taken = np.array([letter.at for letter in letters]).reshape(-1, 2)
-    near = np.hypot(*(spots[:, None] - taken[None]).transpose(2, 0, 1)).min(axis=1, initial=np.inf) < BESIDE
-    return spot(spots[int(np.argmax(np.where(near, out - 1e6, out)))])
+    near = (
+        np.hypot(*(spots[:, None] - taken[None]).transpose(2, 0, 1)).min(axis=1, initial=np.inf) < PATH_NAME_CLEARANCE
+    )
+    return paper_point(spots[int(np.argmax(np.where(near, out - 1e6, out)))])
 
 
-def _letters(run: Run, chosen: Sequence[str], rows: Sequence[int], scale: Scale) -> Iterator[Letter]:
+def _position_labels(run: DrawnRun, chosen: Sequence[str], rows: Sequence[int], scale: Scale) -> Iterator[Label]:
     """A_0, A_1 and so on; where several are at one spot they stand together; fixed points by their names."""
     pinned = {
-        point.name for point in named_points(run.motion.mechanism) if set(point.members) & _joints(run.motion.mechanism)
+        point.name
+        for point in named_points(run.motion.mechanism)
+        if set(point.members) & _joint_members(run.motion.mechanism)
     }
-    left = ROOM
+    left = MAX_LABELS
     for name in chosen:
         spots = run.point(name).position[list(rows)] / scale.per_mm
         groups: list[list[int]] = []
         for index, at in enumerate(spots):
-            beside = next((group for group in groups if np.hypot(*(spots[group[0]] - at)) <= SAME), None)
+            beside = next(
+                (group for group in groups if np.hypot(*(spots[group[0]] - at)) <= SAME_POINT_TOLERANCE), None
+            )
             if beside is None:
                 groups.append([index])
             else:
@@ -218,33 +232,35 @@ def _letters(run: Run, chosen: Sequence[str], rows: Sequence[int], scale: Scale)
         for group in shown:
             strong = group[0] == 0
             away = 1.8 if strong and name in pinned else 0.9
-            text, math = _numbered(name, group)
-            yield Letter(text, spot(spots[group[0]]), f"{name} {group[0]}", 9.0 if strong else 7.0, away, math=math)
+            text, math = _numbered_name(name, group)
+            yield Label(
+                text, paper_point(spots[group[0]]), f"{name} {group[0]}", 9.0 if strong else 7.0, away, math=math
+            )
     frame = run.motion.mechanism.frame
     for point in named_points(run.motion.mechanism):
         if any(link == frame for link, _ in point.members):
             at = run.motion.point(point.name).position[0] / scale.per_mm
-            yield Letter(point.name, spot(at), f"point {point.name}", 9.0, 1.8)
+            yield Label(point.name, paper_point(at), f"point {point.name}", 9.0, 1.8)
 
 
-def _numbered(name: str, indices: Sequence[int]) -> tuple[str, bool]:
+def _numbered_name(name: str, indices: Sequence[int]) -> tuple[str, bool]:
     """A name with the numbers of its positions, and whether that is mathtext: a name of letters and digits is."""
-    if re.fullmatch(f"(?![0-9]){LETTER}+", name):
+    if re.fullmatch(f"(?![0-9]){LETTER_PATTERN}+", name):
         base = name if len(name) == 1 else f"\\mathit{{{name}}}"
         return ", ".join(f"${base}_{{{index}}}$" for index in indices), True
-    return ", ".join(f"{name}{str(index).translate(LOWERED)}" for index in indices), False
+    return ", ".join(f"{name}{str(index).translate(SUBSCRIPTS)}" for index in indices), False
 
 
-def _dead_centres(run: Run, scale: Scale) -> Iterator[Mark]:
+def _dead_centre_marks(run: DrawnRun, scale: Scale) -> Iterator[Mark]:
     """TDC and BDC named at the ends of the slide, each at a thin line across its guide."""
     if run.stroke is None:
         return
-    pair = motions(run.motion.mechanism)[run.stroke.pair]
-    rides = pair.rides()
+    pair = relative_motions(run.motion.mechanism)[run.stroke.pair]
+    rides = pair.point_on_line()
     if rides is None or rides[1] != run.motion.mechanism.frame:
         return
     at = run.motion.point(".".join(rides[0])).position / scale.per_mm
-    went = np.asarray(run.motion.pair(pair.name)[next(iter(pair.reports))])
+    went = np.asarray(run.motion.pair(pair.name)[next(iter(pair.result_kinds))])
     far = int(np.argmax(np.abs(went - went[0])))
     slope = (at[far] - at[0]) / (went[far] - went[0])
     across = np.array([-slope[1], slope[0]]) / np.hypot(*slope)
@@ -254,28 +270,32 @@ def _dead_centres(run: Run, scale: Scale) -> Iterator[Mark]:
         across = -across
     for name, end in (("TDC", run.stroke.top), ("BDC", run.stroke.bottom)):
         here = at[0] + slope * (end.value - went[0])
-        yield Line((spot(here), spot(here + CENTRE * across)), Pen.CONSTRUCTION, f"{name} of {pair.name}")
-        yield Letter(name, spot(here + CENTRE * across), f"{name} of {pair.name}", 8.0, 0.5)
+        yield Polyline(
+            (paper_point(here), paper_point(here + DEAD_CENTRE_LINE * across)),
+            Pen.CONSTRUCTION,
+            f"{name} of {pair.name}",
+        )
+        yield Label(name, paper_point(here + DEAD_CENTRE_LINE * across), f"{name} of {pair.name}", 8.0, 0.5)
 
 
-def _gone(run: Run, first: int, last: int) -> str:
+def _travel_text(run: DrawnRun, first: int, last: int) -> str:
     """What lies between two rows: a time, or how far the input goes."""
-    if run.in_time:
+    if run.is_time_run:
         return f"{run.time[last] - run.time[first]:.6g} s"
     gone = amount(
-        float(run.turned[last] - run.turned[first]),
-        "length" if run.slides else "angle",
+        float(run.input_travel[last] - run.input_travel[first]),
+        "length" if run.is_sliding_input else "angle",
         run.motion.mechanism.units,
     )
-    return f"{gone} of the input {run.given.pair}"
+    return f"{gone} of the input {run.input.pair}"
 
 
-def _start(run: Run) -> str:
+def _start_sentence(run: DrawnRun) -> str:
     """Where position 0 is."""
-    kind = "length" if run.slides else "angle"
-    at = f"the input {run.given.pair} at {amount(run.first, kind, run.motion.mechanism.units)}"
+    kind = "length" if run.is_sliding_input else "angle"
+    at = f"the input {run.input.pair} at {amount(run.start_position, kind, run.motion.mechanism.units)}"
     return (
         f"Position 0: top dead centre (TDC) of {run.stroke.pair}, {at}"
-        if run.from_top and run.stroke
+        if run.starts_at_top and run.stroke
         else f"Position 0: {at}"
     )

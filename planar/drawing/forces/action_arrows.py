@@ -9,25 +9,25 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.drawing.paper.picture import Pen
-from planar.drawing.scheme.scheme import LOWERED
-from planar.dynamics.external_actions import Acting
+from planar.drawing.scheme.scheme import SUBSCRIPTS
+from planar.dynamics.external_actions import ExternalAction
 from planar.dynamics.forces import Forces
-from planar.model.link_graph import numbered
+from planar.model.link_graph import link_numbers
 
 Array = np.ndarray
 
-NOTHING = 1e-9
+ROUND_OFF_RATIO = 1e-9
 """A force, or a couple at an arm of the mechanism's size, below this part of the greatest force is round-off."""
-SIMPLE = re.compile(r"[A-Za-z0-9,: ]+")
+SIMPLE_INDEX = re.compile(r"[A-Za-z0-9,: ]+")
 """What mathtext can show as an index."""
-PENS = {"input": Pen.LOAD, "inertia": Pen.INERTIA, "load": Pen.LOAD, "spring": Pen.LOAD, "weight": Pen.LOAD}
-MASSIVE = ("weight", "inertia")
+ACTION_PENS = {"input": Pen.LOAD, "inertia": Pen.INERTIA, "load": Pen.LOAD, "spring": Pen.LOAD, "weight": Pen.LOAD}
+MASS_ACTIONS = ("weight", "inertia")
 """What acts at a centre of mass."""
-LETTERS = {"load": ("P", "M"), "weight": ("W", "W"), "spring": ("S", "S"), "input": ("F", "T")}
+ACTION_LETTERS = {"load": ("P", "M"), "weight": ("W", "W"), "spring": ("S", "S"), "input": ("F", "T")}
 """Of the force and of the couple that each kind of action is."""
 
 
-class Sign(NamedTuple):
+class ActionSymbol(NamedTuple):
     """A letter with its index, `primes` where a link feels several that are called the same."""
 
     base: str
@@ -35,110 +35,112 @@ class Sign(NamedTuple):
     primes: int = 0
 
     @property
-    def text(self) -> tuple[str, bool]:
+    def label(self) -> tuple[str, bool]:
         """How it is written, and whether that is mathtext."""
         letters = self.base.removeprefix("-")
-        if not SIMPLE.fullmatch(self.index):
+        if not SIMPLE_INDEX.fullmatch(self.index):
             return f"{self.base}{'′' * self.primes} ({self.index})", False
         index = self.index.replace(" ", r"\ ").replace(",", "{,}").replace(":", "{:}")
         each = (f"{letter}{chr(39) * self.primes}_{{{index}}}".replace("α", r"\alpha ") for letter in letters)
         return f"${'-' if self.base != letters else ''}{''.join(each)}$", True
 
     @property
-    def plain(self) -> str:
+    def plain_text(self) -> str:
         """How it is written in a sentence: F₃₂."""
-        return f"{self.base}{'′' * self.primes}{self.index.translate(LOWERED)}"
+        return f"{self.base}{'′' * self.primes}{self.index.translate(SUBSCRIPTS)}"
 
     def __str__(self) -> str:
         return f"{self.base}{'′' * self.primes}_{self.index}"
 
 
-class Push(NamedTuple):
+class ActionArrow(NamedTuple):
     """A force (2,), N, at a place (2,), m, or a couple, N m, that a link feels; not a number where it is not told.
 
     A couple that belongs to no place in particular has none.
     """
 
-    sign: Sign
+    symbol: ActionSymbol
     pen: Pen
     at: Array | None
     force: Array | None = None
     couple: float | None = None
-    massive: bool = False
+    at_mass_centre: bool = False
     "whether its place is a centre of mass"
 
     @property
-    def told(self) -> bool:
+    def is_determined(self) -> bool:
         """Whether equilibrium tells it."""
         return bool(np.isfinite(self.force if self.force is not None else self.couple).all())
 
 
-def pushes(forces: Forces, arm: float) -> dict[str, tuple[Push, ...]]:
+def action_arrows(forces: Forces, arm: float) -> dict[str, tuple[ActionArrow, ...]]:
     """What acts on every moving link at a position, but for what is nothing; `arm` is the mechanism's size (m)."""
     mechanism = forces.mechanism
-    number = numbered(mechanism)
+    number = link_numbers(mechanism)
     of = {
-        link: [*_reactions(forces, link, number), *_actions(forces, link, number)]
+        link: [*_reaction_arrows(forces, link, number), *_load_arrows(forces, link, number)]
         for link in number
         if link != mechanism.frame
     }
-    sizes = [_size(each, arm) for felt in of.values() for each in felt if each.told]
-    least = NOTHING * max(sizes, default=0.0)
+    sizes = [_magnitude_at_arm(each, arm) for felt in of.values() for each in felt if each.is_determined]
+    least = ROUND_OFF_RATIO * max(sizes, default=0.0)
     return {
-        link: tuple(_distinct(each for each in felt if not each.told or _size(each, arm) > least))
+        link: tuple(
+            _with_primes(each for each in felt if not each.is_determined or _magnitude_at_arm(each, arm) > least)
+        )
         for link, felt in of.items()
     }
 
 
-def both(link: str, other: str) -> str:
+def link_pair_index(link: str, other: str) -> str:
     """The index of what a link feels of another, by their numbers: 32, or 12,3 where one has two digits."""
     return ("," if len(link + other) > 2 else "").join((link, other))
 
 
-def _reactions(forces: Forces, link: str, number: Mapping[str, str]) -> Iterator[Push]:
+def _reaction_arrows(forces: Forces, link: str, number: Mapping[str, str]) -> Iterator[ActionArrow]:
     for name, pair in forces.reactions.items():
         if pair.couples:
             if link in pair.couples:
-                yield Push(Sign("M", name), Pen.REACTION, None, couple=float(pair.couples[link]))
+                yield ActionArrow(ActionSymbol("M", name), Pen.REACTION, None, couple=float(pair.couples[link]))
             continue
         if link not in pair.links or pair.at is None:
             continue
         first, second = pair.links
         sense, other = (1.0, first) if link == second else (-1.0, second)
-        index = both(number[link], number[other])
-        yield Push(Sign("F", index), Pen.REACTION, pair.at, sense * np.asarray(pair.force))
-        yield Push(Sign("M", index), Pen.REACTION, pair.at, couple=sense * float(pair.couple))
+        index = link_pair_index(number[link], number[other])
+        yield ActionArrow(ActionSymbol("F", index), Pen.REACTION, pair.at, sense * np.asarray(pair.force))
+        yield ActionArrow(ActionSymbol("M", index), Pen.REACTION, pair.at, couple=sense * float(pair.couple))
 
 
-def _actions(forces: Forces, link: str, number: Mapping[str, str]) -> Iterator[Push]:
+def _load_arrows(forces: Forces, link: str, number: Mapping[str, str]) -> Iterator[ActionArrow]:
     for each in forces.acting:
         if each.link != link:
             continue
-        force, couple = _signs(each, number)
-        pen, massive = PENS[each.kind], each.kind in MASSIVE
-        yield Push(force, pen, np.asarray(each.at), np.asarray(each.force), massive=massive)
+        force, couple = _action_symbols(each, number)
+        pen, massive = ACTION_PENS[each.kind], each.kind in MASS_ACTIONS
+        yield ActionArrow(force, pen, np.asarray(each.at), np.asarray(each.force), at_mass_centre=massive)
         driven = forces.reactions.get(each.name) if each.kind == "input" else None
         at = np.asarray(each.at) if massive else driven and driven.at
-        yield Push(couple, pen, at, couple=float(each.couple))
+        yield ActionArrow(couple, pen, at, couple=float(each.couple))
 
 
-def _signs(acting: Acting, number: Mapping[str, str]) -> tuple[Sign, Sign]:
+def _action_symbols(acting: ExternalAction, number: Mapping[str, str]) -> tuple[ActionSymbol, ActionSymbol]:
     """The letters of the force and of the couple of an action."""
     own = number[acting.link]
     if acting.kind == "inertia":
-        return Sign("-ma", own), Sign("-Iα", own)
+        return ActionSymbol("-ma", own), ActionSymbol("-Iα", own)
     index = {"weight": own, "spring": acting.name.removeprefix("spring ")}.get(acting.kind, acting.name)
-    force, couple = LETTERS[acting.kind]
-    return Sign(force, index), Sign(couple, own if acting.name == acting.link else index)
+    force, couple = ACTION_LETTERS[acting.kind]
+    return ActionSymbol(force, index), ActionSymbol(couple, own if acting.name == acting.link else index)
 
 
-def _size(push: Push, arm: float) -> float:
+def _magnitude_at_arm(push: ActionArrow, arm: float) -> float:
     return float(np.hypot(*push.force)) if push.force is not None else abs(push.couple or 0.0) / arm
 
 
-def _distinct(felt: Iterable[Push]) -> Iterator[Push]:
+def _with_primes(felt: Iterable[ActionArrow]) -> Iterator[ActionArrow]:
     """The same with primes on letters that a link has had before."""
-    seen: dict[Sign, int] = {}
+    seen: dict[ActionSymbol, int] = {}
     for each in felt:
-        seen[each.sign] = seen.get(each.sign, -1) + 1
-        yield each._replace(sign=each.sign._replace(primes=seen[each.sign]))
+        seen[each.symbol] = seen.get(each.symbol, -1) + 1
+        yield each._replace(symbol=each.symbol._replace(primes=seen[each.symbol]))

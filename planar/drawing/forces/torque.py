@@ -7,91 +7,97 @@ from collections.abc import Iterator
 import numpy as np
 
 from planar.drawing.diagrams import axes
-from planar.drawing.forces.drawn_forces import Loaded, loaded
-from planar.drawing.paper.picture import Circle, Fill, Letter, Line, Mark, Pen, Picture
-from planar.drawing.paper.scales import said
-from planar.dynamics.flywheel import FLUCTUATION, Flywheel, flywheel, no_cycle
+from planar.drawing.forces.drawn_forces import ForceRun, forces_over_cycle
+from planar.drawing.paper.picture import Circle, Fill, Label, Mark, Pen, Picture, Polyline
+from planar.drawing.paper.scales import format_force
+from planar.dynamics.flywheel import DEFAULT_FLUCTUATION, Flywheel, explain_no_cycle, flywheel
 from planar.dynamics.forces import Forces
 from planar.foundation.errors import BadInput
-from planar.foundation.units import unit
+from planar.foundation.units import parse_unit
 from planar.model.mechanism import Mechanism
 from planar.results.motion import Motion
 
 Array = np.ndarray
 
-WIDTH, HEIGHT = 170.0, 85.0
+DIAGRAM_WIDTH, DIAGRAM_HEIGHT = 170.0, 85.0
 """mm between the axes."""
-SPOT = 0.5
+MARK_RADIUS = 0.5
 """mm: the radius of the mark at the greatest and the least."""
-PARTS = {"load": "loads", "weight": "weights", "spring": "springs", "inertia": "inertia"}
-NOTHING = 1e-9
+PART_NAMES = {"load": "loads", "weight": "weights", "spring": "springs", "inertia": "inertia"}
+ROUND_OFF_RATIO = 1e-9
 """A part of the greatest below this is round-off."""
 
 
 def torque_picture(
-    what: Forces | Motion | Mechanism, of: str | None = None, fluctuation: float = FLUCTUATION
+    source: Forces | Motion | Mechanism, of: str | None = None, fluctuation: float = DEFAULT_FLUCTUATION
 ) -> Picture:
     """The effort of an input (left out: of the one that runs) over a cycle.
 
     Strokes are `about` "effort", "mean", "above", "below", "greatest", "least", and "part loads" and the like where it
     has several. Raises BadInput for an input that is not there, or a fluctuation that is none.
     """
-    drawn = loaded(what)
+    drawn = forces_over_cycle(source)
     found = drawn.forces
-    name = found.moving.running if of is None else of
+    name = found.moving.running_input if of is None else of
     if name not in found.inputs:
         raise BadInput(name, f"there is no input of this name; inputs are at {', '.join(found.inputs)}")
-    effort = drawn.along(found.inputs[name])
+    effort = drawn.in_order(found.inputs[name])
     if not np.isfinite(effort).any():
         told = found.undetermined.get(name, "no forces in the pairs balance the links at any position")
         raise BadInput(name, f"what it supplies is not told: {told}")
-    effort = np.where(np.abs(effort) <= drawn.least * (1.0 if found.slides(name) else drawn.arm), 0.0, effort)
-    symbol, measure = ("F", "N") if found.slides(name) else ("T", "N·m")
-    why = no_cycle(found, name)
+    effort = np.where(
+        np.abs(effort) <= drawn.round_off * (1.0 if found.is_force_input(name) else drawn.arm), 0.0, effort
+    )
+    symbol, measure = ("F", "N") if found.is_force_input(name) else ("T", "N·m")
+    why = explain_no_cycle(found, name)
     even = None if why else flywheel(found, name, fluctuation)
     mean = even.mean if even is not None else None
-    seen = axes.within(effort)
-    parts = {label: np.where(np.isfinite(seen), part, np.nan) for label, part in _parts(drawn, name).items()}
-    across = axes.axis(drawn.over, WIDTH, drawn.name, tidy=False, degrees=drawn.unit == "deg")
-    up = axes.effort_axis(np.concatenate([seen, *parts.values()]), HEIGHT, symbol, measure)
-    strokes: list[Mark] = [] if mean is None else [*_areas(drawn.over, effort, mean, across, up)]
-    strokes += axes.frame(across, up)
+    seen = axes.without_outliers(effort)
+    parts = {label: np.where(np.isfinite(seen), part, np.nan) for label, part in _effort_parts(drawn, name).items()}
+    across = axes.fit_axis(
+        drawn.abscissa, DIAGRAM_WIDTH, drawn.axis_name, end_at_ticks=False, degrees=drawn.unit == "deg"
+    )
+    up = axes.force_axis(np.concatenate([seen, *parts.values()]), DIAGRAM_HEIGHT, symbol, measure)
+    strokes: list[Mark] = [] if mean is None else [*_mean_areas(drawn.abscissa, effort, mean, across, up)]
+    strokes += axes.axes_frame(across, up)
     for label, part in parts.items():
-        strokes += axes.curve(drawn.over, part, across, up, Pen.SHARE, f"part {label}")
+        strokes += axes.curve_strokes(drawn.abscissa, part, across, up, Pen.SHARE, f"part {label}")
         row = int(np.nanargmax(np.abs(part)))
-        strokes.append(Letter(label, axes.at(drawn.over[row], part[row], across, up), f"part {label}", 7.5, 0.8))
+        strokes.append(
+            Label(label, axes.point_on_paper(drawn.abscissa[row], part[row], across, up), f"part {label}", 7.5, 0.8)
+        )
     if mean is not None:
         level = float(up.on_paper(mean))
-        strokes.append(Line(((0.0, level), (WIDTH, level)), Pen.MEAN, "mean"))
-        text = f"${symbol}_m$ = {said(mean, measure)}"
-        strokes.append(Letter(text, (WIDTH, level), "mean", 8.0, 1.2, math=True, side=(1, 0)))
-    strokes += axes.curve(drawn.over, seen, across, up, Pen.CURVE, "effort")
+        strokes.append(Polyline(((0.0, level), (DIAGRAM_WIDTH, level)), Pen.MEAN, "mean"))
+        text = f"${symbol}_m$ = {format_force(mean, measure)}"
+        strokes.append(Label(text, (DIAGRAM_WIDTH, level), "mean", 8.0, 1.2, math=True, side=(1, 0)))
+    strokes += axes.curve_strokes(drawn.abscissa, seen, across, up, Pen.CURVE, "effort")
     notes = [*drawn.notes]
     extremes = {"greatest": int(np.nanargmax(effort)), "least": int(np.nanargmin(effort))}
-    if np.ptp(effort[[*extremes.values()]]) <= NOTHING * np.nanmax(np.abs(effort)):
+    if np.ptp(effort[[*extremes.values()]]) <= ROUND_OFF_RATIO * np.nanmax(np.abs(effort)):
         extremes = {}
         notes.append("the same at every position")
     for told, row in extremes.items():
-        text = f"{said(effort[row], measure)} {drawn.place(row)}"
+        text = f"{format_force(effort[row], measure)} {drawn.place_text(row)}"
         if np.isfinite(seen[row]):
-            at = axes.at(drawn.over[row], effort[row], across, up)
-            strokes.append(Circle(at, SPOT, Pen.CURVE, told, Fill.PAPER))
-            strokes.append(Letter(text, at, told, 8.0, 1.0))
+            at = axes.point_on_paper(drawn.abscissa[row], effort[row], across, up)
+            strokes.append(Circle(at, MARK_RADIUS, Pen.CURVE, told, Fill.PAPER))
+            strokes.append(Label(text, at, told, 8.0, 1.0))
         else:
             notes.append(f"beyond the axis: {text}")
     notes += _notes(even, why, measure, drawn)
-    what_of = "force" if found.slides(name) else "torque"
+    what_of = "force" if found.is_force_input(name) else "torque"
     return Picture(tuple(strokes), f"{found.mechanism.name}: {what_of} of the input {name}", tuple(notes))
 
 
-def _notes(even: Flywheel | None, why: str, measure: str, drawn: Loaded) -> Iterator[str]:
+def _notes(even: Flywheel | None, why: str, measure: str, drawn: ForceRun) -> Iterator[str]:
     if even is None:
         yield f"no mean and no flywheel: {why}"
         return
-    yield f"mean {said(even.mean, measure)}; fluctuation of energy ΔE = {even.energy:.4g} J"
+    yield f"mean {format_force(even.mean, measure)}; fluctuation of energy ΔE = {even.energy:.4g} J"
     if not even.energy:
         return
-    slow, fast = (np.mod(unit(drawn.unit).from_si(each), drawn.period) for each in (even.slowest, even.fastest))
+    slow, fast = (np.mod(parse_unit(drawn.unit).from_si(each), drawn.period) for each in (even.slowest, even.fastest))
     yield f"fastest at {fast:.4g} {drawn.unit}, slowest at {slow:.4g} {drawn.unit}, driven by the mean torque"
     if even.inertia is None:
         yield "no flywheel: the input has no steady speed"
@@ -102,7 +108,7 @@ def _notes(even: Flywheel | None, why: str, measure: str, drawn: Loaded) -> Iter
         )
 
 
-def _parts(drawn: Loaded, name: str) -> dict[str, Array]:
+def _effort_parts(drawn: ForceRun, name: str) -> dict[str, Array]:
     """What the input supplies against loads, weights, springs and inertia each, where it is the only one that moves.
 
     By power: at every position that of a part and that of its share are opposite.
@@ -113,15 +119,15 @@ def _parts(drawn: Loaded, name: str) -> dict[str, Array]:
         return {}
     found: dict[str, Array] = {}
     for each in drawn.forces.acting:
-        if each.kind in PARTS:
-            share = drawn.along(-each.power / rates[name])
-            found[PARTS[each.kind]] = found.get(PARTS[each.kind], 0.0) + share
+        if each.kind in PART_NAMES:
+            share = drawn.in_order(-each.power / rates[name])
+            found[PART_NAMES[each.kind]] = found.get(PART_NAMES[each.kind], 0.0) + share
     most = max((float(np.nanmax(np.abs(part))) for part in found.values()), default=0.0)
-    seen = {label: part for label, part in found.items() if np.nanmax(np.abs(part)) > NOTHING * most}
+    seen = {label: part for label, part in found.items() if np.nanmax(np.abs(part)) > ROUND_OFF_RATIO * most}
     return seen if len(seen) > 1 else {}
 
 
-def _areas(x: Array, y: Array, mean: float, across: axes.Axis, up: axes.Axis) -> Iterator[Line]:
+def _mean_areas(x: Array, y: Array, mean: float, across: axes.Axis, up: axes.Axis) -> Iterator[Polyline]:
     """What of a curve is above its mean, and what is below, between the places where it crosses it."""
     off = y - mean
     over = off >= 0.0
@@ -133,4 +139,4 @@ def _areas(x: Array, y: Array, mean: float, across: axes.Axis, up: axes.Axis) ->
         side = "above" if over[piece[0]] else "below"
         spots = [(first, mean), *zip(x[piece], y[piece], strict=True), (last, mean)]
         fill = Fill.ABOVE if side == "above" else Fill.BELOW
-        yield Line(tuple(axes.at(*each, across, up) for each in spots), Pen.HATCH, side, True, fill)
+        yield Polyline(tuple(axes.point_on_paper(*each, across, up) for each in spots), Pen.HATCH, side, True, fill)

@@ -11,24 +11,24 @@ from logging import ERROR, getLogger
 from typing import TYPE_CHECKING
 from unicodedata import category
 
-from planar.drawing.paper.pens import ready
+from planar.drawing.paper.pens import require_matplotlib
 from planar.foundation.errors import MissingGlyphs
 
 if TYPE_CHECKING:
     from matplotlib.font_manager import FontProperties
     from matplotlib.ft2font import FT2Font
 
-FAMILY = "DejaVu Sans"
+DRAWING_FAMILY = "DejaVu Sans"
 """The font that comes along with matplotlib, so that a drawing is the same everywhere."""
-BOOK = "STIXGeneral"
+BOOK_FAMILY = "STIXGeneral"
 """The book face that comes along with matplotlib, for printed pages."""
-UNKNOWN = "\N{REPLACEMENT CHARACTER}"
+UNKNOWN_CHARACTER = "\N{REPLACEMENT CHARACTER}"
 """Shown for a character that no font has."""
 LAYOUT = ("GSUB", "GPOS", "GDEF", "BASE", "MATH", "kern")
 """Tables of a font that tell how its letters stand together."""
 LAST_RESORT = "Last Resort"
 """A font that has boxes for everything."""
-JAPANESE = (
+JAPANESE_FONTS = (
     "Noto Sans CJK JP",
     "Noto Sans JP",
     "Source Han Sans JP",
@@ -38,7 +38,7 @@ JAPANESE = (
     "MS Gothic",
     "IPAGothic",
 )
-KOREAN = (
+KOREAN_FONTS = (
     "Noto Sans CJK KR",
     "Noto Sans KR",
     "Source Han Sans KR",
@@ -46,7 +46,7 @@ KOREAN = (
     "Malgun Gothic",
     "NanumGothic",
 )
-CHINESE = (
+CHINESE_FONTS = (
     "Noto Sans CJK SC",
     "Noto Sans SC",
     "Source Han Sans SC",
@@ -60,60 +60,67 @@ CHINESE = (
     "PingFang TC",
     "Microsoft JhengHei",
 )
-WIDE = ("Noto Sans", "Arial Unicode MS", "Segoe UI", "FreeSans")
+WIDE_COVERAGE_FONTS = ("Noto Sans", "Arial Unicode MS", "Segoe UI", "FreeSans")
 """Fonts without serifs that have letters of many scripts."""
-SCRIPTS = ((re.compile("[\u3040-\u30ff]"), JAPANESE), (re.compile("[\u1100-\u11ff\uac00-\ud7af]"), KOREAN))
+FONTS_BY_SCRIPT = (
+    (re.compile("[\u3040-\u30ff]"), JAPANESE_FONTS),
+    (re.compile("[\u1100-\u11ff\uac00-\ud7af]"), KOREAN_FONTS),
+)
 """Letters that tell a language, and fonts that draw the characters it shares with others as it does."""
 
 
-def font(
-    points: float, slanted: bool = False, heavy: bool = False, families: tuple[str, ...] = (FAMILY,)
+def font_properties(
+    points: float, slanted: bool = False, heavy: bool = False, families: tuple[str, ...] = (DRAWING_FAMILY,)
 ) -> FontProperties:
     """The font of a size (points), the first of the families that has a character."""
-    ready()
-    return _font(points, slanted, heavy, families)
+    require_matplotlib()
+    return _cached_font_properties(points, slanted, heavy, families)
 
 
 @lru_cache(maxsize=1024)
-def _font(points: float, slanted: bool, heavy: bool, families: tuple[str, ...]) -> FontProperties:
+def _cached_font_properties(points: float, slanted: bool, heavy: bool, families: tuple[str, ...]) -> FontProperties:
     from matplotlib.font_manager import FontProperties
 
-    style = "italic" if families[0] == BOOK else "oblique"
+    style = "italic" if families[0] == BOOK_FAMILY else "oblique"
     return FontProperties(
         family=list(families), style=style if slanted else "normal", weight="bold" if heavy else "normal", size=points
     )
 
 
-def families(text: str, slanted: bool = False, heavy: bool = False, first: str = FAMILY) -> tuple[str, ...]:
+def font_families(
+    text: str, slanted: bool = False, heavy: bool = False, first: str = DRAWING_FAMILY
+) -> tuple[str, ...]:
     """The families that a text is set in: the first, with those after it that have what it lacks.
 
     A text that the drawings' family has all of, and the first has not, is set in that alone.
     """
-    lacking = _lacking(text, first, slanted, heavy)
+    lacking = _missing_characters(text, first, slanted, heavy)
     if not lacking:
         return (first,)
-    if first != FAMILY and not _lacking(text, FAMILY, slanted, heavy):
-        return (FAMILY,)
-    return (first, *_others(lacking, slanted, heavy, _installed()))
+    if first != DRAWING_FAMILY and not _missing_characters(text, DRAWING_FAMILY, slanted, heavy):
+        return (DRAWING_FAMILY,)
+    return (first, *_fallback_families(lacking, slanted, heavy, _installed_count()))
 
 
-def shown(text: str, slanted: bool = False, heavy: bool = False) -> str:
+def printable_text(text: str, slanted: bool = False, heavy: bool = False) -> str:
     """The text on one line, with U+FFFD for what cannot be shown; spaces of any kind become plain ones.
 
     Warns of characters that no installed font has (MissingGlyphs).
     """
     spaced = " ".join("".join(each for each in text if category(each) != "Cf").split())
-    plain = "".join(each if each.isprintable() else UNKNOWN for each in spaced)
-    lacking = _lacking(plain, FAMILY, slanted, heavy)
+    plain = "".join(each if each.isprintable() else UNKNOWN_CHARACTER for each in spaced)
+    lacking = _missing_characters(plain, DRAWING_FAMILY, slanted, heavy)
     if not lacking:
         return plain
-    absent = _absent(lacking, _others(lacking, slanted, heavy, _installed()), slanted, heavy)
+    absent = _characters_in_none(
+        lacking, _fallback_families(lacking, slanted, heavy, _installed_count()), slanted, heavy
+    )
     if absent:
         warnings.warn(MissingGlyphs(absent), stacklevel=2)
-    return "".join(UNKNOWN if each in absent else each for each in plain)
+    return "".join(UNKNOWN_CHARACTER if each in absent else each for each in plain)
 
 
-def covering(lacking: frozenset[str], fonts: Iterable[tuple[str, Callable[[str], bool]]]) -> list[str]:
+def select_fonts(lacking: frozenset[str], fonts: Iterable[tuple[str, Callable[[str], bool]]]) -> list[str]:
     """The fewest of the fonts (name, whether it has a character), best first, that have what any has of the characters.
 
     A font that has all of them is taken at once; else the one with the most of them, the first of those alike, and then
@@ -137,7 +144,7 @@ def covering(lacking: frozenset[str], fonts: Iterable[tuple[str, Callable[[str],
 
 
 @contextmanager
-def quiet() -> Iterator[None]:
+def quiet_font_logs() -> Iterator[None]:
     """The libraries of fonts do not tell how old or how heavy a font is."""
     logs = [(log, log.level) for log in map(getLogger, ("fontTools", "matplotlib.font_manager"))]
     for log, _ in logs:
@@ -169,20 +176,20 @@ def outlines_only() -> Iterator[None]:
         Options._drop_tables_default = kept
 
 
-def outlined(used: Iterable[str]) -> bool:
+def have_truetype_outlines(used: Iterable[str]) -> bool:
     """Whether all families have outlines of the kind that PDF files embed as they are (TrueType's, not CFF's)."""
-    for family in sorted({*used} - {FAMILY, BOOK}):
+    for family in sorted({*used} - {DRAWING_FAMILY, BOOK_FAMILY}):
         from fontTools.ttLib import TTFont
         from matplotlib.font_manager import findfont
 
-        path = findfont(font(9.0, families=(family,)))
+        path = findfont(font_properties(9.0, families=(family,)))
         with TTFont(path, fontNumber=getattr(path, "face_index", 0), lazy=True) as file:
             if "glyf" not in file:
                 return False
     return True
 
 
-def _installed() -> int:
+def _installed_count() -> int:
     """How many fonts are installed: what was found holds as long as there come no more."""
     from matplotlib.font_manager import fontManager
 
@@ -190,31 +197,31 @@ def _installed() -> int:
 
 
 @lru_cache(maxsize=4096)
-def _lacking(text: str, family: str, slanted: bool, heavy: bool) -> frozenset[str]:
+def _missing_characters(text: str, family: str, slanted: bool, heavy: bool) -> frozenset[str]:
     """The characters of a text that a family lacks."""
-    return frozenset(_absent({each for each in text if not each.isspace()}, (family,), slanted, heavy))
+    return frozenset(_characters_in_none({each for each in text if not each.isspace()}, (family,), slanted, heavy))
 
 
-def _absent(characters: Iterable[str], among: Iterable[str], slanted: bool, heavy: bool) -> set[str]:
+def _characters_in_none(characters: Iterable[str], among: Iterable[str], slanted: bool, heavy: bool) -> set[str]:
     """The characters that none of the families has."""
-    return {each for each in characters if not any(_has(family, slanted, heavy, each) for family in among)}
+    return {each for each in characters if not any(_has_character(family, slanted, heavy, each) for family in among)}
 
 
 @lru_cache(maxsize=65536)
-def _has(family: str, slanted: bool, heavy: bool, character: str) -> bool:
-    return _draws(_opened(family, slanted, heavy), character)
+def _has_character(family: str, slanted: bool, heavy: bool, character: str) -> bool:
+    return _can_draw(_open_font(family, slanted, heavy), character)
 
 
 @lru_cache(maxsize=256)
-def _opened(family: str, slanted: bool, heavy: bool) -> FT2Font:
-    ready()
+def _open_font(family: str, slanted: bool, heavy: bool) -> FT2Font:
+    require_matplotlib()
     from matplotlib.font_manager import findfont, get_font
 
-    with quiet():
-        return get_font(findfont(font(10.0, slanted, heavy, (family,))))
+    with quiet_font_logs():
+        return get_font(findfont(font_properties(10.0, slanted, heavy, (family,))))
 
 
-def _draws(made: FT2Font, character: str) -> bool:
+def _can_draw(made: FT2Font, character: str) -> bool:
     """Whether a font has a character, and outlines of it: some have pictures in colour alone."""
     code = ord(character)
     if not made.get_char_index(code):
@@ -228,27 +235,32 @@ def _draws(made: FT2Font, character: str) -> bool:
 
 
 @lru_cache(maxsize=256)
-def _others(lacking: frozenset[str], slanted: bool, heavy: bool, _installed: int) -> tuple[str, ...]:
+def _fallback_families(lacking: frozenset[str], slanted: bool, heavy: bool, _font_count: int) -> tuple[str, ...]:
     """Families that have characters which the usual one lacks; of likely ones, else of all that are installed."""
-    with quiet():
-        found = covering(lacking, _candidates(lacking, slanted, heavy))
-        if _absent(lacking, found, slanted, heavy) and _more():
-            found = covering(lacking, _candidates(lacking, slanted, heavy))
+    with quiet_font_logs():
+        found = select_fonts(lacking, _candidate_fonts(lacking, slanted, heavy))
+        if _characters_in_none(lacking, found, slanted, heavy) and _add_new_fonts():
+            found = select_fonts(lacking, _candidate_fonts(lacking, slanted, heavy))
     return tuple(found)
 
 
-def _candidates(lacking: frozenset[str], slanted: bool, heavy: bool) -> Iterator[tuple[str, Callable[[str], bool]]]:
+def _candidate_fonts(
+    lacking: frozenset[str], slanted: bool, heavy: bool
+) -> Iterator[tuple[str, Callable[[str], bool]]]:
     """Families with what tells whether they have a character: likely ones first, then all others by their names."""
     from matplotlib.font_manager import fontManager, get_font
 
     text = "".join(sorted(lacking))
-    told = [names for script, names in SCRIPTS if script.search(text)]
+    told = [names for script, names in FONTS_BY_SCRIPT if script.search(text)]
     named = {each.name for each in fontManager.ttflist}
     likely = dict.fromkeys(
-        name for names in (*told, CHINESE, JAPANESE, KOREAN, WIDE) for name in names if name in named
+        name
+        for names in (*told, CHINESE_FONTS, JAPANESE_FONTS, KOREAN_FONTS, WIDE_COVERAGE_FONTS)
+        for name in names
+        if name in named
     )
     for name in likely:
-        yield name, lambda each, name=name: _has(name, slanted, heavy, each)
+        yield name, lambda each, name=name: _has_character(name, slanted, heavy, each)
     files = {each.fname: each.name for each in fontManager.ttflist if not getattr(each, "index", 0)}
     for file, name in sorted(files.items(), key=lambda each: (each[1], each[0])):
         if name in likely or name.startswith(LAST_RESORT):
@@ -257,10 +269,10 @@ def _candidates(lacking: frozenset[str], slanted: bool, heavy: bool) -> Iterator
             made = get_font(file)
         except (OSError, RuntimeError):
             continue
-        yield name, lambda each, made=made: _draws(made, each)
+        yield name, lambda each, made=made: _can_draw(made, each)
 
 
-def _more() -> bool:
+def _add_new_fonts() -> bool:
     """Add fonts that were installed since matplotlib listed them, which it does once; whether there were any."""
     from matplotlib.font_manager import findSystemFonts, fontManager
 

@@ -8,69 +8,69 @@ from collections.abc import Callable, Mapping
 from planar.analysis.rich_text import (
     Chord,
     Fraction,
+    MeasuredValue,
     Name,
     Phrase,
-    Piece,
-    Quantity,
-    Raised,
-    Spot,
+    PhrasePiece,
+    PolygonLetter,
+    Power,
     Symbol,
-    bare,
-    primed,
+    length_without_primes,
+    with_double_primes,
 )
-from planar.drawing.labels.text_line import LETTER
+from planar.drawing.labels.text_line import LETTER_PATTERN
 
 GREEK = {"ω": r"\omega", "α": r"\alpha"}
-SIMPLE = re.compile(f"{LETTER}(?:{LETTER}|[′″]){{0,23}}")
+SIMPLE_WORD = re.compile(f"{LETTER_PATTERN}(?:{LETTER_PATTERN}|[′″]){{0,23}}")
 """A name, or a word of it, that may stand in a formula; any other is set as the text that it is."""
-ITALIC = re.compile(r"([^\W\d_][0-9]{0,2}[′″]*){1,2}|([A-Z][0-9]{0,2}[′″]*){1,6}")
+ITALIC_NAME = re.compile(r"([^\W\d_][0-9]{0,2}[′″]*){1,2}|([A-Z][0-9]{0,2}[′″]*){1,6}")
 """Names of points, of links and of lines between points, which are slanted; words are upright."""
-COUNTED = re.compile(r"[0-9.()×+/ −]*")
+NUMERIC_TEXT = re.compile(r"[0-9.()×+/ −]*")
 """Numbers and what stands between them."""
 
 
-def formula(piece: Piece) -> str | None:
+def formula(piece: PhrasePiece) -> str | None:
     """A piece as mathtext, without dollars; None where it is to be set as plain text."""
     if isinstance(piece, str):
         counted = piece.replace("×", r"\times").replace("−", "-").replace(" ", r"\ ")
-        return rf"\mathrm{{{counted}}}" if COUNTED.fullmatch(piece) and piece else None
-    return _WRITTEN[type(piece)](piece)
+        return rf"\mathrm{{{counted}}}" if NUMERIC_TEXT.fullmatch(piece) and piece else None
+    return _WRITERS[type(piece)](piece)
 
 
-def _row(phrase: Phrase) -> str | None:
-    return _all([formula(piece) for piece in phrase])
+def _phrase(phrase: Phrase) -> str | None:
+    return _join_parts([formula(piece) for piece in phrase])
 
 
-def _all(parts: list[str | None]) -> str | None:
+def _join_parts(parts: list[str | None]) -> str | None:
     """The parts one after the other, if all of them are formulas."""
     return None if None in parts else "".join(filter(None, parts))
 
 
 def _name(name: Name) -> str | None:
-    return _word(primed(name.text)) if ITALIC.fullmatch(name.text) else None
+    return _word(with_double_primes(name.text)) if ITALIC_NAME.fullmatch(name.text) else None
 
 
 def _symbol(symbol: Symbol) -> str | None:
     return _indexed(GREEK.get(symbol.letter) or _word(symbol.letter), symbol.subscript, symbol.superscript)
 
 
-def _spot(spot: Spot) -> str | None:
+def _spot(spot: PolygonLetter) -> str | None:
     return _indexed(_word(spot.letter), spot.mark, "")
 
 
 def _chord(chord: Chord) -> str | None:
-    long = max(bare(chord.tail.letter), bare(chord.head.letter)) > 1
+    long = max(length_without_primes(chord.tail.letter), length_without_primes(chord.head.letter)) > 1
     between = r"\mathrm{–}" if long else r"\," if chord.tail.mark else ""
-    return _all([_spot(chord.tail), between, _spot(chord.head)])
+    return _join_parts([_spot(chord.tail), between, _spot(chord.head)])
 
 
-def _raised(raised: Raised) -> str | None:
-    inside = _row(raised.of)
-    return None if inside is None else f"{inside}^{{\\mathrm{{{raised.power}}}}}"
+def _raised(raised: Power) -> str | None:
+    inside = _phrase(raised.base)
+    return None if inside is None else f"{inside}^{{\\mathrm{{{raised.exponent}}}}}"
 
 
 def _fraction(fraction: Fraction) -> str | None:
-    over, under = _row(fraction.over), _row(fraction.under)
+    over, under = _phrase(fraction.numerator), _phrase(fraction.denominator)
     return None if over is None or under is None else rf"\dfrac{{{over}}}{{{under}}}"
 
 
@@ -82,7 +82,7 @@ def _indexed(letter: str | None, below: str, above: str) -> str | None:
         parts.append(None if None in names else f"_{{{'/'.join(filter(None, names))}}}")
     if above:
         parts.append(f"^{{{above}}}")
-    return _all(parts)
+    return _join_parts(parts)
 
 
 def _words(name: str) -> str | None:
@@ -92,21 +92,21 @@ def _words(name: str) -> str | None:
 
 
 def _word(word: str) -> str | None:
-    if not SIMPLE.fullmatch(word):
+    if not SIMPLE_WORD.fullmatch(word):
         return None
     if word.isdigit():
         return rf"\mathrm{{{word}}}"
     # a prime stands where it is, in its own size: a slanted name may be of two points
-    face = "mathit" if ITALIC.fullmatch(word) else "mathrm"
+    face = "mathit" if ITALIC_NAME.fullmatch(word) else "mathrm"
     return "".join(part if part[0] in "′″" else rf"\{face}{{{part}}}" for part in re.split("([′″]+)", word) if part)
 
 
-_WRITTEN: Mapping[type, Callable[..., str | None]] = {
+_WRITERS: Mapping[type, Callable[..., str | None]] = {
     Symbol: _symbol,
-    Spot: _spot,
+    PolygonLetter: _spot,
     Chord: _chord,
     Name: _name,
-    Raised: _raised,
+    Power: _raised,
     Fraction: _fraction,
-    Quantity: lambda quantity: None,  # noqa: ARG005
+    MeasuredValue: lambda quantity: None,  # noqa: ARG005
 }

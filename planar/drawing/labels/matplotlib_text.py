@@ -11,31 +11,33 @@ from matplotlib.path import Path
 from matplotlib.text import Text
 from matplotlib.transforms import Affine2D, Bbox, Transform
 
-from planar.drawing.labels.fonts import FAMILY, font
+from planar.drawing.labels.fonts import DRAWING_FAMILY, font_properties
 from planar.drawing.labels.text_line import TextLine, text_line
-from planar.drawing.paper.picture import Spot
+from planar.drawing.paper.picture import PaperPoint
 
-SIDES = {"left": 0.0, "center": 0.5, "right": 1.0}
+ALIGNMENT_FRACTIONS = {"left": 0.0, "center": 0.5, "right": 1.0}
 
 
-class Written(Text):
+class TextLineArtist(Text):
     """A line of text, or a formula, that is drawn piece by piece; its extent is that of its letters."""
 
     def __init__(
-        self, at: Spot, text: str, size: float, math: bool, slanted: bool, heavy: bool, family: str, **looks: Any
+        self, at: PaperPoint, text: str, size: float, math: bool, slanted: bool, heavy: bool, family: str, **looks: Any
     ):
         self.line: TextLine = text_line(text, math, slanted, heavy, family)
         chosen = self.line.pieces[0].families if self.line.pieces else (family,)
-        super().__init__(*at, text, fontproperties=font(size, slanted, heavy, chosen), va="baseline", **looks)
+        super().__init__(
+            *at, text, fontproperties=font_properties(size, slanted, heavy, chosen), va="baseline", **looks
+        )
         self.set_parse_math(math)
         if hasattr(self, "set_fontfeatures"):
             # a letter that stands in a ligature makes a font of its own in PDF files
             self.set_fontfeatures(("-liga", "-clig"))
 
-    def _start(self, pixels: float) -> Spot:
+    def _start_point(self, pixels: float) -> PaperPoint:
         """Where the line begins on its base line, in pixels; `pixels` is the size of its font."""
         x, y = self.get_transform().transform(self.get_unitless_position())
-        return float(x - SIDES[self.get_horizontalalignment()] * self.line.width * pixels), float(y)
+        return float(x - ALIGNMENT_FRACTIONS[self.get_horizontalalignment()] * self.line.width * pixels), float(y)
 
     @allow_rasterization
     def draw(self, renderer: Any) -> None:
@@ -47,12 +49,12 @@ class Written(Text):
         pen.set_alpha(self.get_alpha())
         pen.set_linewidth(0.0)
         pixels = renderer.points_to_pixels(self.get_fontsize())
-        x, y = self._start(pixels)
+        x, y = self._start_point(pixels)
         top = renderer.get_canvas_width_height()[1] if renderer.flipy() else None
         alone = self if len(self.line.pieces) == 1 and not self.line.bars else None
         for each in self.line.pieces:
             right, up = x + pixels * each.x, y + pixels * each.y
-            looks = font(self.get_fontsize() * each.size, each.slanted, each.heavy, each.families)
+            looks = font_properties(self.get_fontsize() * each.size, each.slanted, each.heavy, each.families)
             renderer.draw_text(pen, right, up if top is None else top - up, each.text, looks, 0.0, False, alone)
         for left, low, right, high in self.line.bars:
             corners = Path([(left, low), (right, low), (right, high), (left, high), (left, low)], closed=True)
@@ -67,21 +69,21 @@ class Written(Text):
         whole = figure.dpi if figure is not None else 72.0
         shift = 1.0 if dpi is None else dpi / whole
         pixels = self.get_fontsize() * whole / 72.0
-        x, y = self._start(pixels)
-        box = (x, y - pixels * self.line.down, x + pixels * self.line.width, y + pixels * self.line.up)
+        x, y = self._start_point(pixels)
+        box = (x, y - pixels * self.line.descent, x + pixels * self.line.width, y + pixels * self.line.ascent)
         return Bbox.from_extents(*(shift * each for each in box))
 
 
-def write(
+def draw_text(
     on: Figure | Axes,
     text: str,
-    at: Spot,
+    at: PaperPoint,
     size: float,
     *,
     math: bool = False,
     slanted: bool = False,
     heavy: bool = False,
-    family: str = FAMILY,
+    family: str = DRAWING_FAMILY,
     ha: str = "left",
     color: str = "black",
     transform: Transform | None = None,
@@ -91,7 +93,7 @@ def write(
 
     Raises ValueError for a formula with a fault.
     """
-    made = Written(at, text, size, math, slanted, heavy, family, ha=ha, color=color, **looks)
+    made = TextLineArtist(at, text, size, math, slanted, heavy, family, ha=ha, color=color, **looks)
     if isinstance(on, Figure):
         made.set_transform(transform or on.transFigure)
         made.set_figure(on)
@@ -103,10 +105,10 @@ def write(
     return made
 
 
-def families_of(figure: Figure) -> set[str]:
+def used_families(figure: Figure) -> set[str]:
     """The families of fonts that a figure's texts are set in."""
     found: set[str] = set()
     for text in figure.findobj(Text):
-        pieces = text.line.pieces if isinstance(text, Written) else ()
+        pieces = text.line.pieces if isinstance(text, TextLineArtist) else ()
         found.update(text.get_fontfamily(), *(each.families for each in pieces))
     return found

@@ -6,39 +6,39 @@ from bisect import bisect_left
 from functools import lru_cache
 from typing import NamedTuple
 
-from planar.drawing.labels.fonts import shown
+from planar.drawing.labels.fonts import printable_text
 from planar.drawing.labels.text_line import text_line
-from planar.drawing.paper.pens import POINT, ready
-from planar.drawing.paper.picture import Letter
+from planar.drawing.paper.pens import MM_PER_POINT, require_matplotlib
+from planar.drawing.paper.picture import Label
 
-LONGEST = 60
+MAX_LABEL_LENGTH = 60
 """Characters of a plain letter that are shown; of longer ones the middle is left out."""
 
 
-class Size(NamedTuple):
+class TextSize(NamedTuple):
     """What a line of text takes on paper (mm): width, height, and how much of the height is below its base line."""
 
     width: float
     height: float
-    below: float
+    descent: float
 
 
-def fit(letter: Letter) -> Letter:
+def fit_label(letter: Label) -> Label:
     """The letter with a text that can be drawn as it stands; `math` stays only where that is mathtext without fault."""
-    ready()
-    text = shown(letter.text, letter.slanted)
+    require_matplotlib()
+    text = printable_text(letter.text, letter.slanted)
     math = letter.math and "$" in text
     if math:
         try:
-            measured(text, letter.size, letter.slanted, True)
+            text_size(text, letter.size, letter.slanted, True)
         except ValueError:
             math = False
-    if not math and len(text) > LONGEST:
-        text = f"{text[: LONGEST * 2 // 3]} … {text[3 - LONGEST // 3 :]}"
+    if not math and len(text) > MAX_LABEL_LENGTH:
+        text = f"{text[: MAX_LABEL_LENGTH * 2 // 3]} … {text[3 - MAX_LABEL_LENGTH // 3 :]}"
     return letter._replace(text=text, math=math)
 
 
-def joined(letters: list[Letter]) -> Letter:
+def join_labels(letters: list[Label]) -> Label:
     """One letter for several of one size and slant at one spot: their texts in the order given, as "a, d, g"."""
     first, texts = letters[0], list(dict.fromkeys(each.text for each in letters))
     if len(texts) > 1 and any(each.math for each in letters):
@@ -48,28 +48,28 @@ def joined(letters: list[Letter]) -> Letter:
     return first._replace(
         text=", ".join(texts),
         about=", ".join(abouts),
-        away=max(each.away for each in letters),
+        clearance=max(each.clearance for each in letters),
         math=any(each.math for each in letters),
     )
 
 
 @lru_cache(maxsize=4096)
-def measured(text: str, points: float, slanted: bool = False, math: bool = False, heavy: bool = False) -> Size:
+def text_size(text: str, points: float, slanted: bool = False, math: bool = False, heavy: bool = False) -> TextSize:
     """The size on paper of one line of text (mm). Raises ValueError where mathtext is faulty."""
-    line, size = text_line(text, math, slanted, heavy), POINT * points
-    return Size(size * line.width, size * (line.up + line.down), size * line.down)
+    line, size = text_line(text, math, slanted, heavy), MM_PER_POINT * points
+    return TextSize(size * line.width, size * (line.ascent + line.descent), size * line.descent)
 
 
-def wrapped(text: str, points: float, width: float, heavy: bool = False) -> list[str]:
+def wrap_text(text: str, points: float, width: float, heavy: bool = False) -> list[str]:
     """A plain text as lines of at most so many mm, broken at spaces and within a word that is too long by itself."""
 
     def fits(part: str) -> bool:
-        return measured(part, points, heavy=heavy).width <= width
+        return text_size(part, points, heavy=heavy).width <= width
 
     # no letter is narrower than a fifth of the font's size
-    most = max(1, int(width / (0.2 * POINT * points)))
+    most = max(1, int(width / (0.2 * MM_PER_POINT * points)))
     lines, line = [], ""
-    for word in shown(text, heavy=heavy).split():
+    for word in printable_text(text, heavy=heavy).split():
         if len(word) <= most and fits(f"{line} {word}".strip()):
             line = f"{line} {word}".strip()
             continue
@@ -86,14 +86,14 @@ def wrapped(text: str, points: float, width: float, heavy: bool = False) -> list
     return [*lines, line] if line else lines
 
 
-def clipped(text: str, points: float, room: float, heavy: bool = False) -> str:
+def clip_text(text: str, points: float, width: float, heavy: bool = False) -> str:
     """A plain text on one line of at most so many mm, the rest left out."""
-    text = shown(text, heavy=heavy)
-    while len(text) > 1 and (wide := measured(text, points, heavy=heavy).width) > room:
-        text = f"{text[: min(len(text) - 2, int(len(text) * room / wide))]}…"
+    text = printable_text(text, heavy=heavy)
+    while len(text) > 1 and (wide := text_size(text, points, heavy=heavy).width) > width:
+        text = f"{text[: min(len(text) - 2, int(len(text) * width / wide))]}…"
     return text
 
 
-def signed(value: float) -> str:
+def format_tick(value: float) -> str:
     """A number of an axis with a proper minus sign."""
     return f"{value:.6g}".replace("-", "−") if value else "0"

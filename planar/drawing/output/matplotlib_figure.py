@@ -8,36 +8,36 @@ from io import BytesIO
 from math import hypot
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from planar.drawing.labels.fonts import outlined, outlines_only, quiet, shown
-from planar.drawing.labels.placement import Placed, placed
-from planar.drawing.labels.text_metrics import measured, wrapped
-from planar.drawing.paper.pens import FILLS, INK, POINT, Ink, ready
-from planar.drawing.paper.picture import Arrow, Circle, Letter, Line, Mark, Pen, Picture, Spot, extent
-from planar.drawing.paper.stroke_shapes import Head, check, head, pointed, sweep
-from planar.foundation.errors import BadInput, no_format
+from planar.drawing.labels.fonts import have_truetype_outlines, outlines_only, printable_text, quiet_font_logs
+from planar.drawing.labels.placement import PlacedLabel, place_labels
+from planar.drawing.labels.text_metrics import text_size, wrap_text
+from planar.drawing.paper.pens import FILL_COLOURS, MM_PER_POINT, PEN_STYLES, PenStyle, require_matplotlib
+from planar.drawing.paper.picture import Arrow, Circle, Label, Mark, PaperPoint, Pen, Picture, Polyline, extent
+from planar.drawing.paper.stroke_shapes import ArrowHead, arc_arrow_head, arrow_head, check_finite, sweep_angle
+from planar.foundation.errors import BadInput, unknown_format_error
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-INCH = 25.4
-PAGE, PAGE_HEIGHT = 277.0, 190.0
+MM_PER_INCH = 25.4
+PAGE_WIDTH, PAGE_HEIGHT = 277.0, 190.0
 """mm that a row of pictures may be wide, and all rows high where there are several sheets: A4 on its side."""
-MARGIN, APART, EDGE = 3.0, 8.0, 5.0
+PICTURE_MARGIN, PICTURE_GAP, SHEET_MARGIN = 3.0, 8.0, 5.0
 """mm about the marks of a picture, between pictures, and about them all."""
-CAPTION = 70.0
+MIN_CAPTION_WIDTH = 70.0
 """mm that the text below a narrow picture may be wide."""
-HEADING, TITLE, NOTE = 12.0, 10.0, 8.5
+HEADING_SIZE, TITLE_SIZE, NOTE_SIZE = 12.0, 10.0, 8.5
 """Sizes of texts in points: above all pictures, below each, and its notes."""
 LEADING = 1.35
 """From one line of text to the next, in sizes of the font."""
-LARGEST = 5000.0
+MAX_SHEET_SIZE = 5000.0
 """mm: the largest sheet that readers of PDF files show."""
 RESOLUTION = 200
 """Dots to an inch in PNG files."""
-PIXELS = 1e8
-SETTINGS = {
+MAX_PIXELS = 1e8
+MATPLOTLIB_SETTINGS = {
     "svg.fonttype": "none",
     "svg.hashsalt": "planar",
     "pdf.fonttype": 42,
@@ -73,299 +73,311 @@ METADATA: dict[str, dict[str, Any]] = {
 }
 
 
-class _Cell(NamedTuple):
+class PictureCell(NamedTuple):
     """A picture with its letters placed: its corners (mm, in its own axes), and lines of text as (text, size)."""
 
     picture: Picture
-    letters: tuple[Placed, ...]
-    low: Spot
-    high: Spot
-    text: tuple[tuple[str, float], ...]
+    labels: tuple[PlacedLabel, ...]
+    low: PaperPoint
+    high: PaperPoint
+    text_lines: tuple[tuple[str, float], ...]
 
     @property
-    def inside(self) -> tuple[float, float]:
+    def axes_size(self) -> tuple[float, float]:
         """Width and height of its axes (mm)."""
         return self.high[0] - self.low[0], self.high[1] - self.low[1]
 
     @property
     def width(self) -> float:
         """mm, with the text below."""
-        return max(self.inside[0], *(measured(text, size, heavy=size == TITLE).width for text, size in self.text), 1.0)
+        return max(
+            self.axes_size[0],
+            *(text_size(text, size, heavy=size == TITLE_SIZE).width for text, size in self.text_lines),
+            1.0,
+        )
 
     @property
-    def below(self) -> float:
+    def text_height(self) -> float:
         """mm that the text takes."""
-        return sum(LEADING * POINT * size for _, size in self.text) + (2.0 if self.text else 0.0)
+        return sum(LEADING * MM_PER_POINT * size for _, size in self.text_lines) + (2.0 if self.text_lines else 0.0)
 
 
-def figure(pictures: Sequence[Picture], title: str = "") -> Figure:
+def draw_pictures(pictures: Sequence[Picture], title: str = "") -> Figure:
     """Pictures in rows, each in axes whose data units are millimetres on paper, named by the picture's title.
 
     Below each stand its title and its notes; `title` goes above all. Every stroke's artist has the mark's `about` as
     its gid, the head of an arrow that and " head" (its first corner is the tip). Raises BadInput for a picture that
     is too large for any sheet or has a mark with no place, and where matplotlib is missing.
     """
-    return _sheet(_rows([cell(picture) for picture in pictures]), title)
+    return _draw_sheet(_arrange_rows([lay_out_picture(picture) for picture in pictures]), title)
 
 
-def on_sheets(pictures: Sequence[Picture], title: str = "") -> list[Figure]:
+def draw_on_sheets(pictures: Sequence[Picture], title: str = "") -> list[Figure]:
     """The same on as many sheets as it takes for none to be higher than A4 on its side, where a row itself is not.
 
     Several sheets are as wide as the page.
     """
-    sheets: list[list[list[_Cell]]] = []
+    sheets: list[list[list[PictureCell]]] = []
     left = 0.0
-    for row in _rows([cell(picture) for picture in pictures]):
-        if not sheets or _tall(row) > left:
+    for row in _arrange_rows([lay_out_picture(picture) for picture in pictures]):
+        if not sheets or _row_height(row) > left:
             sheets.append([])
-            left = PAGE_HEIGHT - _heading(title, PAGE)[1]
+            left = PAGE_HEIGHT - _heading_lines(title, PAGE_WIDTH)[1]
         sheets[-1].append(row)
-        left -= _tall(row) + APART
-    return [_sheet(rows, title, PAGE if len(sheets) > 1 else 0.0) for rows in sheets]
+        left -= _row_height(row) + PICTURE_GAP
+    return [_draw_sheet(rows, title, PAGE_WIDTH if len(sheets) > 1 else 0.0) for rows in sheets]
 
 
-def _sheet(rows: Sequence[Sequence[_Cell]], title: str, least: float = 0.0) -> Figure:
+def _draw_sheet(rows: Sequence[Sequence[PictureCell]], title: str, min_width: float = 0.0) -> Figure:
     """Rows of pictures below each other, at least so wide (mm)."""
-    ready()
+    require_matplotlib()
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    widest = max(least, max(map(_across, rows), default=20.0))
-    heading, above = _heading(title, widest)
-    widest = max([widest, *(measured(line, HEADING, heavy=True).width for line in heading)])
-    width = widest + 2.0 * EDGE
-    height = above + sum(map(_tall, rows)) + APART * max(len(rows) - 1, 0) + 2.0 * EDGE
-    if max(width, height) > LARGEST:
+    widest = max(min_width, max(map(_row_width, rows), default=20.0))
+    heading, above = _heading_lines(title, widest)
+    widest = max([widest, *(text_size(line, HEADING_SIZE, heavy=True).width for line in heading)])
+    width = widest + 2.0 * SHEET_MARGIN
+    height = above + sum(map(_row_height, rows)) + PICTURE_GAP * max(len(rows) - 1, 0) + 2.0 * SHEET_MARGIN
+    if max(width, height) > MAX_SHEET_SIZE:
         raise BadInput("scale", f"the drawing would be {max(width, height) / 1e3:.3g} m on paper: choose a smaller one")
-    with rc_context(SETTINGS):
-        made = Figure(figsize=(width / INCH, height / INCH), dpi=RESOLUTION, facecolor="white")
-        top = height - EDGE
+    with rc_context(MATPLOTLIB_SETTINGS):
+        made = Figure(figsize=(width / MM_PER_INCH, height / MM_PER_INCH), dpi=RESOLUTION, facecolor="white")
+        top = height - SHEET_MARGIN
         for line in heading:
-            top -= LEADING * POINT * HEADING
-            _write(made, line, (width / 2.0, top), HEADING)
-        top = height - EDGE - above
+            top -= LEADING * MM_PER_POINT * HEADING_SIZE
+            _write_centred(made, line, (width / 2.0, top), HEADING_SIZE)
+        top = height - SHEET_MARGIN - above
         for row in rows:
-            left = (width - _across(row)) / 2.0
-            floor = top - max(each.inside[1] for each in row)
+            left = (width - _row_width(row)) / 2.0
+            floor = top - max(each.axes_size[1] for each in row)
             for each in row:
-                put(made, each, (left, floor))
-                left += each.width + APART
-            top -= _tall(row) + APART
+                draw_cell(made, each, (left, floor))
+                left += each.width + PICTURE_GAP
+            top -= _row_height(row) + PICTURE_GAP
     return made
 
 
-def _heading(title: str, widest: float) -> tuple[list[str], float]:
+def _heading_lines(title: str, width: float) -> tuple[list[str], float]:
     """The lines of a title above pictures so wide, and what they take (mm)."""
-    lines = wrapped(title, HEADING, max(widest, CAPTION), heavy=True)
-    return lines, LEADING * POINT * HEADING * len(lines) + (3.0 if lines else 0.0)
+    lines = wrap_text(title, HEADING_SIZE, max(width, MIN_CAPTION_WIDTH), heavy=True)
+    return lines, LEADING * MM_PER_POINT * HEADING_SIZE * len(lines) + (3.0 if lines else 0.0)
 
 
-def _tall(row: Sequence[_Cell]) -> float:
+def _row_height(row: Sequence[PictureCell]) -> float:
     """mm that a row takes, with the texts below."""
-    return max(each.inside[1] for each in row) + max(each.below for each in row)
+    return max(each.axes_size[1] for each in row) + max(each.text_height for each in row)
 
 
-def saved(figure: Figure, suffix: str) -> bytes:
+def encode_figure(figure: Figure, suffix: str) -> bytes:
     """A figure as a file's content: png (200 dots to an inch), svg or pdf; the same bytes for the same picture.
 
     Raises BadInput for another suffix, or a PNG too large for any screen.
     """
-    return pages([figure], suffix)
+    return encode_pages([figure], suffix)
 
 
-def pages(figures: Sequence[Figure], suffix: str) -> bytes:
+def encode_pages(figures: Sequence[Figure], suffix: str) -> bytes:
     """Figures as the pages of one PDF, or a single one as png or svg. Raises BadInput."""
-    ready()
+    require_matplotlib()
     from matplotlib import rc_context
 
     kind = suffix.lower().removeprefix(".")
     if kind not in METADATA:
-        raise no_format(suffix, "a drawing", (f".{each}" for each in METADATA))
+        raise unknown_format_error(suffix, "a drawing", (f".{each}" for each in METADATA))
     if not figures:
         raise BadInput(suffix, "there is nothing to draw")
     if len(figures) > 1 and kind != "pdf":
         raise BadInput(suffix, f"{len(figures)} sheets need pages, which only .pdf has")
     out = BytesIO()
-    with rc_context(SETTINGS), quiet():
+    with rc_context(MATPLOTLIB_SETTINGS), quiet_font_logs():
         if kind == "pdf":
-            return _book(figures)
+            return _encode_pdf(figures)
         across, up = figures[0].get_size_inches() * RESOLUTION
-        if kind == "png" and (across * up > PIXELS or max(across, up) >= 2**16):
+        if kind == "png" and (across * up > MAX_PIXELS or max(across, up) >= 2**16):
             raise BadInput(suffix, f"{across:.0f} x {up:.0f} pixels are too many: choose .pdf, .svg or a smaller scale")
         figures[0].savefig(out, format=kind, dpi=RESOLUTION, metadata=METADATA[kind])
-    return _any_font(out.getvalue()) if kind == "svg" else out.getvalue()
+    return _add_font_fallback(out.getvalue()) if kind == "svg" else out.getvalue()
 
 
-def _book(figures: Sequence[Figure]) -> bytes:
+def _encode_pdf(figures: Sequence[Figure]) -> bytes:
     from matplotlib import rc_context
     from matplotlib.backends.backend_pdf import PdfPages
 
-    from planar.drawing.labels.matplotlib_text import families_of
+    from planar.drawing.labels.matplotlib_text import used_families
 
     out = BytesIO()
-    used = {family for each in figures for family in families_of(each)}
+    used = {family for each in figures for family in used_families(each)}
     # where a font cannot be embedded as it is, all are embedded as drawings of their letters
-    fonts = {} if outlined(used) else {"pdf.fonttype": 3, "ps.fonttype": 3}
+    fonts = {} if have_truetype_outlines(used) else {"pdf.fonttype": 3, "ps.fonttype": 3}
     with rc_context(fonts), outlines_only(), PdfPages(out, metadata=METADATA["pdf"]) as book:
         for each in figures:
             book.savefig(each)
     return out.getvalue()
 
 
-def _any_font(page: bytes) -> bytes:
+def _add_font_fallback(page: bytes) -> bytes:
     """An SVG page whose letters any font without serifs can show where those that it names are not installed."""
     return re.sub(rb"(font(?:-family)?: [^;\"]*'DejaVu Sans[^;\"]*')(?=[;\"])", rb"\1, sans-serif", page)
 
 
-def cell(picture: Picture) -> _Cell:
+def lay_out_picture(picture: Picture) -> PictureCell:
     for mark in picture.marks:
-        check(mark)
-    letters = placed([mark for mark in picture.marks if isinstance(mark, Letter)], picture.marks)
-    strokes = [mark for mark in picture.marks if not isinstance(mark, Letter)]
+        check_finite(mark)
+    letters = place_labels([mark for mark in picture.marks if isinstance(mark, Label)], picture.marks)
+    strokes = [mark for mark in picture.marks if not isinstance(mark, Label)]
     corners = [*(picture.window or extent(strokes))] if strokes else []
     for each in letters:
         corners += [(each.box.left, each.box.bottom), (each.box.right, each.box.top), *(each.leader or ())]
     corners = corners or [(0.0, 0.0)]
-    low = min(x for x, _ in corners) - MARGIN, min(y for _, y in corners) - MARGIN
-    high = max(x for x, _ in corners) + MARGIN, max(y for _, y in corners) + MARGIN
-    room = max(high[0] - low[0], CAPTION)
-    text = [(line, TITLE) for line in wrapped(picture.title, TITLE, room, heavy=True)]
-    text += [(line, NOTE) for note in picture.notes for line in wrapped(note, NOTE, room)]
-    return _Cell(picture, letters, low, high, tuple(text))
+    low = min(x for x, _ in corners) - PICTURE_MARGIN, min(y for _, y in corners) - PICTURE_MARGIN
+    high = max(x for x, _ in corners) + PICTURE_MARGIN, max(y for _, y in corners) + PICTURE_MARGIN
+    room = max(high[0] - low[0], MIN_CAPTION_WIDTH)
+    text = [(line, TITLE_SIZE) for line in wrap_text(picture.title, TITLE_SIZE, room, heavy=True)]
+    text += [(line, NOTE_SIZE) for note in picture.notes for line in wrap_text(note, NOTE_SIZE, room)]
+    return PictureCell(picture, letters, low, high, tuple(text))
 
 
-def _across(row: Sequence[_Cell]) -> float:
-    return sum(cell.width for cell in row) + APART * (len(row) - 1)
+def _row_width(row: Sequence[PictureCell]) -> float:
+    return sum(cell.width for cell in row) + PICTURE_GAP * (len(row) - 1)
 
 
-def _rows(cells: Sequence[_Cell]) -> list[list[_Cell]]:
+def _arrange_rows(cells: Sequence[PictureCell]) -> list[list[PictureCell]]:
     """Cells in reading order, as many to a row as the page is wide, one at least."""
-    rows: list[list[_Cell]] = []
+    rows: list[list[PictureCell]] = []
     for cell in cells:
-        if rows and _across([*rows[-1], cell]) <= PAGE:
+        if rows and _row_width([*rows[-1], cell]) <= PAGE_WIDTH:
             rows[-1].append(cell)
         else:
             rows.append([cell])
     return rows
 
 
-def _write(made: Figure, line: str, at: Spot, size: float) -> None:
+def _write_centred(made: Figure, line: str, at: PaperPoint, size: float) -> None:
     """One line of text, centred, on its base line (mm from the sheet's lower left corner)."""
-    from planar.drawing.labels.matplotlib_text import write
+    from planar.drawing.labels.matplotlib_text import draw_text
 
-    width, height = made.get_size_inches() * INCH
-    write(made, line, (at[0] / width, at[1] / height), size, heavy=size != NOTE, ha="center")
+    width, height = made.get_size_inches() * MM_PER_INCH
+    draw_text(made, line, (at[0] / width, at[1] / height), size, heavy=size != NOTE_SIZE, ha="center")
 
 
-def put(made: Figure, cell: _Cell, corner: Spot) -> None:
+def draw_cell(made: Figure, cell: PictureCell, corner: PaperPoint) -> None:
     """A picture with the lower left corner of its place there (mm on the sheet), and its text below."""
-    width, height = made.get_size_inches() * INCH
-    across, up = cell.inside
+    width, height = made.get_size_inches() * MM_PER_INCH
+    across, up = cell.axes_size
     left = corner[0] + (cell.width - across) / 2.0
     axes = made.add_axes((left / width, corner[1] / height, across / width, up / height))
     axes.set_axis_off()
     axes.set_label(cell.picture.title)
-    axes.set_gid(shown(cell.picture.title) or None)
+    axes.set_gid(printable_text(cell.picture.title) or None)
     axes.set(xlim=(cell.low[0], cell.high[0]), ylim=(cell.low[1], cell.high[1]), autoscale_on=False)
     for order, mark in enumerate(cell.picture.marks):
-        _draw(axes, mark, order)
+        _draw_mark(axes, mark, order)
     if cell.picture.window is not None:
         _framed(axes, cell.picture.window)
-    _letter(axes, cell.letters, len(cell.picture.marks))
+    _draw_labels(axes, cell.labels, len(cell.picture.marks))
     down = corner[1]
-    for line, size in cell.text:
-        down -= LEADING * POINT * size
-        _write(made, line, (corner[0] + cell.width / 2.0, down), size)
+    for line, size in cell.text_lines:
+        down -= LEADING * MM_PER_POINT * size
+        _write_centred(made, line, (corner[0] + cell.width / 2.0, down), size)
 
 
-def _framed(axes: Axes, window: tuple[Spot, Spot]) -> None:
+def _framed(axes: Axes, window: tuple[PaperPoint, PaperPoint]) -> None:
     """Show of the strokes what is in a window, and its frame."""
     from matplotlib.patches import Rectangle
 
     (left, low), (right, up) = window
-    ink = INK[Pen.CIRCLE]
-    frame = Rectangle((left, low), right - left, up - low, facecolor="none", edgecolor=ink.colour, **_stroke(ink))
+    ink = PEN_STYLES[Pen.CIRCLE]
+    frame = Rectangle((left, low), right - left, up - low, facecolor="none", edgecolor=ink.colour, **_line_style(ink))
     strokes = [*axes.lines, *axes.patches]
     axes.add_artist(frame)
-    _named(frame, "window", len(strokes))
+    _tag_artist(frame, "window", len(strokes))
     for each in strokes:
         each.set(clip_on=True)
         each.set_clip_path(frame)
 
 
-def _letter(axes: Axes, letters: Sequence[Placed], order: int) -> None:
+def _draw_labels(axes: Axes, labels: Sequence[PlacedLabel], order: int) -> None:
     """Letters in their boxes and the lines that lead to their spots, above all else."""
-    from planar.drawing.labels.matplotlib_text import write
+    from planar.drawing.labels.matplotlib_text import draw_text
 
-    for letter, box, leader in letters:
+    for letter, box, leader in labels:
         if leader is not None:
-            _line(axes, leader, INK[Pen.LEADER], f"{letter.about} leader", order)
-        below = measured(letter.text, letter.size, letter.slanted, letter.math).below
+            _add_line(axes, leader, PEN_STYLES[Pen.LEADER], f"{letter.about} leader", order)
+        below = text_size(letter.text, letter.size, letter.slanted, letter.math).descent
         # centred, as the same font is a little wider or narrower in other programs
         at = (box.left + box.right) / 2.0, box.bottom + below
         looks = {"math": letter.math, "slanted": letter.slanted, "ha": "center"}
-        _named(write(axes, letter.text, at, letter.size, **looks), letter.about, order + 1)
+        _tag_artist(draw_text(axes, letter.text, at, letter.size, **looks), letter.about, order + 1)
 
 
-def _named(artist: Artist, about: str, order: float) -> None:
-    artist.set(gid=shown(about) or None, zorder=order, clip_on=False)
+def _tag_artist(artist: Artist, about: str, order: float) -> None:
+    artist.set(gid=printable_text(about) or None, zorder=order, clip_on=False)
 
 
-def _stroke(ink: Ink, width: float | None = None) -> Mapping[str, Any]:
+def _line_style(ink: PenStyle, width: float | None = None) -> Mapping[str, Any]:
     """How matplotlib draws with an ink, of another width (mm) if one is given."""
     wide = ink.width if width is None else width
     return {
-        "linewidth": wide / POINT,
+        "linewidth": wide / MM_PER_POINT,
         # dashes are counted in widths of the line
         "linestyle": (0, tuple(dash / wide for dash in ink.dashes)) if ink.dashes else "-",
     }
 
 
-def _line(
-    axes: Axes, spots: Sequence[Spot], ink: Ink, about: str, order: float, width: float | None = None, cap: str = "butt"
+def _add_line(
+    axes: Axes,
+    spots: Sequence[PaperPoint],
+    ink: PenStyle,
+    about: str,
+    order: float,
+    width: float | None = None,
+    cap: str = "butt",
 ) -> None:
     from matplotlib.lines import Line2D
 
     x, y = [each[0] for each in spots], [each[1] for each in spots]
-    drawn = Line2D(x, y, color=ink.colour, solid_capstyle=cap, solid_joinstyle="round", **_stroke(ink, width))
+    drawn = Line2D(x, y, color=ink.colour, solid_capstyle=cap, solid_joinstyle="round", **_line_style(ink, width))
     axes.add_artist(drawn)
-    _named(drawn, about, order)
+    _tag_artist(drawn, about, order)
 
 
-def _head(axes: Axes, made: Head, ink: Ink, about: str, order: float) -> None:
+def _add_arrow_head(axes: Axes, made: ArrowHead, ink: PenStyle, about: str, order: float) -> None:
     from matplotlib.patches import Polygon
 
     tip = Polygon(made.corners, closed=True, facecolor=ink.colour, edgecolor="none", linewidth=0.0)
     axes.add_artist(tip)
-    _named(tip, f"{about} head", order)
+    _tag_artist(tip, f"{about} head", order)
 
 
-def _draw(axes: Axes, mark: Mark, order: int) -> None:
+def _draw_mark(axes: Axes, mark: Mark, order: int) -> None:
     """The artists of a stroke; letters are drawn elsewhere."""
-    if isinstance(mark, Line):
+    if isinstance(mark, Polyline):
         _draw_line(axes, mark, order)
     elif isinstance(mark, Arrow):
-        made = head(mark.tail, mark.head, hypot(mark.head[0] - mark.tail[0], mark.head[1] - mark.tail[1]))
+        made = arrow_head(mark.tail, mark.head, hypot(mark.head[0] - mark.tail[0], mark.head[1] - mark.tail[1]))
         if made is not None:
-            ink = INK[mark.pen]
-            _line(axes, (mark.tail, made.end), ink, mark.about, order, min(ink.width, made.line))
-            _head(axes, made, ink, mark.about, order + 0.5)
+            ink = PEN_STYLES[mark.pen]
+            _add_line(axes, (mark.tail, made.line_end), ink, mark.about, order, min(ink.width, made.max_line_width))
+            _add_arrow_head(axes, made, ink, mark.about, order + 0.5)
     elif isinstance(mark, Circle):
         _draw_circle(axes, mark, order)
 
 
-def _draw_line(axes: Axes, mark: Line, order: int) -> None:
+def _draw_line(axes: Axes, mark: Polyline, order: int) -> None:
     from matplotlib.patches import Polygon
 
-    ink = INK[mark.pen]
-    if mark.closed and len(mark.spots) > 2:
-        fill = FILLS.get(mark.fill, "none")
-        area = Polygon(mark.spots, closed=True, facecolor=fill, edgecolor=ink.colour, joinstyle="round", **_stroke(ink))
+    ink = PEN_STYLES[mark.pen]
+    if mark.closed and len(mark.points) > 2:
+        fill = FILL_COLOURS.get(mark.fill, "none")
+        area = Polygon(
+            mark.points, closed=True, facecolor=fill, edgecolor=ink.colour, joinstyle="round", **_line_style(ink)
+        )
         axes.add_artist(area)
-        _named(area, mark.about, order)
-    elif len(mark.spots) > 1:
+        _tag_artist(area, mark.about, order)
+    elif len(mark.points) > 1:
         cap = "butt" if mark.pen in {Pen.HATCH, Pen.GROUND} else "round"
-        _line(axes, mark.spots, ink, mark.about, order, cap=cap)
+        _add_line(axes, mark.points, ink, mark.about, order, cap=cap)
 
 
 def _draw_circle(axes: Axes, mark: Circle, order: int) -> None:
@@ -373,20 +385,20 @@ def _draw_circle(axes: Axes, mark: Circle, order: int) -> None:
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path
 
-    ink, turn = INK[mark.pen], sweep(mark)
-    fill = FILLS.get(mark.fill, "none")
+    ink, turn = PEN_STYLES[mark.pen], sweep_angle(mark)
+    fill = FILL_COLOURS.get(mark.fill, "none")
     looks = {"facecolor": fill, "edgecolor": ink.colour}
-    tip = pointed(mark)
+    tip = arc_arrow_head(mark)
     if turn == 360.0 and tip is None:
-        drawn = Whole(mark.centre, abs(mark.radius), **looks, **_stroke(ink))
+        drawn = Whole(mark.centre, abs(mark.radius), **looks, **_line_style(ink))
     elif turn > 0.0:
         start, stop = (mark.start, mark.start + turn) if tip is None else tip[1:]
         arc = Path.arc(start, stop)
         corners = arc.vertices * mark.radius + mark.centre
-        drawn = PathPatch(Path(corners, arc.codes), capstyle="butt", **looks, **_stroke(ink))
+        drawn = PathPatch(Path(corners, arc.codes), capstyle="butt", **looks, **_line_style(ink))
     else:
         return
     axes.add_artist(drawn)
-    _named(drawn, mark.about, order)
+    _tag_artist(drawn, mark.about, order)
     if tip is not None:
-        _head(axes, tip[0], ink, mark.about, order + 0.5)
+        _add_arrow_head(axes, tip[0], ink, mark.about, order + 0.5)

@@ -17,10 +17,10 @@ class Box(NamedTuple):
     top: float
 
 
-def ring(width: float, height: float, far: float) -> tuple[np.ndarray, np.ndarray]:
+def surrounding_positions(width: float, height: float, distance: float) -> tuple[np.ndarray, np.ndarray]:
     """Middles of a box so far from the origin all around (n, 2), and the directions it lies in (n, 2)."""
     half = np.array([width, height]) / 2.0
-    count = int(np.clip(ceil(far), 3, 11))
+    count = int(np.clip(ceil(distance), 3, 11))
     angles = np.arange(1, count + 1) * (np.pi / 2.0) / (count + 1)
     corner = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     across = np.linspace(-1.0, 1.0, int(np.clip(2 * ceil(width / 3.0) + 1, 3, 9)))
@@ -29,25 +29,25 @@ def ring(width: float, height: float, far: float) -> tuple[np.ndarray, np.ndarra
     for sx, sy in ((1, 1), (-1, 1), (-1, -1), (1, -1)):
         way = corner * (sx, sy)
         ways.append(way)
-        middles.append(far * way + half * (sx, sy))
+        middles.append(distance * way + half * (sx, sy))
     for side in (1.0, -1.0):
         ways += [np.tile([0.0, side], (len(across), 1)), np.tile([side, 0.0], (3, 1))]
-        middles.append(np.stack([across * half[0], np.full(len(across), side * (far + half[1]))], axis=1))
-        middles.append(np.stack([np.full(3, side * (far + half[0])), upright * half[1]], axis=1))
+        middles.append(np.stack([across * half[0], np.full(len(across), side * (distance + half[1]))], axis=1))
+        middles.append(np.stack([np.full(3, side * (distance + half[0])), upright * half[1]], axis=1))
     return np.concatenate(middles), np.concatenate(ways)
 
 
-def inside(boxes: np.ndarray, ends: np.ndarray, pad: np.ndarray | float) -> np.ndarray:
+def lengths_inside_boxes(boxes: np.ndarray, segments: np.ndarray, padding: np.ndarray | float) -> np.ndarray:
     """The length of pieces (..., 4) inside boxes (..., 4) grown by `pad`, -1 where they stay outside.
 
     A piece is cut by the two strips of a box (Liang and Barsky, 1984).
     """
     enter, leave, square = 0.0, 1.0, 0.0
     for axis in (0, 1):
-        start, way = ends[..., axis], ends[..., axis + 2] - ends[..., axis]
+        start, way = segments[..., axis], segments[..., axis + 2] - segments[..., axis]
         steep = 1.0 / np.where(np.abs(way) < 1e-9, 1e-9, way)
-        one = (boxes[..., axis] - (pad + start)) * steep
-        other = (boxes[..., axis + 2] + (pad - start)) * steep
+        one = (boxes[..., axis] - (padding + start)) * steep
+        other = (boxes[..., axis + 2] + (padding - start)) * steep
         enter = np.maximum(enter, np.minimum(one, other))
         leave = np.minimum(leave, np.maximum(one, other))
         square = square + way**2
@@ -55,22 +55,24 @@ def inside(boxes: np.ndarray, ends: np.ndarray, pad: np.ndarray | float) -> np.n
     return np.where(part >= 0.0, part * np.sqrt(square), -1.0)
 
 
-def crossing(lines: np.ndarray, ends: np.ndarray) -> np.ndarray:
+def are_crossing(lines: np.ndarray, segments: np.ndarray) -> np.ndarray:
     """Whether lines (..., 4) cross pieces (..., 4); NaN crosses nothing, nor does what only touches."""
 
     def side(of: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         return (of[..., 2] - of[..., 0]) * (y - of[..., 1]) - (of[..., 3] - of[..., 1]) * (x - of[..., 0])
 
-    parted = side(lines, ends[..., 0], ends[..., 1]) * side(lines, ends[..., 2], ends[..., 3]) < 0.0
-    return parted & (side(ends, lines[..., 0], lines[..., 1]) * side(ends, lines[..., 2], lines[..., 3]) < 0.0)
+    parted = side(lines, segments[..., 0], segments[..., 1]) * side(lines, segments[..., 2], segments[..., 3]) < 0.0
+    return parted & (side(segments, lines[..., 0], lines[..., 1]) * side(segments, lines[..., 2], lines[..., 3]) < 0.0)
 
 
-def around(ends: np.ndarray) -> np.ndarray:
+def bounding_boxes(segments: np.ndarray) -> np.ndarray:
     """The upright boxes (n, 4) around pieces (n, 4)."""
-    return np.concatenate([np.minimum(ends[:, :2], ends[:, 2:]), np.maximum(ends[:, :2], ends[:, 2:])], axis=1)
+    return np.concatenate(
+        [np.minimum(segments[:, :2], segments[:, 2:]), np.maximum(segments[:, :2], segments[:, 2:])], axis=1
+    )
 
 
-def close(boxes: np.ndarray, others: np.ndarray, gap: float) -> tuple[np.ndarray, np.ndarray]:
+def nearby_pairs(boxes: np.ndarray, others: np.ndarray, gap: float) -> tuple[np.ndarray, np.ndarray]:
     """The pairs (i, j) of boxes (n, 4) and others (m, 4) that are no farther apart than a gap along both axes."""
     apart = boxes[:, None, 0] > others[:, 2] + gap
     apart |= boxes[:, None, 2] < others[:, 0] - gap
@@ -80,7 +82,7 @@ def close(boxes: np.ndarray, others: np.ndarray, gap: float) -> tuple[np.ndarray
     return box, other
 
 
-def meet(boxes: np.ndarray, others: np.ndarray, gap: float) -> np.ndarray:
+def overlap_depths(boxes: np.ndarray, others: np.ndarray, gap: float) -> np.ndarray:
     """How deep boxes (n, 4) reach into others (m, 4) grown by a gap (mm), as (n, m); 0 where they stay apart."""
     deep = np.inf
     for axis in (0, 1):
@@ -89,7 +91,7 @@ def meet(boxes: np.ndarray, others: np.ndarray, gap: float) -> np.ndarray:
     return np.maximum(deep + gap, 0.0)
 
 
-def distances(boxes: np.ndarray, spots: np.ndarray) -> np.ndarray:
+def distances_from_boxes(boxes: np.ndarray, points: np.ndarray) -> np.ndarray:
     """From boxes (n, 4) to spots (m, 2), as (n, m)."""
-    out = np.maximum(boxes[:, None, :2] - spots, spots - boxes[:, None, 2:])
+    out = np.maximum(boxes[:, None, :2] - points, points - boxes[:, None, 2:])
     return np.linalg.norm(np.maximum(out, 0.0), axis=2)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-Spot = tuple[float, float]
+PaperPoint = tuple[float, float]
 """A place on paper (mm)."""
 
 
@@ -93,10 +93,10 @@ class Fill(Enum):
     """What of a curve is below its mean."""
 
 
-class Line(NamedTuple):
+class Polyline(NamedTuple):
     """A line through spots, or an area if it is closed; `about` says what it belongs to, such as "link AB"."""
 
-    spots: tuple[Spot, ...]
+    points: tuple[PaperPoint, ...]
     pen: Pen
     about: str = ""
     closed: bool = False
@@ -106,8 +106,8 @@ class Line(NamedTuple):
 class Arrow(NamedTuple):
     """A straight arrow; its head's tip is at `head` exactly."""
 
-    tail: Spot
-    head: Spot
+    tail: PaperPoint
+    head: PaperPoint
     pen: Pen
     about: str = ""
 
@@ -115,18 +115,18 @@ class Arrow(NamedTuple):
 class Circle(NamedTuple):
     """A whole circle, or an arc anticlockwise from `start` to `stop` (degrees); an arc may end in an arrow head."""
 
-    centre: Spot
+    centre: PaperPoint
     radius: float
     pen: Pen
     about: str = ""
     fill: Fill = Fill.NONE
     start: float = 0.0
     stop: float = 360.0
-    pointed: int = 0
+    arrow_end: int = 0
     "1: an arrow head where the arc stops, -1: where it starts, 0: none"
 
 
-class Letter(NamedTuple):
+class Label(NamedTuple):
     """A text that names something at a spot; it is placed near it, clear of strokes and of other letters.
 
     A text is shown as it stands; with `math` it is mathtext ("$A_1$"), only ever for texts that the program itself
@@ -134,18 +134,18 @@ class Letter(NamedTuple):
     """
 
     text: str
-    at: Spot
+    at: PaperPoint
     about: str = ""
     size: float = 9.0
     "points"
-    away: float = 1.0
+    clearance: float = 1.0
     slanted: bool = False
     math: bool = False
-    side: Spot | None = None
+    side: PaperPoint | None = None
     "the only side on which it may stand, such as (0, -1) for below, as the numbers of an axis do"
 
 
-Mark = Line | Arrow | Circle | Letter
+Mark = Polyline | Arrow | Circle | Label
 
 
 class Picture(NamedTuple):
@@ -155,22 +155,22 @@ class Picture(NamedTuple):
     title: str = ""
     notes: tuple[str, ...] = ()
     "such as the scale: `1 cm = 0.1 m/s`"
-    window: tuple[Spot, Spot] | None = None
+    window: tuple[PaperPoint, PaperPoint] | None = None
     "lower left and upper right corner of what is shown of the strokes; left out, all"
 
 
-def spot(vector: Iterable[float]) -> Spot:
+def paper_point(vector: Iterable[float]) -> PaperPoint:
     """A place on paper from any two numbers."""
     x, y = vector
     return float(x), float(y)
 
 
-def extent(marks: Iterable[Mark]) -> tuple[Spot, Spot]:
+def extent(marks: Iterable[Mark]) -> tuple[PaperPoint, PaperPoint]:
     """The lower left and the upper right corner of everything but the texts (mm); letters count with their spot."""
-    corners: list[Spot] = []
+    corners: list[PaperPoint] = []
     for mark in marks:
-        if isinstance(mark, Line):
-            corners += mark.spots
+        if isinstance(mark, Polyline):
+            corners += mark.points
         elif isinstance(mark, Arrow):
             corners += (mark.tail, mark.head)
         elif isinstance(mark, Circle):
@@ -181,4 +181,4 @@ def extent(marks: Iterable[Mark]) -> tuple[Spot, Spot]:
     if not corners:
         return (0.0, 0.0), (0.0, 0.0)
     both = np.array(corners)
-    return spot(both.min(axis=0)), spot(both.max(axis=0))
+    return paper_point(both.min(axis=0)), paper_point(both.max(axis=0))

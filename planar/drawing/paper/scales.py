@@ -8,19 +8,19 @@ from dataclasses import dataclass
 from math import floor, isfinite, log10
 
 from planar.foundation.errors import BadInput
-from planar.foundation.units import UnitError, coherent, quantity, unit
+from planar.foundation.units import UnitError, coherent_unit, parse_quantity, parse_unit
 
-WIDTH, HEIGHT = 150.0, 110.0
+DRAWING_WIDTH, DRAWING_HEIGHT = 150.0, 110.0
 """mm on paper that one drawing takes at the most, unless its scale is given."""
-ROUND = (1.0, 2.0, 5.0, 10.0)
+ROUND_DIGITS = (1.0, 2.0, 5.0, 10.0)
 """First digits of a scale that a ruler reads easily."""
-PLAIN = (1.0, 2.0, 5.0)
-DEGREES = (1.0, 2.0, 3.0, 4.5, 6.0, 9.0, 1.5)
+DECIMAL_STEPS = (1.0, 2.0, 5.0)
+DEGREE_STEPS = (1.0, 2.0, 3.0, 4.5, 6.0, 9.0, 1.5)
 """First digits of the step between two numbers of an axis."""
-THOUSANDS = (("G", 1e9), ("M", 1e6), ("k", 1e3))
-LARGE, SMALL = 10.0, 0.01
+LARGE_PREFIXES = (("G", 1e9), ("M", 1e6), ("k", 1e3))
+PREFIX_THRESHOLD, MILLI_THRESHOLD = 10.0, 0.01
 """A force or a couple is said in the next larger unit from so many of these on, below so many in thousandths."""
-SYMBOLS = {"length": "μₗ", "velocity": "μᵥ", "acceleration": "μₐ"}
+SCALE_SYMBOLS = {"length": "μₗ", "velocity": "μᵥ", "acceleration": "μₐ"}
 """Of the calculating scales of a space diagram and its polygons."""
 
 
@@ -38,58 +38,60 @@ class Scale:
 
     def __str__(self) -> str:
         """As chapters write it: 1 cm = 100 mm."""
-        value, written = unit(self.unit).from_si(10.0 * self.per_mm), self.unit
+        value, written = parse_unit(self.unit).from_si(10.0 * self.per_mm), self.unit
         if written == "mm" and value >= 1000.0:
             value, written = value / 1000.0, "m"
-        told = f"1 cm = {value:.6g} {raised(written)}"
+        told = f"1 cm = {value:.6g} {printed_unit(written)}"
         return f"{told} (1:1)" if self.kind == "length" and self.per_mm == 1e-3 else told
 
     @property
-    def mu(self) -> str:
+    def calculating_scale(self) -> str:
         """The calculating scale, in SI units to a millimetre, of inches in these: μₗ = 0.01 m/mm."""
-        name, of = coherent(self.unit)
-        name = raised(name)
-        return f"{SYMBOLS[self.kind]} = {of.from_si(self.per_mm):.4g} {f'({name})' if '/' in name else name}/mm"
+        name, of = coherent_unit(self.unit)
+        name = printed_unit(name)
+        return f"{SCALE_SYMBOLS[self.kind]} = {of.from_si(self.per_mm):.4g} {f'({name})' if '/' in name else name}/mm"
 
 
-def fitting(kind: str, written: str, width: float, height: float, room: tuple[float, float] = (WIDTH, HEIGHT)) -> Scale:
+def round_scale(
+    kind: str, unit_name: str, width: float, height: float, room: tuple[float, float] = (DRAWING_WIDTH, DRAWING_HEIGHT)
+) -> Scale:
     """The roundest largest scale at which `width` x `height` (SI) fits the room (mm); `written` is the unit said."""
     most = max(width / room[0], height / room[1])
-    size = unit(written)
+    size = parse_unit(unit_name)
     per_cm = size.from_si(10.0 * most)
     if not isfinite(per_cm) or per_cm <= 0.0:
-        return Scale(kind, size.to_si(1.0) / 10.0, written)
+        return Scale(kind, size.to_si(1.0) / 10.0, unit_name)
     power = 10.0 ** floor(log10(per_cm))
     # a hair of slack, so that what fits exactly fits
-    first = next(digit for digit in ROUND if digit * power >= per_cm * (1.0 - 1e-9))
-    return Scale(kind, size.to_si(first * power) / 10.0, written)
+    first = next(digit for digit in ROUND_DIGITS if digit * power >= per_cm * (1.0 - 1e-9))
+    return Scale(kind, size.to_si(first * power) / 10.0, unit_name)
 
 
-def round_step(least: float, firsts: Sequence[float] = PLAIN) -> float:
+def round_step(least: float, first_digits: Sequence[float] = DECIMAL_STEPS) -> float:
     """The smallest step of the form first * 10^k that is not below the least."""
     power = 10.0 ** (floor(log10(least)) - 1)
-    steps = sorted(first * power * more for first in firsts for more in (1.0, 10.0, 100.0))
+    steps = sorted(first * power * more for first in first_digits for more in (1.0, 10.0, 100.0))
     return next(step for step in steps if step >= least * (1.0 - 1e-9))
 
 
-def prefixed(value: float) -> tuple[str, float]:
+def choose_prefix(value: float) -> tuple[str, float]:
     """The prefix of the unit in which so much force (N) or couple (N m) is said, and how many SI units that has."""
-    small = ("m", 1e-3) if 0.0 < abs(value) < SMALL else ("", 1.0)
-    return next((each for each in THOUSANDS if abs(value) >= LARGE * each[1]), small)
+    small = ("m", 1e-3) if 0.0 < abs(value) < MILLI_THRESHOLD else ("", 1.0)
+    return next((each for each in LARGE_PREFIXES if abs(value) >= PREFIX_THRESHOLD * each[1]), small)
 
 
-def said(value: float, measure: str) -> str:
+def format_force(value: float, measure: str) -> str:
     """A force (N) or a couple (N m) with its unit: 46.65 kN."""
-    prefix, by = prefixed(value)
+    prefix, by = choose_prefix(value)
     return f"{value / by:.4g} {prefix}{measure}".replace("-", "−")
 
 
-def raised(written: str) -> str:
+def printed_unit(unit_name: str) -> str:
     """A unit as it is printed: m/s²."""
-    return written.replace("^2", "²")
+    return unit_name.replace("^2", "²")
 
 
-def given(text: str) -> Scale:
+def parse_scale(text: str) -> Scale:
     """A scale as a reader writes it: "1 cm = 0.1 m/s", of lengths also "1:5" or "2:1". Raises BadInput."""
     ratio = re.fullmatch(r"\s*([0-9.]+)\s*:\s*([0-9.]+)\s*", text)
     try:
@@ -101,8 +103,8 @@ def given(text: str) -> Scale:
             if not equals:
                 raise UnitError(f'{text!r} is not of the form "1 cm = 100 mm", "1 cm = 0.1 m/s" or "1:5"')
             written = re.sub(r"^[\s0-9.eE+-]+", "", right).strip()
-            kind = unit(written).kind
-            per_mm = quantity(right.strip(), kind) / (1e3 * quantity(left.strip(), "length"))
+            kind = parse_unit(written).kind
+            per_mm = parse_quantity(right.strip(), kind) / (1e3 * parse_quantity(left.strip(), "length"))
     except (UnitError, ZeroDivisionError, ValueError) as problem:
         raise BadInput("scale", f"{problem}") from None
     if not 0.0 < per_mm < 1e12:
@@ -110,11 +112,11 @@ def given(text: str) -> Scale:
     return Scale(kind, per_mm, written)
 
 
-def scales(texts: str | Sequence[str] | None, kinds: Sequence[str] = tuple(SYMBOLS)) -> dict[str, Scale]:
+def parse_scales(texts: str | Sequence[str] | None, kinds: Sequence[str] = tuple(SCALE_SYMBOLS)) -> dict[str, Scale]:
     """Scales as a reader writes them, by the kind of quantity that each measures. Raises BadInput for other kinds."""
     found: dict[str, Scale] = {}
     for text in [texts] if isinstance(texts, str) else texts or ():
-        scale = given(text)
+        scale = parse_scale(text)
         if scale.kind not in kinds:
             raise BadInput("scale", f"this drawing has a scale of {' and of '.join(kinds)}, not of {scale.kind}")
         if scale.kind in found:

@@ -10,41 +10,41 @@ from planar.analysis.polygons.construction import acceleration_polygon, velocity
 from planar.drawing.paper import scales as paper
 from planar.drawing.paper.picture import Picture, extent
 from planar.drawing.polygons.polygon import polygon_picture
+from planar.drawing.scheme.scheme import plain_frames, space_scale
 from planar.drawing.scheme.scheme import scheme as scheme_picture
-from planar.drawing.scheme.scheme import space_scale, standing
-from planar.foundation.units import own
+from planar.foundation.units import unit_of_kind
 from planar.results.motion import State
 
-Scales = str | Sequence[str] | None
+ScaleTexts = str | Sequence[str] | None
 """Scales as a reader writes them, each for what its unit measures: "1 cm = 100 mm", "1:5", "1 cm = 0.1 m/s"."""
-PANEL = (80.0, 80.0)
+PANEL_SIZE = (80.0, 80.0)
 """mm on paper for each of several drawings in a row of a sheet of A4."""
 
 
-def panels(state: State, scales: Scales, many: int) -> list[Picture]:
+def polygon_panels(state: State, scales: ScaleTexts, count: int) -> list[Picture]:
     """Space diagram, velocity polygon and acceleration polygon, the first of them, each small enough for a row."""
-    given = paper.scales(scales, ("length", "velocity", "acceleration")[:many])
+    given = paper.parse_scales(scales, ("length", "velocity", "acceleration")[:count])
     space = given.get("length")
     if space is None:
-        whole = space_scale(state.mechanism, standing(state.frames), state.shapes)
-        width, height = _size(scheme_picture(state, whole))
-        space = paper.fitting("length", whole.unit, width * whole.per_mm, height * whole.per_mm, PANEL)
-    pictures = [scheme_picture(state, space)._replace(title="Space diagram", notes=_scales(space))]
-    for polygon in (velocity_polygon(state), acceleration_polygon(state))[: many - 1]:
+        whole = space_scale(state.mechanism, plain_frames(state.frames), state.shapes)
+        width, height = _picture_size(scheme_picture(state, whole))
+        space = paper.round_scale("length", whole.unit, width * whole.per_mm, height * whole.per_mm, PANEL_SIZE)
+    pictures = [scheme_picture(state, space)._replace(title="Space diagram", notes=_scale_notes(space))]
+    for polygon in (velocity_polygon(state), acceleration_polygon(state))[: count - 1]:
         spread = np.ptp([(0.0, 0.0), *polygon.letters.values()], axis=0)
-        unit = own(polygon.kind, state.mechanism.units)[0]
-        fits = given.get(polygon.kind) or paper.fitting(polygon.kind, unit, *map(float, spread), PANEL)
+        unit = unit_of_kind(polygon.kind, state.mechanism.units)[0]
+        fits = given.get(polygon.kind) or paper.round_scale(polygon.kind, unit, *map(float, spread), PANEL_SIZE)
         drawn = polygon_picture(polygon, fits)
-        rest = tuple(note for note in drawn.notes[1:] if note not in _scales(fits))
+        rest = tuple(note for note in drawn.notes[1:] if note not in _scale_notes(fits))
         title = f"{polygon.kind} polygon".capitalize()
-        pictures.append(drawn._replace(title=title, notes=(*_scales(fits), *rest)))
+        pictures.append(drawn._replace(title=title, notes=(*_scale_notes(fits), *rest)))
     return pictures
 
 
-def _scales(scale: paper.Scale) -> tuple[str, str]:
-    return str(scale), scale.mu
+def _scale_notes(scale: paper.Scale) -> tuple[str, str]:
+    return str(scale), scale.calculating_scale
 
 
-def _size(picture: Picture) -> tuple[float, float]:
+def _picture_size(picture: Picture) -> tuple[float, float]:
     low, high = extent(picture.marks)
     return high[0] - low[0], high[1] - low[1]

@@ -6,16 +6,16 @@ from collections.abc import Iterator, Mapping
 from itertools import combinations
 from math import hypot
 
-from planar.drawing.labels.placement import SAME
-from planar.drawing.paper.picture import Letter, Line, Mark, Pen, Picture, Spot, extent, spot
-from planar.drawing.paper.scales import Scale, fitting
+from planar.drawing.labels.placement import SAME_POINT_TOLERANCE
+from planar.drawing.paper.picture import Label, Mark, PaperPoint, Pen, Picture, Polyline, extent, paper_point
+from planar.drawing.paper.scales import Scale, round_scale
 from planar.drawing.scheme import symbols
 from planar.drawing.scheme.link_bodies import all_marks
-from planar.drawing.scheme.scheme import CROWDED, scheme, scheme_scale, standing
+from planar.drawing.scheme.scheme import CROWDED_PIN_DISTANCE, plain_frames, scheme, scheme_scale
 from planar.foundation.geometry import Vector
 from planar.model.mechanism import named_points
-from planar.model.pairs.symbols import Block, Pin
-from planar.model.wording import listed
+from planar.model.pairs.symbols import PinMark, SliderMark
+from planar.model.wording import join_all_names
 from planar.results.motion import State
 
 APART = 24.0
@@ -46,15 +46,15 @@ def scheme_with_details(state: State, scale: Scale | None = None) -> list[Pictur
     pictures = []
     for names, places, nearest in _clusters(points, chosen):
         apart = min(APART, LARGEST * usual.on_paper(nearest))
-        larger = fitting("length", state.mechanism.units.length, nearest, nearest, (apart, apart))
+        larger = round_scale("length", state.mechanism.units.length, nearest, nearest, (apart, apart))
         by = chosen.per_mm / larger.per_mm
         window = _window(places, larger.per_mm)
         wide = max(b - a for a, b in zip(*window, strict=True)) * larger.per_mm
         if by <= 1.0 or wide > most or len(pictures) == MOST:
             continue
-        title = f"Detail: {listed(names)}"
-        (left, low_), (right, up) = (spot(Vector(*corner) * (1.0 / by)) for corner in window)
-        frames.append(Line(((left, low_), (right, low_), (right, up), (left, up)), Pen.CIRCLE, title, closed=True))
+        title = f"Detail: {join_all_names(names)}"
+        (left, low_), (right, up) = (paper_point(Vector(*corner) * (1.0 / by)) for corner in window)
+        frames.append(Polyline(((left, low_), (right, low_), (right, up), (left, up)), Pen.CIRCLE, title, closed=True))
         marks = tuple(mark for mark in scheme(state, larger).marks if _meets(mark, window))
         pictures.append(Picture(marks, title, (str(larger),), window))
     return [whole._replace(marks=(*whole.marks, *frames)), *pictures]
@@ -62,17 +62,17 @@ def scheme_with_details(state: State, scale: Scale | None = None) -> list[Pictur
 
 def _symbols(state: State) -> dict[str, tuple[Vector, float]]:
     """The place (m) of every pin and block by its point's name, and how far its symbol reaches (mm)."""
-    frames, found = standing(state.frames), {}
+    frames, found = plain_frames(state.frames), {}
     marks = all_marks(state.mechanism, state.shapes)
-    pins = {mark.name for mark in marks if isinstance(mark, Pin)}
-    blocks = {mark.name for mark in marks if isinstance(mark, Block)}
-    riders = {pair.rides()[0] for pair in state.mechanism.pairs if pair.name in blocks and pair.rides()}
+    pins = {mark.name for mark in marks if isinstance(mark, PinMark)}
+    blocks = {mark.name for mark in marks if isinstance(mark, SliderMark)}
+    riders = {pair.point_on_line()[0] for pair in state.mechanism.pairs if pair.name in blocks and pair.point_on_line()}
     for each in named_points(state.mechanism):
         block = not riders.isdisjoint(each.members)
         if block or each.name in pins:
             link, point = each.members[0]
-            reach = hypot(*symbols.BLOCK) / 2.0 if block else CROWDED / 2.0
-            found[each.name] = frames[link].carry(state.shapes[link].at(point)), reach
+            reach = hypot(*symbols.BLOCK_SIZE) / 2.0 if block else CROWDED_PIN_DISTANCE / 2.0
+            found[each.name] = frames[link].to_world(state.shapes[link].position(point)), reach
     return found
 
 
@@ -83,7 +83,7 @@ def _clusters(
     near: dict[tuple[str, str], float] = {}
     for (one, (a, reach)), (other, (b, far)) in combinations(points.items(), 2):
         apart = hypot(*(a - b))
-        if SAME < scale.on_paper(apart) < reach + far:
+        if SAME_POINT_TOLERANCE < scale.on_paper(apart) < reach + far:
             near[one, other] = apart
     left = set(near)
     for first in sorted(near, key=lambda pair: near[pair]):
@@ -97,7 +97,7 @@ def _clusters(
         yield names, [points[name][0] for name in names], near[first]
 
 
-def _window(places: list[Vector], per_mm: float) -> tuple[Spot, Spot]:
+def _window(places: list[Vector], per_mm: float) -> tuple[PaperPoint, PaperPoint]:
     """The corners of what is shown of a scheme with so many metres to a millimetre."""
     xs, ys = zip(*places, strict=True)
     return (
@@ -106,9 +106,9 @@ def _window(places: list[Vector], per_mm: float) -> tuple[Spot, Spot]:
     )
 
 
-def _meets(mark: Mark, window: tuple[Spot, Spot]) -> bool:
+def _meets(mark: Mark, window: tuple[PaperPoint, PaperPoint]) -> bool:
     """Whether a mark is to be seen in a window; letters by their spots, rates of inputs only in the whole drawing."""
-    if isinstance(mark, Letter) and mark.about.startswith("input "):
+    if isinstance(mark, Label) and mark.about.startswith("input "):
         return False
     (left, low), (right, up) = window
     (a, b), (c, d) = extent([mark])

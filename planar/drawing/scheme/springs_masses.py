@@ -6,14 +6,14 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from planar.dynamics.load_attachment import attachments
-from planar.dynamics.load_validation import check
+from planar.dynamics.load_validation import check_loads
 from planar.foundation.geometry import Vector
-from planar.model.link_graph import numbered
-from planar.model.link_shapes import Shape
+from planar.model.link_graph import link_numbers
+from planar.model.link_shapes import LinkShape
 from planar.model.loads import Mass, Spring
 from planar.model.mechanism import Mechanism, named_points
 
-LOWERED = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
+SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
 
 class Coil(NamedTuple):
@@ -40,7 +40,7 @@ class Spiral(NamedTuple):
     symbol: str
 
 
-class Centre(NamedTuple):
+class MassCentreMark(NamedTuple):
     """A centre of mass, with the letter that it has where no point of the link has its name there."""
 
     name: str
@@ -49,36 +49,38 @@ class Centre(NamedTuple):
     letter: str
 
 
-Element = Coil | Spiral | Centre
+SpringMassMark = Coil | Spiral | MassCentreMark
 
 
-def elements(mechanism: Mechanism, shapes: Mapping[str, Shape]) -> Iterator[Element]:
+def spring_mass_marks(mechanism: Mechanism, shapes: Mapping[str, LinkShape]) -> Iterator[SpringMassMark]:
     """What is drawn of a mechanism's springs and masses. Raises BadInput where they are none of its own."""
     if not (mechanism.springs or mechanism.masses):
         return
-    check(mechanism)
+    check_loads(mechanism)
     where = attachments(mechanism)
     for number, spring in enumerate(mechanism.springs, start=1):
         symbol = ("both" if spring.damping else "spring") if spring.stiffness or not spring.damping else "damper"
-        if spring.turns:
-            yield _spiral(mechanism, shapes, spring, f"spring {number}", symbol)
+        if spring.is_torsional:
+            yield _torsion_spring_mark(mechanism, shapes, spring, f"spring {number}", symbol)
         else:
             ends = [where[end] for end in spring.ends]
-            first, second = (shapes[each.link].at(each.point) for each in ends)
+            first, second = (shapes[each.link].position(each.point) for each in ends)
             yield Coil(f"spring {number}", (ends[0].link, ends[1].link), (first, second), symbol)
     masses = [mass for mass in mechanism.masses if mass.mass]
-    letters = _letters(mechanism, masses)
+    letters = _mass_centre_letters(mechanism, masses)
     for mass, letter in zip(masses, letters, strict=True):
-        yield Centre(f"mass of {mass.link}", mass.link, shapes[mass.link].at(mass.at), letter)
+        yield MassCentreMark(f"mass of {mass.link}", mass.link, shapes[mass.link].position(mass.at), letter)
 
 
-def _spiral(mechanism: Mechanism, shapes: Mapping[str, Shape], spring: Spring, name: str, symbol: str) -> Spiral:
+def _torsion_spring_mark(
+    mechanism: Mechanism, shapes: Mapping[str, LinkShape], spring: Spring, name: str, symbol: str
+) -> Spiral:
     """Where the two links meet in a point, else at the first point of the second."""
     first, second = spring.ends
     met = [dict(each.members) for each in named_points(mechanism)]
     at = next((each for each in met if first in each and second in each), {})
     own = at.get(second) or next(iter(shapes[second].points), None)
-    place = Vector(0.0, 0.0) if own is None else shapes[second].at(own)
+    place = Vector(0.0, 0.0) if own is None else shapes[second].position(own)
 
     def way(link: str) -> Vector:
         """From the pin to another point of the link, else along its axis."""
@@ -89,15 +91,15 @@ def _spiral(mechanism: Mechanism, shapes: Mapping[str, Shape], spring: Spring, n
     return Spiral(name, (first, second), second, place, (way(first), way(second)), spring.free, symbol)
 
 
-def _letters(mechanism: Mechanism, masses: list[Mass]) -> list[str]:
+def _mass_centre_letters(mechanism: Mechanism, masses: list[Mass]) -> list[str]:
     """G for a centre at no named point, with its link's number where there are several; primes on one link."""
     spots = [mass.link for mass in masses if not isinstance(mass.at, str)]
     plain = len(spots) == 1 and "G" not in {each.name for each in named_points(mechanism)}
-    number, seen, found = numbered(mechanism), dict.fromkeys(spots, 0), []
+    number, seen, found = link_numbers(mechanism), dict.fromkeys(spots, 0), []
     for mass in masses:
         if isinstance(mass.at, str):
             found.append("")
             continue
-        found.append("G" if plain else f"G{number[mass.link].translate(LOWERED)}{'′' * seen[mass.link]}")
+        found.append("G" if plain else f"G{number[mass.link].translate(SUBSCRIPTS)}{'′' * seen[mass.link]}")
         seen[mass.link] += 1
     return found

@@ -1,50 +1,50 @@
 """Input laws in time: motions of a cam's timing diagram, one after the other."""
 
 from planar.model.input_laws.cam_rises import (
-    Cycloidal,
-    Harmonic,
-    ModifiedTrapezoidal,
-    Polynomial345,
-    Polynomial4567,
-    Trapezoidal,
+    CycloidalRise,
+    HarmonicRise,
+    ModifiedTrapezoidalRise,
+    Polynomial345Rise,
+    Polynomial4567Rise,
+    TrapezoidalRise,
 )
-from planar.model.input_laws.constant_rates import ConstantAcceleration, ConstantSpeed, Dwell
-from planar.model.input_laws.input_law import Joint, Law
-from planar.model.input_laws.segment import MOST, Key, Piece
-from planar.model.input_laws.spline_table import Table
+from planar.model.input_laws.constant_rates import ConstantAccelerationSegment, ConstantSpeedSegment, DwellSegment
+from planar.model.input_laws.input_law import InputLaw, SegmentJoint
+from planar.model.input_laws.segment import MAX_LAW_ITEMS, LawSegment, SegmentKey
+from planar.model.input_laws.spline_table import TableSegment
 
-MOTIONS: dict[str, type[Piece]] = {
+SEGMENT_TYPES: dict[str, type[LawSegment]] = {
     kind.motion: kind
     for kind in (
-        Dwell,
-        ConstantSpeed,
-        ConstantAcceleration,
-        Polynomial345,
-        Polynomial4567,
-        Cycloidal,
-        Harmonic,
-        Trapezoidal,
-        ModifiedTrapezoidal,
-        Table,
+        DwellSegment,
+        ConstantSpeedSegment,
+        ConstantAccelerationSegment,
+        Polynomial345Rise,
+        Polynomial4567Rise,
+        CycloidalRise,
+        HarmonicRise,
+        TrapezoidalRise,
+        ModifiedTrapezoidalRise,
+        TableSegment,
     )
 }
 """Every motion of a piece, by its name in files."""
 
 __all__ = [
-    "MOST",
-    "MOTIONS",
-    "ConstantAcceleration",
-    "ConstantSpeed",
-    "Cycloidal",
-    "Dwell",
-    "Harmonic",
-    "Joint",
-    "Key",
-    "Law",
-    "ModifiedTrapezoidal",
-    "Piece",
-    "Polynomial345",
-    "Polynomial4567",
-    "Table",
-    "Trapezoidal",
+    "MAX_LAW_ITEMS",
+    "SEGMENT_TYPES",
+    "ConstantAccelerationSegment",
+    "ConstantSpeedSegment",
+    "CycloidalRise",
+    "DwellSegment",
+    "HarmonicRise",
+    "InputLaw",
+    "LawSegment",
+    "ModifiedTrapezoidalRise",
+    "Polynomial345Rise",
+    "Polynomial4567Rise",
+    "SegmentJoint",
+    "SegmentKey",
+    "TableSegment",
+    "TrapezoidalRise",
 ]

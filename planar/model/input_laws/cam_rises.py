@@ -15,11 +15,11 @@ from typing import ClassVar
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from planar.model.input_laws.segment import Array, Key, Piece
+from planar.model.input_laws.segment import Array, LawSegment, SegmentKey
 
 
 @dataclass(frozen=True)
-class Rise(Piece):
+class CamRise(LawSegment):
     """A way `by` from rest to rest.
 
     All rises here are symmetric, s(1 - x) = 1 - s(x): the first half says all, and both ends are exact.
@@ -27,77 +27,80 @@ class Rise(Piece):
 
     duration: float
     by: float
-    keys: ClassVar[Mapping[str, Key]] = {"by": Key("by", "position"), "in": Key("duration", "time")}
+    keys: ClassVar[Mapping[str, SegmentKey]] = {
+        "by": SegmentKey("by", "position"),
+        "in": SegmentKey("duration", "time"),
+    }
 
     @abstractmethod
-    def half(self, x: Array, back: Array) -> Array:
+    def first_half(self, x: Array, is_mirrored: Array) -> Array:
         """(4, n): s and its derivatives by x, for x (n,) between 0 and 1/2.
 
         Where a derivative jumps, it is what follows; what went before where `back` says so.
         """
 
-    def at(self, t: Array, velocity: float) -> Array:
+    def evaluate(self, t: Array, velocity: float) -> Array:
         x = t / self.duration
         back = x > 0.5
-        s = self.half(np.where(back, 1.0 - x, x), back)
+        s = self.first_half(np.where(back, 1.0 - x, x), back)
         s[0] = np.where(back, 1.0 - s[0], s[0])
         s[2] = np.where(back, -s[2], s[2])
         return s * (self.by / self.duration ** np.arange(4.0))[:, None]
 
-    def ends(self, velocity: float) -> tuple[float, float]:
+    def end_displacement_and_velocity(self, velocity: float) -> tuple[float, float]:
         return self.by, 0.0
 
-    def starts(self, velocity: float) -> float:
+    def start_velocity(self, velocity: float) -> float:
         return 0.0
 
 
-class PolynomialRise(Rise):
+class PolynomialRise(CamRise):
     """A polynomial in x."""
 
     coefficients: ClassVar[tuple[int, ...]]
 
-    def half(self, x: Array, back: Array) -> Array:
+    def first_half(self, x: Array, is_mirrored: Array) -> Array:
         s = Polynomial(self.coefficients)
         return np.stack([s.deriv(k)(x) for k in range(4)])
 
 
-class Polynomial345(PolynomialRise):
+class Polynomial345Rise(PolynomialRise):
     """3-4-5: velocity and acceleration are zero at both ends. Greatest 1.875, 5.7735, 60 times by / duration^k."""
 
     motion = "3-4-5"
     coefficients = (0, 0, 0, 10, -15, 6)
 
 
-class Polynomial4567(PolynomialRise):
+class Polynomial4567Rise(PolynomialRise):
     """4-5-6-7: jerk is zero at both ends too. Greatest 2.1875, 7.5132, 52.5 times by / duration^k."""
 
     motion = "4-5-6-7"
     coefficients = (0, 0, 0, 0, 35, -84, 70, -20)
 
 
-class Cycloidal(Rise):
+class CycloidalRise(CamRise):
     """Cycloidal: acceleration is a full sine. Greatest 2, 2 pi, 4 pi^2 times by / duration^k."""
 
     motion = "cycloidal"
 
-    def half(self, x: Array, back: Array) -> Array:
+    def first_half(self, x: Array, is_mirrored: Array) -> Array:
         turn = 2.0 * pi
         c, s = np.cos(turn * x), np.sin(turn * x)
         return np.stack([x - s / turn, 2.0 * np.sin(pi * x) ** 2, turn * s, turn**2 * c])
 
 
-class Harmonic(Rise):
+class HarmonicRise(CamRise):
     """Simple harmonic: half a cosine, so acceleration jumps at both ends. Greatest pi/2, pi^2/2, pi^3/2."""
 
     motion = "harmonic"
 
-    def half(self, x: Array, back: Array) -> Array:
+    def first_half(self, x: Array, is_mirrored: Array) -> Array:
         c, s = np.cos(pi * x), np.sin(pi * x)
         return np.stack([np.sin(0.5 * pi * x) ** 2, 0.5 * pi * s, 0.5 * pi**2 * c, -0.5 * pi**3 * s])
 
 
 @dataclass(frozen=True)
-class Ramped(Rise):
+class RampedRise(CamRise):
     """Acceleration that comes up in a ramp, stays, goes down in a ramp, and does the same the other way.
 
     Each of the four ramps takes the part `ramp` of the time, 1/4 at most: the two ramps to the opposite
@@ -105,65 +108,65 @@ class Ramped(Rise):
     """
 
     ramp: float = 0.125
-    keys: ClassVar[Mapping[str, Key]] = Rise.keys | {"ramp": Key("ramp", "number", needed=False)}
-    filling: ClassVar[float]
+    keys: ClassVar[Mapping[str, SegmentKey]] = CamRise.keys | {"ramp": SegmentKey("ramp", "number", is_required=False)}
+    ramp_mean: ClassVar[float]
     "the mean of acceleration over a ramp, of its greatest"
 
     @abstractmethod
-    def up(self, x: Array) -> Array:
+    def ramp_integrals(self, x: Array) -> Array:
         """(4, n): what acceleration sums to within a ramp, of height and length one: s, v, a, j over x (n,)."""
 
-    def half(self, x: Array, back: Array) -> Array:
+    def first_half(self, x: Array, is_mirrored: Array) -> Array:
         b = self.ramp
         # v(1/2) = a (1/2 - 2 b + 2 b filling), and s(1/2) = v(1/2) / 4 = 1/2
-        a = 2.0 / (0.5 - 2.0 * b + 2.0 * b * self.filling)
+        a = 2.0 / (0.5 - 2.0 * b + 2.0 * b * self.ramp_mean)
         scale = (a * b ** np.array([2.0, 1.0, 0.0, -1.0]))[:, None]
         flat_from, flat_to = b, 0.5 - b
 
         def passed(edge: float) -> Array:
-            return np.where(back, x > edge, x >= edge)
+            return np.where(is_mirrored, x > edge, x >= edge)
 
-        rising = self.up(np.minimum(x, flat_from) / b) * scale
-        s0, v0 = (self.up(np.ones(1)) * scale)[:2, 0]
+        rising = self.ramp_integrals(np.minimum(x, flat_from) / b) * scale
+        s0, v0 = (self.ramp_integrals(np.ones(1)) * scale)[:2, 0]
         u = np.clip(x - flat_from, 0.0, flat_to - flat_from)
         flat = np.stack([s0 + (v0 + 0.5 * a * u) * u, v0 + a * u, np.full_like(u, a), np.zeros_like(u)])
         # downwards, counted back from the middle: s = 1/2 - v(1/2) y + what a ramp upwards sums to over y
         y = np.clip(0.5 - x, 0.0, b)
-        s, v, up, jerk = self.up(y / b) * scale
+        s, v, up, jerk = self.ramp_integrals(y / b) * scale
         falling = np.stack([0.5 - 2.0 * y + s, 2.0 - v, up, -jerk])
         return np.where(passed(flat_to), falling, np.where(passed(flat_from), flat, rising))
 
-    def problem(self) -> tuple[str, str] | None:
-        found = super().problem()
+    def find_problem(self) -> tuple[str, str] | None:
+        found = super().find_problem()
         if found is None and not 0.001 <= self.ramp <= 0.25:
             told = "each of the four ramps takes a part of the time from 0.001 to 0.25"
             return "ramp", f"{told}, not {float(self.ramp):g}"
         return found
 
 
-class Trapezoidal(Ramped):
+class TrapezoidalRise(RampedRise):
     """Trapezoidal acceleration: straight ramps, so jerk is constant piece by piece.
 
     With ramps of 1/8: greatest 2, 16/3, 128/3 times by / duration^k.
     """
 
     motion = "trapezoidal"
-    filling = 0.5
+    ramp_mean = 0.5
 
-    def up(self, x: Array) -> Array:
+    def ramp_integrals(self, x: Array) -> Array:
         return np.stack([x**3 / 6.0, x**2 / 2.0, x, np.ones_like(x)])
 
 
-class ModifiedTrapezoidal(Ramped):
+class ModifiedTrapezoidalRise(RampedRise):
     """Modified trapezoid: ramps are quarters of a sine (C. N. Neklutin, 1952); with ramps of 1/4 it is cycloidal.
 
     With ramps of 1/8: greatest 2, 4.888, 61.43 times by / duration^k.
     """
 
     motion = "modified trapezoidal"
-    filling = 2.0 / pi
+    ramp_mean = 2.0 / pi
 
-    def up(self, x: Array) -> Array:
+    def ramp_integrals(self, x: Array) -> Array:
         w = 0.5 * pi
         c, s = np.cos(w * x), np.sin(w * x)
         return np.stack([x / w - s / w**2, 2.0 * np.sin(0.5 * w * x) ** 2 / w, s, w * c])

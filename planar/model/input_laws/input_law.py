@@ -11,49 +11,49 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.model.input_laws.segment import MOST, Array, Piece
-from planar.model.input_laws.spline_table import Table
+from planar.model.input_laws.segment import MAX_LAW_ITEMS, Array, LawSegment
+from planar.model.input_laws.spline_table import TableSegment
 
 
-class Joint(NamedTuple):
+class SegmentJoint(NamedTuple):
     """Where a piece starts, or where the last one ends: the velocity there of what ends, and of what starts."""
 
     time: float
     position: float
-    ending: float
-    starting: float
+    velocity_before: float
+    velocity_after: float
 
 
 @dataclass(frozen=True)
-class Law:
+class InputLaw:
     """Pieces of motion from t = 0 on, as in a cam's timing diagram (s, m, rad)."""
 
-    pieces: tuple[Piece, ...]
+    segments: tuple[LawSegment, ...]
 
     @cached_property
-    def times(self) -> tuple[float, ...]:
+    def joint_times(self) -> tuple[float, ...]:
         """When each piece starts, and when the last ends; each sum is rounded once."""
         return tuple(
-            map(float, accumulate((Fraction(float(each.duration)) for each in self.pieces), initial=Fraction(0)))
+            map(float, accumulate((Fraction(float(each.duration)) for each in self.segments), initial=Fraction(0)))
         )
 
     @property
     def duration(self) -> float:
         """When the last piece ends (s)."""
-        return self.times[-1]
+        return self.joint_times[-1]
 
-    def joints(self, position: float, velocity: float) -> tuple[Joint, ...]:
+    def joints(self, position: float, velocity: float) -> tuple[SegmentJoint, ...]:
         """The start of every piece, and the end, of an input that starts at this position and velocity."""
         return tuple(self._joints(position, velocity))
 
-    def _joints(self, position: float, velocity: float) -> Iterator[Joint]:
-        for time, piece in zip(self.times, self.pieces, strict=False):
-            yield Joint(time, position, velocity, piece.starts(velocity))
-            way, velocity = piece.ends(velocity)
+    def _joints(self, position: float, velocity: float) -> Iterator[SegmentJoint]:
+        for time, piece in zip(self.joint_times, self.segments, strict=False):
+            yield SegmentJoint(time, position, velocity, piece.start_velocity(velocity))
+            way, velocity = piece.end_displacement_and_velocity(velocity)
             position += way
-        yield Joint(self.duration, position, velocity, velocity)
+        yield SegmentJoint(self.duration, position, velocity, velocity)
 
-    def at(self, t: Array, position: float, velocity: float) -> Array:
+    def evaluate(self, t: Array, position: float, velocity: float) -> Array:
         """(4, n): position, velocity, acceleration and jerk at times t (n,), from this position and velocity on.
 
         At a joint, rates are those of the piece that starts there; at the very end, those of the last. After it the
@@ -61,36 +61,36 @@ class Law:
         """
         t = np.atleast_1d(np.asarray(t, dtype=float))
         joints = self.joints(position, velocity)
-        index = np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self.pieces) - 1)
+        index = np.clip(np.searchsorted(self.joint_times, t, side="right") - 1, 0, len(self.segments) - 1)
         found = np.zeros((4, len(t)))
         order = np.argsort(index, kind="stable")
         for rows in np.split(order, np.flatnonzero(np.diff(index[order])) + 1) if len(t) else ():
             i = index[rows[0]]
-            piece = self.pieces[i]
+            piece = self.segments[i]
             # at the end of the last piece it is its own time that counts, not the difference of two rounded ones
-            own = np.where(t[rows] >= self.times[i + 1], piece.duration, t[rows] - self.times[i])
-            found[:, rows] = piece.at(np.clip(own, 0.0, piece.duration), joints[i].ending)
+            own = np.where(t[rows] >= self.joint_times[i + 1], piece.duration, t[rows] - self.joint_times[i])
+            found[:, rows] = piece.evaluate(np.clip(own, 0.0, piece.duration), joints[i].velocity_before)
             found[0, rows] += joints[i].position
         for rows, joint in ((t < 0.0, joints[0]), (t > self.duration, joints[-1])):
             found[:, rows] = 0.0
-            found[0, rows] = joint.position + joint.ending * (t[rows] - joint.time)
-            found[1, rows] = joint.ending
+            found[0, rows] = joint.position + joint.velocity_before * (t[rows] - joint.time)
+            found[1, rows] = joint.velocity_before
         return found
 
-    def started(self, position: float, velocity: float) -> Law:
+    def start_at(self, position: float, velocity: float) -> InputLaw:
         """The law for an input that starts here: tables, whose positions are absolute, move to where they start."""
         pieces = []
-        for joint, piece in zip(self.joints(position, velocity), self.pieces, strict=False):
-            lies = not isinstance(piece, Table) or piece.begins(joint.position)
-            pieces.append(piece if lies else piece.moved(joint.position))
-        return Law(tuple(pieces))
+        for joint, piece in zip(self.joints(position, velocity), self.segments, strict=False):
+            lies = not isinstance(piece, TableSegment) or piece.starts_at(joint.position)
+            pieces.append(piece if lies else piece.shift_to(joint.position))
+        return InputLaw(tuple(pieces))
 
-    def problem(self) -> tuple[str, str] | None:
+    def find_problem(self) -> tuple[str, str] | None:
         """The place within the law that cannot be meant, such as "[1].in", and why."""
-        if not 1 <= len(self.pieces) <= MOST:
-            return "", f"a law has from 1 to {MOST} pieces, not {len(self.pieces)}"
-        for i, piece in enumerate(self.pieces):
-            wrong = piece.problem()
+        if not 1 <= len(self.segments) <= MAX_LAW_ITEMS:
+            return "", f"a law has from 1 to {MAX_LAW_ITEMS} pieces, not {len(self.segments)}"
+        for i, piece in enumerate(self.segments):
+            wrong = piece.find_problem()
             if wrong is not None:
                 return f"[{i}].{wrong[0]}", wrong[1]
         return None

@@ -12,25 +12,25 @@ import numpy as np
 
 Array = np.ndarray
 
-SHORTEST, LONGEST = 1e-9, 1e9
+SHORTEST_DURATION, LONGEST_DURATION = 1e-9, 1e9
 """s: what a piece takes at least and at most, so that no rate of it overflows."""
-MOST = 10_000
+MAX_LAW_ITEMS = 10_000
 """Pieces of one law, and points of one table."""
 
 
-class Key(NamedTuple):
+class SegmentKey(NamedTuple):
     """A key of a piece in a file: the field that it fills, and what its value is.
 
     `what` is "time", "number", or what of the input it is: "position", "velocity", "acceleration".
     """
 
     field: str
-    what: str
-    needed: bool = True
-    many: bool = False
+    value_kind: str
+    is_required: bool = True
+    is_list: bool = False
 
 
-class Piece(ABC):
+class LawSegment(ABC):
     """One motion of an input, from the place that it has reached on.
 
     Frozen dataclasses; `motion` is the name in files. All times are in s from where the piece starts, lengths in m,
@@ -38,25 +38,25 @@ class Piece(ABC):
     """
 
     motion: ClassVar[str]
-    keys: ClassVar[Mapping[str, Key]]
+    keys: ClassVar[Mapping[str, SegmentKey]]
     duration: float
 
     @abstractmethod
-    def at(self, t: Array, velocity: float) -> Array:
+    def evaluate(self, t: Array, velocity: float) -> Array:
         """(4, n): the way from where the piece starts, and its three rates, at times (n,) within the piece.
 
         `velocity` is that at which the piece before ended.
         """
 
     @abstractmethod
-    def ends(self, velocity: float) -> tuple[float, float]:
+    def end_displacement_and_velocity(self, velocity: float) -> tuple[float, float]:
         """The whole way, and the velocity in the end."""
 
     @abstractmethod
-    def starts(self, velocity: float) -> float:
+    def start_velocity(self, velocity: float) -> float:
         """The velocity with which the piece starts."""
 
-    def problem(self) -> tuple[str, str] | None:
+    def find_problem(self) -> tuple[str, str] | None:
         """The key whose value cannot be meant, and why."""
         for key, (field, _, _, many) in self.keys.items():
             value = getattr(self, field)
@@ -67,8 +67,11 @@ class Piece(ABC):
                     return place, f"a finite number is wanted here, not {each!r:.40}"
         if "in" in self.keys and not self.duration > 0.0:
             return "in", f"a time above zero is wanted here, not {float(self.duration):g} s"
-        if "in" in self.keys and not SHORTEST <= self.duration <= LONGEST:
-            return "in", f"a piece takes from {SHORTEST:g} s to {LONGEST:g} s, not {float(self.duration):g} s"
+        if "in" in self.keys and not SHORTEST_DURATION <= self.duration <= LONGEST_DURATION:
+            return (
+                "in",
+                f"a piece takes from {SHORTEST_DURATION:g} s to {LONGEST_DURATION:g} s, not {float(self.duration):g} s",
+            )
         return None
 
 

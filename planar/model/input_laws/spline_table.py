@@ -9,19 +9,26 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from planar.model.input_laws.segment import LONGEST, MOST, SHORTEST, Array, Key, Piece
+from planar.model.input_laws.segment import (
+    LONGEST_DURATION,
+    MAX_LAW_ITEMS,
+    SHORTEST_DURATION,
+    Array,
+    LawSegment,
+    SegmentKey,
+)
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
-DEGREE = 5
+SPLINE_DEGREE = 5
 """Of the spline: its fourth derivative goes on at every point, so acceleration and jerk are smooth."""
-CLOSE = 1e-6
+POSITION_TOLERANCE = 1e-6
 """By what part of its size a table may start beside where the piece starts: positions are rounded in print."""
 
 
 @dataclass(frozen=True)
-class Table(Piece):
+class TableSegment(LawSegment):
     """`positions` at `times`, which start at 0, and the spline through them (C. de Boor, A Practical Guide to
     Splines, Springer 2001, ch. XIII: not a knot at the ends).
 
@@ -32,9 +39,9 @@ class Table(Piece):
     times: tuple[float, ...]
     positions: tuple[float, ...]
     motion: ClassVar[str] = "table"
-    keys: ClassVar[Mapping[str, Key]] = {
-        "times": Key("times", "time", many=True),
-        "positions": Key("positions", "position", many=True),
+    keys: ClassVar[Mapping[str, SegmentKey]] = {
+        "times": SegmentKey("times", "time", is_list=True),
+        "positions": SegmentKey("positions", "position", is_list=True),
     }
 
     @property
@@ -48,64 +55,69 @@ class Table(Piece):
 
         x = np.array(self.times, dtype=float) / self.duration
         way = np.array(self.positions, dtype=float) - self.positions[0]
-        degree = min(DEGREE, len(x) - 1)
+        degree = min(SPLINE_DEGREE, len(x) - 1)
         spline = make_interp_spline(x, way, k=degree)
         return tuple(spline.derivative(k) if k else spline for k in range(min(degree, 3) + 1))
 
-    def at(self, t: Array, velocity: float) -> Array:
+    def evaluate(self, t: Array, velocity: float) -> Array:
         x = t / self.duration
         found = np.zeros((4, len(t)))
         for k, spline in enumerate(self.splines):
             found[k] = spline(x) / self.duration**k
         return found
 
-    def ends(self, velocity: float) -> tuple[float, float]:
-        rate = self.at(np.array([self.duration]), velocity)[1, 0]
+    def end_displacement_and_velocity(self, velocity: float) -> tuple[float, float]:
+        rate = self.evaluate(np.array([self.duration]), velocity)[1, 0]
         return self.positions[-1] - self.positions[0], float(rate)
 
-    def starts(self, velocity: float) -> float:
-        return float(self.at(np.zeros(1), velocity)[1, 0])
+    def start_velocity(self, velocity: float) -> float:
+        return float(self.evaluate(np.zeros(1), velocity)[1, 0])
 
-    def begins(self, position: float) -> bool:
+    def starts_at(self, position: float) -> bool:
         """Whether its first position is this one."""
         first = self.positions[0]
-        return abs(first - position) <= CLOSE * max(
+        return abs(first - position) <= POSITION_TOLERANCE * max(
             abs(first), abs(position), max(self.positions) - min(self.positions)
         )
 
-    def moved(self, position: float) -> Table:
+    def shift_to(self, position: float) -> TableSegment:
         """The same table with its first position here."""
         shift = position - self.positions[0]
         return replace(self, positions=(position, *(each + shift for each in self.positions[1:])))
 
-    def problem(self) -> tuple[str, str] | None:
-        return super().problem() or self._unpaired() or self._unordered() or self._unsmooth()
+    def find_problem(self) -> tuple[str, str] | None:
+        return (
+            super().find_problem()
+            or self._find_count_problem()
+            or self._find_order_problem()
+            or self._find_smoothness_problem()
+        )
 
-    def _unpaired(self) -> tuple[str, str] | None:
-        if not 2 <= len(self.times) <= MOST:
-            return "times", f"a table has from 2 to {MOST} points, not {len(self.times)}"
+    def _find_count_problem(self) -> tuple[str, str] | None:
+        if not 2 <= len(self.times) <= MAX_LAW_ITEMS:
+            return "times", f"a table has from 2 to {MAX_LAW_ITEMS} points, not {len(self.times)}"
         if len(self.positions) != len(self.times):
             told = f"there are {len(self.times)} times, so {len(self.times)} positions are wanted"
             return "positions", f"{told}, not {len(self.positions)}"
         return None
 
-    def _unordered(self) -> tuple[str, str] | None:
+    def _find_order_problem(self) -> tuple[str, str] | None:
         if self.times[0] != 0.0:
             return "times[0]", f"times start at 0, where the piece starts, not at {float(self.times[0]):g} s"
         for i, (before, after) in enumerate(zip(self.times, self.times[1:], strict=False), start=1):
-            if not after - before >= SHORTEST:
-                told = f"times increase, by {SHORTEST:g} s at least, but"
+            if not after - before >= SHORTEST_DURATION:
+                told = f"times increase, by {SHORTEST_DURATION:g} s at least, but"
                 return f"times[{i}]", f"{told} {float(after):.9g} s comes after {float(before):.9g} s"
-        if self.duration > LONGEST:
-            return "times", f"a piece takes {LONGEST:g} s at most, not {float(self.duration):g} s"
+        if self.duration > LONGEST_DURATION:
+            return "times", f"a piece takes {LONGEST_DURATION:g} s at most, not {float(self.duration):g} s"
         return None
 
-    def _unsmooth(self) -> tuple[str, str] | None:
+    def _find_smoothness_problem(self) -> tuple[str, str] | None:
         try:
             found = self.splines[0](np.array(self.times) / self.duration)
         except (ValueError, ArithmeticError, np.linalg.LinAlgError):
             found = np.array([np.nan])
         way = np.array(self.positions, dtype=float) - self.positions[0]
-        if not np.max(np.abs(found - way)) <= CLOSE * np.max(np.abs(way)):
+        if not np.max(np.abs(found - way)) <= POSITION_TOLERANCE * np.max(np.abs(way)):
             return "times", "the times lie too unevenly for a smooth curve through all points"
         return None

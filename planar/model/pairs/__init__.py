@@ -6,9 +6,18 @@ from importlib import import_module
 from inspect import isabstract
 from pkgutil import iter_modules
 
-from planar.model.pairs.base import Entry, Kind, Pair, Quantity, Rewritten, Sample
+from planar.model.pairs.base import EntryReader, ExpandedEntry, MeasureKind, Pair, PairSample, QuantityWriter
 
-__all__ = ["Entry", "Kind", "Pair", "Quantity", "Rewritten", "Sample", "joining", "pair_types"]
+__all__ = [
+    "EntryReader",
+    "ExpandedEntry",
+    "MeasureKind",
+    "Pair",
+    "PairSample",
+    "QuantityWriter",
+    "joining_entry_text",
+    "pair_types",
+]
 
 
 @cache
@@ -19,7 +28,7 @@ def pair_types() -> dict[str, type[Pair]]:
     return {kind.keyword: kind for kind in types if issubclass(kind, Pair) and not isabstract(kind)}
 
 
-def joining(point: str) -> str:
+def joining_entry_text(point: str) -> str:
     """The entry of a file, as JSON, that joins all links which carry a point of this name."""
-    entry = next(filter(None, (kind.joining(point) for kind in pair_types().values())))
+    entry = next(filter(None, (kind.joining_entry(point) for kind in pair_types().values())))
     return json.dumps(entry, ensure_ascii=False)

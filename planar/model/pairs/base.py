@@ -10,14 +10,14 @@ from typing import Any, ClassVar, NamedTuple, Protocol, Self
 
 from planar.foundation.geometry import Frame, Vector
 from planar.foundation.jets import Scalar
-from planar.model.link_shapes import Shape
-from planar.model.pairs.symbols import Mark
+from planar.model.link_shapes import LinkShape
+from planar.model.pairs.symbols import DrawingMark
 
-Told = Callable[[float], str]
+LengthFormatter = Callable[[float], str]
 """Says an SI number in the units of a file."""
 
 
-class Kind(Enum):
+class MeasureKind(Enum):
     """What a number or an equation measures, and so how it scales and closes."""
 
     LENGTH = "length"
@@ -43,29 +43,29 @@ class Pair(ABC):
 
     keyword: ClassVar[str]
     """The key that marks the type in a mechanism file."""
-    members: ClassVar[Mapping[str, Schema]]
+    entry_schemas: ClassVar[Mapping[str, Schema]]
     """The other keys of its entry, each with what JSON Schema says of its value."""
-    required: ClassVar[tuple[str, ...]] = ()
+    required_keys: ClassVar[tuple[str, ...]] = ()
     """Those of the keys that cannot be left out."""
-    rule: ClassVar[Schema] = {}
+    entry_rule: ClassVar[Schema] = {}
     """What JSON Schema says of the keys together."""
-    lower: ClassVar[bool]
+    is_lower_pair: ClassVar[bool]
     """Whether the links touch along a surface; higher pairs touch at a point or along a line."""
-    at_a_distance: ClassVar[bool] = False
+    acts_at_distance: ClassVar[bool] = False
     """Whether something runs between the two links, which do not touch themselves."""
-    touching: ClassVar[str] = ""
+    open_contact_hint: ClassVar[str] = ""
     """What to know of a contact that is open, see `apart`."""
     counts_turns: ClassVar[bool] = False
     """Whether the angles of its bodies count whole turns."""
-    constrains: ClassVar[tuple[Kind, ...]]
+    residual_kinds: ClassVar[tuple[MeasureKind, ...]]
     """What each entry of the residual measures."""
-    coordinates: ClassVar[tuple[tuple[str, Kind], ...]] = ()
+    coordinate_kinds: ClassVar[tuple[tuple[str, MeasureKind], ...]] = ()
     """Coordinates of its own that the residual needs beside the two frames."""
-    measures: ClassVar[tuple[Kind, ...]]
+    number_kinds: ClassVar[tuple[MeasureKind, ...]]
     """What each number that `measure` takes from the two shapes is."""
-    reports: ClassVar[Mapping[str, str]]
+    result_kinds: ClassVar[Mapping[str, str]]
     """The names of its results, in order, and the kind of quantity that each is."""
-    drive_kind: ClassVar[Kind]
+    input_kind: ClassVar[MeasureKind]
     """Whether its input is an angle or a length."""
     ties_angles: ClassVar[bool] = False
     """Whether it ties angles alone: what holds it are couples, whatever forces they come from (see `contact`)."""
@@ -76,7 +76,7 @@ class Pair(ABC):
         return self.links
 
     @abstractmethod
-    def measure(self, shapes: Sequence[Shape]) -> Sequence[Scalar]:
+    def measure(self, shapes: Sequence[LinkShape]) -> Sequence[Scalar]:
         """The numbers of the bodies that the residual needs (m, rad)."""
 
     @abstractmethod
@@ -84,81 +84,83 @@ class Pair(ABC):
         """Zero where the pair is closed, an entry per constraint."""
 
     @abstractmethod
-    def drive(self, frames: Sequence[Frame], numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Scalar:
+    def input_position(self, frames: Sequence[Frame], numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Scalar:
         """The relative motion that an input here prescribes (rad or m)."""
 
     @abstractmethod
-    def report(self, position: Scalar, rate: Scalar, second: Scalar) -> dict[str, Scalar | None]:
+    def results(self, position: Scalar, rate: Scalar, second: Scalar) -> dict[str, Scalar | None]:
         """Its results by name, from its drive and the drive's derivatives (SI), numbers or arrays."""
 
-    def coincident(self) -> tuple[tuple[str, str], ...]:
+    def coincident_points(self) -> tuple[tuple[str, str], ...]:
         """The (link, point) that lie on one another in this pair, so that they bear its name."""
         return ()
 
-    def rides(self) -> tuple[tuple[str, str], str] | None:
+    def point_on_line(self) -> tuple[tuple[str, str], str] | None:
         """((link, point), link): a point of one link that moves along a line of another, if it does."""
         return None
 
-    def effort(self, frames: Mapping[str, Frame], shapes: Mapping[str, Shape]) -> Effort:
+    def effort_action(self, frames: Mapping[str, Frame], shapes: Mapping[str, LinkShape]) -> EffortAction:
         """How an effort of its drive acts."""
-        return Effort(self.links[1], self.links[0])
+        return EffortAction(self.links[1], self.links[0])
 
-    def contact(
-        self, frames: Mapping[str, Frame], shapes: Mapping[str, Shape], beside: Sequence[Pair]
-    ) -> Contact | None:
+    def tooth_contact(
+        self, frames: Mapping[str, Frame], shapes: Mapping[str, LinkShape], all_pairs: Sequence[Pair]
+    ) -> ToothContact | None:
         """Where its teeth touch, beside all pairs of its mechanism; None without teeth, or where that is not known."""
         return None
 
-    def marks(self, shapes: Mapping[str, Shape], beside: Sequence[Pair]) -> tuple[Mark, ...]:
+    def drawing_marks(self, shapes: Mapping[str, LinkShape], all_pairs: Sequence[Pair]) -> tuple[DrawingMark, ...]:
         """How it is drawn, beside all pairs of its mechanism; nothing where its sizes cannot be known."""
         return ()
 
-    def sizes_told(self, length: Told) -> str:
+    def describe_sizes(self, format_length: LengthFormatter) -> str:
         """What else defines it, in words for a reader; empty where its links and points say all."""
         return ""
 
-    def ahead(self, drive: float) -> bool:
+    def is_intended_assembly(self, drive: float) -> bool:
         """Whether this is the assembly that an author means who says nothing (a slide ahead of `through`)."""
         return True
 
     @classmethod
-    def holds(cls) -> int:
+    def prevented_motion_count(cls) -> int:
         """How many of the three relative motions of two links it prevents."""
-        return len(cls.constrains) - len(cls.coordinates)
+        return len(cls.residual_kinds) - len(cls.coordinate_kinds)
 
     @classmethod
-    def driven(cls) -> tuple[str, str, str]:
+    def input_quantity_kinds(cls) -> tuple[str, str, str]:
         """The kinds of quantity of an input's position, velocity and acceleration."""
-        if cls.drive_kind is Kind.LENGTH:
+        if cls.input_kind is MeasureKind.LENGTH:
             return "length", "velocity", "acceleration"
         return "angle", "angular velocity", "angular acceleration"
 
-    def misfit(self, beside: Sequence[Pair], shapes: Mapping[str, Shape], length: Told) -> str | None:
+    def find_misfit(
+        self, all_pairs: Sequence[Pair], shapes: Mapping[str, LinkShape], format_length: LengthFormatter
+    ) -> str | None:
         """What is wrong with it beside all pairs of its mechanism, as a sentence."""
         return None
 
-    def apart(self, numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Scalar:
+    def contact_gap(self, numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Scalar:
         """The gap (m) at a contact that other pairs have to keep closed."""
         return 0.0
 
     @classmethod
-    def rewrite(cls, entry: Entry) -> Rewritten | None:
+    def expand_short_form(cls, entry: EntryReader) -> ExpandedEntry | None:
         """A short form of the entry in full; None where it is no short form."""
         return None
 
     @classmethod
-    def joining(cls, point: str) -> dict[str, Any] | None:
+    def joining_entry(cls, point: str) -> dict[str, Any] | None:
         """The entry by which this type joins all links that carry a point of this name; None for one that does not."""
         return None
 
     @classmethod
     @abstractmethod
-    def read(cls, entry: Entry) -> tuple[Self, ...]:
+    def read(cls, entry: EntryReader) -> tuple[Self, ...]:
         """The pairs that one entry of a file describes."""
 
     @classmethod
     @abstractmethod
-    def write(cls, group: Sequence[Self], quantity: Quantity) -> dict[str, Any]:
+    def write(cls, group: Sequence[Self], quantity: QuantityWriter) -> dict[str, Any]:
         """The entry that describes the pairs which one entry was read into."""
 
     def entry_name(self) -> str:
@@ -166,29 +168,29 @@ class Pair(ABC):
         return self.name
 
     @classmethod
-    def motions(cls, group: Sequence[Self]) -> tuple[Self, ...]:
+    def relative_motions(cls, group: Sequence[Self]) -> tuple[Self, ...]:
         """Every relative motion of an entry's links that has a name, as pairs."""
         return tuple(group)
 
     @classmethod
     @abstractmethod
-    def samples(cls) -> tuple[Sample, ...]:
+    def samples(cls) -> tuple[PairSample, ...]:
         """Small closed configurations, in general position, on which every law is tried."""
 
 
-class Effort(NamedTuple):
+class EffortAction(NamedTuple):
     """How what drives a pair acts: on one link, and the opposite on another, in the positive sense of the drive.
 
     A couple, or a force at a place along a way (of length one), in the world's axes.
     """
 
-    on: str
-    against: str
-    at: Vector | None = None
-    way: Vector | None = None
+    link: str
+    reaction_link: str
+    point: Vector | None = None
+    direction: Vector | None = None
 
 
-class Contact(NamedTuple):
+class ToothContact(NamedTuple):
     """Where teeth of two links press on one another, in the world's axes.
 
     They touch at the pitch point `at`; of the force on the second link the part along `way` drives, and `slope` times
@@ -196,13 +198,13 @@ class Contact(NamedTuple):
     pressure angle.
     """
 
-    at: Vector
-    way: Vector
-    apart: Vector
-    slope: float
+    pitch_point: Vector
+    drive_direction: Vector
+    separation_direction: Vector
+    pressure_tangent: float
 
 
-class Rewritten(NamedTuple):
+class ExpandedEntry(NamedTuple):
     """A short entry in full, the links that it brings, and the entry of the pair that is to join these.
 
     Where the file has an entry of that type and name already, the links are added to it instead.
@@ -210,48 +212,48 @@ class Rewritten(NamedTuple):
 
     entry: dict[str, Any]
     links: dict[str, Any]
-    joined_by: dict[str, Any]
+    joining_entry: dict[str, Any]
 
 
-class Sample(NamedTuple):
+class PairSample(NamedTuple):
     """A pair closed between its bodies, which are called a, b, c, with everything that its formulas need."""
 
     pair: Pair
-    shapes: tuple[Shape, ...]
+    shapes: tuple[LinkShape, ...]
     frames: tuple[Frame, ...]
     own: tuple[float, ...]
     entry: dict[str, Any]
     """The pair as a file has it."""
-    beside: tuple[dict[str, Any], ...] = ()
+    other_entries: tuple[dict[str, Any], ...] = ()
     """Entries of other pairs without which it would be refused."""
 
 
-def plain(**points: Vector) -> Shape:
+def sample_shape(**points: Vector) -> LinkShape:
     """A link of a sample, with these points in its own axes."""
-    return Shape(points, Vector(0.0, 0.0), Vector(1.0, 0.0))
+    return LinkShape(points, Vector(0.0, 0.0), Vector(1.0, 0.0))
 
 
 Schema = Mapping[str, Any]
 """What JSON Schema says of a value."""
 
 
-def described(name: str) -> Schema:
+def schema_reference(name: str) -> Schema:
     """The schema of a kind of value that several entries have, such as "length" or "point"."""
     return {"$ref": f"#/$defs/{name}"}
 
 
-def several(item: str, least: int, most: int | None = None) -> Schema:
+def list_schema(item: str, least: int, most: int | None = None) -> Schema:
     """The schema of a list of so many values of one kind."""
-    return {"type": "array", "items": described(item), "minItems": least} | ({"maxItems": most} if most else {})
+    return {"type": "array", "items": schema_reference(item), "minItems": least} | ({"maxItems": most} if most else {})
 
 
-class Quantity(Protocol):
+class QuantityWriter(Protocol):
     """Writes an SI number in the units of a file."""
 
     def __call__(self, value: float, kind: str) -> float | str: ...
 
 
-class Entry(Protocol):
+class EntryReader(Protocol):
     """An object of a mechanism file under a reader that knows its place and units."""
 
     @property
@@ -264,7 +266,7 @@ class Entry(Protocol):
     def number(self, key: str) -> float:
         """A number without a unit."""
 
-    def only(self, *keys: str) -> None:
+    def check_keys(self, *keys: str) -> None:
         """Refuse any key but these."""
 
     def name(self, key: str) -> str:
@@ -285,25 +287,25 @@ class Entry(Protocol):
     def quantities(self, key: str, kind: str, count: int) -> tuple[float, ...]:
         """So many numbers in SI."""
 
-    def counts(self, key: str, count: int) -> tuple[float, ...]:
+    def whole_numbers(self, key: str, count: int) -> tuple[float, ...]:
         """So many whole numbers."""
 
-    def turned(self, key: str) -> float:
+    def counted_angle(self, key: str) -> float:
         """An angle (rad) that may count turns, not so many that nothing is left of the angle."""
 
     def flag(self, key: str) -> bool:
         """True or false; false where the key is left out."""
 
-    def carriers(self, point: str) -> tuple[str, ...]:
+    def links_with_point(self, point: str) -> tuple[str, ...]:
         """All links that carry a point of this name, the frame first."""
 
     def point(self, key: str, link: str) -> str:
         """A point that the link carries."""
 
-    def carried(self, point: str, link: str, key: str) -> None:
+    def check_point_on_link(self, point: str, link: str, key: str) -> None:
         """Refuse, at the key, a point that the link does not carry."""
 
-    def place(self, key: str, link: str) -> str | tuple[float, float]:
+    def point_reference(self, key: str, link: str) -> str | tuple[float, float]:
         """A point of the link by name, or by coordinates."""
 
     def fields(self) -> Mapping[str, Any]:
@@ -312,13 +314,13 @@ class Entry(Protocol):
     def link(self, key: str) -> str:
         """A link of the mechanism."""
 
-    def distinct(
+    def check_distinct_points(
         self, key: str, link: str, first: str | tuple[float, float], second: str | tuple[float, float]
     ) -> None:
         """Refuse, at the key, two places of a link that coincide."""
 
-    def inside(self, key: str) -> Entry:
+    def object_at(self, key: str) -> EntryReader:
         """The object under this key."""
 
-    def refuse(self, key: str | None, sentence: str) -> Exception:
+    def error_at(self, key: str | None, sentence: str) -> Exception:
         """The error that says this of the place."""

@@ -9,27 +9,27 @@ from typing import Any, ClassVar, Self
 
 from planar.foundation.geometry import Frame, Vector, direction, frame_at
 from planar.foundation.jets import Scalar
-from planar.model.link_shapes import Shape
+from planar.model.link_shapes import LinkShape
 from planar.model.pairs.base import (
-    Contact,
-    Entry,
-    Kind,
+    EntryReader,
+    LengthFormatter,
+    MeasureKind,
     Pair,
-    Quantity,
-    Sample,
+    PairSample,
+    QuantityWriter,
     Schema,
-    Told,
-    described,
-    plain,
-    several,
+    ToothContact,
+    list_schema,
+    sample_shape,
+    schema_reference,
 )
-from planar.model.pairs.guide_line import LINE, MEASURES, Guided, Line, along
-from planar.model.pairs.symbols import Mark, PitchLine, Wheel
-from planar.model.pairs.teeth import PRESSURE_ANGLE, TEETH, read_pressure_angle, write_pressure_angle
+from planar.model.pairs.guide_line import LINE_NUMBER_KINDS, LINE_SCHEMA, GuidedPair, LinkLine, point_along_line
+from planar.model.pairs.symbols import DrawingMark, PitchLineMark, WheelMark
+from planar.model.pairs.teeth import STANDARD_PRESSURE_ANGLE, TEETH_SCHEMA, read_pressure_angle, write_pressure_angle
 
 
 @dataclass(frozen=True)
-class Rack(Guided):
+class RackPair(GuidedPair):
     """The pitch line of the first link, on which the second link rolls about its `point` with `radius` (m).
 
     The radius is positive where the centre lies to the left of the line, negative to the right. At displacement
@@ -38,99 +38,106 @@ class Rack(Guided):
     """
 
     radius: float
-    meet: tuple[float, float] = (0.0, 0.0)
-    pressure_angle: float = PRESSURE_ANGLE
+    mesh_reference: tuple[float, float] = (0.0, 0.0)
+    pressure_angle: float = STANDARD_PRESSURE_ANGLE
 
     keyword: ClassVar[str] = "rack"
-    members: ClassVar[Mapping[str, Schema]] = {
-        "links": several("name", 2, 2) | {"uniqueItems": True},
-        "line": LINE,
-        "point": described("name"),
-        "radius": {**described("length"), "not": {"const": 0}},
+    entry_schemas: ClassVar[Mapping[str, Schema]] = {
+        "links": list_schema("name", 2, 2) | {"uniqueItems": True},
+        "line": LINE_SCHEMA,
+        "point": schema_reference("name"),
+        "radius": {**schema_reference("length"), "not": {"const": 0}},
         "mesh": {
             "type": "object",
-            "properties": {"displacement": described("length"), "angle": described("angle")},
+            "properties": {"displacement": schema_reference("length"), "angle": schema_reference("angle")},
             "required": ["displacement", "angle"],
             "additionalProperties": False,
         },
-        **TEETH,
+        **TEETH_SCHEMA,
     }
-    required: ClassVar[tuple[str, ...]] = ("links", "line", "point", "radius")
-    touching: ClassVar[str] = "the centre lies left of the line for a radius above zero, right for one below"
-    lower: ClassVar[bool] = False
+    required_keys: ClassVar[tuple[str, ...]] = ("links", "line", "point", "radius")
+    open_contact_hint: ClassVar[str] = "the centre lies left of the line for a radius above zero, right for one below"
+    is_lower_pair: ClassVar[bool] = False
     counts_turns: ClassVar[bool] = True
-    constrains: ClassVar[tuple[Kind, ...]] = (Kind.LENGTH, Kind.LENGTH, Kind.LENGTH)
-    coordinates: ClassVar[tuple[tuple[str, Kind], ...]] = (("displacement", Kind.LENGTH), ("distance", Kind.LENGTH))
-    measures: ClassVar[tuple[Kind, ...]] = (*MEASURES, *(Kind.LENGTH,) * 4, Kind.TURNS)
+    residual_kinds: ClassVar[tuple[MeasureKind, ...]] = (MeasureKind.LENGTH, MeasureKind.LENGTH, MeasureKind.LENGTH)
+    coordinate_kinds: ClassVar[tuple[tuple[str, MeasureKind], ...]] = (
+        ("displacement", MeasureKind.LENGTH),
+        ("distance", MeasureKind.LENGTH),
+    )
+    number_kinds: ClassVar[tuple[MeasureKind, ...]] = (
+        *LINE_NUMBER_KINDS,
+        *(MeasureKind.LENGTH,) * 4,
+        MeasureKind.TURNS,
+    )
 
-    def measure(self, shapes: Sequence[Shape]) -> Sequence[Scalar]:
+    def measure(self, shapes: Sequence[LinkShape]) -> Sequence[Scalar]:
         rack, pinion = shapes
-        return (*self.line.measure(rack), *pinion.at(self.point), self.radius, *self.meet)
+        return (*self.line.measure_line(rack), *pinion.position(self.point), self.radius, *self.mesh_reference)
 
     def residual(self, frames: Sequence[Frame], numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Sequence[Scalar]:
         rack, pinion = frames
         displacement, distance = own
         radius, s0, a0 = numbers[6:9]
-        off = pinion.carry(Vector(*numbers[4:6])) - along(rack, numbers, displacement, distance)
+        off = pinion.to_world(Vector(*numbers[4:6])) - point_along_line(rack, numbers, displacement, distance)
         # no slip: rolling on along the line with the centre on its left is turning clockwise
         return (*off, displacement - s0 + (pinion.angle - rack.angle - a0) * radius)
 
-    def sizes_told(self, length: Told) -> str:
-        return f"pitch radius {length(abs(self.radius))}"
+    def describe_sizes(self, format_length: LengthFormatter) -> str:
+        return f"pitch radius {format_length(abs(self.radius))}"
 
-    def apart(self, numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Scalar:
+    def contact_gap(self, numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Scalar:
         return own[1] - numbers[6]
 
-    def contact(
-        self, frames: Mapping[str, Frame], shapes: Mapping[str, Shape], beside: Sequence[Pair]
-    ) -> Contact | None:
+    def tooth_contact(
+        self, frames: Mapping[str, Frame], shapes: Mapping[str, LinkShape], all_pairs: Sequence[Pair]
+    ) -> ToothContact | None:
         """Where the pitch circle touches the pitch line."""
         rack, pinion = self.links
-        _, along_line = self._guide(shapes)
-        way = frames[rack].turn(along_line)
+        _, along_line = self._line_in_link(shapes)
+        way = frames[rack].rotate_to_world(along_line)
         left = Vector(-way.y, way.x) * (1.0 if self.radius > 0.0 else -1.0)
-        centre = frames[pinion].carry(shapes[pinion].at(self.point))
-        return Contact(centre - left * abs(self.radius), way, left, tan(self.pressure_angle))
+        centre = frames[pinion].to_world(shapes[pinion].position(self.point))
+        return ToothContact(centre - left * abs(self.radius), way, left, tan(self.pressure_angle))
 
-    def marks(self, shapes: Mapping[str, Shape], beside: Sequence[Pair]) -> tuple[Mark, ...]:
+    def drawing_marks(self, shapes: Mapping[str, LinkShape], all_pairs: Sequence[Pair]) -> tuple[DrawingMark, ...]:
         rack, pinion = self.links
-        wheel = Wheel(self.name, pinion, shapes[pinion].at(self.point), abs(self.radius))
-        return wheel, PitchLine(self.name, rack, *self._guide(shapes), wheel)
+        wheel = WheelMark(self.name, pinion, shapes[pinion].position(self.point), abs(self.radius))
+        return wheel, PitchLineMark(self.name, rack, *self._line_in_link(shapes), wheel)
 
     @classmethod
-    def read(cls, entry: Entry) -> tuple[Rack, ...]:
-        entry.only(cls.keyword, *cls.members)
+    def read(cls, entry: EntryReader) -> tuple[RackPair, ...]:
+        entry.check_keys(cls.keyword, *cls.entry_schemas)
         name, links = entry.name("rack"), entry.two_links("links")
-        line = Line.read(entry, "line", links[0])
+        line = LinkLine.read(entry, "line", links[0])
         point, radius = entry.point("point", links[1]), entry.quantity("radius", "length")
         if radius == 0.0:
-            raise entry.refuse("radius", "zero is no radius of a pinion")
+            raise entry.error_at("radius", "zero is no radius of a pinion")
         meet = (0.0, 0.0)
         if entry.has("mesh"):
-            mesh = entry.inside("mesh")
-            mesh.only("displacement", "angle")
-            meet = (mesh.quantity("displacement", "length"), mesh.turned("angle"))
+            mesh = entry.object_at("mesh")
+            mesh.check_keys("displacement", "angle")
+            meet = (mesh.quantity("displacement", "length"), mesh.counted_angle("angle"))
         return (cls(name, links, line, point, radius, meet, read_pressure_angle(entry)),)
 
     @classmethod
-    def write(cls, group: Sequence[Self], quantity: Quantity) -> dict[str, Any]:
+    def write(cls, group: Sequence[Self], quantity: QuantityWriter) -> dict[str, Any]:
         (pair,) = group
         entry = {"rack": pair.name, "links": list(pair.links), "line": pair.line.write(quantity), "point": pair.point}
         entry["radius"] = quantity(pair.radius, "length")
-        if pair.meet != (0.0, 0.0):
-            s0, a0 = pair.meet
+        if pair.mesh_reference != (0.0, 0.0):
+            s0, a0 = pair.mesh_reference
             entry["mesh"] = {"displacement": quantity(s0, "length"), "angle": quantity(a0, "angle")}
         return entry | write_pressure_angle(pair.pressure_angle, quantity)
 
     @classmethod
-    def samples(cls) -> tuple[Sample, ...]:
-        def sample(angle: float, radius: float, meet: tuple[float, float], turn: float, rack: Frame) -> Sample:
+    def samples(cls) -> tuple[PairSample, ...]:
+        def sample(angle: float, radius: float, meet: tuple[float, float], turn: float, rack: Frame) -> PairSample:
             through, point = Vector(0.2, 0.5), Vector(-0.3, 0.1)
             slide = meet[0] - radius * (turn - meet[1])
             line = direction(angle)
-            centre = rack.carry(through + line * slide + Vector(-line.y, line.x) * radius)
+            centre = rack.to_world(through + line * slide + Vector(-line.y, line.x) * radius)
             pinion = frame_at(0.0, 0.0, rack.angle + turn)
-            at = centre - pinion.turn(point)
+            at = centre - pinion.rotate_to_world(point)
             entry: dict[str, Any] = {
                 "rack": "R",
                 "links": ["a", "b"],
@@ -140,9 +147,9 @@ class Rack(Guided):
             }
             if meet != (0.0, 0.0):
                 entry["mesh"] = {"displacement": meet[0], "angle": meet[1]}
-            return Sample(
-                cls("R", ("a", "b"), Line("P", None, angle), "Q", radius, meet),
-                (plain(P=through), plain(Q=point)),
+            return PairSample(
+                cls("R", ("a", "b"), LinkLine("P", None, angle), "Q", radius, meet),
+                (sample_shape(P=through), sample_shape(Q=point)),
                 (rack, frame_at(at.x, at.y, pinion.angle)),
                 (slide, radius),
                 entry,

@@ -9,107 +9,116 @@ from typing import Any, ClassVar, Self
 
 from planar.foundation.geometry import Frame, Vector, direction, frame_at
 from planar.foundation.jets import Scalar
-from planar.model.link_shapes import Shape
+from planar.model.link_shapes import LinkShape
 from planar.model.pairs.base import (
-    Entry,
-    Kind,
+    EntryReader,
+    ExpandedEntry,
+    MeasureKind,
     Pair,
-    Quantity,
-    Rewritten,
-    Sample,
+    PairSample,
+    QuantityWriter,
     Schema,
-    described,
-    plain,
-    several,
+    list_schema,
+    sample_shape,
+    schema_reference,
 )
-from planar.model.pairs.guide_line import LINE, MEASURES, Guided, Line, along
-from planar.model.pairs.symbols import Block, Guide, Mark
+from planar.model.pairs.guide_line import LINE_NUMBER_KINDS, LINE_SCHEMA, GuidedPair, LinkLine, point_along_line
+from planar.model.pairs.symbols import DrawingMark, GuideMark, SliderMark
 
 
 @dataclass(frozen=True)
-class Sliding(Guided):
+class SlidingPair(GuidedPair):
     """A line of the first link, on which `point` of the second stays.
 
     `turn` (rad) is the fixed angle from the line to the second link's x-axis.
     """
 
-    turn: float = 0.0
+    block_angle: float = 0.0
 
     keyword: ClassVar[str] = "sliding"
-    members: ClassVar[Mapping[str, Schema]] = {
-        "links": several("name", 2, 2) | {"uniqueItems": True},
-        "on": described("name"),
-        "block": described("name"),
-        "line": LINE,
-        "point": described("name"),
-        "turn": described("angle"),
+    entry_schemas: ClassVar[Mapping[str, Schema]] = {
+        "links": list_schema("name", 2, 2) | {"uniqueItems": True},
+        "on": schema_reference("name"),
+        "block": schema_reference("name"),
+        "line": LINE_SCHEMA,
+        "point": schema_reference("name"),
+        "turn": schema_reference("angle"),
     }
-    required: ClassVar[tuple[str, ...]] = ("line",)
-    rule: ClassVar[Schema] = {
+    required_keys: ClassVar[tuple[str, ...]] = ("line",)
+    entry_rule: ClassVar[Schema] = {
         "oneOf": [
             {"required": ["on", "block"], "not": {"anyOf": [{"required": ["links"]}, {"required": ["point"]}]}},
             {"required": ["links", "point"], "not": {"anyOf": [{"required": ["on"]}, {"required": ["block"]}]}},
         ]
     }
-    lower: ClassVar[bool] = True
-    constrains: ClassVar[tuple[Kind, ...]] = (Kind.LENGTH, Kind.LENGTH, Kind.ANGLE)
-    measures: ClassVar[tuple[Kind, ...]] = (*MEASURES, Kind.LENGTH, Kind.LENGTH, Kind.ANGLE)
+    is_lower_pair: ClassVar[bool] = True
+    residual_kinds: ClassVar[tuple[MeasureKind, ...]] = (MeasureKind.LENGTH, MeasureKind.LENGTH, MeasureKind.ANGLE)
+    number_kinds: ClassVar[tuple[MeasureKind, ...]] = (
+        *LINE_NUMBER_KINDS,
+        MeasureKind.LENGTH,
+        MeasureKind.LENGTH,
+        MeasureKind.ANGLE,
+    )
 
-    def measure(self, shapes: Sequence[Shape]) -> Sequence[Scalar]:
+    def measure(self, shapes: Sequence[LinkShape]) -> Sequence[Scalar]:
         first, second = shapes
-        return (*self.line.measure(first), *second.at(self.point), self.line.angle_on(first) + self.turn)
+        return (
+            *self.line.measure_line(first),
+            *second.position(self.point),
+            self.line.direction_angle(first) + self.block_angle,
+        )
 
     def residual(self, frames: Sequence[Frame], numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Sequence[Scalar]:
         first, second = frames
-        off = second.carry(Vector(*numbers[4:6])) - along(first, numbers, own[0])
+        off = second.to_world(Vector(*numbers[4:6])) - point_along_line(first, numbers, own[0])
         return (*off, second.angle - first.angle - numbers[6])
 
-    def marks(self, shapes: Mapping[str, Shape], beside: Sequence[Pair]) -> tuple[Mark, ...]:
+    def drawing_marks(self, shapes: Mapping[str, LinkShape], all_pairs: Sequence[Pair]) -> tuple[DrawingMark, ...]:
         guide, block = self.links
-        through, way = self._guide(shapes)
-        along_block = direction(-self.turn)  # the line's way, seen from the second link
+        through, way = self._line_in_link(shapes)
+        along_block = direction(-self.block_angle)  # the line's way, seen from the second link
         return (
-            Guide(self.name, guide, through, way),
-            Block(self.name, block, shapes[block].at(self.point), along_block, guide),
+            GuideMark(self.name, guide, through, way),
+            SliderMark(self.name, block, shapes[block].position(self.point), along_block, guide),
         )
 
     @classmethod
-    def rewrite(cls, entry: Entry) -> Rewritten | None:
+    def expand_short_form(cls, entry: EntryReader) -> ExpandedEntry | None:
         """`"on": link, "block": point`: a block of its own, pinned at the point to the links that carry it."""
         if not entry.has("block"):
             if entry.has("on"):
-                raise entry.refuse("on", "'on' goes with a 'block'; without one name two 'links' and a 'point'")
+                raise entry.error_at("on", "'on' goes with a 'block'; without one name two 'links' and a 'point'")
             return None
-        entry.only("sliding", "on", "block", "line", "turn")
+        entry.check_keys("sliding", "on", "block", "line", "turn")
         on, point = entry.link("on"), entry.name("block")
-        if not entry.carriers(point):
-            raise entry.refuse("block", f"no link carries a point {point!r}, at which the block would be pinned")
+        if not entry.links_with_point(point):
+            raise entry.error_at("block", f"no link carries a point {point!r}, at which the block would be pinned")
         block = f"block {point}"
         full = {key: value for key, value in entry.fields().items() if key not in ("on", "block")}
         full |= {"links": [on, block], "point": point}
-        return Rewritten(full, {block: {"points": {point: [0, 0]}}}, {"turning": point})
+        return ExpandedEntry(full, {block: {"points": {point: [0, 0]}}}, {"turning": point})
 
     @classmethod
-    def read(cls, entry: Entry) -> tuple[Sliding, ...]:
-        entry.only(cls.keyword, *(key for key in cls.members if key not in ("on", "block")))
+    def read(cls, entry: EntryReader) -> tuple[SlidingPair, ...]:
+        entry.check_keys(cls.keyword, *(key for key in cls.entry_schemas if key not in ("on", "block")))
         name, links = entry.name("sliding"), entry.two_links("links")
-        line = Line.read(entry, "line", links[0])
+        line = LinkLine.read(entry, "line", links[0])
         return (cls(name, links, line, entry.point("point", links[1]), entry.quantity("turn", "angle", 0.0)),)
 
     @classmethod
-    def write(cls, group: Sequence[Self], quantity: Quantity) -> dict[str, Any]:
+    def write(cls, group: Sequence[Self], quantity: QuantityWriter) -> dict[str, Any]:
         (pair,) = group
         entry = {"sliding": pair.name, "links": list(pair.links), "line": pair.line.write(quantity)}
         entry["point"] = pair.point
-        if pair.turn != 0.0:
-            entry["turn"] = quantity(pair.turn, "angle")
+        if pair.block_angle != 0.0:
+            entry["turn"] = quantity(pair.block_angle, "angle")
         return entry
 
     @classmethod
-    def samples(cls) -> tuple[Sample, ...]:
-        def sample(angle: float, turn: float, slide: float, first: Frame) -> Sample:
+    def samples(cls) -> tuple[PairSample, ...]:
+        def sample(angle: float, turn: float, slide: float, first: Frame) -> PairSample:
             through, point = Vector(0.2, 0.5), Vector(-0.3, 0.1)
-            pair = cls("slide", ("a", "b"), Line("P", None, angle), "Q", turn)
+            pair = cls("slide", ("a", "b"), LinkLine("P", None, angle), "Q", turn)
             entry = {
                 "sliding": "slide",
                 "links": ["a", "b"],
@@ -118,9 +127,9 @@ class Sliding(Guided):
                 "turn": turn,
             }
             second = frame_at(0.0, 0.0, first.angle + angle + turn)
-            meet = first.carry(through + direction(angle) * slide) - second.turn(point)
-            shapes = plain(P=through), plain(Q=point)
-            return Sample(pair, shapes, (first, frame_at(meet.x, meet.y, second.angle)), (slide,), entry)
+            meet = first.to_world(through + direction(angle) * slide) - second.rotate_to_world(point)
+            shapes = sample_shape(P=through), sample_shape(Q=point)
+            return PairSample(pair, shapes, (first, frame_at(meet.x, meet.y, second.angle)), (slide,), entry)
 
         return (
             sample(0.4, 1.1, 0.8, frame_at(0.1, 0.7, 0.6)),

@@ -8,71 +8,71 @@ from typing import Any, ClassVar, Self
 
 from planar.foundation.geometry import Frame, Vector, direction, frame_at
 from planar.foundation.jets import Scalar
-from planar.model.link_shapes import Shape
+from planar.model.link_shapes import LinkShape
 from planar.model.pairs.base import (
-    Entry,
-    Kind,
+    EntryReader,
+    MeasureKind,
     Pair,
-    Quantity,
-    Sample,
+    PairSample,
+    QuantityWriter,
     Schema,
-    described,
-    plain,
-    several,
+    list_schema,
+    sample_shape,
+    schema_reference,
 )
-from planar.model.pairs.guide_line import LINE, MEASURES, Guided, Line, along
-from planar.model.pairs.symbols import Mark, Opening
+from planar.model.pairs.guide_line import LINE_NUMBER_KINDS, LINE_SCHEMA, GuidedPair, LinkLine, point_along_line
+from planar.model.pairs.symbols import DrawingMark, SlotMark
 
 
 @dataclass(frozen=True)
-class Slot(Guided):
+class SlotPair(GuidedPair):
     """A slot along a line of the first link, in which a pin at `point` of the second link slides."""
 
     keyword: ClassVar[str] = "slot"
-    members: ClassVar[Mapping[str, Schema]] = {
-        "links": several("name", 2, 2) | {"uniqueItems": True},
-        "line": LINE,
-        "point": described("name"),
+    entry_schemas: ClassVar[Mapping[str, Schema]] = {
+        "links": list_schema("name", 2, 2) | {"uniqueItems": True},
+        "line": LINE_SCHEMA,
+        "point": schema_reference("name"),
     }
-    required: ClassVar[tuple[str, ...]] = ("links", "line", "point")
-    lower: ClassVar[bool] = False
-    constrains: ClassVar[tuple[Kind, ...]] = (Kind.LENGTH, Kind.LENGTH)
-    measures: ClassVar[tuple[Kind, ...]] = (*MEASURES, Kind.LENGTH, Kind.LENGTH)
+    required_keys: ClassVar[tuple[str, ...]] = ("links", "line", "point")
+    is_lower_pair: ClassVar[bool] = False
+    residual_kinds: ClassVar[tuple[MeasureKind, ...]] = (MeasureKind.LENGTH, MeasureKind.LENGTH)
+    number_kinds: ClassVar[tuple[MeasureKind, ...]] = (*LINE_NUMBER_KINDS, MeasureKind.LENGTH, MeasureKind.LENGTH)
 
-    def measure(self, shapes: Sequence[Shape]) -> Sequence[Scalar]:
+    def measure(self, shapes: Sequence[LinkShape]) -> Sequence[Scalar]:
         first, second = shapes
-        return (*self.line.measure(first), *second.at(self.point))
+        return (*self.line.measure_line(first), *second.position(self.point))
 
     def residual(self, frames: Sequence[Frame], numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Sequence[Scalar]:
         first, second = frames
-        return second.carry(Vector(*numbers[4:6])) - along(first, numbers, own[0])
+        return second.to_world(Vector(*numbers[4:6])) - point_along_line(first, numbers, own[0])
 
-    def marks(self, shapes: Mapping[str, Shape], beside: Sequence[Pair]) -> tuple[Mark, ...]:
+    def drawing_marks(self, shapes: Mapping[str, LinkShape], all_pairs: Sequence[Pair]) -> tuple[DrawingMark, ...]:
         slotted, pinned = self.links
-        return (Opening(self.name, slotted, *self._guide(shapes), pinned, shapes[pinned].at(self.point)),)
+        return (SlotMark(self.name, slotted, *self._line_in_link(shapes), pinned, shapes[pinned].position(self.point)),)
 
     @classmethod
-    def read(cls, entry: Entry) -> tuple[Slot, ...]:
-        entry.only(cls.keyword, *cls.members)
+    def read(cls, entry: EntryReader) -> tuple[SlotPair, ...]:
+        entry.check_keys(cls.keyword, *cls.entry_schemas)
         name, links = entry.name("slot"), entry.two_links("links")
-        return (cls(name, links, Line.read(entry, "line", links[0]), entry.point("point", links[1])),)
+        return (cls(name, links, LinkLine.read(entry, "line", links[0]), entry.point("point", links[1])),)
 
     @classmethod
-    def write(cls, group: Sequence[Self], quantity: Quantity) -> dict[str, Any]:
+    def write(cls, group: Sequence[Self], quantity: QuantityWriter) -> dict[str, Any]:
         (pair,) = group
         line = pair.line.write(quantity)
         return {"slot": pair.name, "links": list(pair.links), "line": line, "point": pair.point}
 
     @classmethod
-    def samples(cls) -> tuple[Sample, ...]:
-        def sample(angle: float, slide: float, frames: tuple[Frame, Frame]) -> Sample:
+    def samples(cls) -> tuple[PairSample, ...]:
+        def sample(angle: float, slide: float, frames: tuple[Frame, Frame]) -> PairSample:
             through, point = Vector(0.2, 0.5), Vector(-0.3, 0.1)
             first, second = frames
-            meet = first.carry(through + direction(angle) * slide) - second.turn(point)
+            meet = first.to_world(through + direction(angle) * slide) - second.rotate_to_world(point)
             entry = {"slot": "S", "links": ["a", "b"], "line": {"through": "P", "angle": angle}, "point": "Q"}
-            return Sample(
-                cls("S", ("a", "b"), Line("P", None, angle), "Q"),
-                (plain(P=through), plain(Q=point)),
+            return PairSample(
+                cls("S", ("a", "b"), LinkLine("P", None, angle), "Q"),
+                (sample_shape(P=through), sample_shape(Q=point)),
                 (first, frame_at(meet.x, meet.y, second.angle)),
                 (slide,),
                 entry,

@@ -7,45 +7,45 @@ from typing import NamedTuple
 from planar.foundation.geometry import Vector
 
 
-class Pin(NamedTuple):
+class PinMark(NamedTuple):
     """A pin through links; `at` is where it goes through each of them."""
 
     name: str
     links: tuple[str, ...]
-    at: tuple[Vector, ...]
+    positions: tuple[Vector, ...]
 
 
-class Guide(NamedTuple):
+class GuideMark(NamedTuple):
     """A line of a link, through a point in the unit direction `way`, along which a point of another link runs."""
 
     name: str
     link: str
     through: Vector
-    way: Vector
+    direction: Vector
 
 
-class Block(NamedTuple):
+class SliderMark(NamedTuple):
     """A block that is part of `link`, lies along the unit vector `way` there and slides on a line of link `on`."""
 
     name: str
     link: str
-    at: Vector
-    way: Vector
-    on: str
+    position: Vector
+    direction: Vector
+    guide_link: str
 
 
-class Opening(NamedTuple):
+class SlotMark(NamedTuple):
     """A narrow opening along a line of a link; the pin in it is at `at` of `pin`."""
 
     name: str
     link: str
     through: Vector
-    way: Vector
-    pin: str
-    at: Vector
+    direction: Vector
+    pin_link: str
+    pin_position: Vector
 
 
-class Wheel(NamedTuple):
+class WheelMark(NamedTuple):
     """The pitch circle of a wheel that is part of a link; an internal wheel's radius is negative."""
 
     name: str
@@ -54,23 +54,23 @@ class Wheel(NamedTuple):
     radius: float
 
 
-class PitchLine(NamedTuple):
+class PitchLineMark(NamedTuple):
     """The pitch line of a rack; `wheel` rolls on it."""
 
     name: str
     link: str
     through: Vector
-    way: Vector
-    wheel: Wheel
+    direction: Vector
+    wheel: WheelMark
 
 
-class Band(NamedTuple):
+class BeltMark(NamedTuple):
     """A loop round two wheels; where it is crossed they turn opposite ways."""
 
     name: str
-    first: Wheel
-    second: Wheel
+    first: WheelMark
+    second: WheelMark
     crossed: bool
 
 
-Mark = Pin | Guide | Block | Opening | Wheel | PitchLine | Band
+DrawingMark = PinMark | GuideMark | SliderMark | SlotMark | WheelMark | PitchLineMark | BeltMark

@@ -6,21 +6,21 @@ from collections.abc import Mapping
 from math import pi, radians
 from typing import Any
 
-from planar.model.pairs.base import Entry, Quantity, Schema, described
+from planar.model.pairs.base import EntryReader, QuantityWriter, Schema, schema_reference
 
-PRESSURE_ANGLE = radians(20.0)
+STANDARD_PRESSURE_ANGLE = radians(20.0)
 """Of involute teeth by ISO 53, unless said."""
-TEETH: Mapping[str, Schema] = {"pressure_angle": described("angle")}
+TEETH_SCHEMA: Mapping[str, Schema] = {"pressure_angle": schema_reference("angle")}
 
 
-def read_pressure_angle(entry: Entry) -> float:
+def read_pressure_angle(entry: EntryReader) -> float:
     """The pressure angle of an entry (rad), or the usual one."""
-    found = entry.quantity("pressure_angle", "angle", PRESSURE_ANGLE)
+    found = entry.quantity("pressure_angle", "angle", STANDARD_PRESSURE_ANGLE)
     if not 0.0 <= found < pi / 2.0:
-        raise entry.refuse("pressure_angle", "a pressure angle from zero to less than a right angle is wanted here")
+        raise entry.error_at("pressure_angle", "a pressure angle from zero to less than a right angle is wanted here")
     return found
 
 
-def write_pressure_angle(angle: float, quantity: Quantity) -> dict[str, Any]:
+def write_pressure_angle(angle: float, quantity: QuantityWriter) -> dict[str, Any]:
     """The angle as an entry has it; nothing where it is the usual one."""
-    return {} if angle == PRESSURE_ANGLE else {"pressure_angle": quantity(angle, "angle")}
+    return {} if angle == STANDARD_PRESSURE_ANGLE else {"pressure_angle": quantity(angle, "angle")}

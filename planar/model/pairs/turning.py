@@ -9,24 +9,24 @@ from typing import Any, ClassVar, Self
 
 from planar.foundation.geometry import Frame, Vector, frame_at
 from planar.foundation.jets import Scalar
-from planar.model.link_shapes import Shape
+from planar.model.link_shapes import LinkShape
 from planar.model.pairs.base import (
-    Effort,
-    Entry,
-    Kind,
+    EffortAction,
+    EntryReader,
+    MeasureKind,
     Pair,
-    Quantity,
-    Sample,
+    PairSample,
+    QuantityWriter,
     Schema,
-    described,
-    plain,
-    several,
+    list_schema,
+    sample_shape,
+    schema_reference,
 )
-from planar.model.pairs.symbols import Mark, Pin
+from planar.model.pairs.symbols import DrawingMark, PinMark
 
 
 @dataclass(frozen=True)
-class Turning(Pair):
+class TurningPair(Pair):
     """A pin through `points` of the two links; a pin of n links is n - 1 of these, all from its first link."""
 
     points: tuple[str, str]
@@ -34,65 +34,65 @@ class Turning(Pair):
     radius: float | None = None
 
     keyword: ClassVar[str] = "turning"
-    members: ClassVar[Mapping[str, Schema]] = {
-        "links": several("name", 2) | {"uniqueItems": True},
-        "points": several("name", 2),
-        "pin_radius": described("size"),
-        "pin_diameter": described("size"),
+    entry_schemas: ClassVar[Mapping[str, Schema]] = {
+        "links": list_schema("name", 2) | {"uniqueItems": True},
+        "points": list_schema("name", 2),
+        "pin_radius": schema_reference("size"),
+        "pin_diameter": schema_reference("size"),
     }
-    rule: ClassVar[Schema] = {"not": {"required": ["pin_radius", "pin_diameter"]}}
-    lower: ClassVar[bool] = True
-    constrains: ClassVar[tuple[Kind, ...]] = (Kind.LENGTH, Kind.LENGTH)
-    measures: ClassVar[tuple[Kind, ...]] = (Kind.LENGTH,) * 4
-    reports: ClassVar[Mapping[str, str]] = {
+    entry_rule: ClassVar[Schema] = {"not": {"required": ["pin_radius", "pin_diameter"]}}
+    is_lower_pair: ClassVar[bool] = True
+    residual_kinds: ClassVar[tuple[MeasureKind, ...]] = (MeasureKind.LENGTH, MeasureKind.LENGTH)
+    number_kinds: ClassVar[tuple[MeasureKind, ...]] = (MeasureKind.LENGTH,) * 4
+    result_kinds: ClassVar[Mapping[str, str]] = {
         "relative_angle": "angle",
         "relative_angular_velocity": "angular velocity",
         "relative_angular_acceleration": "angular acceleration",
         "rubbing_speed": "velocity",
     }
-    drive_kind: ClassVar[Kind] = Kind.ANGLE
+    input_kind: ClassVar[MeasureKind] = MeasureKind.ANGLE
 
-    def measure(self, shapes: Sequence[Shape]) -> Sequence[Scalar]:
+    def measure(self, shapes: Sequence[LinkShape]) -> Sequence[Scalar]:
         first, second = shapes
-        return (*first.at(self.points[0]), *second.at(self.points[1]))
+        return (*first.position(self.points[0]), *second.position(self.points[1]))
 
     def residual(self, frames: Sequence[Frame], numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Sequence[Scalar]:
         first, second = frames
-        return second.carry(Vector(*numbers[2:])) - first.carry(Vector(*numbers[:2]))
+        return second.to_world(Vector(*numbers[2:])) - first.to_world(Vector(*numbers[:2]))
 
-    def drive(self, frames: Sequence[Frame], numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Scalar:
+    def input_position(self, frames: Sequence[Frame], numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Scalar:
         """The angle of the second link against the first; at a pin on the frame, of the other link."""
         first, second = frames
         return first.angle - second.angle if second.fixed else second.angle - first.angle
 
-    def effort(self, frames: Mapping[str, Frame], shapes: Mapping[str, Shape]) -> Effort:
+    def effort_action(self, frames: Mapping[str, Frame], shapes: Mapping[str, LinkShape]) -> EffortAction:
         first, second = self.links
-        return Effort(first, second) if frames[second].fixed else Effort(second, first)
+        return EffortAction(first, second) if frames[second].fixed else EffortAction(second, first)
 
-    def report(self, position: Scalar, rate: Scalar, second: Scalar) -> dict[str, Scalar | None]:
+    def results(self, position: Scalar, rate: Scalar, second: Scalar) -> dict[str, Scalar | None]:
         rubbing = None if self.radius is None else abs(rate) * self.radius
-        return dict(zip(self.reports, (position, rate, second, rubbing), strict=True))
+        return dict(zip(self.result_kinds, (position, rate, second, rubbing), strict=True))
 
-    def coincident(self) -> tuple[tuple[str, str], ...]:
+    def coincident_points(self) -> tuple[tuple[str, str], ...]:
         return tuple(zip(self.links, self.points, strict=True))
 
-    def marks(self, shapes: Mapping[str, Shape], beside: Sequence[Pair]) -> tuple[Mark, ...]:
-        places = tuple(shapes[link].at(point) for link, point in self.coincident())
-        return (Pin(self.pin, self.links, places),)
+    def drawing_marks(self, shapes: Mapping[str, LinkShape], all_pairs: Sequence[Pair]) -> tuple[DrawingMark, ...]:
+        places = tuple(shapes[link].position(point) for link, point in self.coincident_points())
+        return (PinMark(self.pin, self.links, places),)
 
     def entry_name(self) -> str:
         return self.pin
 
     @classmethod
-    def motions(cls, group: Sequence[Self]) -> tuple[Self, ...]:
+    def relative_motions(cls, group: Sequence[Self]) -> tuple[Self, ...]:
         """Of a pin of n links all n(n-1)/2 relative motions, named in the order of the links."""
         if len(group) == 1:
             return tuple(group)
         ends = [(group[0].links[0], group[0].points[0])] + [(pair.links[1], pair.points[1]) for pair in group]
-        return cls._between(group[0].pin, ends, list(combinations(range(len(ends)), 2)), group[0].radius)
+        return cls._pairs_between(group[0].pin, ends, list(combinations(range(len(ends)), 2)), group[0].radius)
 
     @classmethod
-    def _between(
+    def _pairs_between(
         cls, pin: str, ends: Sequence[tuple[str, str]], which: Sequence[tuple[int, int]], radius: float | None
     ) -> tuple[Self, ...]:
         """Turning pairs between chosen ends (link, point) of one pin."""
@@ -108,42 +108,42 @@ class Turning(Pair):
         )
 
     @classmethod
-    def joining(cls, point: str) -> dict[str, Any]:
+    def joining_entry(cls, point: str) -> dict[str, Any]:
         return {cls.keyword: point}
 
     @classmethod
-    def read(cls, entry: Entry) -> tuple[Self, ...]:
-        entry.only(cls.keyword, *cls.members)
+    def read(cls, entry: EntryReader) -> tuple[Self, ...]:
+        entry.check_keys(cls.keyword, *cls.entry_schemas)
         pin = entry.name("turning")
         if entry.has("links"):
             links = entry.links("links")
         else:
-            links = entry.carriers(pin)
+            links = entry.links_with_point(pin)
             if len(links) < 2:
                 told = f"only link {links[0]!r} carries" if links else "no link carries"
-                raise entry.refuse(
+                raise entry.error_at(
                     "turning", f"a turning pair needs two links, but {told} a point {pin!r}; name its 'links'"
                 )
         points = entry.names("points", len(links)) if entry.has("points") else (pin,) * len(links)
         for index, (link, point) in enumerate(zip(links, points, strict=True)):
-            entry.carried(point, link, f"points[{index}]" if entry.has("points") else "turning")
+            entry.check_point_on_link(point, link, f"points[{index}]" if entry.has("points") else "turning")
         if entry.has("pin_radius") and entry.has("pin_diameter"):
-            raise entry.refuse("pin_diameter", "give either 'pin_radius' or 'pin_diameter', not both")
+            raise entry.error_at("pin_diameter", "give either 'pin_radius' or 'pin_diameter', not both")
         radius = None
         if entry.has("pin_radius"):
             radius = entry.quantity("pin_radius", "length")
         elif entry.has("pin_diameter"):
             radius = entry.quantity("pin_diameter", "length") / 2.0
         if radius is not None and radius <= 0.0:
-            raise entry.refuse(
+            raise entry.error_at(
                 "pin_radius" if entry.has("pin_radius") else "pin_diameter", "a pin must have a size above zero"
             )
         ends = list(zip(links, points, strict=True))
-        return cls._between(pin, ends, [(0, k) for k in range(1, len(ends))], radius)
+        return cls._pairs_between(pin, ends, [(0, k) for k in range(1, len(ends))], radius)
 
     @classmethod
-    def write(cls, group: Sequence[Self], quantity: Quantity) -> dict[str, Any]:
-        ends = [group[0].coincident()[0]] + [pair.coincident()[1] for pair in group]
+    def write(cls, group: Sequence[Self], quantity: QuantityWriter) -> dict[str, Any]:
+        ends = [group[0].coincident_points()[0]] + [pair.coincident_points()[1] for pair in group]
         entry: dict[str, Any] = {"turning": group[0].pin, "links": [link for link, _ in ends]}
         if any(point != group[0].pin for _, point in ends):
             entry["points"] = [point for _, point in ends]
@@ -152,15 +152,15 @@ class Turning(Pair):
         return entry
 
     @classmethod
-    def samples(cls) -> tuple[Sample, ...]:
-        def sample(first: Vector, second: Vector, frames: tuple[Frame, Frame], radius: float | None) -> Sample:
-            shapes = plain(P=first), plain(P=second)
+    def samples(cls) -> tuple[PairSample, ...]:
+        def sample(first: Vector, second: Vector, frames: tuple[Frame, Frame], radius: float | None) -> PairSample:
+            shapes = sample_shape(P=first), sample_shape(P=second)
             pair = cls("P", ("a", "b"), ("P", "P"), "P", radius)
             entry: dict[str, Any] = {"turning": "P", "links": ["a", "b"]}
             if radius is not None:
                 entry["pin_radius"] = radius
-            meet = frames[0].carry(first) - frames[1].turn(second)
-            return Sample(pair, shapes, (frames[0], frame_at(meet.x, meet.y, frames[1].angle)), (), entry)
+            meet = frames[0].to_world(first) - frames[1].rotate_to_world(second)
+            return PairSample(pair, shapes, (frames[0], frame_at(meet.x, meet.y, frames[1].angle)), (), entry)
 
         return (
             sample(Vector(0.3, -0.2), Vector(-0.5, 0.4), (frame_at(0.1, 0.7, 0.6), frame_at(0.0, 0.0, -1.9)), 0.02),

@@ -10,73 +10,76 @@ from typing import Any, ClassVar, Self
 
 from planar.foundation.geometry import Frame, Vector, frame_at
 from planar.foundation.jets import Scalar, sqrt
-from planar.model.link_shapes import Shape
+from planar.model.link_shapes import LinkShape
 from planar.model.pairs.base import (
-    Effort,
-    Entry,
-    Kind,
+    EffortAction,
+    EntryReader,
+    LengthFormatter,
+    MeasureKind,
     Pair,
-    Quantity,
-    Sample,
+    PairSample,
+    QuantityWriter,
     Schema,
-    Told,
-    described,
-    plain,
-    several,
+    list_schema,
+    sample_shape,
+    schema_reference,
 )
-from planar.model.pairs.symbols import Mark, Wheel
+from planar.model.pairs.symbols import DrawingMark, WheelMark
 
-STEEPEST = 1e6
-SIZES = ("radii", "teeth", "ratio")
-NONZERO: Schema = {"not": {"const": 0}}
-NEAR = 1e-6
+LARGEST_RATIO = 1e6
+SIZE_KEYS = ("radii", "teeth", "ratio")
+NONZERO_SCHEMA: Schema = {"not": {"const": 0}}
+CENTRE_DISTANCE_TOLERANCE = 1e-6
 """Centres are where the radii put them within this part of their distance: dimensions in files are rounded."""
 
 
 @dataclass(frozen=True)
-class Wheels(Pair):
+class WheelPair(Pair):
     """Two wheels whose angles a and b against the carrier obey b - b0 = ratio (a - a0); the angles count turns.
 
     `by` says what `sizes` are: two "radii" (m) or numbers of "teeth", or one "ratio". `meet` is (a0, b0) in rad.
     """
 
     carrier: str
-    by: str
+    size_kind: str
     sizes: tuple[float, ...]
-    meet: tuple[float, float] = (0.0, 0.0)
+    mesh_reference: tuple[float, float] = (0.0, 0.0)
 
-    members: ClassVar[Mapping[str, Schema]] = {
-        "links": several("name", 2, 2) | {"uniqueItems": True},
-        "carrier": described("name"),
-        "radii": {**several("length", 2, 2), "items": {**described("length"), **NONZERO}},
-        "teeth": {**several("number", 2, 2), "items": {**described("number"), **NONZERO, "type": "integer"}},
+    entry_schemas: ClassVar[Mapping[str, Schema]] = {
+        "links": list_schema("name", 2, 2) | {"uniqueItems": True},
+        "carrier": schema_reference("name"),
+        "radii": {**list_schema("length", 2, 2), "items": {**schema_reference("length"), **NONZERO_SCHEMA}},
+        "teeth": {
+            **list_schema("number", 2, 2),
+            "items": {**schema_reference("number"), **NONZERO_SCHEMA, "type": "integer"},
+        },
         "ratio": {
-            **described("number"),
+            **schema_reference("number"),
             "anyOf": [
-                {"minimum": 1.0 / STEEPEST, "maximum": STEEPEST},
-                {"minimum": -STEEPEST, "maximum": -1.0 / STEEPEST},
+                {"minimum": 1.0 / LARGEST_RATIO, "maximum": LARGEST_RATIO},
+                {"minimum": -LARGEST_RATIO, "maximum": -1.0 / LARGEST_RATIO},
             ],
         },
         "mesh": {
             "type": "object",
-            "additionalProperties": described("angle"),
+            "additionalProperties": schema_reference("angle"),
             "minProperties": 2,
             "maxProperties": 2,
         },
     }
-    required: ClassVar[tuple[str, ...]] = ("links",)
-    rule: ClassVar[Schema] = {"oneOf": [{"required": [key]} for key in SIZES]}
-    lower: ClassVar[bool] = False
+    required_keys: ClassVar[tuple[str, ...]] = ("links",)
+    entry_rule: ClassVar[Schema] = {"oneOf": [{"required": [key]} for key in SIZE_KEYS]}
+    is_lower_pair: ClassVar[bool] = False
     counts_turns: ClassVar[bool] = True
     ties_angles: ClassVar[bool] = True
-    constrains: ClassVar[tuple[Kind, ...]] = (Kind.TURNS,)
-    measures: ClassVar[tuple[Kind, ...]] = (Kind.PURE, Kind.TURNS, Kind.TURNS)
-    reports: ClassVar[Mapping[str, str]] = {
+    residual_kinds: ClassVar[tuple[MeasureKind, ...]] = (MeasureKind.TURNS,)
+    number_kinds: ClassVar[tuple[MeasureKind, ...]] = (MeasureKind.PURE, MeasureKind.TURNS, MeasureKind.TURNS)
+    result_kinds: ClassVar[Mapping[str, str]] = {
         "angle": "angle",
         "angular_velocity": "angular velocity",
         "angular_acceleration": "angular acceleration",
     }
-    drive_kind: ClassVar[Kind] = Kind.TURNS
+    input_kind: ClassVar[MeasureKind] = MeasureKind.TURNS
 
     @property
     def bodies(self) -> tuple[str, ...]:
@@ -86,134 +89,145 @@ class Wheels(Pair):
     def ratio(self) -> Scalar:
         """The angular velocity of the second wheel by that of the first, both against the carrier."""
 
-    def measure(self, shapes: Sequence[Shape]) -> Sequence[Scalar]:
-        return (self.ratio(), *self.meet)
+    def measure(self, shapes: Sequence[LinkShape]) -> Sequence[Scalar]:
+        return (self.ratio(), *self.mesh_reference)
 
     def residual(self, frames: Sequence[Frame], numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Sequence[Scalar]:
         first, second, carrier = (frame.angle for frame in frames)
         ratio, a0, b0 = numbers
         return (second - carrier - b0 - (first - carrier - a0) * ratio,)
 
-    def drive(self, frames: Sequence[Frame], numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Scalar:
+    def input_position(self, frames: Sequence[Frame], numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Scalar:
         """The angle of the second wheel against the carrier."""
         return frames[1].angle - frames[2].angle
 
-    def effort(self, frames: Mapping[str, Frame], shapes: Mapping[str, Shape]) -> Effort:
-        return Effort(self.links[1], self.carrier)
+    def effort_action(self, frames: Mapping[str, Frame], shapes: Mapping[str, LinkShape]) -> EffortAction:
+        return EffortAction(self.links[1], self.carrier)
 
-    def report(self, position: Scalar, rate: Scalar, second: Scalar) -> dict[str, Scalar | None]:
-        return dict(zip(self.reports, (position, rate, second), strict=True))
+    def results(self, position: Scalar, rate: Scalar, second: Scalar) -> dict[str, Scalar | None]:
+        return dict(zip(self.result_kinds, (position, rate, second), strict=True))
 
-    def marks(self, shapes: Mapping[str, Shape], beside: Sequence[Pair]) -> tuple[Mark, ...]:
+    def drawing_marks(self, shapes: Mapping[str, LinkShape], all_pairs: Sequence[Pair]) -> tuple[DrawingMark, ...]:
         """Both pitch circles, where both wheels are pinned to the carrier."""
-        pins = [self._centre(wheel, beside) for wheel in self.links]
+        pins = [self._centre_pin(wheel, all_pairs) for wheel in self.links]
         if None in pins:
             return ()
         carrier = shapes[self.carrier]
-        apart = carrier.at(pins[1][self.carrier]) - carrier.at(pins[0][self.carrier])
-        radii = self.sizes if self.by == "radii" else self._pitch_radii(sqrt(apart.dot(apart)))
+        apart = carrier.position(pins[1][self.carrier]) - carrier.position(pins[0][self.carrier])
+        radii = self.sizes if self.size_kind == "radii" else self._pitch_radii(sqrt(apart.dot(apart)))
         return tuple(
-            Wheel(self.name, link, shapes[link].at(pin[link]), radius)
+            WheelMark(self.name, link, shapes[link].position(pin[link]), radius)
             for link, pin, radius in zip(self.links, pins, radii, strict=True)
             if not (isinstance(radius, float) and radius == 0.0)
         )
 
     @abstractmethod
-    def _pitch_radii(self, apart: Scalar) -> tuple[Scalar, ...]:
+    def _pitch_radii(self, centre_distance: Scalar) -> tuple[Scalar, ...]:
         """Radii (m) in the ratio that go with centres so far apart; zeros where there are none."""
 
-    def _centre(self, wheel: str, beside: Sequence[Pair]) -> Mapping[str, str] | None:
+    def _centre_pin(self, wheel: str, beside: Sequence[Pair]) -> Mapping[str, str] | None:
         """The points of links in the pin in which a wheel turns in the carrier."""
         pins: dict[str, dict[str, str]] = {}
         for pair in beside:  # a pin of n links is several pairs
-            pins.setdefault(pair.entry_name(), {}).update(pair.coincident())
+            pins.setdefault(pair.entry_name(), {}).update(pair.coincident_points())
         return next((pin for pin in pins.values() if wheel in pin and self.carrier in pin), None)
 
-    def sizes_told(self, length: Told) -> str:
+    def describe_sizes(self, format_length: LengthFormatter) -> str:
         first, second = self.links
-        sizes = [f"{length(size) if self.by == 'radii' else f'{size:g}'}" for size in self.sizes]
-        told = f"{self.by} {' and '.join(sizes)}, " if len(sizes) == 2 else ""
+        sizes = [f"{format_length(size) if self.size_kind == 'radii' else f'{size:g}'}" for size in self.sizes]
+        told = f"{self.size_kind} {' and '.join(sizes)}, " if len(sizes) == 2 else ""
         return f"{told}{second} turns {self.ratio():.6g} times as fast as {first} against {self.carrier}"
 
-    def misfit(self, beside: Sequence[Pair], shapes: Mapping[str, Shape], length: Told) -> str | None:
-        if self.by != "radii":
+    def find_misfit(
+        self, all_pairs: Sequence[Pair], shapes: Mapping[str, LinkShape], format_length: LengthFormatter
+    ) -> str | None:
+        if self.size_kind != "radii":
             return None
         centres = []
         for wheel in self.links:
-            pin = self._centre(wheel, beside)
+            pin = self._centre_pin(wheel, all_pairs)
             if pin is None:
                 return f"wheels with radii turn in their carrier, but link {wheel!r} is not pinned to {self.carrier!r}"
-            centres.append(shapes[self.carrier].at(pin[self.carrier]))
+            centres.append(shapes[self.carrier].position(pin[self.carrier]))
         apart = centres[1] - centres[0]
-        return self._misplaced(hypot(apart.x, apart.y), length)
+        return self._find_distance_problem(hypot(apart.x, apart.y), format_length)
 
     @abstractmethod
-    def _misplaced(self, apart: float, length: Told) -> str | None:
+    def _find_distance_problem(self, centre_distance: float, format_length: LengthFormatter) -> str | None:
         """What is wrong with wheels of these radii whose centres are so far apart (m)."""
 
     @classmethod
-    def _sizes(cls, entry: Entry) -> tuple[str, tuple[float, ...]]:
-        given = [key for key in SIZES if entry.has(key)]
+    def _read_sizes(cls, entry: EntryReader) -> tuple[str, tuple[float, ...]]:
+        given = [key for key in SIZE_KEYS if entry.has(key)]
         if len(given) != 1:
             told = f"; here are {' and '.join(given)}" if given else ""
-            raise entry.refuse(None, f"wheels are given by one of 'radii', 'teeth' and 'ratio'{told}")
+            raise entry.error_at(None, f"wheels are given by one of 'radii', 'teeth' and 'ratio'{told}")
         (by,) = given
         if by == "ratio":
             sizes: tuple[float, ...] = (entry.number("ratio"),)
         elif by == "radii":
             sizes = entry.quantities("radii", "length", 2)
         else:
-            sizes = entry.counts("teeth", 2)
+            sizes = entry.whole_numbers("teeth", 2)
         if not all(sizes):
-            raise entry.refuse(by, "zero is no size of a wheel")
-        if not 1.0 / STEEPEST <= abs(sizes[0] / (sizes[1] if len(sizes) > 1 else 1.0)) <= STEEPEST:
-            raise entry.refuse(
-                by, f"wheels have a ratio from {1.0 / STEEPEST:g} to {STEEPEST:g} (its sign is free); take one between"
+            raise entry.error_at(by, "zero is no size of a wheel")
+        if not 1.0 / LARGEST_RATIO <= abs(sizes[0] / (sizes[1] if len(sizes) > 1 else 1.0)) <= LARGEST_RATIO:
+            raise entry.error_at(
+                by,
+                f"wheels have a ratio from {1.0 / LARGEST_RATIO:g} to {LARGEST_RATIO:g} (its sign is free); "
+                "take one between",
             )
         return by, sizes
 
     @classmethod
-    def _common(cls, entry: Entry) -> tuple[str, tuple[str, str], str, str, tuple[float, ...], tuple[float, float]]:
+    def _read_common(
+        cls, entry: EntryReader
+    ) -> tuple[str, tuple[str, str], str, str, tuple[float, ...], tuple[float, float]]:
         """name, links, carrier, by, sizes and meet of an entry."""
         name, links = entry.name(cls.keyword), entry.two_links("links")
         carrier = entry.link("carrier") if entry.has("carrier") else entry.frame
         if carrier in links and entry.has("carrier"):
-            raise entry.refuse("carrier", f"{carrier!r} is one of the wheels; the carrier is a third link")
+            raise entry.error_at("carrier", f"{carrier!r} is one of the wheels; the carrier is a third link")
         if carrier in links:
             told = f"{carrier!r} is one of the wheels, so a third link is their 'carrier'; name it"
-            raise entry.refuse(None, told)
-        by, sizes = cls._sizes(entry)
+            raise entry.error_at(None, told)
+        by, sizes = cls._read_sizes(entry)
         meet = (0.0, 0.0)
         if entry.has("mesh"):
-            mesh = entry.inside("mesh")
+            mesh = entry.object_at("mesh")
             for key in mesh.fields():
                 if key not in links:
-                    raise mesh.refuse(key, f"{key!r} is neither of the wheels {links[0]!r} and {links[1]!r}")
-            meet = (mesh.turned(links[0]), mesh.turned(links[1]))
+                    raise mesh.error_at(key, f"{key!r} is neither of the wheels {links[0]!r} and {links[1]!r}")
+            meet = (mesh.counted_angle(links[0]), mesh.counted_angle(links[1]))
         return name, links, carrier, by, sizes, meet
 
     @classmethod
-    def write(cls, group: Sequence[Self], quantity: Quantity) -> dict[str, Any]:
+    def write(cls, group: Sequence[Self], quantity: QuantityWriter) -> dict[str, Any]:
         (pair,) = group
         entry: dict[str, Any] = {cls.keyword: pair.name, "links": list(pair.links), "carrier": pair.carrier}
-        if pair.by == "ratio":
+        if pair.size_kind == "ratio":
             entry["ratio"] = pair.sizes[0]
-        elif pair.by == "radii":
+        elif pair.size_kind == "radii":
             entry["radii"] = [quantity(radius, "length") for radius in pair.sizes]
         else:
             entry["teeth"] = [int(teeth) for teeth in pair.sizes]
-        if pair.meet != (0.0, 0.0):
-            both = zip(pair.links, pair.meet, strict=True)
+        if pair.mesh_reference != (0.0, 0.0):
+            both = zip(pair.links, pair.mesh_reference, strict=True)
             entry["mesh"] = {link: quantity(angle, "angle") for link, angle in both}
         return entry
 
-    def _sample(self, carrier: float, first: float, more: Mapping[str, Any], apart: float | None = None) -> Sample:
+    def _make_sample(
+        self, carrier: float, first: float, more: Mapping[str, Any], apart: float | None = None
+    ) -> PairSample:
         """The pair with its carrier and first wheel at these angles; wheels with radii pinned so far apart."""
-        second = self.ratio() * (first - carrier - self.meet[0]) + carrier + self.meet[1]
+        second = self.ratio() * (first - carrier - self.mesh_reference[0]) + carrier + self.mesh_reference[1]
         frames = frame_at(0.2, 0.5, first), frame_at(-0.7, 0.1, second), frame_at(0.3, -0.4, carrier)
-        shapes, beside = (plain(A=Vector(0.0, 0.0)), plain(B=Vector(0.0, 0.0)), plain(C=Vector(0.0, 0.0))), ()
+        shapes, beside = (
+            (sample_shape(A=Vector(0.0, 0.0)), sample_shape(B=Vector(0.0, 0.0)), sample_shape(C=Vector(0.0, 0.0))),
+            (),
+        )
         if apart is not None:
-            shapes = (*shapes[:2], plain(A=Vector(0.0, 0.0), B=Vector(apart, 0.0)))
+            shapes = (*shapes[:2], sample_shape(A=Vector(0.0, 0.0), B=Vector(apart, 0.0)))
             beside = {"turning": "A", "links": ["c", "a"]}, {"turning": "B", "links": ["c", "b"]}
         entry = {self.keyword: self.name, "links": ["a", "b"], "carrier": "c", **more}
-        return Sample(self, shapes, frames, (), entry, beside)
+        return PairSample(self, shapes, frames, (), entry, beside)

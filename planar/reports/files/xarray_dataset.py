@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from planar.foundation.errors import BadInput
-from planar.foundation.units import SI
-from planar.reports.columns import Told, about, told
+from planar.foundation.units import SI_UNITS
+from planar.reports.columns import ReportedSeries, reported_series, run_header
 from planar.results.motion import Motion
 
 if TYPE_CHECKING:
@@ -38,8 +38,8 @@ def dataset(motion: Motion) -> xr.Dataset:
         import xarray as xr
     except ImportError:
         raise BadInput("xarray", "a Dataset needs xarray: pip install 'planar[xarray]'") from None
-    groups: dict[str, list[Told]] = {"inputs": [], "points": [], "links": [], "pairs": []}
-    for thing in told(motion):
+    groups: dict[str, list[ReportedSeries]] = {"inputs": [], "points": [], "links": [], "pairs": []}
+    for thing in reported_series(motion):
         groups[thing.group].append(thing)
     coordinates: dict[str, Any] = {
         "row": ("row", np.arange(len(motion)), {"long_name": "row"}),
@@ -47,19 +47,21 @@ def dataset(motion: Motion) -> xr.Dataset:
     }
     coordinates |= {group[:-1]: [each.name for each in groups[group]] for group in ("points", "links", "pairs")}
     if motion.time is not None:
-        coordinates["time"] = (("row",), motion.time, _told("time", "time"))
+        coordinates["time"] = (("row",), motion.time, _attributes("time", "time"))
     variables = {
-        name: variable for group in ("points", "links", "pairs") for name, variable in _together(groups[group]).items()
+        name: variable
+        for group in ("points", "links", "pairs")
+        for name, variable in _stack_variables(groups[group]).items()
     }
     for each in groups["inputs"]:
         for what, values in each.values.items():
             into = coordinates if what == "position" else variables
-            attributes = _told(each.kinds[what], f"input {each.name} {what}")
+            attributes = _attributes(each.kinds[what], f"input {each.name} {what}")
             into[f"input_{each.name}_{what}"] = (("row",), values, attributes)
-    return xr.Dataset(variables, coordinates, about(motion))
+    return xr.Dataset(variables, coordinates, run_header(motion))
 
 
-def _together(things: list[Told]) -> dict[str, Variable]:
+def _stack_variables(things: list[ReportedSeries]) -> dict[str, Variable]:
     """Of things of one group every quantity as one array, things first."""
     found: dict[str, dict[int, Array]] = defaultdict(dict)
     kinds: dict[str, str] = {}
@@ -75,9 +77,9 @@ def _together(things: list[Told]) -> dict[str, Variable]:
         for index, values in those.items():
             whole[index] = values
         dimensions = (one, "row", "axis")[: whole.ndim]
-        variables[f"{one}_{what}"] = (dimensions, whole, _told(kinds[what], what.replace("_", " ")))
+        variables[f"{one}_{what}"] = (dimensions, whole, _attributes(kinds[what], what.replace("_", " ")))
     return variables
 
 
-def _told(kind: str, name: str) -> dict[str, str]:
-    return {"units": SI[kind], "long_name": name}
+def _attributes(kind: str, name: str) -> dict[str, str]:
+    return {"units": SI_UNITS[kind], "long_name": name}

@@ -12,14 +12,14 @@ from rich.text import Text
 
 from planar.analysis.motion.answers import Answers
 from planar.analysis.motion.output import Axis, Extreme
-from planar.foundation.units import length_of_rates, unit
-from planar.model.mechanism import Units
+from planar.foundation.units import length_unit_of_rates, parse_unit
+from planar.model.mechanism import FileUnits
 from planar.model.wording import amount
-from planar.reports.tables.mechanical_advantage import MEASURES
+from planar.reports.tables.mechanical_advantage import ADVANTAGE_UNITS
 from planar.reports.tables_of_numbers import DIGITS, plain_table
 from planar.results.motion import Motion
 
-Row = tuple[str, str, str, str]
+AnswerRow = tuple[str, str, str, str]
 
 
 def tables(motion: Motion, asked: Mapping[str, Sequence[Answers]]) -> RenderableType:
@@ -27,29 +27,33 @@ def tables(motion: Motion, asked: Mapping[str, Sequence[Answers]]) -> Renderable
     parts: list[RenderableType] = []
     for each in (one for group in asked.values() for one in group):
         units = motion.mechanism.units
-        position = _Position(motion.slides(each.input), units)
+        position = _PositionFormatter(motion.has_length_motion(each.input), units)
         table = plain_table(
             f"Answers of {each.what} {each.of}", "what", "value", f"at {each.input}", "", left=(0, 1, 2, 3)
         )
-        for row in (*_ranges(each, units, position), *_rates(each, units, position), *_uses(each, units, position)):
+        for row in (
+            *_range_rows(each, units, position),
+            *_rate_rows(each, units, position),
+            *_use_rows(each, units, position),
+        ):
             table.add_row(*row)
         parts += [Text(), table, *(Text(f"- {note}") for note in each.notes)]
     return Group(*parts)
 
 
-class _Position:
+class _PositionFormatter:
     """Says positions of the running input in the units of the file."""
 
-    def __init__(self, slides: bool, units: Units):
+    def __init__(self, slides: bool, units: FileUnits):
         self.kind, self.units = "length" if slides else "angle", units
 
     def __call__(self, *positions: float) -> str:
         name = self.units.length if self.kind == "length" else self.units.angle
-        told = [f"{unit(name).from_si(each) + 0.0:.6g}" for each in positions]
+        told = [f"{parse_unit(name).from_si(each) + 0.0:.6g}" for each in positions]
         return f"{' to '.join(told)} {name}"
 
 
-def _ranges(each: Answers, units: Units, position: _Position) -> Iterator[Row]:
+def _range_rows(each: Answers, units: FileUnits, position: _PositionFormatter) -> Iterator[AnswerRow]:
     """Stroke, swing, extreme positions, time ratio, dwells."""
     kind = "length" if each.length else "angle"
     if each.stroke is not None:
@@ -72,11 +76,11 @@ def _ranges(each: Answers, units: Units, position: _Position) -> Iterator[Row]:
             yield f"  {word}", position(way.travel), position(way.start.input, way.stop.input), took
     for axis, dwell in each.dwells:
         near = f"within {amount(dwell.within, kind, units)} of {amount(dwell.at.value, kind, units)}"
-        yield f"dwell{_of(axis)}", position(dwell.travel), position(dwell.start, dwell.stop), near
+        yield f"dwell{_axis_suffix(axis)}", position(dwell.travel), position(dwell.start, dwell.stop), near
 
 
-def _rates(each: Answers, units: Units, position: _Position) -> Iterator[Row]:
-    name, length = length_of_rates(units.length)
+def _rate_rows(each: Answers, units: FileUnits, position: _PositionFormatter) -> Iterator[AnswerRow]:
+    name, length = length_unit_of_rates(units.length)
     what, per = (name if each.length else "rad"), (name if position.kind == "length" else "rad")
     by = length.from_si(1.0) if each.length else 1.0
     measures = (f"{what}/{per}", f"{what}/{per}²") if each.per_unit else (f"{what}/s", f"{what}/s²")
@@ -91,10 +95,10 @@ def _rates(each: Answers, units: Units, position: _Position) -> Iterator[Row]:
             yield f"greatest {word}", told, position(found.input), ""
 
 
-def _uses(each: Answers, units: Units, position: _Position) -> Iterator[Row]:
+def _use_rows(each: Answers, units: FileUnits, position: _PositionFormatter) -> Iterator[AnswerRow]:
     """Area, transmission angle, mechanical advantage."""
     if each.area is not None:
-        scale = unit(units.length).from_si(1.0) ** 2
+        scale = parse_unit(units.length).from_si(1.0) ** 2
         value = each.area.value * scale if abs(each.area.value) > each.area.error else 0.0
         yield "area of its curve", f"{value:.{DIGITS}g} {units.length}²", "", "anticlockwise positive"
     if each.transmission is not None and each.transmission.least is not None:
@@ -103,35 +107,35 @@ def _uses(each: Answers, units: Units, position: _Position) -> Iterator[Row]:
         yield "least transmission angle", amount(least.value, "angle", units), position(least.input), through
     if each.advantage is not None:
         found = each.advantage
-        measure = MEASURES[found.measure]
+        measure = ADVANTAGE_UNITS[found.measure]
         told = f"{found.least.value:.{DIGITS}g}" + (f" {measure}" if measure else "")
         yield "least mechanical advantage", told, position(found.least.input), ""
         for place in found.infinite:
             yield "  beyond all bounds", "", position(place), ""
 
 
-def _of(axis: Axis | None) -> str:
+def _axis_suffix(axis: Axis | None) -> str:
     return "" if axis is None else f" of {axis}"
 
 
 def record(asked: Mapping[str, Iterable[Answers]]) -> dict[str, Any]:
     """All of it as a JSON value in SI: by name, then by what bears it; what is infinite or not determined is null."""
-    return {name: {each.what: _record(each) for each in group} for name, group in asked.items()}
+    return {name: {each.what: _answers_record(each) for each in group} for name, group in asked.items()}
 
 
-def _record(each: Answers) -> dict[str, Any]:
-    found = {name: _plain(getattr(each, name)) for name in each.__dataclass_fields__ if name not in ("of", "what")}
-    found["extremes"] = {str(one.axis): _plain(one) for one in each.extremes}
-    found["dwells"] = [{"axis": axis} | _plain(dwell) for axis, dwell in each.dwells]
+def _answers_record(each: Answers) -> dict[str, Any]:
+    found = {name: _to_json(getattr(each, name)) for name in each.__dataclass_fields__ if name not in ("of", "what")}
+    found["extremes"] = {str(one.axis): _to_json(one) for one in each.extremes}
+    found["dwells"] = [{"axis": axis} | _to_json(dwell) for axis, dwell in each.dwells]
     return {name: value for name, value in found.items() if value not in (None, {}, [])} | {"notes": list(each.notes)}
 
 
-def _plain(value: Any) -> Any:
+def _to_json(value: Any) -> Any:
     """A value that JSON has: of a named tuple an object."""
     if isinstance(value, Extreme) or hasattr(value, "_asdict"):
-        return {name: _plain(part) for name, part in value._asdict().items()}
+        return {name: _to_json(part) for name, part in value._asdict().items()}
     if isinstance(value, np.ndarray | list | tuple):
-        return [_plain(part) for part in (value.tolist() if isinstance(value, np.ndarray) else value)]
+        return [_to_json(part) for part in (value.tolist() if isinstance(value, np.ndarray) else value)]
     if isinstance(value, float):
         return value if isfinite(value) else None
     return value

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from planar.bench.benchmark import STEPS, TURN, Speed
+from planar.bench.benchmark import CYCLE_STEPS, SWEEP_STEPS, Speed
 from planar.reports.tables_of_numbers import paragraphs, plain_table
 
 CALLS = ("solve, new position", "cycle, a position")
@@ -28,39 +28,43 @@ def table(measured: Iterable[Speed]) -> RenderableType:
     first = plain_table(None, *headings)
     for each in measured:
         times = (each.equations, each.assembly, each.solve, each.cycle)
-        first.add_row(each.name, str(each.links), str(each.unknowns), *map(time, times))
-    note = f"cycle: {TURN} steps; cycle and solve have velocities and accelerations; equations once for a structure"
+        first.add_row(each.name, str(each.links), str(each.unknowns), *map(format_time, times))
+    note = (
+        f"cycle: {CYCLE_STEPS} steps; cycle and solve have velocities and accelerations; equations once for a structure"
+    )
     parts: list[RenderableType] = [first, Text(note, style="italic")]
     for each in measured:
-        parts += [Text(), *_swept(each)]
+        parts += [Text(), *_sweep_tables(each)]
     return Group(*parts)
 
 
-def _swept(speed: Speed) -> list[RenderableType]:
+def _sweep_tables(speed: Speed) -> list[RenderableType]:
     """The sweeps of one mechanism, and what there is to say of it."""
     said = paragraphs(("-", f"{sentence}.") for sentence in speed.bounds)
     if not speed.sweeps:
         return [Text(speed.name, style="bold"), said]
     headings = ("backend", "a position", "with rates", "designs", "refused", "general path", "first call", "compiling")
     within = f"{100.0 * speed.sweeps[0].within:g} %"
-    found = plain_table(f"{speed.name}: sweeps of designs whose lengths are within {within}, {STEPS} steps", *headings)
+    found = plain_table(
+        f"{speed.name}: sweeps of designs whose lengths are within {within}, {SWEEP_STEPS} steps", *headings
+    )
     for backend in dict.fromkeys(each.backend for each in speed.sweeps):
         both = {each.rates: each for each in speed.sweeps if each.backend == backend}
         most = both[True]
         found.add_row(
             backend,
-            time(both[False].seconds if False in both else None),
-            time(most.seconds),
+            format_time(both[False].seconds if False in both else None),
+            format_time(most.seconds),
             str(most.designs),
             str(most.refused),
-            f"{100.0 * most.general / (most.designs * (STEPS + 1)):.3g} %",
-            f"+ {time(most.first)}",
-            time(most.compiling),
+            f"{100.0 * most.general / (most.designs * (SWEEP_STEPS + 1)):.3g} %",
+            f"+ {format_time(most.first)}",
+            format_time(most.compiling),
         )
     return [found, said]
 
 
-def time(seconds: float | None) -> str:
+def format_time(seconds: float | None) -> str:
     """In the unit that fits."""
     if seconds is None:
         return "-"

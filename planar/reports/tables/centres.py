@@ -10,17 +10,17 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planar.analysis.centres.centres import Centres
-from planar.foundation.units import unit
-from planar.model.link_graph import number_and_name
-from planar.model.mechanism import motions
-from planar.model.wording import amount, listed, many
+from planar.foundation.units import parse_unit
+from planar.model.link_graph import link_label
+from planar.model.mechanism import relative_motions
+from planar.model.wording import amount, count_phrase, join_all_names
 from planar.reports.fitted_table import FittedTable
-from planar.reports.tables_of_numbers import DIGITS, SIZE, kept, paragraphs, plain_table
+from planar.reports.tables_of_numbers import DIGITS, SIZE_PHRASE, paragraphs, plain_table, precision_text
 from planar.results.motion import State
 
-ZERO = 1e-12
+ZERO_RATIO = 1e-12
 """A coordinate below this part of the mechanism's size is printed as 0."""
-HOW = {
+METHOD_WORDS = {
     "pair": "by the pairs",
     "Kennedy": "by Kennedy's theorem",
     "ratio": "in the ratio of wheels",
@@ -34,13 +34,13 @@ HOW = {
 def table(centres: Centres) -> RenderableType:
     """All centres in the order of finding, and what proves them."""
     state = centres.state
-    numbers = listed([number_and_name(number, link) for link, number in centres.numbers.items()])
+    numbers = join_all_names([link_label(number, link) for link, number in centres.numbers.items()])
     notes = paragraphs((" -", sentence) for sentence in (*remarks(centres), *state.remarks))
-    head = [Text(state.mechanism.name, style="bold"), Text(_at(state)), Text(f"links: {numbers}"), Text()]
-    return Group(*head, _rows(centres), paragraphs(_proof(centres)), Text(), notes)
+    head = [Text(state.mechanism.name, style="bold"), Text(_inputs_text(state)), Text(f"links: {numbers}"), Text()]
+    return Group(*head, _centres_table(centres), paragraphs(_proof_facts(centres)), Text(), notes)
 
 
-def _rows(centres: Centres) -> FittedTable:
+def _centres_table(centres: Centres) -> FittedTable:
     state = centres.state
     length = state.mechanism.units.length
     rows = plain_table(
@@ -56,60 +56,60 @@ def _rows(centres: Centres) -> FittedTable:
     )
     for centre in centres:
         order = "" if centre.how in ("as one", "open") else str(centre.order)
-        x, y = _place(centre.homogeneous, state)
+        x, y = _coordinate_cells(centre.homogeneous, state)
         rows.add_row(order, centre.name, " - ".join(centre.links), centre.how, x, y, centre.derivation)
     return rows
 
 
-def _there(at: np.ndarray, state: State) -> str:
-    x, y = _place(at, state)
+def _location_text(at: np.ndarray, state: State) -> str:
+    x, y = _coordinate_cells(at, state)
     return f"{x} {y}" if at[2] == 0.0 else f"at ({x}, {y}) {state.mechanism.units.length}"
 
 
-def _place(at: np.ndarray | None, state: State) -> tuple[str, str]:
+def _coordinate_cells(at: np.ndarray | None, state: State) -> tuple[str, str]:
     """Where a homogeneous point (3,) lies, in the units of the file."""
     if at is None:
         return "-", "-"
     units = state.mechanism.units
     x, y, w = at
     if w == 0.0:
-        angle = float(np.arctan2(y, x)) if abs(y) > ZERO else 0.0
+        angle = float(np.arctan2(y, x)) if abs(y) > ZERO_RATIO else 0.0
         return "at infinity", f"at {amount(angle, 'angle', units)}"
     scale = max((float(np.abs(point.position).max()) for point in state.points.values()), default=0.0) or 1.0
-    length = unit(units.length)
-    placed = (length.from_si(float(value)) if abs(value) > ZERO * scale else 0.0 for value in (x / w, y / w))
-    x, y = (_number(value) for value in placed)
+    length = parse_unit(units.length)
+    placed = (length.from_si(float(value)) if abs(value) > ZERO_RATIO * scale else 0.0 for value in (x / w, y / w))
+    x, y = (_format_number(value) for value in placed)
     return x, y
 
 
-def _number(value: float) -> str:
+def _format_number(value: float) -> str:
     return f"{value:.{DIGITS}g}"
 
 
-def _proof(centres: Centres) -> list[tuple[str, str]]:
+def _proof_facts(centres: Centres) -> list[tuple[str, str]]:
     proof = centres.proof
     by_jacobian = "each is that of the null vector of the whole Jacobian, "
     return [
-        ("proof", by_jacobian + kept(proof.routes) if proof.routes is not None else "nothing can move here"),
-        ("", f"the centres of any three links are in one line, {kept(proof.collinear)}"),
+        ("proof", by_jacobian + precision_text(proof.routes) if proof.routes is not None else "nothing can move here"),
+        ("", f"the centres of any three links are in one line, {precision_text(proof.collinear)}"),
         *(
-            [("", f"both links have one velocity in it, {kept(proof.velocities, 'of the greatest')}")]
+            [("", f"both links have one velocity in it, {precision_text(proof.velocities, 'of the greatest')}")]
             if proof.velocities is not None
             else []
         ),
-        ("", f"the figures are the worst of all, lengths in parts {SIZE}"),
+        ("", f"the figures are the worst of all, lengths in parts {SIZE_PHRASE}"),
     ]
 
 
 def remarks(centres: Centres) -> tuple[str, ...]:
     """Sentences: how many were found and how, which needed the equations, what is at rest, moves as one, or is open."""
     counts = Counter(centre.how for centre in centres)
-    found = listed([f"{counts[how]} {words}" for how, words in HOW.items() if counts[how]])
-    said = [f"{many(len(centres), 'centre')} of {many(len(centres.numbers), 'link')}: {found}"]
+    found = join_all_names([f"{counts[how]} {words}" for how, words in METHOD_WORDS.items() if counts[how]])
+    said = [f"{count_phrase(len(centres), 'centre')} of {count_phrase(len(centres.numbers), 'link')}: {found}"]
     equations = [centre for centre in centres if centre.how == "equations"]
     if equations:
-        taken = _verb(equations, "it was taken", "they were taken")
-        names = listed([centre.name for centre in equations])
+        taken = _choose_form(equations, "it was taken", "they were taken")
+        names = join_all_names([centre.name for centre in equations])
         said.append(
             f"{names} needed the simultaneous equations of the rates round the loops: when {taken}, no other centre "
             f"lay on two known lines that meet well; all the rest follow from positions by pairs and lines"
@@ -125,31 +125,31 @@ def remarks(centres: Centres) -> tuple[str, ...]:
     for group in centres.as_one:
         resting = [link for link in group if link != frame]
         if frame in group:
-            said.append(f"{listed(resting)} {_verb(resting, 'rests', 'rest')} in this position")
+            said.append(f"{join_all_names(resting)} {_choose_form(resting, 'rests', 'rest')} in this position")
         else:
-            said.append(f"{listed(group)} move as one in this position, so that every point is their centre")
+            said.append(f"{join_all_names(group)} move as one in this position, so that every point is their centre")
     open_ones = [centre for centre in centres if centre.how == "open"]
     if open_ones:
         why = open_ones[0].derivation.partition(": ")[2]
-        names = listed([centre.name for centre in open_ones])
-        said.append(f"{names} {_verb(open_ones, 'is', 'are')} not determined: {why}")
+        names = join_all_names([centre.name for centre in open_ones])
+        said.append(f"{names} {_choose_form(open_ones, 'is', 'are')} not determined: {why}")
     for number, branch in enumerate(centres.branches, start=1):
-        placed = [f"{name} {_there(at, centres.state)}" for name, at in branch.items()]
-        said.append(f"on branch {number} of those that cross here: {listed(placed)}")
+        placed = [f"{name} {_location_text(at, centres.state)}" for name, at in branch.items()]
+        said.append(f"on branch {number} of those that cross here: {join_all_names(placed)}")
     return tuple(said)
 
 
-def _verb(what: Any, one: str, several: str) -> str:
+def _choose_form(what: Any, one: str, several: str) -> str:
     return one if len(what) == 1 else several
 
 
-def _at(state: State) -> str:
-    named = motions(state.mechanism)
+def _inputs_text(state: State) -> str:
+    named = relative_motions(state.mechanism)
     inputs = [
-        f"{name} = {amount(given.position, named[name].drive_kind.value, state.mechanism.units)}"
+        f"{name} = {amount(given.position, named[name].input_kind.value, state.mechanism.units)}"
         for name, given in state.inputs.items()
     ]
-    return f"at {listed(inputs)}" if inputs else "without inputs"
+    return f"at {join_all_names(inputs)}" if inputs else "without inputs"
 
 
 def record(centres: Centres) -> dict[str, Any]:
@@ -164,9 +164,9 @@ def record(centres: Centres) -> dict[str, Any]:
                 "links": list(centre.links),
                 "order": centre.order,
                 "how": centre.how,
-                "homogeneous": _list(centre.homogeneous),
-                "position": _list(centre.position),
-                "direction": _list(centre.direction),
+                "homogeneous": _to_list(centre.homogeneous),
+                "position": _to_list(centre.position),
+                "direction": _to_list(centre.direction),
                 "derivation": centre.derivation,
                 "lines": [
                     {"centres": list(line.centres)} if line.centres else {"pair": line.pair} for line in centre.lines
@@ -175,11 +175,11 @@ def record(centres: Centres) -> dict[str, Any]:
             for centre in centres
         ],
         "as_one": [list(group) for group in centres.as_one],
-        "branches": [{name: _list(at) for name, at in branch.items()} for branch in centres.branches],
+        "branches": [{name: _to_list(at) for name, at in branch.items()} for branch in centres.branches],
         "proof": centres.proof._asdict(),
         "remarks": [*remarks(centres), *centres.state.remarks],
     }
 
 
-def _list(vector: np.ndarray | None) -> list[float] | None:
+def _to_list(vector: np.ndarray | None) -> list[float] | None:
     return None if vector is None else [float(value) for value in vector]

@@ -9,70 +9,72 @@ from rich.console import Group as Stack
 from rich.console import RenderableType
 from rich.text import Text
 
-from planar.assemblies.circuits.circuit_of_assembly import MOST, Located, located
+from planar.assemblies.circuits.circuit_of_assembly import MAX_LOCATED, LocatedAssembly, locate_assemblies
 from planar.assemblies.circuits.circuits import Branch, Circuit, Circuits
 from planar.assemblies.modes import Modes
 from planar.foundation.errors import Outcome
-from planar.foundation.units import unit
-from planar.model.mechanism import motions
-from planar.model.wording import amount, listed, many
+from planar.foundation.units import parse_unit
+from planar.model.mechanism import relative_motions
+from planar.model.wording import amount, count_phrase, join_all_names
 from planar.reports.fitted_table import FittedTable
-from planar.reports.tables_of_numbers import number, paragraphs, plain_table
+from planar.reports.tables_of_numbers import format_number, paragraphs, plain_table
 
 
 def table(circuits: Circuits, modes: Modes) -> RenderableType:
     """How many circuits there are, where each branch begins and ends, and where the assemblies at the input lie."""
-    head = [Text(circuits.mechanism.name, style="bold"), Text(_running(circuits)), Text(counted(circuits))]
-    lying = located(circuits, modes)
+    head = [Text(circuits.mechanism.name, style="bold"), Text(_running_text(circuits)), Text(count_text(circuits))]
+    lying = locate_assemblies(circuits, modes)
     told = list(circuits.said)
-    if len(lying) == MOST:
-        told.append(f"of the assemblies here the first {MOST} are located")
+    if len(lying) == MAX_LOCATED:
+        told.append(f"of the assemblies here the first {MAX_LOCATED} are located")
     lost = [str(each.mode.number) for each in lying if each.circuit is None]
     if lost:
-        told.append(f"of the assemblies here on none of these circuits: {listed(lost)}")
-    tables = [_branches(circuits, lying)] if len(circuits) else []
-    tables += [_intervals(circuits)] if circuits.intervals else []
+        told.append(f"of the assemblies here on none of these circuits: {join_all_names(lost)}")
+    tables = [_branches_table(circuits, lying)] if len(circuits) else []
+    tables += [_intervals_table(circuits)] if circuits.intervals else []
     return Stack(*head, Text(), *tables, Text(), paragraphs((" -", sentence) for sentence in told))
 
 
-def counted(circuits: Circuits) -> str:
+def count_text(circuits: Circuits) -> str:
     """How many circuits there are, how sure that is, and where it goes together."""
-    there = f"{many(len(circuits), 'circuit')}, {circuits.complete.value}"
-    return f"{there}; {_assembling(circuits)}"
+    there = f"{count_phrase(len(circuits), 'circuit')}, {circuits.complete.value}"
+    return f"{there}; {_assembly_range_text(circuits)}"
 
 
-def _assembling(circuits: Circuits) -> str:
+def _assembly_range_text(circuits: Circuits) -> str:
     if not circuits.assembles:
         return "no position of the input was found at which it goes together"
-    if _round(circuits):
+    if _assembles_all_round(circuits):
         return "it goes together all round"
-    ends = [" to ".join(_amount(circuits, end) for end in both) for both in circuits.assembles]
-    return f"it goes together with {circuits.pair} from {listed(ends)}"
+    ends = [" to ".join(_position_text(circuits, end) for end in both) for both in circuits.assembles]
+    return f"it goes together with {circuits.pair} from {join_all_names(ends)}"
 
 
-def _round(circuits: Circuits) -> bool:
+def _assembles_all_round(circuits: Circuits) -> bool:
     """Whether it goes together at every position of an input that turns."""
-    return not _slides(circuits) and any(high - low >= 2.0 * pi * (1.0 - 1e-9) for low, high in circuits.assembles)
+    return not _is_sliding_input(circuits) and any(
+        high - low >= 2.0 * pi * (1.0 - 1e-9) for low, high in circuits.assembles
+    )
 
 
-def _running(circuits: Circuits) -> str:
+def _running_text(circuits: Circuits) -> str:
     """Which input runs, and where the others stand."""
-    named, units = motions(circuits.mechanism), circuits.mechanism.units
+    named, units = relative_motions(circuits.mechanism), circuits.mechanism.units
     rest = [
-        f"{given.pair} = {amount(given.position, named[given.pair].drive_kind.value, units)}"
+        f"{given.pair} = {amount(given.position, named[given.pair].input_kind.value, units)}"
         for given in circuits.mechanism.inputs
         if given.pair != circuits.pair
     ]
-    return f"input {circuits.pair} running" + (f", {listed(rest)} held" if rest else "")
+    return f"input {circuits.pair} running" + (f", {join_all_names(rest)} held" if rest else "")
 
 
-def _branches(circuits: Circuits, lying: tuple[Located, ...]) -> FittedTable:
-    at = _amount(circuits, _position(circuits))
+def _branches_table(circuits: Circuits, lying: tuple[LocatedAssembly, ...]) -> FittedTable:
+    at = _position_text(circuits, _file_position(circuits))
     rows = plain_table(
         "Circuits and branches",
         "circuit",
         "branch",
-        (f"from, {_unit(circuits)}", f"to, {_unit(circuits)}", "ends"),
+        (f"from, {_input_unit(circuits)}", f"to, {_input_unit(circuits)}", "ends"),
         f"assemblies at, {at}",
         left=(4, 5),
         keys=2,
@@ -80,14 +82,18 @@ def _branches(circuits: Circuits, lying: tuple[Located, ...]) -> FittedTable:
     for circuit in circuits:
         for branch in circuit.branches:
             here = [
-                f"{each.mode.number}{' as sketched' if each.own else ''}" for each in lying if each.on(circuit, branch)
+                f"{each.mode.number}{' as sketched' if each.is_sketched else ''}"
+                for each in lying
+                if each.is_on(circuit, branch)
             ]
-            ends = [_printed(circuits, end) for end in (branch.low, branch.high)]
-            rows.add_row(str(circuit.number), str(branch.number), *ends, _ends(branch), listed(here) if here else "")
+            ends = [_position_cell(circuits, end) for end in (branch.low, branch.high)]
+            rows.add_row(
+                str(circuit.number), str(branch.number), *ends, _ends_text(branch), join_all_names(here) if here else ""
+            )
     return rows
 
 
-def _ends(branch: Branch) -> str:
+def _ends_text(branch: Branch) -> str:
     """What stands at the ends: goes all round, dead points, dead point and without end."""
     if branch.turns:
         return "goes all round" if branch.turns == 1 else f"back after {branch.turns} turns"
@@ -95,49 +101,49 @@ def _ends(branch: Branch) -> str:
     return f"{low}s" if low == high == "dead point" else low if low == high else f"{low} and {high}"
 
 
-def _intervals(circuits: Circuits) -> FittedTable:
+def _intervals_table(circuits: Circuits) -> FittedTable:
     rows = plain_table(
         "Intervals of the input",
-        (f"from, {_unit(circuits)}", f"to, {_unit(circuits)}"),
+        (f"from, {_input_unit(circuits)}", f"to, {_input_unit(circuits)}"),
         "assemblies",
         left=(),
         keys=0,
     )
     for each in circuits.intervals:
         many_ = "?" if each.assemblies is None else str(each.assemblies)
-        rows.add_row(_printed(circuits, each.low), _printed(circuits, each.high), many_)
+        rows.add_row(_position_cell(circuits, each.low), _position_cell(circuits, each.high), many_)
     return rows
 
 
-def _slides(circuits: Circuits) -> bool:
-    return motions(circuits.mechanism)[circuits.pair].drive_kind.value == "length"
+def _is_sliding_input(circuits: Circuits) -> bool:
+    return relative_motions(circuits.mechanism)[circuits.pair].input_kind.value == "length"
 
 
-def _unit(circuits: Circuits) -> str:
+def _input_unit(circuits: Circuits) -> str:
     units = circuits.mechanism.units
-    return units.length if _slides(circuits) else units.angle
+    return units.length if _is_sliding_input(circuits) else units.angle
 
 
-def _printed(circuits: Circuits, position: float) -> str:
-    return number(unit(_unit(circuits)).from_si(float(position)))
+def _position_cell(circuits: Circuits, position: float) -> str:
+    return format_number(parse_unit(_input_unit(circuits)).from_si(float(position)))
 
 
-def _amount(circuits: Circuits, position: float) -> str:
-    return amount(float(position), "length" if _slides(circuits) else "angle", circuits.mechanism.units)
+def _position_text(circuits: Circuits, position: float) -> str:
+    return amount(float(position), "length" if _is_sliding_input(circuits) else "angle", circuits.mechanism.units)
 
 
-def _position(circuits: Circuits) -> float:
+def _file_position(circuits: Circuits) -> float:
     """Where the file has the input that runs."""
     return next(given.position for given in circuits.mechanism.inputs if given.pair == circuits.pair)
 
 
 def record(circuits: Circuits, modes: Modes) -> dict[str, Any]:
     """The circuits and branches as a JSON value, in SI units."""
-    lying = located(circuits, modes)
+    lying = locate_assemblies(circuits, modes)
     refused = None if modes else modes.refusal()
 
     def told(circuit: Circuit, branch: Branch) -> dict[str, Any]:
-        here = [each.mode.number for each in lying if each.on(circuit, branch)]
+        here = [each.mode.number for each in lying if each.is_on(circuit, branch)]
         return branch._asdict() | {"modes": here}
 
     return {
@@ -150,7 +156,7 @@ def record(circuits: Circuits, modes: Modes) -> dict[str, Any]:
         "critical": list(circuits.critical),
         "assembles": [list(both) for both in circuits.assembles],
         "intervals": [each._asdict() for each in circuits.intervals],
-        "nearest": next((each.mode.number for each in lying if each.own), None),
+        "nearest": next((each.mode.number for each in lying if each.is_sketched), None),
         "circuits": [
             {
                 "number": circuit.number,

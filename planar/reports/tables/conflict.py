@@ -11,17 +11,20 @@ from rich.text import Text
 from planar.assemblies.circuits.circuits import Circuits
 from planar.assemblies.conflict import Conflict
 from planar.assemblies.polynomial.completeness import Completeness
-from planar.model.mechanism import motions
-from planar.model.wording import amount, listed
+from planar.model.mechanism import relative_motions
+from planar.model.wording import amount, join_all_names
 from planar.reports.tables_of_numbers import paragraphs, plain_table
-from planar.solving.diagnosis.remedy import Change
+from planar.solving.diagnosis.remedy import RemedyChange
 
 
 def conflict_table(conflict: Conflict, runs: Sequence[Circuits]) -> RenderableType:
     """The pairs in conflict, the changes of one number that mend it, and where the inputs let it go together."""
     units = conflict.mechanism.units
     head = [Text(conflict.mechanism.name, style="bold"), Text(), Text("Why it does not go together", style="bold")]
-    parts: list[RenderableType] = [*head, paragraphs((" -", each) for each in (*conflict.said, *map(_within, runs)))]
+    parts: list[RenderableType] = [
+        *head,
+        paragraphs((" -", each) for each in (*conflict.said, *map(_range_sentence, runs))),
+    ]
     changes = (*conflict.dimensions, *conflict.positions)
     if changes:
         table = plain_table("It would go together with one of these changed", "what", "to", "instead of", "change")
@@ -32,12 +35,12 @@ def conflict_table(conflict: Conflict, runs: Sequence[Circuits]) -> RenderableTy
     return Group(*parts)
 
 
-def _within(run: Circuits) -> str:
+def _range_sentence(run: Circuits) -> str:
     """Where one input lets the mechanism go together."""
-    kind, units = motions(run.mechanism)[run.pair].drive_kind.value, run.mechanism.units
+    kind, units = relative_motions(run.mechanism)[run.pair].input_kind.value, run.mechanism.units
     known = "as far as known" if run.complete is Completeness.NOT else run.complete.value
     ranges = [f"from {amount(low, kind, units)} to {amount(high, kind, units)}" for low, high in run.assembles]
-    where = listed(ranges) if ranges else "nowhere"
+    where = join_all_names(ranges) if ranges else "nowhere"
     return f"it goes together with the input at {run.pair!r} {where}, {known}"
 
 
@@ -47,8 +50,8 @@ def conflict_record(conflict: Conflict, runs: Sequence[Circuits]) -> dict[str, A
         "pairs": list(conflict.pairs),
         "inputs": list(conflict.inputs),
         "complete": conflict.complete.value,
-        "dimensions": [_change(each) for each in conflict.dimensions],
-        "positions": [_change(each) for each in conflict.positions],
+        "dimensions": [_change_record(each) for each in conflict.dimensions],
+        "positions": [_change_record(each) for each in conflict.positions],
         "assembles": {
             run.pair: {"intervals": [list(each) for each in run.assembles], "complete": run.complete.value}
             for run in runs
@@ -57,5 +60,5 @@ def conflict_record(conflict: Conflict, runs: Sequence[Circuits]) -> dict[str, A
     }
 
 
-def _change(change: Change) -> dict[str, Any]:
+def _change_record(change: RemedyChange) -> dict[str, Any]:
     return {"name": change.name, "was": change.was, "value": change.value}

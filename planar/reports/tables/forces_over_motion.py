@@ -10,15 +10,15 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planar.dynamics.forces import Forces
-from planar.dynamics.load_attachment import choices
+from planar.dynamics.load_attachment import attachment_remarks
 from planar.dynamics.reactions import Reaction
-from planar.model.wording import listed, many
-from planar.reports.columns import Told
+from planar.model.wording import count_phrase, join_all_names
+from planar.reports.columns import ReportedSeries
 from planar.reports.fitted_table import FittedTable
 from planar.reports.tables import forces as at_one
 from planar.reports.tables import loads
-from planar.reports.tables.motion import head, place, place_heading, running
-from planar.reports.tables_of_numbers import counted, paragraphs, plain_table
+from planar.reports.tables.motion import motion_heading, position_cell, position_heading, running_pair
+from planar.reports.tables_of_numbers import format_or_zero, paragraphs, plain_table
 
 Array = np.ndarray
 
@@ -26,23 +26,30 @@ Array = np.ndarray
 def tables(forces: Forces) -> RenderableType:
     """Mean, least and greatest effort of every input, the greatest force and couple in every pair, each with where."""
     motion = forces.moving
-    parts: list[RenderableType] = [*head(motion), Text(at_one.balanced(forces)), Text(), _efforts(forces)]
-    parts += [_reactions(forces), paragraphs([*_shaking(forces), *at_one.proved(forces)])]
-    notes = (*_undetermined(forces), *choices(forces.mechanism), *motion.remarks)
+    parts: list[RenderableType] = [
+        *motion_heading(motion),
+        Text(at_one.equilibrium_text(forces)),
+        Text(),
+        _efforts_table(forces),
+    ]
+    parts += [_reactions_table(forces), paragraphs([*_shaking_facts(forces), *at_one.proof_facts(forces)])]
+    notes = (*_undetermined_sentences(forces), *attachment_remarks(forces.mechanism), *motion.remarks)
     if notes:
         parts += [Text(), paragraphs(("-", sentence) for sentence in notes)]
     return Group(*parts)
 
 
-def _efforts(forces: Forces) -> FittedTable:
-    at, most = place_heading(forces.moving), at_one.greatest(forces)
+def _efforts_table(forces: Forces) -> FittedTable:
+    at, most = position_heading(forces.moving), at_one.greatest_moment_and_force(forces)
     table = plain_table(
         "Inputs, among these positions", "input", ("mean effort", "unit"), ("least", at), ("greatest", at), left=(0, 2)
     )
     for name, effort in forces.inputs.items():
-        _, unit = at_one.measure(forces, name)
-        least, greatest = (_extreme(forces, sense * effort) for sense in (-1.0, 1.0))
-        mean, low, high = (counted(each, most[unit == "N"]) for each in (_mean(forces, effort), -least[0], greatest[0]))
+        _, unit = at_one.effort_name_and_unit(forces, name)
+        least, greatest = (_greatest_with_place(forces, sense * effort) for sense in (-1.0, 1.0))
+        mean, low, high = (
+            format_or_zero(each, most[unit == "N"]) for each in (_mean(forces, effort), -least[0], greatest[0])
+        )
         table.add_row(name, mean, unit, low, least[1], high, greatest[1])
     return table
 
@@ -50,7 +57,7 @@ def _efforts(forces: Forces) -> FittedTable:
 def _mean(forces: Forces, values: Array) -> float:
     """Over the time, or over the way of the input that runs, there and back: work by way where it does not turn."""
     motion = forces.moving
-    driver = running(motion)
+    driver = running_pair(motion)
     ways = motion.time if driver is None else motion.inputs[driver].position
     steps = np.abs(np.diff(ways))
     if not steps.any():
@@ -58,16 +65,20 @@ def _mean(forces: Forces, values: Array) -> float:
     return float(np.sum(0.5 * (values[1:] + values[:-1]) * steps) / np.sum(steps))
 
 
-def _extreme(forces: Forces, values: Array) -> tuple[float, str]:
+def _greatest_with_place(forces: Forces, values: Array) -> tuple[float, str]:
     """The greatest of the values that are determined, and where it is."""
     if not np.isfinite(values).any():
         return np.nan, ""
     row = int(np.nanargmax(values))
-    return float(values[row]), place(forces.moving, row)
+    return float(values[row]), position_cell(forces.moving, row)
 
 
-def _reactions(forces: Forces) -> FittedTable:
-    degree, at, (moment, greatest) = forces.mechanism.units.angle, place_heading(forces.moving), at_one.greatest(forces)
+def _reactions_table(forces: Forces) -> FittedTable:
+    degree, at, (moment, greatest) = (
+        forces.mechanism.units.angle,
+        position_heading(forces.moving),
+        at_one.greatest_moment_and_force(forces),
+    )
     force = ("greatest force, N", f"its direction, {degree}", at)
     headings = ("pair", "on", "by", force, ("greatest couple, N·m", at))
     table = plain_table("Reactions in the pairs, among these positions", *headings, left=(0, 1, 2), keys=3)
@@ -75,77 +86,82 @@ def _reactions(forces: Forces) -> FittedTable:
         first, second = each.links
         if each.at is not None:
             force = np.hypot(*each.force.T)
-            most, where = _extreme(forces, force)
-            way = loads.arrow(each.force[int(np.nanargmax(force))], degree, greatest)[1] if where else ""
-            told = counted(most, greatest), way, where if way else ""
-            table.add_row(name, second, first, *told, *_turned(forces, each.couple, moment))
+            most, where = _greatest_with_place(forces, force)
+            way = loads.polar_cells(each.force[int(np.nanargmax(force))], degree, greatest)[1] if where else ""
+            told = format_or_zero(most, greatest), way, where if way else ""
+            table.add_row(name, second, first, *told, *_greatest_couple(forces, each.couple, moment))
         for link, couple in each.couples.items():
-            table.add_row(name, link, "", "-", "", "", *_turned(forces, couple, moment))
+            table.add_row(name, link, "", "-", "", "", *_greatest_couple(forces, couple, moment))
     return table
 
 
-def _turned(forces: Forces, couple: Array, beside: float) -> tuple[str, str]:
+def _greatest_couple(forces: Forces, couple: Array, beside: float) -> tuple[str, str]:
     """The greatest couple, whatever its sense, and where; nowhere if there is none."""
-    most, where = _extreme(forces, np.abs(couple))
-    told = counted(most, beside)
+    most, where = _greatest_with_place(forces, np.abs(couple))
+    told = format_or_zero(most, beside)
     return told, "" if told == "0" else where
 
 
-def _shaking(forces: Forces) -> Iterator[tuple[str, str]]:
-    if not at_one.accelerated(forces):
+def _shaking_facts(forces: Forces) -> Iterator[tuple[str, str]]:
+    if not at_one.has_inertia(forces):
         return
     force, moment = forces.shaking
-    (name, measure), told = place_heading(forces.moving).split(", "), []
+    (name, measure), told = position_heading(forces.moving).split(", "), []
     for values, unit, beside in zip(
-        (np.hypot(*force.T), np.abs(moment)), ("N", "N·m"), at_one.greatest(forces)[::-1], strict=True
+        (np.hypot(*force.T), np.abs(moment)), ("N", "N·m"), at_one.greatest_moment_and_force(forces)[::-1], strict=True
     ):
-        most, where = _extreme(forces, values)
-        told.append(f"up to {counted(most, beside)} {unit} ({name} = {where} {measure})")
+        most, where = _greatest_with_place(forces, values)
+        told.append(f"up to {format_or_zero(most, beside)} {unit} ({name} = {where} {measure})")
     yield "shaking", f"{told[0]}, and {told[1]} about the frame's origin"
 
 
-def _undetermined(forces: Forces) -> Iterator[str]:
+def _undetermined_sentences(forces: Forces) -> Iterator[str]:
     """What is not told, at how many positions, and why; what has the same reason together."""
     efforts = {name: np.isnan(values) for name, values in forces.inputs.items()}
     by: dict[tuple[str, int], list[str]] = {}
-    for name, lost in (efforts | {name: _unknown(each) for name, each in forces.reactions.items()}).items():
+    for name, lost in (efforts | {name: _undetermined_rows(each) for name, each in forces.reactions.items()}).items():
         if lost.any():
             by.setdefault((forces.undetermined[name], int(np.sum(lost))), []).append(name)
     for (why, count), names in by.items():
-        yield f"not determined at {listed(names)}, at {count} of {many(len(forces.moving), 'position')}: {why}"
+        yield (
+            f"not determined at {join_all_names(names)}, at {count} of "
+            f"{count_phrase(len(forces.moving), 'position')}: {why}"
+        )
 
 
-def _unknown(each: Reaction) -> Array:
+def _undetermined_rows(each: Reaction) -> Array:
     """Where something of a reaction is not told (n,)."""
     parts = [np.asarray(couple) for couple in each.couples.values()] or [*each.force.T, np.asarray(each.couple)]
     return np.isnan(parts).any(axis=0)
 
 
-def told(forces: Forces) -> Iterable[Told]:
+def force_series(forces: Forces) -> Iterable[ReportedSeries]:
     """Efforts, reactions, shaking force and moment at every position, beside what a file of the motion has."""
     for name, effort in forces.inputs.items():
-        what, _ = at_one.measure(forces, name)
-        yield Told("inputs", name, {what: what, "power": "power"}, {what: effort, "power": forces.powers[name]})
+        what, _ = at_one.effort_name_and_unit(forces, name)
+        yield ReportedSeries(
+            "inputs", name, {what: what, "power": "power"}, {what: effort, "power": forces.powers[name]}
+        )
     for name, each in forces.reactions.items():
-        values = _values(each)
-        yield Told("reactions", name, {what: _KINDS.get(what, "torque") for what in values}, values)
-    if at_one.accelerated(forces):
+        values = _reaction_values(each)
+        yield ReportedSeries("reactions", name, {what: _REACTION_KINDS.get(what, "torque") for what in values}, values)
+    if at_one.has_inertia(forces):
         force, moment = forces.shaking
-        yield Told("shaking", "", {"force": "force", "moment": "torque"}, {"force": force, "moment": moment})
+        yield ReportedSeries("shaking", "", {"force": "force", "moment": "torque"}, {"force": force, "moment": moment})
 
 
-_KINDS = {"position": "length", "force": "force"}
+_REACTION_KINDS = {"position": "length", "force": "force"}
 """Of what is told of a reaction; everything else of it is a couple."""
 
 
-def _values(each: Reaction) -> dict[str, Array]:
+def _reaction_values(each: Reaction) -> dict[str, Array]:
     if each.at is None:
         return {f"couple on {link}": np.asarray(couple) for link, couple in each.couples.items()}
     return {"position": each.at, "force": each.force, "couple": np.asarray(each.couple)}
 
 
-def said(forces: Forces) -> dict[str, Any]:
+def run_facts(forces: Forces) -> dict[str, Any]:
     """What is said of the whole motion, as JSON values; forces in a pair are on the second of the links `between`."""
     between = {name: list(each.links) for name, each in forces.reactions.items()}
-    remarks = [*choices(forces.mechanism), *forces.moving.remarks]
-    return {"between": between, "remarks": remarks, **at_one.said(forces)}
+    remarks = [*attachment_remarks(forces.mechanism), *forces.moving.remarks]
+    return {"between": between, "remarks": remarks, **at_one.proof_record(forces)}

@@ -8,11 +8,11 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planar.analysis.identity.inspection import Inspection
-from planar.model.wording import listed, many
+from planar.model.wording import count_phrase, join_all_names
 from planar.reports.tables_of_numbers import paragraphs, plain_table
 
 
-def inspection(found: Inspection) -> RenderableType:
+def inspection_tables(found: Inspection) -> RenderableType:
     """Names, links, pairs, chain and mobility, in the order in which a textbook takes them up."""
     links = plain_table("Links", "no.", "link", "order", "motion", left=(1, 2, 3), keys=2)
     for name, link in found.links.items():
@@ -22,26 +22,26 @@ def inspection(found: Inspection) -> RenderableType:
         ("kinematic chain", "closed" if found.closed else "open: some links have one pair only"),
         ("mechanism", f"{'yes' if found.is_mechanism else 'no'}: {found.mechanism_reason}"),
         ("linkage", f"{'yes' if found.is_linkage else 'no'}: {found.linkage_reason}"),
-        ("links", orders(found)),
-        ("pairs", f"{many(found.lower, 'lower pair')}, {many(found.higher, 'higher pair')}"),
+        ("links", link_orders_text(found)),
+        ("pairs", f"{count_phrase(found.lower, 'lower pair')}, {count_phrase(found.higher, 'higher pair')}"),
         *((" ", f"{len(pairs)} {kind}: {', '.join(pairs)}") for kind, pairs in found.pairs),
-        *_mobility(found),
+        *_mobility_facts(found),
     ]
-    return Group(Text(found.name, style="bold"), Text(), paragraphs(said), Text(), links, *_acting(found))
+    return Group(Text(found.name, style="bold"), Text(), paragraphs(said), Text(), links, *_actions_tables(found))
 
 
-def _acting(found: Inspection) -> Iterator[RenderableType]:
+def _actions_tables(found: Inspection) -> Iterator[RenderableType]:
     """Loads, springs and masses, where there are any."""
     if found.actions:
         acting = plain_table("Loads, springs and masses", "what", "at", "on", "how much", left=(0, 1, 2, 3))
         for each in found.actions:
-            acting.add_row(each.kind, each.at, listed(each.links) if each.links else "", each.amount)
+            acting.add_row(each.kind, each.at, join_all_names(each.links) if each.links else "", each.amount)
         yield acting
     if found.remarks:
         yield paragraphs(("-", remark) for remark in found.remarks)
 
 
-def _mobility(found: Inspection) -> list[tuple[str, str]]:
+def _mobility_facts(found: Inspection) -> list[tuple[str, str]]:
     count = f"{found.gruebler} by count (Gruebler, Kutzbach)"
     mobility = found.mobility
     if mobility is None:
@@ -50,9 +50,9 @@ def _mobility(found: Inspection) -> list[tuple[str, str]]:
     return [("mobility", whole), *((" ", sentence) for sentence in mobility.why)]
 
 
-def orders(found: Inspection) -> str:
+def link_orders_text(found: Inspection) -> str:
     """How many links there are of each order."""
     counts: dict[str, int] = {}
     for link in found.links.values():
         counts[link.order] = counts.get(link.order, 0) + 1
-    return listed([f"{count} {order}" for order, count in counts.items()])
+    return join_all_names([f"{count} {order}" for order, count in counts.items()])

@@ -7,81 +7,88 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planar.dynamics.external_actions import Acting, Field
+from planar.dynamics.external_actions import ExternalAction, KinematicArrays
 from planar.dynamics.forces import Forces
-from planar.foundation.units import shown, unit
-from planar.model.mechanism import Units
+from planar.foundation.units import display_unit, parse_unit
+from planar.model.mechanism import FileUnits
 from planar.reports.fitted_table import FittedTable
-from planar.reports.tables_of_numbers import ROUNDING, counted, direction, heading, plain_table
+from planar.reports.tables_of_numbers import (
+    ROUNDING_RATIO,
+    column_heading,
+    format_or_zero,
+    plain_table,
+    vector_direction,
+)
 
 Array = np.ndarray
 
 
-class Moved(NamedTuple):
+class ActionMotion(NamedTuple):
     """What acts at a position, and how fast what it acts on moves: its place (2,), m/s, and its link, rad/s."""
 
-    acting: Acting
+    acting: ExternalAction
     velocity: Array
     angular_velocity: float
 
     @property
-    def most(self) -> float:
+    def max_power(self) -> float:
         """The greatest power that it could have at these speeds, W."""
         pushing = float(np.hypot(*self.acting.force) * np.hypot(*self.velocity))
         return pushing + abs(self.acting.couple * self.angular_velocity)
 
 
-def moved(forces: Forces, inertia: bool) -> list[Moved]:
+def actions_with_motion(forces: Forces, inertia: bool) -> list[ActionMotion]:
     """Of a position: the links' inertia, or everything else but the inputs."""
-    field = Field(forces.moving, forces.moving.shapes)
+    field = KinematicArrays(forces.moving, forces.moving.shapes)
     asked = [each for each in forces.acting if each.kind == "inertia"] if inertia else forces.loads
     return [
-        Moved(each, field.velocity(each.link, each.at[None])[0], float(field.turning(each.link)[0])) for each in asked
+        ActionMotion(each, field.velocity_at(each.link, each.at[None])[0], float(field.angle_rates(each.link)[0]))
+        for each in asked
     ]
 
 
-def acting_table(title: str, rows: Iterable[Moved], units: Units, moment: float) -> FittedTable:
+def actions_table(title: str, rows: Iterable[ActionMotion], units: FileUnits, moment: float) -> FittedTable:
     """Forces and couples with the motion of what they act on, and their power; beside the greatest moment (N m)."""
-    at = heading("at", "angle", units)
+    at = column_heading("at", "angle", units)
     table = plain_table(
         title,
         "what",
         "on",
         ("force, N", at),
         "torque, N·m",
-        (heading("velocity", "velocity", units), at),
-        heading("ang. velocity", "angular velocity", units),
+        (column_heading("velocity", "velocity", units), at),
+        column_heading("ang. velocity", "angular velocity", units),
         "power, W",
         left=(0, 1),
         keys=2,
     )
-    measure = shown("velocity", units)[1]
+    measure = display_unit("velocity", units)[1]
     for each in rows:
         acting = each.acting
-        turns = abs(acting.couple) > ROUNDING * moment
+        turns = abs(acting.couple) > ROUNDING_RATIO * moment
         pushes = acting.force.any() or not turns
         table.add_row(
             acting.name,
             acting.link,
-            *arrow(acting.force if pushes else None, units.angle),
-            counted(float(acting.couple) if turns else None),
-            *arrow(measure.from_si(each.velocity) if pushes else None, units.angle),
-            counted(each.angular_velocity if turns else None),
-            counted(float(acting.power), each.most + moment * abs(each.angular_velocity)),
+            *polar_cells(acting.force if pushes else None, units.angle),
+            format_or_zero(float(acting.couple) if turns else None),
+            *polar_cells(measure.from_si(each.velocity) if pushes else None, units.angle),
+            format_or_zero(each.angular_velocity if turns else None),
+            format_or_zero(float(acting.power), each.max_power + moment * abs(each.angular_velocity)),
         )
     return table
 
 
-def arrow(vector: Array | None, degree: str, beside: float = 0.0) -> tuple[str, str]:
+def polar_cells(vector: Array | None, degree: str, beside: float = 0.0) -> tuple[str, str]:
     """A vector's magnitude and direction, without one where it is nothing (see `counted`)."""
     if vector is None or not np.isfinite(vector).all():
         return "-", "-"
     size = float(np.hypot(*vector))
-    way = counted(unit(degree).from_si(direction(vector))) if size > ROUNDING * beside else ""
-    return counted(size, beside), way
+    way = format_or_zero(parse_unit(degree).from_si(vector_direction(vector))) if size > ROUNDING_RATIO * beside else ""
+    return format_or_zero(size, beside), way
 
 
-def record(rows: Iterable[Moved]) -> list[dict[str, Any]]:
+def record(rows: Iterable[ActionMotion]) -> list[dict[str, Any]]:
     """The same as JSON values (SI)."""
     return [
         {"kind": each.acting.kind, "name": each.acting.name, "link": each.acting.link}

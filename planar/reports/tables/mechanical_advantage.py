@@ -7,15 +7,15 @@ from typing import Any
 
 from planar.analysis.motion.mechanical_advantage import Advantage
 from planar.reports.fitted_table import FittedTable
-from planar.reports.tables_of_numbers import counted, plain_table
+from planar.reports.tables_of_numbers import format_or_zero, plain_table
 
 Advantages = Mapping[str, Mapping[str, Advantage]]
 """By output and input."""
-MEASURES = {"1/m": "N per N·m", "m": "N·m per N", "1": ""}
+ADVANTAGE_UNITS = {"1/m": "N per N·m", "m": "N·m per N", "1": ""}
 """How an advantage's unit is printed; one of like for like has none."""
 
 
-def each_of(advantages: Advantages) -> list[Advantage]:
+def all_advantages(advantages: Advantages) -> list[Advantage]:
     """All of them in one list."""
     return [each for row in advantages.values() for each in row.values()]
 
@@ -25,8 +25,8 @@ def advantages_table(ratios: Iterable[Advantage]) -> FittedTable:
     headings = ("output", "for the input", ("by power", "by centres", "unit"), "through")
     table = plain_table("Mechanical advantage", *headings, left=(0, 1, 4, 5), keys=2)
     for each in ratios:
-        values = counted(each.by_power), counted(each.by_centres)
-        table.add_row(each.output, each.input, *values, MEASURES[each.measure], " ".join(each.through))
+        values = format_or_zero(each.by_power), format_or_zero(each.by_centres)
+        table.add_row(each.output, each.input, *values, ADVANTAGE_UNITS[each.measure], " ".join(each.through))
     return table
 
 

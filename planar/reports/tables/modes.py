@@ -11,21 +11,21 @@ from rich.console import RenderableType
 from rich.text import Text
 
 from planar.assemblies.circuits.circuits import Circuits
-from planar.assemblies.modes import Group, Mode, Modes
+from planar.assemblies.modes import Mode, Modes, ModesBlock
 from planar.foundation.errors import BadInput, Outcome
-from planar.foundation.units import unit
-from planar.model.mechanism import motions
-from planar.model.wording import amount, listed, many
+from planar.foundation.units import parse_unit
+from planar.model.mechanism import relative_motions
+from planar.model.wording import amount, count_phrase, join_all_names
 from planar.reports.fitted_table import FittedTable
 from planar.reports.tables_of_numbers import DIGITS, paragraphs, plain_table
 
-COLUMNS = 4
+MAX_POINT_COLUMNS = 4
 """Points whose places are printed unless they are named."""
-LISTED = 6
+MAX_LISTED_NAMES = 6
 """Names or numbers of one sentence."""
-CHOICES = 12
+MAX_CHOICE_GROUPS = 12
 """Groups: of more the choices are not printed."""
-ZERO = 1e-12
+ZERO_RATIO = 1e-12
 """A coordinate below this part of the greatest is printed as 0."""
 
 
@@ -33,13 +33,13 @@ def table(modes: Modes, limit: int, points: Sequence[str] = (), circuits: Circui
     """The first assemblies: how many there are, group by group, and where each has the points; on which circuit."""
     mechanism = modes.mechanism
     shown = list(islice(modes, limit))
-    head = [Text(mechanism.name, style="bold"), Text(_at(modes)), Text(counted(modes, len(shown)))]
-    names = _named(modes, points) if points else _telling(modes, shown)
+    head = [Text(mechanism.name, style="bold"), Text(_inputs_text(modes)), Text(count_text(modes, len(shown)))]
+    names = _check_points(modes, points) if points else _distinguishing_points(modes, shown)
     told = [*modes.said]
-    rest = [name for name in _moving(modes) if name not in names]
+    rest = [name for name in _moving_points(modes) if name not in names]
     if rest and not points:
-        more = [*rest[:LISTED], "more"] if len(rest) > LISTED else rest
-        told.append(f"places of {listed(more)} with --point or --json")
+        more = [*rest[:MAX_LISTED_NAMES], "more"] if len(rest) > MAX_LISTED_NAMES else rest
+        told.append(f"places of {join_all_names(more)} with --point or --json")
     if modes.mechanism.sketch:
         told.append("off: how far the sketched points are from the sketch, root of the mean square")
     why: dict[str, list[str]] = {}
@@ -47,24 +47,25 @@ def table(modes: Modes, limit: int, points: Sequence[str] = (), circuits: Circui
         if mode.reason:
             why.setdefault(mode.reason, []).append(str(mode.number))
     for reason, which in why.items():
-        told.append(f"{listed([*which[:LISTED], 'more'] if len(which) > LISTED else which)}: {reason}")
+        names = [*which[:MAX_LISTED_NAMES], "more"] if len(which) > MAX_LISTED_NAMES else which
+        told.append(f"{join_all_names(names)}: {reason}")
     notes = paragraphs((" -", sentence) for sentence in told)
-    groups = [_groups(modes)] if modes.groups else []
-    return Stack(*head, Text(), *groups, _rows(modes, shown, names, circuits), Text(), notes)
+    groups = [_groups_table(modes)] if modes.groups else []
+    return Stack(*head, Text(), *groups, _assemblies_table(modes, shown, names, circuits), Text(), notes)
 
 
-def counted(modes: Modes, listed: int) -> str:
+def count_text(modes: Modes, listed_count: int) -> str:
     """How many assemblies there are, and how sure that is: 4 assemblies, complete."""
     bound = modes.bound
     most = "" if bound is None else f", {bound} at most"
     if modes.total is None:
-        return f"more than {many(listed, 'assembly', 'assemblies')}{most}; {modes.complete.value}"
+        return f"more than {count_phrase(listed_count, 'assembly', 'assemblies')}{most}; {modes.complete.value}"
     beside = f" of {bound} complex solutions" if bound is not None and bound != modes.total else ""
-    left = f"; the first {listed} are listed" if listed < modes.total else ""
-    return f"{many(modes.total, 'assembly', 'assemblies')}{beside}, {modes.complete.value}{left}"
+    left = f"; the first {listed_count} are listed" if listed_count < modes.total else ""
+    return f"{count_phrase(modes.total, 'assembly', 'assemblies')}{beside}, {modes.complete.value}{left}"
 
 
-def _groups(modes: Modes) -> FittedTable:
+def _groups_table(modes: Modes) -> FittedTable:
     rows = plain_table(
         "Groups of links, one after the other",
         "group",
@@ -77,25 +78,34 @@ def _groups(modes: Modes) -> FittedTable:
     )
     for number, group in enumerate(modes.groups, start=1):
         expected = "?" if group.expected is None else str(group.expected)
-        rows.add_row(str(number), _about(group), expected, _range(group.found), _range(group.real), _whole(group))
+        rows.add_row(
+            str(number),
+            _group_members(group),
+            expected,
+            _range_text(group.found),
+            _range_text(group.real),
+            _completeness_text(group),
+        )
     return rows
 
 
-def _whole(group: Group) -> str:
+def _completeness_text(group: ModesBlock) -> str:
     return f"{group.complete.value}, with a curve of assemblies" if group.curve else group.complete.value
 
 
-def _about(group: Group) -> str:
+def _group_members(group: ModesBlock) -> str:
     return ", ".join(group.links or group.pairs)
 
 
-def _range(ends: tuple[int, int]) -> str:
+def _range_text(ends: tuple[int, int]) -> str:
     return str(ends[0]) if ends[0] == ends[1] else f"{ends[0]} to {ends[1]}"
 
 
-def _rows(modes: Modes, shown: Sequence[Mode], names: Sequence[str], circuits: Circuits | None) -> FittedTable:
+def _assemblies_table(
+    modes: Modes, shown: Sequence[Mode], names: Sequence[str], circuits: Circuits | None
+) -> FittedTable:
     length = modes.mechanism.units.length
-    several = 1 < len(modes.groups) <= CHOICES
+    several = 1 < len(modes.groups) <= MAX_CHOICE_GROUPS
     leading = several + (0 if circuits is None else 2)
     near = modes.nearest
     rows = plain_table(
@@ -110,55 +120,55 @@ def _rows(modes: Modes, shown: Sequence[Mode], names: Sequence[str], circuits: C
         left=(len(names) + leading + 2, len(names) + leading + 3),
         keys=1 + several,
     )
-    by = unit(length)
+    by = parse_unit(length)
     for mode in shown:
         distance = mode.distance
         rows.add_row(
             str(mode.number),
             *([".".join(map(str, mode.choices))] if several else []),
-            *([] if circuits is None else [str(each or "-") for each in _lying(circuits, mode)]),
-            *(_place(mode, name, by) for name in names),
+            *([] if circuits is None else [str(each or "-") for each in _circuit_and_branch(circuits, mode)]),
+            *(_point_cell(mode, name, by) for name in names),
             "-" if distance is None else f"{by.from_si(distance):.4g}",
             "yes" if mode.certified else "no",
-            listed(_marks(mode, near)) if _marks(mode, near) else "",
+            join_all_names(_mode_remarks(mode, near)) if _mode_remarks(mode, near) else "",
         )
     return rows
 
 
-def _lying(circuits: Circuits, mode: Mode) -> tuple[int | None, int | None]:
+def _circuit_and_branch(circuits: Circuits, mode: Mode) -> tuple[int | None, int | None]:
     """The numbers of the circuit and the branch on which an assembly lies."""
     place = circuits.of(mode)
     return (None, None) if place is None else (place[0].number, place[1].number)
 
 
-def _marks(mode: Mode, near: Mode | None) -> list[str]:
+def _mode_remarks(mode: Mode, near: Mode | None) -> list[str]:
     found = ["as sketched"] if near is not None and mode.choices == near.choices else []
     found += ["two that meet"] if mode.double else []
     return found + ([] if mode.outcome is Outcome.SOLVED else [mode.outcome.value])
 
 
-def _place(mode: Mode, name: str, by: Any) -> str:
+def _point_cell(mode: Mode, name: str, by: Any) -> str:
     greatest = max((float(abs(at).max()) for at in mode.points.values()), default=0.0)
-    told = [by.from_si(float(each)) if abs(each) > ZERO * greatest else 0.0 for each in mode.points[name]]
+    told = [by.from_si(float(each)) if abs(each) > ZERO_RATIO * greatest else 0.0 for each in mode.points[name]]
     return " ".join(f"{each:.{DIGITS}g}" for each in told)
 
 
-def _moving(modes: Modes) -> list[str]:
+def _moving_points(modes: Modes) -> list[str]:
     """The points that are not on the frame or where the inputs put them, in the order in which they are placed."""
     first = modes.places
     return sorted((name for name, level in first.items() if level >= 0), key=lambda name: first[name])
 
 
-def _telling(modes: Modes, shown: Sequence[Mode]) -> list[str]:
+def _distinguishing_points(modes: Modes, shown: Sequence[Mode]) -> list[str]:
     """Points whose places are printed: those that tell these assemblies apart, of each group one, then others."""
-    names, first = _moving(modes), modes.places
+    names, first = _moving_points(modes), modes.places
     apart = {name for name in names if len({mode.points[name].tobytes() for mode in shown}) > 1}
     ones = set({first[name]: name for name in reversed(names)}.values())
-    ordered = sorted(names, key=lambda name: (name not in apart, name not in ones))[:COLUMNS]
+    ordered = sorted(names, key=lambda name: (name not in apart, name not in ones))[:MAX_POINT_COLUMNS]
     return [name for name in names if name in ordered]
 
 
-def _named(modes: Modes, points: Sequence[str]) -> list[str]:
+def _check_points(modes: Modes, points: Sequence[str]) -> list[str]:
     known = modes.places
     for name in points:
         if name not in known:
@@ -166,13 +176,13 @@ def _named(modes: Modes, points: Sequence[str]) -> list[str]:
     return list(points)
 
 
-def _at(modes: Modes) -> str:
-    named, units = motions(modes.mechanism), modes.mechanism.units
+def _inputs_text(modes: Modes) -> str:
+    named, units = relative_motions(modes.mechanism), modes.mechanism.units
     told = [
-        f"{given.pair} = {amount(given.position, named[given.pair].drive_kind.value, units)}"
+        f"{given.pair} = {amount(given.position, named[given.pair].input_kind.value, units)}"
         for given in modes.mechanism.inputs
     ]
-    return f"at {listed(told)}" if told else "without inputs"
+    return f"at {join_all_names(told)}" if told else "without inputs"
 
 
 def record(modes: Modes, limit: int, circuits: Circuits | None = None) -> dict[str, Any]:
@@ -199,7 +209,11 @@ def record(modes: Modes, limit: int, circuits: Circuits | None = None) -> dict[s
                 "outcome": mode.outcome.value,
                 "reason": mode.reason,
                 "points": {name: at.tolist() for name, at in mode.points.items()},
-                **({} if circuits is None else dict(zip(("circuit", "branch"), _lying(circuits, mode), strict=True))),
+                **(
+                    {}
+                    if circuits is None
+                    else dict(zip(("circuit", "branch"), _circuit_and_branch(circuits, mode), strict=True))
+                ),
             }
             for mode in shown
         ],

@@ -8,47 +8,49 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from planar.foundation.units import shown, unit
-from planar.model.wording import amount, listed, many
+from planar.foundation.units import display_unit, parse_unit
+from planar.model.wording import amount, count_phrase, join_all_names
 from planar.reports.fitted_table import FittedTable
 from planar.reports.tables_of_numbers import (
-    SIZE,
-    counted,
-    heading,
-    kept,
-    number,
+    SIZE_PHRASE,
+    column_heading,
+    format_number,
+    format_or_zero,
     paragraphs,
     plain_table,
+    precision_text,
 )
 from planar.results.motion import Motion
 
-MOST_ENDS = 6
+MAX_LISTED_ENDS = 6
 """Ends of stretches of a circuit that are named one by one."""
-WHOLE = 1e-9
+TURN_TOLERANCE = 1e-9
 """Turns: what rounding leaves of one."""
 
 
-def ran(motion: Motion) -> RenderableType:
+def motion_tables(motion: Motion) -> RenderableType:
     """A run: its range, its limits, and for every point where it went and how fast it was, at most, among the rows."""
-    tables = [Text(), _limits(motion)] if motion.limits else []
+    tables = [Text(), _limits_table(motion)] if motion.limits else []
     notes = [paragraphs(("-", remark) for remark in motion.remarks)] if motion.remarks else []
-    return Group(*head(motion), *tables, Text(), _points(motion), *notes)
+    return Group(*motion_heading(motion), *tables, Text(), _points_table(motion), *notes)
 
 
-def head(motion: Motion) -> list[Text]:
+def motion_heading(motion: Motion) -> list[Text]:
     """What runs, from where to where, and how well it is solved."""
     lines = [Text(motion.mechanism.name, style="bold")]
-    lines += [Text(_range(motion, name)) for name in motion.inputs]
+    lines += [Text(_range_text(motion, name)) for name in motion.inputs]
     if motion.time is not None:
         lines.append(Text(f"in time, from 0 s to {motion.time[-1]:.6g} s"))
-    worst = f"every pair closes {kept(motion.residual, SIZE)}"
-    lines.append(Text(f"{many(len(motion), 'position')}; {worst}" + (f"; {motion.reason}" if motion.reason else "")))
+    worst = f"every pair closes {precision_text(motion.residual, SIZE_PHRASE)}"
+    lines.append(
+        Text(f"{count_phrase(len(motion), 'position')}; {worst}" + (f"; {motion.reason}" if motion.reason else ""))
+    )
     return lines
 
 
-def _range(motion: Motion, name: str) -> str:
+def _range_text(motion: Motion, name: str) -> str:
     """Where an input went: A from 0 deg to 90 deg and to 0 deg."""
-    units, kind = motion.mechanism.units, "length" if motion.slides(name) else "angle"
+    units, kind = motion.mechanism.units, "length" if motion.has_length_motion(name) else "angle"
     position = motion.inputs[name].position
     way = np.sign(np.diff(position))
     moved = np.flatnonzero(way)
@@ -57,69 +59,73 @@ def _range(motion: Motion, name: str) -> str:
     if len(set(ends)) == 1 and not turns:
         return f"{name} = {ends[0]}" + (", held" if len(motion) > 1 else "")
     gone = abs(float(position[-1] - position[0])) / (2.0 * np.pi)
-    if not turns and kind == "angle" and round(gone) >= 1 and abs(gone - round(gone)) < WHOLE:
-        told = "a full turn" if round(gone) == 1 else many(round(gone), "full turn")
+    if not turns and kind == "angle" and round(gone) >= 1 and abs(gone - round(gone)) < TURN_TOLERANCE:
+        told = "a full turn" if round(gone) == 1 else count_phrase(round(gone), "full turn")
         return f"{name} from {ends[0]} to {ends[1]}, {told}"
-    told = ends[1:] if len(ends) <= MOST_ENDS else [*ends[1:MOST_ENDS], f"and so on to {ends[-1]}"]
+    told = ends[1:] if len(ends) <= MAX_LISTED_ENDS else [*ends[1:MAX_LISTED_ENDS], f"and so on to {ends[-1]}"]
     return f"{name} from {ends[0]} to {', to '.join(told)}"
 
 
-def _limits(motion: Motion) -> FittedTable:
+def _limits_table(motion: Motion) -> FittedTable:
     """Dead points, change points and ends of strokes, solved for."""
     units = motion.mechanism.units
-    driver = running(motion)
-    at = place_heading(motion)
+    driver = running_pair(motion)
+    at = position_heading(motion)
     table = plain_table("Limits, solved for", "limit", "of", at, "where")
     for limit in motion.limits:
         of = [name for name in (limit.of,) if name]
-        kind = "length" if limit.of and motion.slides(limit.of) else "angle"
+        kind = "length" if limit.of and motion.has_length_motion(limit.of) else "angle"
         where = amount(limit.value, kind, units) if limit.kind == "stroke end" else ""
-        at_input = limit.input if driver is None else _in_units(motion, driver, limit.input)
+        at_input = limit.input if driver is None else _to_file_unit(motion, driver, limit.input)
         name = f"{limit.kind}, {limit.end}" if limit.end else limit.kind
-        table.add_row(name, listed(of) if of else "", number(at_input), where)
+        table.add_row(name, join_all_names(of) if of else "", format_number(at_input), where)
     return table
 
 
-def place_heading(motion: Motion) -> str:
+def position_heading(motion: Motion) -> str:
     """The heading of a column that says where in a run something is: at the input that runs, or the time."""
-    driver, units = running(motion), motion.mechanism.units
-    return "time, s" if driver is None else f"at {driver}, {units.length if motion.slides(driver) else units.angle}"
+    driver, units = running_pair(motion), motion.mechanism.units
+    return (
+        "time, s"
+        if driver is None
+        else f"at {driver}, {units.length if motion.has_length_motion(driver) else units.angle}"
+    )
 
 
-def place(motion: Motion, row: int) -> str:
+def position_cell(motion: Motion, row: int) -> str:
     """Where in a run a row is, under that heading."""
-    driver = running(motion)
+    driver = running_pair(motion)
     if motion.time is not None:
-        return number(float(motion.time[row]))
-    return number(_in_units(motion, driver, float(motion.inputs[driver].position[row]))) if driver else ""
+        return format_number(float(motion.time[row]))
+    return format_number(_to_file_unit(motion, driver, float(motion.inputs[driver].position[row]))) if driver else ""
 
 
-def _in_units(motion: Motion, pair: str, value: float) -> float:
+def _to_file_unit(motion: Motion, pair: str, value: float) -> float:
     units = motion.mechanism.units
-    return unit(units.length if motion.slides(pair) else units.angle).from_si(value)
+    return parse_unit(units.length if motion.has_length_motion(pair) else units.angle).from_si(value)
 
 
-def running(motion: Motion) -> str | None:
+def running_pair(motion: Motion) -> str | None:
     """The input that runs, unless they run in time."""
-    return motion.running if motion.time is None else None
+    return motion.running_input if motion.time is None else None
 
 
-def _points(motion: Motion) -> FittedTable:
+def _points_table(motion: Motion) -> FittedTable:
     units = motion.mechanism.units
     heads = [tuple(f"{axis} {end}, {units.length}" for end in ("from", "to")) for axis in "xy"]
     kinds = ("velocity", "acceleration")
-    most = [heading(f"{kind} up to", kind, units) for kind in kinds]
+    most = [column_heading(f"{kind} up to", kind, units) for kind in kinds]
     table = plain_table("Points, among these positions", "point", *heads, *most)
-    measures = [shown(kind, units)[1] for kind in kinds]
-    length = unit(units.length).from_si
+    measures = [display_unit(kind, units)[1] for kind in kinds]
+    length = parse_unit(units.length).from_si
     farthest = max((float(np.abs(each.position).max()) for each in motion.points.values()), default=0.0)
     for name, point in motion.points.items():
         ends = [float(end) for values in point.position.T for end in (values.min(), values.max())]
         fastest = [np.hypot(*rate.T) for rate in (point.velocity, point.acceleration)]
         rates = [
-            "-" if np.isnan(rate).all() else number(of.from_si(float(np.nanmax(rate))))
+            "-" if np.isnan(rate).all() else format_number(of.from_si(float(np.nanmax(rate))))
             for rate, of in zip(fastest, measures, strict=True)
         ]
-        places = (counted(length(end), length(farthest)) for end in ends)
+        places = (format_or_zero(length(end), length(farthest)) for end in ends)
         table.add_row(name, *places, *rates)
     return table

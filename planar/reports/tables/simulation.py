@@ -9,11 +9,11 @@ import numpy as np
 from rich.console import Group, RenderableType
 
 from planar.dynamics.simulation import Simulation
-from planar.foundation.units import shown, unit
-from planar.reports.columns import Told
+from planar.foundation.units import display_unit, parse_unit
+from planar.reports.columns import ReportedSeries
 from planar.reports.fitted_table import FittedTable
-from planar.reports.tables.motion import ran
-from planar.reports.tables_of_numbers import counted, number, paragraphs, plain_table
+from planar.reports.tables.motion import motion_tables
+from planar.reports.tables_of_numbers import format_number, format_or_zero, paragraphs, plain_table
 
 ENERGIES = ("kinetic", "potential", "work")
 
@@ -22,31 +22,33 @@ def tables(simulation: Simulation) -> RenderableType:
     """The run, which inputs were let go, how they moved, and what became of the energy."""
     motion = simulation.motion
     kept = f"kinetic + potential − work stays what it was, but for {simulation.balance:.1e} of the energy that changes"
-    return Group(ran(motion), _inputs(simulation), _energies(simulation), paragraphs([("energy", kept)]))
+    return Group(
+        motion_tables(motion), _inputs_table(simulation), _energies_table(simulation), paragraphs([("energy", kept)])
+    )
 
 
-def _inputs(simulation: Simulation) -> FittedTable:
+def _inputs_table(simulation: Simulation) -> FittedTable:
     motion = simulation.motion
     units = motion.mechanism.units
     headings = ("input", "", ("unit", "start", "end", "least", "greatest"), ("greatest speed", "unit"))
     table = plain_table("Inputs, among these positions", *headings, left=(0, 1, 2, 8), keys=2)
     for name, each in motion.inputs.items():
-        own = units.length if motion.slides(name) else units.angle
-        of = unit(own).from_si
-        per, rate = shown(motion.driven(name)[1], units)
+        own = units.length if motion.has_length_motion(name) else units.angle
+        of = parse_unit(own).from_si
+        per, rate = display_unit(motion.input_quantity_kinds(name)[1], units)
         places = (each.position[0], each.position[-1], each.position.min(), each.position.max())
         table.add_row(
             name,
             "driven" if name in simulation.driven else "let go",
             own,
-            *(number(of(float(place))) for place in places),
-            number(rate.from_si(float(np.abs(each.velocity).max()))),
+            *(format_number(of(float(place))) for place in places),
+            format_number(rate.from_si(float(np.abs(each.velocity).max()))),
             per,
         )
     return table
 
 
-def _energies(simulation: Simulation) -> FittedTable:
+def _energies_table(simulation: Simulation) -> FittedTable:
     headings = ("of", "at the start, J", "at the end, J", "least, J", "greatest, J")
     table = plain_table("Energy", *headings)
     names = ("kinetic energy", "potential energy", "work put in")
@@ -54,15 +56,17 @@ def _energies(simulation: Simulation) -> FittedTable:
     for name, what in zip(names, ENERGIES, strict=True):
         values = getattr(simulation, what)
         ends = (values[0], values[-1], values.min(), values.max())
-        table.add_row(name, *(counted(float(each), most) for each in ends))
+        table.add_row(name, *(format_or_zero(float(each), most) for each in ends))
     return table
 
 
-def told(simulation: Simulation) -> Iterable[Told]:
+def energy_series(simulation: Simulation) -> Iterable[ReportedSeries]:
     """The energies at every position, beside what a file of the motion has."""
-    yield Told("energy", "", dict.fromkeys(ENERGIES, "energy"), {what: getattr(simulation, what) for what in ENERGIES})
+    yield ReportedSeries(
+        "energy", "", dict.fromkeys(ENERGIES, "energy"), {what: getattr(simulation, what) for what in ENERGIES}
+    )
 
 
-def said(simulation: Simulation) -> dict[str, Any]:
+def simulation_facts(simulation: Simulation) -> dict[str, Any]:
     """What is said of the whole motion, as JSON values."""
     return {"driven": list(simulation.driven), "energy_balance": simulation.balance}

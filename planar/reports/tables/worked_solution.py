@@ -8,95 +8,95 @@ from typing import Any
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from planar.analysis.polygons.notation import Row
-from planar.analysis.rich_text import Paper, Phrase, number, plain
+from planar.analysis.polygons.notation import VectorRow
+from planar.analysis.rich_text import PaperScale, Phrase, format_number, plain_text
 from planar.analysis.worked.sections import Section
-from planar.analysis.worked.solution import LinkResult, PointResult, SlideResult, Solution, Worked
-from planar.dynamics.load_attachment import choices
-from planar.foundation.units import Unit, shown, unit
-from planar.reports.tables_of_numbers import heading, paragraphs, plain_table, published
+from planar.analysis.worked.solution import LinkResult, PointResult, SlideResult, WorkedPolygon, WorkedSolution
+from planar.dynamics.load_attachment import attachment_remarks
+from planar.foundation.units import Unit, display_unit, parse_unit
+from planar.reports.tables_of_numbers import column_heading, paragraphs, plain_table, published_table
 
-Scales = Mapping[str, Paper]
+Scales = Mapping[str, PaperScale]
 
 
-def explained(solution: Solution, scales: Scales | None = None) -> RenderableType:
+def solution_text(solution: WorkedSolution, scales: Scales | None = None) -> RenderableType:
     """A worked solution; lengths on paper stand beside what is drawn where its kind has a scale."""
     scales = scales or {}
     mechanism = solution.state.mechanism
     parts: list[RenderableType] = [Text(mechanism.name, style="bold")]
     if mechanism.source:
         parts.append(Text(mechanism.source, style="italic"))
-    parts += [Text(), Text("Given", style="bold"), _paragraphs(solution.given, scales)]
-    parts += [Text(), Text("To find", style="bold"), _paragraphs(solution.asked, scales)]
-    for number_, half in enumerate(solution.halves, 1):
-        parts += [Text(), _heading(number_, half, scales)]
+    parts += [Text(), Text("Given", style="bold"), _phrase_paragraphs(solution.given, scales)]
+    parts += [Text(), Text("To find", style="bold"), _phrase_paragraphs(solution.asked, scales)]
+    for number_, half in enumerate(solution.worked_polygons, 1):
+        parts += [Text(), _polygon_heading(number_, half, scales)]
         for section in half.sections:
-            parts += [Text(), *_section(section, half, scales)]
-    parts += [Text(), *_results(solution)]
+            parts += [Text(), *_section_parts(section, half, scales)]
+    parts += [Text(), *_result_tables(solution)]
     if solution.comparisons:
-        parts.append(published(solution.comparisons, mechanism.units))
-    notes = [*choices(mechanism), *solution.state.remarks, *mechanism.notes]
+        parts.append(published_table(solution.comparisons, mechanism.units))
+    notes = [*attachment_remarks(mechanism), *solution.state.remarks, *mechanism.notes]
     if notes:
         parts += [Text("Notes", style="bold"), paragraphs(("-", note) for note in notes)]
     return Group(*parts)
 
 
-def _heading(count: int, half: Worked, scales: Scales) -> Text:
+def _polygon_heading(count: int, half: WorkedPolygon, scales: Scales) -> Text:
     scale = scales.get(half.kind)
     return Text(f"{count}. {half.kind.capitalize()} polygon" + (f", {scale}" if scale else ""), style="bold underline")
 
 
-def _paragraphs(phrases: Iterable[Phrase], scales: Scales) -> RenderableType:
-    return paragraphs(("-", plain(phrase, scales)) for phrase in phrases)
+def _phrase_paragraphs(phrases: Iterable[Phrase], scales: Scales) -> RenderableType:
+    return paragraphs(("-", plain_text(phrase, scales)) for phrase in phrases)
 
 
-def _section(section: Section, half: Worked, scales: Scales) -> Iterator[RenderableType]:
+def _section_parts(section: Section, half: WorkedPolygon, scales: Scales) -> Iterator[RenderableType]:
     yield Text(section.title, style="bold")
     if section.known:
-        yield _paragraphs(section.known, scales)
+        yield _phrase_paragraphs(section.known, scales)
     if section.equation:
-        yield paragraphs((" ", plain(line)) for line in section.equation)
+        yield paragraphs((" ", plain_text(line)) for line in section.equation)
     if section.rows:
-        yield _table(section.rows, shown(half.kind, half.polygon.state.mechanism.units)[0])
-    steps = [(f"{count})", plain(step, scales)) for count, step in enumerate((*section.steps, *section.images), 1)]
+        yield _vector_table(section.rows, display_unit(half.kind, half.polygon.state.mechanism.units)[0])
+    steps = [(f"{count})", plain_text(step, scales)) for count, step in enumerate((*section.steps, *section.images), 1)]
     if section.simultaneous:
         yield paragraphs(steps[: len(section.steps)])
-        yield paragraphs((" ", plain(line)) for line in section.simultaneous)
+        yield paragraphs((" ", plain_text(line)) for line in section.simultaneous)
         yield paragraphs(steps[len(section.steps) :])
     else:
         yield paragraphs(steps)
     if section.results:
         yield Text("Read off:")
-        yield _paragraphs(section.results, {})
+        yield _phrase_paragraphs(section.results, {})
 
 
-def _table(rows: Iterable[Row], measure: str) -> RenderableType:
+def _vector_table(rows: Iterable[VectorRow], measure: str) -> RenderableType:
     table = plain_table(
         None, "S.N.", "vector", f"magnitude, {measure}", "direction", "sense", left=(1, 2, 3, 4), keys=2
     )
     for count, row in enumerate(rows, 1):
-        vector = f"{plain((row.symbol,))} or {plain((row.chord,))}"
-        table.add_row(f"{count}.", vector, plain(row.magnitude), plain(row.direction), plain(row.sense))
+        vector = f"{plain_text((row.symbol,))} or {plain_text((row.chord,))}"
+        table.add_row(f"{count}.", vector, plain_text(row.magnitude), plain_text(row.direction), plain_text(row.sense))
     return table
 
 
-def _results(solution: Solution) -> Iterator[RenderableType]:
+def _result_tables(solution: WorkedSolution) -> Iterator[RenderableType]:
     units = solution.state.mechanism.units
-    rates = [shown(kind, units)[1] for kind in ("velocity", "acceleration")]
+    rates = [display_unit(kind, units)[1] for kind in ("velocity", "acceleration")]
     links = plain_table(
         "Links", "link", ("ang. velocity, rad/s", "sense"), ("ang. acceleration, rad/s²", "sense"), left=(0, 2, 4)
     )
     for link in solution.links:
-        links.add_row(*_turn(link))
+        links.add_row(*_link_cells(link))
     points = plain_table(
         "Points",
         "point",
-        (heading("velocity", "velocity", units), "sense"),
-        (heading("acceleration", "acceleration", units), "sense"),
+        (column_heading("velocity", "velocity", units), "sense"),
+        (column_heading("acceleration", "acceleration", units), "sense"),
         left=(0, 2, 4),
     )
     for point in solution.points:
-        points.add_row(*_move(point, rates))
+        points.add_row(*_point_cells(point, rates))
     yield Text("3. Results", style="bold underline")
     yield Text()
     yield links
@@ -107,37 +107,37 @@ def _results(solution: Solution) -> Iterator[RenderableType]:
             "Slides, along their lines",
             "pair",
             f"displacement, {length}",
-            heading("velocity", "velocity", units),
-            heading("acceleration", "acceleration", units),
+            column_heading("velocity", "velocity", units),
+            column_heading("acceleration", "acceleration", units),
         )
         for slide in solution.slides:
-            slides.add_row(*_slide(slide, length, rates))
+            slides.add_row(*_slide_cells(slide, length, rates))
         yield slides
     if solution.rubbing:
         yield Text("Rubbing speeds at the pins", style="bold")
-        yield _paragraphs(solution.rubbing, {})
+        yield _phrase_paragraphs(solution.rubbing, {})
 
 
-def _turn(link: LinkResult) -> tuple[str, ...]:
+def _link_cells(link: LinkResult) -> tuple[str, ...]:
     name, velocity, sense, acceleration, second = link
-    return name, number(abs(velocity)), sense, number(abs(acceleration)), second
+    return name, format_number(abs(velocity)), sense, format_number(abs(acceleration)), second
 
 
-def _move(point: PointResult, rates: Sequence[Unit]) -> tuple[str, ...]:
+def _point_cells(point: PointResult, rates: Sequence[Unit]) -> tuple[str, ...]:
     name, velocity, sense, acceleration, second = point
-    return name, number(rates[0].from_si(velocity)), sense, number(rates[1].from_si(acceleration)), second
+    return name, format_number(rates[0].from_si(velocity)), sense, format_number(rates[1].from_si(acceleration)), second
 
 
-def _slide(slide: SlideResult, length: str, rates: Sequence[Unit]) -> tuple[str, ...]:
+def _slide_cells(slide: SlideResult, length: str, rates: Sequence[Unit]) -> tuple[str, ...]:
     name, displacement, velocity, acceleration = slide
     return (
         name,
-        f"{unit(length).from_si(displacement):.6g}",
-        *(number(of.from_si(rate)) for of, rate in zip(rates, (velocity, acceleration), strict=True)),
+        f"{parse_unit(length).from_si(displacement):.6g}",
+        *(format_number(of.from_si(rate)) for of, rate in zip(rates, (velocity, acceleration), strict=True)),
     )
 
 
-def record(solution: Solution, scales: Scales | None = None) -> dict[str, Any]:
+def record(solution: WorkedSolution, scales: Scales | None = None) -> dict[str, Any]:
     """A worked solution as a JSON value, numbers in SI."""
     scales = scales or {}
     found: dict[str, Any] = {
@@ -145,7 +145,7 @@ def record(solution: Solution, scales: Scales | None = None) -> dict[str, Any]:
         "given": _lines(solution.given),
         "asked": _lines(solution.asked),
     }
-    for half in solution.halves:
+    for half in solution.worked_polygons:
         found[half.kind] = {
             "pole": list(half.polygon.pole),
             "letters": {letter: value.tolist() for letter, value in half.polygon.letters.items()},
@@ -165,7 +165,7 @@ def _values(result: LinkResult | PointResult | SlideResult) -> dict[str, Any]:
 
 
 def _lines(phrases: Iterable[Phrase], scales: Scales | None = None) -> list[str]:
-    return [plain(phrase, scales) for phrase in phrases]
+    return [plain_text(phrase, scales) for phrase in phrases]
 
 
 def _part(section: Section, scales: Scales) -> dict[str, Any]:
@@ -177,13 +177,13 @@ def _part(section: Section, scales: Scales) -> dict[str, Any]:
         "vectors": [
             {
                 "symbol": row.symbol._asdict(),
-                "vector": plain((row.symbol,)),
-                "letters": plain((row.chord,)),
+                "vector": plain_text((row.symbol,)),
+                "letters": plain_text((row.chord,)),
                 "value": row.value,
                 "known": row.known,
-                "magnitude": plain(row.magnitude),
-                "direction": plain(row.direction),
-                "sense": plain(row.sense),
+                "magnitude": plain_text(row.magnitude),
+                "direction": plain_text(row.direction),
+                "sense": plain_text(row.sense),
             }
             for row in section.rows
         ],

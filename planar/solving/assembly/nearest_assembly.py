@@ -9,16 +9,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.equations.constraint_equations import Stage
-from planar.solving.assembly.block_assemblies import Candidate, Candidates, hanging
+from planar.equations.constraint_equations import Block
+from planar.solving.assembly.block_assemblies import BlockAssemblies, BlockAssembly, block_dependencies
 
 Array = np.ndarray
 
-ALIKE = 1e-9
+EQUAL_DISTANCE_TOLERANCE = 1e-9
 """Assemblies whose sums of squared distances to the sketch (sizes squared) agree to this fit alike."""
-MOST_TIED = 64
+MAX_TIED = 64
 """Assemblies that fit alike among which one is looked for whose rates are determined."""
-EXPANSIONS = 1000
+MAX_EXPANSIONS = 1000
 """Groups solved before the search stops looking for a nearer assembly and takes the best way to an end."""
 
 
@@ -27,50 +27,52 @@ class Assembly(NamedTuple):
 
     z: Array
     ties: tuple[int, ...] = ()
-    stopped: bool = False
+    is_cut_off: bool = False
 
 
-class Failure(NamedTuple):
+class AssemblySearchFailure(NamedTuple):
     """The group at which every way to assemble ends.
 
     `z`: the unknowns where it is nearest to closing, those of earlier groups filled in; `groups`: how many were solved
     in search of it.
     """
 
-    stage: Stage
+    stage: Block
     z: Array
-    groups: int = 0
+    solved_blocks: int = 0
 
 
-class _Groups:
+class _BlockSearch:
     """The candidates of groups, and where there are none: whatever the groups do on which one does not hang, at the
     same places of those on which it hangs there are none again."""
 
-    def __init__(self, candidates: Candidates):
+    def __init__(self, candidates: BlockAssemblies):
         self.candidates = candidates
-        self.worst: Failure | None = None
+        self.last_failure: AssemblySearchFailure | None = None
         "the last group that could not be assembled"
-        self.hopeless = False
+        self.is_hopeless = False
         "whether one cannot be assembled that hangs on no other"
-        self._hanging: list[list[int]] | None = None
-        self._ends: dict[int, set[bytes]] = {}
+        self._dependencies: list[list[int]] | None = None
+        self._dead_ends: dict[int, set[bytes]] = {}
 
-    def of(self, stage: Stage, z: Array) -> list[Candidate]:
+    def find_assemblies(self, stage: Block, z: Array) -> list[BlockAssembly]:
         """Those of a group, the unknowns before it in z; none as well where a later one would have none for these."""
-        if self._leads_to_an_end(z, stage.unknowns.start):
+        if self._is_dead_end(z, stage.unknowns.start):
             return []
-        found, nearest = self.candidates.of(stage, z)
+        found, nearest = self.candidates.near_sketch(stage, z)
         if not found:
-            if self.worst is None or stage.level > self.worst.stage.level:
-                self.worst = Failure(stage, nearest)
-            self._hanging = self._hanging or [sorted(columns) for columns in hanging(self.candidates.setup)]
-            self._ends.setdefault(stage.level, set()).add(z[self._hanging[stage.level]].tobytes())
-            self.hopeless = not self._hanging[stage.level]
+            if self.last_failure is None or stage.block_index > self.last_failure.stage.block_index:
+                self.last_failure = AssemblySearchFailure(stage, nearest)
+            self._dependencies = self._dependencies or [
+                sorted(columns) for columns in block_dependencies(self.candidates.setup)
+            ]
+            self._dead_ends.setdefault(stage.block_index, set()).add(z[self._dependencies[stage.block_index]].tobytes())
+            self.is_hopeless = not self._dependencies[stage.block_index]
         return found
 
-    def _leads_to_an_end(self, z: Array, known: int) -> bool:
-        columns = self._hanging or []
-        ends = self._ends.items()
+    def _is_dead_end(self, z: Array, known: int) -> bool:
+        columns = self._dependencies or []
+        ends = self._dead_ends.items()
         return any(columns[level][-1] < known and z[columns[level]].tobytes() in places for level, places in ends)
 
 
@@ -78,7 +80,7 @@ class _Node(NamedTuple):
     """A partial assembly, in the order in which the search takes them up."""
 
     cost: float
-    behind: int
+    slides_behind: int
     ranks: tuple[int, ...]
     number: int
     z: Array
@@ -86,23 +88,25 @@ class _Node(NamedTuple):
     "groups in which another choice lies as near to the sketch"
 
 
-def search(candidates: Candidates, sound: Callable[[Array], bool] | None = None) -> Assembly | Failure:
+def find_nearest_assembly(
+    candidates: BlockAssemblies, is_regular: Callable[[Array], bool] | None = None
+) -> Assembly | AssemblySearchFailure:
     """Best first: of all assemblies the one with the least sum of squared distances to the sketch.
 
     The cost of a partial assembly never falls as it grows, so the first whole one is the nearest. Of several that fit
     alike a `sound` one is taken, whose rates are determined, if there is one among the first. After EXPANSIONS groups
     the search only goes on to an end, and says so.
     """
-    stages = candidates.equations.stages
-    number, groups = count(), _Groups(candidates)
+    stages = candidates.equations.blocks
+    number, groups = count(), _BlockSearch(candidates)
     heap = [_Node(0.0, 0, (), next(number), np.zeros(len(candidates.equations.unknowns)), ())]
     chosen: _Node | None = None
     taken: _Node | None = None
     tied = 0
     for expansions in count():
-        if not heap or (chosen is not None and expansions > EXPANSIONS):
+        if not heap or (chosen is not None and expansions > MAX_EXPANSIONS):
             break
-        if expansions < EXPANSIONS:
+        if expansions < MAX_EXPANSIONS:
             node = heapq.heappop(heap)
         else:
             node = heap.pop(min(range(len(heap)), key=lambda index: (-len(heap[index].ranks), *heap[index][:4])))
@@ -111,21 +115,21 @@ def search(candidates: Candidates, sound: Callable[[Array], bool] | None = None)
         if len(node.ranks) == len(stages):
             tied += chosen is not None
             chosen = chosen or node
-            if taken is None and (sound is None or sound(node.z)):
+            if taken is None and (is_regular is None or is_regular(node.z)):
                 taken = node
-            if tied and (taken is not None or tied > MOST_TIED):
+            if tied and (taken is not None or tied > MAX_TIED):
                 return Assembly((taken or chosen).z, (taken or chosen).ties)
             continue
-        found = groups.of(stages[len(node.ranks)], node.z)
-        if groups.hopeless:
+        found = groups.find_assemblies(stages[len(node.ranks)], node.z)
+        if groups.is_hopeless:
             break
         for rank, each in enumerate(found):
-            alike = sum(abs(other.distance - each.distance) <= ALIKE for other in found) > 1
+            alike = sum(abs(other.distance - each.distance) <= EQUAL_DISTANCE_TOLERANCE for other in found) > 1
             heapq.heappush(
                 heap,
                 _Node(
-                    round((node.cost + each.distance) / ALIKE) * ALIKE,
-                    node.behind + each.behind,
+                    round((node.cost + each.distance) / EQUAL_DISTANCE_TOLERANCE) * EQUAL_DISTANCE_TOLERANCE,
+                    node.slides_behind + each.slides_behind,
                     (*node.ranks, rank),
                     next(number),
                     each.z,
@@ -133,6 +137,6 @@ def search(candidates: Candidates, sound: Callable[[Array], bool] | None = None)
                 ),
             )
     if chosen is None:
-        assert groups.worst is not None
-        return groups.worst._replace(groups=expansions)
-    return Assembly((taken or chosen).z, (taken or chosen).ties if tied else (), expansions >= EXPANSIONS)
+        assert groups.last_failure is not None
+        return groups.last_failure._replace(solved_blocks=expansions)
+    return Assembly((taken or chosen).z, (taken or chosen).ties if tied else (), expansions >= MAX_EXPANSIONS)

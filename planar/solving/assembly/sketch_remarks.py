@@ -4,70 +4,79 @@ from __future__ import annotations
 
 import numpy as np
 
-from planar.equations.constraint_equations import Stage
-from planar.equations.functions import placed
-from planar.foundation.units import unit
-from planar.model.pairs import Kind
-from planar.model.wording import listed, many, quoted
+from planar.equations.constraint_equations import Block
+from planar.equations.functions import frames_from_coordinates
+from planar.foundation.units import parse_unit
+from planar.model.pairs import MeasureKind
+from planar.model.wording import count_phrase, join_all_names, quote_names
 from planar.solving.assembly import nearest_assembly
-from planar.solving.assembly.block_assemblies import Candidates
+from planar.solving.assembly.block_assemblies import BlockAssemblies
 from planar.solving.assembly.nearest_assembly import Assembly
-from planar.solving.prepared_mechanism import Setup
+from planar.solving.prepared_mechanism import PreparedMechanism
 
 Array = np.ndarray
 
-MOST = 4
+MAX_NAMED_BLOCKS = 4
 """Groups of links that are named one by one."""
 
 
-def remarks(setup: Setup, candidates: Candidates, found: Assembly) -> tuple[str, ...]:
+def sketch_remarks(setup: PreparedMechanism, candidates: BlockAssemblies, found: Assembly) -> tuple[str, ...]:
     """Sentences on groups whose assembly the sketch leaves open: how they stand, and how to choose."""
-    open_ones = [setup.equations.stages[index] for index in found.ties]
+    open_ones = [setup.equations.blocks[index] for index in found.ties]
     told = []
     if open_ones:
         lead = "the sketch leaves open" if setup.mechanism.sketch else "there is no sketch to say"
-        stand = [_stands(setup, candidates, stage, found.z) for stage in open_ones[:MOST]]
-        more = f", and so on for {many(len(open_ones) - MOST, 'more group')}" if len(open_ones) > MOST else ""
+        stand = [_describe_block_position(setup, candidates, stage, found.z) for stage in open_ones[:MAX_NAMED_BLOCKS]]
+        more = (
+            f", and so on for {count_phrase(len(open_ones) - MAX_NAMED_BLOCKS, 'more group')}"
+            if len(open_ones) > MAX_NAMED_BLOCKS
+            else ""
+        )
         told.append(
-            f"{lead} how some links go together; taken is {listed(stand)}{more}: the sliding points ahead of "
+            f"{lead} how some links go together; taken is {join_all_names(stand)}{more}: the sliding points ahead of "
             f"'through', else the upper assembly; sketch these points elsewhere to choose another"
         )
-    if found.stopped:
+    if found.is_cut_off:
         told.append(
-            f"the search for the assembly nearest to the sketch stopped after {nearest_assembly.EXPANSIONS} groups and "
+            "the search for the assembly nearest to the sketch stopped after "
+            f"{nearest_assembly.MAX_EXPANSIONS} groups and "
             f"took the nearest on its way; sketch more points to be sure of the one that is meant"
         )
-    if setup.deflated:
-        told.append(_touching(setup))
+    if setup.is_deflated:
+        told.append(_second_order_remark(setup))
     return tuple(told)
 
 
-def _touching(setup: Setup) -> str:
+def _second_order_remark(setup: PreparedMechanism) -> str:
     """What to say of constraints that hold to second order what they leave free to first order, all along."""
     rows = setup.equations.rows
-    touching = [stage for stage in setup.equations.stages if any(row.kind is Kind.PURE for row in rows[stage.rows])]
+    touching = [
+        stage for stage in setup.equations.blocks if any(row.kind is MeasureKind.PURE for row in rows[stage.rows])
+    ]
     links = list(dict.fromkeys(link for stage in touching for link in stage.links))
     return (
-        f"all along the motion the pairs hold link{'s' * (len(links) != 1)} {quoted(links)} "
+        f"all along the motion the pairs hold link{'s' * (len(links) != 1)} {quote_names(links)} "
         f"to second order only; to first order more could move, so that a little play lets it move far"
     )
 
 
-def _stands(setup: Setup, candidates: Candidates, stage: Stage, z: Array) -> str:
+def _describe_block_position(setup: PreparedMechanism, candidates: BlockAssemblies, stage: Block, z: Array) -> str:
     """Where a point of a group is: C at [80, 50] mm; of a group without points, its links."""
     placed_here = [
-        (name, link, point) for name, (level, link, point) in candidates.first.items() if level == stage.level
+        (name, link, point)
+        for name, (level, link, point) in candidates.first_link.items()
+        if level == stage.block_index
     ]
     if not placed_here:
-        return f"one assembly of {quoted(stage.links)}"
-    name, link, point = max(placed_here, key=lambda each: len(_sharing(candidates, each[0])))
-    w = setup.program.coordinates(z, setup.station.u, setup.station.p) * setup.scale
-    frames, _ = placed(w, setup.column, [link], {})
-    length = unit(setup.mechanism.units.length)
-    at = [f"{length.from_si(float(each)):.4g}" for each in frames[link].carry(setup.shapes[link].at(point))]
+        return f"one assembly of {quote_names(stage.links)}"
+    name, link, point = max(placed_here, key=lambda each: len(_links_with_point(candidates, each[0])))
+    w = setup.functions.coordinates(z, setup.inputs.u, setup.inputs.p) * setup.scale
+    frames, _ = frames_from_coordinates(w, setup.column, [link], {})
+    length = parse_unit(setup.mechanism.units.length)
+    at = [f"{length.from_si(float(each)):.4g}" for each in frames[link].to_world(setup.shapes[link].position(point))]
     return f"{name} at [{', '.join(at)}] {setup.mechanism.units.length}"
 
 
-def _sharing(candidates: Candidates, name: str) -> list[str]:
+def _links_with_point(candidates: BlockAssemblies, name: str) -> list[str]:
     """The links that carry a point: of those that could be named, one that several share says most."""
     return [link for link, points in candidates.points_of.items() if any(name == each for _, each in points)]

@@ -6,15 +6,15 @@ import numpy as np
 
 from planar.foundation.geometry import Vector
 from planar.model.mechanism import named_points
-from planar.solving.prepared_mechanism import Setup
+from planar.solving.prepared_mechanism import PreparedMechanism
 
 Array = np.ndarray
 
-SPREAD = 0.5
+START_SPREAD = 0.5
 """Sizes, rad: how far tries after the first are spread about what the sketch shows."""
 
 
-def sketched(setup: Setup, seed: int) -> Array:
+def sketch_coordinates(setup: PreparedMechanism, seed: int) -> Array:
     """Coordinates w with the links about where the sketch has their points; what it does not show is at random."""
     rng = np.random.default_rng(seed)
     w = rng.uniform(-1.0, 1.0, len(setup.equations.coordinates))
@@ -30,10 +30,10 @@ def sketched(setup: Setup, seed: int) -> Array:
             continue
         turn = turn_between(both) if len(both) > 1 else None
         angle = float(w[setup.column[link, "angle"]]) * np.pi if turn is None else turn
-        carried = [at - local.turned(Vector(np.cos(angle), np.sin(angle))) for local, at in both]
+        carried = [at - local.rotate(Vector(np.cos(angle), np.sin(angle))) for local, at in both]
         place = (*np.mean(carried, axis=0), angle)
         w[[setup.column[link, part] for part in ("x", "y", "angle")]] = place
-    return w + (SPREAD * rng.normal(size=w.size) if seed else 0.0)
+    return w + (START_SPREAD * rng.normal(size=w.size) if seed else 0.0)
 
 
 def turn_between(ends: list[tuple[Vector, Vector]]) -> float | None:

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from planar.equations.functions import Program
+from planar.equations.functions import EquationFunctions
 
 Array = np.ndarray
 
 
-CLOSE = 1.5
+SINGULAR_DISTANCE_RATIO = 1.5
 """How many times shorter than the distances from singular positions at its two ends a step must be."""
-NOTHING = 1e-6
+ZERO_SINGULAR_VALUE = 1e-6
 """A least singular value that is zero: on the singular position itself it is what rounding left."""
-NUDGE = 1e-6
+DIFFERENCE_STEP = 1e-6
 """The part of a step over which the change of a slope is taken."""
 
 
-class Branch:
+class BranchCheck:
     """Judges the steps of runs of one program, with one set of numbers p.
 
     Two positions lie on one branch if every unknown has moved as its rates allow, and if no group can have been
@@ -27,65 +27,69 @@ class Branch:
     beyond it and however the rates there agree.
     """
 
-    def __init__(self, program: Program, p: Array):
-        self.program, self.p = program, p
+    def __init__(self, program: EquationFunctions, p: Array):
+        self.functions, self.p = program, p
 
-    def along(self, z: Array, u: Array) -> Array:
+    def accept_steps(self, z: Array, u: Array) -> Array:
         """For each step of a run, z (samples, unknowns) and u (samples, inputs), whether it keeps to the branch."""
-        slopes, drives = self.program.slopes(z, u, self.p)
-        gains = cancelling(slopes, drives)
+        slopes, drives = self.functions.jacobians(z, u, self.p)
+        gains = solve_rates_batch(slopes, drives)
         way = np.diff(u, axis=0)
         before, after = ((gain @ way[:, :, None])[..., 0] for gain in (gains[:-1], gains[1:]))
-        smooth = np.all(allowed(np.diff(z, axis=0), before, after), axis=1)
-        smooth &= self._onwards(before, after, way)
-        first = self._safe(z[:-1], u[:-1], slopes[:-1], before, way)
-        second = self._safe(z[1:], u[1:], slopes[1:], after, way)
-        return smooth & np.all(first + second > CLOSE, axis=1)
+        smooth = np.all(is_move_allowed(np.diff(z, axis=0), before, after), axis=1)
+        smooth &= self._keeps_direction(before, after, way)
+        first = self._singular_distances(z[:-1], u[:-1], slopes[:-1], before, way)
+        second = self._singular_distances(z[1:], u[1:], slopes[1:], after, way)
+        return smooth & np.all(first + second > SINGULAR_DISTANCE_RATIO, axis=1)
 
-    def _onwards(self, before: Array, after: Array, way: Array) -> Array:
+    def _keeps_direction(self, before: Array, after: Array, input_step: Array) -> Array:
         """For each step whether every group goes on as it came (steps,): less than a right angle between the tangents.
 
         Beside a limit both ends of a step may be closed, and any move allowed by rates that grow beyond all bounds
         there; but on the branch that comes back from the limit they have the other sign.
         """
-        both, straight = before * after, np.sum(way * way, axis=1)
-        turns = [np.sum(both[:, stage.unknowns], axis=1) for stage in self.program.equations.stages]
-        return np.all([turn + straight >= 0.0 for turn in turns], axis=0) if turns else np.ones(len(way), dtype=bool)
+        both, straight = before * after, np.sum(input_step * input_step, axis=1)
+        turns = [np.sum(both[:, stage.unknowns], axis=1) for stage in self.functions.equations.blocks]
+        return (
+            np.all([turn + straight >= 0.0 for turn in turns], axis=0)
+            if turns
+            else np.ones(len(input_step), dtype=bool)
+        )
 
-    def _safe(self, z: Array, u: Array, slopes: Array, rates: Array, way: Array) -> Array:
+    def _singular_distances(self, z: Array, u: Array, slopes: Array, rates: Array, input_step: Array) -> Array:
         """How far each group is from where it could be singular (samples, stages), in steps of rates and way."""
-        pace = np.maximum(np.max(np.abs(np.hstack([rates, way])), axis=1, initial=0.0), 1e-300)[:, None]
-        nudge = NUDGE / np.maximum(pace, NUDGE)
-        moved, _ = self.program.slopes(z + nudge * rates, u + nudge * way, self.p)
-        distances = np.full((len(z), len(self.program.equations.stages)), np.inf)
-        for index, stage in enumerate(self.program.equations.stages):
+        pace = np.maximum(np.max(np.abs(np.hstack([rates, input_step])), axis=1, initial=0.0), 1e-300)[:, None]
+        nudge = DIFFERENCE_STEP / np.maximum(pace, DIFFERENCE_STEP)
+        moved, _ = self.functions.jacobians(z + nudge * rates, u + nudge * input_step, self.p)
+        distances = np.full((len(z), len(self.functions.equations.blocks)), np.inf)
+        for index, stage in enumerate(self.functions.equations.blocks):
             here, there = (each[:, stage.rows, stage.unknowns] for each in (slopes, moved))
             if here.size:
                 # columns of one size, so that a small link counts as much as a large one
                 sizes = np.maximum(np.linalg.norm(here, axis=1, keepdims=True), 1e-300)
                 change = np.linalg.norm((there - here) / sizes, axis=(1, 2)) / nudge[:, 0]
-                least = _least(here / sizes)
+                least = _least_singular_values(here / sizes)
                 # on the singular position itself rates are rounding, and say nothing of how it changes
-                distances[:, index] = np.where(least < NOTHING, 0.0, least / np.maximum(change, 1e-300))
+                distances[:, index] = np.where(least < ZERO_SINGULAR_VALUE, 0.0, least / np.maximum(change, 1e-300))
         return np.nan_to_num(distances, nan=0.0, posinf=np.inf)
 
 
-def cancelling(slopes: Array, known: Array) -> Array:
+def solve_rates_batch(jacobians: Array, known: Array) -> Array:
     """The rates of the unknowns that cancel what known rates open; slopes (..., rows, unknowns), known (..., rows, k).
 
     Where a square slope is singular, NaN: no rate is allowed there.
     """
-    if slopes.shape[-1] != slopes.shape[-2]:
-        return -np.linalg.pinv(slopes, rcond=1e-12) @ known
+    if jacobians.shape[-1] != jacobians.shape[-2]:
+        return -np.linalg.pinv(jacobians, rcond=1e-12) @ known
     try:
-        return -np.linalg.solve(slopes, known)
+        return -np.linalg.solve(jacobians, known)
     except np.linalg.LinAlgError:
-        if slopes.ndim > 2:
-            return np.stack([cancelling(slope, each) for slope, each in zip(slopes, known, strict=True)])
-        return np.full((slopes.shape[-1], known.shape[-1]), np.nan)
+        if jacobians.ndim > 2:
+            return np.stack([solve_rates_batch(slope, each) for slope, each in zip(jacobians, known, strict=True)])
+        return np.full((jacobians.shape[-1], known.shape[-1]), np.nan)
 
 
-def _least(slopes: Array) -> Array:
+def _least_singular_values(slopes: Array) -> Array:
     """The least singular value of each slope (steps, rows, unknowns), rows >= unknowns."""
     if slopes.shape[1:] == (2, 2):
         # of two by two in closed form: the two have the determinant as product and the norm as sum of squares
@@ -98,7 +102,7 @@ def _least(slopes: Array) -> Array:
     return np.linalg.svd(slopes, compute_uv=False)[:, -1]
 
 
-def allowed(move: Array, before: Array, after: Array) -> Array:
+def is_move_allowed(move: Array, before: Array, after: Array) -> Array:
     """Whether a move is one that the rates at its two ends allow, each as a move over the whole step.
 
     A smooth move differs from the mean of the two by no more than they differ from one another, with room for the

@@ -10,40 +10,44 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from planar.equations.acceptance import CARRIED
-from planar.foundation.geometry import Frame, terms_of
-from planar.foundation.jets import Jet, terms
-from planar.model.link_shapes import Shape
-from planar.model.mechanism import Mechanism, motions
-from planar.model.pairs import Kind, Pair
+from planar.equations.acceptance import CARRIED_ROUNDING
+from planar.foundation.geometry import Frame, frame_term_sizes
+from planar.foundation.jets import Jet, term_sizes
+from planar.model.link_shapes import LinkShape
+from planar.model.mechanism import Mechanism, relative_motions
+from planar.model.pairs import MeasureKind, Pair
 
 Array = np.ndarray
-TOUCHING = 1e-6
+CONTACT_TOLERANCE = 1e-6
 """Sizes: dimensions in files are rounded, so a contact that guides keep closed may be open by as much."""
 EPS = float(np.finfo(float).eps)
-SURELY_KEPT = 1e-7
+NEGLIGIBLE_ERROR = 1e-7
 """Relative errors by round-off that are surely below this are neither looked for nor told."""
-MOST_LOST = 1e-3
+MAX_RATE_ERROR = 1e-3
 """Angles (rad) and rates that may have greater relative errors are no answer: less than three digits are sure."""
-SHORT_ARM = EPS / (SURELY_KEPT * 1e-2**2)
+SHORT_ARM = EPS / (NEGLIGIBLE_ERROR * 1e-2**2)
 """Sizes: where no link has a shorter arm and no group is nearer than 1e-2 to being singular, which backends keep clear
 of, rounding surely takes no more than that."""
 
 
-class Gate:
+class ResidualCheck:
     """The constraints of one mechanism (SI, lengths judged in units of its size)."""
 
     def __init__(
-        self, mechanism: Mechanism, shapes: Mapping[str, Shape], unit: float, named: Mapping[str, Pair] | None = None
+        self,
+        mechanism: Mechanism,
+        shapes: Mapping[str, LinkShape],
+        unit: float,
+        named: Mapping[str, Pair] | None = None,
     ):
         self.mechanism, self.unit = mechanism, unit
-        self.motions = motions(mechanism) if named is None else named
+        self.relative_motions = relative_motions(mechanism) if named is None else named
         self.numbers = {
             pair.name: pair.measure([shapes[link] for link in pair.bodies])
-            for pair in (*mechanism.pairs, *(self.motions[given.pair] for given in mechanism.inputs))
+            for pair in (*mechanism.pairs, *(self.relative_motions[given.pair] for given in mechanism.inputs))
         }
-        self.names = [pair.name for pair in mechanism.pairs for _ in pair.constrains]
-        self.names += [given.pair for given in mechanism.inputs]
+        self.row_pairs = [pair.name for pair in mechanism.pairs for _ in pair.residual_kinds]
+        self.row_pairs += [given.pair for given in mechanism.inputs]
         """The pair of every constraint, the inputs' last."""
         reach = max(
             (abs(value) for pair in mechanism.pairs for value in _lengths(pair, self.numbers[pair.name])), default=0.0
@@ -52,20 +56,22 @@ class Gate:
         # for each link on the way round a loop
         self.tolerance = 16.0 * EPS * (4 + len(mechanism.links)) * max(1.0, reach / unit)
 
-    def moved(self, mechanism: Mechanism) -> Gate:
+    def with_inputs_of(self, mechanism: Mechanism) -> ResidualCheck:
         """The same for a mechanism that differs from this one in its inputs' numbers alone."""
-        there = object.__new__(Gate)
+        there = object.__new__(ResidualCheck)
         there.__dict__.update(self.__dict__)
         there.mechanism = mechanism
         return there
 
-    def gaps(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Array]], u: Array | None = None) -> Array:
+    def residuals(
+        self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Array]], u: Array | None = None
+    ) -> Array:
         """How far every constraint is open (constraints, ...): lengths of the size, or rad; see `names`.
 
         Frames with cos and sin made from their angles, floats or arrays alike. `u` (inputs, ...) are the positions
         of the inputs, else the mechanism's own. What is not a number counts as infinitely open.
         """
-        gaps = [_gap(left, kind, self.unit) for kind, left in self._closures(frames, own, u)]
+        gaps = [_absolute_residual(left, kind, self.unit) for kind, left in self._pair_residuals(frames, own, u)]
         if not gaps:
             return np.zeros((0, 1))
         # the round-off of an angle, and of where its cos and sin put things, grows with the turns that it counts
@@ -75,22 +81,24 @@ class Gate:
         many = np.where(np.isfinite(many), many, 1.0)
         return np.nan_to_num(np.array(np.broadcast_arrays(*gaps)) / many, nan=np.inf, posinf=np.inf)
 
-    def apart(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Jet]]) -> tuple[str, float] | None:
+    def find_open_contact(
+        self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Jet]]
+    ) -> tuple[str, float] | None:
         """The first contact that guides have to keep closed and do not: its pair and the gap (m).
 
         No gap but a rate of it: the contact is closed in passing only.
         """
         for pair in self.mechanism.pairs:
-            gap = pair.apart(self.numbers[pair.name], own[pair.name])
+            gap = pair.contact_gap(self.numbers[pair.name], own[pair.name])
             if not isinstance(gap, Jet):
                 continue
             for order, part in enumerate(gap.parts):
-                scale = self.unit * (self._greatest(frames, own, order) if order else 1.0)
-                if np.nanmax(np.abs(part) / scale, initial=0.0) > TOUCHING:
+                scale = self.unit * (self._greatest_rate(frames, own, order) if order else 1.0)
+                if np.nanmax(np.abs(part) / scale, initial=0.0) > CONTACT_TOLERANCE:
                     return pair.name, float(np.max(np.abs(gap.parts[0])))
         return None
 
-    def rate_gaps(
+    def rate_residuals(
         self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Jet]], inputs: Sequence[Jet] | None = None
     ) -> list[tuple[Array, str]]:
         """How far velocities, then accelerations, break the worst constraint, as a part of its own terms; its pair.
@@ -99,12 +107,14 @@ class Gate:
         """
         u = [Jet(*given[1:4]) for given in self.mechanism.inputs] if inputs is None else inputs
         sizes = {
-            name: frame if frame.fixed else terms_of(*(terms(part) for part in (frame.x, frame.y, frame.angle)))
+            name: frame
+            if frame.fixed
+            else frame_term_sizes(*(term_sizes(part) for part in (frame.x, frame.y, frame.angle)))
             for name, frame in frames.items()
         }
-        own_sizes = {name: [terms(each) for each in values] for name, values in own.items()}
-        given = [terms(each) for each in u]
-        both = zip(self._closures(frames, own, u), self._closures(sizes, own_sizes, given), strict=True)
+        own_sizes = {name: [term_sizes(each) for each in values] for name, values in own.items()}
+        given = [term_sizes(each) for each in u]
+        both = zip(self._pair_residuals(frames, own, u), self._pair_residuals(sizes, own_sizes, given), strict=True)
         closures = [(kind, left, whole) for (kind, left), (_, whole) in both if isinstance(left, Jet)]
         found = []
         for order in (1, 2):
@@ -112,12 +122,12 @@ class Gate:
             speeds = [
                 (whole.parts[k] / self.unit) ** (order / k)
                 for kind, _, whole in closures
-                if kind is Kind.LENGTH
+                if kind is MeasureKind.LENGTH
                 for k in range(1, order + 1)
             ]
-            carried = CARRIED * np.maximum.reduce(np.broadcast_arrays(np.zeros(1), *speeds))
+            carried = CARRIED_ROUNDING * np.maximum.reduce(np.broadcast_arrays(np.zeros(1), *speeds))
             gaps = [
-                np.abs(left.parts[order]) / _scale(whole.parts[order], carried * self._by(kind))
+                np.abs(left.parts[order]) / _row_scale(whole.parts[order], carried * self._unit_of(kind))
                 for kind, left, whole in closures
             ]
             if not gaps:
@@ -125,10 +135,10 @@ class Gate:
                 continue
             part = np.nan_to_num(np.array(np.broadcast_arrays(*gaps)), nan=np.inf)
             worst = int(np.argmax(part.reshape(len(closures), -1).max(axis=1)))
-            found.append((part.max(axis=0), self.names[worst]))
+            found.append((part.max(axis=0), self.row_pairs[worst]))
         return found
 
-    def _greatest(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Jet]], order: int) -> Array:
+    def _greatest_rate(self, frames: Mapping[str, Frame], own: Mapping[str, Sequence[Jet]], order: int) -> Array:
         """The greatest rate of an order (lengths of the size), what a velocity makes of itself in an arc included.
 
         A velocity along a line counts as one in an arc of the size: what turning leaves there but for rounding is none.
@@ -142,33 +152,35 @@ class Gate:
         greatest = np.maximum.reduce(np.broadcast_arrays(*rates))
         return np.where(greatest == 0.0, 1.0, greatest)
 
-    def _by(self, kind: Kind) -> float:
-        return self.unit if kind is Kind.LENGTH else 1.0
+    def _unit_of(self, kind: MeasureKind) -> float:
+        return self.unit if kind is MeasureKind.LENGTH else 1.0
 
-    def _closures(self, frames, own, u=None):  # noqa: ANN001, ANN202 - floats, arrays or jets alike
+    def _pair_residuals(self, frames, own, u=None):  # noqa: ANN001, ANN202 - floats, arrays or jets alike
         """(kind, what is left open) of every constraint, then of every input."""
         for pair in self.mechanism.pairs:
             left = pair.residual([frames[link] for link in pair.bodies], self.numbers[pair.name], own[pair.name])
-            yield from zip(pair.constrains, left, strict=True)
+            yield from zip(pair.residual_kinds, left, strict=True)
         for index, given in enumerate(self.mechanism.inputs):
-            pair = self.motions[given.pair]
-            drive = pair.drive([frames[link] for link in pair.bodies], self.numbers[pair.name], own.get(pair.name, ()))
-            yield pair.drive_kind, drive - (given.position if u is None else u[index])
+            pair = self.relative_motions[given.pair]
+            drive = pair.input_position(
+                [frames[link] for link in pair.bodies], self.numbers[pair.name], own.get(pair.name, ())
+            )
+            yield pair.input_kind, drive - (given.position if u is None else u[index])
 
 
-def _scale(whole: Array, carried: Array) -> Array:
+def _row_scale(whole: Array, carried: Array) -> Array:
     """What a row that should vanish is divided by; one where nothing moves."""
     scale = whole + carried
     return np.where(scale == 0.0, 1.0, scale)
 
 
 def _lengths(pair: Pair, numbers: Sequence[float]) -> list[float]:
-    return [value for value, kind in zip(numbers, pair.measures, strict=True) if kind is Kind.LENGTH]
+    return [value for value, kind in zip(numbers, pair.number_kinds, strict=True) if kind is MeasureKind.LENGTH]
 
 
-def _gap(left: Array, kind: Kind, unit: float) -> Array:
-    if kind is Kind.LENGTH:
-        return np.abs(left) / unit
-    if kind is Kind.ANGLE:
-        return np.abs(np.arctan2(np.sin(left), np.cos(left)))
-    return np.abs(left)
+def _absolute_residual(residual: Array, kind: MeasureKind, unit: float) -> Array:
+    if kind is MeasureKind.LENGTH:
+        return np.abs(residual) / unit
+    if kind is MeasureKind.ANGLE:
+        return np.abs(np.arctan2(np.sin(residual), np.cos(residual)))
+    return np.abs(residual)

@@ -9,32 +9,39 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from planar.equations.functions import Program, length
-from planar.foundation.errors import Ending, NoAnswer
-from planar.solving.checks.branch_check import Branch, cancelling
-from planar.solving.continuation.fast_path import STRAIGHT, Told, course
-from planar.solving.continuation.path_pieces import Local, Met, Piece, met, onwards, pieces
-from planar.solving.continuation.period import Period, Round
-from planar.solving.continuation.predictor_corrector import Missed, Walk, Work
-from planar.solving.continuation.solution_curve import Curve, Point, Traced
+from planar.equations.functions import EquationFunctions, slice_length
+from planar.foundation.errors import NoAnswer, TrackingEnd
+from planar.solving.checks.branch_check import BranchCheck, solve_rates_batch
+from planar.solving.continuation.fast_path import STRAIGHT_TOLERANCE, FastSamples, fast_run
+from planar.solving.continuation.path_pieces import (
+    BranchRates,
+    PathBifurcation,
+    PathPiece,
+    bifurcations_until,
+    path_pieces,
+    start_point,
+)
+from planar.solving.continuation.period import Period, PeriodSearch
+from planar.solving.continuation.predictor_corrector import ArcBudget, CurveTracker, NearbyBifurcation
+from planar.solving.continuation.solution_curve import CurvePoint, CurveSolver, SolutionCurve
 
 Array = np.ndarray
 
-CORRECTIONS = 8
-LEAST_WINDOW = 8
+MAX_CORRECTIONS = 8
+MIN_WINDOW = 8
 """Samples that are tried at once where none has passed before."""
-AHEAD = 1000
+MAX_SAMPLES_AHEAD = 1000
 """Samples that one trip is to come to at most."""
 
 
-class Followed(Traced, Protocol):
+class PathSolver(CurveSolver, Protocol):
     """What following needs of a solver beyond that."""
 
-    def ends(self, u: Array, tangent: Array, ending: Ending) -> NoAnswer:
+    def end_refusal(self, u: Array, tangent: Array, ending: TrackingEnd) -> NoAnswer:
         """What to say of a motion that ends at inputs u, towards which it went along a tangent."""
 
 
-class Run(NamedTuple):
+class FollowedSamples(NamedTuple):
     """Unknowns at every sample that was reached (samples, unknowns), how many of them the general path had to solve,
     and why the rest was not reached, if not, with the last unknowns and inputs before that.
 
@@ -42,16 +49,16 @@ class Run(NamedTuple):
     """
 
     z: Array
-    general: int
+    general_count: int
     stopped: NoAnswer | None = None
-    last: tuple[Array, Array] | None = None
-    local: Mapping[int, Local] = MappingProxyType({})
-    met: tuple[Met, ...] = ()
-    missed: tuple[Missed, ...] = ()
-    told: Told | None = None
+    last_position: tuple[Array, Array] | None = None
+    branch_rates: Mapping[int, BranchRates] = MappingProxyType({})
+    passed: tuple[PathBifurcation, ...] = ()
+    nearby: tuple[NearbyBifurcation, ...] = ()
+    fast_samples: FastSamples | None = None
 
 
-class Trip:
+class PathFollower:
     """Goes along a straight way of the inputs to its first dead point, and tells the unknowns at places in their order.
 
     The way is one in which the fastest input goes one rad or size a unit.
@@ -59,85 +66,89 @@ class Trip:
 
     def __init__(
         self,
-        solver: Followed,
+        solver: PathSolver,
         p: Array,
         z: Array,
         start: Array,
         way: Array,
         branches: Sequence[int] = (),
-        work: Work | None = None,
+        work: ArcBudget | None = None,
     ):
         reach = float(np.max(np.abs(way), initial=0.0)) or 1.0
-        self.curve = Curve(solver, p, start, way / reach)
+        self.curve = SolutionCurve(solver, p, start, way / reach)
         numbers = list(branches)
-        self.walk = Walk(self.curve, onwards(self.curve, np.append(z, 0.0), numbers), numbers, work)
-        self.here = self.walk.here
-        self.dead: Point | None = None
-        self._pieces, self._round = pieces(self.walk), Round(self.walk)
-        self._piece: Piece | None = None
+        self.tracker = CurveTracker(self.curve, start_point(self.curve, np.append(z, 0.0), numbers), numbers, work)
+        self.point = self.tracker.point
+        self.dead_point: CurvePoint | None = None
+        self._pieces, self._period_search = path_pieces(self.tracker), PeriodSearch(self.tracker)
+        self._piece: PathPiece | None = None
         self._period: Period | None = None
         self._wanted = self._reached = 0.0
 
-    def holds(self, place: float) -> bool:
+    def has_position(self, position: float) -> bool:
         """Whether a place lies on what has been followed already."""
-        return self._piece is not None and (place <= self._piece.stop or self._period is not None)
+        return self._piece is not None and (position <= self._piece.stop or self._period is not None)
 
     @property
-    def end(self) -> tuple[Array, Ending]:
+    def end_inputs(self) -> tuple[Array, TrackingEnd]:
         """The inputs beyond which it does not go, and why."""
-        if self.dead is not None:
-            return self.curve.inputs(self.dead.y), Ending.DEAD_POINT
-        if self.walk.limit is not None and self._wanted < self.walk.limit:
-            return self.curve.inputs(self.here.y), Ending.FAR
-        return self.walk.end
+        if self.dead_point is not None:
+            return self.curve.inputs(self.dead_point.y), TrackingEnd.DEAD_POINT
+        if self.tracker.limit is not None and self._wanted < self.tracker.limit:
+            return self.curve.inputs(self.point.y), TrackingEnd.OUT_OF_RANGE
+        return self.tracker.end_inputs
 
     @property
-    def last(self) -> tuple[Array, Array] | None:
+    def last_position(self) -> tuple[Array, Array] | None:
         """Unknowns and inputs of the last position before that; where a slide goes out without an end, of one well out.
         None where it has been beyond that already."""
-        here = self.here
-        if self.end[1] is Ending.ENDLESS:
-            here = self.walk.out or here
+        here = self.point
+        if self.end_inputs[1] is TrackingEnd.ENDLESS:
+            here = self.tracker.far_point or here
             if here.y[-1] <= self._reached:
                 return None
         return here.y[:-1], self.curve.inputs(here.y)
 
     @property
-    def start(self) -> tuple[Array, Local]:
+    def start_position(self) -> tuple[Array, BranchRates]:
         """The unknowns where it starts on a change point by a way that was asked for, with their rates along it."""
-        found = self.to(0.0)
+        found = self.unknowns_at(0.0)
         assert found is not None
         assert found[1] is not None
         return found[0], found[1]
 
-    def to(self, place: float) -> tuple[Array, Local | None] | None:
+    def unknowns_at(self, position: float) -> tuple[Array, BranchRates | None] | None:
         """The unknowns so far along the way, with rates where the slope is singular; None if it ends before."""
-        self._wanted = place
-        while self._piece is None or not self.holds(place):
-            if self.dead is not None:
+        self._wanted = position
+        while self._piece is None or not self.has_position(position):
+            if self.dead_point is not None:
                 return None
             self._piece = next(self._pieces, None)
             if self._piece is None:
                 return None
-            self.dead = self._piece.dead
-            self.here = self.dead or self._piece.arc.after
-            self._period = self._round.after(self._piece)
-        self._reached = place
-        if self._period is not None and place > self._piece.stop:
-            return self._period.at(self.curve, place)
-        return self._piece.at(self.curve, place)
+            self.dead_point = self._piece.dead_point
+            self.point = self.dead_point or self._piece.arc.after
+            self._period = self._period_search.period_after(self._piece)
+        self._reached = position
+        if self._period is not None and position > self._piece.stop:
+            return self._period.unknowns_at(self.curve, position)
+        return self._piece.unknowns_at(self.curve, position)
 
-    def met(self, last: float) -> tuple[Met, ...]:
+    def bifurcations_until(self, last: float) -> tuple[PathBifurcation, ...]:
         """The change points passed up to a place that it has come to."""
-        return met(self.walk, last) if self._period is None else tuple(self._period.met(self.curve, last))
+        return (
+            bifurcations_until(self.tracker, last)
+            if self._period is None
+            else tuple(self._period.bifurcations_until(self.curve, last))
+        )
 
 
-def follow(solver: Followed, p: Array, z: Array, start: Array, stop: Array) -> Array:
+def follow_to(solver: PathSolver, p: Array, z: Array, start: Array, stop: Array) -> Array:
     """The unknowns at inputs `stop`; see `followed`."""
-    return followed(solver, p, z, start, stop).z[-1]
+    return follow_straight(solver, p, z, start, stop).z[-1]
 
 
-def followed(solver: Followed, p: Array, z: Array, start: Array, stop: Array) -> Run:
+def follow_straight(solver: PathSolver, p: Array, z: Array, start: Array, stop: Array) -> FollowedSamples:
     """The unknowns at inputs `start` and `stop`, followed along the straight line between them.
 
     Smoothly through change points. Raises NoAnswer where a dead point is on the way, or the branch cannot be followed.
@@ -145,24 +156,26 @@ def followed(solver: Followed, p: Array, z: Array, start: Array, stop: Array) ->
     way = stop - start
     reach = float(np.max(np.abs(way), initial=0.0))
     if reach == 0.0:
-        return Run(np.stack([z, z]), 0)
-    trip = Trip(solver, p, z, start, way)
-    found = trip.to(reach)
+        return FollowedSamples(np.stack([z, z]), 0)
+    trip = PathFollower(solver, p, z, start, way)
+    found = trip.unknowns_at(reach)
     if found is None:
-        raise ended(solver, trip)
+        raise path_end_refusal(solver, trip)
     local = {} if found[1] is None else {1: found[1]}
-    return Run(np.stack([z, found[0]]), 1, None, None, local, trip.met(reach), tuple(trip.walk.missed))
+    return FollowedSamples(
+        np.stack([z, found[0]]), 1, None, None, local, trip.bifurcations_until(reach), tuple(trip.tracker.nearby)
+    )
 
 
-def run(
-    solver: Followed,
+def follow_samples(
+    solver: PathSolver,
     p: Array,
     z: Array,
     u: Array,
     branches: Sequence[int] = (),
     rates: tuple[Array, Array] | None = None,
-    work: Work | None = None,
-) -> Run:
+    budget: ArcBudget | None = None,
+) -> FollowedSamples:
     """The unknowns at every sample of a run of inputs u (samples, inputs), from those of the first.
 
     The whole run is one call of the compiled program; every sample then passes both parts of the gate, and from
@@ -170,162 +183,166 @@ def run(
     `rates` of the inputs the run tells those of its samples as well, so far as they are surely sound. What the general
     path does is counted in `work`.
     """
-    samples, work = len(u), work or Work()
+    samples, budget = len(u), budget or ArcBudget()
     found = np.empty((samples, z.size))
     found[0] = z
     done, general, window = 1, 0, samples
-    local: dict[int, Local] = {}
-    met_on_way: list[Met] = []
-    told = _Sure(solver, samples) if rates is not None else None
-    missed: list[Missed] = []
-    trip: Trip | None = None
+    local: dict[int, BranchRates] = {}
+    met_on_way: list[PathBifurcation] = []
+    told = _FastSamplesBuffer(solver, samples) if rates is not None else None
+    missed: list[NearbyBifurcation] = []
+    trip: PathFollower | None = None
     steps: Iterator[tuple[float, float]] = iter(())
     before = 0
     while done < samples:
         first, last = done, min(done + window, samples)
-        done = _at_once(solver, p, (found, u), slice(done - 1, last), rates, told, done - 1 in local)
+        done = _solve_compiled(solver, p, (found, u), slice(done - 1, last), rates, told, done - 1 in local)
         # of what comes after a sample that did not pass no more is tried than has passed before
-        window = max(LEAST_WINDOW, 2 * (done - first))
+        window = max(MIN_WINDOW, 2 * (done - first))
         if done > first:
             steps = iter(())
         if done == last:
             continue
         at_once = next(steps, None)
         if trip is None or at_once is None:
-            missed += trip.walk.missed if trip is not None else ()
+            missed += trip.tracker.nearby if trip is not None else ()
             base = done - 1
-            while base and base in local and (u[done] - u[done - 1]) @ local[base].way < 0.0:
+            while base and base in local and (u[done] - u[done - 1]) @ local[base].input_direction < 0.0:
                 base -= 1  # what turns back on a change point comes back by the branch on which it came
-            ahead = np.vstack([u[base], u[done : done + AHEAD]])
-            trip, places = _trip(solver, p, found[base], ahead, branches[len(met_on_way) :], work)
+            ahead = np.vstack([u[base], u[done : done + MAX_SAMPLES_AHEAD]])
+            trip, places = _straight_follower(solver, p, found[base], ahead, branches[len(met_on_way) :], budget)
             steps, before = pairwise([*places, np.inf]), len(met_on_way)
             at_once = next(steps)
-            if trip.walk.leaves and base == done - 1:
-                found[base], local[base] = trip.start
+            if trip.tracker.starts_on_bifurcation and base == done - 1:
+                found[base], local[base] = trip.start_position
         for place, following in chain([at_once], steps):
-            at = trip.to(place)
+            at = trip.unknowns_at(place)
             if at is None:
-                met_on_way[before:] = trip.met(place)
-                known = told and told.of(done)
-                stopped = ended(solver, trip)
-                return Run(
+                met_on_way[before:] = trip.bifurcations_until(place)
+                known = told and told.first_samples(done)
+                stopped = path_end_refusal(solver, trip)
+                return FollowedSamples(
                     found[:done],
                     general,
                     stopped,
-                    trip.last,
+                    trip.last_position,
                     local,
                     tuple(met_on_way),
-                    (*missed, *trip.walk.missed),
+                    (*missed, *trip.tracker.nearby),
                     known,
                 )
             found[done] = at[0]
             if at[1] is not None:
                 local[done] = at[1]
             done, general = done + 1, general + 1
-            if at[1] is None and not trip.holds(following):
+            if at[1] is None and not trip.has_position(following):
                 break
-        met_on_way[before:] = trip.met(place)
-    missed += trip.walk.missed if trip is not None else ()
-    return Run(found, general, None, None, local, tuple(met_on_way), tuple(missed), told and told.of(samples))
+        met_on_way[before:] = trip.bifurcations_until(place)
+    missed += trip.tracker.nearby if trip is not None else ()
+    return FollowedSamples(
+        found, general, None, None, local, tuple(met_on_way), tuple(missed), told and told.first_samples(samples)
+    )
 
 
-class _Sure:
+class _FastSamplesBuffer:
     """What a run tells of its samples so far."""
 
-    def __init__(self, solver: Followed, samples: int):
-        many = len(solver.program.equations.coordinates)
+    def __init__(self, solver: PathSolver, samples: int):
+        many = len(solver.functions.equations.coordinates)
         self.parts, self.sure, self.open = np.empty((samples, 3, many)), np.zeros(samples, dtype=bool), 0.0
 
-    def of(self, samples: int) -> Told:
+    def first_samples(self, samples: int) -> FastSamples:
         """Of its first samples."""
-        return Told(self.parts[:samples], self.sure[:samples], self.open)
+        return FastSamples(self.parts[:samples], self.sure[:samples], self.open)
 
 
-def _at_once(
-    solver: Followed,
+def _solve_compiled(
+    solver: PathSolver,
     p: Array,
     samples: tuple[Array, Array],
     rest: slice,
     rates: tuple[Array, Array] | None,
-    told: _Sure | None,
+    told: _FastSamplesBuffer | None,
     beside: bool,
 ) -> int:
     """Fill in unknowns of the samples after the first of the `rest` in one call, as far as they pass both parts of the
     gate; how many are known then. Of a first one `beside` a change point more is known than can be read off its slope.
     """
     (found, u), first = samples, rest.start
-    sure = course(solver, found[first], u[rest], *(each[rest] for each in rates)) if rates is not None else None
+    sure = fast_run(solver, found[first], u[rest], *(each[rest] for each in rates)) if rates is not None else None
     if sure is not None and told is not None:
         through = len(sure.z)
         if not through:
             return first + 1
         same = slice(first + beside, first + through)
         found[same] = sure.z[beside:]
-        told.parts[same], told.sure[same] = sure.parts[beside:], True
-        told.open = max(told.open, sure.open)
+        told.parts[same], told.sure[same] = sure.coordinate_rates[beside:], True
+        told.open = max(told.open, sure.residual)
         return first + through
-    if not solver.program.square:
+    if not solver.functions.is_square:
         return first + 1
     after = slice(first + 1, rest.stop)
-    found[after] = solver.program.run(found[first], u[after], p)
-    after = slice(first + 1, first + 1 + _passing(solver, p, found[rest], u[rest]))
-    found[after] = _settled(solver.program, p, found[after], u[after])
+    found[after] = solver.functions.run_samples(found[first], u[after], p)
+    after = slice(first + 1, first + 1 + _count_accepted(solver, p, found[rest], u[rest]))
+    found[after] = _correct_once(solver.functions, p, found[after], u[after])
     return after.stop
 
 
-def _trip(
-    solver: Followed, p: Array, z: Array, u: Array, branches: Sequence[int], work: Work
-) -> tuple[Trip, list[float]]:
+def _straight_follower(
+    solver: PathSolver, p: Array, z: Array, u: Array, branches: Sequence[int], work: ArcBudget
+) -> tuple[PathFollower, list[float]]:
     """A trip from the first of these inputs towards the next, and the places of those that lie on the same way."""
     away = np.max(np.abs(u - u[0]), axis=1, initial=0.0)
     way = u[int(np.argmax(away > 0.0))] - u[0]
     reach = float(np.max(np.abs(way), initial=0.0))
     if reach == 0.0:
-        return Trip(solver, p, z, u[0], way, (), work), [0.0]
+        return PathFollower(solver, p, z, u[0], way, (), work), [0.0]
     axis = way / reach
     gone = (u[1:] - u[0]) @ axis / float(axis @ axis)
-    aside = np.max(np.abs(u[1:] - u[0] - gone[:, None] * axis), axis=1) > STRAIGHT
+    aside = np.max(np.abs(u[1:] - u[0] - gone[:, None] * axis), axis=1) > STRAIGHT_TOLERANCE
     back = np.diff(gone, prepend=0.0) < 0.0
     off = aside | back
     many = int(np.argmax(off)) if off.any() else len(gone)
-    return Trip(solver, p, z, u[0], way, branches, work), gone[:many].tolist()
+    return PathFollower(solver, p, z, u[0], way, branches, work), gone[:many].tolist()
 
 
-def ended(solver: Followed, trip: Trip) -> NoAnswer:
+def path_end_refusal(solver: PathSolver, trip: PathFollower) -> NoAnswer:
     """Why a trip goes no further."""
-    u, ending = trip.end
-    return solver.ends(u, trip.here.tangent, ending)
+    u, ending = trip.end_inputs
+    return solver.end_refusal(u, trip.point.tangent, ending)
 
 
-def _passing(solver: Followed, p: Array, z: Array, u: Array) -> int:
+def _count_accepted(solver: PathSolver, p: Array, z: Array, u: Array) -> int:
     """How many samples after the first pass both parts of the gate, up to the first that does not."""
-    closed = solver.open_along(z, u) <= solver.tolerance
+    closed = solver.max_residuals(z, u) <= solver.tolerance
     whole = len(closed) if closed.all() else int(np.argmin(closed))
     if whole < 2:
         return 0
-    keeps = Branch(solver.program, p).along(z[:whole], u[:whole])
+    keeps = BranchCheck(solver.functions, p).accept_steps(z[:whole], u[:whole])
     return len(keeps) if keeps.all() else int(np.argmin(keeps))
 
 
-def _settled(program: Program, p: Array, z: Array, u: Array) -> Array:
+def _correct_once(program: EquationFunctions, p: Array, z: Array, u: Array) -> Array:
     """Regular samples after one more of Newton's corrections: beside a change point the gate leaves room for an error
     in their unknowns, which grows with every rate."""
     if not z.size:
         return z
     none = np.zeros((len(z), z.shape[1] + u.shape[1]))
     there = program.kinematics(np.hstack([z, u]), none, none, p)
-    return z + cancelling(there.slope, there.F[..., None])[..., 0]
+    return z + solve_rates_batch(there.jacobian, there.F[..., None])[..., 0]
 
 
-def corrected(program: Program, p: Array, z: Array, u: Array, last: int | None = None) -> Array | None:
+def correct_blocks(
+    program: EquationFunctions, p: Array, z: Array, u: Array, last_level: int | None = None
+) -> Array | None:
     """Newton's corrector, group after group (to the `last`), from unknowns near by; None where one does not close."""
     z = z.copy()
-    for stage in program.equations.stages:
-        if not length(stage.rows) or (last is not None and stage.level > last):
+    for stage in program.equations.blocks:
+        if not slice_length(stage.rows) or (last_level is not None and stage.block_index > last_level):
             continue
-        closing = program.closed(stage)
+        closing = program.block_call(stage)
         before = np.inf
-        for _ in range(CORRECTIONS):
+        for _ in range(MAX_CORRECTIONS):
             left, slope = closing(z, u, p)
             gap = float(np.max(np.abs(left), initial=0.0))
             if not gap < before:

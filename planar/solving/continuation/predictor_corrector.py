@@ -7,283 +7,305 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.foundation.errors import Ending
-from planar.foundation.root_finding import root
-from planar.model.pairs import Kind
+from planar.foundation.errors import TrackingEnd
+from planar.foundation.root_finding import find_root
+from planar.model.pairs import MeasureKind
 from planar.solving.continuation.bifurcation import (
-    Beside,
-    Crossing,
-    beside,
-    crossing,
-    nearest,
-    starting,
+    Bifurcation,
+    BranchCrossing,
+    bifurcation_ahead,
+    bifurcation_at_start,
+    bifurcation_candidates,
+    branch_crossing,
 )
-from planar.solving.continuation.solution_curve import Arc, Curve, Point, between
+from planar.solving.continuation.solution_curve import Arc, CurvePoint, SolutionCurve, arc_between
 
 Array = np.ndarray
 
-FIRST, LONGEST, SHORTEST = 0.05, 0.25, 1e-9
+FIRST_STEP, LONGEST_STEP, SHORTEST_STEP = 0.05, 0.25, 1e-9
 """Steps of arc length (rad, lengths of the size): the first, the longest, and one at which the curve ends."""
-BENT = 0.4
+MAX_TANGENT_TURN = 0.4
 """rad by which the tangent may turn in a step."""
-CLOSE = 1.5
+REGULAR_DISTANCE_RATIO = 1.5
 """How many times shorter than the distances from singular slopes at its two ends a step must be."""
-SUSPECTED, AGAIN = 0.15, 0.2
+SEARCH_DISTANCE, REPEATED_SEARCH_RATIO = 0.15, 0.2
 """Where to look for a change point: so near to a singular slope, and again where it is so many times nearer."""
-AT = 1e-5
+AT_BIFURCATION_DISTANCE = 1e-5
 """So near to a singular slope a start may be a change point, known to the root of rounding."""
-AHEAD = 10.0
+MAX_AHEAD_RATIO = 10.0
 """A change point farther ahead than so many times the distance within which there is none is another one."""
-ARCS = 5_000
+MAX_ARCS = 5_000
 """Arcs that are walked for one answer; a turn of a usual linkage has some fifty."""
-NEAR_BY = 4.0
+NEAR_SLIDE_EXTENT = 4.0
 """Lengths of the size: where a slide is farther out than this, steps along it grow with how far it is."""
-OUT = 100.0
+SHOWN_SLIDE_EXTENT = 100.0
 """Lengths of the size, or times the greatest number of a pair: so far out a slide is shown that goes out without an
 end."""
-FARTHEST = 6e6
+MAX_SLIDE_EXTENT = 6e6
 """Lengths of the size: farther out than this the gate tells nothing."""
-CONVERGES = 0.25
+MIN_LIMIT_POWER = 0.25
 """Where a slide goes out without an end the inputs tend to a limit with a power of the slide's inverse; beyond half of
 the square root, which is the lowest that lines becoming parallel give, they do."""
-STANDS = 1e-12
+STANDING_INPUT = 1e-12
 """rad or sizes: inputs that move less than this stand still."""
 
 
-class Passed(NamedTuple):
+class PassedBifurcation(NamedTuple):
     """A change point that a walk went through: the ways, by the first of which it came, and by which it went on; or
     on which it started."""
 
-    crossing: Crossing
-    went: int
-    starts: bool = False
+    bifurcation: Bifurcation
+    branch_index: int
+    is_start: bool = False
     beyond: bool = False
     """Whether a higher number was asked for than there are ways, so that it took the last."""
 
     @property
-    def switches(self) -> bool:
+    def is_switched(self) -> bool:
         """Whether it went on by another way than smoothly."""
-        return self.went != 0 and not self.starts
+        return self.branch_index != 0 and not self.is_start
 
 
-class Missed(NamedTuple):
+class NearbyBifurcation(NamedTuple):
     """A change point of a neighbouring linkage that a walk came near: where, how near, and by how much this linkage's
     constraints do not close there (lengths of the size)."""
 
     y: Array
     distance: float
-    open: float
+    residual: float
 
 
-class Work:
+class ArcBudget:
     """What may be spent on one answer, counted in arcs, and who is told of each: where the inputs are."""
 
-    def __init__(self, most: int = ARCS, tell: Callable[[Array], None] | None = None):
-        self.left, self._tell = most, tell
+    def __init__(self, most: int = MAX_ARCS, tell: Callable[[Array], None] | None = None):
+        self.arcs_left, self._report = most, tell
 
     def spend(self, u: Array) -> bool:
         """Count an arc from inputs u (inputs,); False where nothing is left to spend."""
-        self.left -= 1
-        if self._tell is not None:
-            self._tell(u)
-        return self.left >= 0
+        self.arcs_left -= 1
+        if self._report is not None:
+            self._report(u)
+        return self.arcs_left >= 0
 
 
-class Walk:
+class CurveTracker:
     """One walk along a curve from a point: its arcs, one after the other, and what it met on the way.
 
     `branches` are the numbers of the ways taken at change points, in the order in which they are met: 1 goes on
     smoothly, 2 takes the way nearest to that, and so on; 1 where the list ends. Of a start on one see `starting`.
     """
 
-    def __init__(self, curve: Curve, start: Point, branches: Sequence[int] = (), work: Work | None = None):
-        self.curve, self.here, self.work = curve, start, work or Work()
+    def __init__(
+        self, curve: SolutionCurve, start: CurvePoint, branches: Sequence[int] = (), work: ArcBudget | None = None
+    ):
+        self.curve, self.point, self.budget = curve, start, work or ArcBudget()
         self.branches = list(branches)
-        self.passed: list[Passed] = []
-        self.missed: list[Missed] = []
-        self.step = FIRST
-        self._looked, self._approaching = np.inf, False
-        self._out_of: Beside | None = None
-        self._leave()
-        self.ending = Ending.LOST
+        self.passed: list[PassedBifurcation] = []
+        self.nearby: list[NearbyBifurcation] = []
+        self.step = FIRST_STEP
+        self._last_search_distance, self._approaching = np.inf, False
+        self._start_crossing: BranchCrossing | None = None
+        self._choose_start_branch()
+        self.ending = TrackingEnd.BRANCH_LOST
         self.limit: float | None = None
         "the place of the inputs to which the curve tends while a slide goes out without an end"
-        self.out: Point | None = None
+        self.far_point: CurvePoint | None = None
         "where a slide has come out far, and went on"
-        equations = curve.program.equations
+        equations = curve.functions.equations
         kinds = [equations.coordinates[column].kind for column in equations.unknowns]
-        self._slides = np.array([kind is Kind.LENGTH for kind in kinds], dtype=bool)
-        turns = any(kind is not Kind.LENGTH for kind, way in zip(equations.drives, curve.way, strict=True) if way)
-        self.turning = np.append(~self._slides, turns)
+        self._is_length = np.array([kind is MeasureKind.LENGTH for kind in kinds], dtype=bool)
+        turns = any(
+            kind is not MeasureKind.LENGTH
+            for kind, way in zip(equations.input_kinds, curve.input_direction, strict=True)
+            if way
+        )
+        self.is_periodic = np.append(~self._is_length, turns)
         "which entries of y come back after whole turns: angles, and the place of inputs that turn"
 
     def arcs(self) -> Iterator[Arc]:
         """The arcs of the curve; they end where it cannot be followed further, `ending` and `limit` say why."""
-        shown = OUT * max(1.0, float(np.max(np.abs(self.curve.p), initial=0.0)))
-        farthest = max(FARTHEST, 2.0 * self._out(self.here.y))
-        if self._out_of is not None:
-            self.here = self._out_of.after
-            yield self._out_of.arc(self._out_of.middle, self._out_of.after)
+        shown = SHOWN_SLIDE_EXTENT * max(1.0, float(np.max(np.abs(self.curve.p), initial=0.0)))
+        farthest = max(MAX_SLIDE_EXTENT, 2.0 * self._slide_extent(self.point.y))
+        if self._start_crossing is not None:
+            self.point = self._start_crossing.after
+            yield self._start_crossing.arc(self._start_crossing.middle, self._start_crossing.after)
         while True:
-            here = self.here
-            if not self.work.spend(self.curve.inputs(here.y)):
-                self.ending = Ending.SPENT
+            here = self.point
+            if not self.budget.spend(self.curve.inputs(here.y)):
+                self.ending = TrackingEnd.WORK_LIMIT
                 return
-            if self._approaching and here.clear < min(SUSPECTED, AGAIN * self._looked, self.step):
-                through = list(self._through())
+            if self._approaching and here.regular_distance < min(
+                SEARCH_DISTANCE, REPEATED_SEARCH_RATIO * self._last_search_distance, self.step
+            ):
+                through = list(self._arcs_through_bifurcation())
                 if through:
                     yield from through
-                    self.step, self._looked, self._approaching = FIRST, np.inf, False
+                    self.step, self._last_search_distance, self._approaching = FIRST_STEP, np.inf, False
                     continue
-            elif here.clear > SUSPECTED:
-                self._looked = np.inf
-            out = self._out(here.y)
-            after = None if out > farthest else self._next()
+            elif here.regular_distance > SEARCH_DISTANCE:
+                self._last_search_distance = np.inf
+            out = self._slide_extent(here.y)
+            after = None if out > farthest else self._next_point()
             if after is None:
-                self.limit = _limit(here, int(np.argmax(np.abs(here.y[:-1]) * self._slides))) if out > OUT else None
+                self.limit = (
+                    _input_limit(here, int(np.argmax(np.abs(here.y[:-1]) * self._is_length)))
+                    if out > SHOWN_SLIDE_EXTENT
+                    else None
+                )
                 if self.limit is not None:
-                    self.ending = Ending.ENDLESS
+                    self.ending = TrackingEnd.ENDLESS
                 elif out > farthest:
-                    self.ending = Ending.FAR
+                    self.ending = TrackingEnd.OUT_OF_RANGE
                 return
-            self._note(after)
-            self._approaching = after.clear < here.clear
-            arc = between(here, after)
-            if self.out is None and self._out(after.y) > shown:
+            self._update_nearby(after)
+            self._approaching = after.regular_distance < here.regular_distance
+            arc = arc_between(here, after)
+            if self.far_point is None and self._slide_extent(after.y) > shown:
                 first, last = arc.ends
-                x = root(lambda x, arc=arc: self._out(arc.y(self.curve, x)) - shown, first, last)
-                self.out = arc.at(self.curve, x)
-            self.here = after
+                x = find_root(
+                    lambda x, arc=arc: self._slide_extent(arc.curve_coordinates(self.curve, x)) - shown, first, last
+                )
+                self.far_point = arc.point_at(self.curve, x)
+            self.point = after
             yield arc
 
     @property
-    def leaves(self) -> bool:
+    def starts_on_bifurcation(self) -> bool:
         """Whether it starts on a change point, by a way that was asked for."""
-        return self._out_of is not None
+        return self._start_crossing is not None
 
-    def _leave(self) -> None:
+    def _choose_start_branch(self) -> None:
         """Start by the way of the next number where that is asked for and the start is a change point."""
-        if not (self.branches and self.here.clear < AT):
+        if not (self.branches and self.point.regular_distance < AT_BIFURCATION_DISTANCE):
             return
-        found = starting(self.curve, self.here.y)
+        found = bifurcation_at_start(self.curve, self.point.y)
         number = self.branches[0]
-        went = min(number, len(found.ways)) - 1 if found else 0
-        out = found and beside(self.curve, found.ways[went], found.lost)
+        went = min(number, len(found.branches)) - 1 if found else 0
+        out = found and branch_crossing(self.curve, found.branches[went], found.rank_loss)
         if found is not None and out is not None:
             del self.branches[0]
-            self.here, self._out_of = out.middle, out
-            self.passed.append(Passed(found, went, True, number > len(found.ways)))
+            self.point, self._start_crossing = out.middle, out
+            self.passed.append(PassedBifurcation(found, went, True, number > len(found.branches)))
 
     @property
-    def end(self) -> tuple[Array, Ending]:
+    def end_inputs(self) -> tuple[Array, TrackingEnd]:
         """The inputs beyond which the arcs do not go, and why."""
-        y = self.here.y if self.limit is None else np.append(self.here.y[:-1], self.limit)
+        y = self.point.y if self.limit is None else np.append(self.point.y[:-1], self.limit)
         return self.curve.inputs(y), self.ending
 
-    def _out(self, y: Array) -> float:
+    def _slide_extent(self, y: Array) -> float:
         """How far the farthest slide is out (sizes)."""
-        return float(np.max(np.abs(y[:-1][self._slides]), initial=0.0))
+        return float(np.max(np.abs(y[:-1][self._is_length]), initial=0.0))
 
-    def _next(self) -> Point | None:
+    def _next_point(self) -> CurvePoint | None:
         """The next point: a predictor of second order, Newton's corrector, and the second part of the gate."""
-        here, curve = self.here, self.curve
-        bent = float(np.linalg.norm(here.bend))
+        here, curve = self.point, self.curve
+        bent = float(np.linalg.norm(here.curvature))
         # far out a step of a slide may be longer, but not that of an angle
-        out = max(self._out(here.y), 0.0 if self.turning[-1] else abs(float(here.y[-1])))
-        turning = float(np.max(np.abs(here.tangent[self.turning]), initial=0.0))
-        longest = LONGEST / max(turning, min(1.0, NEAR_BY / max(out, 1.0)))
-        step = min(self.step, longest, 1.2 * here.clear, 0.8 * BENT / max(bent, 1e-300))
-        while step > SHORTEST:
-            y = curve.corrected(here.y + step * here.tangent + 0.5 * step**2 * here.bend, here.tangent)
+        out = max(self._slide_extent(here.y), 0.0 if self.is_periodic[-1] else abs(float(here.y[-1])))
+        turning = float(np.max(np.abs(here.tangent[self.is_periodic]), initial=0.0))
+        longest = LONGEST_STEP / max(turning, min(1.0, NEAR_SLIDE_EXTENT / max(out, 1.0)))
+        step = min(self.step, longest, 1.2 * here.regular_distance, 0.8 * MAX_TANGENT_TURN / max(bent, 1e-300))
+        while step > SHORTEST_STEP:
+            y = curve.correct(here.y + step * here.tangent + 0.5 * step**2 * here.curvature, here.tangent)
             if y is not None:
-                after = curve.at(y, here.tangent)
+                after = curve.point_at(y, here.tangent)
                 gone = float(np.linalg.norm(y - here.y))
-                onwards = after.tangent @ here.tangent > np.cos(BENT)
-                if onwards and CLOSE * gone < here.clear + after.clear and gone < 2.0 * step:
+                onwards = after.tangent @ here.tangent > np.cos(MAX_TANGENT_TURN)
+                if (
+                    onwards
+                    and REGULAR_DISTANCE_RATIO * gone < here.regular_distance + after.regular_distance
+                    and gone < 2.0 * step
+                ):
                     self.step = 1.6 * step
                     return after
             step *= 0.5
         return None
 
-    def _through(self) -> Iterator[Arc]:
+    def _arcs_through_bifurcation(self) -> Iterator[Arc]:
         """The arcs through a change point that lies just ahead, if one does."""
-        here = self.here
-        self._looked = here.clear
-        found = self._crossing(here)
+        here = self.point
+        self._last_search_distance = here.regular_distance
+        found = self._bifurcation_ahead(here)
         if found is None:
             return
-        went, onwards, beyond = self._taken(found, here)
-        inwards, outwards = self._sided(found, 0, here), self._sided(found, went, onwards)
+        went, onwards, beyond = self._choose_branch(found, here)
+        inwards, outwards = self._crossing_towards(found, 0, here), self._crossing_towards(found, went, onwards)
         if inwards is None or outwards is None:
             return
         if float(inwards.middle.tangent @ (here.y - inwards.before.y)) < 0.0:
-            yield between(here, inwards.before)
+            yield arc_between(here, inwards.before)
             here = inwards.before
-        self.passed.append(Passed(found, went, beyond=beyond))
+        self.passed.append(PassedBifurcation(found, went, beyond=beyond))
         yield inwards.arc(here, inwards.middle)
         yield outwards.arc(outwards.middle, outwards.after)
-        self.here = outwards.after
+        self.point = outwards.after
 
-    def _crossing(self, here: Point) -> Crossing | None:
+    def _bifurcation_ahead(self, here: CurvePoint) -> Bifurcation | None:
         """The change point that lies just ahead; those of neighbouring linkages are noted."""
         curve = self.curve
-        for near in nearest(curve, here):
+        for near in bifurcation_candidates(curve, here):
             away = float(np.linalg.norm(near.y - here.y))
-            if not float(here.tangent @ (near.y - here.y)) > 0.0 or away > max(AHEAD * here.clear, SUSPECTED):
+            if not float(here.tangent @ (near.y - here.y)) > 0.0 or away > max(
+                MAX_AHEAD_RATIO * here.regular_distance, SEARCH_DISTANCE
+            ):
                 continue
-            if near.open > curve.solver.tolerance or not curve.closes(near.y):
-                self.missed = [each for each in self.missed if np.linalg.norm(each.y - near.y) > 1e-6]
-                self.missed.append(Missed(near.y, away, near.open))
+            if near.residual > curve.solver.tolerance or not curve.is_closed(near.y):
+                self.nearby = [each for each in self.nearby if np.linalg.norm(each.y - near.y) > 1e-6]
+                self.nearby.append(NearbyBifurcation(near.y, away, near.residual))
                 continue
-            found = crossing(curve, here, near.y)
+            found = bifurcation_ahead(curve, here, near.y)
             if found is not None:
                 return found
         return None
 
-    def _sided(self, found: Crossing, index: int, towards: Point) -> Beside | None:
+    def _crossing_towards(self, found: Bifurcation, index: int, towards: CurvePoint) -> BranchCrossing | None:
         """The curve beside a change point along one of its ways, in the sense of a point on it."""
-        way = found.ways[index]
-        return beside(self.curve, way if way.tangent @ towards.tangent >= 0.0 else way.turned(), found.lost)
+        way = found.branches[index]
+        return branch_crossing(
+            self.curve, way if way.tangent @ towards.tangent >= 0.0 else way.reversed(), found.rank_loss
+        )
 
-    def _taken(self, found: Crossing, here: Point) -> tuple[int, Point, bool]:
+    def _choose_branch(self, found: Bifurcation, here: CurvePoint) -> tuple[int, CurvePoint, bool]:
         """The way to go on by, and a point in whose sense: smoothly, or as asked for; and whether it is but the last,
         as there are not so many."""
         number = self.branches.pop(0) if self.branches else 1
-        options = outgoing(found, here)
+        options = outgoing_branches(found, here)
         index, tangent = options[min(number, len(options)) - 1]
-        return index, found.ways[index]._replace(tangent=tangent), number > len(options)
+        return index, found.branches[index]._replace(tangent=tangent), number > len(options)
 
-    def _note(self, after: Point) -> None:
+    def _update_nearby(self, after: CurvePoint) -> None:
         """How near the walk comes to change points of neighbouring linkages."""
-        for k, each in enumerate(self.missed):
-            self.missed[k] = each._replace(distance=min(each.distance, float(np.linalg.norm(after.y - each.y))))
+        for k, each in enumerate(self.nearby):
+            self.nearby[k] = each._replace(distance=min(each.distance, float(np.linalg.norm(after.y - each.y))))
 
 
-def _limit(here: Point, slide: int) -> float | None:
+def _input_limit(here: CurvePoint, slide: int) -> float | None:
     """The place to which the inputs tend as a slide goes out without an end; None where they go on with it.
 
     Far out t = limit + c s^-k, of which the first and second derivative by s tell k and the rest of the way.
     """
-    s, s1, s2 = here.y[slide], here.tangent[slide], here.bend[slide]
-    t, t1, t2 = here.y[-1], here.tangent[-1], here.bend[-1]
+    s, s1, s2 = here.y[slide], here.tangent[slide], here.curvature[slide]
+    t, t1, t2 = here.y[-1], here.tangent[-1], here.curvature[-1]
     if s * s1 <= 0.0:
         return None
     first, second = t1 / s1, (t2 * s1 - t1 * s2) / s1**3
-    if abs(s * first) < STANDS:
+    if abs(s * first) < STANDING_INPUT:
         return float(t)
     power = -s * second / first - 1.0
-    return float(t + s * first / power) if power > CONVERGES else None
+    return float(t + s * first / power) if power > MIN_LIMIT_POWER else None
 
 
-def outgoing(found: Crossing, here: Point) -> list[tuple[int, Array]]:
+def outgoing_branches(found: Bifurcation, here: CurvePoint) -> list[tuple[int, Array]]:
     """The ways on from a change point with their directions: the smooth one first, then by the angle from it.
 
     Of another way the direction in which the inputs go on as they came; both where they rest on it.
     """
-    smooth = found.ways[0].tangent
+    smooth = found.branches[0].tangent
     smooth = smooth if smooth @ here.tangent >= 0.0 else -smooth
     options = []
-    for index, way in enumerate(found.ways):
+    for index, way in enumerate(found.branches):
         for tangent in (way.tangent, -way.tangent):
             same = index == 0
             onwards = tangent @ smooth > 0.0 if same else tangent[-1] * smooth[-1] >= -1e-9

@@ -13,25 +13,25 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.equations.functions import Rates
-from planar.solving.prepared_mechanism import Setup
+from planar.equations.functions import EquationRates
+from planar.solving.prepared_mechanism import PreparedMechanism
 
 Array = np.ndarray
 
-SINGULAR = 1e-6
+SINGULAR_TOLERANCE = 1e-6
 """A singular value below this part of the greatest is zero: beside a crossing positions are known to about 1e-8."""
-AGREES, ALIKE = 1e-6, 1e-5
+CONDITION_TOLERANCE, SQUARED_TOLERANCE = 1e-6, 1e-5
 """Parts of the greatest: of a condition that is met to the position's own error, and of one that is squared in it."""
-TRULY = 1e-10
+EXACT_SINGULAR_TOLERANCE = 1e-10
 """At the position to round-off the least singular value, as a part of the greatest, is zero to rounding."""
-MOVED = 1e-6
+MAX_REFINEMENT = 1e-6
 """rad or sizes: a singular position is first known to about 1e-8; what moves further was none."""
-FAR = 1e-3
+DISTINCT_ROOT_RATIO = 1e-3
 """Roots nearer than this part are one."""
-REFINEMENTS = 4
+REFINEMENT_STEPS = 4
 
 
-class Passing(NamedTuple):
+class SingularRates(NamedTuple):
     """A position at a singularity, to round-off, with the rates of the one motion that goes on through it."""
 
     z: Array
@@ -39,104 +39,106 @@ class Passing(NamedTuple):
     z2: Array
 
 
-class _Tangents(NamedTuple):
+class _FirstOrderSolution(NamedTuple):
     """What the first order leaves: z1 = base + free c, and the rows `left` that have to vanish in second order."""
 
     base: Array
-    free: Array
-    left: Array
+    null: Array
+    left_null: Array
 
 
-def passing(setup: Setup, z: Array) -> Passing | None:
+def singular_rates(setup: PreparedMechanism, z: Array) -> SingularRates | None:
     """The one motion through a singular position near z, one freedom more than inputs; None if it is not one."""
-    u1, u2 = setup.station.u1, setup.station.u2
+    u1, u2 = setup.inputs.u1, setup.inputs.u2
     speed, gain = float(np.linalg.norm(u1)), float(np.linalg.norm(u2))
     if speed > 0.0:
         # in units of time in which the inputs run at speed one, so that no tolerance depends on the speed
-        found = _Crossing(setup, u1 / speed, u2 / speed**2).passing(z)
-        return found and Passing(found.z, found.z1 * speed, found.z2 * speed**2)
+        found = _RateConditions(setup, u1 / speed, u2 / speed**2).solve(z)
+        return found and SingularRates(found.z, found.z1 * speed, found.z2 * speed**2)
     way = u2 / gain if gain > 0.0 else np.eye(u1.size)[0]
-    found = _Crossing(setup, way, np.zeros_like(way)).passing(z)
-    return found and Passing(found.z, 0.0 * found.z1, found.z1 * gain)
+    found = _RateConditions(setup, way, np.zeros_like(way)).solve(z)
+    return found and SingularRates(found.z, 0.0 * found.z1, found.z1 * gain)
 
 
-class _Crossing:
+class _RateConditions:
     """The conditions of each order at positions of one mechanism, for given rates of its inputs."""
 
-    def __init__(self, setup: Setup, u1: Array, u2: Array):
-        self.program, self.u, self.p = setup.program, setup.station.u, setup.station.p
+    def __init__(self, setup: PreparedMechanism, u1: Array, u2: Array):
+        self.program, self.u, self.p = setup.functions, setup.inputs.u, setup.inputs.p
         self.u1, self.u2 = u1, u2
 
-    def passing(self, z: Array) -> Passing | None:
-        for _ in range(REFINEMENTS):
+    def solve(self, z: Array) -> SingularRates | None:
+        for _ in range(REFINEMENT_STEPS):
             z1 = self._velocity(z)
             if z1 is None:
                 return None
-            refined = self._refined(z, z1)
-            if np.max(np.abs(refined - z)) > MOVED:
+            refined = self._refine(z, z1)
+            if np.max(np.abs(refined - z)) > MAX_REFINEMENT:
                 return None
             z = refined
-        slope = self._rates(z, 0.0 * z, 0.0 * z).slope
+        slope = self._rates(z, 0.0 * z, 0.0 * z).jacobian
         values = np.linalg.svd(slope, compute_uv=False)
-        if values[min(slope.shape) - 1] > TRULY * values[0]:
+        if values[min(slope.shape) - 1] > EXACT_SINGULAR_TOLERANCE * values[0]:
             return None  # it only comes near
-        z1, tangents = self._velocity(z), self._tangents(z)
+        z1, tangents = self._velocity(z), self._first_order(z)
         z2 = None if z1 is None or tangents is None else self._acceleration(z, z1, tangents)
-        return None if z1 is None or z2 is None else Passing(z, z1, z2)
+        return None if z1 is None or z2 is None else SingularRates(z, z1, z2)
 
-    def _at(self, z: Array, z1: Array, z2: Array) -> tuple[Array, Array, Array]:
+    def _with_inputs(self, z: Array, z1: Array, z2: Array) -> tuple[Array, Array, Array]:
         return np.concatenate([z, self.u]), np.concatenate([z1, self.u1]), np.concatenate([z2, self.u2])
 
-    def _rates(self, z: Array, z1: Array, z2: Array) -> Rates:
-        return self.program.kinematics(*self._at(z, z1, z2), self.p)
+    def _rates(self, z: Array, z1: Array, z2: Array) -> EquationRates:
+        return self.program.kinematics(*self._with_inputs(z, z1, z2), self.p)
 
-    def _tangents(self, z: Array) -> _Tangents | None:
+    def _first_order(self, z: Array) -> _FirstOrderSolution | None:
         """What the first order leaves open; None where it cannot be met."""
         none = np.zeros_like(z)
         rest = self._rates(z, none, none)
-        u, s, vt = np.linalg.svd(rest.slope)
-        rank = int(np.sum(s > SINGULAR * s[0])) if s.size else 0
+        u, s, vt = np.linalg.svd(rest.jacobian)
+        rank = int(np.sum(s > SINGULAR_TOLERANCE * s[0])) if s.size else 0
         base = -vt[:rank].T @ ((u[:, :rank].T @ rest.F1) / s[:rank])
-        left = rest.slope @ base + rest.F1
-        if np.max(np.abs(left), initial=0.0) > AGREES * max(1.0, np.max(np.abs(rest.F1), initial=0.0)):
+        left = rest.jacobian @ base + rest.F1
+        if np.max(np.abs(left), initial=0.0) > CONDITION_TOLERANCE * max(1.0, np.max(np.abs(rest.F1), initial=0.0)):
             return None
-        return _Tangents(base, vt[rank:].T, u[:, rank:])
+        return _FirstOrderSolution(base, vt[rank:].T, u[:, rank:])
 
     def _velocity(self, z: Array) -> Array | None:
         """The z1 for which the second order can be solved; None if there is none, or more than one."""
-        tangents = self._tangents(z)
-        if tangents is None or tangents.free.shape[1] != 1:
+        tangents = self._first_order(z)
+        if tangents is None or tangents.null.shape[1] != 1:
             return None
         scale = max(1.0, float(np.linalg.norm(tangents.base)))
-        way = tangents.free[:, 0] * scale
+        way = tangents.null[:, 0] * scale
 
         def open_at(c: float) -> Array:
-            return tangents.left.T @ self._rates(z, tangents.base + c * way, np.zeros_like(z)).F2
+            return tangents.left_null.T @ self._rates(z, tangents.base + c * way, np.zeros_like(z)).F2
 
         below, here, above = (open_at(c) for c in (-1.0, 0.0, 1.0))
-        roots = _common_roots(0.5 * (above + below) - here, 0.5 * (above - below), here, AGREES * scale**2)
+        roots = _common_roots(0.5 * (above + below) - here, 0.5 * (above - below), here, CONDITION_TOLERANCE * scale**2)
         return tangents.base + roots[0] * way if len(roots) == 1 else None
 
-    def _refined(self, z: Array, z1: Array) -> Array:
+    def _refine(self, z: Array, z1: Array) -> Array:
         """The position to round-off: with the velocity's own equations beside the constraints it is no double root."""
-        left, slope = self.program.deflated(z, z1, self.u, self.u1, self.p)
-        return z + np.linalg.lstsq(slope, -left, rcond=SINGULAR)[0][: z.size]
+        left, slope = self.program.deflated_system(z, z1, self.u, self.u1, self.p)
+        return z + np.linalg.lstsq(slope, -left, rcond=SINGULAR_TOLERANCE)[0][: z.size]
 
-    def _acceleration(self, z: Array, z1: Array, tangents: _Tangents) -> Array | None:
+    def _acceleration(self, z: Array, z1: Array, tangents: _FirstOrderSolution) -> Array | None:
         """z2 from the third order, in which it is linear."""
         known = self._rates(z, z1, np.zeros_like(z))
-        base = -np.linalg.pinv(known.slope, rcond=SINGULAR) @ known.F2
-        free = tangents.free[:, 0]
+        base = -np.linalg.pinv(known.jacobian, rcond=SINGULAR_TOLERANCE) @ known.F2
+        free = tangents.null[:, 0]
 
         def open_at(e: float) -> Array:
-            return tangents.left.T @ self.program.third(*self._at(z, z1, base + e * free), self.p)
+            return tangents.left_null.T @ self.program.third_rate_remainder(
+                *self._with_inputs(z, z1, base + e * free), self.p
+            )
 
         here, above = open_at(0.0), open_at(1.0)
         slope = above - here
-        if np.linalg.norm(slope) < AGREES:
+        if np.linalg.norm(slope) < CONDITION_TOLERANCE:
             return None
         e = -float(slope @ here) / float(slope @ slope)
-        if np.max(np.abs(here + e * slope)) > ALIKE * (1.0 + np.max(np.abs(here))):
+        if np.max(np.abs(here + e * slope)) > SQUARED_TOLERANCE * (1.0 + np.max(np.abs(here))):
             return None
         return base + e * free
 
@@ -150,11 +152,11 @@ def _common_roots(bend: Array, slope: Array, here: Array, least: float) -> list[
     if not sizes.size or sizes.max() < least:
         return []
     first = int(np.argmax(sizes))
-    straight = abs(bend[first]) < AGREES * 1e-3 * sizes[first]
+    straight = abs(bend[first]) < CONDITION_TOLERANCE * 1e-3 * sizes[first]
     roots = np.roots([slope[first], here[first]] if straight else [bend[first], slope[first], here[first]])
-    real = [float(root.real) for root in roots if abs(root.imag) < ALIKE * (1.0 + abs(root))]
+    real = [float(root.real) for root in roots if abs(root.imag) < SQUARED_TOLERANCE * (1.0 + abs(root))]
     left = [(c, np.max(np.abs((bend * c + slope) * c + here)) / (1.0 + c * c)) for c in real]
-    fitting = [c for c, open_by in left if open_by < ALIKE * sizes.max()]
-    if len(fitting) == 2 and abs(fitting[0] - fitting[1]) < FAR * (1.0 + abs(fitting[0])):
+    fitting = [c for c, open_by in left if open_by < SQUARED_TOLERANCE * sizes.max()]
+    if len(fitting) == 2 and abs(fitting[0] - fitting[1]) < DISTINCT_ROOT_RATIO * (1.0 + abs(fitting[0])):
         return []
     return fitting

@@ -7,37 +7,37 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from planar.equations.functions import Program
+from planar.equations.functions import EquationFunctions
 
 Array = np.ndarray
 
-CORRECTIONS = 10
-CLOSED = 1e-10
+MAX_CORRECTIONS = 10
+CLOSED_TOLERANCE = 1e-10
 """A corrected point leaves no more open than this, where it is far out this part of how far."""
-NUDGE = 1e-6
+DIFFERENCE_STEP = 1e-6
 """The part of a step over which the change of a slope is taken."""
-NOTHING = 1e-10
+ZERO_SINGULAR_VALUE = 1e-10
 """A singular value that is this part of the greatest is zero to rounding."""
-SMALLEST = 1e-6
+MIN_COLUMN_NORM = 1e-6
 """A column of the slope is judged by its own size, down to this part of the size of the mechanism."""
 
 
-REGULAR = 1e-4
+REGULAR_SINGULAR_VALUE = 1e-4
 """A least singular value (columns of one size) from which on tangents are solved for without looking at all of them."""
-ASIDE = 100.0
+MAX_TANGENT_RATIO = 100.0
 """How many times longer than its part in the direction asked for a tangent may be for that."""
-SHORT = 0.25
+SHORT_REGULAR_DISTANCE = 0.25
 """rad or sizes: a distance from singular slopes from which on no step is shortened."""
-FARTHEST = 1e3
+MAX_SOLVED_STEP = 1e3
 """A longer step is that of a singular system, solved once more in the sense of least squares."""
 
 
-class Traced(Protocol):
+class CurveSolver(Protocol):
     """What a curve needs of a solver."""
 
-    program: Program
+    functions: EquationFunctions
 
-    def open_along(self, z: Array, u: Array) -> Array:
+    def max_residuals(self, z: Array, u: Array) -> Array:
         """What the worst constraint leaves open at every sample; z (samples, unknowns), u (samples, inputs)."""
 
     @property
@@ -45,107 +45,107 @@ class Traced(Protocol):
         """What the gate lets pass."""
 
 
-class Point(NamedTuple):
+class CurvePoint(NamedTuple):
     """A point of the curve: y = (unknowns, how far the inputs are on their way), (n + 1,), its unit tangent, its second
     derivative by arc length, and how far it is at least to where the slope could lose rank."""
 
     y: Array
     tangent: Array
-    bend: Array
-    clear: float
+    curvature: Array
+    regular_distance: float
 
     @property
-    def advance(self) -> float:
+    def input_rate(self) -> float:
         """The rate of the inputs along the curve: positive where they go on, zero at a dead point."""
         return float(self.tangent[-1])
 
-    def turned(self) -> Point:
+    def reversed(self) -> CurvePoint:
         """The same point, to be left the other way."""
         return self._replace(tangent=-self.tangent)
 
 
-class Curve:
+class SolutionCurve:
     """All positions F(z, start + t way) = 0 near by, as a curve in y = (z, t): dead points are on it as any others.
 
     Lengths are in sizes of the mechanism, angles in rad. The slope J = dF/dy (rows, n + 1) has rank n but at change
     points; its null vector is the tangent. E. Allgower, K. Georg, Introduction to Numerical Continuation Methods, 2003.
     """
 
-    def __init__(self, solver: Traced, p: Array, start: Array, way: Array):
-        self.solver, self.program, self.p, self.start, self.way = solver, solver.program, p, start, way
+    def __init__(self, solver: CurveSolver, p: Array, start: Array, way: Array):
+        self.solver, self.functions, self.p, self.start, self.input_direction = solver, solver.functions, p, start, way
 
     def inputs(self, y: Array) -> Array:
         """The inputs (inputs,) at a point, or at points (points, inputs)."""
-        return self.start + y[..., -1:] * self.way
+        return self.start + y[..., -1:] * self.input_direction
 
-    def whole(self, y: Array) -> Array:
+    def unknowns_and_inputs(self, y: Array) -> Array:
         """Unknowns and inputs at a point, as the program takes them."""
         return np.concatenate([y[:-1], self.inputs(y)])
 
-    def widened(self, way: Array) -> Array:
+    def widen_direction(self, direction: Array) -> Array:
         """A direction along the curve, as one of unknowns and inputs."""
-        return np.concatenate([way[:-1], way[-1] * self.way])
+        return np.concatenate([direction[:-1], direction[-1] * self.input_direction])
 
-    def narrowed(self, matrix: Array) -> Array:
+    def narrow_columns(self, matrix: Array) -> Array:
         """A matrix whose columns belong to unknowns and inputs, as one whose columns belong to y."""
-        many = len(matrix[0]) - len(self.way) if matrix.size else 0
-        return np.hstack([matrix[:, :many], matrix[:, many:] @ self.way[:, None]])
+        many = len(matrix[0]) - len(self.input_direction) if matrix.size else 0
+        return np.hstack([matrix[:, :many], matrix[:, many:] @ self.input_direction[:, None]])
 
-    def slope(self, y: Array) -> Array:
+    def jacobian(self, y: Array) -> Array:
         """J (rows, n + 1)."""
-        return self.opened(y)[1]
+        return self.residuals_and_jacobian(y)[1]
 
-    def left(self, y: Array) -> Array:
+    def residuals(self, y: Array) -> Array:
         """F (rows,)."""
-        return self.opened(y)[0]
+        return self.residuals_and_jacobian(y)[0]
 
-    def opened(self, y: Array) -> tuple[Array, Array]:
+    def residuals_and_jacobian(self, y: Array) -> tuple[Array, Array]:
         """F (rows,) and J (rows, n + 1)."""
-        left, slope = self.program.left(y[:-1], self.inputs(y), self.p)
+        left, slope = self.functions.residuals_and_jacobian(y[:-1], self.inputs(y), self.p)
         many = len(y) - 1
         narrow = np.empty((len(slope), many + 1))
         narrow[:, :many] = slope[:, :many]
-        narrow[:, many] = slope[:, many:] @ self.way
+        narrow[:, many] = slope[:, many:] @ self.input_direction
         return left, narrow
 
-    def second(self, y: Array, way: Array) -> Array:
+    def second_derivative(self, y: Array, direction: Array) -> Array:
         """The second derivative of F along a direction (rows,)."""
-        wide = self.widened(way)
-        return self.program.kinematics(self.whole(y), wide, 0.0 * wide, self.p).F2
+        wide = self.widen_direction(direction)
+        return self.functions.kinematics(self.unknowns_and_inputs(y), wide, 0.0 * wide, self.p).F2
 
-    def closes(self, y: Array) -> bool:
+    def is_closed(self, y: Array) -> bool:
         """Whether a point passes the first part of the gate."""
-        return bool(self.solver.open_along(y[None, :-1], self.inputs(y)[None])[0] <= self.solver.tolerance)
+        return bool(self.solver.max_residuals(y[None, :-1], self.inputs(y)[None])[0] <= self.solver.tolerance)
 
-    def at(self, y: Array, towards: Array) -> Point:
+    def point_at(self, y: Array, towards: Array) -> CurvePoint:
         """The point at y, its tangent less than a right angle from a direction."""
-        slope = self.slope(y)
-        least = self._least(slope)
+        slope = self.jacobian(y)
+        least = self._least_singular_value(slope)
         many = len(y) - 1
-        if len(slope) == many and least > REGULAR:
+        if len(slope) == many and least > REGULAR_SINGULAR_VALUE:
             system = np.vstack([slope, towards])
-            tangent = _regular(system, np.append(np.zeros(many), 1.0))
+            tangent = _solve_regular(system, np.append(np.zeros(many), 1.0))
             size = np.inf if tangent is None else float(np.linalg.norm(tangent))
-            if tangent is not None and size * float(np.linalg.norm(towards)) < ASIDE:
+            if tangent is not None and size * float(np.linalg.norm(towards)) < MAX_TANGENT_RATIO:
                 tangent /= size
                 system[many] = tangent
-                bend = _solved(system, np.append(-self.second(y, tangent), 0.0))
-                return Point(y, tangent, bend, self._clear(y, tangent, slope, least))
+                bend = _solve_shortest(system, np.append(-self.second_derivative(y, tangent), 0.0))
+                return CurvePoint(y, tangent, bend, self._regular_distance(y, tangent, slope, least))
         u, s, vt = np.linalg.svd(slope)
         tangent = vt[many] if vt[many] @ towards >= 0.0 else -vt[many]
-        kept = s[:many] > NOTHING * max(s[0], 1.0) if many else np.zeros(0, dtype=bool)
-        along = (u.T[:many] @ self.second(y, tangent)) if many else np.zeros(0)
+        kept = s[:many] > ZERO_SINGULAR_VALUE * max(s[0], 1.0) if many else np.zeros(0, dtype=bool)
+        along = (u.T[:many] @ self.second_derivative(y, tangent)) if many else np.zeros(0)
         bend = -vt[:many].T @ np.where(kept, along / np.where(kept, s[:many], 1.0), 0.0)
-        return Point(y, tangent, bend, self._clear(y, tangent, slope, least))
+        return CurvePoint(y, tangent, bend, self._regular_distance(y, tangent, slope, least))
 
-    def _least(self, slope: Array) -> float:
+    def _least_singular_value(self, slope: Array) -> float:
         """The least singular value of J, columns of one size, so that a small link counts as much as a large one."""
         many = slope.shape[1] - 1
         if many == 0:
             return 1.0
-        return float(np.linalg.svd(slope / _sizes(slope), compute_uv=False)[many - 1])
+        return float(np.linalg.svd(slope / _column_norms(slope), compute_uv=False)[many - 1])
 
-    def _clear(self, y: Array, tangent: Array, slope: Array, least: float) -> float:
+    def _regular_distance(self, y: Array, tangent: Array, slope: Array, least: float) -> float:
         """How far along the curve J keeps its rank: until it has changed by its least singular value (Weyl).
 
         Constraints that nearly depend on one another all along keep J near a singular one, but do not bring it nearer.
@@ -155,52 +155,52 @@ class Curve:
         """
         if len(y) == 1:
             return np.inf
-        sizes = _sizes(slope)
-        change = (self.slope(y + NUDGE * tangent) - slope) / (sizes * NUDGE)
+        sizes = _column_norms(slope)
+        change = (self.jacobian(y + DIFFERENCE_STEP * tangent) - slope) / (sizes * DIFFERENCE_STEP)
         clear = least / max(float(np.linalg.norm(change)), 1e-300)
-        if clear >= SHORT or least < NOTHING:
+        if clear >= SHORT_REGULAR_DISTANCE or least < ZERO_SINGULAR_VALUE:
             return clear
-        turned = np.linalg.lstsq(slope / sizes, change, rcond=0.1 * NOTHING)[0]
+        turned = np.linalg.lstsq(slope / sizes, change, rcond=0.1 * ZERO_SINGULAR_VALUE)[0]
         return max(clear, 1.0 / max(float(np.linalg.norm(turned)), 1e-300))
 
-    def corrected(self, y: Array, normal: Array) -> Array | None:
+    def correct(self, y: Array, normal: Array) -> Array | None:
         """The point of the curve near y in the plane through y with this normal; None where Newton finds none."""
         y, before = y.copy(), np.inf
-        for _ in range(CORRECTIONS):
-            left, slope = self.opened(y)
+        for _ in range(MAX_CORRECTIONS):
+            left, slope = self.residuals_and_jacobian(y)
             gap = float(np.max(np.abs(left), initial=0.0))
             if not gap < before:
                 break
             before = gap
-            y = y + _solved(np.vstack([slope, normal]), np.append(-left, 0.0))
-        return y if before <= CLOSED * max(1.0, float(np.max(np.abs(y)))) else None
+            y = y + _solve_shortest(np.vstack([slope, normal]), np.append(-left, 0.0))
+        return y if before <= CLOSED_TOLERANCE * max(1.0, float(np.max(np.abs(y)))) else None
 
-    def polished(self, y: Array, lost: int) -> Array:
+    def correct_at_lower_rank(self, y: Array, rank_loss: int) -> Array:
         """A position beside a change point, closed to round-off but not moved from one branch to the other.
 
         `lost` is by how much the slope's rank falls at the change point.
         """
         for _ in range(2):
-            y = y - truncated(self.slope(y), self.left(y), len(y) - 1 - lost)
+            y = y - truncated_step(self.jacobian(y), self.residuals(y), len(y) - 1 - rank_loss)
         return y
 
-    def closed(self, y: Array, lost: int) -> Array:
+    def correct_at_inputs(self, y: Array, rank_loss: int) -> Array:
         """The same for inputs that stay where they are."""
         for _ in range(2):
-            y = y - np.append(truncated(self.slope(y)[:, :-1], self.left(y), len(y) - 1 - lost), 0.0)
+            y = y - np.append(truncated_step(self.jacobian(y)[:, :-1], self.residuals(y), len(y) - 1 - rank_loss), 0.0)
         return y
 
 
-def _solved(system: Array, known: Array) -> Array:
+def _solve_shortest(system: Array, known: Array) -> Array:
     """The shortest solution in the sense of least squares; straight away where the system is square and regular."""
     if system.shape[0] == system.shape[1]:
-        found = _regular(system, known)
-        if found is not None and np.max(np.abs(found), initial=0.0) < FARTHEST:
+        found = _solve_regular(system, known)
+        if found is not None and np.max(np.abs(found), initial=0.0) < MAX_SOLVED_STEP:
             return found
     return np.linalg.lstsq(system, known, rcond=1e-14)[0]
 
 
-def _regular(system: Array, known: Array) -> Array | None:
+def _solve_regular(system: Array, known: Array) -> Array | None:
     """The solution of a square system; None where it is singular to the last bit, as on an exact dead point."""
     try:
         return np.linalg.solve(system, known)
@@ -208,14 +208,14 @@ def _regular(system: Array, known: Array) -> Array | None:
         return None
 
 
-def _sizes(slope: Array) -> Array:
-    return np.maximum(np.sqrt(np.einsum("rk,rk->k", slope, slope)), SMALLEST)
+def _column_norms(slope: Array) -> Array:
+    return np.maximum(np.sqrt(np.einsum("rk,rk->k", slope, slope)), MIN_COLUMN_NORM)
 
 
-def truncated(slope: Array, left: Array, rank: int) -> Array:
+def truncated_step(jacobian: Array, residuals: Array, rank: int) -> Array:
     """The shortest step that closes what is open, by so many of the directions in which the slope is steepest."""
-    u, s, vt = np.linalg.svd(slope, full_matrices=False)
-    return vt[:rank].T @ ((u.T[:rank] @ left) / s[:rank])
+    u, s, vt = np.linalg.svd(jacobian, full_matrices=False)
+    return vt[:rank].T @ ((u.T[:rank] @ residuals) / s[:rank])
 
 
 class Arc(NamedTuple):
@@ -226,19 +226,19 @@ class Arc(NamedTuple):
     that change point, and 0 where there is none.
     """
 
-    before: Point
-    after: Point
+    before: CurvePoint
+    after: CurvePoint
     origin: Array
     axis: Array
-    half: float
-    shape: Array
+    unit_length: float
+    coefficients: Array
     "coefficients (degree + 1, n + 1), of powers of the distance over `half`"
-    lost: int
+    rank_loss: int
 
     @property
-    def exact(self) -> bool:
+    def is_exact(self) -> bool:
         """Whether the polynomial is the curve to round-off."""
-        return self.lost > 0
+        return self.rank_loss > 0
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -246,55 +246,57 @@ class Arc(NamedTuple):
         first, last = (float(self.axis @ (point.y - self.origin)) for point in (self.before, self.after))
         return first, last
 
-    def rough(self, x: float, order: int = 0) -> Array:
+    def polynomial(self, x: float, order: int = 0) -> Array:
         """The polynomial, or a derivative of it (n + 1,), so far along the axis."""
-        powers, shape = np.arange(len(self.shape)), self.shape
+        powers, shape = np.arange(len(self.coefficients)), self.coefficients
         for _ in range(order):
-            shape, powers = shape[1:] * powers[1 : len(shape), None] / self.half, powers[: len(shape) - 1]
-        return ((x / self.half) ** np.arange(len(shape))) @ shape
+            shape, powers = shape[1:] * powers[1 : len(shape), None] / self.unit_length, powers[: len(shape) - 1]
+        return ((x / self.unit_length) ** np.arange(len(shape))) @ shape
 
-    def y(self, curve: Curve, x: float) -> Array:
+    def curve_coordinates(self, curve: SolutionCurve, x: float) -> Array:
         """The point of the curve so far along the axis (n + 1,)."""
-        rough = self.rough(x)
-        if self.exact:
-            return curve.polished(rough, self.lost)
-        found = curve.corrected(rough, self.axis)
+        rough = self.polynomial(x)
+        if self.is_exact:
+            return curve.correct_at_lower_rank(rough, self.rank_loss)
+        found = curve.correct(rough, self.axis)
         return rough if found is None else found
 
-    def at(self, curve: Curve, x: float) -> Point:
+    def point_at(self, curve: SolutionCurve, x: float) -> CurvePoint:
         """The point of the curve so far along the axis, with its tangent."""
-        y = self.y(curve, x)
-        if not self.exact:
-            return curve.at(y, self.before.tangent)
-        first, second = self.rough(x, 1), self.rough(x, 2)
+        y = self.curve_coordinates(curve, x)
+        if not self.is_exact:
+            return curve.point_at(y, self.before.tangent)
+        first, second = self.polynomial(x, 1), self.polynomial(x, 2)
         speed = float(np.linalg.norm(first))
         tangent = first / speed
         bend = (second - tangent * (tangent @ second)) / speed**2
         sense = 1.0 if tangent @ self.before.tangent >= 0.0 else -1.0
-        return Point(y, sense * tangent, bend, 0.0)
+        return CurvePoint(y, sense * tangent, bend, 0.0)
 
 
-def between(before: Point, after: Point) -> Arc:
+def arc_between(before: CurvePoint, after: CurvePoint) -> Arc:
     """The arc between two points: the polynomial of fifth degree with their tangents and second derivatives."""
     chord = after.y - before.y
     length = float(np.linalg.norm(chord))
     axis = chord / length
-    shape = fitted((before, after), axis, (0.0, 1.0), length)
+    shape = fit_polynomial((before, after), axis, (0.0, 1.0), length)
     return Arc(before, after, before.y, axis, length, shape, 0)
 
 
-def fitted(points: tuple[Point, ...], axis: Array, places: tuple[float, ...], half: float) -> Array:
+def fit_polynomial(
+    points: tuple[CurvePoint, ...], axis: Array, positions: tuple[float, ...], unit_length: float
+) -> Array:
     """Coefficients of the polynomial through points at these places (times half) along an axis from the origin."""
     rows = []
     for point in points:
-        speed, change = float(axis @ point.tangent), float(axis @ point.bend)
+        speed, change = float(axis @ point.tangent), float(axis @ point.curvature)
         first = point.tangent / speed
-        rows += [point.y, first * half, (point.bend - first * change) / speed**2 * half**2]
-    return np.linalg.solve(_hermite(places), np.array(rows))
+        rows += [point.y, first * unit_length, (point.curvature - first * change) / speed**2 * unit_length**2]
+    return np.linalg.solve(_hermite_matrix(positions), np.array(rows))
 
 
 @cache
-def _hermite(places: tuple[float, ...]) -> Array:
+def _hermite_matrix(places: tuple[float, ...]) -> Array:
     """Values, first and second derivatives of the powers at the places (3 places, powers)."""
     degree = 3 * len(places)
     rows = []

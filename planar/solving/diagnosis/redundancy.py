@@ -6,19 +6,26 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from planar.solving.full_constraints import AWAY, Constraints, joined, motion_from, moved, null_space
-from planar.solving.prepared_mechanism import Setup
+from planar.solving.full_constraints import (
+    PROBE_DISTANCE,
+    FullConstraints,
+    find_closed_position,
+    motion_dimension,
+    null_space,
+    random_step,
+)
+from planar.solving.prepared_mechanism import PreparedMechanism
 
 Array = np.ndarray
 
-NOTHING = 1e-7
+ZERO_COMPONENT = 1e-7
 """A part of a unit vector that is zero but for rounding."""
-MOST = 600
+MAX_COORDINATES = 600
 """Coordinates: a larger mechanism is not searched for inputs that are stuck, or for how it moves in general."""
 
 
-def smallest_sets(
-    left: Array, owners: Sequence[str], order: Callable[[str], Sequence[str]]
+def smallest_dependent_sets(
+    left_null: Array, owners: Sequence[str], order: Callable[[str], Sequence[str]]
 ) -> tuple[tuple[str, ...], ...]:
     """The smallest sets of owners of rows that depend on one another.
 
@@ -30,42 +37,42 @@ def smallest_sets(
         rows_of.setdefault(owner, []).append(row)
     found: dict[frozenset[str], None] = {}
     for owner, rows in rows_of.items():
-        span = left
-        if np.linalg.norm(span[rows]) < NOTHING:
+        span = left_null
+        if np.linalg.norm(span[rows]) < ZERO_COMPONENT:
             continue
         for other in order(owner):
-            without = span @ _null(span[rows_of.get(other, [])])
-            if without.size and np.linalg.norm(without[rows]) > NOTHING:
+            without = span @ _null_combinations(span[rows_of.get(other, [])])
+            if without.size and np.linalg.norm(without[rows]) > ZERO_COMPONENT:
                 span = without
-        held = frozenset(name for name, each in rows_of.items() if np.linalg.norm(span[each]) > NOTHING)
+        held = frozenset(name for name, each in rows_of.items() if np.linalg.norm(span[each]) > ZERO_COMPONENT)
         found[held] = None
     sets = [tuple(name for name in rows_of if name in held) for held in found]
     return tuple(sorted(sets, key=len))
 
 
-def _null(rows: Array) -> Array:
+def _null_combinations(rows: Array) -> Array:
     """Combinations of columns that vanish in these rows; the columns are orthonormal, so sizes mean something."""
     if not rows.size:
         return np.eye(rows.shape[1])
     _, values, vectors = np.linalg.svd(rows)
-    return vectors[int(np.sum(values > NOTHING)) :].T
+    return vectors[int(np.sum(values > ZERO_COMPONENT)) :].T
 
 
-def stuck(setup: Setup) -> tuple[list[str], list[str]] | None:
+def find_jammed_inputs(setup: PreparedMechanism) -> tuple[list[str], list[str]] | None:
     """Inputs that no motion of the pairs can move while others can: their names, and the links that are free.
 
     None where the mechanism cannot be joined, or every input moves.
     """
     names = tuple(given.pair for given in setup.mechanism.inputs)
-    places = _anywhere(setup) if names else ()
+    places = _closed_positions(setup) if names else ()
     if not places:
         return None
-    constraints = Constraints(setup)
+    constraints = FullConstraints(setup)
     moves = np.zeros(len(names))
     for w in places:
-        free = null_space(constraints.slope(w))
-        moves = np.maximum(moves, np.abs(constraints.drive_slope(names, w) @ free).max(axis=1, initial=0.0))
-    fast = [name for name, move in zip(names, moves, strict=True) if move < 100.0 * NOTHING]
+        free = null_space(constraints.jacobian(w))
+        moves = np.maximum(moves, np.abs(constraints.relative_jacobian(names, w) @ free).max(axis=1, initial=0.0))
+    fast = [name for name, move in zip(names, moves, strict=True) if move < 100.0 * ZERO_COMPONENT]
     if not fast or not free.size:
         return None
     share = np.abs(free).max(axis=1)
@@ -77,31 +84,31 @@ def stuck(setup: Setup) -> tuple[list[str], list[str]] | None:
     return fast, list(links)
 
 
-def ways_on(setup: Setup, w: Array) -> int | None:
+def count_motions(setup: PreparedMechanism, w: Array) -> int | None:
     """In how many ways the mechanism can move on from a position w, inputs left aside; None where it is too large."""
-    return motion_from(Constraints(setup), w)[0] if w.size <= MOST else None
+    return motion_dimension(FullConstraints(setup), w)[0] if w.size <= MAX_COORDINATES else None
 
 
-def conflicting(setup: Setup) -> tuple[tuple[str, ...], ...]:
+def find_conflicting_inputs(setup: PreparedMechanism) -> tuple[tuple[str, ...], ...]:
     """The smallest sets of inputs that move one another, or cannot move; none where the mechanism cannot be joined."""
     names = tuple(given.pair for given in setup.mechanism.inputs)
-    places = _anywhere(setup)
+    places = _closed_positions(setup)
     if not places:
         return ()
-    w, constraints = places[-1], Constraints(setup)
-    rates = constraints.drive_slope(names, w) @ null_space(constraints.slope(w))
+    w, constraints = places[-1], FullConstraints(setup)
+    rates = constraints.relative_jacobian(names, w) @ null_space(constraints.jacobian(w))
     together = null_space(rates.T) if rates.size else np.eye(len(names))
-    return smallest_sets(together, names, lambda name: [other for other in names if other != name])
+    return smallest_dependent_sets(together, names, lambda name: [other for other in names if other != name])
 
 
-def _anywhere(setup: Setup) -> tuple[Array, ...]:
+def _closed_positions(setup: PreparedMechanism) -> tuple[Array, ...]:
     """A closed position, at the inputs if that can be, and one beside it, which is like most; none if none is found."""
-    if len(setup.equations.coordinates) > MOST:
+    if len(setup.equations.coordinates) > MAX_COORDINATES:
         return ()
-    constraints = Constraints(setup)
-    w = joined(constraints)
+    constraints = FullConstraints(setup)
+    w = find_closed_position(constraints)
     if w is None:
         return ()
-    free = null_space(constraints.slope(w))
-    beside = constraints.closed(w + moved(free, np.random.default_rng(0), AWAY)) if free.size else None
+    free = null_space(constraints.jacobian(w))
+    beside = constraints.correct(w + random_step(free, np.random.default_rng(0), PROBE_DISTANCE)) if free.size else None
     return (w,) if beside is None else (w, beside)

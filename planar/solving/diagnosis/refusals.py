@@ -9,134 +9,138 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from planar.equations.functions import length
-from planar.foundation.errors import MOST_NAMES, Ending, NoAnswer, Outcome
-from planar.foundation.errors import listed as several
-from planar.model.mechanism import unjoined
-from planar.model.pairs import Kind, joining
-from planar.model.wording import amount, listed, many, quoted
-from planar.solving.assembly.nearest_assembly import Failure
-from planar.solving.checks.residual_check import TOUCHING
-from planar.solving.prepared_mechanism import Setup
+from planar.equations.functions import slice_length
+from planar.foundation.errors import MAX_NAMES_LISTED, NoAnswer, Outcome, TrackingEnd
+from planar.foundation.errors import join_names as several
+from planar.model.mechanism import unjoined_points
+from planar.model.pairs import MeasureKind, joining_entry_text
+from planar.model.wording import amount, count_phrase, join_all_names, quote_names
+from planar.solving.assembly.nearest_assembly import AssemblySearchFailure
+from planar.solving.checks.residual_check import CONTACT_TOLERANCE
+from planar.solving.prepared_mechanism import PreparedMechanism
 
 Array = np.ndarray
 
-MOST = 4
+MAX_BRANCHES_TOLD = 4
 """Ways that are told one by one."""
-DIFFERENT = 1e-3
+DISTINCT_RATE = 1e-3
 """Rates of an angle on two ways that tell them apart."""
 
 
-def free(setup: Setup) -> NoAnswer:
+def free_links(setup: PreparedMechanism) -> NoAnswer:
     """Links that the inputs leave free whatever the dimensions, or that nothing joins to the frame."""
-    from planar.model.link_graph import detached  # the graph library is slow to load, and only needed here
+    from planar.model.link_graph import unconnected_links  # the graph library is slow to load, and only needed here
 
-    apart = detached(setup.mechanism)
+    apart = unconnected_links(setup.mechanism)
     if apart:
         return NoAnswer(
             Outcome.TOO_FEW_INPUTS,
             f"no chain of pairs joins {_links(apart)} to the frame {setup.mechanism.frame!r}; "
-            f"{_forgotten(setup, apart) or 'add a pair'}",
-            **_whole(apart),
+            f"{_missing_pairs(setup, apart) or 'add a pair'}",
+            **_all_links(apart),
         )
-    jam = jammed(setup)
+    jam = jammed_inputs(setup)
     if jam is not None:
         return jam
-    stages = [stage for stage in setup.equations.stages if stage.free]
+    stages = [stage for stage in setup.equations.blocks if stage.is_free]
     links = list(dict.fromkeys(link for stage in stages for link in stage.links))
-    ways = sum(length(stage.unknowns) - length(stage.rows) for stage in stages)
+    ways = sum(slice_length(stage.unknowns) - slice_length(stage.rows) for stage in stages)
     inputs = len(setup.mechanism.inputs)
-    forgotten = _forgotten(setup, links)
+    forgotten = _missing_pairs(setup, links)
     return NoAnswer(
         Outcome.TOO_FEW_INPUTS,
-        f"with {many(inputs, 'input')} {_links(links)} can still move in {many(ways, 'way')}; "
-        f"{f'{forgotten}, or ' if forgotten else ''}give an input at {_pairs_of(setup, links, 6)}{_surplus(setup)}",
-        **_whole(links),
+        f"with {count_phrase(inputs, 'input')} {_links(links)} can still move in {count_phrase(ways, 'way')}; "
+        f"{f'{forgotten}, or ' if forgotten else ''}give an input at "
+        f"{_offered_pairs(setup, links, 6)}{_surplus_inputs(setup)}",
+        **_all_links(links),
     )
 
 
-def _forgotten(setup: Setup, links: Sequence[str]) -> str:
+def _missing_pairs(setup: PreparedMechanism, links: Sequence[str]) -> str:
     """Points that free links share with others but no pair joins, else of links that hang by one pair."""
     mechanism, loose = setup.mechanism, set(links)
-    shared = {point: carriers for point, carriers in unjoined(mechanism).items() if loose & set(carriers)}
+    shared = {point: carriers for point, carriers in unjoined_points(mechanism).items() if loose & set(carriers)}
     if shared:
         told = [f"{_links(carriers)} at {point!r}" for point, carriers in shared.items()]
-        return f"no pair joins {several(told, 3)}: add {several(map(joining, shared), 3)} to the pairs"
+        return f"no pair joins {several(told, 3)}: add {several(map(joining_entry_text, shared), 3)} to the pairs"
     moving = [link.name for link in mechanism.links if link.name != mechanism.frame]
     joints = {link: [pair.entry_name() for pair in mechanism.pairs if link in pair.links] for link in moving}
     hanging = [f"link {link!r} hangs at {names[0]!r} alone" for link, names in joints.items() if len(names) == 1]
     return f"{several(hanging, 3)}: add the pair that joins it to the rest" if hanging else ""
 
 
-def _whole(links: Sequence[str]) -> dict[str, list[str]]:
+def _all_links(links: Sequence[str]) -> dict[str, list[str]]:
     """All links, for a program, where the sentence names the first of them."""
-    return {"links": list(links)} if len(links) > MOST_NAMES + 1 else {}
+    return {"links": list(links)} if len(links) > MAX_NAMES_LISTED + 1 else {}
 
 
-def ever_free(setup: Setup, links: Sequence[str]) -> NoAnswer:
+def always_free(setup: PreparedMechanism, links: Sequence[str]) -> NoAnswer:
     """Links that stay free while others hold each other more than once."""
-    jam = jammed(setup)
+    jam = jammed_inputs(setup)
     if jam is not None:
         return jam
     return NoAnswer(
         Outcome.TOO_FEW_INPUTS,
-        f"with {many(len(setup.mechanism.inputs), 'input')} {_links(links)} can still move, while some of the links "
-        f"hold each other more than once; give an input at {_pairs_of(setup, links, 6)}",
-        **_whole(links),
+        f"with {count_phrase(len(setup.mechanism.inputs), 'input')} {_links(links)} can still move, while some "
+        "of the links "
+        f"hold each other more than once; give an input at {_offered_pairs(setup, links, 6)}",
+        **_all_links(links),
     )
 
 
-def jammed(setup: Setup) -> NoAnswer | None:
+def jammed_inputs(setup: PreparedMechanism) -> NoAnswer | None:
     """Inputs at pairs that the others hold fast, while something else is free."""
-    from planar.solving.diagnosis.redundancy import stuck
+    from planar.solving.diagnosis.redundancy import find_jammed_inputs
 
-    found = stuck(setup)
+    found = find_jammed_inputs(setup)
     if found is None:
         return None
     names, links = found
     one = len(names) == 1
     return NoAnswer(
         Outcome.INPUT_JAMMED,
-        f"{_at(names)} cannot move: the pairs hold {_links(_ends(setup, names))} fast, while {_links(links)} "
-        f"{'is' if len(links) == 1 else 'are'} free; drive {_pairs_of(setup, links, 4)} instead"
+        f"{_inputs_at(names)} cannot move: the pairs hold {_links(_links_at(setup, names))} fast, while "
+        f"{_links(links)} "
+        f"{'is' if len(links) == 1 else 'are'} free; drive {_offered_pairs(setup, links, 4)} instead"
         f"{'' if one else ', with one input for each way'}",
     )
 
 
-def _ends(setup: Setup, names: Sequence[str]) -> list[str]:
+def _links_at(setup: PreparedMechanism, names: Sequence[str]) -> list[str]:
     """The links at these pairs."""
-    return list(dict.fromkeys(link for name in names for link in setup.named[name].links))
+    return list(dict.fromkeys(link for name in names for link in setup.relative_motions[name].links))
 
 
-def change_point(setup: Setup, links: Sequence[str], mobility: int, z: Array) -> NoAnswer:
+def change_point(setup: PreparedMechanism, links: Sequence[str], mobility: int, z: Array) -> NoAnswer:
     """A position from which the mechanism may go on in several ways, and how one is chosen."""
     return NoAnswer(
         Outcome.CHANGE_POINT,
-        f"{setup.at()} the mechanism has {_freedoms(setup, mobility)}: {_links(links)} may move in more than one way "
-        f"from here; move the input, or give a further input{_choices(setup, z)}",
-        **_whole(links),
+        f"{setup.describe_position()} the mechanism has {_freedoms(setup, mobility)}: {_links(links)} may move "
+        "in more than one way "
+        f"from here; move the input, or give a further input{_branch_choices(setup, z)}",
+        **_all_links(links),
     )
 
 
-def _choices(setup: Setup, z: Array) -> str:
+def _branch_choices(setup: PreparedMechanism, z: Array) -> str:
     """By which number a cycle goes on along which way, told by the link that moves most differently on them."""
-    if len(setup.mechanism.inputs) != 1 or not setup.extended:
+    if len(setup.mechanism.inputs) != 1 or not setup.has_extent:
         return ""
-    from planar.solving.continuation.bifurcation import starting
-    from planar.solving.continuation.solution_curve import Curve
+    from planar.solving.continuation.bifurcation import bifurcation_at_start
+    from planar.solving.continuation.solution_curve import SolutionCurve
 
-    found = starting(Curve(setup, setup.station.p, setup.station.u, np.ones(1)), np.append(z, 0.0))
-    if found is None or len(found.ways) < 2:
+    found = bifurcation_at_start(SolutionCurve(setup, setup.inputs.p, setup.inputs.u, np.ones(1)), np.append(z, 0.0))
+    if found is None or len(found.branches) < 2:
         return ""
     columns = list(setup.equations.unknowns)
-    (slides,) = setup.outline.slide
-    rates = np.array([way.tangent[:-1] / way.advance for way in found.ways]) * setup.scale[columns]
+    (slides,) = setup.structure.input_slides
+    rates = np.array([way.tangent[:-1] / way.input_rate for way in found.branches]) * setup.scale[columns]
     rates /= setup.unit if slides else 1.0
-    angles = [setup.equations.coordinates[column].kind is not Kind.LENGTH for column in columns]
+    angles = [setup.equations.coordinates[column].kind is not MeasureKind.LENGTH for column in columns]
     apart = np.ptp(rates, axis=0)
-    most = int(np.argmax(np.where(angles, apart, 0.0) if np.any(apart[angles] > DIFFERENT) else apart))
+    most = int(np.argmax(np.where(angles, apart, 0.0) if np.any(apart[angles] > DISTINCT_RATE) else apart))
     what = setup.equations.coordinates[columns[most]].owner
-    moved = [f"{k} moves {what!r} by {_rounded(rate)}" for k, rate in enumerate(rates[:MOST, most], 1)]
+    moved = [f"{k} moves {what!r} by {_rounded(rate)}" for k, rate in enumerate(rates[:MAX_BRANCHES_TOLD, most], 1)]
     each = f"{'rad' if angles[most] else 'm'} for each {'m' if slides else 'rad'} of the input"
     return f"; a cycle goes on by the way whose number `branches` (--branch) has: {', '.join(moved)} {each}"
 
@@ -145,39 +149,39 @@ def _rounded(rate: float) -> str:
     return f"{round(rate, 6) + 0.0:.4g}"
 
 
-def dead_point(setup: Setup, links: Sequence[str]) -> NoAnswer:
+def dead_point(setup: PreparedMechanism, links: Sequence[str]) -> NoAnswer:
     """A position in which the inputs cannot move some links."""
     return NoAnswer(
         Outcome.DEAD_POINT,
-        f"{setup.at()} {_inputs(setup)} cannot move {_links(links)}, whose velocity is not determined; "
-        f"move the input away from here, or drive {_pairs_of(setup, links, 4)}",
-        **_whole(links),
+        f"{setup.describe_position()} {_inputs(setup)} cannot move {_links(links)}, whose velocity is not determined; "
+        f"move the input away from here, or drive {_offered_pairs(setup, links, 4)}",
+        **_all_links(links),
     )
 
 
-def ended(setup: Setup, links: Sequence[str], where: str, ending: Ending) -> NoAnswer:
+def motion_ended(setup: PreparedMechanism, links: Sequence[str], where: str, ending: TrackingEnd) -> NoAnswer:
     """Where a motion of the inputs ends: a dead point, the infinite, or branches that cannot be told apart."""
-    drive = _pairs_of(setup, links, 4)
-    if ending is Ending.DEAD_POINT:
+    drive = _offered_pairs(setup, links, 4)
+    if ending is TrackingEnd.DEAD_POINT:
         return NoAnswer(
             Outcome.DEAD_POINT,
             f"{_inputs(setup)} cannot go beyond {where}, a dead point: {_links(links)} would lead back from there; "
             f"stay short of it, go through the whole circuit, or drive {drive}",
         )
-    if ending is Ending.ENDLESS:
+    if ending is TrackingEnd.ENDLESS:
         return NoAnswer(
             Outcome.BRANCH_LOST,
             f"{_inputs(setup)} cannot go beyond {where}: towards there {_links(links)} slide out without an end, as "
             f"where lines become parallel; stop short of it, or drive {drive}",
         )
-    if ending is Ending.FAR:
+    if ending is TrackingEnd.OUT_OF_RANGE:
         return NoAnswer(
             Outcome.BRANCH_LOST,
             f"this assembly can be followed only to {where}: there {_links(links)} are out by millions of times the "
             f"mechanism's size; stop short of it, or write the place that is wanted as the input's `position` in the "
             "file",
         )
-    if ending is Ending.SPENT:
+    if ending is TrackingEnd.WORK_LIMIT:
         return NoAnswer(
             Outcome.BRANCH_LOST,
             f"this assembly was followed as far as {where}, which took all the work that one answer may; stop there "
@@ -191,112 +195,116 @@ def ended(setup: Setup, links: Sequence[str], where: str, ending: Ending) -> NoA
     )
 
 
-def not_closed(setup: Setup, pair: str, gap: float, at: str = "") -> NoAnswer:
+def not_closed(setup: PreparedMechanism, pair: str, gap: float, at: str = "") -> NoAnswer:
     """A position that the gate does not let pass; the file's own, or another in words."""
     return NoAnswer(
         Outcome.CANNOT_BE_ASSEMBLED,
-        f"{at or setup.at()} the nearest position leaves pair {pair!r} open by {gap:.2g} of the mechanism's size where "
+        f"{at or setup.describe_position()} the nearest position leaves pair {pair!r} open by {gap:.2g} of the "
+        "mechanism's size where "
         f"rounding explains {setup.tolerance:.2g}; change a length or the input a little",
     )
 
 
-def no_contact(setup: Setup, pair: str, gap: float) -> NoAnswer:
+def open_contact(setup: PreparedMechanism, pair: str, gap: float) -> NoAnswer:
     """A contact that the pair does not keep closed by itself, and that nothing else does."""
     apart = amount(gap, "length", setup.mechanism.units)
-    told = f"are {apart} from touching" if gap > TOUCHING * setup.unit else "touch in passing only"
-    known = setup.pairs[pair].touching
+    told = f"are {apart} from touching" if gap > CONTACT_TOLERANCE * setup.unit else "touch in passing only"
+    known = setup.pairs[pair].open_contact_hint
     return NoAnswer(
         Outcome.CANNOT_BE_ASSEMBLED,
-        f"{setup.at()} {_links(setup.pairs[pair].links)} of pair {pair!r} {told}; let pins or guides keep them in "
+        f"{setup.describe_position()} {_links(setup.pairs[pair].links)} of pair {pair!r} {told}; let pins or "
+        "guides keep them in "
         f"contact{f' ({known})' if known else ''}",
     )
 
 
-def not_assembled(setup: Setup, failure: Failure) -> NoAnswer:
+def not_assembled(setup: PreparedMechanism, failure: AssemblySearchFailure) -> NoAnswer:
     """A group that cannot be joined: by how much, at which pair, and what would mend it."""
-    from planar.solving.diagnosis.remedy import remedy
+    from planar.solving.diagnosis.remedy import describe_remedy
 
     stage = failure.stage
     gaps: dict[str, float] = {}
-    still = setup.program.closing(stage)(failure.z, setup.station.u, setup.station.p)[0].full().ravel()
+    still = setup.functions.block_function(stage)(failure.z, setup.inputs.u, setup.inputs.p)[0].full().ravel()
     for row, left in zip(setup.equations.rows[stage.rows], still, strict=True):
         gaps[row.pair] = float(np.hypot(gaps.get(row.pair, 0.0), left))
     pair = max(gaps, key=lambda name: gaps[name])
     kind = next(row.kind for row in setup.equations.rows[stage.rows] if row.pair == pair)
-    by, what = (setup.unit, "length") if kind is Kind.LENGTH else (1.0, "angle")
-    links = _links(stage.links or setup.pairs.get(pair, setup.named[pair]).links)
+    by, what = (setup.unit, "length") if kind is MeasureKind.LENGTH else (1.0, "angle")
+    links = _links(stage.links or setup.pairs.get(pair, setup.relative_motions[pair]).links)
     return NoAnswer(
         Outcome.CANNOT_BE_ASSEMBLED,
-        f"{setup.at()} {links} cannot be joined: at the nearest, pair {pair!r} stays open by "
+        f"{setup.describe_position()} {links} cannot be joined: at the nearest, pair {pair!r} stays open by "
         f"{amount(gaps[pair] * by, what, setup.mechanism.units)}; "
-        f"{remedy(setup, failure, f'change the input or a dimension of {links}')}",
+        f"{describe_remedy(setup, failure, f'change the input or a dimension of {links}')}",
     )
 
 
-def too_many(setup: Setup) -> NoAnswer:
+def too_many_inputs(setup: PreparedMechanism) -> NoAnswer:
     """Inputs that the pairs leave no freedom for, at positions that do not agree."""
     return NoAnswer(
         Outcome.TOO_MANY_INPUTS,
-        f"{_inputs(setup)} ask for more than the mechanism's freedom and do not agree {setup.at()}{_leave_out(setup)}",
+        f"{_inputs(setup)} ask for more than the mechanism's freedom and do not agree "
+        f"{setup.describe_position()}{_inputs_to_leave_out(setup)}",
     )
 
 
-def _surplus(setup: Setup) -> str:
+def _surplus_inputs(setup: PreparedMechanism) -> str:
     """What to say of inputs that move one another while other links are free."""
-    from planar.solving.diagnosis.redundancy import conflicting
+    from planar.solving.diagnosis.redundancy import find_conflicting_inputs
 
-    sets = conflicting(setup) if len(setup.mechanism.inputs) > 1 else ()
-    return f", and leave one out of those at {quoted(sets[0])}, which move one another" if sets else ""
+    sets = find_conflicting_inputs(setup) if len(setup.mechanism.inputs) > 1 else ()
+    return f", and leave one out of those at {quote_names(sets[0])}, which move one another" if sets else ""
 
 
-def _leave_out(setup: Setup) -> str:
+def _inputs_to_leave_out(setup: PreparedMechanism) -> str:
     """Which inputs conflict, and what to do about it."""
-    from planar.solving.diagnosis.redundancy import conflicting
+    from planar.solving.diagnosis.redundancy import find_conflicting_inputs
 
-    sets = conflicting(setup)
+    sets = find_conflicting_inputs(setup)
     if not sets:
         return "; leave one out"
     told = [
-        f"the input at {each[0]!r} cannot move" if len(each) == 1 else f"those at {quoted(each)} move one another"
+        f"the input at {each[0]!r} cannot move" if len(each) == 1 else f"those at {quote_names(each)} move one another"
         for each in sets[:3]
     ]
     which = "one of each" if len(sets) > 1 else "it" if len(sets[0]) == 1 else "one of them"
-    return f": {listed(told)}; leave {which} out"
+    return f": {join_all_names(told)}; leave {which} out"
 
 
-def disagreeing(setup: Setup, mobility: int, what: str) -> NoAnswer:
+def disagreeing_inputs(setup: PreparedMechanism, mobility: int, what: str) -> NoAnswer:
     """Inputs whose positions agree but whose rates do not."""
     return NoAnswer(
         Outcome.TOO_MANY_INPUTS,
-        f"the mobility is {mobility}, and the {what} of {_inputs(setup)} do not agree{_leave_out(setup)}",
+        f"the mobility is {mobility}, and the {what} of {_inputs(setup)} do not agree{_inputs_to_leave_out(setup)}",
     )
 
 
-def broken_rates(setup: Setup, what: str, pair: str, gap: float, at: str = "") -> NoAnswer:
+def broken_rates(setup: PreparedMechanism, what: str, pair: str, gap: float, at: str = "") -> NoAnswer:
     """Rates that the gate does not let pass, at the file's own position or at another in words."""
     return NoAnswer(
         Outcome.DEAD_POINT,
-        f"{at or setup.at()} the {what} break pair {pair!r} by {gap:.2g} of the greatest; move the input",
+        f"{at or setup.describe_position()} the {what} break pair {pair!r} by {gap:.2g} of the greatest; move "
+        "the input",
     )
 
 
 def _links(names: Sequence[str]) -> str:
-    return f"link{'s' * (len(names) != 1)} {quoted(names)}"
+    return f"link{'s' * (len(names) != 1)} {quote_names(names)}"
 
 
-def _inputs(setup: Setup) -> str:
-    return _at([given.pair for given in setup.mechanism.inputs])
+def _inputs(setup: PreparedMechanism) -> str:
+    return _inputs_at([given.pair for given in setup.mechanism.inputs])
 
 
-def _at(pairs: Sequence[str]) -> str:
-    return f"the input{'s' * (len(pairs) != 1)} at {quoted(pairs)}"
+def _inputs_at(pairs: Sequence[str]) -> str:
+    return f"the input{'s' * (len(pairs) != 1)} at {quote_names(pairs)}"
 
 
-def _freedoms(setup: Setup, mobility: int) -> str:
-    return f"{many(mobility, 'freedom')} for {many(len(setup.mechanism.inputs), 'input')}"
+def _freedoms(setup: PreparedMechanism, mobility: int) -> str:
+    return f"{count_phrase(mobility, 'freedom')} for {count_phrase(len(setup.mechanism.inputs), 'input')}"
 
 
-def _pairs_of(setup: Setup, links: Sequence[str], most: int) -> str:
+def _offered_pairs(setup: PreparedMechanism, links: Sequence[str], most: int) -> str:
     """Pairs of these links that have no input, to be offered."""
     taken = {given.pair for given in setup.mechanism.inputs}
     offered = [name for name, pair in setup.pairs.items() if set(pair.links) & set(links) and name not in taken]

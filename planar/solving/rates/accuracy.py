@@ -6,39 +6,41 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.equations.rounding_errors import round_off
+from planar.equations.rounding_errors import rounding_terms
 from planar.foundation.errors import NoAnswer, Outcome
-from planar.model.pairs import Kind
-from planar.model.wording import many
-from planar.solving.checks.residual_check import EPS, MOST_LOST, SURELY_KEPT
-from planar.solving.prepared_mechanism import Setup
-from planar.solving.rates.regularity import strengths
+from planar.model.pairs import MeasureKind
+from planar.model.wording import count_phrase
+from planar.solving.checks.residual_check import EPS, MAX_RATE_ERROR, NEGLIGIBLE_ERROR
+from planar.solving.prepared_mechanism import PreparedMechanism
+from planar.solving.rates.regularity import regularity
 
 Array = np.ndarray
 
-TINY = float(np.finfo(float).tiny)
-MOST_LOST_OF_SECOND = 0.1
+SMALLEST_NORMAL = float(np.finfo(float).tiny)
+MAX_ACCELERATION_ERROR = 0.1
 """Part of an acceleration that may be wrong."""
-SHORT = 1e-4
+SHORT_ARM = 1e-4
 """Sizes: an arm that is shorter is named as a cause of what is lost."""
 
 
-class Errors(NamedTuple):
+class RateErrors(NamedTuple):
     """Estimates of what round-off makes of samples, each (samples,).
 
     `places`: the greatest error of an angle (rad) or a length (sizes); `first`, `second`: of the velocities and the
     accelerations, as a part of what moves in the same loop. Not numbers where none is known.
     """
 
-    places: Array
-    first: Array
-    second: Array
+    position: Array
+    velocity: Array
+    acceleration: Array
 
     @property
-    def lost(self) -> Array:
+    def is_too_inexact(self) -> Array:
         """Which samples have too few digits left (samples,): next to a change point of places and velocities that are
         known well the accelerations may be known to one."""
-        return ~((np.maximum(self.places, self.first) <= MOST_LOST) & (self.second <= MOST_LOST_OF_SECOND))
+        return ~(
+            (np.maximum(self.position, self.velocity) <= MAX_RATE_ERROR) & (self.acceleration <= MAX_ACCELERATION_ERROR)
+        )
 
     @property
     def greatest(self) -> Array:
@@ -46,94 +48,96 @@ class Errors(NamedTuple):
         return np.maximum.reduce(self)
 
 
-class Doubts(NamedTuple):
+class AccuracyDoubts(NamedTuple):
     """Samples whose accuracy is not sure: which (doubted,), by how much they are wrong at most, and a cause of each in
     words, with what mends it."""
 
     rows: Array
-    errors: Errors
+    errors: RateErrors
     causes: list[tuple[str, str]]
 
     def remark(self, where: str = "") -> str:
         """What there is to say of those that are accurate enough, at a place in words; nothing where there are none."""
-        kept = np.flatnonzero(~self.errors.lost)
+        kept = np.flatnonzero(~self.errors.is_too_inexact)
         if not kept.size:
             return ""
         worst = int(kept[np.argmax(self.errors.greatest[kept])])
         digits = max(int(-np.log10(self.errors.greatest[worst])), 1)
-        return f"rounding leaves {many(digits, 'digit')} of the rates{where}, as {self.causes[worst][0]}"
+        return f"rounding leaves {count_phrase(digits, 'digit')} of the rates{where}, as {self.causes[worst][0]}"
 
-    def refused(self, setup: Setup, k: int, where: str) -> NoAnswer:
+    def refusal(self, setup: PreparedMechanism, k: int, where: str) -> NoAnswer:
         """What to say of the k-th of them, at a place in words."""
         cause, remedy = self.causes[k]
         what = "no digit of the accelerations"
-        for part, of in ((self.errors.first, "the rates"), (self.errors.places, "the position")):
-            if not part[k] <= MOST_LOST:
+        for part, of in ((self.errors.velocity, "the rates"), (self.errors.position, "the position")):
+            if not part[k] <= MAX_RATE_ERROR:
                 what = f"less than three digits of {of}"
         return NoAnswer(Outcome.TOO_INEXACT, f"{where} rounding leaves {what}, as {cause}; {remedy}")
 
 
-def doubts(setup: Setup, slope: Array, w: Array, y: Array, y1: Array, y2: Array) -> Doubts | None:
+def find_accuracy_doubts(
+    setup: PreparedMechanism, jacobian: Array, w: Array, y: Array, y1: Array, y2: Array
+) -> AccuracyDoubts | None:
     """Which samples may be less accurate than they look; None where none is. Arguments as of `errors`, see there.
 
     slope (samples, rows, unknowns), w (samples, coordinates) in sizes.
     """
-    lost, stages, arms = _amplified(setup, slope)
+    lost, stages, arms = _error_amplification(setup, jacobian)
     counted = np.maximum(np.abs(w).max(axis=1, initial=0.0) / np.pi, 1.0)
     # what is not a number is not below anything
-    rows = np.flatnonzero(~(EPS * lost * counted <= SURELY_KEPT))
+    rows = np.flatnonzero(~(EPS * lost * counted <= NEGLIGIBLE_ERROR))
     if not rows.size:
         return None
-    found = errors(setup, y[rows], y1[rows], y2[rows])
-    sure = found.greatest <= SURELY_KEPT
-    rows, found = rows[~sure], Errors(*(each[~sure] for each in found))
+    found = rate_errors(setup, y[rows], y1[rows], y2[rows])
+    sure = found.greatest <= NEGLIGIBLE_ERROR
+    rows, found = rows[~sure], RateErrors(*(each[~sure] for each in found))
     if not rows.size:
         return None
     causes = [_cause(setup, w[row], float(counted[row]), int(stages[row]), arms[row]) for row in rows]
-    return Doubts(rows, found, causes)
+    return AccuracyDoubts(rows, found, causes)
 
 
-def _amplified(setup: Setup, slope: Array) -> tuple[Array, Array, Array]:
+def _error_amplification(setup: PreparedMechanism, slope: Array) -> tuple[Array, Array, Array]:
     """By how much round-off is greater in the rates at most, and in which group (samples,); the arm of every unknown.
 
     A place that is rounded by EPS turns a link whose arm is short by EPS / arm, the more where the group is nearly
     singular; rates that are made of such angles lose as much once more.
     """
     found, which = np.ones(len(slope)), np.zeros(len(slope), dtype=int)
-    strong, arms = strengths(setup, slope), np.ones((len(slope), slope.shape[2]))
-    for index, stage in enumerate(setup.equations.stages):
+    strong, arms = regularity(setup, slope), np.ones((len(slope), slope.shape[2]))
+    for index, stage in enumerate(setup.equations.blocks):
         own = slope[:, stage.rows, stage.unknowns]
         if own.shape[-1]:
             arms[:, stage.unknowns] = np.linalg.norm(own, axis=1)
             least = arms[:, stage.unknowns].min(axis=1)
-            lost = 1.0 / np.maximum(least * strong[:, index] ** 2, TINY)
+            lost = 1.0 / np.maximum(least * strong[:, index] ** 2, SMALLEST_NORMAL)
             which = np.where(lost > found, index, which)
             found = np.maximum(found, lost)
     return found, which, arms
 
 
-def _cause(setup: Setup, w: Array, counted: float, stage: int, arms: Array) -> tuple[str, str]:
+def _cause(setup: PreparedMechanism, w: Array, counted: float, stage: int, arms: Array) -> tuple[str, str]:
     """Why round-off grows at a sample, and a remedy."""
     e = setup.equations
-    if EPS * counted > SURELY_KEPT:
+    if EPS * counted > NEGLIGIBLE_ERROR:
         worst = e.coordinates[int(np.argmax(np.abs(w)))]
         size = f"{float(np.max(np.abs(w))):.3g}"
-        if worst.kind is Kind.LENGTH:
+        if worst.kind is MeasureKind.LENGTH:
             return f"{worst.owner!r} is {size} times as far away as the mechanism is large", "bring them nearer"
         return f"the angle of link {worst.owner!r} counts up to {size} rad", "start from fewer turns"
-    own = e.stages[stage].unknowns
+    own = e.blocks[stage].unknowns
     k = own.start + int(np.argmin(arms[own])) if own.stop > own.start else 0
-    if arms.size and arms[k] < SHORT:
+    if arms.size and arms[k] < SHORT_ARM:
         link = e.coordinates[e.unknowns[k]].owner
         return (
             f"link {link!r} has an arm of {float(arms[k]):.2g} of the mechanism's size",
             f"lengthen link {link!r}, or make one link of those that it joins",
         )
-    links = ", ".join(repr(link) for link in e.stages[stage].links)
+    links = ", ".join(repr(link) for link in e.blocks[stage].links)
     return f"{links} stand next to a dead point or a change point", "move the input"
 
 
-def errors(setup: Setup, y: Array, y1: Array, y2: Array) -> Errors:
+def rate_errors(setup: PreparedMechanism, y: Array, y1: Array, y2: Array) -> RateErrors:
     """What round-off makes of y = (z, u) and its rates, each (samples, y), with no more known than doubles hold.
 
     Every number of a row may be wrong by EPS of itself, and the row by what it leaves open. So much is the position
@@ -141,31 +145,37 @@ def errors(setup: Setup, y: Array, y1: Array, y2: Array) -> Errors:
     2002, sec. 7.2: the componentwise condition), and the rates' rows by what that changes in them.
     """
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # what is not a number is not known
-        return _errors(setup, y, y1, y2)
+        return _rate_errors(setup, y, y1, y2)
 
 
-def _errors(setup: Setup, y: Array, y1: Array, y2: Array) -> Errors:
+def _rate_errors(setup: PreparedMechanism, y: Array, y1: Array, y2: Array) -> RateErrors:
     e = setup.equations
     rows, unknowns = len(e.rows), len(e.unknowns)
-    found = round_off(e, y, y1, y2, setup.station.p)
-    slope, first, second = (np.abs(each) for each in (found.slope, found.first, found.second))
-    inverse = np.abs(_inverse(found.slope[:, :rows, :unknowns]))
+    found = rounding_terms(e, y, y1, y2, setup.inputs.p)
+    slope, first, second = (
+        np.abs(each) for each in (found.jacobian, found.first_rate_jacobian, found.second_rate_jacobian)
+    )
+    inverse = np.abs(_inverse_jacobians(found.jacobian[:, :rows, :unknowns]))
 
     def solved(of_rows: Array, of_inputs: Array) -> Array:
-        return np.hstack([_times(inverse, of_rows), of_inputs])
+        return np.hstack([_matrix_times_vector(inverse, of_rows), of_inputs])
 
     inputs = np.abs(y[:, unknowns:])
-    dy = solved(np.abs(found.value[:, :rows]) + EPS * found.terms[:, :rows], EPS * inputs)
-    at = _times(slope[:, rows:], dy) + EPS * found.terms[:, rows:]
-    lost1 = _times(first, dy) + EPS * _times(slope, np.abs(y1))
+    dy = solved(np.abs(found.value[:, :rows]) + EPS * found.term_sum[:, :rows], EPS * inputs)
+    at = _matrix_times_vector(slope[:, rows:], dy) + EPS * found.term_sum[:, rows:]
+    lost1 = _matrix_times_vector(first, dy) + EPS * _matrix_times_vector(slope, np.abs(y1))
     dy1 = solved(lost1[:, :rows], EPS * np.abs(y1[:, unknowns:]))
-    lost2 = _times(second, dy) + 2.0 * _times(first, dy1) + EPS * _times(slope, np.abs(y2))
+    lost2 = (
+        _matrix_times_vector(second, dy)
+        + 2.0 * _matrix_times_vector(first, dy1)
+        + EPS * _matrix_times_vector(slope, np.abs(y2))
+    )
     dy2 = solved(lost2[:, :rows], EPS * np.abs(y2[:, unknowns:]))
-    one, two = _paces(setup, slope[:, :rows], np.abs(y1), np.abs(y2))
-    return Errors(_greatest(at), _greatest(_part(dy1, one)), _greatest(_part(dy2, two)))
+    one, two = _reference_rates(setup, slope[:, :rows], np.abs(y1), np.abs(y2))
+    return RateErrors(_row_maxima(at), _row_maxima(_relative_errors(dy1, one)), _row_maxima(_relative_errors(dy2, two)))
 
 
-def _paces(setup: Setup, slope: Array, y1: Array, y2: Array) -> tuple[Array, Array]:
+def _reference_rates(setup: PreparedMechanism, slope: Array, y1: Array, y2: Array) -> tuple[Array, Array]:
     """How fast everything in y moves, or would if it did not just come to rest (samples, y), to each order.
 
     What comes first moves the rows of a group, and a row its unknowns, each by its arm. So a link that turns back is
@@ -173,9 +183,11 @@ def _paces(setup: Setup, slope: Array, y1: Array, y2: Array) -> tuple[Array, Arr
     """
     e = setup.equations
     many = len(e.unknowns)
-    angles = np.array([e.coordinates[c].kind is not Kind.LENGTH for c in e.unknowns] + [True] * (y1.shape[1] - many))
+    angles = np.array(
+        [e.coordinates[c].kind is not MeasureKind.LENGTH for c in e.unknowns] + [True] * (y1.shape[1] - many)
+    )
     one, two = y1.copy(), np.maximum(y2, y1 * y1 * angles)
-    for stage in e.stages:
+    for stage in e.blocks:
         own = slice(stage.unknowns.start, stage.unknowns.stop)
         block = slope[:, stage.rows]
         names = [row.pair for row in e.rows[stage.rows]]
@@ -185,7 +197,7 @@ def _paces(setup: Setup, slope: Array, y1: Array, y2: Array) -> tuple[Array, Arr
                 terms = (block * pace[:, None]).max(axis=2, initial=0.0)
                 # both rows of a pin: what moves along one axis now moves along the other in a while
                 terms = np.where(alike, terms[:, None], 0.0).max(axis=2, initial=0.0)
-                arms = np.sqrt((alike @ (block[:, :, own] ** 2)).clip(TINY))
+                arms = np.sqrt((alike @ (block[:, :, own] ** 2)).clip(SMALLEST_NORMAL))
                 could = np.where(block[:, :, own] > 0.0, terms[:, :, None] / arms, 0.0).max(axis=1, initial=0.0)
                 grown = np.maximum(pace[:, own], could)
                 if np.all(grown <= 2.0 * pace[:, own]):
@@ -195,19 +207,19 @@ def _paces(setup: Setup, slope: Array, y1: Array, y2: Array) -> tuple[Array, Arr
     return one, two
 
 
-def _times(matrices: Array, vectors: Array) -> Array:
+def _matrix_times_vector(matrices: Array, vectors: Array) -> Array:
     return (matrices @ vectors[..., None])[..., 0]
 
 
-def _part(errors: Array, of: Array) -> Array:
-    return np.where(errors > 0.0, errors / np.maximum(of, TINY), 0.0)
+def _relative_errors(errors: Array, references: Array) -> Array:
+    return np.where(errors > 0.0, errors / np.maximum(references, SMALLEST_NORMAL), 0.0)
 
 
-def _greatest(values: Array) -> Array:
+def _row_maxima(values: Array) -> Array:
     return np.max(values, axis=1, initial=0.0)
 
 
-def _inverse(slopes: Array) -> Array:
+def _inverse_jacobians(slopes: Array) -> Array:
     """What undoes each slope (samples, unknowns, rows); not numbers where one is singular."""
     try:
         if slopes.shape[1] == slopes.shape[2]:
@@ -216,4 +228,4 @@ def _inverse(slopes: Array) -> Array:
     except np.linalg.LinAlgError:
         if len(slopes) == 1:
             return np.full((1, slopes.shape[2], slopes.shape[1]), np.nan)
-        return np.concatenate([_inverse(each[None]) for each in slopes])
+        return np.concatenate([_inverse_jacobians(each[None]) for each in slopes])

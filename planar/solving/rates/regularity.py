@@ -6,155 +6,166 @@ from collections.abc import Callable
 
 import numpy as np
 
-from planar.equations.constraint_equations import Stage
-from planar.equations.functions import Rates, length
+from planar.equations.constraint_equations import Block
+from planar.equations.functions import EquationRates, slice_length
 from planar.foundation.errors import NoAnswer
-from planar.solving.continuation.path import corrected
+from planar.solving.continuation.path import correct_blocks
 from planar.solving.diagnosis import refusals
-from planar.solving.prepared_mechanism import Setup
+from planar.solving.prepared_mechanism import PreparedMechanism
 
 Array = np.ndarray
 
-SINGULAR = 1e-5
+MIN_REGULARITY = 1e-5
 """A group's slope is singular where its least singular value is below this part of its links' own reach.
 
 Near a dead point the slope falls with the square root of the distance to it, so that round-off in the input of one
 part in 1e16 becomes one in 1e16 / slope^2 in the velocity: at 1e-5 six digits remain, below they are lost.
 """
-NOTHING = 1e-9
+ZERO_REGULARITY = 1e-9
 """A strength below this is zero but for rounding."""
-NEAR_BY = 1e-2
+NEIGHBOUR_DISTANCE = 1e-2
 """How far (rad, or lengths of the size) a position is moved to see whether what holds there holds elsewhere."""
 
 
-class Crossing(Exception):
+class SingularPosition(Exception):
     """A position with one freedom more than inputs, to first order; `refused` says what to say if it is so in truth."""
 
     def __init__(self, refused: Callable[[], NoAnswer]):
         super().__init__()
-        self.refused = refused
+        self.refusal = refused
 
 
-def mobility(setup: Setup, z: Array, motion: Rates) -> int:
+def mobility_by_rank(setup: PreparedMechanism, z: Array, motion: EquationRates) -> int:
     """The mobility at a position by rank; raises NoAnswer where the velocity is not determined, or contradicted.
 
     Raises Crossing where the next orders have to tell whether it is determined.
 
     With the inputs' positions counted as unknowns, what the pairs leave free is unknowns + inputs - rank.
     """
-    inputs = setup.station.u.size
-    found_weak = strengths(setup, motion.slope) < SINGULAR
-    weak = [stage for stage, is_weak in zip(setup.equations.stages, found_weak, strict=True) if is_weak]
-    square = all(length(stage.rows) == length(stage.unknowns) for stage in setup.equations.stages)
+    inputs = setup.inputs.u.size
+    found_weak = regularity(setup, motion.jacobian) < MIN_REGULARITY
+    weak = [stage for stage, is_weak in zip(setup.equations.blocks, found_weak, strict=True) if is_weak]
+    square = all(slice_length(stage.rows) == slice_length(stage.unknowns) for stage in setup.equations.blocks)
     if not weak and square:
         return inputs
     if not weak:
         # the unknowns are determined; each independent way in which the inputs break the rest is a freedom less
-        found = inputs - _broken_ways(motion)
-        if found < inputs and not _agree(setup, motion):
-            raise refusals.disagreeing(setup, found, "velocities")
+        found = inputs - _contradiction_rank(motion)
+        if found < inputs and not _input_rates_agree(setup, motion):
+            raise refusals.disagreeing_inputs(setup, found, "velocities")
         return found
-    found = z.size + inputs - _rank(_scaled(setup, np.hstack([motion.slope, motion.drive_slope])))
-    links = _moving_at_rest(setup, motion.slope) or list(dict.fromkeys(link for stage in weak for link in stage.links))
+    found = z.size + inputs - _rank(_scaled_jacobian(setup, np.hstack([motion.jacobian, motion.input_jacobian])))
+    links = _links_free_at_rest(setup, motion.jacobian) or list(
+        dict.fromkeys(link for stage in weak for link in stage.links)
+    )
     if found <= inputs:
         raise refusals.dead_point(setup, links)
 
     def refused() -> NoAnswer:
-        from planar.solving.diagnosis.redundancy import ways_on  # only where something is refused
+        from planar.solving.diagnosis.redundancy import count_motions  # only where something is refused
 
-        ways = ways_on(setup, motion.w)
-        always = any(always_weak(setup, stage, z) for stage in weak) if ways is None else ways > inputs
-        return refusals.ever_free(setup, links) if always else refusals.change_point(setup, links, found, z)
+        ways = count_motions(setup, motion.w)
+        always = any(is_always_singular(setup, stage, z) for stage in weak) if ways is None else ways > inputs
+        return refusals.always_free(setup, links) if always else refusals.change_point(setup, links, found, z)
 
-    raise Crossing(refused) if found == inputs + 1 else refused()
+    raise SingularPosition(refused) if found == inputs + 1 else refused()
 
 
-def _broken_ways(motion: Rates) -> int:
+def _contradiction_rank(motion: EquationRates) -> int:
     """The rank of what unit rates of the inputs leave open after the unknowns have done all they can."""
-    if motion.slope.shape[0] == motion.slope.shape[1]:
+    if motion.jacobian.shape[0] == motion.jacobian.shape[1]:
         return 0
-    sizes = np.maximum(np.linalg.norm(motion.drive_slope, axis=0), NOTHING)
-    rates = np.linalg.lstsq(motion.slope, motion.drive_slope, rcond=1e-12)[0]
-    left = (motion.drive_slope - motion.slope @ rates) / sizes
-    return int(np.sum(np.linalg.svd(left, compute_uv=False) > SINGULAR))
+    sizes = np.maximum(np.linalg.norm(motion.input_jacobian, axis=0), ZERO_REGULARITY)
+    rates = np.linalg.lstsq(motion.jacobian, motion.input_jacobian, rcond=1e-12)[0]
+    left = (motion.input_jacobian - motion.jacobian @ rates) / sizes
+    return int(np.sum(np.linalg.svd(left, compute_uv=False) > MIN_REGULARITY))
 
 
-def strengths(setup: Setup, slope: Array) -> Array:
+def regularity(setup: PreparedMechanism, jacobian: Array) -> Array:
     """The least singular value of every group's slope (..., stages), each column by what its links could reach at best.
 
     Zero at a dead point or a change point; lengths are divided by the reach of the group's links, so that neither
     their size nor that of the whole matters. `slope` is (..., rows, unknowns).
     """
-    scaled = _scaled(setup, slope)
-    stages = setup.equations.stages
-    found = [_least(scaled[..., stage.rows, stage.unknowns]) for stage in stages]
-    return np.stack(found, axis=-1) if stages else np.zeros((*slope.shape[:-2], 0))
+    scaled = _scaled_jacobian(setup, jacobian)
+    stages = setup.equations.blocks
+    found = [_least_singular_value(scaled[..., stage.rows, stage.unknowns]) for stage in stages]
+    return np.stack(found, axis=-1) if stages else np.zeros((*jacobian.shape[:-2], 0))
 
 
-def _least(own: Array) -> Array:
-    if not own.shape[-1]:
-        return np.ones(own.shape[:-2])
-    if own.shape[-2] < own.shape[-1]:
-        return np.zeros(own.shape[:-2])
-    values = np.linalg.svd(own, compute_uv=False)
+def _least_singular_value(block_jacobian: Array) -> Array:
+    if not block_jacobian.shape[-1]:
+        return np.ones(block_jacobian.shape[:-2])
+    if block_jacobian.shape[-2] < block_jacobian.shape[-1]:
+        return np.zeros(block_jacobian.shape[:-2])
+    values = np.linalg.svd(block_jacobian, compute_uv=False)
     return values[..., -1] / np.maximum(1.0, values[..., 0])
 
 
-def _scaled(setup: Setup, slope: Array) -> Array:
+def _scaled_jacobian(setup: PreparedMechanism, jacobian: Array) -> Array:
     """A slope (..., rows, unknowns and inputs), every group's lengths in units of its reach, columns of one size.
 
     The size of an unknown's column is that in its own group, whatever large or small things later groups hang on it.
     A column that could reach further than it does now keeps what it lacks: it is that which vanishes.
     """
-    scaled = slope / setup.by[:, None]
-    sizes = np.maximum(np.linalg.norm(slope, axis=-2), 1.0)
-    for stage in setup.equations.stages:
+    scaled = jacobian / setup.row_scale[:, None]
+    sizes = np.maximum(np.linalg.norm(jacobian, axis=-2), 1.0)
+    for stage in setup.equations.blocks:
         own = np.linalg.norm(scaled[..., stage.rows, stage.unknowns], axis=-2)
-        sizes[..., stage.unknowns] = np.maximum(own, setup.least[stage.unknowns])
+        sizes[..., stage.unknowns] = np.maximum(own, setup.min_column_scale[stage.unknowns])
     return scaled / sizes[..., None, :]
 
 
-def cancelled(slope: Array, known: Array) -> Array:
+def solve_rates(jacobian: Array, known: Array) -> Array:
     """The rates of the unknowns (unknowns,) that cancel what known rates open (rows,)."""
-    if slope.shape[0] == slope.shape[1]:
-        return np.linalg.solve(slope, -known) if known.size else np.zeros(0)
-    return np.linalg.lstsq(slope, -known, rcond=1e-12)[0]
+    if jacobian.shape[0] == jacobian.shape[1]:
+        return np.linalg.solve(jacobian, -known) if known.size else np.zeros(0)
+    return np.linalg.lstsq(jacobian, -known, rcond=1e-12)[0]
 
 
-def _agree(setup: Setup, motion: Rates) -> bool:
+def _input_rates_agree(setup: PreparedMechanism, motion: EquationRates) -> bool:
     """Whether rates of the inputs that are more than the freedom do not contradict one another."""
-    left = motion.slope @ cancelled(motion.slope, motion.F1) + motion.F1
-    scale = np.max(np.abs(setup.station.u1), initial=0.0) or 1.0
+    left = motion.jacobian @ solve_rates(motion.jacobian, motion.F1) + motion.F1
+    scale = np.max(np.abs(setup.inputs.u1), initial=0.0) or 1.0
     return bool(np.max(np.abs(left), initial=0.0) <= 1e-9 * scale)
 
 
-def always_weak(setup: Setup, stage: Stage, z: Array) -> bool:
+def is_always_singular(setup: PreparedMechanism, stage: Block, z: Array) -> bool:
     """Whether a group is singular in closed positions near by too, so that it is no matter of this one."""
-    u, p = setup.station.u, setup.station.p
+    u, p = setup.inputs.u, setup.inputs.p
     for seed in range(3):
         rng = np.random.default_rng(seed)
-        near = u + rng.uniform(-NEAR_BY, NEAR_BY, u.size)
-        moved = corrected(setup.program, p, z + rng.uniform(-NEAR_BY, NEAR_BY, z.size), near, stage.level)
-        if moved is not None and strengths(setup, slope_at(setup, moved, near))[stage.level] > NOTHING:
+        near = u + rng.uniform(-NEIGHBOUR_DISTANCE, NEIGHBOUR_DISTANCE, u.size)
+        moved = correct_blocks(
+            setup.functions,
+            p,
+            z + rng.uniform(-NEIGHBOUR_DISTANCE, NEIGHBOUR_DISTANCE, z.size),
+            near,
+            stage.block_index,
+        )
+        if (
+            moved is not None
+            and regularity(setup, jacobian_at(setup, moved, near))[stage.block_index] > ZERO_REGULARITY
+        ):
             return False
     return True
 
 
-def slope_at(setup: Setup, z: Array, u: Array) -> Array:
+def jacobian_at(setup: PreparedMechanism, z: Array, u: Array) -> Array:
     """dF/dz (rows, unknowns) at unknowns z and inputs u."""
-    return setup.program.slopes(z[None], u[None], setup.station.p)[0][0]
+    return setup.functions.jacobians(z[None], u[None], setup.inputs.p)[0][0]
 
 
-def _moving_at_rest(setup: Setup, slope: Array) -> list[str]:
+def _links_free_at_rest(setup: PreparedMechanism, slope: Array) -> list[str]:
     """The links that can move while the inputs are held, from the slope's null vectors."""
-    _, values, vectors = np.linalg.svd(_scaled(setup, slope))
-    null = vectors[int(np.sum(values > SINGULAR * max(1.0, values[0]))) :]
+    _, values, vectors = np.linalg.svd(_scaled_jacobian(setup, slope))
+    null = vectors[int(np.sum(values > MIN_REGULARITY * max(1.0, values[0]))) :]
     if null.size == 0:
         return []
-    return moved_by(setup, np.max(np.abs(null), axis=0))
+    return moved_links(setup, np.max(np.abs(null), axis=0))
 
 
-def moved_by(setup: Setup, rates: Array) -> list[str]:
+def moved_links(setup: PreparedMechanism, rates: Array) -> list[str]:
     """The links that rates of the unknowns (unknowns,) move."""
     share = np.abs(rates)
     moved = [
@@ -170,4 +181,4 @@ def _rank(matrix: Array) -> int:
     if matrix.size == 0:
         return 0
     values = np.linalg.svd(matrix, compute_uv=False)
-    return int(np.sum(values > SINGULAR * max(1.0, values[0])))
+    return int(np.sum(values > MIN_REGULARITY * max(1.0, values[0])))

@@ -7,67 +7,75 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.foundation.errors import NoAnswer, Outcome
-from planar.solving.continuation.path_pieces import Local, Piece, pieces, rests
-from planar.solving.continuation.period import BACK, PIECES, closing, home
-from planar.solving.continuation.predictor_corrector import OUT, Walk
-from planar.solving.continuation.solution_curve import Curve
-from planar.solving.position import Solver
+from planar.solving.continuation.path_pieces import BranchRates, PathPiece, is_dead_point, path_pieces
+from planar.solving.continuation.period import CLOSED_TOLERANCE, MAX_PIECES, closing_piece, nearest_start
+from planar.solving.continuation.predictor_corrector import SHOWN_SLIDE_EXTENT, CurveTracker
+from planar.solving.continuation.solution_curve import SolutionCurve
+from planar.solving.position import PositionSolver
 
 Array = np.ndarray
 
 
-class Stretch(NamedTuple):
+class CircuitBranch(NamedTuple):
     """A part of a circuit on which the input goes one way: to a dead point, or to the circuit's start."""
 
-    pieces: tuple[Piece, ...]
+    pieces: tuple[PathPiece, ...]
 
     @property
     def ends(self) -> tuple[float, float]:
         """Where the input starts and stops on its way."""
         return self.pieces[0].start, self.pieces[-1].stop
 
-    def at(self, curve: Curve, place: float) -> tuple[Array, Local | None]:
+    def unknowns_at(self, curve: SolutionCurve, position: float) -> tuple[Array, BranchRates | None]:
         """The unknowns where the input is at a place, with their rates where the slope is singular."""
-        return next((each for each in self.pieces if each.holds(place)), self.pieces[-1]).at(curve, place)
+        return next((each for each in self.pieces if each.has_position(position)), self.pieces[-1]).unknowns_at(
+            curve, position
+        )
 
 
-class Circuit(NamedTuple):
+class ClosedCircuit(NamedTuple):
     """The pieces of a closed curve in their order, and whether it starts in a dead point."""
 
-    pieces: tuple[Piece, ...]
-    from_dead: bool
+    pieces: tuple[PathPiece, ...]
+    starts_at_dead_point: bool
 
     @property
-    def stretches(self) -> tuple[Stretch, ...]:
+    def branches(self) -> tuple[CircuitBranch, ...]:
         """Its parts between dead points."""
-        found: list[list[Piece]] = [[]]
+        found: list[list[PathPiece]] = [[]]
         for piece in self.pieces:
             found[-1].append(piece)
-            if piece.dead is not None:
+            if piece.dead_point is not None:
                 found.append([])
-        return tuple(Stretch(tuple(each)) for each in found if each and each[0].start != each[-1].stop)
+        return tuple(CircuitBranch(tuple(each)) for each in found if each and each[0].start != each[-1].stop)
 
 
-def circuit(setup: Solver, walk: Walk) -> Circuit:
+def follow_circuit(setup: PositionSolver, tracker: CurveTracker) -> ClosedCircuit:
     """The circuit from where a walk stands. Raises NoAnswer where it is not found to close."""
-    start, curve = walk.here, walk.curve
-    turning = walk.turning
-    found: list[Piece] = []
-    for piece in pieces(walk):
+    start, curve = tracker.point, tracker.curve
+    turning = tracker.is_periodic
+    found: list[PathPiece] = []
+    for piece in path_pieces(tracker):
         if piece.first == piece.last:
             continue
         if len(found) > 1:
-            if piece.dead is not None and rests(start) and home(piece.dead.y, start, turning)[1] < BACK:
-                return Circuit((*found, piece), True)
-            last = closing(curve, piece, start, turning)
+            if (
+                piece.dead_point is not None
+                and is_dead_point(start)
+                and nearest_start(piece.dead_point.y, start, turning)[1] < CLOSED_TOLERANCE
+            ):
+                return ClosedCircuit((*found, piece), True)
+            last = closing_piece(curve, piece, start, turning)
             if last is not None:
-                return Circuit((*found, last), rests(start))
+                return ClosedCircuit((*found, last), is_dead_point(start))
         found.append(piece)
-        out = not turning[-1] and abs(piece.stop) > OUT
-        if out or len(found) > PIECES:
+        out = not turning[-1] and abs(piece.stop) > SHOWN_SLIDE_EXTENT
+        if out or len(found) > MAX_PIECES:
             told = (
-                "the input slides on without an end" if out else f"the motion does not come back within {PIECES} arcs"
+                "the input slides on without an end"
+                if out
+                else f"the motion does not come back within {MAX_PIECES} arcs"
             )
             raise NoAnswer(Outcome.BRANCH_LOST, f"{told}; name where the range starts and stops instead of the circuit")
-    u, ending = walk.end
-    raise setup.ends(u, walk.here.tangent, ending)
+    u, ending = tracker.end_inputs
+    raise setup.end_refusal(u, tracker.point.tangent, ending)
