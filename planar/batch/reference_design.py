@@ -136,11 +136,16 @@ class ReferenceDesign:
         """The designs with a link whose arm is so short that rounding may take digits (designs,)."""
         found = np.zeros(many, dtype=bool)
         column, known_from = self.solver.column, self.functions.equations.known_after_block
+        known = {link: known_from[column[link, "angle"]] if (link, "angle") in column else -1 for link in shapes}
         for link, at in shapes.items():
-            if known_from[column[link, "angle"]] < 0 if (link, "angle") in column else True:
+            if known[link] < 0:
                 continue  # what the input turns is turned exactly
             pinned = {
-                point for pair in self.mechanism.pairs for owner, point in pair.coincident_points() if owner == link
+                point
+                for pair in self.mechanism.pairs
+                if all(known[other] <= known[link] for other in pair.bodies)  # later groups ask for places alone
+                for owner, point in pair.coincident_points()
+                if owner == link
             }
             for one, other in combinations([at.points[point] for point in sorted(pinned)], 2):
                 arm = np.hypot(other.x - one.x, other.y - one.y)

@@ -158,6 +158,18 @@ def test_the_order_in_which_bars_are_given_does_not_matter():
                 np.testing.assert_allclose(values, result[0].velocity[name], rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.parametrize("apart", [0.0, 1e-17, 1e-9, 1e-3])
+def test_pins_that_only_later_groups_hang_on_may_lie_next_to_each_other(apart):
+    """The rocker's angle is known by its own arm before anything hangs on a pin beside its joint."""
+    places = [(0.0, 0.0), (0.3, 0.2), (1.0, 0.0), (0.9, 0.7), (0.9 + apart, 0.7), (2.0, 0.0), (2.1, 0.8)]
+    bars = [(0, 1), (1, 3), (2, 3, 4), (4, 6), (5, 6)]
+    mechanism = planar.pinned(places, bars, [0, 2, 5], 0)
+    for each in (mechanism, replace(mechanism)):  # read as arrays, and link by link
+        result = planar.sweep_each([each], 50)
+        assert (result.general, result[0].status.sum()) == (0, 0)
+    assert planar.sweep(planar.from_dict(planar.to_dict(mechanism)), {"P0.velocity": [1.0, 2.0]}, 50).general == 0
+
+
 # closed forms
 
 

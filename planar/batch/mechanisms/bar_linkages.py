@@ -128,18 +128,16 @@ def bar_linkage_arrays(layouts: Sequence[PinLayout], wanted: Sequence[int] | Non
 
 
 def _has_short_bar(merged: _MergedBars, decomposition: _CranksAndDyads) -> Array:
-    """The linkages with a bar so short that rounding may take digits, other than a crank (linkages,)."""
-    order = np.argsort(merged.link, kind="stable")
-    link, at = merged.link[order], merged.local[order]
-    exempt = np.zeros(len(merged.owner), dtype=bool)
-    exempt[merged.link[decomposition.cranks]] = True
-    exempt[merged.first_link[:-1]] = True
+    """The linkages with a bar of a dyad so short that rounding may take digits (linkages,).
+
+    Pins that a bar carries for later dyads may lie as near to its own as they like: its angle is known by then.
+    """
     found = np.zeros(len(merged.unit), dtype=bool)
-    for ahead in range(1, int(np.bincount(link).max(initial=0))):
-        both = np.flatnonzero((link[ahead:] == link[:-ahead]) & ~exempt[link[ahead:]])
-        arm = np.hypot(*(at[both + ahead] - at[both]).T)
-        owner = merged.owner[link[both]]
-        found[owner[(arm > 0.0) & (arm < SHORT_ARM * merged.unit[owner])]] = True
+    for each in decomposition.dyads:
+        for known, between in ((each.first, each.first_between), (each.second, each.second_between)):
+            arm = np.linalg.norm(merged.local[between] - merged.local[known], axis=-1)
+            owner = merged.owner[merged.link[known]]
+            found[owner[(arm > 0.0) & (arm < SHORT_ARM * merged.unit[owner])]] = True
     return found
 
 

@@ -153,10 +153,6 @@ class _Partitioner:
             self.input_of_pair[place] = k
             self.is_symmetric[place] = False  # an input is of the second body against the first
             self.prevented_motions[place] += 1
-        turned = {link for place in self.input_of_pair for link in self.ends[place]}
-        for k, each in enumerate(self.shapes.values()):
-            if k != self.frame and k not in turned and _shortest_distance(each) < SHORT_ARM * self.unit:
-                raise NotPartitionable(f"link {self.names[k]} is so short that rounding takes digits")
         self.number = number
         self.shared_pins = self._find_shared_pins()
         self.link_index = [-1] * many
@@ -282,6 +278,21 @@ class _Partitioner:
                 raise NotPartitionable(f"{len(links)} links are solved together")
             self._add_block(links)
 
+    def _refuse_short_arms(self, inner: tuple[int, ...], pairs: Sequence[int]) -> None:
+        """Links whose arm between the pairs that place them is so short that rounding takes digits of their angles.
+
+        What the input turns is turned exactly, and the pairs of later groups ask for places alone.
+        """
+        if len(inner) == 1 and any(k in self.input_of_pair for k in pairs):
+            return
+        for link in inner:
+            name = self.names[link]
+            points = {at for k in pairs for owner, at in self.pairs[k].coincident_points() if owner == name}
+            places = [self.shapes[name].points[at] for at in points]
+            arms = (hypot(b.x - a.x, b.y - a.y) for a, b in combinations(places, 2))
+            if min(filter(None, arms), default=inf) < SHORT_ARM * self.unit:
+                raise NotPartitionable(f"link {name} is so short that rounding takes digits")
+
     def _add_block(self, inner: tuple[int, ...]) -> None:
         """Add a group: its pairs in an order that does not depend on names."""
         place, pairs, driven = self.link_index, self.pairs, self.input_of_pair
@@ -317,6 +328,7 @@ class _Partitioner:
                 half = len(numbers) // 2
                 numbers = (*numbers[half:], *numbers[:half])
             p += numbers
+        self._refuse_short_arms(inner, [each[-2] for each in found])
         known = (len(inner), len(given), tuple(key))
         own = _BLOCK_TYPES.get(known) or _make_block_type(known, pairs, found)
         if not own.is_square:
@@ -375,9 +387,3 @@ def _size_and_reach(shapes: Iterable[LinkShape]) -> tuple[float, float]:
             greatest = max(greatest, hypot(max(xs) - min(xs), max(ys) - min(ys)))
             reach = max(reach, *map(abs, xs), *map(abs, ys))
     return greatest or 1.0, reach
-
-
-def _shortest_distance(shape: LinkShape) -> float:
-    """The least distance between two points of a link that do not coincide (m)."""
-    apart = (hypot(b.x - a.x, b.y - a.y) for a, b in combinations(shape.points.values(), 2))
-    return min(filter(None, apart), default=inf)
