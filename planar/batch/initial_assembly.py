@@ -11,8 +11,8 @@ from planar.batch.march.backend import AssemblyCorrector
 from planar.batch.march.checks import column_volume
 from planar.batch.nearest_assemblies import CLEAR_REGULARITY, MAX_BLOCK_UNKNOWNS, NEAR_SKETCH, find_nearest_assemblies
 from planar.batch.reference_design import ReferenceDesign, shape_of_designs
-from planar.equations.constraint_equations import Block
-from planar.equations.functions import frames_from_coordinates, slice_length
+from planar.equations.constraint_equations import Block, slice_length
+from planar.equations.coordinates import frames_from_coordinates
 from planar.foundation.geometry import Vector
 from planar.model.link_shapes import LinkShape
 from planar.model.pairs import MeasureKind

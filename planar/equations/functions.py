@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from functools import cached_property, lru_cache
-from math import hypot
 from typing import NamedTuple
 
 import casadi as ca
@@ -12,13 +11,12 @@ import numpy as np
 
 from planar.equations.casadi_call import BufferedFunction, RunFunction
 from planar.equations.closed_form import ClosedForm, find_closed_form
-from planar.equations.constraint_equations import Block, ConstraintEquations, build_equations
+from planar.equations.constraint_equations import Block, ConstraintEquations, build_equations, slice_length
 from planar.equations.elimination import stack_expressions
-from planar.foundation.geometry import GROUND, Frame, frame_at
-from planar.foundation.jets import Scalar
-from planar.model.link_shapes import LinkShape, link_shape
-from planar.model.mechanism import Input, Link, Mechanism, relative_motions
-from planar.model.pairs import MeasureKind, Pair
+from planar.equations.linear import solve_linear
+from planar.equations.mechanism_numbers import equation_structure
+from planar.equations.rates import rate_symbols, time_derivatives
+from planar.model.mechanism import Mechanism
 
 Array = np.ndarray
 MAX_CACHED_STRUCTURES = 256
@@ -31,7 +29,7 @@ RUN_NEWTON_STEPS = 4
 
 
 class EquationRates(NamedTuple):
-    """What `Program.kinematics` returns: F and w with their first and second time derivatives, and dF/dz, dF/du.
+    """F and w with their first and second time derivatives, and dF/dz, dF/du: see `EquationFunctions.kinematics`.
 
     Each with a first axis for the samples, if there is one.
     """
@@ -55,7 +53,7 @@ class ClosedFormAssemblies:
         self._unknowns, self._form, self._polished = unknowns, form, polished
 
     def __call__(self, z: Array, u: Array, p: Array) -> tuple[list[Array], float, float]:
-        """Both (unknowns,), what they leave open at most, and how near they are to where they meet (`closed.Closed`).
+        """Both (unknowns,), what they leave open at most, and how near they are to where they meet (`ClosedForm`).
 
         What is not there is not a number.
         """
@@ -152,7 +150,9 @@ class EquationFunctions:
         """(y, y1, y2, p) -> F and w, one after the other, with their first and second rates, and dF/dy."""
         e = self.equations
         both = ca.vertcat(e.F, e.w)
-        y, y1, y2, first, second = time_derivatives(e, both)
+        y = ca.vertcat(e.z, e.u)
+        y1, y2 = rate_symbols(y, 2)
+        first, second = time_derivatives(both, y, y1, y2)
         slopes = ca.jacobian(e.F, y)
         outputs = [ca.horzcat(both, first, second), slopes]
         return ca.Function("kinematics", [y, y1, y2, e.p], [ca.densify(output) for output in outputs])
@@ -160,17 +160,17 @@ class EquationFunctions:
     @cached_property
     def _third_rate_function(self) -> ca.Function:
         e = self.equations
-        y, y1, y2, _, second = time_derivatives(e, e.F)
-        third = ca.jtimes(second, y, y1) + ca.jtimes(second, y1, y2)
+        y = ca.vertcat(e.z, e.u)
+        y1, y2 = rate_symbols(y, 2)
+        third = time_derivatives(e.F, y, y1, y2, ca.SX.zeros(y.numel()))[-1]
         return ca.Function("third", [y, y1, y2, e.p], [ca.densify(third)])
 
     @cached_property
     def _jerk_function(self) -> ca.Function:
         e = self.equations
-        both = ca.vertcat(e.F, e.w)
-        y, y1, y2, _, second = time_derivatives(e, both)
-        y3 = ca.SX.sym("y3", y.numel())
-        third = ca.jtimes(second, y, y1) + ca.jtimes(second, y1, y2) + ca.jtimes(second, y2, y3)
+        y = ca.vertcat(e.z, e.u)
+        y1, y2, y3 = rate_symbols(y, 3)
+        third = time_derivatives(ca.vertcat(e.F, e.w), y, y1, y2, y3)[-1]
         return ca.Function("jerks", [y, y1, y2, y3, e.p], [ca.densify(third)])
 
     def third_rates(self, y: Array, y1: Array, y2: Array, y3: Array, p: Array) -> tuple[Array, Array]:
@@ -307,38 +307,9 @@ class EquationFunctions:
         )
 
 
-def time_derivatives(e: ConstraintEquations, value: ca.SX) -> tuple[ca.SX, ...]:
-    """y = (z, u) with symbols for its derivatives, and those of an expression in y.
-
-    The chain rule twice: d/dt = (d/dy) y1, d2/dt2 = (d/dy)(d/dt) y1 + (d/dy) y2.
-    """
-    y = ca.vertcat(e.z, e.u)
-    y1, y2 = ca.SX.sym("y1", y.numel()), ca.SX.sym("y2", y.numel())
-    first = ca.jtimes(value, y, y1)
-    return y, y1, y2, first, ca.jtimes(first, y, y1) + ca.jtimes(value, y, y2)
-
-
 def function_with_cse(name: str, given: Sequence[ca.SX], wanted: Sequence[ca.SX]) -> ca.Function:
     """A function in which what stands in several places is computed once."""
     return ca.Function(name, given, ca.cse(list(wanted)))
-
-
-def slice_length(part: slice) -> int:
-    """How many entries a part of z or F has."""
-    return part.stop - part.start
-
-
-def solve_linear(matrix: ca.SX, right_side: ca.SX) -> ca.SX:
-    """slope^-1 left; two by two by the adjugate, larger by QR, neither of which needs a pivot to be chosen."""
-    if matrix.numel() == 1:
-        return right_side / matrix
-    if matrix.numel() == 4:
-        a, b, c, d = matrix[0, 0], matrix[0, 1], matrix[1, 0], matrix[1, 1]
-        return ca.vertcat(d * right_side[0] - b * right_side[1], a * right_side[1] - c * right_side[0]) / (
-            a * d - b * c
-        )
-    q, r = ca.qr(matrix)
-    return ca.solve(r, ca.mtimes(q.T, right_side))
 
 
 def equation_functions(mechanism: Mechanism) -> EquationFunctions:
@@ -349,76 +320,3 @@ def equation_functions(mechanism: Mechanism) -> EquationFunctions:
 @lru_cache(maxsize=MAX_CACHED_STRUCTURES)
 def _cached_equation_functions(structure: Mechanism) -> EquationFunctions:
     return EquationFunctions(build_equations(structure))
-
-
-def equation_structure(mechanism: Mechanism) -> Mechanism:
-    """All of a mechanism that its equations depend on: names of links, pairs, which motions are driven."""
-    return Mechanism(
-        name="",
-        frame=mechanism.frame,
-        links=tuple(Link(link.name) for link in mechanism.links),
-        pairs=mechanism.pairs,
-        inputs=tuple(Input(given.pair, 0.0) for given in mechanism.inputs),
-    )
-
-
-def shapes_of_links(mechanism: Mechanism) -> dict[str, LinkShape]:
-    """The shape of every link (m)."""
-    return {link.name: link_shape(link) for link in mechanism.links}
-
-
-def mechanism_size(mechanism: Mechanism, shapes: Mapping[str, LinkShape]) -> float:
-    """The mechanism's size (m): the greatest distance between two points of one link, else of a slide's travel."""
-    named = relative_motions(mechanism)
-    slide = [named[given.pair].input_kind is MeasureKind.LENGTH for given in mechanism.inputs]
-    return size_from_extents(mechanism, {name: shape_extent(shape) for name, shape in shapes.items()}, slide)
-
-
-def size_from_extents(mechanism: Mechanism, extents: Mapping[str, float], is_slide: Sequence[bool]) -> float:
-    """The mechanism's size (m) from the extents of its links and from which of its inputs slide."""
-    slides = [abs(given.position) for given, slides in zip(mechanism.inputs, is_slide, strict=True) if slides]
-    return max(extents.values(), default=0.0) or max(slides, default=0.0) or 1.0
-
-
-def shape_extent(shape: LinkShape) -> float:
-    """The greatest distance between two points of a link (m)."""
-    x, y = [at.x for at in shape.points.values()], [at.y for at in shape.points.values()]
-    return hypot(max(x) - min(x), max(y) - min(y)) if x else 0.0
-
-
-def pair_numbers(mechanism: Mechanism, shapes: Mapping[str, LinkShape], unit: float) -> Array:
-    """p: the numbers of every pair, lengths divided by `unit`."""
-    measured = {pair.name: pair.measure([shapes[link] for link in pair.bodies]) for pair in mechanism.pairs}
-    return pair_numbers_from(mechanism, measured, unit)
-
-
-def pair_numbers_from(mechanism: Mechanism, numbers: Mapping[str, Sequence[float]], unit: float) -> Array:
-    """p from the numbers of every pair, lengths divided by `unit`."""
-    found: list[float] = []
-    for pair in mechanism.pairs:
-        found += scale_lengths(numbers[pair.name], pair.number_kinds, unit)
-    return np.array(found, dtype=float)
-
-
-def scale_lengths(values: Sequence[float], kinds: Sequence[MeasureKind], unit: float) -> list[float]:
-    """Numbers with the lengths among them divided by `unit`."""
-    return [value / unit if kind is MeasureKind.LENGTH else value for value, kind in zip(values, kinds, strict=True)]
-
-
-def frames_from_coordinates(
-    w: Sequence[Scalar] | Array,
-    column: Mapping[tuple[str, str], int],
-    links: Iterable[str],
-    pairs: Mapping[str, Pair],
-    make_frame: Callable[..., Frame] = frame_at,
-) -> tuple[dict[str, Frame], dict[str, tuple[Scalar, ...]]]:
-    """Frames of links and own coordinates of pairs from w, whose entries may be floats, arrays or jets.
-
-    `framed` makes a frame of x, y and angle.
-    """
-    frames = {
-        link: make_frame(*(w[column[link, part]] for part in ("x", "y", "angle"))) if (link, "x") in column else GROUND
-        for link in links
-    }
-    own = {name: tuple(w[column[name, part]] for part, _ in pair.coordinate_kinds) for name, pair in pairs.items()}
-    return frames, own

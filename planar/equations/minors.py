@@ -10,9 +10,9 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from planar.equations.constraint_equations import ConstraintRow
 from planar.equations.elimination import stack_expressions
 from planar.equations.functions import MAX_CACHED_STRUCTURES, EquationFunctions
+from planar.equations.residuals import ConstraintRow
 from planar.model.pairs import MeasureKind
 
 Array = np.ndarray

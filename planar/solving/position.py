@@ -9,13 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from planar.equations.functions import (
-    MAX_CACHED_STRUCTURES,
-    EquationRates,
-    equation_functions,
-    frames_from_coordinates,
-    slice_length,
-)
+from planar.equations.constraint_equations import slice_length
+from planar.equations.coordinates import frames_from_coordinates
+from planar.equations.functions import MAX_CACHED_STRUCTURES, EquationRates, equation_functions
 from planar.foundation.errors import NoAnswer, Outcome, TrackingEnd
 from planar.foundation.geometry import Frame
 from planar.foundation.jets import Jet

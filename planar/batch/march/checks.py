@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.batch.march.design_functions import DesignFunctions
-from planar.equations.functions import EquationFunctions, frames_from_coordinates
+from planar.equations.coordinates import frames_from_coordinates
+from planar.equations.functions import EquationFunctions
 from planar.model.mechanism import Mechanism
 from planar.solving.checks.branch_check import SINGULAR_DISTANCE_RATIO, BranchCheck, is_move_allowed, solve_rates_batch
 from planar.solving.checks.residual_check import EPS, NEGLIGIBLE_ERROR, ResidualCheck

@@ -10,7 +10,8 @@ import numpy as np
 from planar.batch.march.backend import DesignBatch, UnsupportedStructure
 from planar.batch.march.checks import DesignBranchCheck, DesignPositions, DesignResidualCheck
 from planar.batch.march.design_functions import DesignFunctions
-from planar.equations.functions import EquationRates, mechanism_size, shapes_of_links
+from planar.equations.functions import EquationRates
+from planar.equations.mechanism_numbers import mechanism_size, shapes_of_links
 from planar.foundation.geometry import Vector
 from planar.foundation.jets import Jet
 from planar.solving.checks.residual_check import ResidualCheck

@@ -7,10 +7,9 @@ from typing import NamedTuple
 
 import casadi as ca
 
-from planar.batch.march.kernel import solve_with_regularity
 from planar.equations.closed_form import ClosedForm, find_closed_form
-from planar.equations.constraint_equations import Block, ConstraintEquations, build_equations
-from planar.equations.functions import slice_length
+from planar.equations.constraint_equations import Block, ConstraintEquations, build_equations, slice_length
+from planar.equations.linear import solve_by_determinants
 from planar.model.mechanism import Input, Link, Mechanism
 from planar.model.pairs import MeasureKind as Measure
 from planar.model.pairs import Pair
@@ -125,7 +124,7 @@ def linear_form(e: ConstraintEquations, stage: Block) -> LinearForm | None:
         return None
     if ca.jacobian_sparsity(slope, own).nnz():
         return None
-    found = -solve_with_regularity(slope, ca.substitute(rows, own, ca.SX.zeros(many)))[0]
+    found = -solve_by_determinants(slope, ca.substitute(rows, own, ca.SX.zeros(many)))
     if many == 1:
         return LinearForm(((found,),), ca.SX(0.0))
     det = slope[0, 0] * slope[1, 1] - slope[0, 1] * slope[1, 0]

@@ -9,7 +9,8 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from planar.equations.functions import EquationFunctions, slice_length
+from planar.equations.constraint_equations import slice_length
+from planar.equations.functions import EquationFunctions
 from planar.foundation.errors import NoAnswer, TrackingEnd
 from planar.solving.checks.branch_check import BranchCheck, solve_rates_batch
 from planar.solving.continuation.fast_path import STRAIGHT_TOLERANCE, FastSamples, fast_run

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from planar.equations.constraint_equations import Block
-from planar.equations.functions import EquationRates, slice_length
+from planar.equations.constraint_equations import Block, slice_length
+from planar.equations.functions import EquationRates
 from planar.foundation.errors import NoAnswer
 from planar.solving.continuation.path import correct_blocks
 from planar.solving.diagnosis import refusals
