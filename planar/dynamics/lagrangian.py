@@ -17,9 +17,10 @@ import casadi as ca
 import numpy as np
 
 from planar.dynamics.load_attachment import Attachment, attachments
+from planar.equations.coordinates import FRAME_PARTS, frames_from_coordinates
 from planar.equations.mechanism_numbers import mechanism_size, shapes_of_links
-from planar.equations.residuals import input_positions, pair_residuals
-from planar.foundation.geometry import GROUND, Vector, frame_at
+from planar.equations.residuals import input_positions, pair_residuals, scalars
+from planar.foundation.geometry import Vector
 from planar.foundation.jets import value_and_rates
 from planar.model.loads import COINCIDENCE_TOLERANCE, Load, Mass, Spring
 from planar.model.mechanism import Mechanism, relative_motions
@@ -47,16 +48,19 @@ class LagrangianFunctions:
         )
         self.factors = ca.SX.sym("f", len(mechanism.loads))
         self.spring_turns = ca.SX.sym("t", len(mechanism.springs))
-        self.frames = {mechanism.frame: GROUND} | {
-            link: frame_at(*(self.q[at + k] for k in range(3))) for link, at in self.link_columns.items()
-        }
         self.own_slices: dict[str, slice] = {}
         "of every pair: its own coordinates"
         at = self.link_coordinate_count
         for name, count in own.items():
             self.own_slices[name] = slice(at, at + count)
             at += count
-        self.own = {name: [self.q[k] for k in range(s.start, s.stop)] for name, s in self.own_slices.items()}
+        columns = {(link, part): at + k for link, at in self.link_columns.items() for k, part in enumerate(FRAME_PARTS)}
+        for pair in mechanism.pairs:
+            first = self.own_slices[pair.name].start
+            columns |= {(pair.name, part): first + k for k, (part, _) in enumerate(pair.coordinate_kinds)}
+        pairs = {pair.name: pair for pair in mechanism.pairs}
+        links = [link.name for link in mechanism.links]
+        self.frames, self.own = frames_from_coordinates(scalars(self.q), columns, links, pairs)
         self.numbers = {
             pair.name: pair.measure([self.shapes[link] for link in pair.bodies])
             for pair in (*mechanism.pairs, *self.relative_motions.values())
@@ -80,7 +84,7 @@ class LagrangianFunctions:
 
     def coordinates(self, moving: KinematicResult) -> tuple[Array, Array, Array]:
         """The coordinates of a state or a motion with their two rates (n, coordinates)."""
-        values = [getattr(moving.frames[link], part) for link in self.links for part in ("x", "y", "angle")]
+        values = [getattr(moving.frames[link], part) for link in self.links for part in FRAME_PARTS]
         values += [each for pair in self.mechanism.pairs for each in moving.own.get(pair.name, ())]
         parts = [value_and_rates(value)[:3] for value in values]
         many = max((np.size(part) for each in parts for part in each), default=1)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import casadi as ca
@@ -61,6 +62,16 @@ class ConstraintEquations:
     F: ca.SX
     input_kinds: tuple[MeasureKind, ...]
     """What every entry of u is."""
+
+    @cached_property
+    def y(self) -> ca.SX:
+        """(z, u): what changes in time."""
+        return ca.vertcat(self.z, self.u)
+
+    @cached_property
+    def jacobian(self) -> ca.SX:
+        """dF/dy (rows, y)."""
+        return ca.jacobian(self.F, self.y)
 
 
 class _MechanismCoordinates(NamedTuple):

@@ -13,6 +13,9 @@ from planar.model.pairs import MeasureKind, Pair
 
 Array = np.ndarray
 
+FRAME_PARTS = ("x", "y", "angle")
+"""The coordinates of a link."""
+
 
 class Coordinate(NamedTuple):
     """One entry of w: a part of a link's frame ("x", "y", "angle"), or a coordinate of a pair's own."""
@@ -41,7 +44,7 @@ def frames_from_coordinates(
     x, y and angle.
     """
     frames = {
-        link: make_frame(*(w[column[link, part]] for part in ("x", "y", "angle"))) if (link, "x") in column else GROUND
+        link: make_frame(*(w[column[link, part]] for part in FRAME_PARTS)) if (link, "x") in column else GROUND
         for link in links
     }
     own = {name: tuple(w[column[name, part]] for part, _ in pair.coordinate_kinds) for name, pair in pairs.items()}

@@ -85,10 +85,9 @@ class EquationFunctions:
     @cached_property
     def _block_functions(self) -> dict[int, ca.Function]:
         e = self.equations
-        slopes = ca.jacobian(e.F, e.z)
         return {
             stage.block_index: ca.Function(
-                "closing", [e.z, e.u, e.p], [e.F[stage.rows], ca.densify(slopes[stage.rows, stage.unknowns])]
+                "closing", [e.z, e.u, e.p], [e.F[stage.rows], ca.densify(e.jacobian[stage.rows, stage.unknowns])]
             )
             for stage in e.blocks
         }
@@ -150,17 +149,16 @@ class EquationFunctions:
         """(y, y1, y2, p) -> F and w, one after the other, with their first and second rates, and dF/dy."""
         e = self.equations
         both = ca.vertcat(e.F, e.w)
-        y = ca.vertcat(e.z, e.u)
+        y = e.y
         y1, y2 = rate_symbols(y, 2)
         first, second = time_derivatives(both, y, y1, y2)
-        slopes = ca.jacobian(e.F, y)
-        outputs = [ca.horzcat(both, first, second), slopes]
+        outputs = [ca.horzcat(both, first, second), e.jacobian]
         return ca.Function("kinematics", [y, y1, y2, e.p], [ca.densify(output) for output in outputs])
 
     @cached_property
     def _third_rate_function(self) -> ca.Function:
         e = self.equations
-        y = ca.vertcat(e.z, e.u)
+        y = e.y
         y1, y2 = rate_symbols(y, 2)
         third = time_derivatives(e.F, y, y1, y2, ca.SX.zeros(y.numel()))[-1]
         return ca.Function("third", [y, y1, y2, e.p], [ca.densify(third)])
@@ -168,7 +166,7 @@ class EquationFunctions:
     @cached_property
     def _jerk_function(self) -> ca.Function:
         e = self.equations
-        y = ca.vertcat(e.z, e.u)
+        y = e.y
         y1, y2, y3 = rate_symbols(y, 3)
         third = time_derivatives(ca.vertcat(e.F, e.w), y, y1, y2, y3)[-1]
         return ca.Function("jerks", [y, y1, y2, y3, e.p], [ca.densify(third)])
@@ -186,7 +184,7 @@ class EquationFunctions:
     @cached_property
     def _second_derivative_functions(self) -> tuple[ca.Function, ca.Function]:
         e = self.equations
-        y, way, rows = ca.vertcat(e.z, e.u), ca.SX.sym("way", e.z.numel() + e.u.numel()), ca.SX.sym("l", e.F.numel())
+        y, way, rows = e.y, ca.SX.sym("way", e.y.numel()), ca.SX.sym("l", e.F.numel())
         along = ca.jacobian(ca.jtimes(e.F, y, way), y)
         weighed = ca.jacobian(ca.jtimes(e.F, y, rows, True), y)
         return (
@@ -206,7 +204,7 @@ class EquationFunctions:
     def _deflated_function(self) -> ca.Function:
         e = self.equations
         z1, u1 = ca.SX.sym("z1", e.z.numel()), ca.SX.sym("u1", e.u.numel())
-        both = ca.vertcat(e.F, ca.jtimes(e.F, ca.vertcat(e.z, e.u), ca.vertcat(z1, u1)))
+        both = ca.vertcat(e.F, ca.jtimes(e.F, e.y, ca.vertcat(z1, u1)))
         slopes = ca.jacobian(both, ca.vertcat(e.z, z1))
         return ca.Function("deflated", [e.z, z1, e.u, u1, e.p], [ca.densify(both), ca.densify(slopes)])
 
@@ -270,8 +268,7 @@ class EquationFunctions:
     @cached_property
     def _jacobian_function(self) -> ca.Function:
         e = self.equations
-        slopes = ca.jacobian(e.F, ca.vertcat(e.z, e.u))
-        return ca.Function("slopes", [e.z, e.u, e.p], [ca.densify(slopes)])
+        return ca.Function("slopes", [e.z, e.u, e.p], [ca.densify(e.jacobian)])
 
     def jacobians(self, z: Array, u: Array, p: Array) -> tuple[Array, Array]:
         """dF/dz (samples, rows, unknowns) and dF/du (samples, rows, inputs) at z (samples, unknowns), u alike."""
@@ -288,8 +285,7 @@ class EquationFunctions:
     @cached_property
     def _residual_call(self) -> BufferedFunction:
         e = self.equations
-        slopes = ca.jacobian(e.F, ca.vertcat(e.z, e.u))
-        return BufferedFunction(ca.Function("left", [e.z, e.u, e.p], [ca.densify(e.F), ca.densify(slopes)]))
+        return BufferedFunction(ca.Function("left", [e.z, e.u, e.p], [ca.densify(e.F), ca.densify(e.jacobian)]))
 
     def residuals_and_jacobian(self, z: Array, u: Array, p: Array) -> tuple[Array, Array]:
         """F (rows,) and its slope (rows, unknowns and inputs) at one position."""

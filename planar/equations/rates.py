@@ -44,7 +44,7 @@ class UnknownRates:
 
     def __init__(self, e: ConstraintEquations, solve: Callable[[ca.SX, ca.SX], ca.SX] = solve_linear):
         """`solve` gives matrix^-1 right side, see `linear`."""
-        self.equations, self.y, self._solve = e, ca.vertcat(e.z, e.u), solve
+        self.equations, self.y, self._solve = e, e.y, solve
         self._y1, self._y2 = rate_symbols(self.y, 2)
         self._first, self._second = time_derivatives(e.F, self.y, self._y1, self._y2)
         self.jacobians = [block_jacobian(e, block.rows, block.unknowns) for block in e.blocks]

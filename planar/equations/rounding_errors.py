@@ -39,7 +39,7 @@ def rounding_terms(equations: ConstraintEquations, y: Array, y1: Array, y2: Arra
 @lru_cache(maxsize=16)
 def _rounding_function(e: ConstraintEquations) -> BufferedFunction:
     both = ca.vertcat(e.F, e.w)
-    y = ca.vertcat(e.z, e.u)
+    y = e.y
     y1, y2 = rate_symbols(y, 2)
     first, second = time_derivatives(both, y, y1, y2)
     slopes = [ca.jacobian(each, y) for each in (both, first, second)]

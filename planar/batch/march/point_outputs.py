@@ -54,5 +54,5 @@ class PointKernelWriter(KernelWriter):
         if not self.rates:
             return [places]
         z1, z2 = self.equations.rates(s["u1"], s["u2"])
-        y, y1, y2 = ca.vertcat(e.z, e.u), ca.vertcat(z1, s["u1"]), ca.vertcat(z2, s["u2"])
+        y, y1, y2 = e.y, ca.vertcat(z1, s["u1"]), ca.vertcat(z2, s["u2"])
         return [places, *first_and_second_rates(places, y, y1, y2)]

@@ -213,7 +213,7 @@ class FormulaBuilder:
         """x', y', angle', then the second ones of every inner link."""
         e, (u1, u2) = self.equations, self.symbols[2:]
         z1, z2 = UnknownRates(e, solve_by_determinants).first_and_second(u1, u2)
-        y, y1, y2 = ca.vertcat(e.z, e.u), ca.vertcat(z1, u1), ca.vertcat(z2, u2)
+        y, y1, y2 = e.y, ca.vertcat(z1, u1), ca.vertcat(z2, u2)
         w = e.w[: 3 * len(self.block_equations.inner_links)]
         both = ca.vertcat(*first_and_second_rates(w, y, y1, y2))
         values = self._inline((), [both], way.z)
