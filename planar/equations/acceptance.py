@@ -38,7 +38,7 @@ CARRIED_ROUNDING = 1e-3
 """The rates of a constraint are judged by its own terms, and by this part of the greatest speed anywhere: some rounding
 of that is carried round a loop into terms that are small, as where a link comes to rest."""
 MAX_BLOCK_SIZE = 12
-"""Unknowns of a group: the expressions of a larger one would be too long."""
+"""Unknowns of a block: the expressions of a larger one would be too long."""
 
 
 class AcceptanceResult(NamedTuple):
@@ -55,9 +55,9 @@ class AcceptanceResult(NamedTuple):
     contact_gap: Array
     "the greatest gap, or rate of one as a part of the greatest, of contacts that guides have to keep closed"
     regularity: Array
-    "no more than the least strength of any group, see `solving.rates.regularity`"
+    "no more than the least regularity of any block, see `solving.rates.regularity`"
     least_singular_value: Array
-    "no more than the least singular value of any group, columns of one size"
+    "no more than the least singular value of any block, columns of one size"
     rounding_amplification: Array
     "by how much, at most, round-off is greater in the rates, see `solving.rates.accuracy`"
 
@@ -72,22 +72,22 @@ class StepCheck(NamedTuple):
     deviation: float
     "how far the unknowns have gone aside of what the rates at its ends allow; 1 at most"
     forward_product: float
-    "negative where a group comes back"
+    "negative where a block comes back"
     regular_distance: float
-    "how far the two ends together are from where a group could be singular, in steps"
+    "how far the two ends together are from where a block could be singular, in steps"
     least_singular_value: float
-    "no more than the least singular value of any group at its ends, columns of one size"
+    "no more than the least singular value of any block at its ends, columns of one size"
 
 
 class AcceptanceFunctions:
-    """The compiled functions of one structure. Only for structures whose every group has as many constraints as
+    """The compiled functions of one structure. Only for structures whose every block has as many constraints as
     unknowns."""
 
     def __init__(self, structure: Mechanism, program: EquationFunctions):
         self.structure, self.functions, self.equations = structure, program, program.equations
-        sizes = [slice_length(stage.unknowns) for stage in self.equations.blocks]
+        sizes = [slice_length(block.unknowns) for block in self.equations.blocks]
         self.is_available = program.is_square and max(sizes, default=0) <= MAX_BLOCK_SIZE
-        self.block_starts = np.array([stage.unknowns.start for stage in self.equations.blocks], dtype=int)
+        self.block_starts = np.array([block.unknowns.start for block in self.equations.blocks], dtype=int)
 
     @cached_property
     def corrected_position(self) -> BufferedFunction:
@@ -98,7 +98,7 @@ class AcceptanceFunctions:
         given = [ca.SX.sym(name, size.numel()) for name, size in zip(names, sizes, strict=True)]
         settled, left = self.functions.newton_expressions(given[0], given[2], given[5])
         parts, verdict, *along = self._position(settled, *given[1:])
-        # one step from a position that is not closed to round-off does not make it so where groups are weak
+        # one step from a position that is not closed to round-off does not make it so where blocks are weak
         open_ = ca.fmax(verdict[0], greatest_entry(ca.fabs(left)))
         verdict = ca.vertcat(open_, verdict[1] + ca.sum1(left), verdict[2:])
         return BufferedFunction(function_with_cse("row", given, [settled, parts, verdict, *along]))
@@ -108,7 +108,7 @@ class AcceptanceFunctions:
         """(z, axis, u, u1, u2, p, by, least) -> (w, w1, w2), verdict, rates along the axis of the inputs, distances.
 
         `by` (rows,): what every row is divided by, `least` (unknowns,): the least sizes of columns, see
-        `solving.rates.regularity`. Distances (stages,) are along the axis: within them no group can become singular.
+        `solving.rates.regularity`. Distances (blocks,) are along the axis: within them no block can become singular.
         """
         return BufferedFunction(self._position)
 
@@ -122,12 +122,12 @@ class AcceptanceFunctions:
         z1, z2 = rates.first_and_second(u1, u2)
         w1, w2 = first_and_second_rates(e.w, rates.y, ca.vertcat(z1, u1), ca.vertcat(z2, u2))
         strength, lost = ca.SX(1.0), ca.SX(1.0)
-        for stage, block in zip(e.blocks, rates.jacobians, strict=True):
-            if slice_length(stage.unknowns):
-                own = regularity_bound(block, by[stage.rows], least[stage.unknowns])
+        for block, jacobian in zip(e.blocks, rates.jacobians, strict=True):
+            if slice_length(block.unknowns):
+                own = regularity_bound(jacobian, by[block.rows], least[block.unknowns])
                 strength = ca.fmin(strength, own)
-                for k in range(block.size2()):
-                    lost = ca.fmax(lost, 1.0 / (ca.norm_2(block[:, k]) * own * own))
+                for k in range(jacobian.size2()):
+                    lost = ca.fmax(lost, 1.0 / (ca.norm_2(jacobian[:, k]) * own * own))
         lost = lost * ca.fmax(greatest_entry(ca.fabs(e.w)) / np.pi, 1.0)
         clear, distances = regular_distances(rates, ca.vertcat(ways, axis))
         judged = self._residual_check(e.w, w1, w2, e.u, u1, u2, e.p)
@@ -157,7 +157,7 @@ class AcceptanceFunctions:
         change = ca.fabs(there - before) + 0.25 * ca.fmax(ca.fabs(before), ca.fabs(there)) + 1e-9
         astray = greatest_entry(ca.fabs(after - z - 0.5 * (before + there)) / change)
         turns = [
-            ca.dot(before[stage.unknowns], there[stage.unknowns]) for stage in e.blocks if slice_length(stage.unknowns)
+            ca.dot(before[block.unknowns], there[block.unknowns]) for block in e.blocks if slice_length(block.unknowns)
         ]
         onwards = ca.SX(1.0)
         for turn in turns:

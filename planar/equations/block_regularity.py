@@ -32,7 +32,7 @@ def greatest_entry(values: ca.SX) -> ca.SX:
 
 
 def regularity_bound(block: ca.SX, row_scale: ca.SX, column_floor: ca.SX) -> ca.SX:
-    """No more than the strength of a group, see `solving.rates.regularity`."""
+    """No more than the regularity of a block, see `solving.rates.regularity`."""
     scaled = block / ca.repmat(row_scale, 1, block.size2())
     sizes = [ca.fmax(ca.norm_2(scaled[:, k]), column_floor[k]) for k in range(block.size2())]
     low, high = _singular_value_bounds(scaled / ca.repmat(ca.horzcat(*sizes), block.size1(), 1))
@@ -54,7 +54,7 @@ def _singular_value_bounds(matrix: ca.SX) -> tuple[ca.SX, ca.SX]:
 
 
 def _regular_distance(block: ca.SX, y: ca.SX, direction: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """No more than the least singular value of a group, columns of one size, and how far along a way it is one at
+    """No more than the least singular value of a block, columns of one size, and how far along a direction it is one at
     least (Weyl), see `solving.checks.branch_check`."""
     change = ca.reshape(ca.jtimes(ca.vec(block), y, direction), block.shape)
     sizes = ca.horzcat(*(ca.norm_2(block[:, k]) for k in range(block.size2())))

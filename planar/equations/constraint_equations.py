@@ -47,7 +47,7 @@ def slice_length(part: slice) -> int:
 
 @dataclass(frozen=True, eq=False)
 class ConstraintEquations:
-    """See the module's symbol table; `coordinates`, `rows`, `unknowns` say which name owns which entry."""
+    """The symbols of `planar.equations`; `coordinates`, `rows`, `unknowns` say which name owns which entry."""
 
     coordinates: tuple[Coordinate, ...]
     unknowns: tuple[int, ...]
@@ -67,6 +67,13 @@ class ConstraintEquations:
     def y(self) -> ca.SX:
         """(z, u): what changes in time."""
         return ca.vertcat(self.z, self.u)
+
+    @property
+    def is_square(self) -> bool:
+        """Whether every block has as many rows as unknowns."""
+        return not any(
+            block.is_free or slice_length(block.rows) != slice_length(block.unknowns) for block in self.blocks
+        )
 
     @cached_property
     def jacobian(self) -> ca.SX:

@@ -47,13 +47,13 @@ class EquationRates(NamedTuple):
 
 
 class ClosedFormAssemblies:
-    """The two assemblies of one stage in closed form, carried to round-off by Newton's steps."""
+    """The two assemblies of one block in closed form, carried to round-off by Newton's steps."""
 
     def __init__(self, unknowns: slice, form: BufferedFunction, polished: BufferedFunction):
         self._unknowns, self._form, self._polished = unknowns, form, polished
 
     def __call__(self, z: Array, u: Array, p: Array) -> tuple[list[Array], float, float]:
-        """Both (unknowns,), what they leave open at most, and how near they are to where they meet (`ClosedForm`).
+        """Both (unknowns,), the greatest residual of the two, and how near they are to where they meet (`ClosedForm`).
 
         What is not there is not a number.
         """
@@ -78,48 +78,48 @@ class EquationFunctions:
     def __init__(self, equations: ConstraintEquations):
         self.equations = equations
 
-    def block_function(self, stage: Block) -> ca.Function:
-        """(z, u, p) -> F of this stage (rows,) and its slope in the stage's own unknowns (rows, unknowns)."""
-        return self._block_functions[stage.block_index]
+    def block_function(self, block: Block) -> ca.Function:
+        """(z, u, p) -> F of this block (rows,) and its Jacobian in the block's own unknowns (rows, unknowns)."""
+        return self._block_functions[block.block_index]
 
     @cached_property
     def _block_functions(self) -> dict[int, ca.Function]:
         e = self.equations
         return {
-            stage.block_index: ca.Function(
-                "closing", [e.z, e.u, e.p], [e.F[stage.rows], ca.densify(e.jacobian[stage.rows, stage.unknowns])]
+            block.block_index: ca.Function(
+                "closing", [e.z, e.u, e.p], [e.F[block.rows], ca.densify(e.jacobian[block.rows, block.unknowns])]
             )
-            for stage in e.blocks
+            for block in e.blocks
         }
 
-    def block_call(self, stage: Block) -> BufferedFunction:
-        """The same, called on arrays: F and the slope's columns (unknowns, rows)."""
-        if stage.block_index not in self._block_calls:
-            self._block_calls[stage.block_index] = BufferedFunction(self.block_function(stage))
-        return self._block_calls[stage.block_index]
+    def block_call(self, block: Block) -> BufferedFunction:
+        """The same, called on arrays: F and the Jacobian's columns (unknowns, rows)."""
+        if block.block_index not in self._block_calls:
+            self._block_calls[block.block_index] = BufferedFunction(self.block_function(block))
+        return self._block_calls[block.block_index]
 
     @cached_property
     def _block_calls(self) -> dict[int, BufferedFunction]:
         return {}
 
-    def block_assemblies(self, stage: Block) -> ClosedFormAssemblies | None:
-        """Both assemblies of a stage; None for one without a closed form."""
-        if stage.block_index not in self._block_assemblies:
-            form = find_closed_form(self.equations, stage)
-            self._block_assemblies[stage.block_index] = form and self._make_assemblies(stage, form)
-        return self._block_assemblies[stage.block_index]
+    def block_assemblies(self, block: Block) -> ClosedFormAssemblies | None:
+        """Both assemblies of a block; None for one without a closed form."""
+        if block.block_index not in self._block_assemblies:
+            form = find_closed_form(self.equations, block)
+            self._block_assemblies[block.block_index] = form and self._make_assemblies(block, form)
+        return self._block_assemblies[block.block_index]
 
     @cached_property
     def _block_assemblies(self) -> dict[int, ClosedFormAssemblies | None]:
         return {}
 
-    def _make_assemblies(self, stage: Block, form: ClosedForm) -> ClosedFormAssemblies:
+    def _make_assemblies(self, block: Block, form: ClosedForm) -> ClosedFormAssemblies:
         e = self.equations
         found = stack_expressions(ca.atan2(each[1], each[0]) if len(each) == 2 else each[0] for each in form.values)
-        left, slope = self.block_function(stage)(e.z, e.u, e.p)
-        polished = [e.z[stage.unknowns] - solve_linear(slope, left), ca.norm_inf(left)]
+        left, slope = self.block_function(block)(e.z, e.u, e.p)
+        polished = [e.z[block.unknowns] - solve_linear(slope, left), ca.norm_inf(left)]
         return ClosedFormAssemblies(
-            stage.unknowns,
+            block.unknowns,
             BufferedFunction(ca.Function("assembly", [e.z, e.u, e.p, form.sign], [found, form.coalescence])),
             BufferedFunction(ca.Function("polished", [e.z, e.u, e.p], polished)),
         )
@@ -193,7 +193,7 @@ class EquationFunctions:
         )
 
     def second_derivative_along(self, y: Array, direction: Array, p: Array) -> Array:
-        """The slope of (dF/dy) way (rows, y): the second derivatives of F with one direction filled in."""
+        """The second derivatives of F with one direction filled in (rows, y): the Jacobian of (dF/dy) direction."""
         return self._second_derivative_functions[0](y, direction, p).full()
 
     def weighted_hessian(self, y: Array, weights: Array, p: Array) -> Array:
@@ -209,7 +209,7 @@ class EquationFunctions:
         return ca.Function("deflated", [e.z, z1, e.u, u1, e.p], [ca.densify(both), ca.densify(slopes)])
 
     def deflated_system(self, z: Array, z1: Array, u: Array, u1: Array, p: Array) -> tuple[Array, Array]:
-        """F and its first time derivative (2 rows,), and their slope in z and z1 (2 rows, 2 unknowns).
+        """F and its first time derivative (2 rows,), and their Jacobian in z and z1 (2 rows, 2 unknowns).
 
         A. Leykin, J. Verschelde, A. Zhao, Newton's method with deflation for isolated singularities, Theor. Comp. Sci.
         359, 2006.
@@ -229,9 +229,9 @@ class EquationFunctions:
 
     @cached_property
     def newton_function(self) -> ca.Function:
-        """(z, u, p) -> z: Newton group after group, unrolled.
+        """(z, u, p) -> z: Newton block after block, unrolled.
 
-        Only for structures whose every group has as many constraints as unknowns.
+        Only for structures whose every block has as many constraints as unknowns.
         """
         e = self.equations
         z, u, p = (ca.SX.sym(name, each.numel()) for name, each in (("z", e.z), ("u", e.u), ("p", e.p)))
@@ -246,15 +246,17 @@ class EquationFunctions:
         return BufferedFunction(self.newton_function)
 
     def newton_expressions(self, z: ca.SX, u: ca.SX, p: ca.SX, steps: int = 1) -> tuple[ca.SX, ca.SX]:
-        """Unknowns after so many of Newton's steps, group after group, for structures as `advance` takes, and what each
-        group left open before its last step (rows,)."""
+        """Unknowns after so many of Newton's steps, block after block, and the residuals before the last (rows,).
+
+        For structures as `newton_function` takes.
+        """
         open_ = []
         now = ca.vertsplit(z) if z.numel() else []
-        for stage in self.equations.blocks:
-            for _ in range(steps if slice_length(stage.unknowns) else 0):
-                left, slope = self.block_function(stage)(ca.vertcat(*now), u, p)
-                now[stage.unknowns] = ca.vertsplit(ca.vertcat(*now[stage.unknowns]) - solve_linear(slope, left))
-            open_ += [left] if slice_length(stage.unknowns) else []
+        for block in self.equations.blocks:
+            for _ in range(steps if slice_length(block.unknowns) else 0):
+                left, slope = self.block_function(block)(ca.vertcat(*now), u, p)
+                now[block.unknowns] = ca.vertsplit(ca.vertcat(*now[block.unknowns]) - solve_linear(slope, left))
+            open_ += [left] if slice_length(block.unknowns) else []
         return stack_expressions(now), stack_expressions(open_)
 
     def run_samples(self, z: Array, u: Array, p: Array) -> Array:
@@ -288,7 +290,7 @@ class EquationFunctions:
         return BufferedFunction(ca.Function("left", [e.z, e.u, e.p], [ca.densify(e.F), ca.densify(e.jacobian)]))
 
     def residuals_and_jacobian(self, z: Array, u: Array, p: Array) -> tuple[Array, Array]:
-        """F (rows,) and its slope (rows, unknowns and inputs) at one position."""
+        """F (rows,) and its Jacobian (rows, unknowns and inputs) at one position."""
         if not len(self.equations.rows):
             return np.zeros(0), np.zeros((0, len(z) + len(u)))
         left, slope = self._residual_call(z, u, p)
@@ -296,11 +298,8 @@ class EquationFunctions:
 
     @cached_property
     def is_square(self) -> bool:
-        """Whether every group has as many constraints as unknowns."""
-        return all(
-            slice_length(stage.rows) == slice_length(stage.unknowns) and not stage.is_free
-            for stage in self.equations.blocks
-        )
+        """Whether every block has as many constraints as unknowns."""
+        return self.equations.is_square
 
 
 def function_with_cse(name: str, given: Sequence[ca.SX], wanted: Sequence[ca.SX]) -> ca.Function:

@@ -75,7 +75,7 @@ class KernelEquations:
 
     def __init__(self, equations: ConstraintEquations, mechanism: Mechanism, given: Sequence[str] = ()):
         e = self.equations = equations
-        if any(slice_length(s.rows) != slice_length(s.unknowns) or s.is_free for s in e.blocks):
+        if not e.is_square:
             raise UnsupportedOperation("constraints hold each other more than once")
         self.mechanism, self.given_links = mechanism, tuple(given)
         self.blocks = tuple(

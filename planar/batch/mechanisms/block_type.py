@@ -92,10 +92,7 @@ class BlockEquations:
         self.closed_forms = [find_closed_form(e, stage) or linear_form(e, stage) for stage in self.blocks]
         self.sign_count = sum(each is not None and isinstance(each, ClosedForm) for each in self.closed_forms)
         "how many groups in it can be assembled in two ways"
-        square = all(
-            slice_length(stage.rows) == slice_length(stage.unknowns) and not stage.is_free for stage in e.blocks
-        )
-        self.is_square = square and not any(pair.sample.counts_turns for pair in pairs)
+        self.is_square = e.is_square and not any(pair.sample.counts_turns for pair in pairs)
         "whether it can be solved without the whole"
 
     @property
