@@ -271,7 +271,7 @@ class _AssemblySearch:
             # the error of the next step is the square of this one, which the march looks at again
             done = np.max(np.abs(left), axis=1, initial=0.0) <= NEARLY_CLOSED_TOLERANCE
             self.regularity[busy] = column_volume(slope)
-            move = solve_vectors(slope, left, singular=None)
+            move = solve_vectors(slope, left, least_squares=True)
             far = np.maximum(np.max(np.abs(move), axis=1), LONGEST_NEWTON_STEP)[:, None] / LONGEST_NEWTON_STEP
             at[:, stage.unknowns] -= move / far
             if step == steps or np.all(done):

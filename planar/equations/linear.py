@@ -99,13 +99,13 @@ def _row_minors(rows: ca.SX, columns: Sequence[int]) -> list[tuple[tuple[int, ..
 def solve_arrays(
     matrices: Array,
     right_sides: Array,
-    singular: float | None = np.nan,
     least_determinant: float = 0.0,
+    least_squares: bool = False,
 ) -> Array:
     """matrices^-1 right sides (..., unknowns, k); matrices (..., rows, unknowns), right sides (..., rows, k).
 
-    `singular` is what the unknowns of a square matrix are whose determinant is not above `least_determinant`, or that
-    is not all numbers; None for those of least squares. With more rows, or fewer, than unknowns always least squares.
+    Not numbers where the determinant of a square matrix is not above `least_determinant`; with `least_squares` those
+    of least squares where there are more than two unknowns. With more rows, or fewer, than unknowns always those.
     """
     rows, unknowns = matrices.shape[-2:]
     if rows != unknowns:
@@ -122,21 +122,22 @@ def solve_arrays(
             return np.linalg.solve(matrices, right_sides)
         except np.linalg.LinAlgError:
             pass
-    regular = np.all(np.isfinite(matrices), axis=(-2, -1))
-    regular = regular & (np.abs(np.linalg.det(matrices)) > least_determinant)
+    known = np.all(np.isfinite(matrices), axis=(-2, -1))
+    regular = np.array(known)
+    regular[known] = np.abs(np.linalg.det(matrices[known])) > least_determinant
     right_sides = np.broadcast_to(right_sides, (*matrices.shape[:-1], right_sides.shape[-1]))
-    found = np.full(right_sides.shape, np.nan if singular is None else singular)
+    found = np.full(right_sides.shape, np.nan)
     found[regular] = np.linalg.solve(matrices[regular], right_sides[regular])
-    if singular is None:
+    if least_squares:
         found[~regular] = np.linalg.pinv(np.nan_to_num(matrices[~regular])) @ right_sides[~regular]
     return found
 
 
 def solve_vectors(
-    matrices: Array, vectors: Array, singular: float | None = np.nan, least_determinant: float = 0.0
+    matrices: Array, vectors: Array, least_determinant: float = 0.0, least_squares: bool = False
 ) -> Array:
     """The same of one vector each: vectors (..., rows) to (..., unknowns)."""
-    return solve_arrays(matrices, vectors[..., None], singular, least_determinant)[..., 0]
+    return solve_arrays(matrices, vectors[..., None], least_determinant, least_squares)[..., 0]
 
 
 def inverse_arrays(matrices: Array) -> Array:
