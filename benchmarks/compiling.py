@@ -73,7 +73,7 @@ def spent(structure: str) -> dict[str, float]:
     from planar.batch.march.llvm_runner import designs_kernel
     from planar.codegen import llvm_compile
     from planar.equations.functions import equation_functions
-    from planar.equations.functions import equation_structure as of
+    from planar.equations.mechanism_numbers import equation_structure as of
     from planar.model.mechanism import named_points
 
     document, point = STRUCTURES[structure]()

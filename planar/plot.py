@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from planar.document.files import save_file as write
 from planar.drawing.output.matplotlib_figure import draw_on_sheets, draw_pictures, encode_figure
 from planar.drawing.paper.scales import parse_scales
+from planar.foundation.safe_files import save_file as write
 
 # what only some drawings need is imported where they are made: that takes longer than to draw
 if TYPE_CHECKING:

@@ -14,7 +14,8 @@ import numpy as np
 
 from planar.assemblies.polynomial.completeness import Completeness
 from planar.assemblies.search_tree import BEST_TO_WORST, AssemblyPath, AssemblyTree
-from planar.equations.functions import frames_from_coordinates, slice_length
+from planar.equations.constraint_equations import slice_length
+from planar.equations.coordinates import frames_from_coordinates
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.geometry import Frame
 from planar.foundation.notebook_display import Displayable

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.assemblies.polynomial.completeness import BlockRoots, Completeness
-from planar.equations.constraint_equations import Block
-from planar.equations.functions import POLISHING_STEPS, slice_length
+from planar.equations.constraint_equations import Block, slice_length
+from planar.equations.functions import POLISHING_STEPS
 from planar.model.pairs import MeasureKind
 from planar.solving.assembly.block_assemblies import MEETING_COSINE_SQUARED, block_dependencies
 from planar.solving.newton import CLOSED_TOLERANCE

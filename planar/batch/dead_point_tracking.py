@@ -10,6 +10,7 @@ from planar.batch.march.backend import DesignBatch, LastGoodUnknowns
 from planar.batch.march.checks import DesignBranchCheck
 from planar.batch.march.design_functions import DesignFunctions
 from planar.batch.march.numpy_backend import DesignsAtStep, PointWriter, iterate_steps, make_residual_check
+from planar.equations.linear import solve_vectors
 
 Array = np.ndarray
 
@@ -124,10 +125,7 @@ def _solve_bordered(jacobians: Array, normal: Array, right: Array, last: float) 
     """x with slope x = left and normal x = last, for each design; not numbers where that is singular."""
     whole = np.concatenate([jacobians, normal[:, None]], axis=1)
     right = np.concatenate([right, np.full((len(right), 1), last)], axis=1)
-    fine = np.all(np.isfinite(whole), axis=(1, 2)) & (np.abs(np.linalg.det(whole)) > 1e-12)
-    found = np.full(right.shape, np.nan)
-    found[fine] = np.linalg.solve(whole[fine], right[fine, :, None])[..., 0]
-    return found
+    return solve_vectors(whole, right, least_determinant=1e-12)
 
 
 def follow_to_dead_points(

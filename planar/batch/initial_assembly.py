@@ -11,8 +11,9 @@ from planar.batch.march.backend import AssemblyCorrector
 from planar.batch.march.checks import column_volume
 from planar.batch.nearest_assemblies import CLEAR_REGULARITY, MAX_BLOCK_UNKNOWNS, NEAR_SKETCH, find_nearest_assemblies
 from planar.batch.reference_design import ReferenceDesign, shape_of_designs
-from planar.equations.constraint_equations import Block
-from planar.equations.functions import frames_from_coordinates, slice_length
+from planar.equations.constraint_equations import Block, slice_length
+from planar.equations.coordinates import frames_from_coordinates
+from planar.equations.linear import solve_vectors
 from planar.foundation.geometry import Vector
 from planar.model.link_shapes import LinkShape
 from planar.model.pairs import MeasureKind
@@ -270,7 +271,7 @@ class _AssemblySearch:
             # the error of the next step is the square of this one, which the march looks at again
             done = np.max(np.abs(left), axis=1, initial=0.0) <= NEARLY_CLOSED_TOLERANCE
             self.regularity[busy] = column_volume(slope)
-            move = _newton_step(left, slope)
+            move = solve_vectors(slope, left, least_squares=True)
             far = np.maximum(np.max(np.abs(move), axis=1), LONGEST_NEWTON_STEP)[:, None] / LONGEST_NEWTON_STEP
             at[:, stage.unknowns] -= move / far
             if step == steps or np.all(done):
@@ -407,18 +408,3 @@ class _AssemblySearch:
             # it may have assemblies that no start has led to: none of these is nearer than what is near
             sure &= least <= shown * (NEAR_SKETCH if largest <= MAX_BLOCK_UNKNOWNS else CLEAR_SKETCH_DISTANCE) ** 2
         return DesignAssemblies(z, sure, self.failed_block)
-
-
-def _newton_step(residuals: Array, jacobians: Array) -> Array:
-    """Newton's step back (designs, unknowns); left (designs, rows), slope (designs, rows, unknowns)."""
-    rows, unknowns = jacobians.shape[1:]
-    if rows == unknowns == 1:
-        return residuals / jacobians[:, :, 0]
-    if rows == unknowns == 2:
-        a, b, c, d = (jacobians[:, i, j] for i in (0, 1) for j in (0, 1))
-        one, two = residuals[:, 0], residuals[:, 1]
-        return np.stack([d * one - b * two, a * two - c * one], axis=1) / (a * d - b * c)[:, None]
-    try:
-        return np.linalg.solve(jacobians, residuals[:, :, None])[..., 0]
-    except np.linalg.LinAlgError:
-        return (np.linalg.pinv(np.nan_to_num(jacobians)) @ residuals[:, :, None])[..., 0]

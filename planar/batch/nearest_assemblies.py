@@ -9,8 +9,7 @@ import numpy as np
 
 from planar.batch.march.backend import AssemblyCorrector, CorrectedAssemblies, DesignBatch, UnsupportedStructure
 from planar.batch.reference_design import ReferenceDesign, stack_rows
-from planar.equations.constraint_equations import Block
-from planar.equations.functions import slice_length
+from planar.equations.constraint_equations import Block, slice_length
 from planar.model.link_shapes import LinkShape
 from planar.solving.assembly.block_assemblies import CLEAR_SKETCH_DISTANCE, SAME_ASSEMBLY_TOLERANCE, BlockAssemblies
 from planar.solving.assembly.nearest_assembly import EQUAL_DISTANCE_TOLERANCE

@@ -100,7 +100,7 @@ class PreparedSweep:
             from planar.batch.march.llvm_positions import PositionsKernel
             from planar.batch.march.llvm_runner import LONGEST_STEP, kernel_equations
             from planar.codegen.instructions import UnsupportedOperation
-            from planar.equations.functions import equation_structure
+            from planar.equations.mechanism_numbers import equation_structure
         except ImportError:
             return None
         u, _, _ = base_.inputs(base_.mechanism, 1)

@@ -10,7 +10,7 @@ import numpy as np
 
 from planar.batch.design_arrays import design_variables
 from planar.document.cursor import suggest_spelling
-from planar.equations.functions import scale_lengths
+from planar.equations.mechanism_numbers import scaled_pair_numbers
 from planar.foundation.errors import BadInput
 from planar.foundation.jets import Scalar
 from planar.model.dimensions import Dimension
@@ -98,7 +98,7 @@ class ReferenceDesign:
         """p (numbers, designs), lengths in units of the base's size."""
         rows: list[Scalar] = []
         for pair in self.mechanism.pairs:
-            rows += scale_lengths(pair.measure([shapes[link] for link in pair.bodies]), pair.number_kinds, self.unit)
+            rows += scaled_pair_numbers(pair, shapes, self.unit)
         return stack_rows(rows, many)
 
     def tolerance(self, p: Array) -> float:

@@ -20,7 +20,8 @@ from planar.batch.reference_design import reference_design
 from planar.batch.sweep import sweep
 from planar.bench.profiling import profile_cycle, profile_first_call, profile_sweep
 from planar.equations.constraint_equations import Block, ConstraintEquations, build_equations
-from planar.equations.functions import EquationFunctions, equation_structure
+from planar.equations.functions import EquationFunctions
+from planar.equations.mechanism_numbers import equation_structure
 from planar.foundation.errors import BadInput
 from planar.model.dimensions import Dimension
 from planar.model.mechanism import Mechanism

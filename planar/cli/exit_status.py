@@ -61,7 +61,7 @@ class CommandGroup(click.Group):
     def main(self, *args: Any, **more: Any) -> Any:
         """As click's, but that output which cannot be written ends in a status of its own, the last of it too."""
         if sys.stdout is None:
-            from planar.document.files import closed_output
+            from planar.foundation.safe_files import closed_output
 
             sys.stdout = closed_output()
         try:
@@ -156,7 +156,7 @@ def _exit_refused(
 
 def _exit_unwritable(problem: OSError) -> NoReturn:
     """End where what is printed cannot be written, quietly where nobody reads it any more."""
-    from planar.document.files import NO_SPACE_ERRORS, discard_stream
+    from planar.foundation.safe_files import NO_SPACE_ERRORS, discard_stream
 
     if problem.errno not in NO_SPACE_ERRORS:
         raise problem
@@ -173,6 +173,6 @@ def _print_error(sentence: str) -> None:
     try:
         click.echo(f"planar: {shown}", err=True)
     except OSError:
-        from planar.document.files import discard_stream
+        from planar.foundation.safe_files import discard_stream
 
         discard_stream(sys.stderr)

@@ -193,7 +193,7 @@ def print_or_write(renderable: Any, output: Path | None) -> None:
             console.width = 140
         console.print(renderable, crop=False)
         return
-    from planar.document.files import save_file
+    from planar.foundation.safe_files import save_file
     from planar.reports.files.table_files import encode_tables
 
     save_file(output, encode_tables(renderable, output.suffix))
@@ -237,7 +237,7 @@ def report_motion(
         click.echo(json.dumps(record(motion, more, facts or {}), ensure_ascii=False, allow_nan=False))
     else:
         if output is not None:
-            from planar.document.files import save_file
+            from planar.foundation.safe_files import save_file
 
             save_file(output, encode_run(motion, output.suffix, more, facts or {}))
         for each in tables():

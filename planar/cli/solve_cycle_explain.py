@@ -91,8 +91,8 @@ def explain(
     state, comparisons = _solve_model(model, mode, at, as_json, output)
     given = read(scales)
     if output is not None and on_pages:
-        from planar.document.files import save_file
         from planar.drawing.output.solution_pages import encode_sheets, solution_pages
+        from planar.foundation.safe_files import save_file
 
         with show_status(state.mechanism.name):
             save_file(output, encode_sheets(solution_pages(state, comparisons, given), output.suffix))

@@ -18,7 +18,7 @@ from contextvars import ContextVar
 from hashlib import sha256
 from pathlib import Path
 
-from planar.document.files import PARTIAL_FILE_NAME, read_private, write_private
+from planar.foundation.safe_files import PARTIAL_FILE_NAME, read_private, write_private
 
 MAX_CACHE_BYTES = 256 * 2**20
 """Bytes of all that is kept; those that have not been read for longest go first."""

@@ -1,4 +1,4 @@
-"""The instructions of a casadi function carried out on numbers of another kind: balls, or symbols."""
+"""The instructions of a casadi function carried out on numbers of another kind: balls, symbols, or new instructions."""
 
 from __future__ import annotations
 
@@ -23,15 +23,21 @@ OPERATIONS: Mapping[int, Callable[..., Any]] = {
 """What the coefficients of a linkage are made of."""
 
 
+def apply_operation(code: int, operands: Sequence[Any]) -> Any:
+    """What an operation of casadi makes of numbers of any kind. Raises KeyError for one that is not of `OPERATIONS`."""
+    return OPERATIONS[code](*operands)
+
+
 def evaluate_function(
     function: ca.Function,
     inputs: Sequence[Sequence[Any]],
     convert: Callable[[float], Any],
-    operations: Mapping[int, Callable[..., Any]] = OPERATIONS,
+    apply: Callable[[int, list[Any]], Any] = apply_operation,
 ) -> list[list[Any]]:
-    """The results of a function of dense matrices, column by column. Raises KeyError where it holds anything else."""
+    """The results of a function, dense, column by column; `convert` makes a constant, `apply` a casadi operation."""
     work: dict[int, Any] = {}
     found: list[list[Any]] = [[convert(0.0)] * function.numel_out(k) for k in range(function.n_out())]
+    places = [function.sparsity_out(k).find() for k in range(function.n_out())]
     for k in range(function.n_instructions()):
         code, out, of = function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)
         if code == ca.OP_INPUT:
@@ -39,7 +45,7 @@ def evaluate_function(
         elif code == ca.OP_CONST:
             work[out[0]] = convert(function.instruction_constant(k))
         elif code == ca.OP_OUTPUT:
-            found[out[0]][out[1]] = work[of[0]]
+            found[out[0]][places[out[0]][out[1]]] = work[of[0]]
         else:
-            work[out[0]] = operations[code](*(work[each] for each in of))
+            work[out[0]] = apply(code, [work[each] for each in of])
     return found

@@ -9,6 +9,8 @@ from typing import NamedTuple
 
 import casadi as ca
 
+from planar.codegen.generic_evaluation import evaluate_function
+
 UNARY_OPERATIONS = {
     ca.OP_NEG: "neg",
     ca.OP_SQRT: "sqrt",
@@ -116,21 +118,7 @@ class InstructionList:
 
     def inline_function(self, function: ca.Function, inputs: list[list[int]]) -> list[list[int]]:
         """A function of values: the numbers of its results, dense, column by column. Raises NotPrinted."""
-        work: dict[int, int] = {}
-        found = [[self.add_constant(0.0)] * function.numel_out(k) for k in range(function.n_out())]
-        places = [function.sparsity_out(k).find() for k in range(function.n_out())]
-        for k in range(function.n_instructions()):
-            code, out = function.instruction_id(k), function.instruction_output(k)
-            of = function.instruction_input(k)
-            if code == ca.OP_INPUT:
-                work[out[0]] = inputs[of[0]][of[1]]
-            elif code == ca.OP_CONST:
-                work[out[0]] = self.add_constant(function.instruction_constant(k))
-            elif code == ca.OP_OUTPUT:
-                found[out[0]][places[out[0]][out[1]]] = work[of[0]]
-            else:
-                work[out[0]] = self._add_operation(code, [work[each] for each in of])
-        return found
+        return evaluate_function(function, inputs, self.add_constant, self._add_operation)
 
     def _add_operation(self, code: int, of: list[int]) -> int:
         if code in BINARY_OPERATIONS:

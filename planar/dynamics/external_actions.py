@@ -14,7 +14,7 @@ import numpy as np
 
 from planar.dynamics.load_attachment import Attachment, attachments
 from planar.dynamics.load_variation import load_factors
-from planar.equations.functions import mechanism_size
+from planar.equations.mechanism_numbers import mechanism_size
 from planar.foundation.geometry import Frame, Vector
 from planar.foundation.jets import value_and_rates
 from planar.model.link_shapes import LinkShape

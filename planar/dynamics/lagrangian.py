@@ -10,19 +10,20 @@ inputs, whose drives are D q',
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from functools import cached_property, lru_cache
 
 import casadi as ca
 import numpy as np
 
 from planar.dynamics.load_attachment import Attachment, attachments
-from planar.equations.functions import mechanism_size, shapes_of_links
-from planar.foundation.geometry import GROUND, Frame, Vector, frame_at
+from planar.equations.coordinates import FRAME_PARTS, frames_from_coordinates
+from planar.equations.mechanism_numbers import mechanism_size, shapes_of_links
+from planar.equations.residuals import input_positions, pair_residuals, scalars
+from planar.foundation.geometry import Vector
 from planar.foundation.jets import value_and_rates
 from planar.model.loads import COINCIDENCE_TOLERANCE, Load, Mass, Spring
 from planar.model.mechanism import Mechanism, relative_motions
-from planar.model.pairs import Pair
 from planar.results.motion import KinematicResult
 
 Array = np.ndarray
@@ -47,15 +48,23 @@ class LagrangianFunctions:
         )
         self.factors = ca.SX.sym("f", len(mechanism.loads))
         self.spring_turns = ca.SX.sym("t", len(mechanism.springs))
-        self.frames = {mechanism.frame: GROUND} | {
-            link: frame_at(*(self.q[at + k] for k in range(3))) for link, at in self.link_columns.items()
-        }
         self.own_slices: dict[str, slice] = {}
         "of every pair: its own coordinates"
         at = self.link_coordinate_count
         for name, count in own.items():
             self.own_slices[name] = slice(at, at + count)
             at += count
+        columns = {(link, part): at + k for link, at in self.link_columns.items() for k, part in enumerate(FRAME_PARTS)}
+        for pair in mechanism.pairs:
+            first = self.own_slices[pair.name].start
+            columns |= {(pair.name, part): first + k for k, (part, _) in enumerate(pair.coordinate_kinds)}
+        pairs = {pair.name: pair for pair in mechanism.pairs}
+        links = [link.name for link in mechanism.links]
+        self.frames, self.own = frames_from_coordinates(scalars(self.q), columns, links, pairs)
+        self.numbers = {
+            pair.name: pair.measure([self.shapes[link] for link in pair.bodies])
+            for pair in (*mechanism.pairs, *self.relative_motions.values())
+        }
 
     def initial_spring_turns(self, q: Array) -> Array:
         """The whole turns (rad) by which links stand apart whose torsional springs do not count them (springs,).
@@ -75,7 +84,7 @@ class LagrangianFunctions:
 
     def coordinates(self, moving: KinematicResult) -> tuple[Array, Array, Array]:
         """The coordinates of a state or a motion with their two rates (n, coordinates)."""
-        values = [getattr(moving.frames[link], part) for link in self.links for part in ("x", "y", "angle")]
+        values = [getattr(moving.frames[link], part) for link in self.links for part in FRAME_PARTS]
         values += [each for pair in self.mechanism.pairs for each in moving.own.get(pair.name, ())]
         parts = [value_and_rates(value)[:3] for value in values]
         many = max((np.size(part) for each in parts for part in each), default=1)
@@ -85,17 +94,13 @@ class LagrangianFunctions:
     @cached_property
     def residuals(self) -> ca.SX:
         """What every constraint leaves open (rows,), m or rad."""
-        gaps = [row for pair in self.mechanism.pairs for row in pair.residual(*self.pair_arguments(pair))]
-        return ca.vertcat(*gaps) if gaps else ca.SX.zeros(0)
+        rows = pair_residuals(self.mechanism.pairs, self.frames, self.numbers, self.own)
+        return ca.vertcat(ca.SX(0, 1), *(value for _, value in rows))
 
     @cached_property
     def input_positions(self) -> ca.SX:
         """The positions of the inputs (inputs,)."""
-        drives = [
-            self.relative_motions[given.pair].input_position(*self.pair_arguments(self.relative_motions[given.pair]))
-            for given in self.mechanism.inputs
-        ]
-        return ca.vertcat(*drives) if drives else ca.SX.zeros(0)
+        return ca.vertcat(ca.SX(0, 1), *self._relative_positions(given.pair for given in self.mechanism.inputs))
 
     @cached_property
     def momentum(self) -> ca.SX:
@@ -122,11 +127,10 @@ class LagrangianFunctions:
             loads, efforts = loads + at * self.factors[k], efforts + relative * self.factors[k]
         return loads, efforts
 
-    def pair_arguments(self, pair: Pair) -> tuple[list[Frame], Sequence[float], list[ca.SX]]:
-        """What a pair's formulas take."""
-        own = self.own_slices.get(pair.name, slice(0, 0))
-        numbers = pair.measure([self.shapes[link] for link in pair.bodies])
-        return [self.frames[link] for link in pair.bodies], numbers, [self.q[k] for k in range(own.start, own.stop)]
+    def _relative_positions(self, names: Iterable[str]) -> list[ca.SX]:
+        """The positions of relative motions."""
+        motions = [self.relative_motions[name] for name in names]
+        return input_positions(motions, self.frames, self.numbers, self.own)
 
     @cached_property
     def energies(self) -> tuple[ca.SX, ca.SX, ca.SX]:
@@ -216,8 +220,8 @@ class LagrangianFunctions:
         if load.link is not None and load.torque is not None and load.link in self.link_columns:
             found[self.link_columns[load.link] + 2] += load.torque
         if load.pair is not None and load.effort is not None:
-            pair = self.relative_motions[load.pair]
-            effort += load.effort * ca.gradient(pair.input_position(*self.pair_arguments(pair)), q)
+            (position,) = self._relative_positions([load.pair])
+            effort += load.effort * ca.gradient(position, q)
         return found, effort
 
     def attachment_position(self, at: Attachment) -> Vector:

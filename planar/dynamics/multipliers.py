@@ -14,7 +14,7 @@ import numpy as np
 
 from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.virtual_work import BalanceFunction, VirtualWorkBalance
-from planar.equations.functions import mechanism_size
+from planar.equations.mechanism_numbers import mechanism_size
 from planar.foundation.geometry import Vector
 from planar.model.pairs import Pair
 from planar.model.pairs.base import ToothContact

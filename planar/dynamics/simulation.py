@@ -13,7 +13,7 @@ from planar.dynamics.equations_of_motion import EquationsOfMotion
 from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.lagrangian import lagrangian_functions
 from planar.dynamics.load_validation import check_loads
-from planar.equations.functions import mechanism_size
+from planar.equations.mechanism_numbers import mechanism_size
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.foundation.geometry import Frame, frame_at
 from planar.foundation.jets import Jet

@@ -1,1 +1,29 @@
-"""The constraint equations of a structure, and the compiled functions over z, u, p."""
+"""The constraint equations of a structure: residuals, rates, linear solves, and the compiled functions over z, u, p.
+
+The symbols, everywhere in this room and in those above it. Lengths are divided by the mechanism's size, angles are in
+rad, times in s; arrays of many positions have the samples first, arrays of many designs the designs last.
+
+======  ================================================================================  =======================
+z       unknowns: coordinates that remain after elimination, block after block            (unknowns,)
+u       inputs: x, y, angle of every given link, then the positions of the inputs         (inputs,)
+p       numbers: what the pairs take from the shapes of their links, pair after pair      (numbers,)
+w       coordinates: x, y, angle of every moving link, then every pair's own              (coordinates,)
+F       residuals: what the remaining constraints leave open, block after block           (rows,)
+y       (z, u), what changes in time; p does not                                          (unknowns + inputs,)
+z1, z2  first and second rates of z, so u1, u2 and y1, y2; w1, w2 of w, F1, F2 of F        as what they are rates of
+q       points of links whose positions are wanted (x, y each); in `dynamics` w in m       (2 points,)
+======  ================================================================================  =======================
+
+A *block* is a group of unknowns that is solved together, by a slice of the rows of F; blocks stand in the order in
+which they are solved, so that dF/dz is triangular by blocks. An entry of F or w is a length, or an angle: one that
+closes modulo a turn, or one in which whole turns count.
+
+coordinates           what stands in w, and the frames of links that it makes
+mechanism_numbers     structure, size and numbers p of a mechanism
+residuals             the residuals of all pairs and inputs, for every arithmetic
+linear                small linear systems, as expressions and for arrays
+constraint_equations  z, u, p, w, F built as casadi expressions: elimination, then blocks
+rates                 time derivatives of expressions in y, and of the unknowns
+functions             the same as compiled functions of arrays
+acceptance            all that a position has to pass, as one compiled function
+"""

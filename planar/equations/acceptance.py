@@ -5,30 +5,31 @@ It says yes to what is surely sound. To what it does not, the general path says 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 
+from planar.equations.block_regularity import greatest_entry, regular_distances, regularity_bound
 from planar.equations.casadi_call import BufferedFunction
-from planar.equations.constraint_equations import ConstraintEquations
+from planar.equations.constraint_equations import slice_length
+from planar.equations.coordinates import coordinate_columns, frames_from_coordinates
 from planar.equations.elimination import stack_expressions
 from planar.equations.functions import (
     MAX_CACHED_STRUCTURES,
     RUN_NEWTON_STEPS,
     EquationFunctions,
     equation_functions,
-    equation_structure,
-    frames_from_coordinates,
     function_with_cse,
-    slice_length,
-    solve_linear,
 )
+from planar.equations.mechanism_numbers import equation_structure
+from planar.equations.rates import UnknownRates, first_and_second_rates, time_derivatives
+from planar.equations.residuals import closing_error, residuals, scalars, split_pair_numbers
 from planar.foundation.geometry import Frame, frame_at, frame_term_sizes
 from planar.foundation.jets import Jet, TermSizes, term_sizes
-from planar.model.mechanism import Mechanism, relative_motions
+from planar.model.mechanism import Mechanism
 from planar.model.pairs import MeasureKind
 
 Array = np.ndarray
@@ -37,7 +38,7 @@ CARRIED_ROUNDING = 1e-3
 """The rates of a constraint are judged by its own terms, and by this part of the greatest speed anywhere: some rounding
 of that is carried round a loop into terms that are small, as where a link comes to rest."""
 MAX_BLOCK_SIZE = 12
-"""Unknowns of a group: the expressions of a larger one would be too long."""
+"""Unknowns of a block: the expressions of a larger one would be too long."""
 
 
 class AcceptanceResult(NamedTuple):
@@ -54,11 +55,11 @@ class AcceptanceResult(NamedTuple):
     contact_gap: Array
     "the greatest gap, or rate of one as a part of the greatest, of contacts that guides have to keep closed"
     regularity: Array
-    "no more than the least strength of any group, see `solving.freedom`"
+    "no more than the least regularity of any block, see `solving.rates.regularity`"
     least_singular_value: Array
-    "no more than the least singular value of any group, columns of one size"
+    "no more than the least singular value of any block, columns of one size"
     rounding_amplification: Array
-    "by how much, at most, round-off is greater in the rates, see `solving.accuracy`"
+    "by how much, at most, round-off is greater in the rates, see `solving.rates.accuracy`"
 
 
 class StepCheck(NamedTuple):
@@ -71,22 +72,22 @@ class StepCheck(NamedTuple):
     deviation: float
     "how far the unknowns have gone aside of what the rates at its ends allow; 1 at most"
     forward_product: float
-    "negative where a group comes back"
+    "negative where a block comes back"
     regular_distance: float
-    "how far the two ends together are from where a group could be singular, in steps"
+    "how far the two ends together are from where a block could be singular, in steps"
     least_singular_value: float
-    "no more than the least singular value of any group at its ends, columns of one size"
+    "no more than the least singular value of any block at its ends, columns of one size"
 
 
 class AcceptanceFunctions:
-    """The compiled functions of one structure. Only for structures whose every group has as many constraints as
+    """The compiled functions of one structure. Only for structures whose every block has as many constraints as
     unknowns."""
 
     def __init__(self, structure: Mechanism, program: EquationFunctions):
         self.structure, self.functions, self.equations = structure, program, program.equations
-        sizes = [slice_length(stage.unknowns) for stage in self.equations.blocks]
+        sizes = [slice_length(block.unknowns) for block in self.equations.blocks]
         self.is_available = program.is_square and max(sizes, default=0) <= MAX_BLOCK_SIZE
-        self.block_starts = np.array([stage.unknowns.start for stage in self.equations.blocks], dtype=int)
+        self.block_starts = np.array([block.unknowns.start for block in self.equations.blocks], dtype=int)
 
     @cached_property
     def corrected_position(self) -> BufferedFunction:
@@ -97,8 +98,8 @@ class AcceptanceFunctions:
         given = [ca.SX.sym(name, size.numel()) for name, size in zip(names, sizes, strict=True)]
         settled, left = self.functions.newton_expressions(given[0], given[2], given[5])
         parts, verdict, *along = self._position(settled, *given[1:])
-        # one step from a position that is not closed to round-off does not make it so where groups are weak
-        open_ = ca.fmax(verdict[0], _maximum(ca.fabs(left)))
+        # one step from a position that is not closed to round-off does not make it so where blocks are weak
+        open_ = ca.fmax(verdict[0], greatest_entry(ca.fabs(left)))
         verdict = ca.vertcat(open_, verdict[1] + ca.sum1(left), verdict[2:])
         return BufferedFunction(function_with_cse("row", given, [settled, parts, verdict, *along]))
 
@@ -107,7 +108,7 @@ class AcceptanceFunctions:
         """(z, axis, u, u1, u2, p, by, least) -> (w, w1, w2), verdict, rates along the axis of the inputs, distances.
 
         `by` (rows,): what every row is divided by, `least` (unknowns,): the least sizes of columns, see
-        `solving.freedom`. Distances (stages,) are along the axis: within them no group can become singular.
+        `solving.rates.regularity`. Distances (blocks,) are along the axis: within them no block can become singular.
         """
         return BufferedFunction(self._position)
 
@@ -116,22 +117,19 @@ class AcceptanceFunctions:
         e = self.equations
         axis, u1, u2 = (ca.SX.sym(name, e.u.numel()) for name in ("axis", "u1", "u2"))
         by, least = ca.SX.sym("by", e.F.numel()), ca.SX.sym("least", e.z.numel())
-        rates = _RateExpressions(e)
+        rates = UnknownRates(e)
         ways = rates.first(axis)
-        z1 = rates.first(u1)
-        z2 = rates.second(z1, u1, u2)
-        w1 = ca.jtimes(e.w, rates.y, rates.v)
-        w2 = ca.jtimes(w1, rates.y, rates.v) + ca.jtimes(e.w, rates.y, rates.a)
-        w1, w2 = ca.substitute([w1, w2], [rates.v, rates.a], [ca.vertcat(z1, u1), ca.vertcat(z2, u2)])
+        z1, z2 = rates.first_and_second(u1, u2)
+        w1, w2 = first_and_second_rates(e.w, rates.y, ca.vertcat(z1, u1), ca.vertcat(z2, u2))
         strength, lost = ca.SX(1.0), ca.SX(1.0)
-        for stage, block in zip(e.blocks, rates.blocks, strict=True):
-            if slice_length(stage.unknowns):
-                own = _regularity_bound(block, by[stage.rows], least[stage.unknowns])
+        for block, jacobian in zip(e.blocks, rates.jacobians, strict=True):
+            if slice_length(block.unknowns):
+                own = regularity_bound(jacobian, by[block.rows], least[block.unknowns])
                 strength = ca.fmin(strength, own)
-                for k in range(block.size2()):
-                    lost = ca.fmax(lost, 1.0 / (ca.norm_2(block[:, k]) * own * own))
-        lost = lost * ca.fmax(_maximum(ca.fabs(e.w)) / np.pi, 1.0)
-        clear, distances = rates.regular_distances(ca.vertcat(ways, axis))
+                for k in range(jacobian.size2()):
+                    lost = ca.fmax(lost, 1.0 / (ca.norm_2(jacobian[:, k]) * own * own))
+        lost = lost * ca.fmax(greatest_entry(ca.fabs(e.w)) / np.pi, 1.0)
+        clear, distances = regular_distances(rates, ca.vertcat(ways, axis))
         judged = self._residual_check(e.w, w1, w2, e.u, u1, u2, e.p)
         outputs = [ca.horzcat(e.w, w1, w2), stack_expressions([*judged, strength, clear, lost]), ways, distances]
         given = [e.z, axis, e.u, u1, u2, e.p, by, least]
@@ -140,14 +138,14 @@ class AcceptanceFunctions:
     @cached_property
     def step_check(self) -> BufferedFunction:
         """(z, u, step of u, p) -> z after the step, and what is judged of the step, see `Stride`."""
-        e, rates = self.equations, _RateExpressions(self.equations)
+        e, rates = self.equations, UnknownRates(self.equations)
         z, u, du, p = (
             ca.SX.sym(name, size.numel())
             for name, size in zip(("z", "u", "du", "p"), (e.z, e.u, e.u, e.p), strict=True)
         )
         first = rates.first(du)
         second = rates.second(first, du, ca.SX.zeros(e.u.numel()))
-        clear, distances = rates.regular_distances(ca.vertcat(first, du))
+        clear, distances = regular_distances(rates, ca.vertcat(first, du))
         end = ca.Function("end", [e.z, e.u, du, e.p], [first, second, stack_expressions([clear]), distances])
         before, bend, clear, room = end(z, u, du, p)
         after = self.functions.newton_expressions(z + before + 0.5 * bend, u + du, p, RUN_NEWTON_STEPS)[0]
@@ -157,9 +155,9 @@ class AcceptanceFunctions:
         still = ca.SX.zeros(e.u.numel()), ca.SX.zeros(e.u.numel())
         open_, whole = self._residual_check(w, *none, u + du, *still, p)[:2]
         change = ca.fabs(there - before) + 0.25 * ca.fmax(ca.fabs(before), ca.fabs(there)) + 1e-9
-        astray = _maximum(ca.fabs(after - z - 0.5 * (before + there)) / change)
+        astray = greatest_entry(ca.fabs(after - z - 0.5 * (before + there)) / change)
         turns = [
-            ca.dot(before[stage.unknowns], there[stage.unknowns]) for stage in e.blocks if slice_length(stage.unknowns)
+            ca.dot(before[block.unknowns], there[block.unknowns]) for block in e.blocks if slice_length(block.unknowns)
         ]
         onwards = ca.SX(1.0)
         for turn in turns:
@@ -172,7 +170,7 @@ class AcceptanceFunctions:
         return BufferedFunction(function_with_cse("stride", [z, u, du, p], [after, ca.densify(judged)]))
 
     def _residual_check(self, *given: ca.SX) -> list[ca.SX]:
-        """What `solving.gate` judges, from coordinates and rates alone: nothing of the elimination is believed."""
+        """What `ResidualCheck` of `solving` judges, by coordinates and rates alone, without the elimination."""
         e = self.equations
         w, w1, w2 = (ca.SX.sym(name, e.w.numel()) for name in ("w", "w1", "w2"))
         u, u1, u2, p = (
@@ -182,31 +180,27 @@ class AcceptanceFunctions:
         whole = self._term_sizes((w, w1, w2), (u, u1, u2), p)
         x, x1, x2 = ca.vertcat(w, u), ca.vertcat(w1, u1), ca.vertcat(w2, u2)
 
-        def rates(of: ca.SX) -> tuple[ca.SX, ca.SX]:
-            once = ca.jtimes(of, x, x1)
-            return once, ca.jtimes(once, x, x1) + ca.jtimes(of, x, x2)
-
-        gaps = [
-            ca.fabs(ca.sin(left)) + 1.0 - ca.cos(left) if kind is MeasureKind.ANGLE else ca.fabs(left)
-            for kind, left in zip(kinds, ca.vertsplit(closures) if kinds else [], strict=True)
-        ]
+        gaps = [ca.fabs(closing_error(left, kind)) for kind, left in zip(kinds, scalars(closures), strict=True)]
         broken = []
         lengths = [k for k, kind in enumerate(kinds) if kind is MeasureKind.LENGTH]
         fastest = ca.SX(0.0)
-        for order, left in enumerate(rates(closures), 1):
+        for order, left in enumerate(time_derivatives(closures, x, x1, x2), 1):
             scale = stack_expressions(size.parts[order] for size in whole)
             # a velocity counts as one in an arc of the size: what turning leaves there but for rounding is none
-            fastest = ca.fmax(_maximum(scale[lengths]), fastest**2)
+            fastest = ca.fmax(greatest_entry(scale[lengths]), fastest**2)
             scale = scale + CARRIED_ROUNDING * fastest
-            broken.append(_maximum(ca.fabs(left) / ca.if_else(scale == 0.0, 1.0, scale)))
+            broken.append(greatest_entry(ca.fabs(left) / ca.if_else(scale == 0.0, 1.0, scale)))
         greatest = self._greatest_rates(w1, w2)
-        open_ = [
-            _maximum(ca.fabs(each) / size)
-            for each, size in zip((contacts, *rates(contacts)), (1.0, *greatest), strict=True)
-        ]
-        many = ca.fmax(_maximum(ca.fabs(counted)) / (2.0 * np.pi), 1.0)
+        moving = (contacts, *time_derivatives(contacts, x, x1, x2))
+        open_ = [greatest_entry(ca.fabs(each) / size) for each, size in zip(moving, (1.0, *greatest), strict=True)]
+        many = ca.fmax(greatest_entry(ca.fabs(counted)) / (2.0 * np.pi), 1.0)
         total = sum(gaps, ca.SX(0.0)) + ca.sum1(ca.vertcat(w, w1, w2))
-        verdict = [_maximum(stack_expressions(gaps)) / many, total, *broken, _maximum(stack_expressions(open_))]
+        verdict = [
+            greatest_entry(stack_expressions(gaps)) / many,
+            total,
+            *broken,
+            greatest_entry(stack_expressions(open_)),
+        ]
         inner = ca.Function("gate", [w, w1, w2, u, u1, u2, p], verdict)
         return list(inner(*given))
 
@@ -217,7 +211,7 @@ class AcceptanceFunctions:
             for k, each in enumerate(self.equations.coordinates)
             if each.of_link and each.kind is not MeasureKind.LENGTH
         ]
-        found = [_maximum(ca.fabs(w1)), ca.fmax(_maximum(ca.fabs(w2)), _maximum(w1[turns] ** 2))]
+        found = [greatest_entry(ca.fabs(w1)), ca.fmax(greatest_entry(ca.fabs(w2)), greatest_entry(w1[turns] ** 2))]
         return [ca.if_else(each == 0.0, 1.0, each) for each in found]
 
     def _term_sizes(self, w: tuple[ca.SX, ...], u: tuple[ca.SX, ...], p: ca.SX) -> list[TermSizes]:
@@ -225,138 +219,31 @@ class AcceptanceFunctions:
         sizes = [term_sizes(Jet(*each)) for each in zip(*(ca.vertsplit(each) for each in w), strict=True)]
         frames, own = self._frames_from_coordinates(sizes, frame_term_sizes)
         given = [term_sizes(Jet(*each)) for each in zip(*(ca.vertsplit(each) for each in u), strict=True)]
-        return [each for _, each in self._constraint_residuals(frames, own, given, p)]
+        numbers = split_pair_numbers(self.structure.pairs, p)
+        return [each for _, each in residuals(self.structure, frames, numbers, own, given)]
 
     def _frames_from_coordinates(
         self, w: Sequence[Any], frame: Callable[..., Frame]
     ) -> tuple[dict[str, Frame], dict[str, tuple]]:
-        column = {(c.owner, c.part): k for k, c in enumerate(self.equations.coordinates)}
         pairs = {pair.name: pair for pair in self.structure.pairs}
-        return frames_from_coordinates(w, column, [link.name for link in self.structure.links], pairs, frame)
-
-    def _constraint_residuals(
-        self, frames: dict[str, Frame], own: dict[str, tuple], u: Sequence[Any], p: ca.SX
-    ) -> Iterator[tuple[MeasureKind, Any]]:
-        """(kind, what is left open) of every constraint, then of every input."""
-        mechanism, values = self.structure, iter(ca.vertsplit(p) if p.numel() else ())
-        numbers: dict[str, list[ca.SX]] = {}
-        for pair in mechanism.pairs:
-            numbers[pair.name] = [next(values) for _ in pair.number_kinds]
-            left = pair.residual([frames[link] for link in pair.bodies], numbers[pair.name], own[pair.name])
-            yield from zip(pair.residual_kinds, left, strict=True)
-        named = relative_motions(mechanism)
-        for given, at in zip(mechanism.inputs, u, strict=True):
-            pair = named[given.pair]
-            known = numbers.get(pair.name, [])
-            yield (
-                pair.input_kind,
-                pair.input_position([frames[link] for link in pair.bodies], known, own.get(pair.name, ())) - at,
-            )
+        columns = coordinate_columns(self.equations.coordinates)
+        return frames_from_coordinates(w, columns, [link.name for link in self.structure.links], pairs, frame)
 
     def _residuals_and_contacts(self, w: ca.SX, u: ca.SX, p: ca.SX) -> tuple[ca.SX, list[MeasureKind], ca.SX, ca.SX]:
         """What every constraint and every input leaves open with its kind, gaps of contacts, and what counts turns."""
-        mechanism, first = self.structure, 0
         frames, own = self._frames_from_coordinates(ca.vertsplit(w), frame_at)
-        rows = list(self._constraint_residuals(frames, own, ca.vertsplit(u) if u.numel() else [], p))
-        contacts: list[ca.SX] = []
-        for pair in mechanism.pairs:
-            gap = pair.contact_gap([p[first + k] for k in range(len(pair.number_kinds))], own[pair.name])
-            first += len(pair.number_kinds)
-            contacts += [gap] if isinstance(gap, ca.SX) else []
+        numbers = split_pair_numbers(self.structure.pairs, p)
+        rows = list(residuals(self.structure, frames, numbers, own, u))
+        gaps = [pair.contact_gap(numbers[pair.name], own[pair.name]) for pair in self.structure.pairs]
+        contacts = [gap for gap in gaps if isinstance(gap, ca.SX)]
         counted = [frame.angle for frame in frames.values() if not frame.fixed]
         counted += [each for values in own.values() for each in values]
         return (
             stack_expressions(left for _, left in rows),
-            [kind for kind, _ in rows],
+            [row.kind for row, _ in rows],
             stack_expressions(contacts),
             stack_expressions(counted),
         )
-
-
-class _RateExpressions:
-    """Rates of the unknowns as expressions, stage after stage."""
-
-    def __init__(self, e: ConstraintEquations):
-        self.e, self.y = e, ca.vertcat(e.z, e.u)
-        self.v, self.a = ca.SX.sym("v", self.y.numel()), ca.SX.sym("a", self.y.numel())
-        self.first_rate = ca.jtimes(e.F, self.y, self.v)
-        self.second_rate = ca.jtimes(self.first_rate, self.y, self.v) + ca.jtimes(e.F, self.y, self.a)
-        self.blocks = [ca.densify(ca.jacobian(e.F[stage.rows], e.z[stage.unknowns])) for stage in e.blocks]
-
-    def first(self, u1: ca.SX) -> ca.SX:
-        """The first rates of the unknowns for those of the inputs."""
-        return self._solve_blocks(self.first_rate, self.v, u1)
-
-    def second(self, z1: ca.SX, u1: ca.SX, u2: ca.SX) -> ca.SX:
-        """Their second rates."""
-        return self._solve_blocks(ca.substitute(self.second_rate, self.v, ca.vertcat(z1, u1)), self.a, u2)
-
-    def _solve_blocks(self, rate: ca.SX, unknown_rates: ca.SX, input_rates: ca.SX) -> ca.SX:
-        """The part of `way` that belongs to the unknowns, so that a rate linear in it vanishes."""
-        many = self.e.z.numel()
-        if not many:
-            return ca.SX(0, 1)
-        names, values = [unknown_rates[many:]], [input_rates]
-        for stage, block in zip(self.e.blocks, self.blocks, strict=True):
-            if slice_length(stage.unknowns):
-                # later unknowns may stand in the expression, but cancel
-                ahead = unknown_rates[stage.unknowns.start : many]
-                rest = ca.substitute(rate[stage.rows], ahead, ca.SX.zeros(ahead.numel()))
-                names.append(unknown_rates[stage.unknowns])
-                values.append(-solve_linear(block, rest))
-        return ca.substitute_inplace(names, values, [unknown_rates[:many]])[1][0]
-
-    def regular_distances(self, along: ca.SX) -> tuple[ca.SX, ca.SX]:
-        """The least singular value of any group, and how far along a way each group is regular (stages,)."""
-        clear, distances = ca.SX(1.0), []
-        for stage, block in zip(self.e.blocks, self.blocks, strict=True):
-            if not slice_length(stage.unknowns):
-                distances.append(ca.SX(np.inf))
-                continue
-            value, distance = _regular_distance(block, self.y, along)
-            clear = ca.fmin(clear, value)
-            distances.append(distance)
-        return clear, stack_expressions(distances)
-
-
-def _maximum(values: ca.SX) -> ca.SX:
-    """The greatest of a column of numbers from zero on."""
-    found = ca.SX(0.0)
-    for value in ca.vertsplit(values) if values.numel() else []:
-        found = ca.fmax(found, value)
-    return found
-
-
-def _regularity_bound(block: ca.SX, row_scale: ca.SX, column_floor: ca.SX) -> ca.SX:
-    """No more than the strength of a group, see `solving.freedom`."""
-    scaled = block / ca.repmat(row_scale, 1, block.size2())
-    sizes = [ca.fmax(ca.norm_2(scaled[:, k]), column_floor[k]) for k in range(block.size2())]
-    low, high = _singular_value_bounds(scaled / ca.repmat(ca.horzcat(*sizes), block.size1(), 1))
-    return low / ca.fmax(1.0, high)
-
-
-def _singular_value_bounds(matrix: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """No more than the least singular value of a square matrix, and no less than the greatest; of two by two exact."""
-    if matrix.numel() == 1:
-        return ca.fabs(matrix), ca.fabs(matrix)
-    square = ca.sumsqr(matrix)
-    if matrix.numel() == 4:
-        det = ca.fabs(matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0])
-        greatest = ca.sqrt(0.5 * (square + ca.sqrt(ca.fmax(square * square - 4.0 * det * det, 0.0))))
-        return det / greatest, greatest
-    # the inverse is as large as that of the triangle
-    inverse = ca.solve(ca.qr(matrix)[1], ca.SX.eye(matrix.size1()))
-    return 1.0 / ca.norm_fro(inverse), ca.sqrt(square)
-
-
-def _regular_distance(block: ca.SX, y: ca.SX, direction: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """No more than the least singular value of a group, columns of one size, and how far along a way it is one at
-    least (Weyl), see `solving.branch`."""
-    change = ca.reshape(ca.jtimes(ca.vec(block), y, direction), block.shape)
-    sizes = ca.horzcat(*(ca.norm_2(block[:, k]) for k in range(block.size2())))
-    whole = ca.repmat(sizes, block.size1(), 1)
-    value = _singular_value_bounds(block / whole)[0]
-    return value, value / ca.fmax(ca.norm_fro(change / whole), 1e-300)
 
 
 def acceptance_functions(mechanism: Mechanism) -> AcceptanceFunctions:

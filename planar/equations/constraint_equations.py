@@ -1,26 +1,20 @@
 """The constraint equations of a mechanism, built once as casadi SX, split into groups and shortened inside each.
 
-Symbol table, used in every room above this one (lengths divided by the mechanism's size, angles in rad):
-
-====  ==========================================================================  ============
-z     unknown coordinates that remain after elimination                           (unknowns,)
-u     x, y, angle of every given link, then positions of the inputs, in order     (inputs,)
-p     numbers that the pairs take from the shapes of their links                  (numbers,)
-w     x, y, angle of every moving link, then every pair's own coordinates         (coordinates,)
-F     what the remaining constraints leave open, group after group                (rows,)
-====  ==========================================================================  ============
+The symbols z, u, p, w and F are those of the table in `planar.equations`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
 from planar.equations.block_decomposition import decompose_blocks
+from planar.equations.coordinates import Coordinate
 from planar.equations.elimination import (
     CoordinateSymbols,
     EliminationSteps,
@@ -29,25 +23,10 @@ from planar.equations.elimination import (
     split_constant_factors,
     stack_expressions,
 )
+from planar.equations.residuals import ConstraintRow, residuals, split_pair_numbers, wrapped_residual
 from planar.foundation.geometry import GROUND, Frame, frame_at
 from planar.model.mechanism import Mechanism, relative_motions
-from planar.model.pairs import MeasureKind, Pair
-
-
-class Coordinate(NamedTuple):
-    """One entry of w: a part of a link's frame ("x", "y", "angle"), or a coordinate of a pair's own."""
-
-    owner: str
-    part: str
-    kind: MeasureKind
-    of_link: bool
-
-
-class ConstraintRow(NamedTuple):
-    """One constraint: of a pair, or of an input at it."""
-
-    pair: str
-    kind: MeasureKind
+from planar.model.pairs import MeasureKind
 
 
 class Block(NamedTuple):
@@ -61,9 +40,14 @@ class Block(NamedTuple):
     block_index: int
 
 
+def slice_length(part: slice) -> int:
+    """How many entries a part of z or F has."""
+    return part.stop - part.start
+
+
 @dataclass(frozen=True, eq=False)
 class ConstraintEquations:
-    """See the module's symbol table; `coordinates`, `rows`, `unknowns` say which name owns which entry."""
+    """The symbols of `planar.equations`; `coordinates`, `rows`, `unknowns` say which name owns which entry."""
 
     coordinates: tuple[Coordinate, ...]
     unknowns: tuple[int, ...]
@@ -78,6 +62,23 @@ class ConstraintEquations:
     F: ca.SX
     input_kinds: tuple[MeasureKind, ...]
     """What every entry of u is."""
+
+    @cached_property
+    def y(self) -> ca.SX:
+        """(z, u): what changes in time."""
+        return ca.vertcat(self.z, self.u)
+
+    @property
+    def is_square(self) -> bool:
+        """Whether every block has as many rows as unknowns."""
+        return not any(
+            block.is_free or slice_length(block.rows) != slice_length(block.unknowns) for block in self.blocks
+        )
+
+    @cached_property
+    def jacobian(self) -> ca.SX:
+        """dF/dy (rows, y)."""
+        return ca.jacobian(self.F, self.y)
 
 
 class _MechanismCoordinates(NamedTuple):
@@ -101,9 +102,11 @@ def build_equations(mechanism: Mechanism, given_links: Sequence[str] = ()) -> Co
     )
     u = ca.SX.sym("u", len(drives))
     unknown = _make_coordinates(mechanism, {link: u[3 * k : 3 * k + 3] for k, link in enumerate(given_links)})
-    p, numbers = _make_numbers(mechanism)
-    closures, rows = _constraint_residuals(mechanism, unknown, numbers, u[3 * len(given_links) :])
-    lines = split_constant_factors(closures, unknown.symbols)
+    p = stack_expressions(ca.SX.sym(f"of {pair.name}") for pair in mechanism.pairs for _ in pair.number_kinds)
+    numbers = split_pair_numbers(mechanism.pairs, p)
+    closing = list(residuals(mechanism, unknown.frames, numbers, unknown.own, u[3 * len(given_links) :]))
+    rows = [row for row, _ in closing]
+    lines = split_constant_factors([value for _, value in closing], unknown.symbols)
 
     solved: EliminationSteps = []
     columns: list[int] = []
@@ -113,17 +116,12 @@ def build_equations(mechanism: Mechanism, given_links: Sequence[str] = ()) -> Co
         columns += remaining
         left += remaining_rows
     z = ca.SX.sym("z", len(columns))
-    open_ones = [_wrap_residual(lines[row].as_expression(unknown.symbols), rows[row].kind) for row in left]
+    open_ones = [wrapped_residual(lines[row].as_expression(unknown.symbols), rows[row].kind) for row in left]
     wanted = [stack_expressions(open_ones), stack_expressions(unknown.symbols.values)]
     F, w = back_substitute(dict(zip(columns, ca.vertsplit(z), strict=True)), solved, unknown.symbols, wanted)
     kept = tuple(rows[row] for row in left)
     whole = ConstraintEquations(tuple(unknown.coordinates), tuple(columns), kept, (), (), z, u, p, w, F, drives)
     return _split_into_blocks(mechanism, whole)
-
-
-def _wrap_residual(left: ca.SX, kind: MeasureKind) -> ca.SX:
-    """What a constraint leaves open; an angle that closes modulo a turn, between half a turn and minus that."""
-    return ca.atan2(ca.sin(left), ca.cos(left)) if kind is MeasureKind.ANGLE else left
 
 
 def _split_into_blocks(mechanism: Mechanism, equations: ConstraintEquations) -> ConstraintEquations:
@@ -235,31 +233,3 @@ def _make_coordinates(mechanism: Mechanism, given: Mapping[str, ca.SX]) -> _Mech
         frames[link.name] = Frame(x, y, *both, angle)
     own = {pair.name: [add(pair.name, *each, False) for each in pair.coordinate_kinds] for pair in mechanism.pairs}
     return _MechanismCoordinates(coordinates, CoordinateSymbols(values, turned), frames, own)
-
-
-def _make_numbers(mechanism: Mechanism) -> tuple[ca.SX, dict[str, list[ca.SX]]]:
-    """A symbol for each number of each pair, in the order in which `program.fitted` fills them."""
-    numbers = {pair.name: [ca.SX.sym(f"of {pair.name}") for _ in pair.number_kinds] for pair in mechanism.pairs}
-    return stack_expressions(symbol for each in numbers.values() for symbol in each), numbers
-
-
-def _constraint_residuals(
-    mechanism: Mechanism, unknown: _MechanismCoordinates, numbers: dict[str, list[ca.SX]], u: ca.SX
-) -> tuple[list[ca.SX], list[ConstraintRow]]:
-    """Every constraint that must vanish: the residuals of all pairs, then drive minus position of all inputs."""
-    closures: list[ca.SX] = []
-    rows: list[ConstraintRow] = []
-
-    def of(pair: Pair) -> tuple[Sequence[Frame], Sequence[ca.SX], Sequence[ca.SX]]:
-        frames = [unknown.frames[link] for link in pair.bodies]
-        return frames, numbers.get(pair.name, []), unknown.own.get(pair.name, [])
-
-    for pair in mechanism.pairs:
-        closures += pair.residual(*of(pair))
-        rows += [ConstraintRow(pair.name, kind) for kind in pair.residual_kinds]
-    named = relative_motions(mechanism)
-    for index, given in enumerate(mechanism.inputs):
-        pair = named[given.pair]
-        closures.append(pair.input_position(*of(pair)) - u[index])
-        rows.append(ConstraintRow(pair.name, pair.input_kind))
-    return closures, rows

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from functools import cached_property, lru_cache
-from math import hypot
 from typing import NamedTuple
 
 import casadi as ca
@@ -12,13 +11,12 @@ import numpy as np
 
 from planar.equations.casadi_call import BufferedFunction, RunFunction
 from planar.equations.closed_form import ClosedForm, find_closed_form
-from planar.equations.constraint_equations import Block, ConstraintEquations, build_equations
+from planar.equations.constraint_equations import Block, ConstraintEquations, build_equations, slice_length
 from planar.equations.elimination import stack_expressions
-from planar.foundation.geometry import GROUND, Frame, frame_at
-from planar.foundation.jets import Scalar
-from planar.model.link_shapes import LinkShape, link_shape
-from planar.model.mechanism import Input, Link, Mechanism, relative_motions
-from planar.model.pairs import MeasureKind, Pair
+from planar.equations.linear import solve_linear
+from planar.equations.mechanism_numbers import equation_structure
+from planar.equations.rates import rate_symbols, time_derivatives
+from planar.model.mechanism import Mechanism
 
 Array = np.ndarray
 MAX_CACHED_STRUCTURES = 256
@@ -31,7 +29,7 @@ RUN_NEWTON_STEPS = 4
 
 
 class EquationRates(NamedTuple):
-    """What `Program.kinematics` returns: F and w with their first and second time derivatives, and dF/dz, dF/du.
+    """F and w with their first and second time derivatives, and dF/dz, dF/du: see `EquationFunctions.kinematics`.
 
     Each with a first axis for the samples, if there is one.
     """
@@ -49,13 +47,13 @@ class EquationRates(NamedTuple):
 
 
 class ClosedFormAssemblies:
-    """The two assemblies of one stage in closed form, carried to round-off by Newton's steps."""
+    """The two assemblies of one block in closed form, carried to round-off by Newton's steps."""
 
     def __init__(self, unknowns: slice, form: BufferedFunction, polished: BufferedFunction):
         self._unknowns, self._form, self._polished = unknowns, form, polished
 
     def __call__(self, z: Array, u: Array, p: Array) -> tuple[list[Array], float, float]:
-        """Both (unknowns,), what they leave open at most, and how near they are to where they meet (`closed.Closed`).
+        """Both (unknowns,), the greatest residual of the two, and how near they are to where they meet (`ClosedForm`).
 
         What is not there is not a number.
         """
@@ -80,49 +78,48 @@ class EquationFunctions:
     def __init__(self, equations: ConstraintEquations):
         self.equations = equations
 
-    def block_function(self, stage: Block) -> ca.Function:
-        """(z, u, p) -> F of this stage (rows,) and its slope in the stage's own unknowns (rows, unknowns)."""
-        return self._block_functions[stage.block_index]
+    def block_function(self, block: Block) -> ca.Function:
+        """(z, u, p) -> F of this block (rows,) and its Jacobian in the block's own unknowns (rows, unknowns)."""
+        return self._block_functions[block.block_index]
 
     @cached_property
     def _block_functions(self) -> dict[int, ca.Function]:
         e = self.equations
-        slopes = ca.jacobian(e.F, e.z)
         return {
-            stage.block_index: ca.Function(
-                "closing", [e.z, e.u, e.p], [e.F[stage.rows], ca.densify(slopes[stage.rows, stage.unknowns])]
+            block.block_index: ca.Function(
+                "closing", [e.z, e.u, e.p], [e.F[block.rows], ca.densify(e.jacobian[block.rows, block.unknowns])]
             )
-            for stage in e.blocks
+            for block in e.blocks
         }
 
-    def block_call(self, stage: Block) -> BufferedFunction:
-        """The same, called on arrays: F and the slope's columns (unknowns, rows)."""
-        if stage.block_index not in self._block_calls:
-            self._block_calls[stage.block_index] = BufferedFunction(self.block_function(stage))
-        return self._block_calls[stage.block_index]
+    def block_call(self, block: Block) -> BufferedFunction:
+        """The same, called on arrays: F and the Jacobian's columns (unknowns, rows)."""
+        if block.block_index not in self._block_calls:
+            self._block_calls[block.block_index] = BufferedFunction(self.block_function(block))
+        return self._block_calls[block.block_index]
 
     @cached_property
     def _block_calls(self) -> dict[int, BufferedFunction]:
         return {}
 
-    def block_assemblies(self, stage: Block) -> ClosedFormAssemblies | None:
-        """Both assemblies of a stage; None for one without a closed form."""
-        if stage.block_index not in self._block_assemblies:
-            form = find_closed_form(self.equations, stage)
-            self._block_assemblies[stage.block_index] = form and self._make_assemblies(stage, form)
-        return self._block_assemblies[stage.block_index]
+    def block_assemblies(self, block: Block) -> ClosedFormAssemblies | None:
+        """Both assemblies of a block; None for one without a closed form."""
+        if block.block_index not in self._block_assemblies:
+            form = find_closed_form(self.equations, block)
+            self._block_assemblies[block.block_index] = form and self._make_assemblies(block, form)
+        return self._block_assemblies[block.block_index]
 
     @cached_property
     def _block_assemblies(self) -> dict[int, ClosedFormAssemblies | None]:
         return {}
 
-    def _make_assemblies(self, stage: Block, form: ClosedForm) -> ClosedFormAssemblies:
+    def _make_assemblies(self, block: Block, form: ClosedForm) -> ClosedFormAssemblies:
         e = self.equations
         found = stack_expressions(ca.atan2(each[1], each[0]) if len(each) == 2 else each[0] for each in form.values)
-        left, slope = self.block_function(stage)(e.z, e.u, e.p)
-        polished = [e.z[stage.unknowns] - solve_linear(slope, left), ca.norm_inf(left)]
+        left, slope = self.block_function(block)(e.z, e.u, e.p)
+        polished = [e.z[block.unknowns] - solve_linear(slope, left), ca.norm_inf(left)]
         return ClosedFormAssemblies(
-            stage.unknowns,
+            block.unknowns,
             BufferedFunction(ca.Function("assembly", [e.z, e.u, e.p, form.sign], [found, form.coalescence])),
             BufferedFunction(ca.Function("polished", [e.z, e.u, e.p], polished)),
         )
@@ -152,25 +149,26 @@ class EquationFunctions:
         """(y, y1, y2, p) -> F and w, one after the other, with their first and second rates, and dF/dy."""
         e = self.equations
         both = ca.vertcat(e.F, e.w)
-        y, y1, y2, first, second = time_derivatives(e, both)
-        slopes = ca.jacobian(e.F, y)
-        outputs = [ca.horzcat(both, first, second), slopes]
+        y = e.y
+        y1, y2 = rate_symbols(y, 2)
+        first, second = time_derivatives(both, y, y1, y2)
+        outputs = [ca.horzcat(both, first, second), e.jacobian]
         return ca.Function("kinematics", [y, y1, y2, e.p], [ca.densify(output) for output in outputs])
 
     @cached_property
     def _third_rate_function(self) -> ca.Function:
         e = self.equations
-        y, y1, y2, _, second = time_derivatives(e, e.F)
-        third = ca.jtimes(second, y, y1) + ca.jtimes(second, y1, y2)
+        y = e.y
+        y1, y2 = rate_symbols(y, 2)
+        third = time_derivatives(e.F, y, y1, y2, ca.SX.zeros(y.numel()))[-1]
         return ca.Function("third", [y, y1, y2, e.p], [ca.densify(third)])
 
     @cached_property
     def _jerk_function(self) -> ca.Function:
         e = self.equations
-        both = ca.vertcat(e.F, e.w)
-        y, y1, y2, _, second = time_derivatives(e, both)
-        y3 = ca.SX.sym("y3", y.numel())
-        third = ca.jtimes(second, y, y1) + ca.jtimes(second, y1, y2) + ca.jtimes(second, y2, y3)
+        y = e.y
+        y1, y2, y3 = rate_symbols(y, 3)
+        third = time_derivatives(ca.vertcat(e.F, e.w), y, y1, y2, y3)[-1]
         return ca.Function("jerks", [y, y1, y2, y3, e.p], [ca.densify(third)])
 
     def third_rates(self, y: Array, y1: Array, y2: Array, y3: Array, p: Array) -> tuple[Array, Array]:
@@ -186,7 +184,7 @@ class EquationFunctions:
     @cached_property
     def _second_derivative_functions(self) -> tuple[ca.Function, ca.Function]:
         e = self.equations
-        y, way, rows = ca.vertcat(e.z, e.u), ca.SX.sym("way", e.z.numel() + e.u.numel()), ca.SX.sym("l", e.F.numel())
+        y, way, rows = e.y, ca.SX.sym("way", e.y.numel()), ca.SX.sym("l", e.F.numel())
         along = ca.jacobian(ca.jtimes(e.F, y, way), y)
         weighed = ca.jacobian(ca.jtimes(e.F, y, rows, True), y)
         return (
@@ -195,7 +193,7 @@ class EquationFunctions:
         )
 
     def second_derivative_along(self, y: Array, direction: Array, p: Array) -> Array:
-        """The slope of (dF/dy) way (rows, y): the second derivatives of F with one direction filled in."""
+        """The second derivatives of F with one direction filled in (rows, y): the Jacobian of (dF/dy) direction."""
         return self._second_derivative_functions[0](y, direction, p).full()
 
     def weighted_hessian(self, y: Array, weights: Array, p: Array) -> Array:
@@ -206,12 +204,12 @@ class EquationFunctions:
     def _deflated_function(self) -> ca.Function:
         e = self.equations
         z1, u1 = ca.SX.sym("z1", e.z.numel()), ca.SX.sym("u1", e.u.numel())
-        both = ca.vertcat(e.F, ca.jtimes(e.F, ca.vertcat(e.z, e.u), ca.vertcat(z1, u1)))
+        both = ca.vertcat(e.F, ca.jtimes(e.F, e.y, ca.vertcat(z1, u1)))
         slopes = ca.jacobian(both, ca.vertcat(e.z, z1))
         return ca.Function("deflated", [e.z, z1, e.u, u1, e.p], [ca.densify(both), ca.densify(slopes)])
 
     def deflated_system(self, z: Array, z1: Array, u: Array, u1: Array, p: Array) -> tuple[Array, Array]:
-        """F and its first time derivative (2 rows,), and their slope in z and z1 (2 rows, 2 unknowns).
+        """F and its first time derivative (2 rows,), and their Jacobian in z and z1 (2 rows, 2 unknowns).
 
         A. Leykin, J. Verschelde, A. Zhao, Newton's method with deflation for isolated singularities, Theor. Comp. Sci.
         359, 2006.
@@ -231,9 +229,9 @@ class EquationFunctions:
 
     @cached_property
     def newton_function(self) -> ca.Function:
-        """(z, u, p) -> z: Newton group after group, unrolled.
+        """(z, u, p) -> z: Newton block after block, unrolled.
 
-        Only for structures whose every group has as many constraints as unknowns.
+        Only for structures whose every block has as many constraints as unknowns.
         """
         e = self.equations
         z, u, p = (ca.SX.sym(name, each.numel()) for name, each in (("z", e.z), ("u", e.u), ("p", e.p)))
@@ -248,15 +246,17 @@ class EquationFunctions:
         return BufferedFunction(self.newton_function)
 
     def newton_expressions(self, z: ca.SX, u: ca.SX, p: ca.SX, steps: int = 1) -> tuple[ca.SX, ca.SX]:
-        """Unknowns after so many of Newton's steps, group after group, for structures as `advance` takes, and what each
-        group left open before its last step (rows,)."""
+        """Unknowns after so many of Newton's steps, block after block, and the residuals before the last (rows,).
+
+        For structures as `newton_function` takes.
+        """
         open_ = []
         now = ca.vertsplit(z) if z.numel() else []
-        for stage in self.equations.blocks:
-            for _ in range(steps if slice_length(stage.unknowns) else 0):
-                left, slope = self.block_function(stage)(ca.vertcat(*now), u, p)
-                now[stage.unknowns] = ca.vertsplit(ca.vertcat(*now[stage.unknowns]) - solve_linear(slope, left))
-            open_ += [left] if slice_length(stage.unknowns) else []
+        for block in self.equations.blocks:
+            for _ in range(steps if slice_length(block.unknowns) else 0):
+                left, slope = self.block_function(block)(ca.vertcat(*now), u, p)
+                now[block.unknowns] = ca.vertsplit(ca.vertcat(*now[block.unknowns]) - solve_linear(slope, left))
+            open_ += [left] if slice_length(block.unknowns) else []
         return stack_expressions(now), stack_expressions(open_)
 
     def run_samples(self, z: Array, u: Array, p: Array) -> Array:
@@ -270,8 +270,7 @@ class EquationFunctions:
     @cached_property
     def _jacobian_function(self) -> ca.Function:
         e = self.equations
-        slopes = ca.jacobian(e.F, ca.vertcat(e.z, e.u))
-        return ca.Function("slopes", [e.z, e.u, e.p], [ca.densify(slopes)])
+        return ca.Function("slopes", [e.z, e.u, e.p], [ca.densify(e.jacobian)])
 
     def jacobians(self, z: Array, u: Array, p: Array) -> tuple[Array, Array]:
         """dF/dz (samples, rows, unknowns) and dF/du (samples, rows, inputs) at z (samples, unknowns), u alike."""
@@ -288,11 +287,10 @@ class EquationFunctions:
     @cached_property
     def _residual_call(self) -> BufferedFunction:
         e = self.equations
-        slopes = ca.jacobian(e.F, ca.vertcat(e.z, e.u))
-        return BufferedFunction(ca.Function("left", [e.z, e.u, e.p], [ca.densify(e.F), ca.densify(slopes)]))
+        return BufferedFunction(ca.Function("left", [e.z, e.u, e.p], [ca.densify(e.F), ca.densify(e.jacobian)]))
 
     def residuals_and_jacobian(self, z: Array, u: Array, p: Array) -> tuple[Array, Array]:
-        """F (rows,) and its slope (rows, unknowns and inputs) at one position."""
+        """F (rows,) and its Jacobian (rows, unknowns and inputs) at one position."""
         if not len(self.equations.rows):
             return np.zeros(0), np.zeros((0, len(z) + len(u)))
         left, slope = self._residual_call(z, u, p)
@@ -300,45 +298,13 @@ class EquationFunctions:
 
     @cached_property
     def is_square(self) -> bool:
-        """Whether every group has as many constraints as unknowns."""
-        return all(
-            slice_length(stage.rows) == slice_length(stage.unknowns) and not stage.is_free
-            for stage in self.equations.blocks
-        )
-
-
-def time_derivatives(e: ConstraintEquations, value: ca.SX) -> tuple[ca.SX, ...]:
-    """y = (z, u) with symbols for its derivatives, and those of an expression in y.
-
-    The chain rule twice: d/dt = (d/dy) y1, d2/dt2 = (d/dy)(d/dt) y1 + (d/dy) y2.
-    """
-    y = ca.vertcat(e.z, e.u)
-    y1, y2 = ca.SX.sym("y1", y.numel()), ca.SX.sym("y2", y.numel())
-    first = ca.jtimes(value, y, y1)
-    return y, y1, y2, first, ca.jtimes(first, y, y1) + ca.jtimes(value, y, y2)
+        """Whether every block has as many constraints as unknowns."""
+        return self.equations.is_square
 
 
 def function_with_cse(name: str, given: Sequence[ca.SX], wanted: Sequence[ca.SX]) -> ca.Function:
     """A function in which what stands in several places is computed once."""
     return ca.Function(name, given, ca.cse(list(wanted)))
-
-
-def slice_length(part: slice) -> int:
-    """How many entries a part of z or F has."""
-    return part.stop - part.start
-
-
-def solve_linear(matrix: ca.SX, right_side: ca.SX) -> ca.SX:
-    """slope^-1 left; two by two by the adjugate, larger by QR, neither of which needs a pivot to be chosen."""
-    if matrix.numel() == 1:
-        return right_side / matrix
-    if matrix.numel() == 4:
-        a, b, c, d = matrix[0, 0], matrix[0, 1], matrix[1, 0], matrix[1, 1]
-        return ca.vertcat(d * right_side[0] - b * right_side[1], a * right_side[1] - c * right_side[0]) / (
-            a * d - b * c
-        )
-    q, r = ca.qr(matrix)
-    return ca.solve(r, ca.mtimes(q.T, right_side))
 
 
 def equation_functions(mechanism: Mechanism) -> EquationFunctions:
@@ -349,76 +315,3 @@ def equation_functions(mechanism: Mechanism) -> EquationFunctions:
 @lru_cache(maxsize=MAX_CACHED_STRUCTURES)
 def _cached_equation_functions(structure: Mechanism) -> EquationFunctions:
     return EquationFunctions(build_equations(structure))
-
-
-def equation_structure(mechanism: Mechanism) -> Mechanism:
-    """All of a mechanism that its equations depend on: names of links, pairs, which motions are driven."""
-    return Mechanism(
-        name="",
-        frame=mechanism.frame,
-        links=tuple(Link(link.name) for link in mechanism.links),
-        pairs=mechanism.pairs,
-        inputs=tuple(Input(given.pair, 0.0) for given in mechanism.inputs),
-    )
-
-
-def shapes_of_links(mechanism: Mechanism) -> dict[str, LinkShape]:
-    """The shape of every link (m)."""
-    return {link.name: link_shape(link) for link in mechanism.links}
-
-
-def mechanism_size(mechanism: Mechanism, shapes: Mapping[str, LinkShape]) -> float:
-    """The mechanism's size (m): the greatest distance between two points of one link, else of a slide's travel."""
-    named = relative_motions(mechanism)
-    slide = [named[given.pair].input_kind is MeasureKind.LENGTH for given in mechanism.inputs]
-    return size_from_extents(mechanism, {name: shape_extent(shape) for name, shape in shapes.items()}, slide)
-
-
-def size_from_extents(mechanism: Mechanism, extents: Mapping[str, float], is_slide: Sequence[bool]) -> float:
-    """The mechanism's size (m) from the extents of its links and from which of its inputs slide."""
-    slides = [abs(given.position) for given, slides in zip(mechanism.inputs, is_slide, strict=True) if slides]
-    return max(extents.values(), default=0.0) or max(slides, default=0.0) or 1.0
-
-
-def shape_extent(shape: LinkShape) -> float:
-    """The greatest distance between two points of a link (m)."""
-    x, y = [at.x for at in shape.points.values()], [at.y for at in shape.points.values()]
-    return hypot(max(x) - min(x), max(y) - min(y)) if x else 0.0
-
-
-def pair_numbers(mechanism: Mechanism, shapes: Mapping[str, LinkShape], unit: float) -> Array:
-    """p: the numbers of every pair, lengths divided by `unit`."""
-    measured = {pair.name: pair.measure([shapes[link] for link in pair.bodies]) for pair in mechanism.pairs}
-    return pair_numbers_from(mechanism, measured, unit)
-
-
-def pair_numbers_from(mechanism: Mechanism, numbers: Mapping[str, Sequence[float]], unit: float) -> Array:
-    """p from the numbers of every pair, lengths divided by `unit`."""
-    found: list[float] = []
-    for pair in mechanism.pairs:
-        found += scale_lengths(numbers[pair.name], pair.number_kinds, unit)
-    return np.array(found, dtype=float)
-
-
-def scale_lengths(values: Sequence[float], kinds: Sequence[MeasureKind], unit: float) -> list[float]:
-    """Numbers with the lengths among them divided by `unit`."""
-    return [value / unit if kind is MeasureKind.LENGTH else value for value, kind in zip(values, kinds, strict=True)]
-
-
-def frames_from_coordinates(
-    w: Sequence[Scalar] | Array,
-    column: Mapping[tuple[str, str], int],
-    links: Iterable[str],
-    pairs: Mapping[str, Pair],
-    make_frame: Callable[..., Frame] = frame_at,
-) -> tuple[dict[str, Frame], dict[str, tuple[Scalar, ...]]]:
-    """Frames of links and own coordinates of pairs from w, whose entries may be floats, arrays or jets.
-
-    `framed` makes a frame of x, y and angle.
-    """
-    frames = {
-        link: make_frame(*(w[column[link, part]] for part in ("x", "y", "angle"))) if (link, "x") in column else GROUND
-        for link in links
-    }
-    own = {name: tuple(w[column[name, part]] for part, _ in pair.coordinate_kinds) for name, pair in pairs.items()}
-    return frames, own

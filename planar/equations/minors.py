@@ -10,9 +10,9 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from planar.equations.constraint_equations import ConstraintRow
 from planar.equations.elimination import stack_expressions
 from planar.equations.functions import MAX_CACHED_STRUCTURES, EquationFunctions
+from planar.equations.residuals import ConstraintRow
 from planar.model.pairs import MeasureKind
 
 Array = np.ndarray
@@ -34,7 +34,7 @@ def constraint_dependencies(program: EquationFunctions) -> tuple[frozenset[int],
     """For every constraint the entries of (z, u) on which it depends."""
     e = program.equations
     columns: list[set[int]] = [set() for _ in e.rows]
-    for row, column in zip(*ca.jacobian_sparsity(e.F, ca.vertcat(e.z, e.u)).get_triplet(), strict=True):
+    for row, column in zip(*ca.jacobian_sparsity(e.F, e.y).get_triplet(), strict=True):
         columns[row].add(column)
     return tuple(map(frozenset, columns))
 
@@ -42,7 +42,7 @@ def constraint_dependencies(program: EquationFunctions) -> tuple[frozenset[int],
 def add_minors(program: EquationFunctions, blocks: Mapping[int, LowRankBlock]) -> EquationFunctions:
     """The program whose groups have the minors of their blocks as constraints too."""
     e = program.equations
-    slope = ca.jacobian(e.F, ca.vertcat(e.z, e.u))
+    slope = e.jacobian
     rows: list[ConstraintRow] = []
     left, stages = [], []
     for stage in e.blocks:

@@ -10,7 +10,8 @@ import numpy as np
 
 from planar.equations.casadi_call import BufferedFunction
 from planar.equations.constraint_equations import ConstraintEquations
-from planar.equations.functions import function_with_cse, time_derivatives
+from planar.equations.functions import function_with_cse
+from planar.equations.rates import rate_symbols, time_derivatives
 
 Array = np.ndarray
 
@@ -38,7 +39,9 @@ def rounding_terms(equations: ConstraintEquations, y: Array, y1: Array, y2: Arra
 @lru_cache(maxsize=16)
 def _rounding_function(e: ConstraintEquations) -> BufferedFunction:
     both = ca.vertcat(e.F, e.w)
-    y, y1, y2, first, second = time_derivatives(e, both)
+    y = e.y
+    y1, y2 = rate_symbols(y, 2)
+    first, second = time_derivatives(both, y, y1, y2)
     slopes = [ca.jacobian(each, y) for each in (both, first, second)]
     terms = ca.mtimes(ca.fabs(ca.jacobian(both, e.p)), ca.fabs(e.p)) + ca.mtimes(ca.fabs(slopes[0]), ca.fabs(y))
     return BufferedFunction(

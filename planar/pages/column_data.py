@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 
 from planar.codegen.javascript import write_javascript
-from planar.equations.functions import frames_from_coordinates
+from planar.equations.coordinates import frames_from_coordinates
 from planar.foundation.errors import Outcome
 from planar.foundation.jets import Jet
 from planar.model.link_shapes import LinkShape

@@ -10,8 +10,9 @@ from urllib.parse import quote
 
 import numpy as np
 
-from planar.document.files import read_asset, save_file, write_error
+from planar.document.files import read_asset
 from planar.foundation.errors import BadInput, NoAnswer
+from planar.foundation.safe_files import save_file, write_error
 from planar.model.mechanism import Mechanism
 from planar.pages.gallery_kinds import KINDS, kind_and_search_text
 from planar.pages.page import fill_template, page, script_safe_json

@@ -7,7 +7,7 @@ import unicodedata
 
 from planar.analysis.identity.mechanism_names import mechanism_names
 from planar.drawing.scheme.link_bodies import all_marks
-from planar.equations.functions import shapes_of_links
+from planar.equations.mechanism_numbers import shapes_of_links
 from planar.model.mechanism import Mechanism
 from planar.model.pairs.symbols import BeltMark, PitchLineMark, WheelMark
 

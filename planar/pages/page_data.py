@@ -21,7 +21,8 @@ from planar.codegen.javascript import write_javascript
 from planar.drawing.scheme.link_bodies import all_marks
 from planar.drawing.scheme.springs_masses import SpringMassMark
 from planar.drawing.scheme.symbols import SPRING_SYMBOLS
-from planar.equations.functions import scale_lengths, shapes_of_links, slice_length
+from planar.equations.constraint_equations import slice_length
+from planar.equations.mechanism_numbers import scale_lengths, shapes_of_links
 from planar.foundation.geometry import Vector
 from planar.foundation.units import display_unit
 from planar.model.dimensions import Dimension, change_dimension, dimensions

@@ -6,7 +6,7 @@ import numpy as np
 
 from planar.drawing.output.svg import svg
 from planar.drawing.scheme.scheme import scheme
-from planar.equations.functions import frames_from_coordinates
+from planar.equations.coordinates import frames_from_coordinates
 from planar.model.mechanism import Mechanism
 from planar.results.motion import State
 from planar.solving.position import solved_mechanism

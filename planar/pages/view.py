@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planar.document.files import save_file
 from planar.foundation.errors import BadInput, NoAnswer
 from planar.foundation.geometry import frame_at
 from planar.foundation.jets import Jet, Scalar
 from planar.foundation.notebook_display import Displayable
+from planar.foundation.safe_files import save_file
 from planar.model.mechanism import Drive, Mechanism, replace_inputs
 from planar.pages.notebook import must_carry_scripts, output_html
 from planar.pages.page import PageRange, page

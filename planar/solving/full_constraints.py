@@ -6,14 +6,16 @@ W. Squire, G. Trapp, Using Complex Variables to Estimate Derivatives of Real Fun
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from planar.equations.functions import frames_from_coordinates, scale_lengths
+from planar.equations.coordinates import frames_from_coordinates
+from planar.equations.mechanism_numbers import scaled_pair_numbers
+from planar.equations.residuals import ConstraintRow, input_positions, pair_residuals, wrapped_residual
 from planar.foundation.geometry import Frame
-from planar.model.pairs import MeasureKind, Pair
+from planar.foundation.jets import Scalar
+from planar.model.pairs import Pair
 from planar.solving.assembly.sketch_start import sketch_coordinates
 from planar.solving.prepared_mechanism import PreparedMechanism
 
@@ -45,25 +47,21 @@ class FullConstraints:
         self.coordinates = setup.equations.coordinates
         self.pair_of_row = tuple(pair.name for pair in self.pairs for _ in pair.residual_kinds)
         self._numbers = {
-            pair.name: scale_lengths(
-                pair.measure([setup.shapes[link] for link in pair.bodies]), pair.number_kinds, setup.unit
-            )
+            pair.name: scaled_pair_numbers(pair, setup.shapes, setup.unit)
             for pair in (*self.pairs, *setup.relative_motions.values())
         }
 
     def residuals(self, w: Array) -> Array:
         """What every constraint leaves open (rows,), of w (coordinates, many) of each (rows, many)."""
-        left, (frames, own) = [], self._frames_and_own(w)
-        for pair in self.pairs:
-            for kind, value in zip(
-                pair.residual_kinds, pair.residual(*self._pair_arguments(pair, frames, own)), strict=True
-            ):
-                left.append(np.arctan2(np.sin(value), np.cos(value)) if self._wraps(kind, w) else value)
+        # a complex step goes by no arc, and needs none
+        stepped = np.iscomplexobj(w)
+        left = [value if stepped else wrapped_residual(value, row.kind) for row, value in self.row_residuals(w)]
         return np.array(np.broadcast_arrays(*left)) if left else np.zeros((0, *w.shape[1:]))
 
-    @staticmethod
-    def _wraps(kind: MeasureKind, w: Array) -> bool:
-        return kind is MeasureKind.ANGLE and not np.iscomplexobj(w)
+    def row_residuals(self, w: Array | Sequence[Scalar]) -> Iterator[tuple[ConstraintRow, Scalar]]:
+        """The residual of every constraint, with its row, at coordinates of any arithmetic; angles with their turns."""
+        frames, own = self._frames_and_own(w)
+        return pair_residuals(self.pairs, frames, self._numbers, own)
 
     def jacobian(self, w: Array) -> Array:
         """(rows, coordinates)"""
@@ -81,22 +79,13 @@ class FullConstraints:
 
     def _relative_positions(self, names: tuple[str, ...], w: Array) -> list[Array]:
         frames, own = self._frames_and_own(w)
-        return [
-            pair.input_position(*self._pair_arguments(pair, frames, own))
-            for pair in (self.setup.relative_motions[name] for name in names)
-        ]
+        return input_positions([self.setup.relative_motions[name] for name in names], frames, self._numbers, own)
 
     def _complex_steps(self, w: Array) -> Array:
         return np.repeat(w[:, None].astype(complex), w.size, axis=1) + 1j * COMPLEX_STEP * np.eye(w.size)
 
-    def _frames_and_own(self, w: Array) -> tuple[dict[str, Frame], dict[str, tuple[Array, ...]]]:
+    def _frames_and_own(self, w: Array | Sequence[Scalar]) -> tuple[dict[str, Frame], dict[str, tuple[Scalar, ...]]]:
         return frames_from_coordinates(w, self.setup.column, self.setup.shapes, self.setup.pairs)
-
-    def _pair_arguments(
-        self, pair: Pair, frames: dict[str, Frame], own: dict[str, tuple[Array, ...]]
-    ) -> tuple[Any, Any, Any]:
-        """What the pair's formulas take."""
-        return [frames[link] for link in pair.bodies], self._numbers[pair.name], own.get(pair.name, ())
 
     def correct(self, w: Array, held: tuple[str, ...] = (), positions: Array | None = None) -> Array | None:
         """The nearest closed position by Gauss and Newton's method, some drives held; None where there is none."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from planar.equations.functions import frames_from_coordinates
+from planar.equations.coordinates import frames_from_coordinates
 from planar.foundation.jets import Jet
 from planar.solving.prepared_mechanism import PreparedMechanism
 

@@ -9,13 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from planar.equations.functions import (
-    MAX_CACHED_STRUCTURES,
-    EquationRates,
-    equation_functions,
-    frames_from_coordinates,
-    slice_length,
-)
+from planar.equations.constraint_equations import slice_length
+from planar.equations.coordinates import frames_from_coordinates
+from planar.equations.functions import MAX_CACHED_STRUCTURES, EquationRates, equation_functions
+from planar.equations.linear import solve_vectors
 from planar.foundation.errors import NoAnswer, Outcome, TrackingEnd
 from planar.foundation.geometry import Frame
 from planar.foundation.jets import Jet
@@ -37,7 +34,6 @@ from planar.solving.rates.regularity import (
     mobility_by_rank,
     moved_links,
     regularity,
-    solve_rates,
 )
 
 if TYPE_CHECKING:
@@ -168,9 +164,9 @@ class PositionSolver(PreparedMechanism):
             if state is None:
                 raise problem.refusal() from None
             return state
-        y1 = np.concatenate([solve_rates(still.jacobian, still.F1), s.u1])
+        y1 = np.concatenate([solve_vectors(still.jacobian, -still.F1), s.u1])
         moving = self.functions.kinematics(y, y1, given, s.p)
-        y2 = np.concatenate([solve_rates(moving.jacobian, moving.F2), s.u2])
+        y2 = np.concatenate([solve_vectors(moving.jacobian, -moving.F2), s.u2])
         motion = self.functions.kinematics(y, y1, y2, s.p)
         doubt = find_accuracy_doubts(self, motion.jacobian[None], motion.w[None], y[None], y1[None], y2[None])
         if doubt is not None and doubt.errors.is_too_inexact[0]:

@@ -9,14 +9,9 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from planar.equations.acceptance import AcceptanceFunctions
-from planar.equations.functions import (
-    EquationFunctions,
-    frames_from_coordinates,
-    pair_numbers_from,
-    shape_extent,
-    shapes_of_links,
-    size_from_extents,
-)
+from planar.equations.coordinates import frames_from_coordinates
+from planar.equations.functions import EquationFunctions
+from planar.equations.mechanism_numbers import pair_numbers_from, shape_extent, shapes_of_links, size_from_extents
 from planar.foundation.errors import BadInput
 from planar.foundation.errors import join_names as several
 from planar.foundation.geometry import Frame

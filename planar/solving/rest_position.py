@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from planar.equations.functions import frames_from_coordinates
+from planar.equations.coordinates import frames_from_coordinates
 from planar.model.mechanism import Drive, Mechanism, replace_inputs
 from planar.results.motion import State
 from planar.solving.continuation.path import follow_to

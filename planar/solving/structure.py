@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.equations.acceptance import AcceptanceFunctions, acceptance_functions
+from planar.equations.coordinates import coordinate_columns
 from planar.equations.functions import MAX_CACHED_STRUCTURES, EquationFunctions, equation_functions
 from planar.foundation.errors import BadInput
 from planar.model.link_shapes import At
@@ -44,7 +45,7 @@ class MechanismStructure:
         self.mechanism = mechanism
         self.functions: EquationFunctions = equation_functions(mechanism)
         self.equations = self.functions.equations
-        self.column = {(c.owner, c.part): index for index, c in enumerate(self.equations.coordinates)}
+        self.column = coordinate_columns(self.equations.coordinates)
         self.pairs: dict[str, Pair] = {pair.name: pair for pair in mechanism.pairs}
         self.relative_motions = relative_motions(mechanism)
         self.is_length = np.array([c.kind is MeasureKind.LENGTH for c in self.equations.coordinates], dtype=bool)

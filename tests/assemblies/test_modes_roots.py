@@ -15,7 +15,7 @@ from planar.assemblies.polynomial.completeness import Completeness
 from planar.assemblies.polynomial.isotropic_form import isotropic_form
 from planar.assemblies.polynomial.path_tracker import solve_generic_instance
 from planar.document import files
-from planar.equations.functions import slice_length
+from planar.equations.constraint_equations import slice_length
 from planar.solving.prepared_mechanism import PreparedMechanism
 from tests.draws import draws, part
 from tests.inversions import group, listed, missed, one_group, structures, unknowns_of

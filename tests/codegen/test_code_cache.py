@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from planar.codegen import code_cache, llvm_compile
-from planar.document import files
+from planar.foundation import safe_files
 
 TIMES = """
 define void @times(ptr %at) {
@@ -85,7 +85,7 @@ def test_another_process_does_not_compile_again(place):
         "import ctypes\nfrom planar.codegen import llvm_compile\nimport tests.codegen.test_code_cache as here\n"
         "llvm_compile._made = None  # cannot be called\nprint(here.times(3))"
     )
-    root = Path(files.__file__).parents[2]
+    root = Path(code_cache.__file__).parents[2]
     ended = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, text=True, check=False)
     assert (ended.stdout, ended.stderr) == ("6.0\n", "")
 
@@ -127,11 +127,11 @@ def test_what_another_user_wrote_or_could_write_is_not_run(place, made, monkeypa
     for each, mode in ((path, 0o620), (path, 0o602), (place, 0o770), (place, 0o707)):
         usual = each.stat().st_mode
         each.chmod(mode)
-        assert files.read_private(path) is None
+        assert safe_files.read_private(path) is None
         each.chmod(usual)
-    assert files.read_private(path) is not None
+    assert safe_files.read_private(path) is not None
     monkeypatch.setattr(os, "getuid", lambda: mine + 1)
-    assert files.read_private(path) is None
+    assert safe_files.read_private(path) is None
     before = path.stat().st_mtime_ns
     assert times(3) == 6.0  # nor is anything written into a folder of another
     assert (len(made), path.stat().st_mtime_ns) == (2, before)

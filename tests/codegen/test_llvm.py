@@ -18,7 +18,7 @@ from planar.codegen.instructions import (
     UnsupportedOperation,
     expand_angle_sums,
 )
-from planar.equations.functions import equation_structure
+from planar.equations.mechanism_numbers import equation_structure
 from planar.foundation.errors import BadInput, Outcome
 from planar.model.mechanism import named_points
 from tests.draws import part

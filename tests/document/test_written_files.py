@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from planar.document import files
-from planar.document.files import save_file
+from planar.foundation import safe_files
 from planar.foundation.errors import BadInput, WriteFailure
+from planar.foundation.safe_files import save_file
 from tests.command import run
 
 OLD, NEW = b"the old result", b"new " * 1000
@@ -73,13 +73,13 @@ def test_a_full_disk_leaves_no_new_file(tmp_path):
     ],
 )
 def test_no_command_loses_what_an_earlier_one_wrote(words, tmp_path, monkeypatch):
-    really = files.write_atomically
+    really = safe_files.write_atomically
 
     def without_room(path, whole):
         with room(100):  # only here: libraries keep files of their own
             really(path, whole)
 
-    monkeypatch.setattr(files, "write_atomically", without_room)
+    monkeypatch.setattr(safe_files, "write_atomically", without_room)
     name = words.split()[-1]
     (tmp_path / name).write_bytes(OLD)
     sentence = run(tmp_path, *words.split()).refused(3)
@@ -179,7 +179,7 @@ def test_a_device_stays_one():
     with pytest.raises(WriteFailure, match="No space left on device"):
         save_file(FULL, NEW)
     assert stat.S_ISCHR(FULL.stat().st_mode)
-    assert not [path for path in FULL.parent.iterdir() if files.PARTIAL_FILE_NAME.fullmatch(path.name)]
+    assert not [path for path in FULL.parent.iterdir() if safe_files.PARTIAL_FILE_NAME.fullmatch(path.name)]
 
 
 @pytest.mark.skipif(not Path("/dev/fd").exists(), reason="there is no such folder")

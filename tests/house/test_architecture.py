@@ -159,7 +159,8 @@ def test_no_pair_type_is_named_outside_the_pairs():
         assert not texts & set(pair_types())
 
 
-def test_only_the_files_room_opens_mechanism_files():
+def test_only_two_files_open_files():
+    """One reads what is given, the other writes what is to be kept."""
     opening = {"open", "read_text", "read_bytes", "write_text", "write_bytes"}
     for path in FILES:
         called = {
@@ -168,7 +169,7 @@ def test_only_the_files_room_opens_mechanism_files():
             if isinstance(node, ast.Call)
         }
         if called & opening:
-            assert path == ROOT / "document" / "files.py"
+            assert path in (ROOT / "document" / "files.py", ROOT / "foundation" / "safe_files.py")
 
 
 def test_files_are_small_and_say_their_job_first():

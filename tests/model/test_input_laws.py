@@ -18,7 +18,7 @@ from jsonschema import Draft202012Validator
 
 import planar
 from planar.document.schema import schema
-from planar.equations.functions import equation_structure
+from planar.equations.mechanism_numbers import equation_structure
 from planar.foundation.errors import BadInput
 from planar.model.input_laws import (
     SEGMENT_TYPES,

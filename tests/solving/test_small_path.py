@@ -130,8 +130,8 @@ def test_wrong_rates_of_a_compiled_function_do_not_pass(order, monkeypatch):
     solver = PositionSolver(mechanism())
     z = solver.find_assembly().z
     assert fast_position(solver, z) is not None
-    real = getattr(acceptance._RateExpressions, order)
-    monkeypatch.setattr(acceptance._RateExpressions, order, lambda self, *given: real(self, *given) * (1.0 + 1e-7))
+    real = getattr(acceptance.UnknownRates, order)
+    monkeypatch.setattr(acceptance.UnknownRates, order, lambda self, *given: real(self, *given) * (1.0 + 1e-7))
     wrong = acceptance.AcceptanceFunctions(solver.structure.mechanism, solver.functions)
     monkeypatch.setattr(solver.structure, "acceptance", wrong)
     assert fast_position(solver, z) is None

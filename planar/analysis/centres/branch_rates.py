@@ -8,7 +8,6 @@ import numpy as np
 
 from planar.analysis.centres.null_space_check import FullPosition, full_position, poles_of_motions
 from planar.analysis.rate_equations import derivative
-from planar.equations.functions import frames_from_coordinates, scale_lengths
 from planar.foundation.jets import Jet
 from planar.results.motion import State
 
@@ -53,12 +52,4 @@ def branch_poles(state: State, middle: Array, size: float) -> tuple[Mapping[str,
 def _second_derivative(here: FullPosition, direction: Array) -> Array:
     """H(v, v): the second derivative of all constraints along a straight way in the coordinates (rows,)."""
     moving = [Jet(float(w), float(v), 0.0) for w, v in zip(here.w, direction, strict=True)]
-    frames, own = frames_from_coordinates(moving, here.prepared.column, here.prepared.shapes, here.prepared.pairs)
-    unit, rows = here.prepared.unit, []
-    for pair in here.constraints.pairs:
-        numbers = scale_lengths(
-            pair.measure([here.prepared.shapes[link] for link in pair.bodies]), pair.number_kinds, unit
-        )
-        bodies = [frames[link] for link in pair.bodies]
-        rows += [derivative(row, 2) for row in pair.residual(bodies, numbers, own.get(pair.name, ()))]
-    return np.array(rows)
+    return np.array([derivative(value, 2) for _, value in here.constraints.row_residuals(moving)])

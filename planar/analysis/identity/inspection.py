@@ -11,7 +11,7 @@ from planar.analysis.identity.load_descriptions import ActionDescription, descri
 from planar.analysis.identity.mechanism_names import mechanism_names
 from planar.analysis.identity.mobility import Mobility, gruebler, mobility
 from planar.dynamics.load_attachment import attachment_remarks
-from planar.equations.functions import mechanism_size, shapes_of_links
+from planar.equations.mechanism_numbers import mechanism_size, shapes_of_links
 from planar.foundation.errors import BadInput, NoAnswer, Outcome, PlanarError
 from planar.model.link_graph import link_numbers, pair_labels_by_type, unconnected_links
 from planar.model.mechanism import Input, Mechanism, pair_entries

@@ -9,7 +9,7 @@ import numpy as np
 
 from planar.analysis.interpolated_run import InterpolatedRun
 from planar.analysis.motion.extremes import Extreme, Stroke, find_stroke
-from planar.equations.functions import mechanism_size, shapes_of_links
+from planar.equations.mechanism_numbers import mechanism_size, shapes_of_links
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.model.mechanism import Drive, Mechanism, relative_motions, replace_inputs
 from planar.model.pairs import MeasureKind

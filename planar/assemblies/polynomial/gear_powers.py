@@ -83,7 +83,7 @@ def angle_arguments(e: ConstraintEquations, stage: Block, angles: Sequence[int],
     def linear(of: ca.SX) -> tuple[Array, ca.SX, Array]:
         rate = ca.densify(ca.jacobian(of, own))
         still = ca.substitute(of, own, ca.SX.zeros(own.numel()))
-        if ca.depends_on(rate, ca.vertcat(e.z, e.u)):
+        if ca.depends_on(rate, e.y):
             raise _NonlinearArgument
         rates, at = (each.full() for each in ca.Function("of", [e.z, e.u, e.p], [rate, still])(*place, p))
         if np.any(np.delete(rates, angles, axis=1)):
@@ -102,7 +102,9 @@ def angle_arguments(e: ConstraintEquations, stage: Block, angles: Sequence[int],
     closed, between = (e.F[stage.rows][np.flatnonzero(np.equal(loops, which)).tolist()] for which in (True, False))
     rows = ca.Function("rows", [e.z, e.u, e.p], [ca.densify(closed)])
     try:
-        (written,) = evaluate_function(rows, [ca.vertsplit(each) for each in (e.z, e.u, e.p)], ca.SX, done)
+        (written,) = evaluate_function(
+            rows, [ca.vertsplit(each) for each in (e.z, e.u, e.p)], ca.SX, lambda code, of: done[code](*of)
+        )
         relations, left, _ = linear(ca.densify(between))
     except (_NonlinearArgument, KeyError):
         return None

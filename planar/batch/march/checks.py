@@ -8,9 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.batch.march.design_functions import DesignFunctions
-from planar.equations.functions import EquationFunctions, frames_from_coordinates
+from planar.equations.coordinates import coordinate_columns, frames_from_coordinates
+from planar.equations.functions import EquationFunctions
+from planar.equations.linear import solve_arrays
+from planar.equations.residuals import split_pair_numbers
 from planar.model.mechanism import Mechanism
-from planar.solving.checks.branch_check import SINGULAR_DISTANCE_RATIO, BranchCheck, is_move_allowed, solve_rates_batch
+from planar.solving.checks.branch_check import SINGULAR_DISTANCE_RATIO, BranchCheck, is_move_allowed
 from planar.solving.checks.residual_check import EPS, NEGLIGIBLE_ERROR, ResidualCheck
 
 Array = np.ndarray
@@ -37,7 +40,7 @@ class DesignBranchCheck(BranchCheck):
     def evaluate(self, z: Array, u: Array) -> DesignPositions:
         """What is judged at a step; z (designs, unknowns), u (designs, inputs)."""
         slopes, drives = self.functions.jacobians(z, u, self.p)
-        return DesignPositions(z, u, slopes, _sensitivities(slopes, drives))
+        return DesignPositions(z, u, slopes, -solve_arrays(slopes, drives))
 
     def check_step(
         self, before: DesignPositions, after: DesignPositions, regular_distance: Array | None
@@ -81,16 +84,6 @@ def column_volume(jacobians: Array) -> Array:
     return np.abs(np.linalg.det(jacobians)) / np.prod(sizes, axis=1)
 
 
-def _sensitivities(jacobians: Array, input_jacobians: Array) -> Array:
-    """The rates of the unknowns by those of the inputs; not numbers where a slope is singular."""
-    many = jacobians.shape[-1]
-    if many == 2:
-        a, b, c, d = (jacobians[:, i, j, None] for i in (0, 1) for j in (0, 1))
-        one, two = input_jacobians[:, 0], input_jacobians[:, 1]
-        return np.stack([b * two - d * one, c * one - a * two], axis=1) / (a * d - b * c)[:, None]
-    return solve_rates_batch(jacobians, input_jacobians)
-
-
 class DesignResidualCheck:
     """The first part of the gate, for designs each with its own p (numbers, designs), in units of the size."""
 
@@ -98,14 +91,11 @@ class DesignResidualCheck:
         self.mechanism, self.program = mechanism, program
         self.residual_check = copy(residual_check)
         self.residual_check.unit = 1.0
-        ends = np.cumsum([len(pair.number_kinds) for pair in mechanism.pairs])
-        self.residual_check.numbers = {
-            pair.name: tuple(part) for pair, part in zip(mechanism.pairs, np.split(p, ends[:-1]), strict=True)
-        }
+        self.residual_check.numbers = split_pair_numbers(mechanism.pairs, p)
         # a pin of many links has motions between links that no pair of its own joins
         for given in mechanism.inputs:
             self.residual_check.numbers.setdefault(given.pair, tuple(residual_check.numbers[given.pair]))
-        self.column = {(c.owner, c.part): index for index, c in enumerate(program.equations.coordinates)}
+        self.column = coordinate_columns(program.equations.coordinates)
         self.links = [link.name for link in mechanism.links]
         self.pairs = {pair.name: pair for pair in mechanism.pairs}
 

@@ -26,10 +26,13 @@ from planar.codegen.instructions import (
 from planar.codegen.invariant_hoisting import InvariantHoister
 from planar.codegen.llvm_ir import IRWriter
 from planar.equations.closed_form import ClosedForm, find_closed_form
-from planar.equations.constraint_equations import Block, ConstraintEquations
-from planar.equations.functions import frames_from_coordinates, slice_length
+from planar.equations.constraint_equations import Block, ConstraintEquations, slice_length
+from planar.equations.coordinates import coordinate_columns, frames_from_coordinates
+from planar.equations.linear import solve_by_determinants, solve_with_volume
+from planar.equations.rates import UnknownRates, block_jacobian
+from planar.equations.residuals import closing_error, residuals, scalars, split_pair_numbers
 from planar.foundation.geometry import GROUND, Frame, frame_at
-from planar.model.mechanism import Mechanism, relative_motions
+from planar.model.mechanism import Mechanism
 from planar.model.pairs import MeasureKind
 
 MAX_TURN_PER_STEP = 0.5
@@ -72,7 +75,7 @@ class KernelEquations:
 
     def __init__(self, equations: ConstraintEquations, mechanism: Mechanism, given: Sequence[str] = ()):
         e = self.equations = equations
-        if any(slice_length(s.rows) != slice_length(s.unknowns) or s.is_free for s in e.blocks):
+        if not e.is_square:
             raise UnsupportedOperation("constraints hold each other more than once")
         self.mechanism, self.given_links = mechanism, tuple(given)
         self.blocks = tuple(
@@ -82,7 +85,7 @@ class KernelEquations:
         self.input_is_angle = tuple(kind is MeasureKind.ANGLE for kind in e.input_kinds)
         self.closed_forms = tuple(part.closed_form for part in self.blocks if part.closed_form is not None)
         self.sides = ca.vertcat(ca.SX(0, 1), *(form.sign_expression for form in self.closed_forms))
-        self.column_of = {(c.owner, c.part): k for k, c in enumerate(e.coordinates)}
+        self.column_of = coordinate_columns(e.coordinates)
 
     def assembly_signs(self, z: np.ndarray, u: np.ndarray, p: np.ndarray) -> np.ndarray:
         """Which assembly every group in closed form is in (groups,), +1 or -1."""
@@ -107,111 +110,22 @@ class KernelEquations:
 
         Of an angle that closes modulo a turn |sin| + 1 - cos, which needs no arc.
         """
-        e, mechanism = self.equations, self.mechanism
-        pairs = {pair.name: pair for pair in mechanism.pairs}
-        _, own = frames_from_coordinates(ca.vertsplit(e.w), self.column_of, (), pairs)
-        frames = {link.name: self.frame(link.name) for link in mechanism.links}
-        found, first = [], 0
-        numbers: dict[str, list[ca.SX]] = {}
-        for pair in mechanism.pairs:
-            numbers[pair.name] = [e.p[first + k] for k in range(len(pair.number_kinds))]
-            first += len(pair.number_kinds)
-            left = pair.residual([frames[link] for link in pair.bodies], numbers[pair.name], own[pair.name])
-            found += list(zip(pair.residual_kinds, left, strict=True))
-        named = relative_motions(mechanism)
-        for k, given in enumerate(mechanism.inputs, start=3 * len(self.given_links)):
-            pair = named[given.pair]
-            bodies = [frames[link] for link in pair.bodies]
-            drive = pair.input_position(bodies, numbers.get(pair.name, []), own.get(pair.name, ()))
-            found.append((pair.input_kind, drive - e.u[k]))
-        shut = [
-            ca.fabs(ca.sin(left)) + 1.0 - ca.cos(left) if kind is MeasureKind.ANGLE else left for kind, left in found
-        ]
-        return ca.vertcat(*shut)
+        e, pairs = self.equations, self.mechanism.pairs
+        _, own = frames_from_coordinates(ca.vertsplit(e.w), self.column_of, (), {pair.name: pair for pair in pairs})
+        frames = {link.name: self.frame(link.name) for link in self.mechanism.links}
+        u = scalars(e.u)[3 * len(self.given_links) :]
+        rows = residuals(self.mechanism, frames, split_pair_numbers(pairs, e.p), own, u)
+        return ca.vertcat(*(closing_error(value, row.kind) for row, value in rows))
 
     def rates(self, u1: ca.SX, u2: ca.SX) -> tuple[ca.SX, ca.SX]:
         """First and second rates of the unknowns, group after group."""
-        e = self.equations
-        y = ca.vertcat(e.z, e.u)
-        v1, v2 = ca.SX.sym("v1", y.numel()), ca.SX.sym("v2", y.numel())
-        first = ca.jtimes(e.F, y, v1)
-        second = ca.jtimes(first, y, v1) + ca.jtimes(e.F, y, v2)
-        z1, z2 = ca.SX.zeros(e.z.numel()), ca.SX.zeros(e.z.numel())
-        for expression, found in ((first, z1), (second, z2)):
-            for stage, _ in self.blocks:
-                known = ca.substitute(expression[stage.rows], ca.vertcat(v1, v2), ca.vertcat(z1, u1, z2, u2))
-                found[stage.unknowns] = -solve_with_regularity(self._jacobian(stage), known)[0]
-        return z1, z2
+        return UnknownRates(self.equations, solve_by_determinants).first_and_second(u1, u2)
 
     def newton_step(self, stage: Block) -> list[ca.SX]:
         """Newton's step of a group, the square of the volume that its slope's columns span, and that of their
         lengths."""
-        return list(solve_with_regularity(self._jacobian(stage), self.equations.F[stage.rows]))
-
-    def _jacobian(self, stage: Block) -> ca.SX:
         e = self.equations
-        return ca.densify(ca.jacobian(e.F[stage.rows], e.z[stage.unknowns]))
-
-
-def solve_with_regularity(matrix: ca.SX, right: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """slope^-1 left, the square of the volume that its columns span, and the product of the squares of their lengths.
-
-    Up to four unknowns by determinants, which leave nothing where the slope has nothing; of more by QR.
-    """
-    many = right.numel()
-    if many == 1:
-        return right / matrix, matrix * matrix, ca.SX(1.0)
-    if many > MAX_CRAMER_UNKNOWNS:
-        q, r = ca.qr(matrix)
-        strength = ca.SX(1.0)
-        for k in range(many):
-            strength = ca.fmin(strength, r[k, k] ** 2 / ca.sumsqr(matrix[:, k]))
-        return ca.solve(r, ca.mtimes(q.T, right)), strength, ca.SX(1.0)
-    both = ca.horzcat(matrix, right)
-    minors = _minors(both)
-    whole = minors[tuple(range(many))]
-    scale = 1.0 / whole
-    # Cramer's rule: the left side in place of a column, moved there from the end
-    step = [
-        minors[tuple(k for k in range(many + 1) if k != column)]
-        * (1.0 if (many - 1 - column) % 2 == 0 else -1.0)
-        * scale
-        for column in range(many)
-    ]
-    lengths = ca.SX(1.0)
-    for k in range(many):
-        lengths = lengths * ca.sumsqr(matrix[:, k])
-    return ca.vertcat(*step), whole * whole, lengths
-
-
-MAX_CRAMER_UNKNOWNS = 4
-
-
-def _minors(matrix: ca.SX) -> dict[tuple[int, ...], ca.SX]:
-    """The determinants of all rows with as many columns, by those of two rows at a time (Laplace)."""
-    rows, columns = matrix.shape
-    here: dict[tuple[int, ...], ca.SX] = {(): ca.SX(1.0)}
-    for first in range(0, rows, 2):
-        pair = matrix[first : min(first + 2, rows), :]
-        found: dict[tuple[int, ...], ca.SX] = {}
-        for chosen, value in here.items():
-            rest = [k for k in range(columns) if k not in chosen]
-            for own, minor in _row_minors(pair, rest):
-                sign = -1.0 if sum(a > b for a in chosen for b in own) % 2 else 1.0
-                key = tuple(sorted((*chosen, *own)))
-                found[key] = found.get(key, ca.SX(0.0)) + sign * value * minor
-        here = found
-    return here
-
-
-def _row_minors(rows: ca.SX, columns: Sequence[int]) -> list[tuple[tuple[int, ...], ca.SX]]:
-    if rows.shape[0] == 1:
-        return [((k,), rows[0, k]) for k in columns]
-    return [
-        ((i, j), rows[0, i] * rows[1, j] - rows[0, j] * rows[1, i])
-        for n, i in enumerate(columns)
-        for j in columns[n + 1 :]
-    ]
+        return list(solve_with_volume(block_jacobian(e, stage.rows, stage.unknowns), e.F[stage.rows]))
 
 
 class KernelWriter:

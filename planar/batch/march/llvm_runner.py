@@ -19,7 +19,8 @@ from planar.batch.march.llvm_designs import (
 from planar.codegen.aligned_arrays import allocate_aligned, is_aligned
 from planar.codegen.instructions import UnsupportedOperation
 from planar.codegen.llvm_compile import compile_function
-from planar.equations.functions import EquationFunctions, equation_structure
+from planar.equations.functions import EquationFunctions
+from planar.equations.mechanism_numbers import equation_structure
 from planar.model.mechanism import Mechanism
 
 Array = np.ndarray

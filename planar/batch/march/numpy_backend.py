@@ -10,7 +10,9 @@ import numpy as np
 from planar.batch.march.backend import DesignBatch, UnsupportedStructure
 from planar.batch.march.checks import DesignBranchCheck, DesignPositions, DesignResidualCheck
 from planar.batch.march.design_functions import DesignFunctions
-from planar.equations.functions import EquationRates, mechanism_size, shapes_of_links
+from planar.equations.functions import EquationRates
+from planar.equations.linear import solve_vectors
+from planar.equations.mechanism_numbers import mechanism_size, shapes_of_links
 from planar.foundation.geometry import Vector
 from planar.foundation.jets import Jet
 from planar.solving.checks.residual_check import ResidualCheck
@@ -139,7 +141,7 @@ class PointWriter:
             return self.functions.kinematics(y, np.hstack([z1, u1]), np.hstack([z2, u2]))
 
         z1 = (row.positions.sensitivities @ u1[:, :, None])[..., 0]
-        z2 = _solve_negated(row.positions.jacobians, at(z1, none).F2)
+        z2 = -solve_vectors(row.positions.jacobians, at(z1, none).F2)
         found = at(z1, z2)
         return found.w, found.w1, found.w2
 
@@ -151,17 +153,3 @@ class PointWriter:
             for axis, value in enumerate(place):
                 for order, part in enumerate(value.parts if isinstance(value, Jet) else (value,)):
                     np.multiply(part, self.task.unit, out=out[order * many + 2 * k + axis])
-
-
-def _solve_negated(jacobians: Array, right: Array) -> Array:
-    """-slope^-1 left for each design (designs, unknowns); not numbers where a slope is singular."""
-    if jacobians.shape[1] == 0:
-        return np.zeros((len(jacobians), 0))
-    if jacobians.shape[1] == 2:
-        a, b, c, d = (jacobians[:, i, j] for i in (0, 1) for j in (0, 1))
-        one, two = right.T
-        return np.stack([b * two - d * one, c * one - a * two], axis=1) / (a * d - b * c)[:, None]
-    regular = np.all(np.isfinite(jacobians), axis=(1, 2)) & (np.abs(np.linalg.det(jacobians)) > 1e-300)
-    found = np.full(right.shape, np.nan)
-    found[regular] = -np.linalg.solve(jacobians[regular], right[regular, :, None])[..., 0]
-    return found

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import casadi as ca
 
 from planar.batch.march.kernel import KernelEquations, KernelWriter, Operand
+from planar.equations.rates import first_and_second_rates
 from planar.foundation.geometry import Vector
 from planar.model.mechanism import links_counting_turns
 from planar.model.pairs import MeasureKind
@@ -53,9 +54,5 @@ class PointKernelWriter(KernelWriter):
         if not self.rates:
             return [places]
         z1, z2 = self.equations.rates(s["u1"], s["u2"])
-        y, y1, y2 = ca.vertcat(e.z, e.u), ca.vertcat(z1, s["u1"]), ca.vertcat(z2, s["u2"])
-        first = ca.jtimes(places, y, y1)
-        v1, v2 = ca.SX.sym("v1", y.numel()), ca.SX.sym("v2", y.numel())
-        moving = ca.jtimes(places, y, v1)
-        second = ca.jtimes(moving, y, v1) + ca.jtimes(places, y, v2)
-        return [places, first, ca.substitute(second, ca.vertcat(v1, v2), ca.vertcat(y1, y2))]
+        y, y1, y2 = e.y, ca.vertcat(z1, s["u1"]), ca.vertcat(z2, s["u2"])
+        return [places, *first_and_second_rates(places, y, y1, y2)]

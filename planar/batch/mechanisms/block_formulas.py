@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 
-from planar.batch.march.kernel import solve_with_regularity
 from planar.batch.mechanisms.block_type import COS, SIN, X1, X2, BlockEquations
 from planar.codegen.block_formula import BlockFormula, FormulaInput
 from planar.codegen.instructions import (
@@ -19,8 +18,11 @@ from planar.codegen.instructions import (
     required_values,
 )
 from planar.equations.closed_form import ClosedForm
-from planar.equations.constraint_equations import Block, ConstraintEquations
-from planar.equations.functions import frames_from_coordinates, slice_length
+from planar.equations.constraint_equations import Block
+from planar.equations.coordinates import coordinate_columns, frames_from_coordinates
+from planar.equations.linear import solve_by_determinants, solve_with_volume
+from planar.equations.rates import UnknownRates, block_jacobian, first_and_second_rates
+from planar.equations.residuals import closing_error, input_residuals, pair_residuals, scalars, split_pair_numbers
 from planar.foundation.geometry import GROUND, Frame, frame_at
 from planar.model.pairs import MeasureKind as Measure
 
@@ -106,7 +108,7 @@ class FormulaBuilder:
             if is_angle:
                 turned[k] = self.cos_sin[z[k]] = CosSin(self.add_input("z", (k, 0)), self.add_input("z", (k, 1)))
         if rates is None:
-            step, square, *lengths = solve_with_regularity(ca.densify(ca.jacobian(e.F, e.z)), e.F)
+            step, square, *lengths = solve_with_volume(ca.densify(ca.jacobian(e.F, e.z)), e.F)
             strength = square / lengths[0] if lengths else square
             return self.make_formula(self._inline((), [step, strength], z))
         way = SymbolicAssembly(z, turned, [])
@@ -129,8 +131,8 @@ class FormulaBuilder:
                 self.cos_sin[near[k]] = CosSin(*parts[k])
             else:
                 near[k] = found[0]
-        slope = ca.densify(ca.jacobian(e.F[stage.rows], e.z[stage.unknowns]))
-        step = self._inline((), [_solve(slope, e.F[stage.rows])], near)
+        slope = block_jacobian(e, stage.rows, stage.unknowns)
+        step = self._inline((), [solve_by_determinants(slope, e.F[stage.rows])], near)
         found = {}
         for (k, own), back in zip(parts.items(), step, strict=True):
             if len(own) == 1:
@@ -150,7 +152,7 @@ class FormulaBuilder:
     def _inner_frames(self) -> tuple[dict[str, Frame], dict[str, tuple]]:
         """Frames of the inner links and own coordinates of the pairs, in the unknowns."""
         e, kind = self.equations, self.block_equations
-        column = {(c.owner, c.part): k for k, c in enumerate(e.coordinates)}
+        column = coordinate_columns(e.coordinates)
         return frames_from_coordinates(
             ca.vertsplit(e.w), column, kind.inner_links, {pair.name: pair for pair in kind.mechanism.pairs}
         )
@@ -169,27 +171,23 @@ class FormulaBuilder:
         """
         e, kind = self.equations, self.block_equations
         places = ca.SX.sym("places", 3 * len(kind.inner_links))
-        numbers: list[int] = []
+        poses_given: list[int] = []
         for k, (x, y, c, s) in enumerate(poses):
-            numbers += [x, y, self.add_input("unknown", (len(self.instructions.instructions), k))]
-            self.cos_sin[numbers[-1]] = CosSin(c, s)
+            poses_given += [x, y, self.add_input("unknown", (len(self.instructions.instructions), k))]
+            self.cos_sin[poses_given[-1]] = CosSin(c, s)
         names = (*kind.given_links, *kind.inner_links)
         split = [*ca.vertsplit(e.u)[: 3 * len(kind.given_links)], *ca.vertsplit(places)]
         frames = {name: frame_at(*split[3 * k : 3 * k + 3]) for k, name in enumerate(names)} | {"frame": GROUND}
         _, own = self._inner_frames()
-        found: list[tuple[Measure, ca.SX]] = []
-        first, driven = 0, 3 * len(kind.given_links)
-        for pair, joint in zip(kind.mechanism.pairs, kind.signature.pairs, strict=True):
-            sizes = [e.p[first + k] for k in range(len(pair.number_kinds))]
-            first += len(sizes)
-            bodies = [frames[link] for link in pair.bodies]
-            found += zip(pair.residual_kinds, pair.residual(bodies, sizes, own[pair.name]), strict=True)
-            if joint.driven:
-                found.append((pair.input_kind, pair.input_position(bodies, sizes, own[pair.name]) - e.u[driven]))
-                driven += 1
-        open_ = [ca.sin(left) if kind is Measure.ANGLE else left for kind, left in found]
-        open_ += [1.0 - ca.cos(left) for kind, left in found if kind is Measure.ANGLE]
-        values = self._inline((places,), [ca.SX(each) for each in open_], way.z, (numbers,))
+        pairs = kind.mechanism.pairs
+        numbers = split_pair_numbers(pairs, e.p)
+        driven = [pair for pair, joint in zip(pairs, kind.signature.pairs, strict=True) if joint.driven]
+        rows = [
+            *pair_residuals(pairs, frames, numbers, own),
+            *input_residuals(driven, frames, numbers, own, scalars(e.u)[3 * len(kind.given_links) :]),
+        ]
+        open_ = [closing_error(value, row.kind) for row, value in rows]
+        values = self._inline((places,), [ca.SX(each) for each in open_], way.z, (poses_given,))
         add = self.instructions.add
         for c, s in way.cos_sin.values():
             square = add("add", add("mul", c, c), add("mul", s, s))
@@ -214,13 +212,10 @@ class FormulaBuilder:
     def rates(self, way: SymbolicAssembly) -> list[list[int]]:
         """x', y', angle', then the second ones of every inner link."""
         e, (u1, u2) = self.equations, self.symbols[2:]
-        z1, z2 = _unknown_rates(e, u1, u2)
-        y, y1, y2 = ca.vertcat(e.z, e.u), ca.vertcat(z1, u1), ca.vertcat(z2, u2)
-        v1, v2 = ca.SX.sym("v1", y.numel()), ca.SX.sym("v2", y.numel())
+        z1, z2 = UnknownRates(e, solve_by_determinants).first_and_second(u1, u2)
+        y, y1, y2 = e.y, ca.vertcat(z1, u1), ca.vertcat(z2, u2)
         w = e.w[: 3 * len(self.block_equations.inner_links)]
-        first = ca.jtimes(w, y, v1)
-        second = ca.jtimes(first, y, v1) + ca.jtimes(w, y, v2)
-        both = ca.substitute(ca.vertcat(first, second), ca.vertcat(v1, v2), ca.vertcat(y1, y2))
+        both = ca.vertcat(*first_and_second_rates(w, y, y1, y2))
         values = self._inline((), [both], way.z)
         many = 3 * len(self.block_equations.inner_links)
         return [values[3 * k : 3 * k + 3] + values[many + 3 * k : many + 3 * k + 3] for k in range(many // 3)]
@@ -253,24 +248,3 @@ class FormulaBuilder:
                     raise UnsupportedOperation("an angle stands outside cos and sin")
                 leaves[number] = FormulaInput(what, *(data if isinstance(data, tuple) else (data,)))
         return BlockFormula(made, tuple(numbers), leaves)
-
-
-def _unknown_rates(e: ConstraintEquations, u1: ca.SX, u2: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """First and second rates of the unknowns, stage after stage."""
-    y = ca.vertcat(e.z, e.u)
-    v1, v2 = ca.SX.sym("v1", y.numel()), ca.SX.sym("v2", y.numel())
-    first = ca.jtimes(e.F, y, v1)
-    second = ca.jtimes(first, y, v1) + ca.jtimes(e.F, y, v2)
-    z1, z2 = ca.SX.zeros(e.z.numel()), ca.SX.zeros(e.z.numel())
-    for order, expression in ((z1, first), (z2, second)):
-        for stage in e.blocks:
-            if slice_length(stage.unknowns) == 0:
-                continue
-            known = ca.substitute(expression[stage.rows], ca.vertcat(v1, v2), ca.vertcat(z1, u1, z2, u2))
-            slope = ca.densify(ca.jacobian(e.F[stage.rows], e.z[stage.unknowns]))
-            order[stage.unknowns] = -_solve(slope, known)
-    return z1, z2
-
-
-def _solve(matrix: ca.SX, right: ca.SX) -> ca.SX:
-    return solve_with_regularity(matrix, right)[0]

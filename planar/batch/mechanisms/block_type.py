@@ -7,10 +7,9 @@ from typing import NamedTuple
 
 import casadi as ca
 
-from planar.batch.march.kernel import solve_with_regularity
 from planar.equations.closed_form import ClosedForm, find_closed_form
-from planar.equations.constraint_equations import Block, ConstraintEquations, build_equations
-from planar.equations.functions import slice_length
+from planar.equations.constraint_equations import Block, ConstraintEquations, build_equations, slice_length
+from planar.equations.linear import solve_by_determinants
 from planar.model.mechanism import Input, Link, Mechanism
 from planar.model.pairs import MeasureKind as Measure
 from planar.model.pairs import Pair
@@ -93,10 +92,7 @@ class BlockEquations:
         self.closed_forms = [find_closed_form(e, stage) or linear_form(e, stage) for stage in self.blocks]
         self.sign_count = sum(each is not None and isinstance(each, ClosedForm) for each in self.closed_forms)
         "how many groups in it can be assembled in two ways"
-        square = all(
-            slice_length(stage.rows) == slice_length(stage.unknowns) and not stage.is_free for stage in e.blocks
-        )
-        self.is_square = square and not any(pair.sample.counts_turns for pair in pairs)
+        self.is_square = e.is_square and not any(pair.sample.counts_turns for pair in pairs)
         "whether it can be solved without the whole"
 
     @property
@@ -125,7 +121,7 @@ def linear_form(e: ConstraintEquations, stage: Block) -> LinearForm | None:
         return None
     if ca.jacobian_sparsity(slope, own).nnz():
         return None
-    found = -solve_with_regularity(slope, ca.substitute(rows, own, ca.SX.zeros(many)))[0]
+    found = -solve_by_determinants(slope, ca.substitute(rows, own, ca.SX.zeros(many)))
     if many == 1:
         return LinearForm(((found,),), ca.SX(0.0))
     det = slope[0, 0] * slope[1, 1] - slope[0, 1] * slope[1, 0]

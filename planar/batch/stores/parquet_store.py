@@ -25,8 +25,9 @@ from planar.batch.stores.store import (
     point_views,
     reporting_write_errors,
 )
-from planar.document.files import PARTIAL_FILE_NAME, file_sha256, read_limited, write_atomically
+from planar.document.files import read_limited
 from planar.foundation.errors import BadInput, Outcome
+from planar.foundation.safe_files import PARTIAL_FILE_NAME, file_sha256, write_atomically
 
 Array = np.ndarray
 

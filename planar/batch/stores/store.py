@@ -16,8 +16,9 @@ import numpy as np
 from planar.batch.block import DesignBlock, SolvedDesigns
 from planar.batch.results import Sweep
 from planar.codegen.aligned_arrays import allocate_aligned
-from planar.document.files import PARTIAL_FILE_NAME, to_dict, write_error
+from planar.document.files import to_dict
 from planar.foundation.errors import BadInput, Outcome
+from planar.foundation.safe_files import PARTIAL_FILE_NAME, write_error
 
 Array = np.ndarray
 

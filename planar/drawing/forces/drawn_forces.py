@@ -12,7 +12,7 @@ from planar.drawing.diagrams.drawn_run import closed_run, steady_run
 from planar.dynamics.flywheel import whole_turns
 from planar.dynamics.forces import Forces, forces
 from planar.dynamics.load_validation import require_loads
-from planar.equations.functions import mechanism_size
+from planar.equations.mechanism_numbers import mechanism_size
 from planar.foundation.errors import BadInput
 from planar.foundation.units import parse_unit
 from planar.model.mechanism import Mechanism

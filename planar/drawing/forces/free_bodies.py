@@ -31,7 +31,7 @@ from planar.drawing.scheme.scheme import point_labels, scheme, space_scale
 from planar.dynamics.forces import Forces
 from planar.dynamics.load_attachment import attachment_remarks
 from planar.dynamics.load_validation import require_loads
-from planar.equations.functions import mechanism_size
+from planar.equations.mechanism_numbers import mechanism_size
 from planar.foundation.errors import BadInput
 from planar.foundation.geometry import Vector, direction
 from planar.model.link_graph import link_label, link_numbers

@@ -13,7 +13,7 @@ from planar.analysis.worked.published import Comparison
 from planar.dynamics.forces import Forces
 from planar.dynamics.load_attachment import attachment_remarks
 from planar.dynamics.reactions import Reaction
-from planar.equations.functions import mechanism_size
+from planar.equations.mechanism_numbers import mechanism_size
 from planar.foundation.errors import Outcome
 from planar.foundation.units import display_unit
 from planar.model.link_graph import link_label, link_numbers

@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.equations.constraint_equations import Block
-from planar.equations.functions import EquationFunctions, frames_from_coordinates, slice_length
+from planar.equations.constraint_equations import Block, slice_length
+from planar.equations.coordinates import frames_from_coordinates
+from planar.equations.functions import EquationFunctions
 from planar.equations.minors import constraint_dependencies
 from planar.foundation.geometry import Vector
 from planar.model.pairs import MeasureKind

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from planar.equations.constraint_equations import Block
-from planar.equations.functions import frames_from_coordinates
+from planar.equations.coordinates import frames_from_coordinates
 from planar.foundation.units import parse_unit
 from planar.model.pairs import MeasureKind
 from planar.model.wording import count_phrase, join_all_names, quote_names

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from planar.equations.functions import EquationFunctions
+from planar.equations.linear import solve_arrays
 
 Array = np.ndarray
 
@@ -33,7 +34,7 @@ class BranchCheck:
     def accept_steps(self, z: Array, u: Array) -> Array:
         """For each step of a run, z (samples, unknowns) and u (samples, inputs), whether it keeps to the branch."""
         slopes, drives = self.functions.jacobians(z, u, self.p)
-        gains = solve_rates_batch(slopes, drives)
+        gains = -solve_arrays(slopes, drives)
         way = np.diff(u, axis=0)
         before, after = ((gain @ way[:, :, None])[..., 0] for gain in (gains[:-1], gains[1:]))
         smooth = np.all(is_move_allowed(np.diff(z, axis=0), before, after), axis=1)
@@ -72,21 +73,6 @@ class BranchCheck:
                 # on the singular position itself rates are rounding, and say nothing of how it changes
                 distances[:, index] = np.where(least < ZERO_SINGULAR_VALUE, 0.0, least / np.maximum(change, 1e-300))
         return np.nan_to_num(distances, nan=0.0, posinf=np.inf)
-
-
-def solve_rates_batch(jacobians: Array, known: Array) -> Array:
-    """The rates of the unknowns that cancel what known rates open; slopes (..., rows, unknowns), known (..., rows, k).
-
-    Where a square slope is singular, NaN: no rate is allowed there.
-    """
-    if jacobians.shape[-1] != jacobians.shape[-2]:
-        return -np.linalg.pinv(jacobians, rcond=1e-12) @ known
-    try:
-        return -np.linalg.solve(jacobians, known)
-    except np.linalg.LinAlgError:
-        if jacobians.ndim > 2:
-            return np.stack([solve_rates_batch(slope, each) for slope, each in zip(jacobians, known, strict=True)])
-        return np.full((jacobians.shape[-1], known.shape[-1]), np.nan)
 
 
 def _least_singular_values(slopes: Array) -> Array:

@@ -1,6 +1,6 @@
 """The first part of the gate that every answer passes, whichever way it was found: is everything closed?
 
-It knows nothing of elimination, casadi or Newton: it runs the pairs' own formulas on plain numbers. The second part,
+It knows nothing of elimination or Newton: it runs the pairs' own formulas on plain numbers. The second part,
 since the residual of a flipped linkage is zero too, is `branch`.
 """
 
@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from planar.equations.acceptance import CARRIED_ROUNDING
+from planar.equations.residuals import closing_error, input_residuals, pair_residuals
 from planar.foundation.geometry import Frame, frame_term_sizes
 from planar.foundation.jets import Jet, term_sizes
 from planar.model.link_shapes import LinkShape
@@ -71,7 +72,10 @@ class ResidualCheck:
         Frames with cos and sin made from their angles, floats or arrays alike. `u` (inputs, ...) are the positions
         of the inputs, else the mechanism's own. What is not a number counts as infinitely open.
         """
-        gaps = [_absolute_residual(left, kind, self.unit) for kind, left in self._pair_residuals(frames, own, u)]
+        gaps = [
+            np.abs(closing_error(left, kind)) / self._unit_of(kind)
+            for (_, kind), left in self._residuals(frames, own, u)
+        ]
         if not gaps:
             return np.zeros((0, 1))
         # the round-off of an angle, and of where its cos and sin put things, grows with the turns that it counts
@@ -114,8 +118,8 @@ class ResidualCheck:
         }
         own_sizes = {name: [term_sizes(each) for each in values] for name, values in own.items()}
         given = [term_sizes(each) for each in u]
-        both = zip(self._pair_residuals(frames, own, u), self._pair_residuals(sizes, own_sizes, given), strict=True)
-        closures = [(kind, left, whole) for (kind, left), (_, whole) in both if isinstance(left, Jet)]
+        both = zip(self._residuals(frames, own, u), self._residuals(sizes, own_sizes, given), strict=True)
+        closures = [(row.kind, left, whole) for (row, left), (_, whole) in both if isinstance(left, Jet)]
         found = []
         for order in (1, 2):
             # a velocity counts as one in an arc of the size: what turning leaves there but for rounding is none
@@ -155,17 +159,14 @@ class ResidualCheck:
     def _unit_of(self, kind: MeasureKind) -> float:
         return self.unit if kind is MeasureKind.LENGTH else 1.0
 
-    def _pair_residuals(self, frames, own, u=None):  # noqa: ANN001, ANN202 - floats, arrays or jets alike
-        """(kind, what is left open) of every constraint, then of every input."""
-        for pair in self.mechanism.pairs:
-            left = pair.residual([frames[link] for link in pair.bodies], self.numbers[pair.name], own[pair.name])
-            yield from zip(pair.residual_kinds, left, strict=True)
-        for index, given in enumerate(self.mechanism.inputs):
-            pair = self.relative_motions[given.pair]
-            drive = pair.input_position(
-                [frames[link] for link in pair.bodies], self.numbers[pair.name], own.get(pair.name, ())
-            )
-            yield pair.input_kind, drive - (given.position if u is None else u[index])
+    def _residuals(self, frames, own, u=None):  # noqa: ANN001, ANN202 - floats, arrays or jets alike
+        """The residuals of all pairs, then of all inputs, with their rows."""
+        inputs = self.mechanism.inputs
+        yield from pair_residuals(self.mechanism.pairs, frames, self.numbers, own)
+        motions = [self.relative_motions[given.pair] for given in inputs]
+        yield from input_residuals(
+            motions, frames, self.numbers, own, [given.position for given in inputs] if u is None else u
+        )
 
 
 def _row_scale(whole: Array, carried: Array) -> Array:
@@ -176,11 +177,3 @@ def _row_scale(whole: Array, carried: Array) -> Array:
 
 def _lengths(pair: Pair, numbers: Sequence[float]) -> list[float]:
     return [value for value, kind in zip(numbers, pair.number_kinds, strict=True) if kind is MeasureKind.LENGTH]
-
-
-def _absolute_residual(residual: Array, kind: MeasureKind, unit: float) -> Array:
-    if kind is MeasureKind.LENGTH:
-        return np.abs(residual) / unit
-    if kind is MeasureKind.ANGLE:
-        return np.abs(np.arctan2(np.sin(residual), np.cos(residual)))
-    return np.abs(residual)

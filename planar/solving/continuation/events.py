@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.equations.functions import frames_from_coordinates
+from planar.equations.coordinates import frames_from_coordinates
 from planar.foundation.errors import TrackingEnd
 from planar.foundation.jets import Jet, value_and_rates
 from planar.foundation.root_finding import find_root

@@ -9,9 +9,11 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from planar.equations.functions import EquationFunctions, slice_length
+from planar.equations.constraint_equations import slice_length
+from planar.equations.functions import EquationFunctions
+from planar.equations.linear import solve_vectors
 from planar.foundation.errors import NoAnswer, TrackingEnd
-from planar.solving.checks.branch_check import BranchCheck, solve_rates_batch
+from planar.solving.checks.branch_check import BranchCheck
 from planar.solving.continuation.fast_path import STRAIGHT_TOLERANCE, FastSamples, fast_run
 from planar.solving.continuation.path_pieces import (
     BranchRates,
@@ -329,7 +331,7 @@ def _correct_once(program: EquationFunctions, p: Array, z: Array, u: Array) -> A
         return z
     none = np.zeros((len(z), z.shape[1] + u.shape[1]))
     there = program.kinematics(np.hstack([z, u]), none, none, p)
-    return z + solve_rates_batch(there.jacobian, there.F[..., None])[..., 0]
+    return z - solve_vectors(there.jacobian, there.F)
 
 
 def correct_blocks(

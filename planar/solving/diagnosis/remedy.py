@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.equations.constraint_equations import Block
-from planar.equations.functions import pair_numbers, shapes_of_links
+from planar.equations.mechanism_numbers import pair_numbers, shapes_of_links
 from planar.foundation.units import parse_unit
 from planar.model.dimensions import change_dimension, dimensions
 from planar.model.link_shapes import PointPlacementError

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.equations.linear import inverse_arrays
 from planar.equations.rounding_errors import rounding_terms
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.model.pairs import MeasureKind
@@ -155,7 +156,7 @@ def _rate_errors(setup: PreparedMechanism, y: Array, y1: Array, y2: Array) -> Ra
     slope, first, second = (
         np.abs(each) for each in (found.jacobian, found.first_rate_jacobian, found.second_rate_jacobian)
     )
-    inverse = np.abs(_inverse_jacobians(found.jacobian[:, :rows, :unknowns]))
+    inverse = np.abs(inverse_arrays(found.jacobian[:, :rows, :unknowns]))
 
     def solved(of_rows: Array, of_inputs: Array) -> Array:
         return np.hstack([_matrix_times_vector(inverse, of_rows), of_inputs])
@@ -217,15 +218,3 @@ def _relative_errors(errors: Array, references: Array) -> Array:
 
 def _row_maxima(values: Array) -> Array:
     return np.max(values, axis=1, initial=0.0)
-
-
-def _inverse_jacobians(slopes: Array) -> Array:
-    """What undoes each slope (samples, unknowns, rows); not numbers where one is singular."""
-    try:
-        if slopes.shape[1] == slopes.shape[2]:
-            return np.linalg.inv(slopes)
-        return np.linalg.pinv(slopes, rcond=1e-12)
-    except np.linalg.LinAlgError:
-        if len(slopes) == 1:
-            return np.full((1, slopes.shape[2], slopes.shape[1]), np.nan)
-        return np.concatenate([_inverse_jacobians(each[None]) for each in slopes])

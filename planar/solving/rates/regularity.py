@@ -6,8 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from planar.equations.constraint_equations import Block
-from planar.equations.functions import EquationRates, slice_length
+from planar.equations.constraint_equations import Block, slice_length
+from planar.equations.functions import EquationRates
+from planar.equations.linear import solve_vectors
 from planar.foundation.errors import NoAnswer
 from planar.solving.continuation.path import correct_blocks
 from planar.solving.diagnosis import refusals
@@ -116,16 +117,9 @@ def _scaled_jacobian(setup: PreparedMechanism, jacobian: Array) -> Array:
     return scaled / sizes[..., None, :]
 
 
-def solve_rates(jacobian: Array, known: Array) -> Array:
-    """The rates of the unknowns (unknowns,) that cancel what known rates open (rows,)."""
-    if jacobian.shape[0] == jacobian.shape[1]:
-        return np.linalg.solve(jacobian, -known) if known.size else np.zeros(0)
-    return np.linalg.lstsq(jacobian, -known, rcond=1e-12)[0]
-
-
 def _input_rates_agree(setup: PreparedMechanism, motion: EquationRates) -> bool:
     """Whether rates of the inputs that are more than the freedom do not contradict one another."""
-    left = motion.jacobian @ solve_rates(motion.jacobian, motion.F1) + motion.F1
+    left = motion.F1 - motion.jacobian @ solve_vectors(motion.jacobian, motion.F1)
     scale = np.max(np.abs(setup.inputs.u1), initial=0.0) or 1.0
     return bool(np.max(np.abs(left), initial=0.0) <= 1e-9 * scale)
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.solving.checks.branch_check import solve_rates_batch
+from planar.equations.linear import solve_vectors
 from planar.solving.continuation.path import BranchRates
 from planar.solving.continuation.solution_curve import truncated_step
 from planar.solving.prepared_mechanism import PreparedMechanism
@@ -69,7 +69,7 @@ def sample_rates(
     def solved(left: Array, order: int) -> Array:
         found = np.full(z.shape, np.nan)
         if strong.any():
-            found[strong] = solve_rates_batch(rest.jacobian[strong], left[strong][..., None])[..., 0]
+            found[strong] = -solve_vectors(rest.jacobian[strong], left[strong])
         for index, each in known.items():
             slope, guess = rest.jacobian[index], each[order - 1]
             found[index] = guess - truncated_step(

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from planar.equations.functions import frames_from_coordinates
+from planar.equations.coordinates import frames_from_coordinates
 from planar.foundation.errors import BadInput, Outcome
 from planar.foundation.jets import Jet
 from planar.foundation.root_finding import find_root

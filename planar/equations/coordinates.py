@@ -1,0 +1,51 @@
+"""The coordinates w of a mechanism: what each is, and the frames of links that they make."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from planar.foundation.geometry import GROUND, Frame, frame_at
+from planar.foundation.jets import Scalar
+from planar.model.pairs import MeasureKind, Pair
+
+Array = np.ndarray
+
+FRAME_PARTS = ("x", "y", "angle")
+"""The coordinates of a link."""
+
+
+class Coordinate(NamedTuple):
+    """One entry of w: a part of a link's frame ("x", "y", "angle"), or a coordinate of a pair's own."""
+
+    owner: str
+    part: str
+    kind: MeasureKind
+    of_link: bool
+
+
+def coordinate_columns(coordinates: Iterable[Coordinate]) -> dict[tuple[str, str], int]:
+    """Where in w each part of a link or a pair stands."""
+    return {(each.owner, each.part): k for k, each in enumerate(coordinates)}
+
+
+def frames_from_coordinates(
+    w: Sequence[Scalar] | Array,
+    column: Mapping[tuple[str, str], int],
+    links: Iterable[str],
+    pairs: Mapping[str, Pair],
+    make_frame: Callable[..., Frame] = frame_at,
+) -> tuple[dict[str, Frame], dict[str, tuple[Scalar, ...]]]:
+    """Frames of links and own coordinates of pairs from w, whose entries may be of any arithmetic.
+
+    `column` says where a part stands in w; a link without a place there is the frame. `make_frame` makes a frame of
+    x, y and angle.
+    """
+    frames = {
+        link: make_frame(*(w[column[link, part]] for part in FRAME_PARTS)) if (link, "x") in column else GROUND
+        for link in links
+    }
+    own = {name: tuple(w[column[name, part]] for part, _ in pair.coordinate_kinds) for name, pair in pairs.items()}
+    return frames, own

@@ -1,0 +1,162 @@
+"""Small linear systems solved, as casadi expressions and for stacks of arrays.
+
+Everywhere the matrix is a Jacobian of residuals in unknowns (..., rows, unknowns), and the right side is what these
+have to make; a rate that cancels it is minus what is returned.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import casadi as ca
+import numpy as np
+
+Array = np.ndarray
+
+MAX_CRAMER_UNKNOWNS = 4
+"""More unknowns are not solved by determinants."""
+RANK_TOLERANCE = 1e-12
+"""Singular values below this part of the greatest count as zero where there are more rows, or fewer, than unknowns."""
+
+
+def solve_linear(matrix: ca.SX, right_side: ca.SX) -> ca.SX:
+    """matrix^-1 right side (unknowns, 1); two by two by the adjugate, larger by QR, neither of which needs a pivot."""
+    if matrix.numel() == 1:
+        return right_side / matrix
+    if matrix.numel() == 4:
+        a, b, c, d = matrix[0, 0], matrix[0, 1], matrix[1, 0], matrix[1, 1]
+        return ca.vertcat(d * right_side[0] - b * right_side[1], a * right_side[1] - c * right_side[0]) / (
+            a * d - b * c
+        )
+    q, r = ca.qr(matrix)
+    return ca.solve(r, ca.mtimes(q.T, right_side))
+
+
+def solve_by_determinants(matrix: ca.SX, right_side: ca.SX) -> ca.SX:
+    """matrix^-1 right side, as `solve_with_volume` has it."""
+    return solve_with_volume(matrix, right_side)[0]
+
+
+def solve_with_volume(matrix: ca.SX, right_side: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """matrix^-1 right side, the squared volume that the columns span, and the product of the squares of their lengths.
+
+    Up to four unknowns by determinants (Cramer's rule), which leave nothing where the matrix has nothing; of more by
+    QR, and then in place of the volume the least squared ratio of a column's part across those before it, beside one.
+    """
+    count = right_side.numel()
+    if count == 1:
+        return right_side / matrix, matrix * matrix, ca.SX(1.0)
+    if count > MAX_CRAMER_UNKNOWNS:
+        q, r = ca.qr(matrix)
+        least = ca.SX(1.0)
+        for k in range(count):
+            least = ca.fmin(least, r[k, k] ** 2 / ca.sumsqr(matrix[:, k]))
+        return ca.solve(r, ca.mtimes(q.T, right_side)), least, ca.SX(1.0)
+    minors = _minors(ca.horzcat(matrix, right_side))
+    determinant = minors[tuple(range(count))]
+    scale = 1.0 / determinant
+    # the right side in place of a column, moved there from the end
+    solution = [
+        minors[tuple(k for k in range(count + 1) if k != column)]
+        * (1.0 if (count - 1 - column) % 2 == 0 else -1.0)
+        * scale
+        for column in range(count)
+    ]
+    lengths = ca.SX(1.0)
+    for k in range(count):
+        lengths = lengths * ca.sumsqr(matrix[:, k])
+    return ca.vertcat(*solution), determinant * determinant, lengths
+
+
+def _minors(matrix: ca.SX) -> dict[tuple[int, ...], ca.SX]:
+    """The determinants of all rows with as many columns, by those of two rows at a time (Laplace)."""
+    rows, columns = matrix.shape
+    here: dict[tuple[int, ...], ca.SX] = {(): ca.SX(1.0)}
+    for first in range(0, rows, 2):
+        pair = matrix[first : min(first + 2, rows), :]
+        found: dict[tuple[int, ...], ca.SX] = {}
+        for chosen, value in here.items():
+            rest = [k for k in range(columns) if k not in chosen]
+            for own, minor in _row_minors(pair, rest):
+                sign = -1.0 if sum(a > b for a in chosen for b in own) % 2 else 1.0
+                key = tuple(sorted((*chosen, *own)))
+                found[key] = found.get(key, ca.SX(0.0)) + sign * value * minor
+        here = found
+    return here
+
+
+def _row_minors(rows: ca.SX, columns: Sequence[int]) -> list[tuple[tuple[int, ...], ca.SX]]:
+    """The minors of one row, or of two, by their columns."""
+    if rows.shape[0] == 1:
+        return [((k,), rows[0, k]) for k in columns]
+    return [
+        ((i, j), rows[0, i] * rows[1, j] - rows[0, j] * rows[1, i])
+        for n, i in enumerate(columns)
+        for j in columns[n + 1 :]
+    ]
+
+
+def solve_arrays(
+    matrices: Array,
+    right_sides: Array,
+    least_determinant: float = 0.0,
+    least_squares: bool = False,
+) -> Array:
+    """matrices^-1 right sides (..., unknowns, k); matrices (..., rows, unknowns), right sides (..., rows, k).
+
+    Not numbers where the determinant of a square matrix is not above `least_determinant`; with `least_squares` those
+    of least squares where there are more than two unknowns. With more rows, or fewer, than unknowns always those.
+    """
+    rows, unknowns = matrices.shape[-2:]
+    if rows != unknowns:
+        return _pseudo_inverses(matrices) @ right_sides
+    if matrices.ndim > 2 and unknowns == 1:
+        return _divide(right_sides, matrices, least_determinant)
+    if matrices.ndim > 2 and unknowns == 2:
+        a, b, c, d = (matrices[..., i, j, None] for i in (0, 1) for j in (0, 1))
+        first, second = right_sides[..., 0, :], right_sides[..., 1, :]
+        adjugate_times = np.stack([d * first - b * second, a * second - c * first], axis=-2)
+        return _divide(adjugate_times, (a * d - b * c)[..., None, :], least_determinant)
+    if not least_determinant:
+        try:
+            return np.linalg.solve(matrices, right_sides)
+        except np.linalg.LinAlgError:
+            pass
+    known = np.all(np.isfinite(matrices), axis=(-2, -1))
+    regular = np.array(known)
+    regular[known] = np.abs(np.linalg.det(matrices[known])) > least_determinant
+    right_sides = np.broadcast_to(right_sides, (*matrices.shape[:-1], right_sides.shape[-1]))
+    found = np.full(right_sides.shape, np.nan)
+    found[regular] = np.linalg.solve(matrices[regular], right_sides[regular])
+    if least_squares:
+        found[~regular] = np.linalg.pinv(np.nan_to_num(matrices[~regular])) @ right_sides[~regular]
+    return found
+
+
+def solve_vectors(
+    matrices: Array, vectors: Array, least_determinant: float = 0.0, least_squares: bool = False
+) -> Array:
+    """The same of one vector each: vectors (..., rows) to (..., unknowns)."""
+    return solve_arrays(matrices, vectors[..., None], least_determinant, least_squares)[..., 0]
+
+
+def inverse_arrays(matrices: Array) -> Array:
+    """matrices^-1 (..., unknowns, rows), or what gives least squares; not numbers where one is singular."""
+    return solve_arrays(matrices, np.eye(matrices.shape[-2]))
+
+
+def _divide(values: Array, determinants: Array, least_determinant: float) -> Array:
+    """Values over determinants, not numbers where these are too small."""
+    if least_determinant or not np.all(determinants):
+        determinants = np.where(np.abs(determinants) > least_determinant, determinants, np.nan)
+    return values / determinants
+
+
+def _pseudo_inverses(matrices: Array) -> Array:
+    """What gives least squares (..., unknowns, rows); not numbers where a matrix is not all numbers."""
+    known = np.all(np.isfinite(matrices), axis=(-2, -1))
+    if np.all(known):
+        return np.linalg.pinv(matrices, rcond=RANK_TOLERANCE)
+    found = np.full((*matrices.shape[:-2], *matrices.shape[:-3:-1]), np.nan)
+    found[known] = np.linalg.pinv(matrices[known], rcond=RANK_TOLERANCE)
+    return found

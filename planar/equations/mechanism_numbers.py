@@ -1,0 +1,73 @@
+"""What the equations take of a mechanism: its structure, the sizes of its links, the numbers p of its pairs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import hypot
+
+import numpy as np
+
+from planar.model.link_shapes import LinkShape, link_shape
+from planar.model.mechanism import Input, Link, Mechanism, relative_motions
+from planar.model.pairs import MeasureKind, Pair
+
+Array = np.ndarray
+
+
+def equation_structure(mechanism: Mechanism) -> Mechanism:
+    """All of a mechanism that its equations depend on: names of links, pairs, which motions are driven."""
+    return Mechanism(
+        name="",
+        frame=mechanism.frame,
+        links=tuple(Link(link.name) for link in mechanism.links),
+        pairs=mechanism.pairs,
+        inputs=tuple(Input(given.pair, 0.0) for given in mechanism.inputs),
+    )
+
+
+def shapes_of_links(mechanism: Mechanism) -> dict[str, LinkShape]:
+    """The shape of every link (m)."""
+    return {link.name: link_shape(link) for link in mechanism.links}
+
+
+def mechanism_size(mechanism: Mechanism, shapes: Mapping[str, LinkShape]) -> float:
+    """The mechanism's size (m): the greatest distance between two points of one link, else of a slide's travel."""
+    named = relative_motions(mechanism)
+    slide = [named[given.pair].input_kind is MeasureKind.LENGTH for given in mechanism.inputs]
+    return size_from_extents(mechanism, {name: shape_extent(shape) for name, shape in shapes.items()}, slide)
+
+
+def size_from_extents(mechanism: Mechanism, extents: Mapping[str, float], is_slide: Sequence[bool]) -> float:
+    """The mechanism's size (m) from the extents of its links and from which of its inputs slide."""
+    slides = [abs(given.position) for given, slides in zip(mechanism.inputs, is_slide, strict=True) if slides]
+    return max(extents.values(), default=0.0) or max(slides, default=0.0) or 1.0
+
+
+def shape_extent(shape: LinkShape) -> float:
+    """The greatest distance between two points of a link (m)."""
+    x, y = [at.x for at in shape.points.values()], [at.y for at in shape.points.values()]
+    return hypot(max(x) - min(x), max(y) - min(y)) if x else 0.0
+
+
+def pair_numbers(mechanism: Mechanism, shapes: Mapping[str, LinkShape], unit: float) -> Array:
+    """p: the numbers of every pair, lengths divided by `unit`."""
+    measured = {pair.name: pair.measure([shapes[link] for link in pair.bodies]) for pair in mechanism.pairs}
+    return pair_numbers_from(mechanism, measured, unit)
+
+
+def pair_numbers_from(mechanism: Mechanism, numbers: Mapping[str, Sequence[float]], unit: float) -> Array:
+    """p from the numbers of every pair, lengths divided by `unit`."""
+    found: list[float] = []
+    for pair in mechanism.pairs:
+        found += scale_lengths(numbers[pair.name], pair.number_kinds, unit)
+    return np.array(found, dtype=float)
+
+
+def scaled_pair_numbers(pair: Pair, shapes: Mapping[str, LinkShape], unit: float) -> list[float]:
+    """The numbers of one pair, lengths divided by `unit`."""
+    return scale_lengths(pair.measure([shapes[link] for link in pair.bodies]), pair.number_kinds, unit)
+
+
+def scale_lengths(values: Sequence[float], kinds: Sequence[MeasureKind], unit: float) -> list[float]:
+    """Numbers with the lengths among them divided by `unit`."""
+    return [value / unit if kind is MeasureKind.LENGTH else value for value, kind in zip(values, kinds, strict=True)]
