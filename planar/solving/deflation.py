@@ -17,6 +17,7 @@ import numpy as np
 from planar.equations.constraint_equations import Block
 from planar.equations.functions import EquationFunctions
 from planar.equations.minors import LowRankBlock, add_minors, constraint_dependencies
+from planar.solving.newton import correct, shortest_step
 from planar.solving.prepared_mechanism import PreparedMechanism
 
 Array = np.ndarray
@@ -72,15 +73,15 @@ def _holds_along_motion(setup: PreparedMechanism, program: EquationFunctions, y:
 
 def _correct(setup: PreparedMechanism, program: EquationFunctions, y: Array, free_count: int) -> Array | None:
     """The nearest position to y = (unknowns, inputs) that closes, of which the first `free` may move; None without."""
-    y, many, before = y.copy(), len(y) - len(setup.inputs.u), np.inf
-    for _ in range(MAX_CORRECTIONS):
+    many, held = len(y) - len(setup.inputs.u), y[free_count:]
+
+    def here(x: Array) -> tuple[Array, Array]:
+        y = np.concatenate([x, held])
         left, slope = program.residuals_and_jacobian(y[:many], y[many:], setup.inputs.p)
-        gap = float(np.max(np.abs(left), initial=0.0))
-        if not gap < before:
-            break
-        before = gap
-        y[:free_count] -= np.linalg.lstsq(slope[:, :free_count], left, rcond=SINGULAR_TOLERANCE)[0]
-    return y if before <= CLOSED_TOLERANCE else None
+        return left, slope[:, :free_count]
+
+    found, gap = correct(here, shortest_step(SINGULAR_TOLERANCE), y[:free_count], MAX_CORRECTIONS)
+    return np.concatenate([found, held]) if gap <= CLOSED_TOLERANCE else None
 
 
 def _minor_block(setup: PreparedMechanism, stage: Block, z: Array, with_earlier: bool) -> LowRankBlock | None:

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.solving.continuation.solution_curve import Arc, CurvePoint, SolutionCurve, fit_polynomial
+from planar.solving.newton import settle, shortest_step
 
 Array = np.ndarray
 
@@ -88,32 +89,31 @@ def bifurcation_candidates(curve: SolutionCurve, here: CurvePoint) -> Iterator[B
 def _refine_candidate(curve: SolutionCurve, y: Array, null_start: Array) -> BifurcationCandidate | None:
     """The point next to y at which the slope has null vectors next to these (n + 1, k)."""
     size, count = null_start.shape
-    null = null_start
-    for _ in range(MAX_REFINEMENTS):
-        slope = curve.jacobian(y)
+
+    def augmented(x: Array) -> tuple[Array, Array]:
+        y, null = x[:size], x[size:].reshape(count, size).T
+        left, slope = curve.residuals_and_jacobian(y)
         rows = len(slope)
-        left = [curve.residuals(y), *(slope @ null).T, (null_start.T @ null - np.eye(count)).ravel()]
+        residuals = [left, *(slope @ null).T, (null_start.T @ null - np.eye(count)).ravel()]
         system = np.zeros((rows * (1 + count) + count * count, size * (1 + count)))
         system[:rows, :size] = slope
+        whole = curve.unknowns_and_inputs(y)
         for k in range(count):
             band = slice(rows * (1 + k), rows * (2 + k))
-            system[band, :size] = curve.narrow_columns(
-                curve.functions.second_derivative_along(
-                    curve.unknowns_and_inputs(y), curve.widen_direction(null[:, k]), curve.p
-                )
-            )
+            change = curve.functions.second_derivative_along(whole, curve.widen_direction(null[:, k]), curve.p)
+            system[band, :size] = curve.narrow_columns(change)
             system[band, size * (1 + k) : size * (2 + k)] = slope
             # entry (j, k) of start^T null
             system[rows * (1 + count) + k :: count, size * (1 + k) : size * (2 + k)] = null_start.T
-        step = _solve_least_squares(system, -np.concatenate(left))
-        if not np.all(np.isfinite(step)) or np.max(np.abs(step)) > 1.0:
-            return None
-        y = y + step[:size]
-        null = null + step[size:].reshape(count, size).T
-        if np.max(np.abs(step[:size])) < CONVERGED_STEP:
-            break
-    else:
+        return np.concatenate(residuals), system
+
+    start = np.concatenate([y, null_start.T.ravel()])
+    x, is_settled = settle(
+        augmented, lambda J, F: _solve_least_squares(J, -F), start, MAX_REFINEMENTS, (size, CONVERGED_STEP), 1.0
+    )
+    if not is_settled:
         return None
+    y = x[:size]
     _, s, vt = np.linalg.svd(curve.jacobian(y))
     rank = int(np.sum(s > SINGULAR_TOLERANCE * max(s[0], 1.0)))
     if rank > size - 2:
@@ -151,12 +151,12 @@ class _BranchConditions:
             return None
         forms = self.forms / scale
         c = c / np.linalg.norm(c)
-        for _ in range(MAX_REFINEMENTS):
+
+        def of_length_one(c: Array) -> tuple[Array, Array]:
             left = np.append(np.einsum("fij,i,j->f", forms, c, c), 0.5 * (c @ c - 1.0))
-            step = np.linalg.lstsq(np.vstack([2.0 * forms @ c, c]), -left, rcond=1e-10)[0]
-            c = c + step
-            if np.max(np.abs(step)) < CONVERGED_STEP:
-                break
+            return left, np.vstack([2.0 * forms @ c, c])
+
+        c, _ = settle(of_length_one, shortest_step(FORM_TOLERANCE), c, MAX_REFINEMENTS, (len(c), CONVERGED_STEP))
         met = (
             np.max(np.abs(np.einsum("fij,i,j->f", forms, c, c))) < FORM_TOLERANCE
             and abs(c @ c - 1.0) < SAME_DIRECTION_TOLERANCE

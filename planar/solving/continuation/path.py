@@ -9,7 +9,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from planar.equations.functions import EquationFunctions, slice_length
+from planar.equations.functions import EquationFunctions
 from planar.foundation.errors import NoAnswer, TrackingEnd
 from planar.solving.checks.branch_check import BranchCheck, solve_rates_batch
 from planar.solving.continuation.fast_path import STRAIGHT_TOLERANCE, FastSamples, fast_run
@@ -27,7 +27,6 @@ from planar.solving.continuation.solution_curve import CurvePoint, CurveSolver, 
 
 Array = np.ndarray
 
-MAX_CORRECTIONS = 8
 MIN_WINDOW = 8
 """Samples that are tried at once where none has passed before."""
 MAX_SAMPLES_AHEAD = 1000
@@ -330,26 +329,3 @@ def _correct_once(program: EquationFunctions, p: Array, z: Array, u: Array) -> A
     none = np.zeros((len(z), z.shape[1] + u.shape[1]))
     there = program.kinematics(np.hstack([z, u]), none, none, p)
     return z + solve_rates_batch(there.jacobian, there.F[..., None])[..., 0]
-
-
-def correct_blocks(
-    program: EquationFunctions, p: Array, z: Array, u: Array, last_level: int | None = None
-) -> Array | None:
-    """Newton's corrector, group after group (to the `last`), from unknowns near by; None where one does not close."""
-    z = z.copy()
-    for stage in program.equations.blocks:
-        if not slice_length(stage.rows) or (last_level is not None and stage.block_index > last_level):
-            continue
-        closing = program.block_call(stage)
-        before = np.inf
-        for _ in range(MAX_CORRECTIONS):
-            left, slope = closing(z, u, p)
-            gap = float(np.max(np.abs(left), initial=0.0))
-            if not gap < before:
-                break
-            before = gap
-            if slope.size:
-                z[stage.unknowns] -= np.linalg.lstsq(slope.T, left[0], rcond=1e-12)[0]
-        if not before <= 1e-10:
-            return None
-    return z

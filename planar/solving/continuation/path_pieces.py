@@ -66,9 +66,8 @@ class PathPiece(NamedTuple):
         rough = arc.polynomial(x)
         rough[-1] = position
         if arc.is_exact:
-            return curve.correct_at_inputs(rough, arc.rank_loss)[:-1], BranchRates(
-                derivatives_by_input(arc, x), curve.input_direction, arc.rank_loss
-            )
+            y = curve.correct_beside_bifurcation(rough, arc.rank_loss, with_inputs=False)
+            return y[:-1], BranchRates(derivatives_by_input(arc, x), curve.input_direction, arc.rank_loss)
         ahead = np.zeros_like(rough)
         ahead[-1] = 1.0
         y = curve.correct(rough, ahead)

@@ -9,8 +9,8 @@ import numpy as np
 from planar.equations.constraint_equations import Block
 from planar.equations.functions import EquationRates, slice_length
 from planar.foundation.errors import NoAnswer
-from planar.solving.continuation.path import correct_blocks
 from planar.solving.diagnosis import refusals
+from planar.solving.newton import correct_blocks
 from planar.solving.prepared_mechanism import PreparedMechanism
 
 Array = np.ndarray

@@ -9,7 +9,7 @@ import numpy as np
 
 from planar.solving.checks.branch_check import solve_rates_batch
 from planar.solving.continuation.path import BranchRates
-from planar.solving.continuation.solution_curve import truncated_step
+from planar.solving.newton import truncated_step
 from planar.solving.prepared_mechanism import PreparedMechanism
 from planar.solving.rates.accuracy import AccuracyDoubts, find_accuracy_doubts
 from planar.solving.rates.regularity import MIN_REGULARITY, regularity
