@@ -13,26 +13,24 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.solving.continuation.second_order import (
+    CONVERGED_STEP,
+    EXACT_SINGULAR_TOLERANCE,
+    MAX_REFINEMENTS,
+    SINGULAR_TOLERANCE,
+    branch_directions,
+    is_same_direction,
+    nearest_direction,
+)
 from planar.solving.continuation.solution_curve import Arc, CurvePoint, SolutionCurve, fit_polynomial
-from planar.solving.newton import settle, shortest_step
+from planar.solving.newton import settle
 
 Array = np.ndarray
 
-MAX_REFINEMENTS = 12
-CONVERGED_STEP = 1e-13
 SMALL_SINGULAR_VALUE = 0.1
 """A singular value below this part of the greatest may be one that vanishes near by."""
-SINGULAR_TOLERANCE = 1e-6
-"""A singular value below this part of the greatest is zero at a change point, which is found to about 1e-8 at first."""
-EXACT_SINGULAR_TOLERANCE = 1e-10
-FORM_TOLERANCE = 1e-10
-"""A quadratic form below this part of the greatest vanishes."""
-STARTS_PER_NULL_VECTOR = 12
-"""Directions for each null vector from which ways are looked for."""
 ON_BRANCH_RATIO = 1e-2
 """A point is on a way if it is no further from it than this part of its distance from the change point."""
-SAME_DIRECTION_TOLERANCE = 1e-6
-"""Ways that are nearer to one another are one."""
 START_DISTANCE_TOLERANCE = 1e-6
 """rad or sizes: so far a position on a change point is from it at most, known to the root of rounding."""
 ZERO_INPUT_RATE = 1e-7
@@ -144,25 +142,6 @@ class _BranchConditions:
             forms.append(self.null.T @ curve.narrow_columns(curve.narrow_columns(bends).T) @ self.null)
         self.forms = np.array(forms).reshape(-1, *2 * [self.null.shape[1]])
 
-    def solve_second_order(self, c: Array) -> Array | None:
-        """The direction next to c, |c| = 1, in which all quadratic forms vanish."""
-        scale = float(np.max(np.abs(self.forms), initial=0.0))
-        if scale < SINGULAR_TOLERANCE:
-            return None
-        forms = self.forms / scale
-        c = c / np.linalg.norm(c)
-
-        def of_length_one(c: Array) -> tuple[Array, Array]:
-            left = np.append(np.einsum("fij,i,j->f", forms, c, c), 0.5 * (c @ c - 1.0))
-            return left, np.vstack([2.0 * forms @ c, c])
-
-        c, _ = settle(of_length_one, shortest_step(FORM_TOLERANCE), c, MAX_REFINEMENTS, (len(c), CONVERGED_STEP))
-        met = (
-            np.max(np.abs(np.einsum("fij,i,j->f", forms, c, c))) < FORM_TOLERANCE
-            and abs(c @ c - 1.0) < SAME_DIRECTION_TOLERANCE
-        )
-        return c if met else None
-
     def branch_along(self, c: Array) -> CurvePoint | None:
         """The way with tangent null c and its second derivative; None where the third order leaves it open."""
         curve, rank = self.curve, self.rank
@@ -183,12 +162,11 @@ class _BranchConditions:
 def bifurcation_ahead(curve: SolutionCurve, here: CurvePoint, y: Array) -> Bifurcation | None:
     """A change point with the ways through it, if one of them leads from a point beside it."""
     ways = _BranchConditions(curve, y)
-    first = ways.solve_second_order(ways.null.T @ (y - here.y))
+    first = nearest_direction(ways.forms, ways.null.T @ (y - here.y))
     came = None if first is None else ways.branch_along(first)
     if first is None or came is None or not _leads_to(curve, here, came):
         return None
-    found = _branch_directions(ways, [first])
-    others = [ways.branch_along(c) for c in found[1:]]
+    others = [ways.branch_along(c) for c in branch_directions(ways.forms) if not is_same_direction(c, first)]
     told = tuple(way for way in others if way is not None)
     return Bifurcation(y, (came, *told), len(told) == len(others), len(first) - 1)
 
@@ -207,7 +185,7 @@ def bifurcation_at_start(curve: SolutionCurve, y: Array) -> Bifurcation | None:
     if near is None or np.linalg.norm(near.y - y) > START_DISTANCE_TOLERANCE or near.residual > curve.solver.tolerance:
         return None
     ways = _BranchConditions(curve, near.y)
-    found = _branch_directions(ways, [])
+    found = branch_directions(ways.forms)
     told = [way for way in map(ways.branch_along, found) if way is not None]
     moving = [way if way.input_rate > 0.0 else way.reversed() for way in told if abs(way.input_rate) > ZERO_INPUT_RATE]
     if not moving:
@@ -217,18 +195,6 @@ def bifurcation_at_start(curve: SolutionCurve, y: Array) -> Bifurcation | None:
     rates = [tuple(np.round(sense * way.tangent[:-1] / way.input_rate, 6)) for way in moving]
     order = sorted(range(len(moving)), key=lambda k: (round(float(np.linalg.norm(rates[k])), 6), rates[k]))
     return Bifurcation(near.y, tuple(moving[k] for k in order), len(told) == len(found), near.null.shape[1] - 1)
-
-
-def _branch_directions(ways: _BranchConditions, found: list[Array]) -> list[Array]:
-    """The directions in which the conditions of second order are met, beside those found already."""
-    size = ways.null.shape[1]
-    for start in np.random.default_rng(0).normal(size=(STARTS_PER_NULL_VECTOR * size, size)):
-        c = ways.solve_second_order(start)
-        if c is not None and all(
-            min(np.linalg.norm(c - a), np.linalg.norm(c + a)) > SAME_DIRECTION_TOLERANCE for a in found
-        ):
-            found.append(c)
-    return found
 
 
 def _leads_to(curve: SolutionCurve, here: CurvePoint, branch: CurvePoint) -> bool:
