@@ -124,13 +124,22 @@ def polish_root(residual_function: ResidualFunction, z: Array) -> Array:
     """One root (n,) of a block carried to round-off."""
     if not z.size:
         return z
+    undamped = np.zeros(1)
 
-    def here(z: Array) -> tuple[Array, Array]:
+    def step(jacobian: Array, residuals: Array) -> Array:
+        return _damped_step(residuals[None], jacobian[None], undamped)[0]
+
+    return correct(one_system(residual_function), step, z, MAX_POLISHING_STEPS)[0]
+
+
+def one_system(residual_function: ResidualFunction) -> SystemFunction:
+    """A function of many starts, for one."""
+
+    def at(z: Array) -> tuple[Array, Array]:
         left, slope = residual_function(z[None])
         return left[0], slope[0]
 
-    undamped = np.zeros(1)
-    return correct(here, lambda J, F: _damped_step(F[None], J[None], undamped)[0], z, MAX_POLISHING_STEPS)[0]
+    return at
 
 
 def correct_blocks(

@@ -40,4 +40,4 @@ def test_three_null_vectors():
     assert len(found) == 4
     for expected in (*np.eye(3), np.ones(3) / np.sqrt(3.0)):
         assert sum(is_same_direction(c, expected) for c in found) == 1
-        assert is_same_direction(nearest_direction(forms, expected + (1e-3, 0.0, -1e-3)), expected)
+        assert is_same_direction(nearest_direction(forms, expected + 1e-3 * np.array((1.0, 0.0, -1.0))), expected)

@@ -33,6 +33,8 @@ ON_BRANCH_RATIO = 1e-2
 """A point is on a way if it is no further from it than this part of its distance from the change point."""
 START_DISTANCE_TOLERANCE = 1e-6
 """rad or sizes: so far a position on a change point is from it at most, known to the root of rounding."""
+AT_BIFURCATION_DISTANCE = 1e-5
+"""So near to a singular slope a start may be a change point, known to the root of rounding."""
 ZERO_INPUT_RATE = 1e-7
 """A rate of the inputs along a way below this is none."""
 HALF_ARC_LENGTH, MIN_HALF_ARC_LENGTH = 0.02, 1e-4

@@ -19,11 +19,10 @@ from planar.solving.continuation.path_pieces import (
     PathPiece,
     bifurcations_until,
     path_pieces,
-    start_point,
 )
 from planar.solving.continuation.period import Period, PeriodSearch
 from planar.solving.continuation.predictor_corrector import ArcBudget, CurveTracker, NearbyBifurcation
-from planar.solving.continuation.solution_curve import CurvePoint, CurveSolver, SolutionCurve
+from planar.solving.continuation.solution_curve import CurvePoint, CurveSolver
 
 Array = np.ndarray
 
@@ -74,9 +73,8 @@ class PathFollower:
         work: ArcBudget | None = None,
     ):
         reach = float(np.max(np.abs(way), initial=0.0)) or 1.0
-        self.curve = SolutionCurve(solver, p, start, way / reach)
-        numbers = list(branches)
-        self.tracker = CurveTracker(self.curve, start_point(self.curve, np.append(z, 0.0), numbers), numbers, work)
+        self.tracker = CurveTracker.from_position(solver, p, (z, start), way / reach, branches, work)
+        self.curve = self.tracker.curve
         self.point = self.tracker.point
         self.dead_point: CurvePoint | None = None
         self._pieces, self._period_search = path_pieces(self.tracker), PeriodSearch(self.tracker)
