@@ -15,6 +15,7 @@ from planar.equations.functions import frames_from_coordinates, scale_lengths
 from planar.foundation.geometry import Frame
 from planar.model.pairs import MeasureKind, Pair
 from planar.solving.assembly.sketch_start import sketch_coordinates
+from planar.solving.checks.singular_values import null_space, rank
 from planar.solving.newton import damped_newton
 from planar.solving.prepared_mechanism import PreparedMechanism
 
@@ -31,8 +32,6 @@ PROBE_DISTANCE = 0.02
 MIN_PROBES, MAX_PROBES = 3, 12
 NEIGHBOUR_DISTANCE = 1e-3
 """How far its neighbours are from a position whose motions are counted; what bends back within it is none."""
-SINGULAR_TOLERANCE = 1e-6
-"""A singular value below this part of the greatest is zero: where constraints touch, rounding leaves about 1e-8."""
 
 
 class FullConstraints:
@@ -113,19 +112,6 @@ class FullConstraints:
             left = np.concatenate([left, self.relative_positions(drives, w) - at])
             slope = np.vstack([slope, self.relative_jacobian(drives, w)])
         return left, slope
-
-
-def rank(jacobian: Array) -> int:
-    """The rank of a slope, rounding apart."""
-    values = np.linalg.svd(jacobian, compute_uv=False) if jacobian.size else np.zeros(0)
-    return int(np.sum(values > SINGULAR_TOLERANCE * max(values[0], 1e-300))) if values.size else 0
-
-
-def null_space(jacobian: Array) -> Array:
-    """Orthonormal columns that the slope takes to zero (columns, nullity)."""
-    if not jacobian.size:
-        return np.eye(jacobian.shape[1])
-    return np.linalg.svd(jacobian)[2][rank(jacobian) :].T
 
 
 def random_step(free: Array, rng: np.random.Generator, length: float) -> Array:

@@ -11,7 +11,8 @@ from planar.analysis.rate_equations import derivative
 from planar.equations.functions import frames_from_coordinates, scale_lengths
 from planar.foundation.jets import Jet
 from planar.results.motion import State
-from planar.solving.continuation.second_order import SINGULAR_TOLERANCE, branch_directions
+from planar.solving.checks.singular_values import SINGULAR_TOLERANCE, null_space
+from planar.solving.continuation.second_order import branch_directions
 
 Array = np.ndarray
 
@@ -25,11 +26,9 @@ def branch_poles(state: State, middle: Array, size: float) -> tuple[Mapping[str,
     here = full_position(state)
     if here.motions.shape[1] != 2:
         return ()
-    slope = here.constraints.jacobian(here.w)
-    left, values, _ = np.linalg.svd(slope)
-    rank = int((values > SINGULAR_TOLERANCE * values.max(initial=1e-300)).sum())
+    left_null = null_space(here.constraints.jacobian(here.w).T)
     bent = [_second_derivative(here, here.motions @ way) for way in ((1.0, 0.0), (0.0, 1.0), (1.0, 1.0))]
-    first, second, both = (left[:, rank:].T @ each for each in bent)
+    first, second, both = (left_null.T @ each for each in bent)
     mixed = 0.5 * (both - first - second)
     forms = np.array([[first, mixed], [mixed, second]]).transpose(2, 0, 1)
     directions = branch_directions(forms, SINGULAR_TOLERANCE)

@@ -10,8 +10,9 @@ import numpy as np
 from planar.batch.march.design_functions import DesignFunctions
 from planar.equations.functions import EquationFunctions, frames_from_coordinates
 from planar.model.mechanism import Mechanism
-from planar.solving.checks.branch_check import SINGULAR_DISTANCE_RATIO, BranchCheck, is_move_allowed, solve_rates_batch
+from planar.solving.checks.branch_check import BranchCheck, is_move_allowed, solve_rates_batch
 from planar.solving.checks.residual_check import EPS, NEGLIGIBLE_ERROR, ResidualCheck
+from planar.solving.checks.singular_values import SINGULAR_DISTANCE_RATIO
 
 Array = np.ndarray
 

@@ -13,11 +13,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.solving.checks.singular_values import SINGULAR_TOLERANCE, null_space
 from planar.solving.continuation.second_order import (
     CONVERGED_STEP,
     EXACT_SINGULAR_TOLERANCE,
     MAX_REFINEMENTS,
-    SINGULAR_TOLERANCE,
     branch_directions,
     is_same_direction,
     nearest_direction,
@@ -114,11 +114,9 @@ def _refine_candidate(curve: SolutionCurve, y: Array, null_start: Array) -> Bifu
     if not is_settled:
         return None
     y = x[:size]
-    _, s, vt = np.linalg.svd(curve.jacobian(y))
-    rank = int(np.sum(s > SINGULAR_TOLERANCE * max(s[0], 1.0)))
-    if rank > size - 2:
-        return None
-    return BifurcationCandidate(y, vt[rank:].T, float(np.max(np.abs(curve.residuals(y)), initial=0.0)))
+    left, slope = curve.residuals_and_jacobian(y)
+    null = null_space(slope, SINGULAR_TOLERANCE, unit=1.0)
+    return BifurcationCandidate(y, null, float(np.max(np.abs(left), initial=0.0))) if null.shape[1] > 1 else None
 
 
 def _solve_least_squares(system: Array, right_side: Array) -> Array:

@@ -10,6 +10,7 @@ import numpy as np
 from planar.foundation.errors import TrackingEnd
 from planar.foundation.root_finding import find_root
 from planar.model.pairs import MeasureKind
+from planar.solving.checks.singular_values import SINGULAR_DISTANCE_RATIO
 from planar.solving.continuation.bifurcation import (
     AT_BIFURCATION_DISTANCE,
     Bifurcation,
@@ -28,8 +29,6 @@ FIRST_STEP, LONGEST_STEP, SHORTEST_STEP = 0.05, 0.25, 1e-9
 """Steps of arc length (rad, lengths of the size): the first, the longest, and one at which the curve ends."""
 MAX_TANGENT_TURN = 0.4
 """rad by which the tangent may turn in a step."""
-REGULAR_DISTANCE_RATIO = 1.5
-"""How many times shorter than the distances from singular slopes at its two ends a step must be."""
 SEARCH_DISTANCE, REPEATED_SEARCH_RATIO = 0.15, 0.2
 """Where to look for a change point: so near to a singular slope, and again where it is so many times nearer."""
 MAX_AHEAD_RATIO = 10.0
@@ -233,7 +232,7 @@ class CurveTracker:
                 onwards = after.tangent @ here.tangent > np.cos(MAX_TANGENT_TURN)
                 if (
                     onwards
-                    and REGULAR_DISTANCE_RATIO * gone < here.regular_distance + after.regular_distance
+                    and SINGULAR_DISTANCE_RATIO * gone < here.regular_distance + after.regular_distance
                     and gone < 2.0 * step
                 ):
                     self.step = 1.6 * step

@@ -9,13 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from planar.solving.checks.singular_values import SINGULAR_TOLERANCE
 from planar.solving.newton import settle, shortest_step
 
 Array = np.ndarray
 
-SINGULAR_TOLERANCE = 1e-6
-"""A singular value below this part of the greatest is zero at a change point, which is found to about 1e-8 at first;
-and so is a form."""
 EXACT_SINGULAR_TOLERANCE = 1e-10
 """At the position to round-off a singular value below this part of the greatest is zero."""
 EXACT_FORM_TOLERANCE = 1e-10

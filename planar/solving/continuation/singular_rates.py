@@ -14,8 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.equations.functions import EquationRates
+from planar.solving.checks.singular_values import SINGULAR_TOLERANCE
 from planar.solving.continuation.bifurcation import ZERO_INPUT_RATE
-from planar.solving.continuation.second_order import EXACT_SINGULAR_TOLERANCE, SINGULAR_TOLERANCE, branch_directions
+from planar.solving.continuation.second_order import EXACT_SINGULAR_TOLERANCE, branch_directions
 from planar.solving.prepared_mechanism import PreparedMechanism
 
 Array = np.ndarray

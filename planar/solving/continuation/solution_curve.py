@@ -8,6 +8,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from planar.equations.functions import EquationFunctions
+from planar.solving.checks.singular_values import DIFFERENCE_STEP, column_norms, singular_distance
 from planar.solving.newton import correct, correct_at_rank
 
 Array = np.ndarray
@@ -15,8 +16,6 @@ Array = np.ndarray
 MAX_CORRECTIONS = 10
 CLOSED_TOLERANCE = 1e-10
 """A corrected point leaves no more open than this, where it is far out this part of how far."""
-DIFFERENCE_STEP = 1e-6
-"""The part of a step over which the change of a slope is taken."""
 ZERO_SINGULAR_VALUE = 1e-10
 """A singular value that is this part of the greatest is zero to rounding."""
 MIN_COLUMN_NORM = 1e-6
@@ -144,7 +143,7 @@ class SolutionCurve:
         many = slope.shape[1] - 1
         if many == 0:
             return 1.0
-        return float(np.linalg.svd(slope / _column_norms(slope), compute_uv=False)[many - 1])
+        return float(np.linalg.svd(slope / column_norms(slope, MIN_COLUMN_NORM), compute_uv=False)[many - 1])
 
     def _regular_distance(self, y: Array, tangent: Array, slope: Array, least: float) -> float:
         """How far along the curve J keeps its rank: until it has changed by its least singular value (Weyl).
@@ -156,9 +155,9 @@ class SolutionCurve:
         """
         if len(y) == 1:
             return np.inf
-        sizes = _column_norms(slope)
+        sizes = column_norms(slope, MIN_COLUMN_NORM)
         change = (self.jacobian(y + DIFFERENCE_STEP * tangent) - slope) / (sizes * DIFFERENCE_STEP)
-        clear = least / max(float(np.linalg.norm(change)), 1e-300)
+        clear = float(singular_distance(least, np.linalg.norm(change)))
         if clear >= SHORT_REGULAR_DISTANCE or least < ZERO_SINGULAR_VALUE:
             return clear
         turned = np.linalg.lstsq(slope / sizes, change, rcond=0.1 * ZERO_SINGULAR_VALUE)[0]
@@ -197,10 +196,6 @@ def _solve_regular(system: Array, known: Array) -> Array | None:
         return np.linalg.solve(system, known)
     except np.linalg.LinAlgError:
         return None
-
-
-def _column_norms(slope: Array) -> Array:
-    return np.maximum(np.sqrt(np.einsum("rk,rk->k", slope, slope)), MIN_COLUMN_NORM)
 
 
 class Arc(NamedTuple):
