@@ -10,7 +10,7 @@ import numpy as np
 from planar.analysis.polygons.loop_equations import loop_equations
 from planar.analysis.rate_equations import PinJoint, Rate, RateEquations, moving_links, turning_classes
 from planar.analysis.vector_chains import KnownRates, VectorChains
-from planar.solving.full_constraints import SINGULAR_TOLERANCE
+from planar.solving.checks.singular_values import SINGULAR_TOLERANCE
 
 Array = np.ndarray
 ROUNDING = 1e-15

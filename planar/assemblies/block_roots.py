@@ -35,7 +35,13 @@ from planar.equations.constraint_equations import Block, ConstraintEquations, sl
 from planar.equations.functions import EquationFunctions
 from planar.model.pairs import MeasureKind
 from planar.solving.assembly.block_assemblies import SAME_ASSEMBLY_TOLERANCE, BlockAssemblies, block_residual_function
-from planar.solving.newton import CLOSED_TOLERANCE, ResidualFunction, damped_newton, polish_root
+from planar.solving.newton import (
+    CLOSED_TOLERANCE,
+    ResidualFunction,
+    damped_newton,
+    polish_root,
+    refine_multiple_root,
+)
 from planar.solving.prepared_mechanism import PreparedMechanism
 
 Array = np.ndarray
@@ -56,11 +62,6 @@ CORRECTION_STEPS = 12
 """Steps that put what else moves in its place on a way off along an open direction."""
 DOUBLE_ROOT_RATIO, ROUNDING_SINGULAR_VALUE = 30.0, 1e-9
 """How much less open a direction has to be there; below what part of the greatest singular value it is open in full."""
-MAX_MULTIPLE_ROOT_STEPS = 40
-"""Newton's steps to a root where several may meet: towards three each leaves two thirds of the way."""
-ZERO_SINGULAR_VALUE = 1e-13
-"""Singular values below this part of the greatest are none."""
-EPS = float(np.finfo(float).eps)
 ZERO_COEFFICIENT = 1e-13
 """Coefficients below this part of the greatest are none: the structure is one without them."""
 SAME_SINGULAR_ROOT_DISTANCE = 1e-3
@@ -261,7 +262,10 @@ class _BlockRootSolver:
         if not len(near):
             return []
         ended_ = damped_newton(self.residual_function, near)
-        return [_refine_multiple_root(self.residual_function, each) for each in ended_.unknowns[ended_.converged]]
+        return [
+            refine_multiple_root(self.residual_function, each, SAME_SINGULAR_ROOT_DISTANCE)
+            for each in ended_.unknowns[ended_.converged]
+        ]
 
     def _is_root(self, root: Array, within: float) -> bool:
         """Whether all rows are met, those too that a redundant group has more."""
@@ -340,24 +344,6 @@ def _linear_root(setup: PreparedMechanism, stage: Block, z: Array, slope: ca.Fun
     proved = certify and rows == unknowns and is_available() and is_regular(slope, given)
     whole = Completeness.PROVED if proved else Completeness.NUMERICALLY
     return BlockRoots(root[None], ~one, one & proved, 1, 1, whole, False, said)
-
-
-def _refine_multiple_root(residual_function: ResidualFunction, root: Array) -> Array:
-    """The place with the least left open on Newton's way from near a root to which several may come.
-
-    A step along what is all but open bends away before the next one brings it nearer, so none is refused.
-    """
-    best, least = root, np.inf
-    for _ in range(MAX_MULTIPLE_ROOT_STEPS):
-        left, slope = residual_function(root[None])
-        left_open = float(np.abs(left).max())
-        if left_open < least:
-            best, least = root, left_open
-        step = np.linalg.pinv(slope[0], rcond=ZERO_SINGULAR_VALUE) @ left[0]
-        if not EPS < np.abs(step).max() < SAME_SINGULAR_ROOT_DISTANCE:
-            break
-        root = root - step
-    return best
 
 
 def _least_singular_ratio(closing: ResidualFunction, real: Array) -> Array:

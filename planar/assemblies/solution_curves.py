@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from planar.solving.newton import CLOSED_TOLERANCE, ResidualFunction, damped_newton
+from planar.solving.newton import CLOSED_TOLERANCE, ResidualFunction, correct, damped_newton, one_system, shortest_step
 
 Array = np.ndarray
 
@@ -14,6 +14,7 @@ SINGULAR_RATIO = 1e-5
 """Least singular value, of the greatest, below which a direction may be open."""
 STEP_LENGTH = 0.05
 """How far along the direction that is open a curve of assemblies is looked for (rad, sizes)."""
+MAX_CORRECTIONS = 8
 MAX_CURVE_LENGTH = 20.0
 """How far a curve is followed each way (rad, sizes): eight links that turn right round together are shorter."""
 
@@ -69,12 +70,8 @@ def _follow_curve(closing: ResidualFunction, start: Array, angles: Array) -> lis
 
 def _correct(closing: ResidualFunction, tried: Array) -> Array | None:
     """The place of a curve beside one that is tried."""
-    for _ in range(8):
-        left, slope = closing(tried[None])
-        if np.abs(left).max() <= CLOSED_TOLERANCE:
-            return tried
-        tried = tried - np.linalg.pinv(slope[0], rcond=SINGULAR_RATIO) @ left[0]
-    return None
+    found, gap = correct(one_system(closing), shortest_step(SINGULAR_RATIO), tried, MAX_CORRECTIONS)
+    return found if gap <= CLOSED_TOLERANCE else None
 
 
 def _distances(curve: Array, place: Array, angles: Array) -> Array:

@@ -72,7 +72,10 @@ LARGEST_NUMBER = 10**100
 SMALLEST_NUMBER = 1e-100
 """SI; a number that is not 0 is no smaller, or its square is none."""
 LARGEST_INPUT_POSITION = 1e4
-"""rad or m: to where a position is followed step by step."""
+"""rad or m: to where a sweep or a law leads an input.
+
+These follow the input sample by sample all the way, so that work and rounding grow with it. An angle that only stands
+somewhere, or that runs at a steady pace (`solve`, `cycle`), counts whole turns: see `LARGEST_COUNTED_ANGLE`."""
 LARGEST_COUNTED_ANGLE = 1e12
 """rad: how far an angle may count; beyond it rounding leaves less than three digits of where it points."""
 

@@ -17,14 +17,14 @@ import numpy as np
 from planar.equations.constraint_equations import Block
 from planar.equations.functions import EquationFunctions
 from planar.equations.minors import LowRankBlock, add_minors, constraint_dependencies
+from planar.solving.checks.singular_values import MIN_REGULARITY, column_norms, null_space, rank
+from planar.solving.newton import correct, shortest_step
 from planar.solving.prepared_mechanism import PreparedMechanism
 
 Array = np.ndarray
 
 MAX_MINOR_RANK = 12
 """Rank from which on minors would be expressions too long."""
-SINGULAR_TOLERANCE = 1e-5
-"""A singular value below this part of the greatest is zero: a double root is known to about 1e-8."""
 PROBE_DISTANCE = 1e-2
 """rad, or lengths of the size: how far along the motion it is looked whether the rank is as low."""
 PROBE_COUNT = 4
@@ -58,11 +58,10 @@ def _holds_along_motion(setup: PreparedMechanism, program: EquationFunctions, y:
         return False
     slope = program.residuals_and_jacobian(y[:-inputs], y[-inputs:], setup.inputs.p)[1]
     least = np.concatenate([setup.min_column_scale, np.ones(inputs)])
-    sizes = np.maximum(np.linalg.norm(slope, axis=0), least)
-    _, values, vectors = np.linalg.svd(slope / sizes)
-    if int(np.sum(values > SINGULAR_TOLERANCE * max(1.0, values[0]))) != len(y) - inputs:
+    sizes = column_norms(slope, least)
+    ways = null_space(slope / sizes, MIN_REGULARITY, unit=1.0).T / sizes
+    if len(ways) != inputs:
         return False
-    ways = vectors[len(y) - inputs :] / sizes
     for seed in range(PROBE_COUNT):
         way = np.random.default_rng(seed).normal(size=inputs) @ ways
         if _correct(setup, program, y + PROBE_DISTANCE * way / np.linalg.norm(way), len(y)) is None:
@@ -72,15 +71,15 @@ def _holds_along_motion(setup: PreparedMechanism, program: EquationFunctions, y:
 
 def _correct(setup: PreparedMechanism, program: EquationFunctions, y: Array, free_count: int) -> Array | None:
     """The nearest position to y = (unknowns, inputs) that closes, of which the first `free` may move; None without."""
-    y, many, before = y.copy(), len(y) - len(setup.inputs.u), np.inf
-    for _ in range(MAX_CORRECTIONS):
+    many, held = len(y) - len(setup.inputs.u), y[free_count:]
+
+    def here(x: Array) -> tuple[Array, Array]:
+        y = np.concatenate([x, held])
         left, slope = program.residuals_and_jacobian(y[:many], y[many:], setup.inputs.p)
-        gap = float(np.max(np.abs(left), initial=0.0))
-        if not gap < before:
-            break
-        before = gap
-        y[:free_count] -= np.linalg.lstsq(slope[:, :free_count], left, rcond=SINGULAR_TOLERANCE)[0]
-    return y if before <= CLOSED_TOLERANCE else None
+        return left, slope[:, :free_count]
+
+    found, gap = correct(here, shortest_step(MIN_REGULARITY), y[:free_count], MAX_CORRECTIONS)
+    return np.concatenate([found, held]) if gap <= CLOSED_TOLERANCE else None
 
 
 def _minor_block(setup: PreparedMechanism, stage: Block, z: Array, with_earlier: bool) -> LowRankBlock | None:
@@ -97,12 +96,11 @@ def _minor_block(setup: PreparedMechanism, stage: Block, z: Array, with_earlier:
     both = setup.functions.jacobians(z[None], setup.inputs.u[None], setup.inputs.p)
     own = np.hstack([each[0] for each in both])[np.ix_(rows, many)] / setup.row_scale[rows, None]
     least = np.concatenate([setup.min_column_scale, np.ones(len(setup.inputs.u))])[many]
-    sizes = np.maximum(np.linalg.norm(own, axis=0), least)
-    values = np.linalg.svd(own / sizes, compute_uv=False)
-    rank = int(np.sum(values > SINGULAR_TOLERANCE * max(1.0, values[0])))
-    if rank == min(own.shape) or rank >= MAX_MINOR_RANK:
+    sizes = column_norms(own, least)
+    held = rank(own / sizes, MIN_REGULARITY, unit=1.0)
+    if held == min(own.shape) or held >= MAX_MINOR_RANK:
         return None
-    return LowRankBlock(tuple(rows), tuple(many), setup.row_scale[rows], sizes, rank)
+    return LowRankBlock(tuple(rows), tuple(many), setup.row_scale[rows], sizes, held)
 
 
 def _dependent_columns(columns_of: Sequence[frozenset[int]], stage: Block) -> set[int]:

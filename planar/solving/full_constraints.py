@@ -17,16 +17,16 @@ from planar.foundation.geometry import Frame
 from planar.foundation.jets import Scalar
 from planar.model.pairs import Pair
 from planar.solving.assembly.sketch_start import sketch_coordinates
+from planar.solving.checks.singular_values import null_space, rank
+from planar.solving.newton import damped_newton
 from planar.solving.prepared_mechanism import PreparedMechanism
 
 Array = np.ndarray
 
 COMPLEX_STEP = 1e-30
-CLOSED_TOLERANCE, ROUND_OFF = 1e-10, 1e-15
-ROUGH_STEP_DAMPING = 1e-6
-"""Damping above which a step need not be exact."""
-MAX_NEWTON_STEPS = 60
-"""Iterations: where constraints only just touch, the error halves each time."""
+CLOSED_TOLERANCE = 1e-10
+NEAR_DAMPING = 1e-6
+"""Of first steps: what is looked for is near by."""
 MAX_STARTS = 4
 """Starts from which a linkage is joined that its inputs do not determine."""
 PROBE_DISTANCE = 0.02
@@ -34,8 +34,6 @@ PROBE_DISTANCE = 0.02
 MIN_PROBES, MAX_PROBES = 3, 12
 NEIGHBOUR_DISTANCE = 1e-3
 """How far its neighbours are from a position whose motions are counted; what bends back within it is none."""
-SINGULAR_TOLERANCE = 1e-6
-"""A singular value below this part of the greatest is zero: where constraints touch, rounding leaves about 1e-8."""
 
 
 class FullConstraints:
@@ -89,18 +87,13 @@ class FullConstraints:
 
     def correct(self, w: Array, held: tuple[str, ...] = (), positions: Array | None = None) -> Array | None:
         """The nearest closed position by Gauss and Newton's method, some drives held; None where there is none."""
-        left, slope = self._residuals_and_jacobian(w, held, positions)
-        damping = 1e-3
-        for _ in range(MAX_NEWTON_STEPS):
-            if np.max(np.abs(left), initial=0.0) < ROUND_OFF or damping > 1e8:
-                break
-            tried = w + _damped_step(slope, left, damping)
-            new = self._residuals_and_jacobian(tried, held, positions)
-            if np.sum(new[0] ** 2) < np.sum(left**2):
-                w, (left, slope), damping = tried, new, 0.1 * damping
-            else:
-                damping *= 10.0
-        return w if np.max(np.abs(left), initial=0.0) <= CLOSED_TOLERANCE else None
+
+        def here(starts: Array) -> tuple[Array, Array]:
+            left, slope = zip(*(self._residuals_and_jacobian(each, held, positions) for each in starts), strict=True)
+            return np.array(left), np.array(slope)
+
+        found = damped_newton(here, w[None], CLOSED_TOLERANCE, NEAR_DAMPING)
+        return found.unknowns[0] if found.converged[0] else None
 
     def _residuals_and_jacobian(self, w: Array, drives: tuple[str, ...], at: Array | None) -> tuple[Array, Array]:
         left, slope = self.residuals(w), self.jacobian(w)
@@ -108,30 +101,6 @@ class FullConstraints:
             left = np.concatenate([left, self.relative_positions(drives, w) - at])
             slope = np.vstack([slope, self.relative_jacobian(drives, w)])
         return left, slope
-
-
-def _damped_step(jacobian: Array, residuals: Array, damping: float) -> Array:
-    top = float(np.linalg.norm(jacobian)) or 1.0
-    if damping > ROUGH_STEP_DAMPING:
-        # far away the normal equations will do, at a fraction of the cost
-        square = jacobian.T @ jacobian + (damping * top) ** 2 * np.eye(jacobian.shape[1])
-        return -np.linalg.solve(square, jacobian.T @ residuals)
-    u, s, vt = np.linalg.svd(jacobian, full_matrices=False)
-    gain = np.where(s > 1e-13 * top, s / np.maximum(s * s + (damping * top) ** 2, 1e-300), 0.0)
-    return -vt.T @ (gain * (u.T @ residuals))
-
-
-def rank(jacobian: Array) -> int:
-    """The rank of a slope, rounding apart."""
-    values = np.linalg.svd(jacobian, compute_uv=False) if jacobian.size else np.zeros(0)
-    return int(np.sum(values > SINGULAR_TOLERANCE * max(values[0], 1e-300))) if values.size else 0
-
-
-def null_space(jacobian: Array) -> Array:
-    """Orthonormal columns that the slope takes to zero (columns, nullity)."""
-    if not jacobian.size:
-        return np.eye(jacobian.shape[1])
-    return np.linalg.svd(jacobian)[2][rank(jacobian) :].T
 
 
 def random_step(free: Array, rng: np.random.Generator, length: float) -> Array:

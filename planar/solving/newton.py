@@ -1,4 +1,8 @@
-"""Newton's method for one group of constraints, from many starts at once."""
+"""Newton's methods: damped from many starts, undamped from near by, block by block, at a given rank, to multiple roots.
+
+Damped steps lead to a root from anywhere, undamped ones carry a position that is all but closed to round-off. What the
+two solve is theirs to give: a block of constraints, or those along a curve with a plane across it.
+"""
 
 from __future__ import annotations
 
@@ -7,15 +11,34 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.equations.functions import EquationFunctions, slice_length
+
 Array = np.ndarray
 ResidualFunction = Callable[[Array], tuple[Array, Array]]
 """Unknowns (starts, n) -> what is left open (starts, m), and its slope (starts, m, n)."""
+SystemFunction = Callable[[Array], tuple[Array, Array]]
+"""The same from one place: unknowns (n,) -> residuals (m,), Jacobian (m, n)."""
+StepSolver = Callable[[Array, Array], Array]
+"""Jacobian (m, n), residuals (m,) -> the step (n,) that closes them to first order."""
 
 CLOSED_TOLERANCE = 1e-11
 """A group counts as closed below this (lengths of the mechanism's size); the gate asks for more afterwards."""
 STALLED_COST_RATIO = 1e-10
+FIRST_DAMPING = 1e-3
+"""The damping from which steps start anywhere, for squares of singular values in parts of the greatest one's."""
+ROUNDED_COST = 1e-31
+"""Where the squares of all that is left open come to less, no step makes it any better."""
 MAX_NEWTON_STEPS = 200
 """Iterations. A double root halves its error each time, so 27 take it from 1 to the square root of round-off."""
+MAX_POLISHING_STEPS = 4
+MAX_BLOCK_STEPS, CLOSED_BLOCK_TOLERANCE = 8, 1e-10
+BLOCK_RANK_TOLERANCE = 1e-12
+"""Singular values of a block below this part of the greatest are none."""
+LOWER_RANK_STEPS = 2
+MAX_MULTIPLE_ROOT_STEPS = 40
+"""Newton's steps to a root where several may meet: towards three each leaves two thirds of the way."""
+MULTIPLE_ROOT_RANK_TOLERANCE = 1e-13
+EPS = float(np.finfo(float).eps)
 
 
 class NewtonResult(NamedTuple):
@@ -26,7 +49,12 @@ class NewtonResult(NamedTuple):
     converged: Array
 
 
-def damped_newton(residual_function: ResidualFunction, starts: Array) -> NewtonResult:
+def damped_newton(
+    residual_function: ResidualFunction,
+    starts: Array,
+    tolerance: float = CLOSED_TOLERANCE,
+    first_damping: float = FIRST_DAMPING,
+) -> NewtonResult:
     """Solve from every start by Levenberg's and Marquardt's damping of Gauss and Newton's method.
 
     The damping falls with every step that succeeds, so convergence at a simple root is quadratic; groups with more
@@ -37,9 +65,9 @@ def damped_newton(residual_function: ResidualFunction, starts: Array) -> NewtonR
     count, unknowns = z.shape
     left, slope = residual_function(z)
     if unknowns == 0:
-        return _newton_result(z, left)
+        return _newton_result(z, left, tolerance)
     cost = np.sum(left * left, axis=1)
-    damping, growth = np.full(count, 1e-3), np.full(count, 2.0)
+    damping, growth = np.full(count, first_damping), np.full(count, 2.0)
     busy = np.arange(count)
     for _ in range(MAX_NEWTON_STEPS):
         if busy.size == 0:
@@ -54,12 +82,12 @@ def damped_newton(residual_function: ResidualFunction, starts: Array) -> NewtonR
         small = np.max(np.abs(step), axis=1) < 1e-13
         # far from closed and hardly coming closer: a start that ends where nothing closes
         small |= better & (cost[busy] - new_cost < STALLED_COST_RATIO * cost[busy]) & (new_cost > 1e-8)
-        settled = small | (better & (new_cost <= 1e-31)) | (damping[busy] > 1e12)
+        settled = small | (better & (new_cost <= ROUNDED_COST)) | (damping[busy] > 1e12)
         cost[taken] = new_cost[better]
         damping[busy] = np.where(better, np.maximum(damping[busy] * 0.1, 1e-17), damping[busy] * growth[busy])
         growth[busy] = np.where(better, 2.0, growth[busy] * 2.0)
         busy = busy[~settled]
-    return _newton_result(z, left)
+    return _newton_result(z, left, tolerance)
 
 
 def _damped_step(residuals: Array, jacobian: Array, damping: Array) -> Array:
@@ -71,21 +99,133 @@ def _damped_step(residuals: Array, jacobian: Array, damping: Array) -> Array:
     return -np.einsum("krn,kr->kn", vt, np.where(s > 1e-14 * scale, gain, 0.0) * along)
 
 
-def polish_root(residual_function: ResidualFunction, z: Array) -> Array:
-    """One root (n,) carried to round-off by undamped steps, as long as each leaves less open."""
-    z = z[None, :]
-    left, slope = residual_function(z)
-    for _ in range(4):
-        if z.shape[1] == 0:
-            break
-        tried = z + _damped_step(left, slope, np.zeros(1))
+def correct(residual_function: SystemFunction, solve_step: StepSolver, y: Array, max_steps: int) -> tuple[Array, float]:
+    """Undamped steps from y (n,), as long as each leaves less open: the best place (n,), and what is open there."""
+    left, slope = residual_function(y)
+    gap = float(np.max(np.abs(left), initial=0.0))
+    if not gap < np.inf:
+        return y, np.inf
+    for _ in range(max_steps):
+        tried = y + solve_step(slope, left)
         new_left, new_slope = residual_function(tried)
-        if np.max(np.abs(new_left)) >= np.max(np.abs(left)):
+        new_gap = float(np.max(np.abs(new_left), initial=0.0))
+        if not new_gap < gap:
             break
-        z, left, slope = tried, new_left, new_slope
-    return z[0]
+        y, left, slope, gap = tried, new_left, new_slope, new_gap
+    return y, gap
 
 
-def _newton_result(z: Array, residuals: Array) -> NewtonResult:
+def shortest_step(rank_tolerance: float) -> StepSolver:
+    """Steps in the sense of least squares; singular values below this part of the greatest are none."""
+    return lambda jacobian, residuals: -np.linalg.lstsq(jacobian, residuals, rcond=rank_tolerance)[0]
+
+
+def polish_root(residual_function: ResidualFunction, z: Array) -> Array:
+    """One root (n,) of a block carried to round-off."""
+    if not z.size:
+        return z
+    undamped = np.zeros(1)
+
+    def step(jacobian: Array, residuals: Array) -> Array:
+        return _damped_step(residuals[None], jacobian[None], undamped)[0]
+
+    return correct(one_system(residual_function), step, z, MAX_POLISHING_STEPS)[0]
+
+
+def one_system(residual_function: ResidualFunction) -> SystemFunction:
+    """A function of many starts, for one."""
+
+    def at(z: Array) -> tuple[Array, Array]:
+        left, slope = residual_function(z[None])
+        return left[0], slope[0]
+
+    return at
+
+
+def correct_blocks(
+    functions: EquationFunctions, p: Array, z: Array, u: Array, last_block: int | None = None
+) -> Array | None:
+    """All unknowns (n,) at inputs u from near by, block after block (to the last); None where one does not close."""
+    z = z.copy()
+    for block in functions.equations.blocks:
+        if not slice_length(block.rows) or (last_block is not None and block.block_index > last_block):
+            continue
+        own, evaluate = block.unknowns, functions.block_call(block)
+
+        def here(x: Array, own: slice = own, evaluate: Callable = evaluate) -> tuple[Array, Array]:
+            z[own] = x
+            left, slope = evaluate(z, u, p)
+            return left[0], slope.T.reshape(len(left[0]), len(x))
+
+        found, gap = correct(here, shortest_step(BLOCK_RANK_TOLERANCE), z[own].copy(), MAX_BLOCK_STEPS)
+        if gap > CLOSED_BLOCK_TOLERANCE:
+            return None
+        z[own] = found
+    return z
+
+
+def correct_at_rank(residual_function: SystemFunction, y: Array, rank: int, free_count: int) -> Array:
+    """A place beside one where the rank falls to this, closed to round-off by its first unknowns, the rest held.
+
+    It is not moved along what the lower rank leaves free: from one branch to the other.
+    """
+    y = y.copy()
+    for _ in range(LOWER_RANK_STEPS):
+        left, slope = residual_function(y)
+        y[:free_count] -= truncated_step(slope[:, :free_count], left, rank)
+    return y
+
+
+def truncated_step(jacobian: Array, residuals: Array, rank: int) -> Array:
+    """The shortest step that closes what is open, by so many of the directions in which the slope is steepest."""
+    u, s, vt = np.linalg.svd(jacobian, full_matrices=False)
+    return vt[:rank].T @ ((u.T[:rank] @ residuals) / s[:rank])
+
+
+def refine_multiple_root(residual_function: ResidualFunction, root: Array, longest_step: float) -> Array:
+    """The place with the least left open on Newton's way from near a root (n,) to which several may come.
+
+    A step along what is all but open bends away before the next one brings it nearer, so none is refused; one that is
+    longer than `longest_step` leads elsewhere.
+    """
+    best, least = root, np.inf
+    for _ in range(MAX_MULTIPLE_ROOT_STEPS):
+        left, slope = residual_function(root[None])
+        left_open = float(np.abs(left).max())
+        if left_open < least:
+            best, least = root, left_open
+        step = np.linalg.pinv(slope[0], rcond=MULTIPLE_ROOT_RANK_TOLERANCE) @ left[0]
+        if not EPS < np.abs(step).max() < longest_step:
+            break
+        root = root - step
+    return best
+
+
+def settle(
+    residual_function: SystemFunction,
+    solve_step: StepSolver,
+    y: Array,
+    max_steps: int,
+    still: tuple[int, float],
+    longest_step: float = np.inf,
+) -> tuple[Array, bool]:
+    """Undamped steps from y (n,) until they stand still, as long as none is too long: where, and whether they do.
+
+    `still`: how many of the unknowns, the first, have to, and by how much less they then move. For systems that come
+    near a root without having one: that they close is for others to see.
+    """
+    leading, settled_step = still
+    for _ in range(max_steps):
+        left, slope = residual_function(y)
+        step = solve_step(slope, left)
+        if not np.all(np.isfinite(step)) or np.max(np.abs(step), initial=0.0) > longest_step:
+            return y, False
+        y = y + step
+        if np.max(np.abs(step[:leading]), initial=0.0) < settled_step:
+            return y, True
+    return y, False
+
+
+def _newton_result(z: Array, residuals: Array, tolerance: float) -> NewtonResult:
     gap = np.max(np.abs(residuals), axis=1, initial=0.0)
-    return NewtonResult(z, gap, gap <= CLOSED_TOLERANCE)
+    return NewtonResult(z, gap, gap <= tolerance)

@@ -20,6 +20,7 @@ from planar.model.mechanism import Drive, Mechanism, replace_inputs
 from planar.results.motion import State
 from planar.solving.assembly.block_assemblies import BlockAssemblies
 from planar.solving.assembly.nearest_assembly import Assembly, AssemblySearchFailure, find_nearest_assembly
+from planar.solving.checks.singular_values import MIN_REGULARITY
 from planar.solving.continuation.fast_path import StraightPathCache, fast_position, is_surely_regular
 from planar.solving.continuation.path import BranchRates, follow_straight
 from planar.solving.diagnosis import refusals
@@ -27,7 +28,6 @@ from planar.solving.lazy_frames import lazy_frames
 from planar.solving.prepared_mechanism import PreparedMechanism
 from planar.solving.rates.accuracy import find_accuracy_doubts
 from planar.solving.rates.regularity import (
-    MIN_REGULARITY,
     SingularPosition,
     is_always_singular,
     jacobian_at,

@@ -24,6 +24,9 @@ from planar.solving.structure import mechanism_structure
 
 Array = np.ndarray
 
+ZERO_POSITION = 1e-14
+"""rad or sizes: a position of an input that was solved for and is nearer to zero is there."""
+
 
 class PositionInputs(NamedTuple):
     """The numbers of one position: inputs u with their rates (scaled), and the numbers p of the pairs."""
@@ -175,8 +178,9 @@ class PreparedMechanism:
         )
 
     def describe_input(self, pair: str, position: float) -> str:
-        """A position of one input in words."""
+        """A position of one input (rad, sizes) in words; what rounding leaves of zero as 0."""
         kind, by = ("length", self.unit) if self.is_sliding(pair) else ("angle", 1.0)
+        position = 0.0 if abs(position) < ZERO_POSITION else position
         return f"{pair} = {amount(position * by, kind, self.mechanism.units)}"
 
     def is_sliding(self, pair: str) -> bool:

@@ -9,11 +9,12 @@ import numpy as np
 from planar.equations.coordinates import frames_from_coordinates
 from planar.model.mechanism import Drive, Mechanism, replace_inputs
 from planar.results.motion import State
+from planar.solving.checks.singular_values import MIN_REGULARITY, null_space
 from planar.solving.continuation.path import follow_to
 from planar.solving.diagnosis import refusals
-from planar.solving.full_constraints import FullConstraints, null_space
+from planar.solving.full_constraints import FullConstraints
 from planar.solving.position import solved_mechanism
-from planar.solving.rates.regularity import MIN_REGULARITY, regularity
+from planar.solving.rates.regularity import regularity
 
 
 def rest_position(mechanism: Mechanism, drives: Sequence[Drive] = ()) -> State:

@@ -11,7 +11,8 @@ import pytest
 import planar
 from planar.document import files
 from planar.foundation.errors import NoAnswer, Outcome
-from planar.solving.full_constraints import FullConstraints, rank
+from planar.solving.checks.singular_values import rank
+from planar.solving.full_constraints import FullConstraints
 from planar.solving.position import PositionSolver
 from tests.draws import part
 from tests.linkages import conditioning, determinate, random_linkage

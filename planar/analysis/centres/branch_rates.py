@@ -10,10 +10,10 @@ from planar.analysis.centres.null_space_check import FullPosition, full_position
 from planar.analysis.rate_equations import derivative
 from planar.foundation.jets import Jet
 from planar.results.motion import State
+from planar.solving.checks.singular_values import SINGULAR_TOLERANCE, null_space
+from planar.solving.continuation.second_order import branch_directions
 
 Array = np.ndarray
-NEGLIGIBLE_RATIO = 1e-6
-"""A part of the greatest below this is none: at a change point positions are exact to the root of rounding."""
 
 
 def branch_poles(state: State, middle: Array, size: float) -> tuple[Mapping[str, Array], ...]:
@@ -25,25 +25,15 @@ def branch_poles(state: State, middle: Array, size: float) -> tuple[Mapping[str,
     here = full_position(state)
     if here.motions.shape[1] != 2:
         return ()
-    slope = here.constraints.jacobian(here.w)
-    left, values, _ = np.linalg.svd(slope)
-    rank = int((values > NEGLIGIBLE_RATIO * values.max(initial=1e-300)).sum())
+    left_null = null_space(here.constraints.jacobian(here.w).T)
     bent = [_second_derivative(here, here.motions @ way) for way in ((1.0, 0.0), (0.0, 1.0), (1.0, 1.0))]
-    first, second, both = (left[:, rank:].T @ each for each in bent)
-    quadratics = np.stack([first, both - first - second, second], axis=1)
-    _, sizes, rows = np.linalg.svd(np.vstack([quadratics, np.zeros((1, 3))]))
-    if sizes[0] <= NEGLIGIBLE_RATIO or sizes[1] > NEGLIGIBLE_RATIO * sizes[0]:
-        return ()
-    a, b, c = rows[0]
-    root = b * b - 4.0 * a * c
-    if root <= NEGLIGIBLE_RATIO:
-        return ()
-    # the roots of a s^2 + b s t + c t^2, without cancelling
-    q = -0.5 * (b + np.copysign(np.sqrt(root), b))
-    ways = [np.array(way) / np.hypot(*way) for way in ((q, a), (c, q))]
+    first, second, both = (left_null.T @ each for each in bent)
+    mixed = 0.5 * (both - first - second)
+    forms = np.array([[first, mixed], [mixed, second]]).transpose(2, 0, 1)
+    directions = branch_directions(forms, SINGULAR_TOLERANCE)
     found = []
-    for s, t in ways:
-        moved = poles_of_motions(state, here, here.motions @ np.array([[s], [t]]), middle, size)
+    for c in directions if len(directions) == 2 else ():
+        moved = poles_of_motions(state, here, here.motions @ c[:, None], middle, size)
         most = max(float(np.linalg.norm(each)) for each in moved.values())
         found.append({link: each[0] / most for link, each in moved.items()})
     return tuple(found)

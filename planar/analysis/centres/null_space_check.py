@@ -12,7 +12,8 @@ from planar.analysis.centres.kennedy import LinkPair
 from planar.analysis.rate_equations import derivative
 from planar.analysis.rate_ratios import choose_motion
 from planar.results.motion import State
-from planar.solving.full_constraints import FullConstraints, null_space
+from planar.solving.checks.singular_values import null_space
+from planar.solving.full_constraints import FullConstraints
 from planar.solving.position import PositionSolver
 from planar.solving.prepared_mechanism import PreparedMechanism
 

@@ -10,6 +10,7 @@ from planar.foundation.geometry import Frame
 from planar.model.mechanism import relative_motions
 from planar.model.pairs import Pair
 from planar.results.motion import State
+from planar.solving.checks.singular_values import null_space
 
 Array = np.ndarray
 RANK_TOLERANCE = 1e-10
@@ -54,19 +55,13 @@ def allowed_poles(state: State, pair: Pair, middle: Array, size: float) -> Array
     free = [column for index, column in enumerate(found.own) if index not in found.held]
     # turned about the middle, the origin moves square to its reach
     columns = [along_x, along_y, turn / size - y * along_x + x * along_y, *free]
-    null = _null_space(np.stack(columns, axis=1))[:, :3]
+    null = null_space(np.stack(columns, axis=1), RANK_TOLERANCE).T[:, :3]
     twists = _orthonormal_basis(null)
     return np.array([[-vy, vx, w] for vx, vy, w in twists]).reshape(-1, 3)
 
 
 def _origin(frame: Frame) -> tuple[float, float]:
     return derivative(frame.x, 0), derivative(frame.y, 0)
-
-
-def _null_space(matrix: Array) -> Array:
-    _, values, rows = np.linalg.svd(matrix)
-    rank = int((values > RANK_TOLERANCE * values.max(initial=0.0)).sum())
-    return rows[rank:]
 
 
 def _orthonormal_basis(vectors: Array) -> Array:

@@ -15,7 +15,8 @@ from planar.model.mechanism import relative_motions
 from planar.model.pairs import MeasureKind, Pair
 from planar.model.wording import join_all_names
 from planar.results.motion import KinematicResult, Motion, State, UnknownName
-from planar.solving.full_constraints import COMPLEX_STEP, SINGULAR_TOLERANCE, FullConstraints
+from planar.solving.checks.singular_values import SINGULAR_TOLERANCE
+from planar.solving.full_constraints import COMPLEX_STEP, FullConstraints
 from planar.solving.prepared_mechanism import PreparedMechanism
 
 Array = np.ndarray

@@ -9,12 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.foundation.errors import NoAnswer
-from planar.solving.continuation.path_pieces import PathPiece, path_pieces, start_point
+from planar.solving.continuation.path_pieces import PathPiece
 from planar.solving.continuation.period import MAX_PIECES
-from planar.solving.continuation.predictor_corrector import SHOWN_SLIDE_EXTENT, CurveTracker
+from planar.solving.continuation.predictor_corrector import CurveTracker
 from planar.solving.continuation.solution_curve import SolutionCurve
 from planar.solving.position import PositionSolver
-from planar.solving.runs.closed_circuit import follow_circuit
+from planar.solving.runs.closed_circuit import follow_circuit, is_endless, moving_pieces, split_at_dead_points
 
 Array = np.ndarray
 
@@ -146,22 +146,18 @@ def _trace_open_circuit(solver: PositionSolver, index: int, z: Array, reason: st
     lost, crossed = "", False
     for way in (-1.0, 1.0):
         walk = _curve_tracker(solver, index, z, way)
-        found: list[list[PathPiece]] = [[]]
+        found: list[PathPiece] = []
         out = False
-        for piece in path_pieces(walk):
-            if piece.first == piece.last:
-                continue
-            found[-1].append(piece)
-            if piece.dead_point is not None:
-                rests.append(first + way * piece.stop)
-                found.append([])
-            out = not turns and abs(piece.stop) > SHOWN_SLIDE_EXTENT
-            if out or sum(map(len, found)) > MAX_PIECES:
+        for piece in moving_pieces(walk):
+            found.append(piece)
+            out = is_endless(walk, piece)
+            if out or len(found) > MAX_PIECES:
                 break
+        rests += [first + way * piece.stop for piece in found if piece.dead_point is not None]
         crossed |= bool(walk.passed)
         if not (out or walk.limit is not None):
             lost = reason
-        sides.append([BranchLeg(walk.curve, tuple(each), first, way) for each in found if each])
+        sides.append([BranchLeg(walk.curve, each.pieces, first, way) for each in split_at_dead_points(found)])
     back, ahead = sides
     home = (*back[:1], *ahead[:1])  # none where no way on is found at all
     branches = [*((leg,) for leg in back[:0:-1]), home, *((leg,) for leg in ahead[1:])] if home else []
@@ -171,5 +167,4 @@ def _trace_open_circuit(solver: PositionSolver, index: int, z: Array, reason: st
 def _curve_tracker(solver: PositionSolver, index: int, z: Array, way: float) -> CurveTracker:
     axis = np.zeros_like(solver.inputs.u)
     axis[index] = way
-    curve = SolutionCurve(solver, solver.inputs.p, solver.inputs.u, axis)
-    return CurveTracker(curve, start_point(curve, np.append(z, 0.0), []))
+    return CurveTracker.from_position(solver, solver.inputs.p, (z, solver.inputs.u), axis)

@@ -13,8 +13,9 @@ from planar.equations.functions import EquationFunctions
 from planar.equations.linear import solve_arrays
 from planar.equations.residuals import split_pair_numbers
 from planar.model.mechanism import Mechanism
-from planar.solving.checks.branch_check import SINGULAR_DISTANCE_RATIO, BranchCheck, is_move_allowed
+from planar.solving.checks.branch_check import BranchCheck, is_move_allowed
 from planar.solving.checks.residual_check import EPS, NEGLIGIBLE_ERROR, ResidualCheck
+from planar.solving.checks.singular_values import SINGULAR_DISTANCE_RATIO
 
 Array = np.ndarray
 

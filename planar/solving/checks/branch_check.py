@@ -6,16 +6,19 @@ import numpy as np
 
 from planar.equations.functions import EquationFunctions
 from planar.equations.linear import solve_arrays
+from planar.solving.checks.singular_values import (
+    DIFFERENCE_STEP,
+    SINGULAR_DISTANCE_RATIO,
+    column_norms,
+    least_singular_values,
+    singular_distance,
+)
 
 Array = np.ndarray
 
 
-SINGULAR_DISTANCE_RATIO = 1.5
-"""How many times shorter than the distances from singular positions at its two ends a step must be."""
 ZERO_SINGULAR_VALUE = 1e-6
 """A least singular value that is zero: on the singular position itself it is what rounding left."""
-DIFFERENCE_STEP = 1e-6
-"""The part of a step over which the change of a slope is taken."""
 
 
 class BranchCheck:
@@ -67,25 +70,14 @@ class BranchCheck:
             here, there = (each[:, stage.rows, stage.unknowns] for each in (slopes, moved))
             if here.size:
                 # columns of one size, so that a small link counts as much as a large one
-                sizes = np.maximum(np.linalg.norm(here, axis=1, keepdims=True), 1e-300)
+                sizes = column_norms(here, 1e-300)[:, None]
                 change = np.linalg.norm((there - here) / sizes, axis=(1, 2)) / nudge[:, 0]
-                least = _least_singular_values(here / sizes)
+                least = least_singular_values(here / sizes)
                 # on the singular position itself rates are rounding, and say nothing of how it changes
-                distances[:, index] = np.where(least < ZERO_SINGULAR_VALUE, 0.0, least / np.maximum(change, 1e-300))
+                distances[:, index] = np.where(least < ZERO_SINGULAR_VALUE, 0.0, singular_distance(least, change))
         return np.nan_to_num(distances, nan=0.0, posinf=np.inf)
 
 
-def _least_singular_values(slopes: Array) -> Array:
-    """The least singular value of each slope (steps, rows, unknowns), rows >= unknowns."""
-    if slopes.shape[1:] == (2, 2):
-        # of two by two in closed form: the two have the determinant as product and the norm as sum of squares
-        det = np.abs(slopes[:, 0, 0] * slopes[:, 1, 1] - slopes[:, 0, 1] * slopes[:, 1, 0])
-        norm = np.sum(slopes * slopes, axis=(1, 2))
-        greatest = np.sqrt(0.5 * (norm + np.sqrt(np.maximum(norm * norm - 4.0 * det * det, 0.0))))
-        return det / np.maximum(greatest, 1e-300)
-    if slopes.shape[1] < slopes.shape[2]:
-        return np.zeros(len(slopes))
-    return np.linalg.svd(slopes, compute_uv=False)[:, -1]
 
 
 def is_move_allowed(move: Array, before: Array, after: Array) -> Array:

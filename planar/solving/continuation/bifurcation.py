@@ -13,27 +13,28 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.solving.checks.singular_values import SINGULAR_TOLERANCE, null_space
+from planar.solving.continuation.second_order import (
+    CONVERGED_STEP,
+    EXACT_SINGULAR_TOLERANCE,
+    MAX_REFINEMENTS,
+    branch_directions,
+    is_same_direction,
+    nearest_direction,
+)
 from planar.solving.continuation.solution_curve import Arc, CurvePoint, SolutionCurve, fit_polynomial
+from planar.solving.newton import settle
 
 Array = np.ndarray
 
-MAX_REFINEMENTS = 12
-CONVERGED_STEP = 1e-13
 SMALL_SINGULAR_VALUE = 0.1
 """A singular value below this part of the greatest may be one that vanishes near by."""
-SINGULAR_TOLERANCE = 1e-6
-"""A singular value below this part of the greatest is zero at a change point, which is found to about 1e-8 at first."""
-EXACT_SINGULAR_TOLERANCE = 1e-10
-FORM_TOLERANCE = 1e-10
-"""A quadratic form below this part of the greatest vanishes."""
-STARTS_PER_NULL_VECTOR = 12
-"""Directions for each null vector from which ways are looked for."""
 ON_BRANCH_RATIO = 1e-2
 """A point is on a way if it is no further from it than this part of its distance from the change point."""
-SAME_DIRECTION_TOLERANCE = 1e-6
-"""Ways that are nearer to one another are one."""
 START_DISTANCE_TOLERANCE = 1e-6
 """rad or sizes: so far a position on a change point is from it at most, known to the root of rounding."""
+AT_BIFURCATION_DISTANCE = 1e-5
+"""So near to a singular slope a start may be a change point, known to the root of rounding."""
 ZERO_INPUT_RATE = 1e-7
 """A rate of the inputs along a way below this is none."""
 HALF_ARC_LENGTH, MIN_HALF_ARC_LENGTH = 0.02, 1e-4
@@ -88,37 +89,34 @@ def bifurcation_candidates(curve: SolutionCurve, here: CurvePoint) -> Iterator[B
 def _refine_candidate(curve: SolutionCurve, y: Array, null_start: Array) -> BifurcationCandidate | None:
     """The point next to y at which the slope has null vectors next to these (n + 1, k)."""
     size, count = null_start.shape
-    null = null_start
-    for _ in range(MAX_REFINEMENTS):
-        slope = curve.jacobian(y)
+
+    def augmented(x: Array) -> tuple[Array, Array]:
+        y, null = x[:size], x[size:].reshape(count, size).T
+        left, slope = curve.residuals_and_jacobian(y)
         rows = len(slope)
-        left = [curve.residuals(y), *(slope @ null).T, (null_start.T @ null - np.eye(count)).ravel()]
+        residuals = [left, *(slope @ null).T, (null_start.T @ null - np.eye(count)).ravel()]
         system = np.zeros((rows * (1 + count) + count * count, size * (1 + count)))
         system[:rows, :size] = slope
+        whole = curve.unknowns_and_inputs(y)
         for k in range(count):
             band = slice(rows * (1 + k), rows * (2 + k))
-            system[band, :size] = curve.narrow_columns(
-                curve.functions.second_derivative_along(
-                    curve.unknowns_and_inputs(y), curve.widen_direction(null[:, k]), curve.p
-                )
-            )
+            change = curve.functions.second_derivative_along(whole, curve.widen_direction(null[:, k]), curve.p)
+            system[band, :size] = curve.narrow_columns(change)
             system[band, size * (1 + k) : size * (2 + k)] = slope
             # entry (j, k) of start^T null
             system[rows * (1 + count) + k :: count, size * (1 + k) : size * (2 + k)] = null_start.T
-        step = _solve_least_squares(system, -np.concatenate(left))
-        if not np.all(np.isfinite(step)) or np.max(np.abs(step)) > 1.0:
-            return None
-        y = y + step[:size]
-        null = null + step[size:].reshape(count, size).T
-        if np.max(np.abs(step[:size])) < CONVERGED_STEP:
-            break
-    else:
+        return np.concatenate(residuals), system
+
+    start = np.concatenate([y, null_start.T.ravel()])
+    x, is_settled = settle(
+        augmented, lambda J, F: _solve_least_squares(J, -F), start, MAX_REFINEMENTS, (size, CONVERGED_STEP), 1.0
+    )
+    if not is_settled:
         return None
-    _, s, vt = np.linalg.svd(curve.jacobian(y))
-    rank = int(np.sum(s > SINGULAR_TOLERANCE * max(s[0], 1.0)))
-    if rank > size - 2:
-        return None
-    return BifurcationCandidate(y, vt[rank:].T, float(np.max(np.abs(curve.residuals(y)), initial=0.0)))
+    y = x[:size]
+    left, slope = curve.residuals_and_jacobian(y)
+    null = null_space(slope, SINGULAR_TOLERANCE, unit=1.0)
+    return BifurcationCandidate(y, null, float(np.max(np.abs(left), initial=0.0))) if null.shape[1] > 1 else None
 
 
 def _solve_least_squares(system: Array, right_side: Array) -> Array:
@@ -144,25 +142,6 @@ class _BranchConditions:
             forms.append(self.null.T @ curve.narrow_columns(curve.narrow_columns(bends).T) @ self.null)
         self.forms = np.array(forms).reshape(-1, *2 * [self.null.shape[1]])
 
-    def solve_second_order(self, c: Array) -> Array | None:
-        """The direction next to c, |c| = 1, in which all quadratic forms vanish."""
-        scale = float(np.max(np.abs(self.forms), initial=0.0))
-        if scale < SINGULAR_TOLERANCE:
-            return None
-        forms = self.forms / scale
-        c = c / np.linalg.norm(c)
-        for _ in range(MAX_REFINEMENTS):
-            left = np.append(np.einsum("fij,i,j->f", forms, c, c), 0.5 * (c @ c - 1.0))
-            step = np.linalg.lstsq(np.vstack([2.0 * forms @ c, c]), -left, rcond=1e-10)[0]
-            c = c + step
-            if np.max(np.abs(step)) < CONVERGED_STEP:
-                break
-        met = (
-            np.max(np.abs(np.einsum("fij,i,j->f", forms, c, c))) < FORM_TOLERANCE
-            and abs(c @ c - 1.0) < SAME_DIRECTION_TOLERANCE
-        )
-        return c if met else None
-
     def branch_along(self, c: Array) -> CurvePoint | None:
         """The way with tangent null c and its second derivative; None where the third order leaves it open."""
         curve, rank = self.curve, self.rank
@@ -183,12 +162,11 @@ class _BranchConditions:
 def bifurcation_ahead(curve: SolutionCurve, here: CurvePoint, y: Array) -> Bifurcation | None:
     """A change point with the ways through it, if one of them leads from a point beside it."""
     ways = _BranchConditions(curve, y)
-    first = ways.solve_second_order(ways.null.T @ (y - here.y))
+    first = nearest_direction(ways.forms, ways.null.T @ (y - here.y))
     came = None if first is None else ways.branch_along(first)
     if first is None or came is None or not _leads_to(curve, here, came):
         return None
-    found = _branch_directions(ways, [first])
-    others = [ways.branch_along(c) for c in found[1:]]
+    others = [ways.branch_along(c) for c in branch_directions(ways.forms) if not is_same_direction(c, first)]
     told = tuple(way for way in others if way is not None)
     return Bifurcation(y, (came, *told), len(told) == len(others), len(first) - 1)
 
@@ -207,7 +185,7 @@ def bifurcation_at_start(curve: SolutionCurve, y: Array) -> Bifurcation | None:
     if near is None or np.linalg.norm(near.y - y) > START_DISTANCE_TOLERANCE or near.residual > curve.solver.tolerance:
         return None
     ways = _BranchConditions(curve, near.y)
-    found = _branch_directions(ways, [])
+    found = branch_directions(ways.forms)
     told = [way for way in map(ways.branch_along, found) if way is not None]
     moving = [way if way.input_rate > 0.0 else way.reversed() for way in told if abs(way.input_rate) > ZERO_INPUT_RATE]
     if not moving:
@@ -217,18 +195,6 @@ def bifurcation_at_start(curve: SolutionCurve, y: Array) -> Bifurcation | None:
     rates = [tuple(np.round(sense * way.tangent[:-1] / way.input_rate, 6)) for way in moving]
     order = sorted(range(len(moving)), key=lambda k: (round(float(np.linalg.norm(rates[k])), 6), rates[k]))
     return Bifurcation(near.y, tuple(moving[k] for k in order), len(told) == len(found), near.null.shape[1] - 1)
-
-
-def _branch_directions(ways: _BranchConditions, found: list[Array]) -> list[Array]:
-    """The directions in which the conditions of second order are met, beside those found already."""
-    size = ways.null.shape[1]
-    for start in np.random.default_rng(0).normal(size=(STARTS_PER_NULL_VECTOR * size, size)):
-        c = ways.solve_second_order(start)
-        if c is not None and all(
-            min(np.linalg.norm(c - a), np.linalg.norm(c + a)) > SAME_DIRECTION_TOLERANCE for a in found
-        ):
-            found.append(c)
-    return found
 
 
 def _leads_to(curve: SolutionCurve, here: CurvePoint, branch: CurvePoint) -> bool:

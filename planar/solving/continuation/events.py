@@ -20,13 +20,12 @@ from planar.solving.continuation.path_pieces import (
     PathBifurcation,
     PathPiece,
     bifurcations_until,
-    cubic_hermite,
-    is_dead_point,
     path_pieces,
 )
 from planar.solving.continuation.period import PeriodSearch
 from planar.solving.continuation.predictor_corrector import CurveTracker
 from planar.solving.continuation.solution_curve import CurvePoint, SolutionCurve
+from planar.solving.continuation.turning_points import is_dead_point, lowest_on_cubic
 from planar.solving.prepared_mechanism import PreparedMechanism
 
 Array = np.ndarray
@@ -293,10 +292,7 @@ def _output_turning_points(
     elif g0 * s0 < 0.0 < g1 * s1 and g0 * g1 > 0.0:
         # both ends go one way, but the output may have gone back in between
         gone, up = abs(piece.last - piece.first), float(np.sign(g0))
-        parts = np.linspace(0.05, 0.95, 19)
-        least, part = min(
-            (cubic_hermite(up * g0, up * s0 * gone, up * g1, up * s1 * gone, part), part) for part in parts
-        )
+        least, part = lowest_on_cubic((up * g0, up * s0 * gone), (up * g1, up * s1 * gone))
         middle = piece.first + sense * part * gone
         if least < 0.0 and up * rate(middle) < -still:
             yield find_root(rate, piece.first, middle)

@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.equations.acceptance import AcceptanceResult, StepCheck
-from planar.solving.checks.branch_check import SINGULAR_DISTANCE_RATIO, is_move_allowed
+from planar.solving.checks.branch_check import is_move_allowed
 from planar.solving.checks.residual_check import CONTACT_TOLERANCE, EPS, NEGLIGIBLE_ERROR
+from planar.solving.checks.singular_values import SINGULAR_DISTANCE_RATIO
 from planar.solving.prepared_mechanism import PreparedMechanism
 
 Array = np.ndarray

@@ -9,7 +9,6 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from planar.equations.constraint_equations import slice_length
 from planar.equations.functions import EquationFunctions
 from planar.equations.linear import solve_vectors
 from planar.foundation.errors import NoAnswer, TrackingEnd
@@ -21,15 +20,13 @@ from planar.solving.continuation.path_pieces import (
     PathPiece,
     bifurcations_until,
     path_pieces,
-    start_point,
 )
 from planar.solving.continuation.period import Period, PeriodSearch
 from planar.solving.continuation.predictor_corrector import ArcBudget, CurveTracker, NearbyBifurcation
-from planar.solving.continuation.solution_curve import CurvePoint, CurveSolver, SolutionCurve
+from planar.solving.continuation.solution_curve import CurvePoint, CurveSolver
 
 Array = np.ndarray
 
-MAX_CORRECTIONS = 8
 MIN_WINDOW = 8
 """Samples that are tried at once where none has passed before."""
 MAX_SAMPLES_AHEAD = 1000
@@ -77,9 +74,8 @@ class PathFollower:
         work: ArcBudget | None = None,
     ):
         reach = float(np.max(np.abs(way), initial=0.0)) or 1.0
-        self.curve = SolutionCurve(solver, p, start, way / reach)
-        numbers = list(branches)
-        self.tracker = CurveTracker(self.curve, start_point(self.curve, np.append(z, 0.0), numbers), numbers, work)
+        self.tracker = CurveTracker.from_position(solver, p, (z, start), way / reach, branches, work)
+        self.curve = self.tracker.curve
         self.point = self.tracker.point
         self.dead_point: CurvePoint | None = None
         self._pieces, self._period_search = path_pieces(self.tracker), PeriodSearch(self.tracker)
@@ -185,65 +181,95 @@ def follow_samples(
     `rates` of the inputs the run tells those of its samples as well, so far as they are surely sound. What the general
     path does is counted in `work`.
     """
-    samples, budget = len(u), budget or ArcBudget()
-    found = np.empty((samples, z.size))
-    found[0] = z
-    done, general, window = 1, 0, samples
-    local: dict[int, BranchRates] = {}
-    met_on_way: list[PathBifurcation] = []
-    told = _FastSamplesBuffer(solver, samples) if rates is not None else None
-    missed: list[NearbyBifurcation] = []
-    trip: PathFollower | None = None
-    steps: Iterator[tuple[float, float]] = iter(())
-    before = 0
-    while done < samples:
-        first, last = done, min(done + window, samples)
-        done = _solve_compiled(solver, p, (found, u), slice(done - 1, last), rates, told, done - 1 in local)
-        # of what comes after a sample that did not pass no more is tried than has passed before
-        window = max(MIN_WINDOW, 2 * (done - first))
-        if done > first:
-            steps = iter(())
-        if done == last:
-            continue
-        at_once = next(steps, None)
-        if trip is None or at_once is None:
-            missed += trip.tracker.nearby if trip is not None else ()
-            base = done - 1
-            while base and base in local and (u[done] - u[done - 1]) @ local[base].input_direction < 0.0:
-                base -= 1  # what turns back on a change point comes back by the branch on which it came
-            ahead = np.vstack([u[base], u[done : done + MAX_SAMPLES_AHEAD]])
-            trip, places = _straight_follower(solver, p, found[base], ahead, branches[len(met_on_way) :], budget)
-            steps, before = pairwise([*places, np.inf]), len(met_on_way)
-            at_once = next(steps)
-            if trip.tracker.starts_on_bifurcation and base == done - 1:
-                found[base], local[base] = trip.start_position
-        for place, following in chain([at_once], steps):
-            at = trip.unknowns_at(place)
+    return _SamplesFollower(solver, p, (z, u), branches, rates, budget or ArcBudget()).follow()
+
+
+class _SamplesFollower:
+    """A run that is followed: what is known of its samples, and the general path where it is needed."""
+
+    def __init__(
+        self,
+        solver: PathSolver,
+        p: Array,
+        run: tuple[Array, Array],
+        branches: Sequence[int],
+        rates: tuple[Array, Array] | None,
+        budget: ArcBudget,
+    ):
+        z, self.u = run
+        self.solver, self.p, self.branches, self.rates, self.budget = solver, p, branches, rates, budget
+        self.z = np.empty((len(self.u), z.size))
+        self.z[0] = z
+        self.general_count = 0
+        self.branch_rates: dict[int, BranchRates] = {}
+        self.passed: list[PathBifurcation] = []
+        self.nearby: list[NearbyBifurcation] = []
+        self.fast_samples = _FastSamplesBuffer(solver, len(self.u)) if rates is not None else None
+        self.follower: PathFollower | None = None
+        self._places: Iterator[tuple[float, float]] = iter(())
+        "those of the next samples on the follower's way, each with the one after it"
+        self._passed_before = 0
+
+    def follow(self) -> FollowedSamples:
+        """All samples, as far as the motion comes."""
+        samples = window = len(self.u)
+        done, stopped = 1, None
+        while done < samples and stopped is None:
+            first, last = done, min(done + window, samples)
+            run, rest = (self.z, self.u), slice(done - 1, last)
+            beside = done - 1 in self.branch_rates
+            done = _solve_compiled(self.solver, self.p, run, rest, self.rates, self.fast_samples, beside)
+            # of what comes after a sample that did not pass no more is tried than has passed before
+            window = max(MIN_WINDOW, 2 * (done - first))
+            if done > first:
+                self._places = iter(())
+            if done < last:
+                done, stopped = self._follow_general(done)
+        last_position = None if stopped is None or self.follower is None else self.follower.last_position
+        nearby = (*self.nearby, *(self.follower.tracker.nearby if self.follower is not None else ()))
+        known = self.fast_samples and self.fast_samples.first_samples(done)
+        z, passed = self.z[:done], tuple(self.passed)
+        return FollowedSamples(z, self.general_count, stopped, last_position, self.branch_rates, passed, nearby, known)
+
+    def _follow_general(self, done: int) -> tuple[int, NoAnswer | None]:
+        """Samples from one on by the general path, until the compiled program can be tried again: how many are known
+        then, and why there are no more."""
+        at_once = next(self._places, None)
+        if self.follower is None or at_once is None:
+            self.follower, at_once = self._start_follower(done)
+        follower, place, stopped = self.follower, at_once[0], None
+        for place, following in chain([at_once], self._places):
+            at = follower.unknowns_at(place)
             if at is None:
-                met_on_way[before:] = trip.bifurcations_until(place)
-                known = told and told.first_samples(done)
-                stopped = path_end_refusal(solver, trip)
-                return FollowedSamples(
-                    found[:done],
-                    general,
-                    stopped,
-                    trip.last_position,
-                    local,
-                    tuple(met_on_way),
-                    (*missed, *trip.tracker.nearby),
-                    known,
-                )
-            found[done] = at[0]
-            if at[1] is not None:
-                local[done] = at[1]
-            done, general = done + 1, general + 1
-            if at[1] is None and not trip.has_position(following):
+                stopped = path_end_refusal(self.solver, follower)
                 break
-        met_on_way[before:] = trip.bifurcations_until(place)
-    missed += trip.tracker.nearby if trip is not None else ()
-    return FollowedSamples(
-        found, general, None, None, local, tuple(met_on_way), tuple(missed), told and told.first_samples(samples)
-    )
+            self.z[done], rates = at
+            if rates is not None:
+                self.branch_rates[done] = rates
+            done, self.general_count = done + 1, self.general_count + 1
+            if rates is None and not follower.has_position(following):
+                break
+        self.passed[self._passed_before :] = follower.bifurcations_until(place)
+        return done, stopped
+
+    def _start_follower(self, done: int) -> tuple[PathFollower, tuple[float, float]]:
+        """A follower from the last sample known on, and the first place to which it is to come."""
+        if self.follower is not None:
+            self.nearby += self.follower.tracker.nearby
+        base = done - 1
+        while base and base in self.branch_rates and self._turns_back(base, done):
+            base -= 1  # what turns back on a change point comes back by the branch on which it came
+        ahead = np.vstack([self.u[base], self.u[done : done + MAX_SAMPLES_AHEAD]])
+        branches = self.branches[len(self.passed) :]
+        follower, places = _straight_follower(self.solver, self.p, self.z[base], ahead, branches, self.budget)
+        self._places, self._passed_before = pairwise([*places, np.inf]), len(self.passed)
+        if follower.tracker.starts_on_bifurcation and base == done - 1:
+            self.z[base], self.branch_rates[base] = follower.start_position
+        return follower, next(self._places)
+
+    def _turns_back(self, base: int, done: int) -> bool:
+        """Whether the inputs go back after a sample on a change point."""
+        return bool((self.u[done] - self.u[done - 1]) @ self.branch_rates[base].input_direction < 0.0)
 
 
 class _FastSamplesBuffer:
@@ -332,26 +358,3 @@ def _correct_once(program: EquationFunctions, p: Array, z: Array, u: Array) -> A
     none = np.zeros((len(z), z.shape[1] + u.shape[1]))
     there = program.kinematics(np.hstack([z, u]), none, none, p)
     return z - solve_vectors(there.jacobian, there.F)
-
-
-def correct_blocks(
-    program: EquationFunctions, p: Array, z: Array, u: Array, last_level: int | None = None
-) -> Array | None:
-    """Newton's corrector, group after group (to the `last`), from unknowns near by; None where one does not close."""
-    z = z.copy()
-    for stage in program.equations.blocks:
-        if not slice_length(stage.rows) or (last_level is not None and stage.block_index > last_level):
-            continue
-        closing = program.block_call(stage)
-        before = np.inf
-        for _ in range(MAX_CORRECTIONS):
-            left, slope = closing(z, u, p)
-            gap = float(np.max(np.abs(left), initial=0.0))
-            if not gap < before:
-                break
-            before = gap
-            if slope.size:
-                z[stage.unknowns] -= np.linalg.lstsq(slope.T, left[0], rcond=1e-12)[0]
-        if not before <= 1e-10:
-            return None
-    return z

@@ -10,7 +10,9 @@ import numpy as np
 from planar.foundation.errors import TrackingEnd
 from planar.foundation.root_finding import find_root
 from planar.model.pairs import MeasureKind
+from planar.solving.checks.singular_values import SINGULAR_DISTANCE_RATIO
 from planar.solving.continuation.bifurcation import (
+    AT_BIFURCATION_DISTANCE,
     Bifurcation,
     BranchCrossing,
     bifurcation_ahead,
@@ -18,7 +20,8 @@ from planar.solving.continuation.bifurcation import (
     bifurcation_candidates,
     branch_crossing,
 )
-from planar.solving.continuation.solution_curve import Arc, CurvePoint, SolutionCurve, arc_between
+from planar.solving.continuation.solution_curve import Arc, CurvePoint, CurveSolver, SolutionCurve, arc_between
+from planar.solving.continuation.turning_points import start_point
 
 Array = np.ndarray
 
@@ -26,12 +29,8 @@ FIRST_STEP, LONGEST_STEP, SHORTEST_STEP = 0.05, 0.25, 1e-9
 """Steps of arc length (rad, lengths of the size): the first, the longest, and one at which the curve ends."""
 MAX_TANGENT_TURN = 0.4
 """rad by which the tangent may turn in a step."""
-REGULAR_DISTANCE_RATIO = 1.5
-"""How many times shorter than the distances from singular slopes at its two ends a step must be."""
 SEARCH_DISTANCE, REPEATED_SEARCH_RATIO = 0.15, 0.2
 """Where to look for a change point: so near to a singular slope, and again where it is so many times nearer."""
-AT_BIFURCATION_DISTANCE = 1e-5
-"""So near to a singular slope a start may be a change point, known to the root of rounding."""
 MAX_AHEAD_RATIO = 10.0
 """A change point farther ahead than so many times the distance within which there is none is another one."""
 MAX_ARCS = 5_000
@@ -122,6 +121,24 @@ class CurveTracker:
         )
         self.is_periodic = np.append(~self._is_length, turns)
         "which entries of y come back after whole turns: angles, and the place of inputs that turn"
+
+    @classmethod
+    def from_position(
+        cls,
+        solver: CurveSolver,
+        p: Array,
+        position: tuple[Array, Array],
+        direction: Array,
+        branches: Sequence[int] = (),
+        work: ArcBudget | None = None,
+    ) -> CurveTracker:
+        """From unknowns and inputs along a direction of the inputs, in which the fastest goes one rad or size a unit.
+
+        At a dead point the first of the `branches` tells by which of its two ways.
+        """
+        (z, u), numbers = position, list(branches)
+        curve = SolutionCurve(solver, p, u, direction)
+        return cls(curve, start_point(curve, np.append(z, 0.0), numbers), numbers, work)
 
     def arcs(self) -> Iterator[Arc]:
         """The arcs of the curve; they end where it cannot be followed further, `ending` and `limit` say why."""
@@ -215,7 +232,7 @@ class CurveTracker:
                 onwards = after.tangent @ here.tangent > np.cos(MAX_TANGENT_TURN)
                 if (
                     onwards
-                    and REGULAR_DISTANCE_RATIO * gone < here.regular_distance + after.regular_distance
+                    and SINGULAR_DISTANCE_RATIO * gone < here.regular_distance + after.regular_distance
                     and gone < 2.0 * step
                 ):
                     self.step = 1.6 * step

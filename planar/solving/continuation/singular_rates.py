@@ -14,20 +14,17 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.equations.functions import EquationRates
+from planar.solving.checks.singular_values import SINGULAR_TOLERANCE
+from planar.solving.continuation.bifurcation import ZERO_INPUT_RATE
+from planar.solving.continuation.second_order import EXACT_SINGULAR_TOLERANCE, branch_directions
 from planar.solving.prepared_mechanism import PreparedMechanism
 
 Array = np.ndarray
 
-SINGULAR_TOLERANCE = 1e-6
-"""A singular value below this part of the greatest is zero: beside a crossing positions are known to about 1e-8."""
-CONDITION_TOLERANCE, SQUARED_TOLERANCE = 1e-6, 1e-5
+CONDITION_TOLERANCE, FORM_TOLERANCE = 1e-6, 1e-5
 """Parts of the greatest: of a condition that is met to the position's own error, and of one that is squared in it."""
-EXACT_SINGULAR_TOLERANCE = 1e-10
-"""At the position to round-off the least singular value, as a part of the greatest, is zero to rounding."""
 MAX_REFINEMENT = 1e-6
 """rad or sizes: a singular position is first known to about 1e-8; what moves further was none."""
-DISTINCT_ROOT_RATIO = 1e-3
-"""Roots nearer than this part are one."""
 REFINEMENT_STEPS = 4
 
 
@@ -107,15 +104,19 @@ class _RateConditions:
         tangents = self._first_order(z)
         if tangents is None or tangents.null.shape[1] != 1:
             return None
-        scale = max(1.0, float(np.linalg.norm(tangents.base)))
-        way = tangents.null[:, 0] * scale
+        # the motions to first order: as the inputs go, with their part, and along what is free while they are held
+        speed = float(np.linalg.norm(np.append(tangents.base, 1.0)))
+        base, free = tangents.base / speed, tangents.null[:, 0]
 
-        def open_at(c: float) -> Array:
-            return tangents.left_null.T @ self._rates(z, tangents.base + c * way, np.zeros_like(z)).F2
+        def second_order(motion: Array, input_part: float) -> Array:
+            whole = np.concatenate([z, self.u]), np.concatenate([motion, input_part * self.u1])
+            return tangents.left_null.T @ self.program.kinematics(*whole, 0.0 * whole[0], self.p).F2
 
-        below, here, above = (open_at(c) for c in (-1.0, 0.0, 1.0))
-        roots = _common_roots(0.5 * (above + below) - here, 0.5 * (above - below), here, CONDITION_TOLERANCE * scale**2)
-        return tangents.base + roots[0] * way if len(roots) == 1 else None
+        along, across = second_order(base, 1.0 / speed), second_order(free, 0.0)
+        mixed = 0.5 * (second_order(base + free, 1.0 / speed) - along - across)
+        forms = np.array([[along, mixed], [mixed, across]]).transpose(2, 0, 1)
+        ways = [c for c in branch_directions(forms, FORM_TOLERANCE) if abs(c[0]) > ZERO_INPUT_RATE]
+        return tangents.base + speed * ways[0][1] / ways[0][0] * free if len(ways) == 1 else None
 
     def _refine(self, z: Array, z1: Array) -> Array:
         """The position to round-off: with the velocity's own equations beside the constraints it is no double root."""
@@ -138,25 +139,6 @@ class _RateConditions:
         if np.linalg.norm(slope) < CONDITION_TOLERANCE:
             return None
         e = -float(slope @ here) / float(slope @ slope)
-        if np.max(np.abs(here + e * slope)) > SQUARED_TOLERANCE * (1.0 + np.max(np.abs(here))):
+        if np.max(np.abs(here + e * slope)) > FORM_TOLERANCE * (1.0 + np.max(np.abs(here))):
             return None
         return base + e * free
-
-
-def _common_roots(bend: Array, slope: Array, here: Array, least: float) -> list[float]:
-    """The real roots that quadratic equations bend c^2 + slope c + here = 0 have in common.
-
-    None where all vanish, or where a root is double: there motions only touch, and this order does not part them.
-    """
-    sizes = np.abs(bend) + np.abs(slope) + np.abs(here)
-    if not sizes.size or sizes.max() < least:
-        return []
-    first = int(np.argmax(sizes))
-    straight = abs(bend[first]) < CONDITION_TOLERANCE * 1e-3 * sizes[first]
-    roots = np.roots([slope[first], here[first]] if straight else [bend[first], slope[first], here[first]])
-    real = [float(root.real) for root in roots if abs(root.imag) < SQUARED_TOLERANCE * (1.0 + abs(root))]
-    left = [(c, np.max(np.abs((bend * c + slope) * c + here)) / (1.0 + c * c)) for c in real]
-    fitting = [c for c, open_by in left if open_by < SQUARED_TOLERANCE * sizes.max()]
-    if len(fitting) == 2 and abs(fitting[0] - fitting[1]) < DISTINCT_ROOT_RATIO * (1.0 + abs(fitting[0])):
-        return []
-    return fitting

@@ -8,14 +8,14 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from planar.equations.functions import EquationFunctions
+from planar.solving.checks.singular_values import DIFFERENCE_STEP, column_norms, singular_distance
+from planar.solving.newton import correct, correct_at_rank
 
 Array = np.ndarray
 
 MAX_CORRECTIONS = 10
 CLOSED_TOLERANCE = 1e-10
 """A corrected point leaves no more open than this, where it is far out this part of how far."""
-DIFFERENCE_STEP = 1e-6
-"""The part of a step over which the change of a slope is taken."""
 ZERO_SINGULAR_VALUE = 1e-10
 """A singular value that is this part of the greatest is zero to rounding."""
 MIN_COLUMN_NORM = 1e-6
@@ -143,7 +143,7 @@ class SolutionCurve:
         many = slope.shape[1] - 1
         if many == 0:
             return 1.0
-        return float(np.linalg.svd(slope / _column_norms(slope), compute_uv=False)[many - 1])
+        return float(np.linalg.svd(slope / column_norms(slope, MIN_COLUMN_NORM), compute_uv=False)[many - 1])
 
     def _regular_distance(self, y: Array, tangent: Array, slope: Array, least: float) -> float:
         """How far along the curve J keeps its rank: until it has changed by its least singular value (Weyl).
@@ -155,9 +155,9 @@ class SolutionCurve:
         """
         if len(y) == 1:
             return np.inf
-        sizes = _column_norms(slope)
+        sizes = column_norms(slope, MIN_COLUMN_NORM)
         change = (self.jacobian(y + DIFFERENCE_STEP * tangent) - slope) / (sizes * DIFFERENCE_STEP)
-        clear = least / max(float(np.linalg.norm(change)), 1e-300)
+        clear = float(singular_distance(least, np.linalg.norm(change)))
         if clear >= SHORT_REGULAR_DISTANCE or least < ZERO_SINGULAR_VALUE:
             return clear
         turned = np.linalg.lstsq(slope / sizes, change, rcond=0.1 * ZERO_SINGULAR_VALUE)[0]
@@ -165,30 +165,20 @@ class SolutionCurve:
 
     def correct(self, y: Array, normal: Array) -> Array | None:
         """The point of the curve near y in the plane through y with this normal; None where Newton finds none."""
-        y, before = y.copy(), np.inf
-        for _ in range(MAX_CORRECTIONS):
-            left, slope = self.residuals_and_jacobian(y)
-            gap = float(np.max(np.abs(left), initial=0.0))
-            if not gap < before:
-                break
-            before = gap
-            y = y + _solve_shortest(np.vstack([slope, normal]), np.append(-left, 0.0))
-        return y if before <= CLOSED_TOLERANCE * max(1.0, float(np.max(np.abs(y)))) else None
 
-    def correct_at_lower_rank(self, y: Array, rank_loss: int) -> Array:
+        def step(slope: Array, left: Array) -> Array:
+            return _solve_shortest(np.vstack([slope, normal]), np.append(-left, 0.0))
+
+        y, gap = correct(self.residuals_and_jacobian, step, y, MAX_CORRECTIONS)
+        return y if gap <= CLOSED_TOLERANCE * max(1.0, float(np.max(np.abs(y)))) else None
+
+    def correct_beside_bifurcation(self, y: Array, rank_loss: int, with_inputs: bool) -> Array:
         """A position beside a change point, closed to round-off but not moved from one branch to the other.
 
-        `lost` is by how much the slope's rank falls at the change point.
+        `rank_loss` is by how much the slope's rank falls at the change point; the inputs move only `with_inputs`.
         """
-        for _ in range(2):
-            y = y - truncated_step(self.jacobian(y), self.residuals(y), len(y) - 1 - rank_loss)
-        return y
-
-    def correct_at_inputs(self, y: Array, rank_loss: int) -> Array:
-        """The same for inputs that stay where they are."""
-        for _ in range(2):
-            y = y - np.append(truncated_step(self.jacobian(y)[:, :-1], self.residuals(y), len(y) - 1 - rank_loss), 0.0)
-        return y
+        many = len(y) - 1
+        return correct_at_rank(self.residuals_and_jacobian, y, many - rank_loss, many + with_inputs)
 
 
 def _solve_shortest(system: Array, known: Array) -> Array:
@@ -206,16 +196,6 @@ def _solve_regular(system: Array, known: Array) -> Array | None:
         return np.linalg.solve(system, known)
     except np.linalg.LinAlgError:
         return None
-
-
-def _column_norms(slope: Array) -> Array:
-    return np.maximum(np.sqrt(np.einsum("rk,rk->k", slope, slope)), MIN_COLUMN_NORM)
-
-
-def truncated_step(jacobian: Array, residuals: Array, rank: int) -> Array:
-    """The shortest step that closes what is open, by so many of the directions in which the slope is steepest."""
-    u, s, vt = np.linalg.svd(jacobian, full_matrices=False)
-    return vt[:rank].T @ ((u.T[:rank] @ residuals) / s[:rank])
 
 
 class Arc(NamedTuple):
@@ -257,7 +237,7 @@ class Arc(NamedTuple):
         """The point of the curve so far along the axis (n + 1,)."""
         rough = self.polynomial(x)
         if self.is_exact:
-            return curve.correct_at_lower_rank(rough, self.rank_loss)
+            return curve.correct_beside_bifurcation(rough, self.rank_loss, with_inputs=True)
         found = curve.correct(rough, self.axis)
         return rough if found is None else found
 

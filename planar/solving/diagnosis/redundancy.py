@@ -6,12 +6,12 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from planar.solving.checks.singular_values import null_space
 from planar.solving.full_constraints import (
     PROBE_DISTANCE,
     FullConstraints,
     find_closed_position,
     motion_dimension,
-    null_space,
     random_step,
 )
 from planar.solving.prepared_mechanism import PreparedMechanism

@@ -19,7 +19,7 @@ from planar.model.mechanism import Drive, Mechanism, replace_inputs
 from planar.model.wording import amount
 from planar.solving.assembly.block_assemblies import BlockAssemblies, BlockAssembly, block_residual_function
 from planar.solving.assembly.nearest_assembly import Assembly, AssemblySearchFailure, find_nearest_assembly
-from planar.solving.newton import damped_newton, polish_root
+from planar.solving.newton import correct_blocks, damped_newton
 from planar.solving.prepared_mechanism import PreparedMechanism
 
 Array = np.ndarray
@@ -338,13 +338,8 @@ def _changed_block(
         return None
     by = [setup.unit if slides else 1.0 for slides in setup.structure.input_slides]
     u = np.array([given.position / size for given, size in zip(mechanism.inputs, by, strict=True)])
-    z = z.copy()
-    for before in setup.equations.blocks[: stage.block_index]:
-        closing = block_residual_function(setup.functions, before, z, u, p)
-        z[before.unknowns] = polish_root(closing, z[before.unknowns])
-        if np.max(np.abs(closing(z[None, before.unknowns])[0]), initial=0.0) > CLOSED_TOLERANCE:
-            return None
-    return _ChangedBlock(setup, stage, z, u, p)
+    moved = correct_blocks(setup.functions, p, z, u, stage.block_index - 1)
+    return None if moved is None else _ChangedBlock(setup, stage, moved, u, p)
 
 
 def _rounded_beyond(value: float, up: bool) -> float:

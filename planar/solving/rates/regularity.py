@@ -10,20 +10,13 @@ from planar.equations.constraint_equations import Block, slice_length
 from planar.equations.functions import EquationRates
 from planar.equations.linear import solve_vectors
 from planar.foundation.errors import NoAnswer
-from planar.solving.continuation.path import correct_blocks
+from planar.solving.checks.singular_values import MIN_REGULARITY, ZERO_REGULARITY, null_space, rank
 from planar.solving.diagnosis import refusals
+from planar.solving.newton import correct_blocks
 from planar.solving.prepared_mechanism import PreparedMechanism
 
 Array = np.ndarray
 
-MIN_REGULARITY = 1e-5
-"""A group's slope is singular where its least singular value is below this part of its links' own reach.
-
-Near a dead point the slope falls with the square root of the distance to it, so that round-off in the input of one
-part in 1e16 becomes one in 1e16 / slope^2 in the velocity: at 1e-5 six digits remain, below they are lost.
-"""
-ZERO_REGULARITY = 1e-9
-"""A strength below this is zero but for rounding."""
 NEIGHBOUR_DISTANCE = 1e-2
 """How far (rad, or lengths of the size) a position is moved to see whether what holds there holds elsewhere."""
 
@@ -55,7 +48,11 @@ def mobility_by_rank(setup: PreparedMechanism, z: Array, motion: EquationRates) 
         if found < inputs and not _input_rates_agree(setup, motion):
             raise refusals.disagreeing_inputs(setup, found, "velocities")
         return found
-    found = z.size + inputs - _rank(_scaled_jacobian(setup, np.hstack([motion.jacobian, motion.input_jacobian])))
+    found = (
+        z.size
+        + inputs
+        - rank(_scaled_jacobian(setup, np.hstack([motion.jacobian, motion.input_jacobian])), MIN_REGULARITY, unit=1.0)
+    )
     links = _links_free_at_rest(setup, motion.jacobian) or list(
         dict.fromkeys(link for stage in weak for link in stage.links)
     )
@@ -152,11 +149,8 @@ def jacobian_at(setup: PreparedMechanism, z: Array, u: Array) -> Array:
 
 def _links_free_at_rest(setup: PreparedMechanism, slope: Array) -> list[str]:
     """The links that can move while the inputs are held, from the slope's null vectors."""
-    _, values, vectors = np.linalg.svd(_scaled_jacobian(setup, slope))
-    null = vectors[int(np.sum(values > MIN_REGULARITY * max(1.0, values[0]))) :]
-    if null.size == 0:
-        return []
-    return moved_links(setup, np.max(np.abs(null), axis=0))
+    null = null_space(_scaled_jacobian(setup, slope), MIN_REGULARITY, unit=1.0)
+    return moved_links(setup, np.max(np.abs(null), axis=1)) if null.size else []
 
 
 def moved_links(setup: PreparedMechanism, rates: Array) -> list[str]:
@@ -169,10 +163,3 @@ def moved_links(setup: PreparedMechanism, rates: Array) -> list[str]:
     ]
     joined = [link for name in moved for link in (setup.pairs[name].links if name in setup.pairs else (name,))]
     return [link for link in dict.fromkeys(joined) if link != setup.mechanism.frame]
-
-
-def _rank(matrix: Array) -> int:
-    if matrix.size == 0:
-        return 0
-    values = np.linalg.svd(matrix, compute_uv=False)
-    return int(np.sum(values > MIN_REGULARITY * max(1.0, values[0])))

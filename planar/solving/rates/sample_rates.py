@@ -8,11 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.equations.linear import solve_vectors
+from planar.solving.checks.singular_values import MIN_REGULARITY
 from planar.solving.continuation.path import BranchRates
-from planar.solving.continuation.solution_curve import truncated_step
+from planar.solving.newton import truncated_step
 from planar.solving.prepared_mechanism import PreparedMechanism
 from planar.solving.rates.accuracy import AccuracyDoubts, find_accuracy_doubts
-from planar.solving.rates.regularity import MIN_REGULARITY, regularity
+from planar.solving.rates.regularity import regularity
 
 Array = np.ndarray
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 
 from planar.foundation.errors import NoAnswer, Outcome
-from planar.solving.continuation.path_pieces import BranchRates, PathPiece, is_dead_point, path_pieces
+from planar.solving.continuation.path_pieces import BranchRates, PathPiece, path_pieces
 from planar.solving.continuation.period import CLOSED_TOLERANCE, MAX_PIECES, closing_piece, nearest_start
 from planar.solving.continuation.predictor_corrector import SHOWN_SLIDE_EXTENT, CurveTracker
 from planar.solving.continuation.solution_curve import SolutionCurve
+from planar.solving.continuation.turning_points import is_dead_point
 from planar.solving.position import PositionSolver
 
 Array = np.ndarray
@@ -42,12 +44,27 @@ class ClosedCircuit(NamedTuple):
     @property
     def branches(self) -> tuple[CircuitBranch, ...]:
         """Its parts between dead points."""
-        found: list[list[PathPiece]] = [[]]
-        for piece in self.pieces:
-            found[-1].append(piece)
-            if piece.dead_point is not None:
-                found.append([])
-        return tuple(CircuitBranch(tuple(each)) for each in found if each and each[0].start != each[-1].stop)
+        return split_at_dead_points(self.pieces)
+
+
+def split_at_dead_points(pieces: Iterable[PathPiece]) -> tuple[CircuitBranch, ...]:
+    """The branches to which the pieces of a curve belong, in their order."""
+    found: list[list[PathPiece]] = [[]]
+    for piece in pieces:
+        found[-1].append(piece)
+        if piece.dead_point is not None:
+            found.append([])
+    return tuple(CircuitBranch(tuple(each)) for each in found if each and each[0].start != each[-1].stop)
+
+
+def moving_pieces(tracker: CurveTracker) -> Iterator[PathPiece]:
+    """The pieces of a curve on which something moves."""
+    return (piece for piece in path_pieces(tracker) if piece.first != piece.last)
+
+
+def is_endless(tracker: CurveTracker, piece: PathPiece) -> bool:
+    """Whether the input slides on so far at a piece's end that it is not followed further."""
+    return not tracker.is_periodic[-1] and abs(piece.stop) > SHOWN_SLIDE_EXTENT
 
 
 def follow_circuit(setup: PositionSolver, tracker: CurveTracker) -> ClosedCircuit:
@@ -55,9 +72,7 @@ def follow_circuit(setup: PositionSolver, tracker: CurveTracker) -> ClosedCircui
     start, curve = tracker.point, tracker.curve
     turning = tracker.is_periodic
     found: list[PathPiece] = []
-    for piece in path_pieces(tracker):
-        if piece.first == piece.last:
-            continue
+    for piece in moving_pieces(tracker):
         if len(found) > 1:
             if (
                 piece.dead_point is not None
@@ -69,7 +84,7 @@ def follow_circuit(setup: PositionSolver, tracker: CurveTracker) -> ClosedCircui
             if last is not None:
                 return ClosedCircuit((*found, last), is_dead_point(start))
         found.append(piece)
-        out = not turning[-1] and abs(piece.stop) > SHOWN_SLIDE_EXTENT
+        out = is_endless(tracker, piece)
         if out or len(found) > MAX_PIECES:
             told = (
                 "the input slides on without an end"

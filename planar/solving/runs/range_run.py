@@ -17,7 +17,7 @@ from planar.solving.continuation import events
 from planar.solving.continuation.events import LocatedLimit
 from planar.solving.continuation.fast_path import FastSamples, fast_run
 from planar.solving.continuation.path import FollowedSamples, PathFollower, follow_samples, follow_to
-from planar.solving.continuation.path_pieces import BranchRates, bifurcations_until, start_point
+from planar.solving.continuation.path_pieces import BranchRates, bifurcations_until
 from planar.solving.continuation.predictor_corrector import (
     MAX_ARCS,
     SHOWN_SLIDE_EXTENT,
@@ -25,7 +25,6 @@ from planar.solving.continuation.predictor_corrector import (
     CurveTracker,
     NearbyBifurcation,
 )
-from planar.solving.continuation.solution_curve import SolutionCurve
 from planar.solving.diagnosis import refusals
 from planar.solving.position import solved_mechanism, stopped_at_start
 from planar.solving.rates.regularity import moved_links
@@ -305,10 +304,8 @@ class RangeRun:
         """A walk from a position of the input, in the direction in which it goes on."""
         axis = np.zeros_like(self.u)
         axis[self.index] = way
-        curve = SolutionCurve(self.solver, self.p, self._inputs_at(first), axis)
-        numbers = list(self.branches)
-        y = np.append(z, 0.0)
-        return CurveTracker(curve, start_point(curve, y, numbers), numbers, work)
+        position = z, self._inputs_at(first)
+        return CurveTracker.from_position(self.solver, self.p, position, axis, self.branches, work)
 
     def _find_range_end(self, z: Array, here: float, sign: float) -> _RangeEnd:
         """Where the range of the input ends, one way from a position with unknowns z."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.jets import Jet
+from planar.model.mechanism import Drive, replace_inputs
 from planar.model.wording import count_phrase
 from planar.results.motion import FollowedPath, Motion
 from planar.results.records import InputMotion, ThirdRates
@@ -184,10 +185,12 @@ def _checked_rates(solver: PositionSolver, run: RunSamples, with_jerk: bool) -> 
             solver, solver.residual_check.row_pairs[pair], residual, f"at {solver.describe_inputs(given.u[row])}"
         )
     parts, doubt = sample_rates(solver, z, given, run.branch_rates, with_jerk)
+    remarks = _undetermined_remark(solver, run, parts[1])
     for part in parts[1:]:
         # where the input turns back, no velocity of the rest goes with one of the input
         part[list(run.dead_points)] = np.nan
-    remarks = _remove_inexact_rates(solver, given, parts, doubt) if doubt is not None else ()
+    if doubt is not None:
+        remarks += _remove_inexact_rates(solver, given, parts, doubt)
     frames, own = lazy_frames(solver, parts[:3])
     determined = ~np.isnan(parts[1]).any(axis=1) if parts[1].size else np.ones(len(z), dtype=bool)
     inputs = [_input_motion(solver, given, index) for index in range(len(solver.mechanism.inputs))]
@@ -207,6 +210,23 @@ def _checked_rates(solver: PositionSolver, run: RunSamples, with_jerk: bool) -> 
         determined &= ~wrong
     solver.refuse_open_contact(frames, own)
     return _CheckedRates(parts, residual, remarks)
+
+
+def _undetermined_remark(solver: PositionSolver, run: RunSamples, w1: Array) -> tuple[str, ...]:
+    """What is said of the first row without rates that is no dead point: what would be said of it by itself."""
+    missing = np.setdiff1d(np.flatnonzero(np.isnan(w1).any(axis=1)), run.dead_points)
+    if not missing.size:
+        return ()
+    row = missing[0]
+    there = tuple(
+        Drive(each.pair, float(at) * (solver.unit if solver.is_sliding(each.pair) else 1.0))
+        for each, at in zip(solver.mechanism.inputs, run.inputs.u[row], strict=True)
+    )
+    try:
+        solver.with_inputs_of(replace_inputs(solver.mechanism, there)).state(run.z[row])
+    except NoAnswer as problem:
+        return (f"{count_phrase(len(missing), 'row')} without rates: {problem.reason}",)
+    return ()
 
 
 def _remove_inexact_rates(
