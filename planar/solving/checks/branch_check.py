@@ -78,8 +78,6 @@ class BranchCheck:
         return np.nan_to_num(distances, nan=0.0, posinf=np.inf)
 
 
-
-
 def is_move_allowed(move: Array, before: Array, after: Array) -> Array:
     """Whether a move is one that the rates at its two ends allow, each as a move over the whole step.
 
