@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.march.backend import AssemblyCorrector
+from planar.batch.march.backend import DesignRunner
 from planar.batch.march.checks import column_volume
 from planar.batch.nearest_assemblies import CLEAR_REGULARITY, MAX_BLOCK_UNKNOWNS, NEAR_SKETCH, find_nearest_assemblies
 from planar.batch.reference_design import ReferenceDesign, shape_of_designs
@@ -72,12 +72,12 @@ def find_assemblies(
     p: Array,
     u: Array,
     tolerance: float,
-    corrector: AssemblyCorrector | None,
+    runner: DesignRunner,
 ) -> DesignAssemblies:
     """The assemblies at inputs u (inputs, designs), of designs with numbers p (numbers, designs) and these shapes."""
     with np.errstate(all="ignore"):  # starts that lead nowhere end as what is no number
-        near = corrector and find_nearest_assemblies(reference, shapes, p, u, tolerance, corrector)
-        if not near:
+        near = find_nearest_assemblies(reference, shapes, p, u, tolerance, runner)
+        if near is None:
             return _AssemblySearch(reference, shapes, p, u).search()
         every, rest = (
             DesignAssemblies(near.z, near.is_clear, np.full(len(near.is_clear), -1)),

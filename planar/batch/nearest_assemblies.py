@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.march.backend import AssemblyCorrector, CorrectedAssemblies, DesignBatch, UnsupportedStructure
+from planar.batch.march.backend import CorrectedAssemblies, DesignBatch, DesignRunner, UnsupportedStructure
 from planar.batch.reference_design import ReferenceDesign, stack_rows
 from planar.equations.constraint_equations import Block
 from planar.equations.functions import slice_length
@@ -42,9 +42,10 @@ def find_nearest_assemblies(
     p: Array,
     u: Array,
     tolerance: float,
-    corrector: AssemblyCorrector,
+    runner: DesignRunner,
 ) -> NearestAssemblies | None:
-    """The assemblies at inputs u (inputs, designs); None where the sketch does not show every group, or `close` cannot.
+    """The assemblies at inputs u (inputs, designs); None where the sketch does not show every group, or no
+    runner can correct them.
 
     Costs never fall: where the nearest assembly is taken of every group, and each group's next one alone would cost
     more than all these, there is no nearer one of the whole. A group in closed form has two assemblies; any other as
@@ -59,7 +60,7 @@ def find_nearest_assemblies(
     ):
         return None
     try:
-        return _NearestAssemblySearch(reference, shapes, p, u, tolerance, corrector, candidates, stages).search()
+        return _NearestAssemblySearch(reference, shapes, p, u, tolerance, runner, candidates, stages).search()
     except UnsupportedStructure:
         return None
 
@@ -72,11 +73,11 @@ class _NearestAssemblySearch:
         p: Array,
         u: Array,
         tolerance: float,
-        close: AssemblyCorrector,
+        runner: DesignRunner,
         candidates: BlockAssemblies,
         stages: list[Block],
     ):
-        self.design_count, self.corrector, self.blocks = p.shape[1], close, stages
+        self.design_count, self.runner, self.blocks = p.shape[1], runner, stages
         at = candidates.sketched_by_level
         self.roots = {
             stage.block_index: each
@@ -110,7 +111,7 @@ class _NearestAssemblySearch:
 
     def search(self) -> NearestAssemblies:
         """See `nearby`."""
-        found = self.corrector(self.batch, self.point_blocks, CORRECTIONS)
+        found = self.runner.correct_assemblies(self.batch, self.point_blocks, CORRECTIONS)
         costs, others = (np.square(places - self.sketch).sum(axis=1) for places in (found.points, found.other_points))
         clear, total, before = found.converged.copy(), costs.sum(axis=0), np.zeros(self.design_count)
         for stage in self.blocks:
@@ -136,7 +137,7 @@ class _NearestAssemblySearch:
         count = np.ones(self.design_count, dtype=int)
         for root in roots[1:]:
             self.batch.z0[stage.unknowns] = root[:, None]
-            other = self.corrector(self.batch, self.point_blocks, CORRECTIONS)
+            other = self.runner.correct_assemblies(self.batch, self.point_blocks, CORRECTIONS)
             z = other.z[stage.unknowns]
             apart = [
                 ~(np.max(np.abs(np.exp(1j * z) - np.exp(1j * each)), axis=0) <= SAME_ASSEMBLY_TOLERANCE)

@@ -13,7 +13,7 @@ from typing import Any
 
 from planar.batch.block import DesignBlock, SolvedDesigns, solve_design_block
 from planar.batch.design_arrays import read_designs, split_into_blocks
-from planar.batch.march.choice import available_runners
+from planar.batch.march.choice import available_backends
 from planar.batch.reference_design import reference_design
 from planar.batch.results import Sweep
 from planar.batch.stores.store import SweepPlan, open_store
@@ -77,7 +77,7 @@ def sweep(
     mechanism = check_range(mechanism, steps, start, stop, pair)
     common = reference_design(mechanism, pair)
     names = common.select_points(points)
-    available_runners(backend)
+    available_backends(backend)
     many = len(next(iter(values.values())))
     size = int(block) if block is not None else _block_size(many, steps, len(names), rates, executor)
     whole = DesignBlock(mechanism, values, int(steps), names, rates, start, stop, pair, backend)

@@ -12,8 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.batch.general_path import OUTCOMES, solve_design
-from planar.batch.march.choice import available_runners
+from planar.batch.march.choice import available_backends
 from planar.batch.mechanisms.bar_linkages import MAX_BARS, bar_linkage_arrays
+from planar.batch.mechanisms.block_runner import BlockRunner, find_block_runner
 from planar.batch.mechanisms.initial_assembly import StartAssemblies, find_start_assemblies
 from planar.batch.mechanisms.linkage_arrays import LinkageArrays, PartitionedLinkage, make_linkage_arrays
 from planar.batch.mechanisms.march import run_linkages
@@ -40,7 +41,7 @@ MAX_STATE_BYTES = 16 * 2**20
 
 
 class _Attempt(NamedTuple):
-    """How linkages are run: with steps so many times finer, `polished` and `quick` as in `running.ran`."""
+    """How linkages are run: with steps so many times finer, `polished` and `verdict_only` as in `run_linkages`."""
 
     refinement: int
     polished: bool
@@ -53,7 +54,8 @@ _ATTEMPTS = (
     _Attempt(1, True, False),
     _Attempt(REFINEMENT, True, False),
 )
-"""One after the other, each for those that the ones before left open; the quick ones are for machine code."""
+"""One after the other, each for those that the ones before left open; those that give a verdict only are for runners
+that can give extremes."""
 
 
 class SweepRequest(NamedTuple):
@@ -63,7 +65,7 @@ class SweepRequest(NamedTuple):
     points: tuple[str, ...] | None
     rates: bool
     pair: str | None
-    native: bool
+    backend: str
 
 
 def sweep_each(
@@ -106,8 +108,8 @@ def sweep_each(
         if pair is not None or not isinstance(mechanism, PinnedMechanism) or mechanism.layout is None:
             _running_input(mechanism, pair, f"mechanisms[{k}]")
     names = (points,) if isinstance(points, str) else None if points is None else tuple(dict.fromkeys(points))
-    native = available_runners(backend)[0][0] == "native" if whole else False
-    wanted = SweepRequest(int(steps), names, rates, pair, native)
+    available_backends(backend)
+    wanted = SweepRequest(int(steps), names, rates, pair, backend)
     parts = [whole[k : k + PART_SIZE] for k in range(0, len(whole), PART_SIZE)]
     found: list[Swept] = []
     for done in _solve_parts(parts, wanted, executor):
@@ -189,14 +191,16 @@ class _LinkageGroup(NamedTuple):
 def solve_mechanisms(mechanisms: Sequence[Mechanism], request: SweepRequest) -> list[Swept]:
     """Some mechanisms, in their order."""
     found: dict[int, Swept] = {}
+    runner = find_block_runner(request.backend)
+    attempts = [each for each in _ATTEMPTS if runner.can_give_extremes or not each.verdict_only]
     for ready in _linkage_groups(mechanisms, request):
-        start = find_start_assemblies(ready.arrays, request.native)
+        start = find_start_assemblies(ready.arrays, runner)
         left = np.flatnonzero(start.is_sure)
-        for each in _ATTEMPTS if request.native else _ATTEMPTS[2:]:
+        for each in attempts:
             for some in _cache_sized_chunks(
                 ready.arrays.link_counts, left, request, _step_division(request.steps) * each.refinement
             ):
-                found |= _run_attempt(ready, some, start, request, each)
+                found |= _run_attempt(ready, some, start, request, each, runner)
             left = np.array([k for k in left if ready.numbers[k] not in found], dtype=int)
             if not left.size:
                 break
@@ -354,7 +358,12 @@ def _step_division(steps: int) -> int:
 
 
 def _run_attempt(
-    group: _LinkageGroup, some: Array, start: StartAssemblies, request: SweepRequest, attempt: _Attempt
+    group: _LinkageGroup,
+    some: Array,
+    start: StartAssemblies,
+    request: SweepRequest,
+    attempt: _Attempt,
+    runner: BlockRunner,
 ) -> dict[int, Swept]:
     """Those that came to their end, or to a dead point, by their numbers."""
     steps, finer = request.steps, _step_division(request.steps) * attempt.refinement
@@ -366,7 +375,7 @@ def _run_attempt(
         gone,
         FULL_TURN / (steps * finer),
         request.rates,
-        request.native,
+        runner,
         attempt.polished,
         attempt.verdict_only,
     )

@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 from planar.batch.march.kernel import (
     LEAST_REGULARITY,
-    MAX_TURN_PER_STEP,
     BareAngle,
     KernelBlock,
     KernelEquations,
@@ -19,6 +18,7 @@ from planar.batch.march.kernel import (
     OperandNames,
 )
 from planar.batch.march.point_outputs import PointKernelWriter
+from planar.batch.march.prediction import MAX_TURN_PER_STEP
 from planar.codegen.instructions import UnsupportedOperation
 
 PREDICTOR_ORDER, HISTORY_LENGTH = 6, 8

@@ -13,13 +13,13 @@ import numpy as np
 
 from planar.batch.march.kernel import (
     LEAST_REGULARITY,
-    MAX_TURN_PER_STEP,
     BareAngle,
     KernelEquations,
     Operand,
     OperandNames,
 )
 from planar.batch.march.point_outputs import PointKernelWriter
+from planar.batch.march.prediction import MAX_TURN_PER_STEP
 from planar.codegen.instructions import UnsupportedOperation
 from planar.codegen.llvm_compile import compile_function
 from planar.codegen.llvm_ir import IRWriter
