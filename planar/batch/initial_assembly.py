@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.batch.assembly_scores import MAX_BLOCK_UNKNOWNS, NEAR_SKETCH, is_at_sketch, is_clearly_regular
 from planar.batch.march.backend import DesignRunner
 from planar.batch.march.checks import column_volume
-from planar.batch.nearest_assemblies import CLEAR_REGULARITY, MAX_BLOCK_UNKNOWNS, NEAR_SKETCH, find_nearest_assemblies
+from planar.batch.nearest_assemblies import find_nearest_assemblies
 from planar.batch.reference_design import ReferenceDesign, shape_of_designs
 from planar.equations.constraint_equations import Block
 from planar.equations.functions import frames_from_coordinates, slice_length
@@ -116,7 +117,7 @@ class _AssemblySearch:
         found = self._choose(here)
         # a group that lies where it is meant may leave the later ones no place near the sketch
         cost = np.where(here.exists, here.distance, np.inf).min(axis=1)
-        again = np.flatnonzero(hasty & (cost > self._sketched_point_count() * CLEAR_SKETCH_DISTANCE**2))
+        again = np.flatnonzero(hasty & ~is_at_sketch(cost, self._sketched_point_count()))
         if again.size:
             own = {name: shape_of_designs(shape, again) for name, shape in self.shapes.items()}
             slow = _AssemblySearch(self.reference, own, self.p[:, again], self.u[:, again])
@@ -192,8 +193,8 @@ class _AssemblySearch:
             return here, every
         z, closed = self._correct(stage, here, roots[:1], NEWTON_STEPS)
         on = self._score(stage, here._replace(z=z[:, :, :, 0], exists=closed[:, :, 0]))
-        near = on.distance - here.distance <= sketched * CLEAR_SKETCH_DISTANCE**2
-        clear = on.exists[:, 0] & near[:, 0] & (self.regularity > CLEAR_REGULARITY)
+        near = is_at_sketch(on.distance - here.distance, sketched)
+        clear = on.exists[:, 0] & near[:, 0] & is_clearly_regular(self.regularity)
         return on, every[~clear]
 
     def _merge_extensions(
@@ -400,12 +401,12 @@ class _AssemblySearch:
             self.is_sure[tied[left.sum(axis=1) > 1]] = False
         z = np.take_along_axis(here.z, best[None, :, None], axis=2)[..., 0]
         shown = self._sketched_point_count()
-        clear = (least <= shown * CLEAR_SKETCH_DISTANCE**2) & (shown > 0) & ~np.isin(np.arange(self.design_count), tied)
+        clear = is_at_sketch(least, shown) & (shown > 0) & ~np.isin(np.arange(self.design_count), tied)
         sure = (self.is_sure | clear) & np.isfinite(least) & (least < self.dropped_distance - EQUAL_DISTANCE_TOLERANCE)
         largest = max((slice_length(stage.unknowns) for stage in self.equations.blocks), default=0)
         if largest > 2:
             # it may have assemblies that no start has led to: none of these is nearer than what is near
-            sure &= least <= shown * (NEAR_SKETCH if largest <= MAX_BLOCK_UNKNOWNS else CLEAR_SKETCH_DISTANCE) ** 2
+            sure &= is_at_sketch(least, shown, NEAR_SKETCH if largest <= MAX_BLOCK_UNKNOWNS else CLEAR_SKETCH_DISTANCE)
         return DesignAssemblies(z, sure, self.failed_block)
 
 

@@ -7,26 +7,24 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.batch.assembly_scores import (
+    MAX_BLOCK_UNKNOWNS,
+    NEAR_SKETCH,
+    is_at_sketch,
+    is_clearly_regular,
+    is_surely_farther,
+)
 from planar.batch.march.backend import CorrectedAssemblies, DesignBatch, DesignRunner, UnsupportedStructure
 from planar.batch.reference_design import ReferenceDesign, stack_rows
 from planar.equations.constraint_equations import Block
 from planar.equations.functions import slice_length
 from planar.model.link_shapes import LinkShape
-from planar.solving.assembly.block_assemblies import CLEAR_SKETCH_DISTANCE, SAME_ASSEMBLY_TOLERANCE, BlockAssemblies
-from planar.solving.assembly.nearest_assembly import EQUAL_DISTANCE_TOLERANCE
+from planar.solving.assembly.block_assemblies import SAME_ASSEMBLY_TOLERANCE, BlockAssemblies
 
 Array = np.ndarray
 
 CORRECTIONS = 6
 """Newton's steps from the assembly of the base."""
-CLEAR_REGULARITY = 0.2
-"""The volume that the columns of a slope span, each of length one, from which on no other assembly is near."""
-NEAR_SKETCH = 0.15
-"""Lengths of the size, on average, from the sketch: a large group that lies farther off may have another assembly that
-is
-nearer, of which no start tells."""
-MAX_BLOCK_UNKNOWNS = 4
-"""Unknowns of the largest group whose regularity a backend tells as that volume."""
 
 
 class NearestAssemblies(NamedTuple):
@@ -118,15 +116,13 @@ class _NearestAssemblySearch:
             own = np.array(self.point_blocks) == stage.block_index
             cost, other = costs[own].sum(axis=0), others[own].sum(axis=0)
             if np.all(np.isinf(other)):
-                clear &= (cost <= np.count_nonzero(own) * NEAR_SKETCH**2) & (found.regularity > CLEAR_REGULARITY)
-                near = cost <= np.count_nonzero(own) * CLEAR_SKETCH_DISTANCE**2
+                clear &= is_at_sketch(cost, np.count_nonzero(own), NEAR_SKETCH) & is_clearly_regular(found.regularity)
+                near = is_at_sketch(cost, np.count_nonzero(own))
                 clear &= (
-                    near
-                    if near.all()
-                    else near | (before + self._next_cost(stage, found, own) > total + EQUAL_DISTANCE_TOLERANCE)
+                    near if near.all() else near | is_surely_farther(before + self._next_cost(stage, found, own), total)
                 )
             else:
-                clear &= before + other > total + EQUAL_DISTANCE_TOLERANCE
+                clear &= is_surely_farther(before + other, total)
             before += cost
         return NearestAssemblies(found.z, clear)
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
+from functools import partial
 from math import ceil
-from numbers import Integral
 from typing import NamedTuple
 
 import numpy as np
 
+from planar.batch.executor import in_order, run_tasks
 from planar.batch.general_path import OUTCOMES, solve_design
 from planar.batch.march.choice import available_backends
 from planar.batch.mechanisms.bar_linkages import MAX_BARS, bar_linkage_arrays
@@ -22,11 +23,11 @@ from planar.batch.mechanisms.partition import NotPartitionable, Partition, parti
 from planar.batch.mechanisms.results import Each, PointMapping, Swept
 from planar.foundation.errors import BadInput, Outcome
 from planar.model.link_shapes import PointPlacementError
-from planar.model.mechanism import Mechanism, named_points, relative_motions
+from planar.model.mechanism import Mechanism, named_points, relative_motions, running_input_index
 from planar.model.pairs import MeasureKind as Measure
 from planar.model.pin_linkage import PinnedMechanism
+from planar.model.run_arguments import check_steps
 from planar.model.wording import count_phrase
-from planar.solving.cycle import MAX_STEPS
 
 Array = np.ndarray
 
@@ -68,7 +69,7 @@ class SweepRequest(NamedTuple):
     backend: str
 
 
-def sweep_each(
+def sweep_each(  # many: the public signature
     mechanisms: Iterable[Mechanism],
     steps: int = 200,
     points: Sequence[str] | str | None = None,
@@ -100,19 +101,19 @@ def sweep_each(
     Raises BadInput for a point that no mechanism has, an input that is not there, or steps that cannot be.
     """
     whole = list(mechanisms)
-    if isinstance(steps, bool) or not isinstance(steps, Integral) or not 1 <= steps <= MAX_STEPS:
-        raise BadInput("steps", f"a whole number of steps from 1 to {MAX_STEPS} is wanted, not {steps!r:.40}")
+    step_count = check_steps(steps)
     for k, mechanism in enumerate(whole):
         if not isinstance(mechanism, Mechanism):
             raise BadInput(f"mechanisms[{k}]", f"a mechanism is wanted, not {mechanism!r:.40}")
         if pair is not None or not isinstance(mechanism, PinnedMechanism) or mechanism.layout is None:
-            _running_input(mechanism, pair, f"mechanisms[{k}]")
+            running_input_index(mechanism, pair, f"mechanisms[{k}]")
     names = (points,) if isinstance(points, str) else None if points is None else tuple(dict.fromkeys(points))
     available_backends(backend)
-    wanted = SweepRequest(int(steps), names, rates, pair, backend)
-    parts = [whole[k : k + PART_SIZE] for k in range(0, len(whole), PART_SIZE)]
+    wanted = SweepRequest(step_count, names, rates, pair, backend)
+    parts = {k: whole[first : first + PART_SIZE] for k, first in enumerate(range(0, len(whole), PART_SIZE))}
+    solve_part = partial(solve_mechanisms, request=wanted)
     found: list[Swept] = []
-    for done in _solve_parts(parts, wanted, executor):
+    for done in in_order(run_tasks(executor, solve_part, parts, lambda k: solve_part(parts[k]))):
         found += done
         if progress is not None:
             progress(len(found), len(whole))
@@ -137,44 +138,6 @@ def _messages(found: Sequence[Swept]) -> tuple[str, ...]:
         f"{count_phrase(len(own), 'mechanism')}: {OUTCOMES[code].value}; {own[0].reason}" for code, own in ended.items()
     ]
     return tuple(told)
-
-
-def _solve_parts(
-    parts: Sequence[list[Mechanism]], request: SweepRequest, executor: Executor | None
-) -> Iterator[list[Swept]]:
-    """The parts as they are solved, in their order, here or by an executor."""
-    if executor is None:
-        for part in parts:
-            yield solve_mechanisms(part, request)
-        return
-    futures = []
-    for part in parts:
-        try:
-            futures.append(executor.submit(solve_mechanisms, part, request))
-        except Exception:  # whatever an executor raises, the part can be solved here
-            futures.append(None)
-    try:
-        for part, future in zip(parts, futures, strict=True):
-            problem = None if future is None else future.exception()
-            if isinstance(problem, BadInput):
-                raise problem
-            yield solve_mechanisms(part, request) if future is None or problem is not None else future.result()
-    finally:
-        for future in futures:
-            if future is not None:
-                future.cancel()
-
-
-def _running_input(mechanism: Mechanism, pair: str | None, place: str) -> int:
-    """The number of the input that runs. Raises BadInput."""
-    names = [given.pair for given in mechanism.inputs]
-    if not names:
-        raise BadInput(place, "the mechanism has no input that could run")
-    if pair is None and len(names) > 1:
-        raise BadInput(place, f"there are several inputs, {', '.join(names)}; name the one that runs")
-    if pair is not None and pair not in names:
-        raise BadInput(place, f"there is no input at {pair!r}; inputs are at {', '.join(names)}")
-    return names.index(pair) if pair is not None else 0
 
 
 class _LinkageGroup(NamedTuple):
@@ -265,7 +228,7 @@ def _partition_linkage(
 ) -> tuple[PartitionedLinkage, list[str], float] | None:
     """A mechanism parted into groups, with the names of its points and where it starts; None where it is for the
     general path."""
-    running = _running_input(mechanism, request.pair, "inputs")
+    running = running_input_index(mechanism, request.pair, "inputs")
     try:
         own = partition_mechanism(mechanism)
     except (NotPartitionable, BadInput, PointPlacementError):
@@ -414,7 +377,7 @@ def _run_attempt(
 
 def _solve_with_general_path(mechanism: Mechanism, request: SweepRequest) -> Swept:
     """One mechanism, solved as a cycle of its own."""
-    running = _running_input(mechanism, request.pair, "inputs")
+    running = running_input_index(mechanism, request.pair, "inputs")
     inputs = tuple(
         given._replace(law=None) if k == running else given._replace(velocity=0.0, acceleration=0.0, law=None)
         for k, given in enumerate(mechanism.inputs)

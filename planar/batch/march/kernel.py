@@ -32,10 +32,6 @@ from planar.foundation.geometry import GROUND, Frame, frame_at
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import MeasureKind
 
-LEAST_REGULARITY = 1e-2
-"""A group whose slope is less regular than this (of more than two unknowns, than its power of 1.5: it is a volume) is
-left to the general path."""
-
 Operand = tuple[str, int]
 """A number that the expressions take: which kind of it, and its index.
 

@@ -8,15 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.initial_assembly import CLEAR_REGULARITY
+from planar.batch.assembly_scores import is_at_sketch, is_clearly_regular, is_surely_farther
 from planar.batch.mechanisms.block_runner import BlockRunner
 from planar.batch.mechanisms.block_type import COS, POSE_ROWS, SIN, SKETCH_SUMS, X, Y
 from planar.batch.mechanisms.linkage_arrays import BlockBatch, LinkageArrays, PointArrays
 from planar.batch.mechanisms.solved_block_type import MAX_SIGNS, BlockType
 from planar.codegen.block_formula import KernelLayout
 from planar.foundation.geometry import GROUND, Frame
-from planar.solving.assembly.block_assemblies import CLEAR_SKETCH_DISTANCE
-from planar.solving.assembly.nearest_assembly import EQUAL_DISTANCE_TOLERANCE
 
 Array = np.ndarray
 
@@ -88,7 +86,7 @@ def find_start_assemblies(linkages: LinkageArrays, runner: BlockRunner) -> Start
         poses = found[every, best, :-3].reshape(groups, len(kind.inner_links), POSE_ROWS)
         state[inner] = poses[:, :, :, None]
     for owner, margin in margins:
-        sure[owner[~(margin > cost[owner] + 2.0 * EQUAL_DISTANCE_TOLERANCE)]] = False
+        sure[owner[~is_surely_farther(margin, cost[owner], roundings=2)]] = False
     return StartAssemblies(sure, signs, z)
 
 
@@ -122,15 +120,15 @@ def _correct_from_sketch(
 
     z = _unknowns_from_frames(kind, frames, rows, batch.p)
     told = runner.run_newton(kind, state, index, batch.p, z, False)
-    left, regular = told.residuals[:, 0], told.squared_regularity[:, 0]
+    left, regularity = told.residuals[:, 0], np.sqrt(np.maximum(told.squared_regularity[:, 0], 0.0))
     x, y, c, s = (state[index[:, batch.inner_slots], row, 0] for row in (X, Y, COS, SIN))
     many, px, py, tx, ty, along, across, squares = np.moveaxis(sketch, 2, 0)
     with np.errstate(invalid="ignore", over="ignore"):
         mixed = x * (c * px - s * py - tx) + y * (s * px + c * py - ty) - c * along - s * across
         distance = np.maximum(np.sum(many * (x * x + y * y) + 2.0 * mixed + squares, axis=1), 0.0)
         points = many.sum(axis=1)
-        good = known & (left <= START_TOLERANCE_FACTOR * tolerance[batch.owner]) & (regular > CLEAR_REGULARITY**2)
-        good &= (points > 0.0) & (distance <= points * CLEAR_SKETCH_DISTANCE**2)
+        good = known & (left <= START_TOLERANCE_FACTOR * tolerance[batch.owner]) & is_clearly_regular(regularity)
+        good &= (points > 0.0) & is_at_sketch(distance, points)
     return z, distance, good
 
 
