@@ -12,8 +12,8 @@ from planar.batch.dead_point_tracking import follow_to_dead_points
 from planar.batch.design_arrays import values_of_design, with_design_values
 from planar.batch.general_path import OUTCOMES, SolvedDesign, solve_design
 from planar.batch.initial_assembly import find_assemblies
-from planar.batch.march.backend import DesignBatch, DesignRunner, LastGoodUnknowns, UnsupportedStructure
-from planar.batch.march.choice import available_runners, find_assembly_corrector, find_last_good_unknowns
+from planar.batch.march.backend import DesignBatch, DesignRunner, UnsupportedStructure
+from planar.batch.march.choice import find_runner
 from planar.batch.march.numpy_backend import iterate_steps
 from planar.batch.reference_design import ReferenceDesign, reference_design, stack_rows
 from planar.codegen.aligned_arrays import allocate_aligned
@@ -139,14 +139,14 @@ class _DesignBlockSolver:
 
     def _run_with_backend(self) -> tuple[Array, Array] | None:
         """out (m, s), and how many of the first steps passed the gate; None where no backend can run the structure."""
-        block, base_ = self.block, self.reference
+        block, base_, runner = self.block, self.reference, find_runner(self.block.backend)
         shapes = base_.shapes(self.all_designs)
         p = base_.pair_numbers(shapes, self.design_count)
         told = {name: base_.point_member(name) for name in block.points}
         moving = {name: each for name, each in told.items() if each[0] != base_.mechanism.frame}
         q = [part for link, point in moving.values() for part in shapes[link].position(point)]
         tolerance = base_.tolerance(p)
-        start = find_assemblies(base_, shapes, p, self.u, tolerance, find_assembly_corrector(block.backend))
+        start = find_assemblies(base_, shapes, p, self.u, tolerance, runner)
         self.failed_block = start.failed_block
         fit = start.is_sure & ~base_.is_unfit(block.designs, shapes) & np.all(np.isfinite(p), axis=0)
         fit &= ~base_.has_short_arm(shapes, self.design_count)
@@ -170,14 +170,12 @@ class _DesignBlockSolver:
             base_.unit,
         )
         march, fit = self._lead_to_start(march, fit)
-        for name, run in available_runners(block.backend):
-            try:
-                out, good = self._run_fit_designs(run, march, fit)
-            except UnsupportedStructure:
-                continue
-            self._follow_to_dead_points(march, out, good, find_last_good_unknowns(name))
-            return self._with_frame_points(out, told, shapes), good
-        return None
+        try:
+            out, good = self._run_fit_designs(runner, march, fit)
+        except UnsupportedStructure:
+            return None
+        self._follow_to_dead_points(march, out, good, runner)
+        return self._with_frame_points(out, told, shapes), good
 
     def _output_array(self) -> Array:
         """Where the results stand."""
@@ -188,28 +186,26 @@ class _DesignBlockSolver:
             )
         return self.out
 
-    def _run_fit_designs(self, run: DesignRunner, march: DesignBatch, fit: Array) -> tuple[Array, Array]:
+    def _run_fit_designs(self, runner: DesignRunner, march: DesignBatch, fit: Array) -> tuple[Array, Array]:
         """out and good of all designs, of which only the fit ones are run."""
         out = self._output_array()
         if march.output_row_count != out.shape[1]:
             out = allocate_aligned(len(out), march.output_row_count, self.design_count)
         if fit.mean() > RUN_ALL_RATIO:
-            return out, np.where(fit, run(march, out), 0)
+            return out, np.where(fit, runner.run(march, out), 0)
         some, good = np.flatnonzero(fit), np.zeros(self.design_count, dtype=int)
         if some.size:
             own = allocate_aligned(len(out), march.output_row_count, some.size)
-            good[some] = run(march.select(some), own)
+            good[some] = runner.run(march.select(some), own)
             out[:, :, some] = own
         return out, good
 
-    def _follow_to_dead_points(
-        self, march: DesignBatch, out: Array, good: Array, reach: LastGoodUnknowns | None
-    ) -> None:
+    def _follow_to_dead_points(self, march: DesignBatch, out: Array, good: Array, runner: DesignRunner) -> None:
         """Follow those that a backend did not bring to the end, all at once, as far as they come."""
         some = np.flatnonzero((good > 0) & (good < len(march.input_offsets)))
         if not some.size:
             return
-        found = follow_to_dead_points(march.select(some), self.reference.running_index, good[some], reach)
+        found = follow_to_dead_points(march.select(some), self.reference.running_index, good[some], runner)
         out[found.step, :, some[found.design]] = found.out.T
         settled = some[found.is_settled]
         self.followed_positions = int(found.design.size)

@@ -6,18 +6,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.march.backend import DesignBatch, LastGoodUnknowns
+from planar.batch.march.backend import DesignBatch, DesignRunner
 from planar.batch.march.checks import DesignBranchCheck
 from planar.batch.march.design_functions import DesignFunctions
-from planar.batch.march.numpy_backend import DesignsAtStep, PointWriter, iterate_steps, make_residual_check
+from planar.batch.march.numpy_backend import DesignsAtStep, PointWriter, make_residual_check
 from planar.equations.linear import solve_vectors
+from planar.solving.checks.singular_values import SINGULAR_DISTANCE_RATIO
+from planar.solving.continuation.predictor_corrector import (
+    FIRST_STEP,
+    LONGEST_STEP,
+    MAX_TANGENT_TURN,
+)
 
 Array = np.ndarray
 
-FIRST_STEP, LONGEST_STEP, SHORTEST_STEP = 0.05, 0.25, 1e-6
-"""Steps of arc length (rad, sizes), as in `solving.walk`."""
-MAX_TANGENT_TURN, SINGULAR_DISTANCE_RATIO = 0.4, 1.5
-"""How far a tangent may turn in a step, and how far singular slopes must be: as in `solving.walk`."""
+SHORTEST_STEP = 1e-6
+"""Arc length (rad, sizes): a curve that asks for shorter steps is left to be followed by itself."""
 CROSSING_DISTANCE = 0.01
 """So near to where branches cross a design is left to be followed by itself."""
 DIFFERENCE_STEP = 1e-6
@@ -26,7 +30,6 @@ MAX_ARCS = 120
 DEAD_POINT_MARGIN = 1e-8
 """Parts of the run: so near to a dead point a step is left to be judged by itself."""
 MAX_HALVINGS = 60
-START_GROUPS = 6
 
 
 class FollowedDesigns(NamedTuple):
@@ -73,7 +76,7 @@ class _CurveArcs(NamedTuple):
 
 
 class _DesignCurves:
-    """The curves of some designs; `Curve` in `solving` is that of one."""
+    """The curves of some designs; `SolutionCurve` in `solving` is that of one."""
 
     def __init__(self, march: DesignBatch, design: Array, direction: Array):
         self.functions = DesignFunctions(march.program, march.p[:, design])
@@ -128,17 +131,14 @@ def _solve_bordered(jacobians: Array, normal: Array, right: Array, last: float) 
     return solve_vectors(whole, right, least_determinant=1e-12)
 
 
-def follow_to_dead_points(
-    batch: DesignBatch, index: int, good_steps: Array, last_unknowns: LastGoodUnknowns | None
-) -> FollowedDesigns:
-    """Go on from the last of the `good` steps of each design, which are one at least; `reach` tells where that was.
+def follow_to_dead_points(batch: DesignBatch, index: int, good_steps: Array, runner: DesignRunner) -> FollowedDesigns:
+    """Go on from the last of the good steps of each design, one at least, to which `runner` has brought them.
 
-    Each step is under the conditions of `solving.walk`; a design that does not keep them is not settled. `index` is the
-    input that runs.
+    Each step is under the conditions of `solving.continuation.predictor_corrector`; a design that does not keep them is
+    not settled. `index` is the input that runs.
     """
     with np.errstate(all="ignore"):  # what leads astray ends as what is no number
-        stopping = _DeadPointTracker(batch, index, good_steps)
-        return stopping.follow(last_unknowns(batch, good_steps).T if last_unknowns else stopping.last_good_unknowns())
+        return _DeadPointTracker(batch, index, good_steps).follow(runner.last_good_unknowns(batch, good_steps).T)
 
 
 class _DeadPointTracker:
@@ -156,23 +156,11 @@ class _DeadPointTracker:
         "the place of the dead point"
 
     def follow(self, z: Array) -> FollowedDesigns:
-        """See `stopped`; z (designs, unknowns) at the last good steps."""
+        """See `follow_to_dead_points`; z (designs, unknowns) at the last good steps."""
         self._track(z)
         if self.dead_point_arcs:
             self._find_dead_points()
         return self._result()
-
-    def last_good_unknowns(self) -> Array:
-        """The unknowns at the last good step of each design (designs, unknowns)."""
-        found = np.full((self.design_count, self.batch.z0.shape[0]), np.nan)
-        # those that come about as far are led together
-        for some in np.array_split(np.argsort(self.good_steps), min(START_GROUPS, self.design_count)):
-            part, good = self.batch.select(some), self.good_steps[some]
-            inputs = (part.u0 + each[:, None] for each in part.input_offsets[: int(good.max())])
-            for k, row in enumerate(iterate_steps(part, inputs)):
-                last = (good == k + 1) & row.passed
-                found[some[last]] = row.z[last]
-        return found
 
     def _track(self, z: Array) -> None:
         active = np.flatnonzero(np.all(np.isfinite(z), axis=1))

@@ -7,31 +7,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.march.backend import AssemblyCorrector
-from planar.batch.march.checks import column_volume
-from planar.batch.nearest_assemblies import CLEAR_REGULARITY, MAX_BLOCK_UNKNOWNS, NEAR_SKETCH, find_nearest_assemblies
+from planar.batch.assembly_scores import MAX_BLOCK_UNKNOWNS, NEAR_SKETCH, is_at_sketch, is_clearly_regular
+from planar.batch.block_corrector import SPREAD_STARTS, BlockCorrector
+from planar.batch.march.backend import DesignRunner
+from planar.batch.nearest_assemblies import find_nearest_assemblies
 from planar.batch.reference_design import ReferenceDesign, shape_of_designs
 from planar.equations.constraint_equations import Block, slice_length
 from planar.equations.coordinates import frames_from_coordinates
-from planar.equations.linear import solve_vectors
 from planar.foundation.geometry import Vector
 from planar.model.link_shapes import LinkShape
-from planar.model.pairs import MeasureKind
-from planar.solving.assembly.block_assemblies import CLEAR_SKETCH_DISTANCE, SAME_ASSEMBLY_TOLERANCE
+from planar.solving.assembly.block_assemblies import CLEAR_SKETCH_DISTANCE
 from planar.solving.assembly.nearest_assembly import EQUAL_DISTANCE_TOLERANCE
-from planar.solving.newton import CLOSED_TOLERANCE, damped_newton
+from planar.solving.newton import damped_newton
 
 Array = np.ndarray
 
 NEWTON_STEPS, SPREAD_NEWTON_STEPS = 8, 40
 """Newton's steps from the assemblies of the base, and from starts all over the circles."""
-LONGEST_NEWTON_STEP = 0.8
-"""rad or sizes: no step of Newton's method is longer."""
-NEARLY_CLOSED_TOLERANCE = 1e-5
-"""Lengths of the size, or rad: a group that is open by less is closed by the step from there."""
-COMPACTION_INTERVAL = 4
-"""Steps after which those that have closed are left out."""
-SPREAD_STARTS = 24
 DAMPED_STARTS = 6
 """Starts of the damped method, by which a design is refused."""
 REFUSAL_TOLERANCE = 1e-6
@@ -73,12 +65,12 @@ def find_assemblies(
     p: Array,
     u: Array,
     tolerance: float,
-    corrector: AssemblyCorrector | None,
+    runner: DesignRunner,
 ) -> DesignAssemblies:
     """The assemblies at inputs u (inputs, designs), of designs with numbers p (numbers, designs) and these shapes."""
     with np.errstate(all="ignore"):  # starts that lead nowhere end as what is no number
-        near = corrector and find_nearest_assemblies(reference, shapes, p, u, tolerance, corrector)
-        if not near:
+        near = find_nearest_assemblies(reference, shapes, p, u, tolerance, runner)
+        if near is None:
             return _AssemblySearch(reference, shapes, p, u).search()
         every, rest = (
             DesignAssemblies(near.z, near.is_clear, np.full(len(near.is_clear), -1)),
@@ -108,16 +100,15 @@ class _AssemblySearch:
         self.failed_block = np.full(self.design_count, -1)
         self.dropped_distance = np.full(self.design_count, np.inf)
         "the nearest partial assembly that was not carried on"
-        self.regularity = np.zeros(0)
-        "how regular the slopes of the last Newton's method were where it ended, see `volume`"
+        self.corrector = BlockCorrector(self.functions, p, u, self.candidates.counts_turns)
 
     def search(self) -> DesignAssemblies:
-        """See `assembled`."""
+        """See `find_assemblies`."""
         here, hasty = self._join_blocks(True)
         found = self._choose(here)
         # a group that lies where it is meant may leave the later ones no place near the sketch
         cost = np.where(here.exists, here.distance, np.inf).min(axis=1)
-        again = np.flatnonzero(hasty & (cost > self._sketched_point_count() * CLEAR_SKETCH_DISTANCE**2))
+        again = np.flatnonzero(hasty & ~is_at_sketch(cost, self._sketched_point_count()))
         if again.size:
             own = {name: shape_of_designs(shape, again) for name, shape in self.shapes.items()}
             slow = _AssemblySearch(self.reference, own, self.p[:, again], self.u[:, again])
@@ -137,9 +128,9 @@ class _AssemblySearch:
                 on, rest = self._extend_clearly(stage, here, roots) if quick else (here, np.arange(self.design_count))
                 hasty[np.setdiff1d(np.arange(self.design_count), rest)] = True
                 if rest.size:
-                    part = self._select(rest)
-                    on = self._merge_extensions(here, on, rest, part._extend(stage, here.select(rest), roots, most))
-                    self.is_sure[rest] &= part.is_sure
+                    others, sure = self._extend(self.corrector.select(rest), stage, here.select(rest), roots, most)
+                    on = self._merge_extensions(here, on, rest, others)
+                    self.is_sure[rest] &= sure
                     none = np.flatnonzero(here.exists.any(axis=1) & ~on.exists.any(axis=1))
                     if none.size:
                         self._refuse_designs(stage, none, here, roots)
@@ -160,7 +151,9 @@ class _AssemblySearch:
         if unknowns > 2:
             return
         ways = [(design, way) for design in designs for way in np.flatnonzero(here.exists[design])]
-        starts = np.repeat(self._spread_starts(stage, roots)[:: SPREAD_STARTS // DAMPED_STARTS], len(ways), axis=0)
+        starts = np.repeat(
+            self.corrector.spread_starts(stage, roots)[:: SPREAD_STARTS // DAMPED_STARTS], len(ways), axis=0
+        )
         each = np.tile(np.arange(len(ways)), len(starts) // len(ways))
         design, way = np.array(ways).T
         whole = here.z[:, design, way]
@@ -191,10 +184,10 @@ class _AssemblySearch:
         # of a group of two both assemblies may be near the sketch, where its links are short
         if not sketched or here.exists.shape[1] > 1 or slice_length(stage.unknowns) <= 2:
             return here, every
-        z, closed = self._correct(stage, here, roots[:1], NEWTON_STEPS)
+        z, closed, regularity = self.corrector.correct(stage, here.z, here.exists, roots[:1], NEWTON_STEPS)
         on = self._score(stage, here._replace(z=z[:, :, :, 0], exists=closed[:, :, 0]))
-        near = on.distance - here.distance <= sketched * CLEAR_SKETCH_DISTANCE**2
-        clear = on.exists[:, 0] & near[:, 0] & (self.regularity > CLEAR_REGULARITY)
+        near = is_at_sketch(on.distance - here.distance, sketched)
+        clear = on.exists[:, 0] & near[:, 0] & is_clearly_regular(regularity[:, 0, 0])
         return on, every[~clear]
 
     def _merge_extensions(
@@ -214,119 +207,40 @@ class _AssemblySearch:
         lying = tuple(widened(*both) for both in zip(here.tie_keys, others.tie_keys, strict=True))
         return _PartialAssemblies(widened(clear.z, others.z), there, widened(here.distance, others.distance), lying)
 
-    def _extend(self, stage: Block, here: _PartialAssemblies, roots: Array, most: int) -> _PartialAssemblies:
-        """Every partial assembly with the ways in which a group may be added to it."""
-        found, there = self._correct(stage, here, roots, NEWTON_STEPS)
-        there &= self._is_distinct(stage, found, there)
+    def _extend(
+        self, corrector: BlockCorrector, stage: Block, here: _PartialAssemblies, roots: Array, most: int
+    ) -> tuple[_PartialAssemblies, Array]:
+        """Every partial assembly with the ways in which a group may be added, and for which designs these are sure."""
+        sure = np.ones(len(here.exists), dtype=bool)
+        found, there, _ = corrector.correct(stage, here.z, here.exists, roots, NEWTON_STEPS)
+        there &= corrector.is_distinct(stage, found, there)
         few = here.exists & (there.sum(axis=2) < most)
         if few.any():
             # where some starts led astray or to one end, others are tried as well
             designs, ways = np.nonzero(few)
-            some = _PartialAssemblies(
-                here.z[:, designs, ways][:, :, None], here.exists[designs, ways][:, None], here.distance
+            part = corrector.select(designs)
+            more, closed, _ = part.correct(
+                stage,
+                here.z[:, designs, ways][:, :, None],
+                here.exists[designs, ways][:, None],
+                part.spread_starts(stage, roots),
+                SPREAD_NEWTON_STEPS,
             )
-            part = self._select(designs)
-            more, closed = part._correct(stage, some, self._spread_starts(stage, roots), SPREAD_NEWTON_STEPS)
             old = found[:, designs, ways][:, :, None], there[designs, ways][:, None]
             more, closed = np.concatenate([old[0], more], axis=3), np.concatenate([old[1], closed], axis=2)
-            closed &= part._is_distinct(stage, more, closed)
+            closed &= part.is_distinct(stage, more, closed)
             order = np.argsort(~closed[:, 0], axis=1, kind="stable")[:, : len(roots)]
             kept = np.take_along_axis(closed[:, 0], order, axis=1)
             # more than the base has, or some but fewer: the search one by one may see it otherwise
             count = closed[:, 0].sum(axis=1)
-            self.is_sure[designs[(count > 0) & (count != most)]] = False
+            sure[designs[(count > 0) & (count != most)]] = False
             found[:, designs, ways] = np.take_along_axis(more[:, :, 0], order[None], axis=2)
             there[designs, ways] = kept
         width = there.shape[1] * there.shape[2]
         spread = np.repeat(here.distance, there.shape[2], axis=1)
         lying = tuple(np.repeat(each, there.shape[2], axis=1) for each in here.tie_keys)
-        return _PartialAssemblies(
-            found.reshape(-1, self.design_count, width), there.reshape(self.design_count, width), spread, lying
-        )
-
-    def _select(self, designs: Array) -> _AssemblySearch:
-        """The same for some of the designs, which may stand there twice."""
-        part = object.__new__(_AssemblySearch)
-        part.__dict__ |= self.__dict__
-        part.p, part.u, part.design_count = self.p[:, designs], self.u[:, designs], len(designs)
-        part.is_sure = np.ones(len(designs), dtype=bool)
-        return part
-
-    def _correct(self, stage: Block, here: _PartialAssemblies, starts: Array, steps: int) -> tuple[Array, Array]:
-        """Newton's method from every partial assembly and start: z (unknowns, designs, ways, starts), which close."""
-        count = len(starts)
-        shape = (*here.exists.shape, count)
-        z = np.repeat(here.z[..., None], count, axis=3)
-        z[stage.unknowns] = starts.T[:, None, None, :]
-        each = np.broadcast_to(np.arange(self.design_count)[:, None, None], shape).ravel()
-        flat = z.reshape(len(z), -1)
-        closed = np.zeros(flat.shape[1], dtype=bool)
-        busy = np.flatnonzero(np.repeat(here.exists[..., None], count, axis=2).ravel())
-        at, *given = self._open_columns(flat, busy, each)
-        closing = self.functions.block_call(stage)
-        self.regularity = np.zeros(flat.shape[1])
-        for step in range(steps + 1):
-            left, slope = closing.evaluate_batch(len(at), at, *given)
-            left, slope = left[:, 0], slope.transpose(0, 2, 1)
-            # the error of the next step is the square of this one, which the march looks at again
-            done = np.max(np.abs(left), axis=1, initial=0.0) <= NEARLY_CLOSED_TOLERANCE
-            self.regularity[busy] = column_volume(slope)
-            move = solve_vectors(slope, left, least_squares=True)
-            far = np.maximum(np.max(np.abs(move), axis=1), LONGEST_NEWTON_STEP)[:, None] / LONGEST_NEWTON_STEP
-            at[:, stage.unknowns] -= move / far
-            if step == steps or np.all(done):
-                flat[:, busy[done]] = at[done].T
-                closed[busy[done]] = True
-                break
-            if step % COMPACTION_INTERVAL == COMPACTION_INTERVAL - 1:
-                flat[:, busy] = at.T
-                closed[busy] = done
-                busy = busy[~done & np.all(np.isfinite(at), axis=1)]
-                if not busy.size:
-                    break
-                at, *given = self._open_columns(flat, busy, each)
-        if self.candidates.counts_turns:
-            flat = self._wind_back(stage, flat, closed, each)
-        return flat.reshape(z.shape), closed.reshape(shape)
-
-    def _open_columns(self, flat: Array, busy: Array, each: Array) -> tuple[Array, Array, Array]:
-        """Columns of z (columns, unknowns) that are not closed yet, with their inputs and numbers."""
-        return np.ascontiguousarray(flat[:, busy].T), self.u.T[each[busy]], self.p.T[each[busy]]
-
-    def _wind_back(self, stage: Block, z: Array, closed: Array, each: Array) -> Array:
-        """The same assemblies with angles at the turn nearest to none where that is closed too, as in `Candidates`."""
-        least = z.copy()
-        own, angles = least[stage.unknowns], self._is_angle(stage)
-        own[angles] = np.arctan2(np.sin(own[angles]), np.cos(own[angles]))
-        left = self.functions.block_function(stage)(least, self.u[:, each], self.p[:, each])[0].full()
-        still = closed & (np.max(np.abs(left), axis=0, initial=0.0) <= 10.0 * CLOSED_TOLERANCE)
-        return np.where(still, least, z)
-
-    def _is_angle(self, stage: Block) -> Array:
-        columns = self.equations.unknowns[stage.unknowns]
-        return np.array([self.equations.coordinates[c].kind is not MeasureKind.LENGTH for c in columns], dtype=bool)
-
-    def _spread_starts(self, stage: Block, roots: Array) -> Array:
-        """Starts with angles spread over the circles, and lengths as the base has them."""
-        angles = self._is_angle(stage)
-        grid = (
-            np.arange(SPREAD_STARTS)[:, None] * np.sqrt([2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0])[: roots.shape[1]] % 1.0
-        )
-        grid = np.pad(grid, ((0, 0), (0, roots.shape[1] - grid.shape[1])), mode="reflect")
-        like = roots[np.arange(SPREAD_STARTS) % len(roots)]
-        return np.where(angles, 2.0 * np.pi * grid - np.pi, like)
-
-    def _is_distinct(self, stage: Block, z: Array, there: Array) -> Array:
-        """Which of the ways from one partial assembly are not the same as one before (designs, ways, starts)."""
-        own, angles = z[stage.unknowns], self._is_angle(stage)
-        found = there.copy()
-        for k in range(1, there.shape[2]):
-            for other in range(k):
-                gap = np.abs(own[..., k] - own[..., other])
-                if not self.candidates.counts_turns:
-                    gap[angles] = np.abs(2.0 * np.sin(0.5 * gap[angles]))
-                found[..., k] &= ~(found[..., other] & np.all(gap < SAME_ASSEMBLY_TOLERANCE, axis=0))
-        return found
+        z, exists = found.reshape(len(found), len(sure), width), there.reshape(len(sure), width)
+        return _PartialAssemblies(z, exists, spread, lying), sure
 
     def _score(self, stage: Block, here: _PartialAssemblies) -> _PartialAssemblies:
         """The partial assemblies with what a group adds to how they are told apart."""
@@ -401,10 +315,10 @@ class _AssemblySearch:
             self.is_sure[tied[left.sum(axis=1) > 1]] = False
         z = np.take_along_axis(here.z, best[None, :, None], axis=2)[..., 0]
         shown = self._sketched_point_count()
-        clear = (least <= shown * CLEAR_SKETCH_DISTANCE**2) & (shown > 0) & ~np.isin(np.arange(self.design_count), tied)
+        clear = is_at_sketch(least, shown) & (shown > 0) & ~np.isin(np.arange(self.design_count), tied)
         sure = (self.is_sure | clear) & np.isfinite(least) & (least < self.dropped_distance - EQUAL_DISTANCE_TOLERANCE)
         largest = max((slice_length(stage.unknowns) for stage in self.equations.blocks), default=0)
         if largest > 2:
             # it may have assemblies that no start has led to: none of these is nearer than what is near
-            sure &= least <= shown * (NEAR_SKETCH if largest <= MAX_BLOCK_UNKNOWNS else CLEAR_SKETCH_DISTANCE) ** 2
+            sure &= is_at_sketch(least, shown, NEAR_SKETCH if largest <= MAX_BLOCK_UNKNOWNS else CLEAR_SKETCH_DISTANCE)
         return DesignAssemblies(z, sure, self.failed_block)

@@ -7,25 +7,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.march.backend import AssemblyCorrector, CorrectedAssemblies, DesignBatch, UnsupportedStructure
+from planar.batch.assembly_scores import (
+    MAX_BLOCK_UNKNOWNS,
+    NEAR_SKETCH,
+    is_at_sketch,
+    is_clearly_regular,
+    is_surely_farther,
+)
+from planar.batch.march.backend import CorrectedAssemblies, DesignBatch, DesignRunner, UnsupportedStructure
 from planar.batch.reference_design import ReferenceDesign, stack_rows
 from planar.equations.constraint_equations import Block, slice_length
 from planar.model.link_shapes import LinkShape
-from planar.solving.assembly.block_assemblies import CLEAR_SKETCH_DISTANCE, SAME_ASSEMBLY_TOLERANCE, BlockAssemblies
-from planar.solving.assembly.nearest_assembly import EQUAL_DISTANCE_TOLERANCE
+from planar.solving.assembly.block_assemblies import SAME_ASSEMBLY_TOLERANCE, BlockAssemblies
 
 Array = np.ndarray
 
 CORRECTIONS = 6
 """Newton's steps from the assembly of the base."""
-CLEAR_REGULARITY = 0.2
-"""The volume that the columns of a slope span, each of length one, from which on no other assembly is near."""
-NEAR_SKETCH = 0.15
-"""Lengths of the size, on average, from the sketch: a large group that lies farther off may have another assembly that
-is
-nearer, of which no start tells."""
-MAX_BLOCK_UNKNOWNS = 4
-"""Unknowns of the largest group whose regularity a backend tells as that volume."""
 
 
 class NearestAssemblies(NamedTuple):
@@ -41,9 +39,10 @@ def find_nearest_assemblies(
     p: Array,
     u: Array,
     tolerance: float,
-    corrector: AssemblyCorrector,
+    runner: DesignRunner,
 ) -> NearestAssemblies | None:
-    """The assemblies at inputs u (inputs, designs); None where the sketch does not show every group, or `close` cannot.
+    """The assemblies at inputs u (inputs, designs); None where the sketch does not show every group, or no
+    runner can correct them.
 
     Costs never fall: where the nearest assembly is taken of every group, and each group's next one alone would cost
     more than all these, there is no nearer one of the whole. A group in closed form has two assemblies; any other as
@@ -58,7 +57,7 @@ def find_nearest_assemblies(
     ):
         return None
     try:
-        return _NearestAssemblySearch(reference, shapes, p, u, tolerance, corrector, candidates, stages).search()
+        return _NearestAssemblySearch(reference, shapes, p, u, tolerance, runner, candidates, stages).search()
     except UnsupportedStructure:
         return None
 
@@ -71,11 +70,11 @@ class _NearestAssemblySearch:
         p: Array,
         u: Array,
         tolerance: float,
-        close: AssemblyCorrector,
+        runner: DesignRunner,
         candidates: BlockAssemblies,
         stages: list[Block],
     ):
-        self.design_count, self.corrector, self.blocks = p.shape[1], close, stages
+        self.design_count, self.runner, self.blocks = p.shape[1], runner, stages
         at = candidates.sketched_by_level
         self.roots = {
             stage.block_index: each
@@ -109,22 +108,20 @@ class _NearestAssemblySearch:
 
     def search(self) -> NearestAssemblies:
         """See `nearby`."""
-        found = self.corrector(self.batch, self.point_blocks, CORRECTIONS)
+        found = self.runner.correct_assemblies(self.batch, self.point_blocks, CORRECTIONS)
         costs, others = (np.square(places - self.sketch).sum(axis=1) for places in (found.points, found.other_points))
         clear, total, before = found.converged.copy(), costs.sum(axis=0), np.zeros(self.design_count)
         for stage in self.blocks:
             own = np.array(self.point_blocks) == stage.block_index
             cost, other = costs[own].sum(axis=0), others[own].sum(axis=0)
             if np.all(np.isinf(other)):
-                clear &= (cost <= np.count_nonzero(own) * NEAR_SKETCH**2) & (found.regularity > CLEAR_REGULARITY)
-                near = cost <= np.count_nonzero(own) * CLEAR_SKETCH_DISTANCE**2
+                clear &= is_at_sketch(cost, np.count_nonzero(own), NEAR_SKETCH) & is_clearly_regular(found.regularity)
+                near = is_at_sketch(cost, np.count_nonzero(own))
                 clear &= (
-                    near
-                    if near.all()
-                    else near | (before + self._next_cost(stage, found, own) > total + EQUAL_DISTANCE_TOLERANCE)
+                    near if near.all() else near | is_surely_farther(before + self._next_cost(stage, found, own), total)
                 )
             else:
-                clear &= before + other > total + EQUAL_DISTANCE_TOLERANCE
+                clear &= is_surely_farther(before + other, total)
             before += cost
         return NearestAssemblies(found.z, clear)
 
@@ -135,7 +132,7 @@ class _NearestAssemblySearch:
         count = np.ones(self.design_count, dtype=int)
         for root in roots[1:]:
             self.batch.z0[stage.unknowns] = root[:, None]
-            other = self.corrector(self.batch, self.point_blocks, CORRECTIONS)
+            other = self.runner.correct_assemblies(self.batch, self.point_blocks, CORRECTIONS)
             z = other.z[stage.unknowns]
             apart = [
                 ~(np.max(np.abs(np.exp(1j * z) - np.exp(1j * each)), axis=0) <= SAME_ASSEMBLY_TOLERANCE)

@@ -10,7 +10,8 @@ import numpy as np
 
 from planar.batch.design_arrays import read_designs, with_design_values
 from planar.batch.initial_assembly import find_assemblies
-from planar.batch.march.choice import find_assembly_corrector
+from planar.batch.march.choice import find_runner
+from planar.batch.march.prediction import LONGEST_STEP
 from planar.batch.reference_design import reference_design
 from planar.batch.sweep import check_range, sweep
 from planar.foundation.errors import BadInput
@@ -98,7 +99,7 @@ class PreparedSweep:
             return None
         try:
             from planar.batch.march.llvm_positions import PositionsKernel
-            from planar.batch.march.llvm_runner import LONGEST_STEP, kernel_equations
+            from planar.batch.march.llvm_runner import kernel_equations
             from planar.codegen.instructions import UnsupportedOperation
             from planar.equations.mechanism_numbers import equation_structure
         except ImportError:
@@ -153,7 +154,7 @@ class PreparedSweep:
             or (arrays and base_.is_unfit(arrays, shapes).any())
         ):
             return False
-        start = find_assemblies(base_, shapes, p, u, self.tolerance, find_assembly_corrector("native"))
+        start = find_assemblies(base_, shapes, p, u, self.tolerance, find_runner("native"))
         if not start.is_sure[0]:
             return False
         q = [

@@ -26,7 +26,7 @@ from planar.model.mechanism import (
 from planar.model.pairs import MeasureKind
 from planar.model.pairs.base import Pair
 from planar.solving.assembly.block_assemblies import BlockAssemblies
-from planar.solving.checks.residual_check import EPS, SHORT_ARM
+from planar.solving.checks.residual_check import SHORT_ARM, residual_tolerance
 from planar.solving.position import PositionSolver
 
 Array = np.ndarray
@@ -102,11 +102,11 @@ class ReferenceDesign:
         return stack_rows(rows, many)
 
     def tolerance(self, p: Array) -> float:
-        """What the gate lets pass for these designs: as `Gate.tolerance`, with the greatest length of any of them."""
+        """What the gate lets pass for these designs: as `ResidualCheck.tolerance`, of the longest of any."""
         kinds = [kind for pair in self.mechanism.pairs for kind in pair.number_kinds]
         lengths = np.array([kind is MeasureKind.LENGTH for kind in kinds], dtype=bool)
         reach = float(np.nanmax(np.abs(p[lengths]), initial=0.0))
-        return 16.0 * EPS * (4 + len(self.mechanism.links)) * max(1.0, reach)
+        return float(residual_tolerance(len(self.mechanism.links), reach))
 
     def inputs(self, designs: Mechanism, many: int) -> tuple[Array, Array, Array]:
         """Positions and rates of all inputs, each (inputs, designs), lengths in units of the size."""

@@ -2,36 +2,32 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import replace
 from math import ceil
-from numbers import Integral, Real
+from numbers import Integral
 from pathlib import Path
 from typing import Any
 
-from planar.batch.block import DesignBlock, SolvedDesigns, solve_design_block
+from planar.batch.block import DesignBlock, solve_design_block
 from planar.batch.design_arrays import read_designs, split_into_blocks
-from planar.batch.march.choice import available_runners
+from planar.batch.executor import TASKS_PER_WORKER, run_tasks, worker_count
+from planar.batch.march.choice import available_backends
 from planar.batch.reference_design import reference_design
 from planar.batch.results import Sweep
 from planar.batch.stores.store import SweepPlan, open_store
 from planar.foundation.errors import BadInput
 from planar.model.mechanism import LARGEST_INPUT_POSITION, Mechanism
-from planar.solving.cycle import MAX_STEPS
+from planar.model.run_arguments import check_number, check_steps
 
 MAX_BLOCK_BYTES = 128 * 2**20
 """Bytes of a block's results."""
 BLOCK_MULTIPLE = 16
 """Blocks are multiples of so many designs, where there are enough."""
-MAX_EXECUTOR_TRIES = 2
-"""How often a block is given to an executor before it is solved here."""
-BLOCKS_PER_WORKER = 2
-"""Blocks in the hands of an executor for each of its workers."""
 
 
-def sweep(
+def sweep(  # many: the public signature; long: its docstring
     mechanism: Mechanism,
     designs: Mapping[str, Any],
     steps: int = 200,
@@ -77,7 +73,7 @@ def sweep(
     mechanism = check_range(mechanism, steps, start, stop, pair)
     common = reference_design(mechanism, pair)
     names = common.select_points(points)
-    available_runners(backend)
+    available_backends(backend)
     many = len(next(iter(values.values())))
     size = int(block) if block is not None else _block_size(many, steps, len(names), rates, executor)
     whole = DesignBlock(mechanism, values, int(steps), names, rates, start, stop, pair, backend)
@@ -92,8 +88,9 @@ def sweep(
     if progress is not None and ready:
         progress(ready, many)
     todo = {k: part for k, part in parts.items() if k not in into.finished}
-    for k, done in _solve_blocks(
-        {k: task(part) for k, part in todo.items()}, executor, lambda k: into.output_array(parts[k])
+    tasks = {k: task(part) for k, part in todo.items()}
+    for k, done in run_tasks(
+        executor, solve_design_block, tasks, lambda k: solve_design_block(tasks[k], into.output_array(parts[k]))
     ):
         into.write_block(k, parts[k], done)
         ready += parts[k].stop - parts[k].start
@@ -104,12 +101,9 @@ def sweep(
 
 def check_range(mechanism: Mechanism, steps: object, start: object, stop: object, pair: str | None) -> Mechanism:
     """The mechanism with inputs that run over a range at their own rates, whatever their laws. Raises BadInput."""
-    if isinstance(steps, bool) or not isinstance(steps, Integral) or not 1 <= steps <= MAX_STEPS:
-        raise BadInput("steps", f"a whole number of steps from 1 to {MAX_STEPS} is wanted, not {steps!r:.40}")
-    for name, value in (("start", start), ("stop", stop)):
-        wrong = isinstance(value, bool) or not isinstance(value, Real) or not abs(value) <= LARGEST_INPUT_POSITION
-        if value is not None and wrong:
-            raise BadInput(name, f"a number up to {LARGEST_INPUT_POSITION:g} (rad or m) is wanted, not {value!r:.40}")
+    check_steps(steps)
+    check_number("start", start, LARGEST_INPUT_POSITION)
+    check_number("stop", stop, LARGEST_INPUT_POSITION)
     lawful = [given.pair for given in mechanism.inputs if given.law is not None]
     if lawful and start is None and stop is None and pair is None:
         told = f"the input at {lawful[0]!r} has a law of time, which a sweep does not run; give it a start and a stop"
@@ -122,52 +116,5 @@ def _block_size(many: int, steps: int, points: int, rates: bool, executor: Execu
     each = (steps + 1) * 2 * max(points, 1) * (3 if rates else 1) * 8
     size = max(1, MAX_BLOCK_BYTES // each)
     if executor is not None:
-        size = min(size, ceil(many / (BLOCKS_PER_WORKER * _worker_count(executor))))
+        size = min(size, ceil(many / (TASKS_PER_WORKER * worker_count(executor))))
     return min(many, ceil(size / BLOCK_MULTIPLE) * BLOCK_MULTIPLE)
-
-
-def _worker_count(executor: Executor) -> int:
-    return max(1, getattr(executor, "_max_workers", None) or os.cpu_count() or 1)
-
-
-def _solve_blocks(
-    tasks: Mapping[int, DesignBlock], executor: Executor | None, output_array: Callable[[int], Any]
-) -> Iterator[tuple[int, SolvedDesigns]]:
-    """The blocks as they are solved, here, each in its room, or by an executor; each by its number."""
-    if executor is None:
-        for k, task in tasks.items():
-            yield k, solve_design_block(task, output_array(k))
-        return
-    waiting, tries = list(tasks)[::-1], dict.fromkeys(tasks, 0)
-    running: dict[Future, int] = {}
-    most = BLOCKS_PER_WORKER * _worker_count(executor)
-    try:
-        while waiting or running:
-            while waiting and len(running) < most:
-                k = waiting.pop()
-                future = _submit(executor, tasks[k]) if tries[k] < MAX_EXECUTOR_TRIES else None
-                tries[k] += 1
-                if future is None:
-                    yield k, solve_design_block(tasks[k])
-                else:
-                    running[future] = k
-            for future in wait(running, return_when=FIRST_COMPLETED).done if running else ():
-                k = running.pop(future)
-                problem = future.exception() if not future.cancelled() else None
-                if isinstance(problem, BadInput):
-                    raise problem
-                if future.cancelled() or problem is not None:
-                    waiting.append(k)
-                else:
-                    yield k, future.result()
-    finally:
-        for future in running:
-            future.cancel()
-
-
-def _submit(executor: Executor, task: DesignBlock) -> Future | None:
-    """The block in the executor's hands; None where it takes no more, as when its workers have been killed."""
-    try:
-        return executor.submit(solve_design_block, task)
-    except Exception:  # whatever an executor raises, the block can be solved here
-        return None

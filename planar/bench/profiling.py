@@ -12,8 +12,8 @@ FunctionKey = tuple[str, ...]
 
 SWEEP_PARTS: dict[FunctionKey, str] = {
     ("batch", "initial_assembly.py", "find_assemblies"): "assembling the starts",
-    ("march", "llvm_backend.py", "run_designs"): "machine code",
-    ("march", "numpy_backend.py", "run_designs"): "casadi's program",
+    ("march", "llvm_backend.py", "run"): "machine code",
+    ("march", "numpy_backend.py", "run"): "casadi's program",
     ("batch", "block.py", "_lead_to_start"): "leading designs to where the run starts",
     ("batch", "dead_point_tracking.py", "follow_to_dead_points"): "following designs to where they stop",
     ("batch", "general_path.py", "solve_design"): "the general path",

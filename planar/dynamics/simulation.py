@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from numbers import Integral, Real
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.foundation.geometry import Frame, frame_at
 from planar.foundation.jets import Jet
 from planar.model.mechanism import Input, Mechanism
+from planar.model.run_arguments import check_steps
 from planar.model.wording import join_all_names
 from planar.results.motion import Motion, State
 from planar.results.records import InputMotion
@@ -27,7 +28,7 @@ Array = np.ndarray
 
 RELATIVE_TOLERANCE = 1e-12
 """What a step may be off, of sizes and turns and of the rates that are reached."""
-MAX_DURATION, MAX_STEPS = 1e4, 10**5
+MAX_DURATION = 1e4
 CONSTANT_ENERGY_TOLERANCE = 1e-12
 """Energies that change by less than this part of the greatest do not change."""
 SHORTEST_STEP_RATIO, MAX_SHORT_STEPS = 1e-10, 20
@@ -92,8 +93,7 @@ def simulate(
     """
     if isinstance(duration, bool) or not isinstance(duration, Real) or not 0.0 < duration <= MAX_DURATION:
         raise BadInput("duration", f"a time above zero up to {MAX_DURATION:g} s is wanted, not {duration!r:.40}")
-    if isinstance(steps, bool) or not isinstance(steps, Integral) or not 1 <= steps <= MAX_STEPS:
-        raise BadInput("steps", f"a whole number of steps from 1 to {MAX_STEPS} is wanted, not {steps!r:.40}")
+    check_steps(steps)
     names = [given.pair for given in mechanism.inputs]
     for pair in driven:
         if pair not in names:

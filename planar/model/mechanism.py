@@ -209,18 +209,18 @@ def replace_inputs(mechanism: Mechanism, drives: tuple[Drive, ...]) -> Mechanism
     return replace(mechanism, inputs=tuple(changed(given) for given in mechanism.inputs))
 
 
-def running_input_index(mechanism: Mechanism, pair: str | None) -> int:
+def running_input_index(mechanism: Mechanism, pair: str | None, place: str | None = None) -> int:
     """Which of the inputs runs while the others stand still; `pair` names it where there are several.
 
-    Raises BadInput where there is no such input, or several of which none is named.
+    Raises BadInput, at `place`, where there is no such input, or several of which none is named.
     """
     names = [given.pair for given in mechanism.inputs]
     if not names:
-        raise BadInput("inputs", "the mechanism has no input that could run")
+        raise BadInput(place or "inputs", "the mechanism has no input that could run")
     if pair is None and len(names) > 1:
-        raise BadInput("inputs", f"there are several inputs, {', '.join(names)}; name the one that runs")
+        raise BadInput(place or "inputs", f"there are several inputs, {', '.join(names)}; name the one that runs")
     if pair is not None and pair not in names:
-        raise BadInput(pair, f"there is no input at {pair!r}; inputs are at {join_names(names)}")
+        raise BadInput(place or pair, f"there is no input at {pair!r}; inputs are at {join_names(names)}")
     return 0 if pair is None else names.index(pair)
 
 

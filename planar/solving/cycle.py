@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from numbers import Integral, Real
+from numbers import Integral
 
 from planar.foundation.errors import BadInput
 from planar.model.mechanism import LARGEST_COUNTED_ANGLE, Mechanism
+from planar.model.run_arguments import check_number, check_steps
 from planar.results.motion import Motion
 from planar.solving.runs.range_run import Progress, RangeRun
 from planar.solving.runs.time_run import TimeRun
 
-MAX_STEPS = 10**5
 """A run of so many positions of forty links takes some hundred megabytes."""
 MAX_DURATION = 1e6
 """s"""
@@ -58,18 +58,10 @@ def cycle(
     range is followed, in rad or m of the input's way. Raises BadInput for an input or a range that is not there,
     NoAnswer where there is no position to start from.
     """
-    if isinstance(steps, bool) or not isinstance(steps, Integral) or not 1 <= steps <= MAX_STEPS:
-        raise BadInput("steps", f"a whole number of steps from 1 to {MAX_STEPS} is wanted, not {steps!r:.40}")
-    for name, value, most in (
-        ("start", start, LARGEST_COUNTED_ANGLE),
-        ("stop", stop, LARGEST_COUNTED_ANGLE),
-        ("duration", duration, MAX_DURATION),
-    ):
-        if value is None:
-            continue
-        if isinstance(value, bool) or not isinstance(value, Real) or not abs(value) <= most:
-            of = "s" if name == "duration" else "rad or m"
-            raise BadInput(name, f"a number up to {most:g} ({of}) is wanted, not {value!r:.40}")
+    check_steps(steps)
+    check_number("start", start, LARGEST_COUNTED_ANGLE)
+    check_number("stop", stop, LARGEST_COUNTED_ANGLE)
+    check_number("duration", duration, MAX_DURATION, "s")
     if duration is not None and not duration > 0.0:
         raise BadInput("duration", f"a time from zero on is wanted, not {duration!r:.40}")
     numbers = branches if isinstance(branches, Iterable) else [branches]

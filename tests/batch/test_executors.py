@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import planar
+from planar.batch import sweep_mechanisms
 from planar.foundation.errors import BadInput
 from tests.solving.test_cycle import ROCKER, four_bar
 
@@ -84,16 +85,31 @@ def test_an_executor_that_loses_every_block_loses_nothing(lost):
     assert pool.given <= 6
 
 
-def test_a_cancelled_block_is_solved_all_the_same():
-    class Cancelling(ThreadPoolExecutor):
-        def submit(self, function, *arguments):
-            future = Future()
-            future.cancel()
-            future.set_running_or_notify_cancel()
-            return future
+class Cancelling(ThreadPoolExecutor):
+    """Cancels whatever it is given."""
 
+    def submit(self, function, *arguments):
+        future = Future()
+        future.cancel()
+        future.set_running_or_notify_cancel()
+        return future
+
+
+def test_a_cancelled_block_is_solved_all_the_same():
     with Cancelling(1) as pool:
         agree(here(executor=pool, block=20), here())
+
+
+@pytest.mark.parametrize("pool", [Cancelling(1), Failing(0), Failing(1), ThreadPoolExecutor(2)])
+def test_mechanisms_in_parts_come_in_their_order_whatever_the_executor_loses(monkeypatch, pool):
+    monkeypatch.setattr(sweep_mechanisms, "PART_SIZE", 2)
+    mechanisms = [four_bar(0.3, length, 0.8, 1.0, 0.8) for length in np.linspace(0.9, 1.1, 7)]
+    wanted, told = planar.sweep_each(mechanisms, STEPS), []
+    with pool:
+        found = planar.sweep_each(mechanisms, STEPS, executor=pool, progress=lambda *done: told.append(done))
+    assert told == [(2, 7), (4, 7), (6, 7), (7, 7)]
+    for one, other in zip(found, wanted, strict=True):
+        np.testing.assert_array_equal(one.position["C"], other.position["C"])
 
 
 def test_bad_input_is_told_once_and_not_tried_again():

@@ -1,9 +1,5 @@
 """Sweeps: every design as its own cycle and the closed forms have it, refused where it must be, kept in stores."""
 
-import sys
-from importlib.machinery import ModuleSpec
-from types import ModuleType
-
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -11,10 +7,11 @@ from hypothesis import strategies as st
 
 import planar
 from planar.batch.design_arrays import values_of_design, with_design_values
-from planar.batch.march import choice, numpy_backend
-from planar.batch.march.backend import UnsupportedStructure
+from planar.batch.march import choice
+from planar.batch.march.backend import RunnerAttempt, UnsupportedStructure
 from planar.batch.march.checks import DesignBranchCheck, DesignResidualCheck
 from planar.batch.march.design_functions import DesignFunctions
+from planar.batch.march.numpy_backend import NumpyRunner
 from planar.batch.reference_design import reference_design
 from planar.document import files
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
@@ -226,12 +223,9 @@ def test_what_is_open_by_the_pairs_own_formulas_does_not_pass():
     assert (left <= solver.tolerance).tolist() == [True, False, False]
 
 
-def backend(monkeypatch, march):
-    """Puts a march in the place of the native backend."""
-    module = ModuleType("a_backend")
-    module.__spec__, module.run_designs = ModuleSpec("a_backend", None), march
-    monkeypatch.setitem(sys.modules, "a_backend", module)
-    monkeypatch.setitem(choice.BACKENDS, "native", "a_backend")
+def backend(monkeypatch, name, runner):
+    """Puts a runner in the place of a backend."""
+    monkeypatch.setitem(choice.BACKENDS, name, lambda: (RunnerAttempt(runner, True),))
 
 
 @pytest.mark.parametrize("rates", [True, False])
@@ -239,15 +233,16 @@ def test_what_a_backend_does_not_let_pass_is_solved_all_the_same_and_counted(mon
     mechanism, designs = four_bar(*ROCKER, 0.8), {"BC.length": np.linspace(0.85, 0.95, 6)}
     wanted = planar.sweep(mechanism, designs, 30, "E", rates=rates)
 
-    def march(task, out):
-        good = numpy_backend.run_designs(task, out)
-        out[7:, :, 1] = np.nan
-        out[:, :, 2] = np.nan
-        good[1], good[2] = 7, 0
-        return good
+    class Failing(NumpyRunner):
+        def run(self, batch, out):
+            good = super().run(batch, out)
+            out[7:, :, 1] = np.nan
+            out[:, :, 2] = np.nan
+            good[1], good[2] = 7, 0
+            return good
 
-    backend(monkeypatch, march)
-    found = planar.sweep(mechanism, designs, 30, "E", rates=rates)
+    backend(monkeypatch, "casadi", Failing())
+    found = planar.sweep(mechanism, designs, 30, "E", rates=rates, backend="casadi")
     assert found.general == 24 + 31
     assert found.said == ("2 of 6 designs went to the general path, which solved 55 positions",)
     np.testing.assert_allclose(found.position["E"], wanted.position["E"], atol=1e-13)
@@ -257,12 +252,29 @@ def test_what_a_backend_does_not_let_pass_is_solved_all_the_same_and_counted(mon
 
 
 def test_a_structure_that_a_backend_cannot_do_is_done_by_the_next(monkeypatch):
-    def march(task, out):
-        raise UnsupportedStructure("not this one")
+    class Refusing(NumpyRunner):
+        def run(self, batch, out):
+            raise UnsupportedStructure("not this one")
 
-    backend(monkeypatch, march)
+    backend(monkeypatch, "native", Refusing())
     for name in ("native", "auto"):
         assert planar.sweep(four_bar(*ROCKER, 0.8), {"BC.length": [0.9]}, 30, backend=name).general == 0
+
+
+def test_designs_that_one_runner_does_not_begin_are_begun_by_the_next(monkeypatch):
+    asked = []
+
+    class Lame(NumpyRunner):
+        def run(self, batch, out):
+            asked.append(batch.p.shape[1])
+            return np.where(np.arange(out.shape[2]) % 2, super().run(batch, out), 0)
+
+    backend(monkeypatch, "native", Lame())
+    found = planar.sweep(four_bar(*ROCKER, 0.8), {"BC.length": np.linspace(0.85, 0.95, 6)}, 30, "E", backend="native")
+    assert asked == [6]
+    assert found.general == 0
+    wanted = planar.sweep(four_bar(*ROCKER, 0.8), {"BC.length": np.linspace(0.85, 0.95, 6)}, 30, "E", backend="casadi")
+    np.testing.assert_allclose(found.position["E"], wanted.position["E"], atol=1e-13)
 
 
 # what may be asked for, and how it is said

@@ -12,7 +12,7 @@ from planar.batch.mechanisms import partition
 from planar.batch.mechanisms.block_type import FRAME_BODY, BlockPair, BlockSignature
 from planar.batch.mechanisms.partition import NotPartitionable, partition_mechanism
 from planar.batch.mechanisms.solved_block_type import find_block_type
-from planar.codegen import block_formula, instructions
+from planar.codegen import block_formula, block_kernel, instructions
 from planar.document import files
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.model.pairs import pair_types
@@ -372,11 +372,11 @@ def test_machine_code_tells_the_extremes_of_what_numpy_tells(monkeypatch):
     formula = dyad.run_formula(False)
     for one in (0, 1):
         both = state.copy(), state.copy()
-        plain = block_formula.run_kernel(
-            formula, block_formula.KernelLayout(gives, 13, 4, 2), both[0], index[:1], p[one : one + 1], False
+        plain = block_formula.run_formula(
+            formula, block_formula.KernelLayout(gives, 13, 4, 2), both[0], index[:1], p[one : one + 1]
         )
-        quick = block_formula.run_kernel(
-            formula, block_formula.KernelLayout(gives, 13, 4, 2, True), both[1], index[:1], p[one : one + 1], True
+        quick = block_kernel.run_kernel(
+            formula, block_formula.KernelLayout(gives, 13, 4, 2, True), both[1], index[:1], p[one : one + 1]
         )
         np.testing.assert_allclose(both[0], both[1], atol=1e-12)
         left, clear = plain[0]

@@ -7,8 +7,9 @@ import pytest
 
 import planar
 from planar.batch.march import llvm_designs, llvm_runner
+from planar.batch.march.backend import DesignBatch
 from planar.batch.march.kernel import BareAngle
-from planar.batch.march.llvm_runner import KernelArrays, designs_kernel, run_designs_kernel
+from planar.batch.march.llvm_runner import designs_kernel, run_designs_kernel
 from planar.batch.reference_design import reference_design
 from planar.codegen import instructions, llvm_compile
 from planar.codegen.instructions import (
@@ -31,34 +32,33 @@ PART = slice(30, 331)
 
 
 def arguments(motion, points):
-    """A run of a motion's rows as what the backend takes, for one design."""
+    """A run of a motion's rows as a batch of one design."""
     course = motion.course
     solver, found = course.ranged.solver, course.found
     named = {each.name: each.members[0] for each in named_points(motion.mechanism)}
     members = [named[point] for point in points]
     u = found.inputs.u[PART]
     places = [solver.shapes[link].position(name) for link, name in members]
-    return {
-        "program": solver.functions,
-        "mechanism": motion.mechanism,
-        "designs": KernelArrays(
-            solver.inputs.p[:, None],
-            np.array([[part / solver.unit] for place in places for part in (place.x, place.y)]),
-            found.z[PART][0][:, None],
-            u[0][:, None],
-            solver.inputs.u1[:, None],
-            solver.inputs.u2[:, None],
-        ),
-        "offsets": u - u[0],
-        "links": [link for link, _ in members],
-        "rates": True,
-        "tolerance": solver.tolerance,
-    }
+    return DesignBatch(
+        solver.functions,
+        motion.mechanism,
+        solver.inputs.p[:, None],
+        np.array([[part / solver.unit] for place in places for part in (place.x, place.y)]),
+        found.z[PART][0][:, None],
+        u - u[0],
+        u[0][:, None],
+        solver.inputs.u1[:, None],
+        solver.inputs.u2[:, None],
+        tuple(link for link, _ in members),
+        True,
+        solver.tolerance,
+        1.0,
+    )
 
 
 def repeated(given, designs):
     """The same design so many times."""
-    return given | {"designs": KernelArrays(*(np.repeat(each, designs, axis=1) for each in given["designs"]))}
+    return given.select(np.zeros(designs, dtype=int))
 
 
 @pytest.mark.parametrize("stem", part([stem for stem, mechanism in MODELS.items() if mechanism.inputs], 6))
@@ -72,12 +72,12 @@ def test_a_run_of_a_model_is_the_one_that_casadi_gives(stem):
     assert motion.outcome is Outcome.SOLVED
     points = motion.point_names[-3:]
     given = repeated(arguments(motion, points), 3)
-    if not given["program"].is_square:
+    if not given.program.is_square:
         with pytest.raises(UnsupportedOperation, match="more than once"):
-            run_designs_kernel(**given)
+            run_designs_kernel(given)
         return
-    out, good = run_designs_kernel(**given)
-    assert out.shape == (len(given["offsets"]), 6 * len(points), 3)
+    out, good = run_designs_kernel(given)
+    assert out.shape == (len(given.input_offsets), 6 * len(points), 3)
     np.testing.assert_array_equal(out, np.repeat(out[:, :, :1], 3, axis=2))
     # what is near a change point, or moves too far in a step, is left to the general path; a step condemns that before
     first = int(good[0])
@@ -129,9 +129,9 @@ def test_cos_and_sin_of_sums_are_put_together_from_the_angles_own():
 def test_what_is_not_a_number_is_not_good():
     motion = planar.cycle(MODELS["crank-rocker"])
     given = repeated(arguments(motion, motion.point_names[-1:]), 2)
-    given["designs"].p[0, 1] = np.nan
-    _, good = run_designs_kernel(**given)
-    assert good.tolist() == [len(given["offsets"]), 0]
+    given.p[0, 1] = np.nan
+    _, good = run_designs_kernel(given)
+    assert good.tolist() == [len(given.input_offsets), 0]
 
 
 # how much is printed

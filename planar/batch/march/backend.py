@@ -1,16 +1,18 @@
-"""What a backend does for a sweep: all designs of a block through the same steps, each position judged."""
+"""What runs the designs of a sweep: all of a batch through the same steps, each position judged."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
+from planar.codegen.aligned_arrays import allocate_aligned
 from planar.equations.functions import EquationFunctions
 from planar.model.mechanism import Mechanism
 
 Array = np.ndarray
+Answer = TypeVar("Answer")
 
 
 class UnsupportedStructure(Exception):
@@ -47,23 +49,18 @@ class DesignBatch(NamedTuple):
         return 2 * len(self.links) * (3 if self.rates else 1)
 
     def select(self, designs: Array, z0: Array | None = None) -> DesignBatch:
-        """The march of some of the designs, from other unknowns if they are given."""
+        """The batch of some of the designs, from other unknowns if they are given."""
         parts = {name: getattr(self, name)[:, designs] for name in ("p", "q", "z0", "u0", "u1", "u2")}
         return self._replace(**parts | ({} if z0 is None else {"z0": z0}))
 
 
-DesignRunner = Callable[[DesignBatch, Array], Array]
-"""Takes a march and room for what it tells, out (steps + 1, rows, designs), which it fills with x and y of each point,
-then their first, then second rates (m, s); gives how many of the first steps passed both parts of the gate (designs,).
-"""
-
-
 class CorrectedAssemblies(NamedTuple):
-    """Where designs are that a backend closed from near by: which are, and how regular the least regular is of the
-    groups that Newton's method closed (the volume that the columns of its slope span), both (designs,); the unknowns
-    (unknowns, designs); the points of the march, and the same in the other assembly of their group, infinite where
-    that is not
-    known (points, 2, designs), in sizes."""
+    """Where designs are that a runner corrected from near by.
+
+    `converged` (designs,), and how regular the least regular is of the blocks that Newton's method solved (the volume
+    that the columns of its Jacobian span) (designs,); the unknowns z (unknowns, designs); the points of the batch, and
+    the same in the other assembly of their block, infinite where that is not known (points, 2, designs), in sizes.
+    """
 
     converged: Array
     regularity: Array
@@ -72,11 +69,75 @@ class CorrectedAssemblies(NamedTuple):
     other_points: Array
 
 
-AssemblyCorrector = Callable[[DesignBatch, Sequence[int], int], CorrectedAssemblies]
-"""Takes a march, of which it looks at the start only, the groups that place its points, and how many of Newton's steps
-it may take. Raises NotMarched."""
+class DesignRunner(Protocol):
+    """Runs the designs of a batch through all steps. Each method raises UnsupportedStructure where it cannot."""
+
+    def run(self, batch: DesignBatch, out: Array) -> Array:
+        """Fill out (steps + 1, rows, designs): x and y of each point, then their first, then second rates (m, s).
+
+        Returns how many of the first steps passed residual and branch check (designs,).
+        """
+
+    def last_good_unknowns(self, batch: DesignBatch, good: Array) -> Array:
+        """The unknowns (unknowns, designs) at the last of so many good steps (designs,), one at least."""
+
+    def correct_assemblies(
+        self, batch: DesignBatch, point_blocks: Sequence[int], corrections: int
+    ) -> CorrectedAssemblies:
+        """Designs corrected from near by, where they start, by so many of Newton's steps.
+
+        `point_blocks` are the blocks that place the points of the batch.
+        """
 
 
-LastGoodUnknowns = Callable[[DesignBatch, Array], Array]
-"""Takes a march and how many of its first steps were good, one at least; gives the unknowns at the last of these
-(unknowns, designs)."""
+class RunnerAttempt(NamedTuple):
+    """A runner, and whether it is given all designs that have not come to the end, or those that have not begun."""
+
+    runner: DesignRunner
+    runs_to_end: bool
+
+
+class RunnerLadder:
+    """A runner made of others: one after the other, each for the designs that the ones before left open."""
+
+    def __init__(self, attempts: Sequence[RunnerAttempt]):
+        self.attempts = attempts
+
+    def run(self, batch: DesignBatch, out: Array) -> Array:
+        """See `DesignRunner`."""
+        good, runs = np.zeros(out.shape[2], dtype=int), 0
+        for runner, runs_to_end in self.attempts:
+            left = np.flatnonzero(good < (len(batch.input_offsets) if runs_to_end else 1))
+            if not left.size:
+                continue
+            try:
+                if left.size == len(good):
+                    good = runner.run(batch, out)
+                else:
+                    own = allocate_aligned(*out.shape[:2], left.size)
+                    good[left] = runner.run(batch.select(left), own)
+                    out[:, :, left] = own
+            except UnsupportedStructure:
+                continue
+            runs += 1
+        if not runs:
+            raise UnsupportedStructure("no runner can run this structure")
+        return good
+
+    def last_good_unknowns(self, batch: DesignBatch, good: Array) -> Array:
+        """See `DesignRunner`."""
+        return self._first_answer(lambda runner: runner.last_good_unknowns(batch, good))
+
+    def correct_assemblies(
+        self, batch: DesignBatch, point_blocks: Sequence[int], corrections: int
+    ) -> CorrectedAssemblies:
+        """See `DesignRunner`."""
+        return self._first_answer(lambda runner: runner.correct_assemblies(batch, point_blocks, corrections))
+
+    def _first_answer(self, ask: Callable[[DesignRunner], Answer]) -> Answer:
+        for runner, _ in self.attempts:
+            try:
+                return ask(runner)
+            except UnsupportedStructure:
+                continue
+        raise UnsupportedStructure("no runner can do this")

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.batch.march.design_functions import DesignFunctions
+from planar.batch.march.regularity import LEAST_NUMPY_REGULARITY, least_regularity
 from planar.equations.coordinates import coordinate_columns, frames_from_coordinates
 from planar.equations.functions import EquationFunctions
 from planar.equations.linear import solve_arrays
@@ -18,9 +19,6 @@ from planar.solving.checks.residual_check import EPS, NEGLIGIBLE_ERROR, Residual
 from planar.solving.checks.singular_values import SINGULAR_DISTANCE_RATIO
 
 Array = np.ndarray
-
-LEAST_REGULARITY = 1e-4
-"""The volume that the columns of a slope span, each of length one: below it a backend does not go on."""
 
 
 class DesignPositions(NamedTuple):
@@ -70,9 +68,9 @@ class DesignBranchCheck(BranchCheck):
             own = positions.jacobians[:, stage.rows, stage.unknowns]
             if own.size:
                 arm = np.minimum(np.linalg.norm(own, axis=1).min(axis=1), 1.0)
-                # short arms lose digits too, see `solving.accuracy`
-                least = np.maximum(LEAST_REGULARITY, np.sqrt(EPS / NEGLIGIBLE_ERROR / np.maximum(arm, 1e-300)))
-                found &= column_volume(own) > (least if own.shape[1] <= 2 else least**1.5)
+                # short arms lose digits too, see `SHORT_ARM`
+                least = np.maximum(LEAST_NUMPY_REGULARITY, np.sqrt(EPS / NEGLIGIBLE_ERROR / np.maximum(arm, 1e-300)))
+                found &= column_volume(own) > (least_regularity(least, own.shape[1]))
         return found
 
 

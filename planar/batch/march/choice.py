@@ -1,40 +1,49 @@
-"""Which backends are there, and which are tried for a sweep."""
+"""Which backends are there, and the ladder of runners that a sweep is given to."""
 
 from __future__ import annotations
 
-from importlib import import_module
-from importlib.util import find_spec
+from collections.abc import Callable
 
-from planar.batch.march.backend import AssemblyCorrector, DesignRunner, LastGoodUnknowns
+from planar.batch.march.backend import RunnerAttempt, RunnerLadder
 from planar.foundation.errors import BadInput
 
-BACKENDS = {"native": "planar.batch.march.llvm_backend", "casadi": "planar.batch.march.numpy_backend"}
-"""The modules of the backends, the faster first; each has a function `run_designs`."""
+
+def _native_attempts() -> tuple[RunnerAttempt, ...]:
+    from planar.batch.march.llvm_backend import EXTRA_CORRECTIONS, LLVMRunner
+
+    return RunnerAttempt(LLVMRunner(), True), RunnerAttempt(LLVMRunner(EXTRA_CORRECTIONS), True)
 
 
-def find_assembly_corrector(backend: str) -> AssemblyCorrector | None:
-    """What closes many designs at once, if the backend that is tried first does."""
-    return getattr(import_module(BACKENDS[available_runners(backend)[0][0]]), "correct_assemblies", None)
+def _numpy_attempts() -> tuple[RunnerAttempt, ...]:
+    from planar.batch.march.numpy_backend import NumpyRunner
+
+    return (RunnerAttempt(NumpyRunner(), False),)
 
 
-def find_last_good_unknowns(name: str) -> LastGoodUnknowns | None:
-    """What of a backend tells where designs came to, if it does."""
-    return getattr(import_module(BACKENDS[name]), "last_good_unknowns", None)
+BACKENDS: dict[str, Callable[[], tuple[RunnerAttempt, ...]]] = {"native": _native_attempts, "casadi": _numpy_attempts}
+"""The attempts of each backend, the faster first; "casadi" evaluates casadi's functions over arrays of numpy.
+
+One whose library is not installed raises ImportError.
+"""
 
 
-def available_runners(backend: str) -> list[tuple[str, DesignRunner]]:
-    """The backends to try, in this order, each with its name; one that raises NotMarched leaves it to the next.
+def available_backends(backend: str) -> list[str]:
+    """The names of the backends to try, in this order: what one cannot do is left to the next. Raises BadInput."""
+    return [name for name, _ in _available_attempts(backend)]
 
-    Raises BadInput.
-    """
+
+def find_runner(backend: str) -> RunnerLadder:
+    """What runs the designs of a sweep by a backend, or "auto". Raises BadInput."""
+    return RunnerLadder([each for _, attempts in _available_attempts(backend) for each in attempts])
+
+
+def _available_attempts(backend: str) -> list[tuple[str, tuple[RunnerAttempt, ...]]]:
     if backend not in ("auto", *BACKENDS):
         raise BadInput("backend", f"there is no backend {backend!r:.40}; choose from auto, {', '.join(BACKENDS)}")
-    wanted = [*BACKENDS] if backend == "auto" else [*dict.fromkeys((backend, "casadi"))]
-    there = [name for name in wanted if find_spec(BACKENDS[name]) is not None]
     found = []
-    for name in there:
+    for name in BACKENDS if backend == "auto" else dict.fromkeys((backend, "casadi")):
         try:
-            found.append((name, import_module(BACKENDS[name]).run_designs))
+            found.append((name, BACKENDS[name]()))
         except ImportError:
             continue
     if backend not in ("auto", *(name for name, _ in found)):

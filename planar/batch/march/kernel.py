@@ -35,12 +35,6 @@ from planar.foundation.geometry import GROUND, Frame, frame_at
 from planar.model.mechanism import Mechanism
 from planar.model.pairs import MeasureKind
 
-MAX_TURN_PER_STEP = 0.5
-"""rad that a link may turn from one step to the next: farther apart they do not show what lies between."""
-LEAST_REGULARITY = 1e-2
-"""A group whose slope is less regular than this (of more than two unknowns, than its power of 1.5: it is a volume) is
-left to the general path."""
-
 Operand = tuple[str, int]
 """A number that the expressions take: which kind of it, and its index.
 

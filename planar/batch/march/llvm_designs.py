@@ -10,8 +10,6 @@ from math import inf
 from typing import NamedTuple
 
 from planar.batch.march.kernel import (
-    LEAST_REGULARITY,
-    MAX_TURN_PER_STEP,
     BareAngle,
     KernelBlock,
     KernelEquations,
@@ -19,6 +17,8 @@ from planar.batch.march.kernel import (
     OperandNames,
 )
 from planar.batch.march.point_outputs import PointKernelWriter
+from planar.batch.march.prediction import MAX_TURN_PER_STEP
+from planar.batch.march.regularity import LEAST_KERNEL_REGULARITY, least_regularity
 from planar.codegen.instructions import UnsupportedOperation
 
 PREDICTOR_ORDER, HISTORY_LENGTH = 6, 8
@@ -229,7 +229,7 @@ class _DesignsKernelWriter(PointKernelWriter):
             t.store(value, slot)
         change = t.binary("mul", t.call_intrinsic("fabs", change), t.constant(0.5))
         kept = t.select_or_zero(t.broadcast_counter_test("%k", "sgt", 1), change)
-        return [t.compare("oge", t.binary("sub", room, kept), t.constant(LEAST_REGULARITY**2))]
+        return [t.compare("oge", t.binary("sub", room, kept), t.constant(LEAST_KERNEL_REGULARITY**2))]
 
     def _write_other_assembly(self, part: KernelBlock, have: OperandNames) -> None:
         """Where the group places its points in its other assembly."""
@@ -325,7 +325,7 @@ class _DesignsKernelWriter(PointKernelWriter):
         t = self.ir
         if self.point_blocks is not None:
             return t.binary("div", spanned, lengths)
-        least = LEAST_REGULARITY**2 if count <= 2 else LEAST_REGULARITY**3
+        least = least_regularity(LEAST_KERNEL_REGULARITY**2, count)
         return t.binary("sub", spanned, t.binary("mul", lengths, t.constant(least)))
 
     def _write_step_end(self, have: OperandNames, flags: list[str], scale: str) -> None:
@@ -349,7 +349,7 @@ class _DesignsKernelWriter(PointKernelWriter):
         )
         flags = [*flags, t.compare("ole", worst, t.broadcast("%tolerance"))]
         if self.newton_unknowns:
-            least = LEAST_REGULARITY**3 if self.point_blocks is not None else 0.0
+            least = LEAST_KERNEL_REGULARITY**3 if self.point_blocks is not None else 0.0
             flags.append(t.compare("oge", t.load(self.regularity_slot), t.constant(least)))
             near = t.compare("ole", t.load(self.correction_slot), t.broadcast("%astray"))
             flags.append(t.or_flags(near, t.broadcast_counter_test("%k", "sle", PREDICTOR_ORDER)))

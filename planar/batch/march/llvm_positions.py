@@ -12,14 +12,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planar.batch.march.kernel import (
-    LEAST_REGULARITY,
-    MAX_TURN_PER_STEP,
     BareAngle,
     KernelEquations,
     Operand,
     OperandNames,
 )
 from planar.batch.march.point_outputs import PointKernelWriter
+from planar.batch.march.prediction import MAX_TURN_PER_STEP
+from planar.batch.march.regularity import LEAST_KERNEL_REGULARITY
 from planar.codegen.instructions import UnsupportedOperation
 from planar.codegen.llvm_compile import compile_function
 from planar.codegen.llvm_ir import IRWriter
@@ -142,7 +142,7 @@ class _PositionsKernelWriter(PointKernelWriter):
                 t.call_intrinsic("minnum", self._write_bend_margin(one), self._write_bend_margin(two)),
                 self._write_bend_margin(three),
             )
-            flag = t.compare("oge", t.binary("sub", least, kept), t.constant(LEAST_REGULARITY**2))
+            flag = t.compare("oge", t.binary("sub", least, kept), t.constant(LEAST_KERNEL_REGULARITY**2))
             self._write_condition(t.or_flags(flag, t.lanes_from(first, places)))
         t.close_loop("j", "blocks", "judge", "done")
         t.write_label("done")

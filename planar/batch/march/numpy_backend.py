@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.march.backend import DesignBatch, UnsupportedStructure
+from planar.batch.march.backend import CorrectedAssemblies, DesignBatch, UnsupportedStructure
 from planar.batch.march.checks import DesignBranchCheck, DesignPositions, DesignResidualCheck
 from planar.batch.march.design_functions import DesignFunctions
+from planar.batch.march.prediction import extrapolation_weights
 from planar.equations.functions import EquationRates
 from planar.equations.linear import solve_vectors
 from planar.equations.mechanism_numbers import mechanism_size, shapes_of_links
@@ -19,10 +20,10 @@ from planar.solving.checks.residual_check import ResidualCheck
 
 Array = np.ndarray
 
-PREDICTOR_WEIGHTS = ((), (1.0,), (2.0, -1.0), (3.0, -3.0, 1.0), (4.0, -6.0, 4.0, -1.0))
-"""Weights of the last moves for the next: the polynomial through them."""
-
-
+PREDICTOR_ORDER = 4
+"""Moves before from which the next is predicted, at most."""
+START_GROUPS = 6
+"""Groups of designs that are led to their last good step together."""
 COMPACTION_RATIO = 0.7
 """Where less than this part of the designs goes on, the others are left behind."""
 
@@ -38,16 +39,38 @@ class DesignsAtStep(NamedTuple):
     positions: DesignPositions
 
 
-def run_designs(task: DesignBatch, out: Array) -> Array:
-    """See `Marching`. Raises NotMarched where groups hold more constraints than unknowns."""
-    steps, designs = len(task.input_offsets), task.p.shape[1]
-    good, some, first, part = np.zeros(designs, dtype=int), np.arange(designs), 0, task
-    with np.errstate(all="ignore"):  # designs that have failed run on as what is no number
-        while some.size and first < steps:
-            first, row = _run_until_many_fail(part, first, some, out, good)
-            # those that have failed are left behind; the others go on from the step where they are
-            some, part = some[row.passed], task.select(some[row.passed], row.z[row.passed].T)
-    return good
+class NumpyRunner:
+    """See `DesignRunner`."""
+
+    def run(self, batch: DesignBatch, out: Array) -> Array:
+        """See `DesignRunner`; raises UnsupportedStructure where blocks hold more constraints than unknowns."""
+        steps, designs = len(batch.input_offsets), batch.p.shape[1]
+        good, some, first, part = np.zeros(designs, dtype=int), np.arange(designs), 0, batch
+        with np.errstate(all="ignore"):  # designs that have failed run on as what is no number
+            while some.size and first < steps:
+                first, row = _run_until_many_fail(part, first, some, out, good)
+                # those that have failed are left behind; the others go on from the step where they are
+                some, part = some[row.passed], batch.select(some[row.passed], row.z[row.passed].T)
+        return good
+
+    def last_good_unknowns(self, batch: DesignBatch, good: Array) -> Array:
+        """See `DesignRunner`."""
+        designs = len(good)
+        found = np.full((len(batch.z0), designs), np.nan)
+        # those that come about as far are led together
+        for some in np.array_split(np.argsort(good), min(START_GROUPS, designs)):
+            part, own = batch.select(some), good[some]
+            inputs = (part.u0 + each[:, None] for each in part.input_offsets[: int(own.max())])
+            for k, row in enumerate(iterate_steps(part, inputs)):
+                last = (own == k + 1) & row.passed
+                found[:, some[last]] = row.z[last].T
+        return found
+
+    def correct_assemblies(
+        self, batch: DesignBatch, point_blocks: Sequence[int], corrections: int
+    ) -> CorrectedAssemblies:
+        """See `DesignRunner`: none here, the search of all blocks is as fast."""
+        raise UnsupportedStructure("assemblies are searched for block after block")
 
 
 def _run_until_many_fail(
@@ -85,11 +108,11 @@ def iterate_steps(
     good = np.ones(len(z), dtype=bool)
     for u in inputs:
         near = z.copy()
-        for weight, move in zip(PREDICTOR_WEIGHTS[min(len(moves), 4)], moves, strict=False):
+        for weight, move in zip(extrapolation_weights(len(moves)), moves, strict=True):
             near += weight * move
         after = functions.correct(near, u.T)
         if before is not None:
-            moves = [after - z, *moves[:3]]
+            moves = [after - z, *moves[: PREDICTOR_ORDER - 1]]
         z = after
         w = functions.coordinates(z, u.T)
         good = good & (closed.worst_residual(w, u) <= task.tolerance) & closed.is_resolved(w)

@@ -10,10 +10,9 @@ import numpy as np
 
 from planar.batch.mechanisms.block_type import FRAME_BODY, BlockPair, BlockSignature
 from planar.batch.mechanisms.linkage_arrays import BlockBatch, InputArrays, LinkageArrays, PointArrays, make_batch
-from planar.batch.mechanisms.partition import EPS
 from planar.batch.mechanisms.solved_block_type import BlockType, find_block_type
 from planar.model.pin_linkage import PinLayout, turning_pair_type
-from planar.solving.checks.residual_check import SHORT_ARM
+from planar.solving.checks.residual_check import SHORT_ARM, residual_tolerance
 
 Array = np.ndarray
 
@@ -121,7 +120,7 @@ def bar_linkage_arrays(layouts: Sequence[PinLayout], wanted: Sequence[int] | Non
     every, yes = np.arange(len(which)), np.ones(len(which), dtype=bool)
     inputs = InputArrays(every, np.ones_like(every), start, yes, yes, *rates.T)
     many = np.diff(whole.first_link)[which]
-    tolerance = 16.0 * EPS * (4 + many) * np.maximum(1.0, whole.reach[which] / unit)
+    tolerance = residual_tolerance(many, whole.reach[which] / unit)
     turns = [levels[0], *([_merge_batches(levels[1:])] if len(levels) > 1 else [])]
     lot = LinkageArrays(many, unit, tolerance, levels, turns, inputs, sketch, points, sketch, len(names))
     return BarLinkages(which, lot, own, start, links)

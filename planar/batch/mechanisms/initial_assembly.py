@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.initial_assembly import CLEAR_REGULARITY
+from planar.batch.assembly_scores import is_at_sketch, is_clearly_regular, is_surely_farther
+from planar.batch.mechanisms.block_runner import BlockRunner
 from planar.batch.mechanisms.block_type import COS, POSE_ROWS, SIN, SKETCH_SUMS, X, Y
 from planar.batch.mechanisms.linkage_arrays import BlockBatch, LinkageArrays, PointArrays
-from planar.batch.mechanisms.newton_march import run_newton, unknowns_from_frames
-from planar.batch.mechanisms.solved_block_type import MAX_SIGNS
-from planar.codegen.block_formula import LANES, KernelLayout, run_kernel
-from planar.foundation.geometry import Frame
-from planar.solving.assembly.block_assemblies import CLEAR_SKETCH_DISTANCE
-from planar.solving.assembly.nearest_assembly import EQUAL_DISTANCE_TOLERANCE
+from planar.batch.mechanisms.solved_block_type import MAX_SIGNS, BlockType
+from planar.codegen.block_formula import KernelLayout
+from planar.foundation.geometry import GROUND, Frame
 
 Array = np.ndarray
 
@@ -38,7 +37,7 @@ class StartAssemblies(NamedTuple):
     z: Array
 
 
-def find_start_assemblies(linkages: LinkageArrays, native: bool) -> StartAssemblies:
+def find_start_assemblies(linkages: LinkageArrays, runner: BlockRunner) -> StartAssemblies:
     """See `Started`.
 
     A way to assemble a group is taken where it is nearer to the sketch than any other by more than all groups of the
@@ -46,7 +45,7 @@ def find_start_assemblies(linkages: LinkageArrays, native: bool) -> StartAssembl
     """
     many = len(linkages)
     first = np.concatenate([[0], np.cumsum(linkages.link_counts)])
-    state = np.zeros((1 + first[-1], POSE_ROWS, LANES if native else 1))
+    state = np.zeros((1 + first[-1], POSE_ROWS, runner.lanes))
     _fill_inputs(state, linkages, first)
     stats = _sketch_sums(linkages.sketch, first)
     seen: Array | None = None
@@ -59,7 +58,7 @@ def find_start_assemblies(linkages: LinkageArrays, native: bool) -> StartAssembl
         if not kind.has_closed_form:
             seen = _sketch_sums(linkages.shown_points, first) if seen is None else seen
             found, distance, good = _correct_from_sketch(
-                batch, state, index, (stats[inner], seen[inner]), linkages.tolerance, native
+                batch, state, index, (stats[inner], seen[inner]), linkages.tolerance, runner
             )
             sure[batch.owner[~good]] = False
             z[batch.block_numbers, : found.shape[1]] = found
@@ -68,7 +67,7 @@ def find_start_assemblies(linkages: LinkageArrays, native: bool) -> StartAssembl
         p = np.hstack([batch.p, stats[inner].reshape(groups, -1)])
         ways, width = 2**kind.sign_count, POSE_ROWS * len(kind.inner_links) + 3
         walk = KernelLayout((), p.shape[1], kind.slot_count, ways * width)
-        found = run_kernel(kind.start_formula, walk, state, index, p, native)[:, :, 0].reshape(groups, ways, width)
+        found = runner.run_formula(kind.start_formula, walk, state, index, p)[:, :, 0].reshape(groups, ways, width)
         left, clear, distance = (found[:, :, k] for k in (-3, -2, -1))
         distance = np.where(np.isfinite(left), distance, np.inf)
         best = np.argmin(distance, axis=1)
@@ -87,12 +86,17 @@ def find_start_assemblies(linkages: LinkageArrays, native: bool) -> StartAssembl
         poses = found[every, best, :-3].reshape(groups, len(kind.inner_links), POSE_ROWS)
         state[inner] = poses[:, :, :, None]
     for owner, margin in margins:
-        sure[owner[~(margin > cost[owner] + 2.0 * EQUAL_DISTANCE_TOLERANCE)]] = False
+        sure[owner[~is_surely_farther(margin, cost[owner], roundings=2)]] = False
     return StartAssemblies(sure, signs, z)
 
 
 def _correct_from_sketch(
-    batch: BlockBatch, state: Array, index: Array, sketch_sums: tuple[Array, Array], tolerance: Array, native: bool
+    batch: BlockBatch,
+    state: Array,
+    index: Array,
+    sketch_sums: tuple[Array, Array],
+    tolerance: Array,
+    runner: BlockRunner,
 ) -> tuple[Array, Array, Array]:
     """Groups that are not in closed form, solved from where they are shown, the points of the sketch and what is shown
     in `stats`: unknowns there, squared distances to the sketch, and for which of them no other assembly can be meant.
@@ -114,18 +118,52 @@ def _correct_from_sketch(
     def rows(slot: int, row: int) -> Array:
         return state[index[:, slot], row, 0]
 
-    z = unknowns_from_frames(kind, frames, rows, batch.p)
-    told = run_newton(kind, state, index, batch.p, z, False, native)
-    left, regular = told.residuals[:, 0], told.squared_regularity[:, 0]
+    z = _unknowns_from_frames(kind, frames, rows, batch.p)
+    told = runner.run_newton(kind, state, index, batch.p, z, False)
+    left, regularity = told.residuals[:, 0], np.sqrt(np.maximum(told.squared_regularity[:, 0], 0.0))
     x, y, c, s = (state[index[:, batch.inner_slots], row, 0] for row in (X, Y, COS, SIN))
     many, px, py, tx, ty, along, across, squares = np.moveaxis(sketch, 2, 0)
     with np.errstate(invalid="ignore", over="ignore"):
         mixed = x * (c * px - s * py - tx) + y * (s * px + c * py - ty) - c * along - s * across
         distance = np.maximum(np.sum(many * (x * x + y * y) + 2.0 * mixed + squares, axis=1), 0.0)
         points = many.sum(axis=1)
-        good = known & (left <= START_TOLERANCE_FACTOR * tolerance[batch.owner]) & (regular > CLEAR_REGULARITY**2)
-        good &= (points > 0.0) & (distance <= points * CLEAR_SKETCH_DISTANCE**2)
+        good = known & (left <= START_TOLERANCE_FACTOR * tolerance[batch.owner]) & is_clearly_regular(regularity)
+        good &= (points > 0.0) & is_at_sketch(distance, points)
     return z, distance, good
+
+
+def _unknowns_from_frames(
+    block_type: BlockType, frames: list[Frame], rows: Callable[[int, int], Array], p: Array
+) -> Array:
+    """The unknowns (groups, unknowns) of groups whose inner links are shown about these frames.
+
+    `rows` gives a row of a slot (groups,), p (groups, numbers). Lengths of slides are read off the frames, in which
+    they are linear.
+    """
+    given = [
+        Frame(*(rows(slot, row) for row in range(POSE_ROWS)), np.zeros(len(p)))  # angles are asked of no pair here
+        for slot in range(len(block_type.given_links))
+    ]
+    of = dict(zip((*block_type.given_links, *block_type.inner_links), (*given, *frames), strict=True)) | {
+        "frame": GROUND
+    }
+    own: dict[tuple[str, str], Array] = {}
+    first = 0
+    for pair in block_type.mechanism.pairs:
+        numbers = [p[:, first + k] for k in range(len(pair.number_kinds))]
+        first += len(numbers)
+        bodies, many = [of[link] for link in pair.bodies], len(pair.coordinate_kinds)
+        if not many:
+            continue
+        still = np.array(pair.residual(bodies, numbers, [0.0] * many)[:2])
+        for k, (part, _) in enumerate(pair.coordinate_kinds):
+            unit = [float(j == k) for j in range(many)]
+            way = np.array(pair.residual(bodies, numbers, unit)[:2]) - still
+            own[pair.name, part] = -np.sum(way * still, axis=0) / np.sum(way * way, axis=0)
+    own |= {(name, "angle"): frame.angle for name, frame in zip(block_type.inner_links, frames, strict=True)}
+    e = block_type.equations
+    names = [(e.coordinates[column].owner, e.coordinates[column].part) for column in e.unknowns]
+    return np.stack([own[name] for name in names], axis=1)
 
 
 def _fill_inputs(state: Array, linkages: LinkageArrays, first: Array) -> None:

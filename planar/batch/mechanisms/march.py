@@ -6,19 +6,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.batch.march.prediction import MAX_TURN_PER_STEP, correction_limit
+from planar.batch.mechanisms.block_runner import BlockRunner
 from planar.batch.mechanisms.block_type import COS, POSE_ROWS, SIN, X1, X2, X
 from planar.batch.mechanisms.initial_assembly import LEAST_CLEARANCE, StartAssemblies
-from planar.batch.mechanisms.linkage_arrays import LinkageArrays
-from planar.batch.mechanisms.newton_march import PREDICTOR_ORDER, run_newton
+from planar.batch.mechanisms.linkage_arrays import BlockBatch, LinkageArrays
+from planar.batch.mechanisms.newton_march import PREDICTOR_ORDER
 from planar.batch.mechanisms.points import point_formula
-from planar.codegen.block_formula import LANES, KernelLayout, run_kernel
+from planar.codegen.block_formula import KernelLayout
 
 Array = np.ndarray
-
-CORRECTION_LIMIT, COARSE_STEP = 3e-3, 0.04
-"""rad or sizes by which Newton's method may correct what was predicted, for steps of the second (rad) or less."""
-MAX_TURN_PER_STEP = 0.5
-"""rad: no link may turn by more in a step, so that nothing is missed between two."""
 
 
 class LinkageRuns(NamedTuple):
@@ -37,48 +34,37 @@ def run_linkages(
     offsets: Array,
     step: float,
     rates: bool,
-    native: bool,
+    runner: BlockRunner,
     polished: bool = False,
     verdict_only: bool = False,
 ) -> LinkageRuns:
-    """Run linkages whose running inputs go so far (steps,) from where they are, by `step` in each. See `Ran`.
+    """Run linkages whose running inputs go so far (steps,) from where they are, by `step` in each. See `LinkageRuns`.
 
-    `polished`: every closed form is followed by a step of Newton's method. `quick`: only whether all steps are good is
-    looked at, in machine code.
+    `polished`: every closed form is followed by a step of Newton's method. `verdict_only`: of blocks in closed form
+    only whether all steps are good is looked at, by a runner that can give extremes alone.
     """
     many, steps = len(linkages), len(offsets)
     first = np.concatenate([[0], np.cumsum(linkages.link_counts)])
-    state = _initial_state(linkages, first, offsets, step, rates, native)
-    verdict_only = verdict_only and native
+    state = _initial_state(linkages, first, offsets, step, rates, runner.lanes)
     good, dead, at = np.full(many, steps), np.zeros(many, dtype=bool), np.full(many, -1)
-    wide = POSE_ROWS + 6 if rates else POSE_ROWS
-    for batch in linkages.merged_batches if native else linkages.batches:
-        kind, index = batch.block_type, batch.state_indices(first)
-        tolerance = linkages.tolerance[batch.owner]
-        if kind.has_closed_form:
-            p = np.hstack([batch.p, start.signs[batch.block_numbers, : kind.sign_count]])
-            gives = tuple(
-                (slot, row) for slot in range(*batch.inner_slots.indices(kind.slot_count)) for row in range(wide)
-            )
-            walk = KernelLayout(gives, p.shape[1], kind.slot_count, 2, verdict_only)
-            judged = run_kernel(kind.run_formula(rates, polished), walk, state, index, p, native)
+    for batch in linkages.merged_batches if runner.runs_in_order else linkages.batches:
+        index, tolerance = batch.state_indices(first), linkages.tolerance[batch.owner]
+        if batch.block_type.has_closed_form:
+            found = _run_closed_form(runner, batch, start, state, index, rates, polished, verdict_only)
             if verdict_only:
-                left, clear, bend, fastest = judged
-                fine = (
-                    (left <= tolerance) & (clear > np.maximum(bend, LEAST_CLEARANCE)) & (fastest <= MAX_TURN_PER_STEP)
-                )
-                good[batch.owner[~fine]] = 0
+                left, clear, bend, fastest = found
+                fine = (left <= tolerance) & (clear > np.maximum(bend, LEAST_CLEARANCE))
+                good[batch.owner[~(fine & (fastest <= MAX_TURN_PER_STEP))]] = 0
                 continue
-            come, ends = _count_good_steps(judged[:, 0, :steps], judged[:, 1, :steps], tolerance)
+            residuals, clearance = found[:, 0, :steps], found[:, 1, :steps]
         else:
-            z = start.z[batch.block_numbers, : len(kind.unknown_is_angle)]
-            told_ = run_newton(kind, state, index, batch.p, z, rates, native)
-            left = told_.residuals[:, :steps].copy()
+            z = start.z[batch.block_numbers, : len(batch.block_type.unknown_is_angle)]
+            run = runner.run_newton(batch.block_type, state, index, batch.p, z, rates)
+            residuals, clearance = run.residuals[:, :steps].copy(), run.squared_regularity[:, :steps]
             # what was not where it was predicted may be elsewhere
-            left[:, PREDICTOR_ORDER + 1 :][
-                told_.corrections[:, PREDICTOR_ORDER + 1 : steps] > CORRECTION_LIMIT * max(1.0, step / COARSE_STEP) ** 2
-            ] = np.inf
-            come, ends = _count_good_steps(left, told_.squared_regularity[:, :steps], tolerance)
+            far = run.corrections[:, PREDICTOR_ORDER + 1 : steps] > correction_limit(step)
+            residuals[:, PREDICTOR_ORDER + 1 :][far] = np.inf
+        come, ends = _count_good_steps(residuals, clearance, tolerance)
         for k in np.flatnonzero(come < good[batch.owner]):
             # of several groups of a linkage the first one that ends
             owner = batch.owner[k]
@@ -87,11 +73,33 @@ def run_linkages(
     if not verdict_only:
         slow = _has_slow_links(state, first, steps, good)
         good[~slow], dead[~slow] = 0, False
-    formula, walk = point_formula(rates)
+    return LinkageRuns(_run_points(runner, linkages, first, state, rates), good, dead, at)
+
+
+def _run_closed_form(
+    runner: BlockRunner,
+    batch: BlockBatch,
+    start: StartAssemblies,
+    state: Array,
+    index: Array,
+    rates: bool,
+    polished: bool,
+    verdict_only: bool,
+) -> Array:
+    """What is left open and how clear of dead points blocks are (blocks, 2, steps), or the extremes of these."""
+    kind, wide = batch.block_type, POSE_ROWS + 6 if rates else POSE_ROWS
+    p = np.hstack([batch.p, start.signs[batch.block_numbers, : kind.sign_count]])
+    rows = tuple((slot, row) for slot in range(*batch.inner_slots.indices(kind.slot_count)) for row in range(wide))
+    layout = KernelLayout(rows, p.shape[1], kind.slot_count, 2, verdict_only)
+    return runner.run_formula(kind.run_formula(rates, polished), layout, state, index, p)
+
+
+def _run_points(runner: BlockRunner, linkages: LinkageArrays, first: Array, state: Array, rates: bool) -> Array:
+    formula, layout = point_formula(rates)
     points = linkages.points
     index = np.where(points.link_index > 0, points.link_index + first[points.owner], 0)[:, None]
     numbers = np.hstack([points.numbers, linkages.unit[points.owner][:, None]])
-    return LinkageRuns(run_kernel(formula, walk, state, index, numbers, native), good, dead, at)
+    return runner.run_formula(formula, layout, state, index, numbers)
 
 
 def _count_good_steps(residuals: Array, clearance: Array, tolerance: Array) -> tuple[Array, Array]:
@@ -130,11 +138,11 @@ def _has_slow_links(state: Array, first: Array, steps: int, good: Array) -> Arra
 
 
 def _initial_state(
-    linkages: LinkageArrays, first: Array, offsets: Array, step: float, rates: bool, native: bool
+    linkages: LinkageArrays, first: Array, offsets: Array, step: float, rates: bool, lanes: int
 ) -> Array:
     """Places (places, rows, steps) of which only the frame's and the inputs' are filled; steps go on to fill the
     lanes."""
-    wide = -(-len(offsets) // LANES) * LANES if native else len(offsets)
+    wide = -(-len(offsets) // lanes) * lanes
     far = np.concatenate([offsets, offsets[-1] + step * np.arange(1, wide - len(offsets) + 1)])
     state = np.empty((1 + first[-1], POSE_ROWS + 6 if rates else POSE_ROWS, wide))
     state[0], state[0, COS] = 0.0, 1.0

@@ -17,7 +17,7 @@ from planar.foundation.geometry import Vector, frame_at
 from planar.model.link_shapes import At, Link, LinkShape, link_shape
 from planar.model.mechanism import Mechanism, check_mechanism
 from planar.model.pairs import Pair
-from planar.solving.checks.residual_check import EPS, SHORT_ARM
+from planar.solving.checks.residual_check import SHORT_ARM, residual_tolerance
 
 MAX_BLOCK_LINKS = 8
 """Links of a group: larger ones are left to the general path, which solves the whole."""
@@ -167,8 +167,7 @@ class _Partitioner:
         self._add_links_and_dyads()
         if len(self.blocks) == 0 or -1 in self.link_index:
             self._add_remaining_blocks()
-        # as the gate of the whole has it
-        tolerance = 16.0 * EPS * (4 + len(self.names)) * max(1.0, self.reach / self.unit)
+        tolerance = float(residual_tolerance(len(self.names), self.reach / self.unit))
         places = dict(zip(self.names, self.link_index, strict=True))
         return Partition(self.mechanism, self.shapes, self.unit, tolerance, self.blocks, places, self.index_count)
 

@@ -31,6 +31,15 @@ SHORT_ARM = EPS / (NEGLIGIBLE_ERROR * 1e-2**2)
 of, rounding surely takes no more than that."""
 
 
+def residual_tolerance(link_count: int | Array, reach: float | Array) -> Array:
+    """By how much constraints may be open (sizes, or rad) that close but for rounding; `reach` is the longest length.
+
+    An entry of a residual is a sum of a few terms as long as the mechanism reaches, after one step of rounding for each
+    link on the way round a loop.
+    """
+    return 16.0 * EPS * (4 + link_count) * np.maximum(1.0, reach)
+
+
 class ResidualCheck:
     """The constraints of one mechanism (SI, lengths judged in units of its size)."""
 
@@ -53,9 +62,7 @@ class ResidualCheck:
         reach = max(
             (abs(value) for pair in mechanism.pairs for value in _lengths(pair, self.numbers[pair.name])), default=0.0
         )
-        # an entry of a residual is a sum of a few terms as long as the mechanism reaches, after one step of rounding
-        # for each link on the way round a loop
-        self.tolerance = 16.0 * EPS * (4 + len(mechanism.links)) * max(1.0, reach / unit)
+        self.tolerance = float(residual_tolerance(len(mechanism.links), reach / unit))
 
     def with_inputs_of(self, mechanism: Mechanism) -> ResidualCheck:
         """The same for a mechanism that differs from this one in its inputs' numbers alone."""

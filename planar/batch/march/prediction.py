@@ -1,0 +1,30 @@
+"""How far a march of many steps goes by what it was before: the prediction, its error, and how long a step may be."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from math import comb
+
+MAX_TURN_PER_STEP = 0.5
+"""rad that a link may turn from one step to the next: farther apart they do not show what lies between."""
+LONGEST_STEP = 0.5
+"""rad or sizes that an input may go in a step: positions that are farther apart do not show whether a group comes to a
+dead point between them."""
+COARSE_STEP = 0.04
+"""rad or sizes: up to this step of the inputs the limit of what may be corrected stays as it is."""
+CORRECTION_LIMIT, MAX_CORRECTION_LIMIT = 3e-3, 0.05
+"""rad or sizes by which Newton's method may correct what was predicted for steps of `COARSE_STEP`, and at most."""
+
+
+@lru_cache
+def extrapolation_weights(order: int) -> tuple[float, ...]:
+    """Weights of the last values, the newest first, in the next: of the polynomial through so many of them.
+
+    Of positions it is of one degree more than of the moves between as many of them.
+    """
+    return tuple((-1.0) ** k * comb(order, k + 1) for k in range(order))
+
+
+def correction_limit(step: float) -> float:
+    """rad or sizes by which Newton's method may correct what was predicted, where inputs go so far in a step."""
+    return min(CORRECTION_LIMIT * max(1.0, step / COARSE_STEP) ** 2, MAX_CORRECTION_LIMIT)
