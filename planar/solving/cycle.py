@@ -8,7 +8,8 @@ from numbers import Integral, Real
 from planar.foundation.errors import BadInput
 from planar.model.mechanism import LARGEST_COUNTED_ANGLE, Mechanism
 from planar.results.motion import Motion
-from planar.solving.runs.range_run import Progress, RangeRun
+from planar.solving.runs.range_run import RangeRun
+from planar.solving.runs.running_input import Progress
 from planar.solving.runs.time_run import TimeRun
 
 MAX_STEPS = 10**5
