@@ -9,7 +9,8 @@ from planar.foundation.errors import BadInput
 from planar.model.mechanism import LARGEST_COUNTED_ANGLE, Mechanism
 from planar.model.run_arguments import check_number, check_steps
 from planar.results.motion import Motion
-from planar.solving.runs.range_run import Progress, RangeRun
+from planar.solving.runs.range_run import RangeRun
+from planar.solving.runs.running_input import Progress
 from planar.solving.runs.time_run import TimeRun
 
 """A run of so many positions of forty links takes some hundred megabytes."""

@@ -2,34 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from math import ceil, pi
 from typing import NamedTuple
 
 import numpy as np
 
 from planar.foundation.errors import BadInput, NoAnswer, Outcome, TrackingEnd
-from planar.model.mechanism import LARGEST_INPUT_POSITION, Drive, Mechanism, replace_inputs, running_input_index
 from planar.model.wording import join_all_names
 from planar.results.motion import Motion
-from planar.results.records import Limit
-from planar.solving.continuation import events
-from planar.solving.continuation.events import LocatedLimit
 from planar.solving.continuation.fast_path import FastSamples, fast_run
 from planar.solving.continuation.path import FollowedSamples, PathFollower, follow_samples, follow_to
 from planar.solving.continuation.path_pieces import BranchRates, bifurcations_until
 from planar.solving.continuation.predictor_corrector import (
-    MAX_ARCS,
     SHOWN_SLIDE_EXTENT,
-    ArcBudget,
-    CurveTracker,
     NearbyBifurcation,
 )
 from planar.solving.diagnosis import refusals
-from planar.solving.position import solved_mechanism, stopped_at_start
+from planar.solving.position import stopped_at_start
 from planar.solving.rates.regularity import moved_links
 from planar.solving.rates.sample_rates import InputRates
-from planar.solving.runs.closed_circuit import ClosedCircuit, follow_circuit
+from planar.solving.runs.closed_circuit import follow_circuit
+from planar.solving.runs.range_limits import STEP_ROUNDING, RangeLimits
+from planar.solving.runs.running_input import RunningInput
 from planar.solving.runs.samples import (
     RunSamples,
     build_motion,
@@ -42,14 +36,8 @@ from planar.solving.runs.samples import (
 
 Array = np.ndarray
 
-STEP_ROUNDING = 1e-9
-"""Parts of a step: what rounding leaves of one."""
 MIN_RANGE = 1e-5
 """rad or sizes: a range shorter than this is none."""
-ARCS_PER_TURN = 100
-"""Arcs by which what may be spent grows with each turn that is asked for, as far as a motion is followed at most."""
-
-Progress = Callable[[float, float], None]
 
 
 class _RangeEnd(NamedTuple):
@@ -64,33 +52,8 @@ class _RangeEnd(NamedTuple):
     nearby: tuple[NearbyBifurcation, ...] = ()
 
 
-class RangeRun:
-    """One input of a mechanism that runs while the others stand still.
-
-    `progress(done, total)` is called now and then, in rad or m of the input's way.
-    """
-
-    def __init__(
-        self,
-        mechanism: Mechanism,
-        pair: str | None,
-        branches: Sequence[int],
-        third: bool,
-        progress: Progress | None = None,
-    ):
-        names = [given.pair for given in mechanism.inputs]
-        self.index = running_input_index(mechanism, pair)
-        still = tuple(Drive(name, None, 0.0, 0.0) for k, name in enumerate(names) if k != self.index)
-        self.known = solved_mechanism(replace_inputs(mechanism, still))
-        self.solver = self.known.solver
-        self.pair = names[self.index]
-        self.is_sliding = self.solver.is_sliding(self.pair)
-        self.scale = self.solver.unit if self.is_sliding else 1.0
-        self.u, self.p = self.solver.inputs.u, self.solver.inputs.p
-        self.branches, self.with_jerk = tuple(branches), third
-        self.assembly = self.known.assembly
-        self.progress = progress
-        self.current_budget = self.arc_budget(0.0)
+class RangeRun(RunningInput):
+    """The runs of one input while the others stand still."""
 
     def run_range(self, steps: int, start: float | None, stop: float | None, back: bool) -> Motion:
         """The run over a range, or over the one that the input has by itself; and back again if wanted."""
@@ -102,17 +65,17 @@ class RangeRun:
             last = first + 2.0 * pi if stop is None else stop / self.scale
             return self._to_motion(self._run(steps, first, last), back)
         end = self._find_range_end(
-            follow_to(self.solver, self.p, self.assembly.z, self.u, self._inputs_at(first)), first, 1.0
+            follow_to(self.solver, self.p, self.assembly.z, self.u, self.inputs_at(first)), first, 1.0
         )
         grid = np.linspace(first, end.position, steps + 1)
         found = self._follow_positions(grid[:-1])
         if found.stopped is not None:
-            return self._to_motion(self._with_stop_row(found, self._input_rates(grid)), back)
+            return self._to_motion(self._with_stop_row(found, self.input_rates(grid)), back)
         whole = found._replace(
             z=np.vstack([found.z, end.z]), fast_samples=found.fast_samples and found.fast_samples.padded(0, 1)
         )
         dead = (steps,) if end.ending is TrackingEnd.DEAD_POINT else ()
-        return self._to_motion(self._with_range_ends(run_samples(whole, self._input_rates(grid), dead), (end,)), back)
+        return self._to_motion(self._with_range_ends(run_samples(whole, self.input_rates(grid), dead), (end,)), back)
 
     def run_circuit(self, steps: int, start: float | None) -> Motion:
         """The whole circuit of the assembly, through its dead points, back to where it starts."""
@@ -120,7 +83,7 @@ class RangeRun:
         first = here if start is None else start / self.scale
         work = self.arc_budget(0.0)
         walk = self.curve_tracker(
-            follow_to(self.solver, self.p, self.assembly.z, self.u, self._inputs_at(first)), first, work=work
+            follow_to(self.solver, self.p, self.assembly.z, self.u, self.inputs_at(first)), first, work=work
         )
         if walk.point.regular_distance < MIN_RANGE and not walk.starts_on_bifurcation:
             told = "branches of the motion cross where the circuit would start; choose one by its number (`branches`,"
@@ -142,18 +105,18 @@ class RangeRun:
                 senses.append(1.0 if last > begin else -1.0)
             dead.append(len(z) - 1)
         ends = (0, *dead) if whole.starts_at_dead_point else tuple(dead[:-1])
-        given = self._input_rates(np.array(places), np.array(senses))
+        given = self.input_rates(np.array(places), np.array(senses))
         found = RunSamples(np.array(z), given, ends, local, bifurcations_until(walk), tuple(walk.nearby))
-        return build_motion(self.solver, self.assembly, found, self.with_jerk, _RangeCourse(self, found, (whole, walk)))
+        return build_motion(self.solver, self.assembly, found, self.with_jerk, RangeLimits(self, found, (whole, walk)))
 
     def _to_motion(self, found: RunSamples, back: bool) -> Motion:
         if back:
             found = join_runs(found, reverse_run(found)._replace(passed=(), nearby=()))
-        return build_motion(self.solver, self.assembly, found, self.with_jerk, _RangeCourse(self, found, None))
+        return build_motion(self.solver, self.assembly, found, self.with_jerk, RangeLimits(self, found, None))
 
     def _run(self, steps: int, first: float, last: float) -> RunSamples:
         grid = np.linspace(first, last, steps + 1)
-        given = self._input_rates(grid)
+        given = self.input_rates(grid)
         self.current_budget = self.arc_budget(abs(last - first) + abs(first - float(self.u[self.index])), first)
         found = self._follow_positions(grid)
         return run_samples(found, given) if found.stopped is None else self._with_stop_row(found, given)
@@ -182,7 +145,7 @@ class RangeRun:
 
     def _follow_from_file(self, grid: Array) -> FollowedSamples:
         here = self.u[self.index]
-        given = self._input_rates(np.append(here, grid))
+        given = self.input_rates(np.append(here, grid))
         rates = None if self.with_jerk else (given.u1, given.u2)
         return follow_samples(self.solver, self.p, self.assembly.z, given.u, self.branches, rates, self.current_budget)
 
@@ -210,17 +173,17 @@ class RangeRun:
         down, up = self._follow_from_file(inner[inner < here][::-1]), self._follow_from_file(inner[inner >= here])
         for part in (down, up):
             if part.stopped is not None:
-                return self._with_stop_row(drop_first(part), self._input_rates(inner[: len(part.z)]))
+                return self._with_stop_row(drop_first(part), self.input_rates(inner[: len(part.z)]))
         found = splice_runs(down, up)
         local = {row + 1: each for row, each in found.branch_rates.items()}
         told = found.fast_samples and found.fast_samples.padded(1, 1)
         whole = found._replace(z=np.vstack([low.z, found.z, high.z]), branch_rates=local, fast_samples=told)
         dead = tuple(index for index, end in ((0, low), (steps, high)) if end.ending is TrackingEnd.DEAD_POINT)
-        return self._with_range_ends(run_samples(whole, self._input_rates(grid), dead), (low, high))
+        return self._with_range_ends(run_samples(whole, self.input_rates(grid), dead), (low, high))
 
     def _one_turn(self, steps: int, here: float) -> RunSamples | _RangeEnd | None:
         """One turn on, if the input makes it; else the end of its range, if that is known."""
-        given = self._input_rates(np.linspace(here, here + 2.0 * pi, steps + 1))
+        given = self.input_rates(np.linspace(here, here + 2.0 * pi, steps + 1))
         sure = fast_run(self.solver, self.assembly.z, *given[:3])
         if sure is not None and len(sure.z) == steps + 1 and not self.with_jerk:
             return RunSamples(
@@ -277,96 +240,20 @@ class RangeRun:
         )
         return reached.with_problem(found.stopped)
 
-    def _input_rates(self, positions: Array, senses: Array | float = 1.0) -> InputRates:
-        """The inputs over a run, each row with the file's rates; backwards the velocity turns round."""
-        s, many = self.solver.inputs, len(positions)
-        u1, u2 = (np.repeat(rate[None], many, axis=0) for rate in (s.u1, s.u2))
-        return InputRates(self._inputs_at(positions), u1 * np.reshape(senses, (-1, 1)), u2, np.zeros_like(u1))
-
-    def _inputs_at(self, positions: Array | float) -> Array:
-        """The inputs where the one that runs is at a position, or at positions (positions, inputs)."""
-        inputs = np.tile(self.u, (*np.shape(positions), 1))
-        inputs[..., self.index] = positions
-        return inputs
-
-    def arc_budget(self, reach: float, first: float | None = None) -> ArcBudget:
-        """What may be spent on so long a way of the input; who asked is told how far from `first` it has come."""
-        tell = None
-        if self.progress is not None and first is not None:
-            inform, total = self.progress, reach * self.scale
-
-            def tell(u: Array) -> None:
-                inform(min(abs(float(u[self.index]) - first) * self.scale, total), total)
-
-        return ArcBudget(MAX_ARCS + int(ARCS_PER_TURN * min(reach, LARGEST_INPUT_POSITION) / (2.0 * pi)), tell)
-
-    def curve_tracker(self, z: Array, first: float, way: float = 1.0, work: ArcBudget | None = None) -> CurveTracker:
-        """A walk from a position of the input, in the direction in which it goes on."""
-        axis = np.zeros_like(self.u)
-        axis[self.index] = way
-        position = z, self._inputs_at(first)
-        return CurveTracker.from_position(self.solver, self.p, position, axis, self.branches, work)
-
     def _find_range_end(self, z: Array, here: float, sign: float) -> _RangeEnd:
         """Where the range of the input ends, one way from a position with unknowns z."""
         far = SHOWN_SLIDE_EXTENT if self.is_sliding else 2.0 * pi
-        start = self._inputs_at(here)
+        start = self.inputs_at(here)
         trip = PathFollower(
-            self.solver, self.p, z, start, self._inputs_at(here + sign) - start, self.branches, self.arc_budget(0.0)
+            self.solver, self.p, z, start, self.inputs_at(here + sign) - start, self.branches, self.arc_budget(0.0)
         )
         found = trip.unknowns_at(far)
         if found is not None:
             if self.is_sliding:
                 told = "the slide goes on without a limit; name where the range starts and stops"
                 raise BadInput(self.pair, told)
-            return _RangeEnd(found[0], here + sign * far, None, self._inputs_at(here + sign * far))
+            return _RangeEnd(found[0], here + sign * far, None, self.inputs_at(here + sign * far))
         limit, ending = trip.end_inputs
         last, u = trip.last_position or (z, start)
         links = tuple(moved_links(self.solver, trip.point.tangent[:-1]))
         return _RangeEnd(last, float(u[self.index]), ending, limit, links, tuple(trip.tracker.nearby))
-
-
-class _RangeCourse:
-    """The curve along which an input runs: what it meets between the first row and the last."""
-
-    def __init__(self, ranged: RangeRun, found: RunSamples, whole: tuple[ClosedCircuit, CurveTracker] | None):
-        self.ranged, self.found, self.whole = ranged, found, whole
-        self.singular_rows = frozenset(found.branch_rates)
-        self.fork_positions = tuple(
-            float(each.u[ranged.index]) * ranged.scale for each in found.passed if each.passed.is_switched
-        )
-
-    def limits(self, motion: Motion) -> tuple[Limit, ...]:
-        """See `Motion.limits`."""
-        ranged, found = self.ranged, self.found
-        u = found.inputs.u[:, ranged.index]
-        if len(u) < 2:
-            return ()
-        if self.whole is not None:
-            parts, walk = self.whole
-            told = events.limits_along(ranged.solver, ranged.pair, float(u[0]), 1.0, walk, parts.pieces)
-            return events.distinct_limits(ranged.solver, ranged.pair, walk.curve, told)
-        # from where the rows were followed from, so that the same ways are taken at change points
-        back = self._is_there_and_back(u)
-        first, last = float(u[0]), float(u[(len(u) - 1) // 2 if back else -1])
-        here, sense = float(ranged.u[ranged.index]), 1.0 if last >= first else -1.0
-        down = self._limits_until(here, first, -sense)
-        up = self._limits_until(here, last, sense)
-        low, high = sorted((first * ranged.scale, last * ranged.scale))
-        room = STEP_ROUNDING * ranged.scale
-        told = [each for each in (*down[::-1], *up) if low - room <= each.limit.input <= high + room]
-        curve = ranged.curve_tracker(ranged.assembly.z, here).curve
-        return events.distinct_limits(ranged.solver, ranged.pair, curve, told)
-
-    def _is_there_and_back(self, u: Array) -> bool:
-        return len(u) > 2 and u[0] == u[-1] and u[1] == u[-2]
-
-    def _limits_until(self, here: float, last: float, way: float) -> list[LocatedLimit]:
-        """What is met from the file's own position to another, if that lies that way."""
-        ranged, far = self.ranged, way * (last - here)
-        if far <= 0.0:
-            return []
-        walk = ranged.curve_tracker(ranged.assembly.z, here, way, work=ranged.arc_budget(far, here))
-        met_there = events.limits_until(ranged.solver, ranged.pair, here, way, walk, far)
-        # all with the input on its way up, whichever way it was followed
-        return [each.in_direction(way) for each in met_there]
