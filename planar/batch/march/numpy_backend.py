@@ -69,7 +69,7 @@ class NumpyRunner:
     def correct_assemblies(
         self, batch: DesignBatch, point_blocks: Sequence[int], corrections: int
     ) -> CorrectedAssemblies:
-        """See `DesignRunner`: none here, the search of all blocks is as fast."""
+        """See `DesignRunner`: none here, they are left to the search block after block."""
         raise UnsupportedStructure("assemblies are searched for block after block")
 
 
