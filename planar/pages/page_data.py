@@ -20,7 +20,6 @@ from planar.assemblies.modes import modes
 from planar.codegen.javascript import write_javascript
 from planar.drawing.scheme.link_bodies import all_marks
 from planar.drawing.scheme.springs_masses import SpringMassMark
-from planar.drawing.scheme.symbols import SPRING_SYMBOLS
 from planar.equations.functions import scale_lengths, shapes_of_links, slice_length
 from planar.foundation.geometry import Vector
 from planar.foundation.units import display_unit
@@ -194,7 +193,6 @@ def drawing_data(mechanism: Mechanism, numbers: DimensionNumbers) -> dict[str, A
         "points": points,
         "names": list(points),
         "marks": [_mark_data(mark, numbers) for mark in all_marks(numbers.mechanism, numbers.shapes)],
-        "coils": SPRING_SYMBOLS,
     }
 
 
@@ -299,19 +297,6 @@ def _admissible_bound(mechanism: Mechanism, each: Dimension, value: float, to: f
     return value
 
 
-PAGE_WORDS: dict[str, tuple[str, dict[str, str]]] = {
-    "PinMark": ("Pin", {"positions": "at"}),
-    "GuideMark": ("Guide", {"direction": "way"}),
-    "SliderMark": ("Block", {"position": "at", "direction": "way", "guide_link": "on"}),
-    "SlotMark": ("Opening", {"direction": "way", "pin_link": "pin", "pin_position": "at"}),
-    "WheelMark": ("Wheel", {}),
-    "PitchLineMark": ("PitchLine", {"direction": "way"}),
-    "BeltMark": ("Band", {}),
-    "MassCentreMark": ("Centre", {}),
-}
-"""What the scripts of a page call the marks and their parts."""
-
-
 def _mark_data(mark: DrawingMark | SpringMassMark, numbers: DimensionNumbers) -> dict[str, Any]:
     """A mark with its numbers as places."""
 
@@ -319,8 +304,7 @@ def _mark_data(mark: DrawingMark | SpringMassMark, numbers: DimensionNumbers) ->
         if isinstance(value, Vector):
             return numbers.add_point(value)
         if isinstance(value, tuple) and hasattr(value, "_fields"):
-            kind, keys = PAGE_WORDS.get(type(value).__name__, (type(value).__name__, {}))
-            return {"kind": kind, **{keys.get(name, name): told(part) for name, part in value._asdict().items()}}
+            return {"kind": type(value).__name__, **{name: told(part) for name, part in value._asdict().items()}}
         if isinstance(value, tuple):
             return [told(part) for part in value]
         return value if isinstance(value, str | bool) else {"at": numbers.add(value)}

@@ -1,6 +1,6 @@
 "use strict";
 /* What each moving link looks like in its own axes (m): the lines between its joints, its plate, its further points,
-   its cylinders; as Python's planar.drawing.bodies and scene have it. Vectors are [x, y]. */
+   its cylinders; as Python's planar.drawing.scheme has it. Vectors are [x, y]. */
 
 const Plane = {
   plus: (a, b) => [a[0] + b[0], a[1] + b[1]],
@@ -105,26 +105,27 @@ const Bodies = (() => {
   function joints(link, all) {
     const found = [];
     for (const mark of all) {
-      if (mark.kind === "Pin") mark.links.forEach((each, k) => { if (each === link) found.push(mark.at[k]); });
-      else if ((mark.kind === "Block" && mark.link === link) || (mark.kind === "Opening" && mark.pin === link)) found.push(mark.at);
-      else if (mark.kind === "Wheel" && mark.link === link) found.push(mark.centre);
+      if (mark.kind === "PinMark") mark.links.forEach((each, k) => { if (each === link) found.push(mark.positions[k]); });
+      else if (mark.kind === "SliderMark" && mark.link === link) found.push(mark.position);
+      else if (mark.kind === "SlotMark" && mark.pin_link === link) found.push(mark.pin_position);
+      else if (mark.kind === "WheelMark" && mark.link === link) found.push(mark.centre);
     }
     return found;
   }
 
   /** The lines of a link, each with the joint on it, else the foot of the perpendicular from the nearest joint. */
   function guides(link, all, met, near) {
-    const lines = all.filter((mark) => ["Guide", "Opening", "PitchLine"].includes(mark.kind) && mark.link === link);
+    const lines = all.filter((mark) => ["GuideMark", "SlotMark", "PitchLineMark"].includes(mark.kind) && mark.link === link);
     return lines.map((mark) => {
-      const { through, way } = mark;
+      const { through, direction: way } = mark;
       const over = met.filter((p) => offLine(p, through, way) <= near);
       if (over.length) return { name: mark.name, foot: cheapest(over, (p) => Math.abs(dot(minus(p, through), way))), way };
       if (met.length) {
         const nearest = cheapest(met, (p) => offLine(p, through, way));
         return { name: mark.name, foot: on(through, way, dot(minus(nearest, through), way)), way };
       }
-      const other = lines.find((each) => each !== mark && Math.abs(cross(way, each.way)) > NEAR);
-      const far = other ? cross(minus(other.through, through), other.way) / cross(way, other.way) : 0;
+      const other = lines.find((each) => each !== mark && Math.abs(cross(way, each.direction)) > NEAR);
+      const far = other ? cross(minus(other.through, through), other.direction) / cross(way, other.direction) : 0;
       return { name: mark.name, foot: on(through, way, far), way };
     });
   }
@@ -177,10 +178,10 @@ const Bodies = (() => {
 
   /** The link whose point runs along the line of a mark, and the point in its axes: [link, at]. */
   function rider(mark, all) {
-    if (mark.kind === "Opening") return [mark.pin, mark.at];
-    if (mark.kind === "PitchLine") return [mark.wheel.link, mark.wheel.centre];
-    const block = all.find((each) => each.kind === "Block" && each.name === mark.name);
-    return block ? [block.link, block.at] : [mark.link, mark.through];
+    if (mark.kind === "SlotMark") return [mark.pin_link, mark.pin_position];
+    if (mark.kind === "PitchLineMark") return [mark.wheel.link, mark.wheel.centre];
+    const block = all.find((each) => each.kind === "SliderMark" && each.name === mark.name);
+    return block ? [block.link, block.position] : [mark.link, mark.through];
   }
 
   /** From where to where that point goes along the line, from a foot on it, in all of some positions (m). */
@@ -188,7 +189,7 @@ const Bodies = (() => {
     const [link, at] = rider(mark, all);
     let low = Infinity, high = -Infinity;
     for (const frames of poses) {
-      const far = dot(minus(local(frames[mark.link], carry(frames[link], at)), foot), mark.way);
+      const far = dot(minus(local(frames[mark.link], carry(frames[link], at)), foot), mark.direction);
       [low, high] = [Math.min(low, far), Math.max(high, far)];
     }
     return [low, high];
@@ -198,25 +199,25 @@ const Bodies = (() => {
   function tubes(page, look, all, poses, near, over) {
     const driven = page.data.inputs.map((given) => given.pair), found = Object.create(null);
     for (const mark of all) {
-      if (mark.kind !== "Block" || mark.link === page.data.frame || mark.on === page.data.frame) continue;
-      const guide = look[mark.on], rod = look[mark.link];
+      if (mark.kind !== "SliderMark" || mark.link === page.data.frame || mark.guide_link === page.data.frame) continue;
+      const guide = look[mark.guide_link], rod = look[mark.link];
       const line = guide.guides.find((each) => each.name === mark.name);
       const pinned = guide.joints.filter((p) => offLine(p, line.foot, line.way) <= near);
-      const lying = [...rod.joints, ...rod.dots].filter((p) => offLine(p, mark.at, mark.way) <= near);
+      const lying = [...rod.joints, ...rod.dots].filter((p) => offLine(p, mark.position, mark.direction) <= near);
       if (pinned.length !== 1 || guide.joints.length !== 1 || (!driven.includes(mark.name) && lying.length < 2)) continue;
-      const [low, high] = range(all.find((each) => each.kind === "Guide" && each.name === mark.name), all, poses, line.foot);
+      const [low, high] = range(all.find((each) => each.kind === "GuideMark" && each.name === mark.name), all, poses, line.foot);
       const sense = low + high < 0 ? -1 : 1;
       const [short, long] = [sense * low, sense * high].sort((a, b) => a - b), stroke = long - short;
-      const along = lying.map((p) => sense * dot(minus(p, mark.at), mark.way));
+      const along = lying.map((p) => sense * dot(minus(p, mark.position), mark.direction));
       const covers = guide.dots.map((p) => sense * dot(minus(p, line.foot), line.way));
       let rear = Math.min(...along), mouth = Math.min(Math.max(REACH * short, 1.15 * stroke), LONGEST * short);
       const front = Math.max(...along);
       if (rear === front) rear = (mouth - stroke) / 2 - short; // the piston as far from either end of its way
       else mouth = Math.max(long + rear + over, 0);
       found[mark.name] = {
-        guide: mark.on, rod: mark.link, foot: line.foot, way: times(line.way, sense),
+        guide: mark.guide_link, rod: mark.link, foot: line.foot, way: times(line.way, sense),
         base: Math.min(0, ...covers), mouth: Math.max(mouth, ...covers),
-        at: mark.at, along: times(mark.way, sense), rear, front,
+        at: mark.position, along: times(mark.direction, sense), rear, front,
       };
     }
     return found;
