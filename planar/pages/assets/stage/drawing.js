@@ -97,7 +97,7 @@ class Drawing {
   corners() {
     const found = Object.create(null);
     for (const [link, body] of Object.entries(this.look)) {
-      found[link] = [...body.sides.flat(), ...body.tracers.flat(), ...body.joints, ...body.dots, ...body.guides.map((each) => each.foot)];
+      found[link] = [...this.points[link].map((point) => point.at), ...body.sides.flat(), ...body.tracers.flat(), ...body.joints, ...body.dots, ...body.guides.map((each) => each.foot)];
     }
     for (const mark of this.marks) {
       if (mark.kind === "SliderMark") found[mark.link].push(mark.position);
@@ -179,7 +179,7 @@ class Drawing {
       this.guideLines(link, body);
     }
     this.springs = new Springs(this);
-    this.sliders(moving);
+    this.sliders();
   }
 
   /** The lines of a link along which blocks run, from its body to beyond the block wherever it comes. */
@@ -231,7 +231,7 @@ class Drawing {
   }
 
   /** Slots, blocks, pins and points, in the order in which they hide one another. */
-  sliders(moving) {
+  sliders() {
     const { marks, poses, mm } = this, { frame } = this.page.data, pinned = new Set();
     for (const mark of marks.filter((each) => each.kind === "SlotMark" && each.link !== frame)) {
       const ends = Bodies.range(mark, marks, poses, mark.through).map((far) => this.px(Plane.on(mark.through, mark.direction, far)));
@@ -246,25 +246,19 @@ class Drawing {
     for (const mark of marks) {
       const at = { PinMark: [mark.links?.[0], mark.positions?.[0]], SlotMark: [mark.pin_link, mark.pin_position] }[mark.kind];
       if (!at) continue;
-      const name = mark.kind === "PinMark" ? mark.name : this.nameAt(...at) ?? mark.name;
+      const name = mark.kind === "PinMark" ? mark.name : this.page.data.running[mark.name] ?? mark.name;
       if (pinned.has(name)) continue;
       pinned.add(name);
       this.symbol("pins", at[0], "pin", this.px(at[1]));
     }
     this.pinned = pinned;
-    for (const [link, body] of [...moving, [frame, null]]) {
-      for (const { name, at } of this.points[link]) {
-        const alone = body ? body.dots.some((p) => Plane.apart(p, at) <= this.near) : !pinned.has(name);
-        if (alone) this.part("pins", link, ...Symbols.symbolParts(body ? "dot" : "fixed dot", mm, this.px(at)));
-      }
+    for (const [link, body] of Object.entries(this.look)) {
+      for (const at of body.dots) this.part("pins", link, ...Symbols.symbolParts(link === frame ? "fixed dot" : "dot", mm, this.px(at)));
     }
   }
 
   /** A circle that letters keep off, as a polygon. */
   round(link, at, r) { this.avoid(link, ...Symbols.round(at, r)); }
-
-  /** The result name of the point of a link at a place. */
-  nameAt(link, at) { return this.points[link].find((point) => Plane.apart(point.at, at) <= this.near)?.name; }
 
   /** What stands still, clear of the links over their motion. */
   ground() {
@@ -343,7 +337,7 @@ class Drawing {
   /** The letters of all points. */
   named() {
     const { mm, marks } = this, points = Object.entries(this.page.data.points);
-    const blocks = new Set(marks.filter((mark) => mark.kind === "SliderMark" && !this.tubes[mark.name]).map((mark) => this.nameAt(mark.link, mark.position)));
+    const blocks = new Set(marks.filter((mark) => mark.kind === "SliderMark" && !this.tubes[mark.name]).map((mark) => this.page.data.running[mark.name]));
     const items = points.map(([name]) => ({
       name, away: (blocks.has(name) ? BLOCK_SIZE[1] / 2 + 0.5 : this.pinned.has(name) ? PIN_RADIUS + 0.5 : 0.9) * mm,
     }));
