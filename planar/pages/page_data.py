@@ -17,6 +17,7 @@ from planar.analysis.rich_text import with_double_primes
 from planar.assemblies.circuits.circuits import circuits
 from planar.assemblies.modes import modes
 from planar.codegen.javascript import write_javascript
+from planar.drawing.centres.circle_diagram import circle_radius, link_points
 from planar.drawing.scheme.link_bodies import RELATIVE_TOLERANCE, LinkBody, all_marks, bodies_of_points, largest_span
 from planar.drawing.scheme.springs_masses import SpringMassMark
 from planar.equations.functions import scale_lengths, shapes_of_links, slice_length
@@ -105,6 +106,7 @@ def page_data(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[s
         "numbers": link_numbers(mechanism),
         "counting": sorted(links_counting_turns(mechanism)),
         "centred": _pair_centres(state),
+        "circle": _circle_data(mechanism),
         **_lettered(mechanism, named),
         "rolling": list(usual_links(mechanism)) if len(mechanism.links) > 1 else None,
         "document": document_data(mechanism, numbers.dimensions),
@@ -205,6 +207,12 @@ def fixed_drawing_data(mechanism: Mechanism) -> tuple[dict[str, Any], list[float
     """What a drawing needs whose dimensions stay as they are, and the numbers themselves."""
     numbers = DimensionNumbers(mechanism, live=False)
     return drawing_data(mechanism, numbers), [float(each) for each in numbers.values]
+
+
+def _circle_data(mechanism: Mechanism) -> dict[str, list[float]]:
+    """Where links stand in the circle diagram, in the order of their numbers, in parts of its radius."""
+    numbers = link_numbers(mechanism)
+    return {link: [x / circle_radius(len(numbers)) for x in at] for link, at in link_points(numbers).items()}
 
 
 def _pair_centres(state: State) -> list[list[str]]:
