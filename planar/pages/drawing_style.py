@@ -9,7 +9,7 @@ from typing import Any
 from planar.drawing.paper.pens import ARROW_HEAD_LENGTH, ARROW_HEAD_WIDTH, PEN_STYLES
 from planar.drawing.paper.picture import Fill, Pen
 from planar.drawing.scheme import symbol_table
-from planar.drawing.scheme.scene import GUIDE_OVERHANG
+from planar.drawing.scheme.scene import CYLINDER_LENGTH_RATIO, GUIDE_OVERHANG, MAX_CYLINDER_LENGTH_RATIO
 from planar.drawing.scheme.scheme import INPUT_ARC_RADII, INPUT_ARC_SWEEP, INPUT_ARROW_LENGTH, INPUT_ARROW_OFFSET
 
 DIGITS = 5
@@ -33,6 +33,7 @@ def symbol_script() -> str:
         "MASS_CENTRE_RADIUS": symbol_table.MASS_CENTRE_RADIUS,
         "SPRING_HALF_WIDTH": symbol_table.SPRING_HALF_WIDTH,
         "GUIDE_OVERHANG": GUIDE_OVERHANG,
+        "CYLINDER_RATIOS": (CYLINDER_LENGTH_RATIO, MAX_CYLINDER_LENGTH_RATIO),
         "ARROW_HEAD": (ARROW_HEAD_LENGTH, ARROW_HEAD_WIDTH),
         "INPUT_ARC": (INPUT_ARC_RADII[0], INPUT_ARC_SWEEP),
         "INPUT_ARROW": (INPUT_ARROW_OFFSET, INPUT_ARROW_LENGTH),

@@ -33,7 +33,6 @@ function cheapest(list, price) {
 const Bodies = (() => {
   const { minus, times, dot, offLine, carry, local } = Plane;
   const NEAR = 1e-6;                  // of the size of the mechanism: a point lies on a line
-  const REACH = 0.62, LONGEST = 0.95; // of a cylinder with its rod when shortest: how long the cylinder is drawn
 
   /** What the pairs say of how they are drawn, with the numbers that the dimensions have now. */
   function marks(page) {
@@ -104,7 +103,7 @@ const Bodies = (() => {
       const [short, long] = [sense * low, sense * high].sort((a, b) => a - b), stroke = long - short;
       const along = lying.map((p) => sense * dot(minus(p, mark.position), mark.direction));
       const covers = guide.dots.map((p) => sense * dot(minus(p, line.foot), line.way));
-      let rear = Math.min(...along), mouth = Math.min(Math.max(REACH * short, 1.15 * stroke), LONGEST * short);
+      let rear = Math.min(...along), mouth = Math.min(Math.max(CYLINDER_RATIOS[0] * short, 1.15 * stroke), CYLINDER_RATIOS[1] * short);
       const front = Math.max(...along);
       if (rear === front) rear = (mouth - stroke) / 2 - short; // the piston as far from either end of its way
       else mouth = Math.max(long + rear + over, 0);
