@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import total_ordering
 from typing import Any
@@ -21,11 +21,12 @@ from planar.model.mechanism import Mechanism
 class DimensionNumber:
     """A number as a function of the dimensions, which compares by its value in the file.
 
-    What is chosen by comparing is thus chosen for the file's dimensions, and what is drawn follows them.
+    What is chosen by comparing is thus chosen for the file's dimensions, and what is drawn follows them. Its expression
+    is made when it is asked for: most numbers are only compared.
     """
 
     value: float
-    expression: Any
+    make_expression: Callable[[], Any]
 
     def __float__(self) -> float:
         return self.value
@@ -43,22 +44,22 @@ class DimensionNumber:
         return hash(self.value)
 
     def __add__(self, other: Any) -> DimensionNumber:
-        return DimensionNumber(self.value + float(other), self.expression + _expression(other))
+        return DimensionNumber(self.value + float(other), lambda: self.make_expression() + _expression(other))
 
     def __sub__(self, other: Any) -> DimensionNumber:
-        return DimensionNumber(self.value - float(other), self.expression - _expression(other))
+        return DimensionNumber(self.value - float(other), lambda: self.make_expression() - _expression(other))
 
     def __mul__(self, other: Any) -> DimensionNumber:
-        return DimensionNumber(self.value * float(other), self.expression * _expression(other))
+        return DimensionNumber(self.value * float(other), lambda: self.make_expression() * _expression(other))
 
     def __truediv__(self, other: Any) -> DimensionNumber:
-        return DimensionNumber(self.value / float(other), self.expression / _expression(other))
+        return DimensionNumber(self.value / float(other), lambda: self.make_expression() / _expression(other))
 
     __radd__, __rmul__ = __add__, __mul__
 
 
 def _expression(number: Any) -> Any:
-    return number.expression if isinstance(number, DimensionNumber) else number
+    return number.make_expression() if isinstance(number, DimensionNumber) else number
 
 
 class DimensionNumbers:
@@ -110,4 +111,4 @@ def _replace_numbers(tree: Any, values: Iterator[float]) -> Any:
     if isinstance(tree, tuple | list):
         parts = [_replace_numbers(part, values) for part in tree]
         return type(tree)(*parts) if hasattr(tree, "_fields") else type(tree)(parts)
-    return tree if isinstance(tree, str | bool) else DimensionNumber(next(values), tree)
+    return tree if isinstance(tree, str | bool) else DimensionNumber(next(values), lambda: tree)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from enum import Enum
+from functools import cache
 from typing import Any
 
 from planar.drawing.paper.pens import ARROW_HEAD_LENGTH, ARROW_HEAD_WIDTH, PEN_STYLES
@@ -19,6 +20,7 @@ FILL_TONES = {Fill.PAPER: "paper", Fill.LINK: "link", Fill.SOLID: "ink"}
 """Colours of areas by the names that a page has for them, where it is light and where it is dark."""
 
 
+@cache
 def symbol_script() -> str:
     """The constants of the scripts: the strokes of every symbol, and the sizes of what is counted or chosen."""
     symbols = {name: [_plain(stroke._asdict()) for stroke in strokes] for name, strokes in symbol_table.SYMBOLS.items()}
@@ -52,6 +54,7 @@ def _plain(value: Any) -> Any:
     return round(value, DIGITS) if isinstance(value, float) else value
 
 
+@cache
 def pen_styles() -> str:
     """The pens and fills of the moving picture as classes, as wide as on paper."""
     lines = []
