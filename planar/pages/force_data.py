@@ -8,6 +8,7 @@ from typing import Any
 import casadi as ca
 
 from planar.codegen.javascript import write_javascript
+from planar.drawing.forces.action_arrows import ACTION_LETTERS, link_pair_index
 from planar.dynamics.forces import forces
 from planar.dynamics.lagrangian import LagrangianFunctions
 from planar.dynamics.load_attachment import attachment_remarks
@@ -15,6 +16,7 @@ from planar.dynamics.reactions import bearing_point
 from planar.dynamics.virtual_velocities import has_length_motion
 from planar.foundation.errors import NoAnswer
 from planar.foundation.geometry import Vector
+from planar.model.link_graph import link_numbers
 from planar.model.loads import Course, Load, Spring
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import Pair
@@ -95,6 +97,8 @@ def force_data(mechanism: Mechanism, d: ca.SX, state: State, unit: float) -> tup
         "timed": any(load.varies is not None and load.varies.input is None for load in mechanism.loads),
         "untold": _undetermined_sentences(state),
         "choices": list(attachment_remarks(mechanism)),
+        "letters": ACTION_LETTERS,
+        "indices": _index_data(mechanism),
     }
     data["inertia"] = rows.add(work.inertia.T)[0]
     table = ca.vertcat(*rows.rows)
@@ -103,6 +107,17 @@ def force_data(mechanism: Mechanism, d: ca.SX, state: State, unit: float) -> tup
     given = [work.q, work.q1, work.q2, work.factors, work.spring_turns, d]
     data |= {"rows": rows.count, "told": told.numel()}
     return data, write_javascript("balance", ca.Function("balance", given, [told]))
+
+
+def _index_data(mechanism: Mechanism) -> dict[str, dict[str, str]]:
+    """The index of what each link feels of the other in a pair, by pair and link."""
+    number = link_numbers(mechanism)
+    return {
+        pair.name: {
+            link: link_pair_index(number[link], number[other]) for link, other in (pair.links, pair.links[::-1])
+        }
+        for pair in mechanism.pairs
+    }
 
 
 def _pair_data(pair: Pair, rows: BalanceRows, held: list[int]) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from planar.document.files import read_asset
 from planar.foundation.errors import BadInput, NoAnswer
 from planar.foundation.safe_files import save_file, write_error
 from planar.model.mechanism import Mechanism
+from planar.pages.drawing_style import pen_styles, symbol_script
 from planar.pages.gallery_kinds import KINDS, kind_and_search_text
 from planar.pages.page import fill_template, page, script_safe_json
 from planar.pages.page_data import fixed_drawing_data
@@ -77,8 +78,8 @@ def index_page(shown: list[dict[str, Any]]) -> str:
     kinds = [(kind, own) for kind, own in kinds if own]
     links = "".join(f'<a href="#kind-{KINDS.index(kind)}">{escape(kind)}</a> ' for kind, _ in kinds)
     title = escape(f"{len(shown)} mechanisms" if len(shown) != 1 else "1 mechanism")
-    scripts = "\n".join(read_asset(name) for name in SCRIPTS)
-    styles = "\n".join(read_asset(name) for name in STYLES).replace("#drawing", ".small")  # a page has one drawing
+    scripts = "\n".join([symbol_script(), *map(read_asset, SCRIPTS)])
+    styles = "\n".join([*map(read_asset, STYLES), pen_styles()]).replace("#drawing", ".small")  # a page has one drawing
     parts = {
         "title": title,
         "styles": styles,

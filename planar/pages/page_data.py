@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import islice
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
 from planar.analysis.centres.centres import extent
@@ -18,21 +17,22 @@ from planar.analysis.rich_text import with_double_primes
 from planar.assemblies.circuits.circuits import circuits
 from planar.assemblies.modes import modes
 from planar.codegen.javascript import write_javascript
-from planar.drawing.scheme.link_bodies import all_marks
+from planar.drawing.centres.circle_diagram import circle_radius, link_points
+from planar.drawing.scheme.link_bodies import RELATIVE_TOLERANCE, LinkBody, all_marks, bodies_of_points, largest_span
 from planar.drawing.scheme.springs_masses import SpringMassMark
-from planar.drawing.scheme.symbols import SPRING_SYMBOLS
 from planar.equations.constraint_equations import slice_length
 from planar.equations.mechanism_numbers import scale_lengths, shapes_of_links
 from planar.foundation.geometry import Vector
 from planar.foundation.units import display_unit
-from planar.model.dimensions import Dimension, change_dimension, dimensions
+from planar.model.dimensions import Dimension, change_dimension
 from planar.model.link_graph import link_numbers
 from planar.model.link_shapes import PointPlacementError
 from planar.model.mechanism import Mechanism, links_counting_turns, named_points, pair_misfits
 from planar.model.pairs import MeasureKind, Pair
-from planar.model.pairs.symbols import DrawingMark
+from planar.model.pairs.symbols import DrawingMark, PinMark
 from planar.model.wording import amount
 from planar.pages.column_data import column_heads, reported_function, uncounted_angles
+from planar.pages.dimension_numbers import DimensionNumbers
 from planar.pages.document_data import dimension_words, document_data, is_positive_length
 from planar.pages.force_data import force_data
 from planar.results.motion import State
@@ -46,31 +46,6 @@ PROBE_RATIO = 0.02
 MAX_HALVINGS = 40
 MAX_ASSEMBLIES = 64
 """Assemblies that a page offers."""
-
-
-class DimensionNumbers:
-    """Numbers that depend on the dimensions, each with its place in what the page's function `sizes` gives."""
-
-    def __init__(self, mechanism: Mechanism, live: bool = True):
-        self.dimensions = list(dimensions(mechanism, frozenset(link.name for link in mechanism.links))) if live else []
-        self.d = ca.SX.sym("d", len(self.dimensions))
-        for k, each in enumerate(self.dimensions):
-            mechanism = change_dimension(mechanism, each, self.d[k])
-        self.mechanism, self.shapes = mechanism, shapes_of_links(mechanism)
-        self.values: list[Any] = []
-
-    def add(self, value: Any) -> int:
-        """The place of a number."""
-        self.values.append(value)
-        return len(self.values) - 1
-
-    def add_point(self, at: Vector) -> list[int]:
-        """The places of x and y."""
-        return [self.add(at.x), self.add(at.y)]
-
-    def to_javascript(self) -> str:
-        """sizes(d): all numbers."""
-        return write_javascript("sizes", ca.Function("sizes", [self.d], [ca.vertcat(*map(ca.SX, self.values))]))
 
 
 SHOWN_KINDS = ("length", "angle", "velocity", "acceleration", "angular velocity", "angular acceleration")
@@ -132,6 +107,7 @@ def page_data(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[s
         "numbers": link_numbers(mechanism),
         "counting": sorted(links_counting_turns(mechanism)),
         "centred": _pair_centres(state),
+        "circle": _circle_data(mechanism),
         **_lettered(mechanism, named),
         "rolling": list(usual_links(mechanism)) if len(mechanism.links) > 1 else None,
         "document": document_data(mechanism, numbers.dimensions),
@@ -181,7 +157,8 @@ def _lettered(mechanism: Mechanism, named: Mapping[tuple[str, str], str]) -> dic
 
 
 def drawing_data(mechanism: Mechanism, numbers: DimensionNumbers) -> dict[str, Any]:
-    """What a drawing of the mechanism needs: its links, points and marks, their numbers as places."""
+    """What a drawing of the mechanism needs: its links, points, bodies and marks, their numbers as places."""
+    named = {member: name for name, members in named_points(mechanism) for member in members}
     points = {
         name: {
             "links": [member[0] for member in members],
@@ -189,20 +166,54 @@ def drawing_data(mechanism: Mechanism, numbers: DimensionNumbers) -> dict[str, A
         }
         for name, members in named_points(mechanism)
     }
+    marks = all_marks(numbers.mechanism, numbers.shapes)
     return {
         "frame": mechanism.frame,
         "links": [link.name for link in mechanism.links],
         "points": points,
         "names": list(points),
-        "marks": [_mark_data(mark, numbers) for mark in all_marks(numbers.mechanism, numbers.shapes)],
-        "coils": SPRING_SYMBOLS,
+        "marks": [_mark_data(mark, numbers) for mark in marks],
+        "bodies": _body_data(mechanism, marks, numbers),
+        "running": {
+            pair.name: named[rides[0]] for pair in mechanism.pairs if (rides := pair.point_on_line()) is not None
+        },
     }
+
+
+def _body_data(mechanism: Mechanism, marks: Sequence[DrawingMark | SpringMassMark], numbers: DimensionNumbers) -> Any:
+    """What each link looks like in its own axes, chosen at the file's dimensions; of the frame its free points."""
+    shapes = shapes_of_links(mechanism)
+    own = {link.name: numbers.shapes[link.name].points for link in mechanism.links}
+    own, marks = numbers.with_values((own, marks))
+    moving = {link: list(points.values()) for link, points in own.items() if link != mechanism.frame}
+    bodies = bodies_of_points(moving, marks, RELATIVE_TOLERANCE * largest_span(shapes))
+    pinned = {mark.name for mark in marks if isinstance(mark, PinMark)}
+    alone = (dict(each.members).get(mechanism.frame) for each in named_points(mechanism) if each.name not in pinned)
+    dots = tuple(own[mechanism.frame][point] for point in alone if point is not None)
+    places: dict[int, list[int]] = {}
+
+    def place(value: Any) -> Any:
+        if isinstance(value, Vector):
+            return places[id(value)] if id(value) in places else places.setdefault(id(value), numbers.add_point(value))
+        if isinstance(value, tuple):
+            parts = [place(part) for part in value]
+            return dict(zip(value._fields, parts, strict=True)) if hasattr(value, "_fields") else parts
+        return value
+
+    bodies[mechanism.frame] = LinkBody(mechanism.frame, dots=dots)
+    return {link: place(body) for link, body in bodies.items()}
 
 
 def fixed_drawing_data(mechanism: Mechanism) -> tuple[dict[str, Any], list[float]]:
     """What a drawing needs whose dimensions stay as they are, and the numbers themselves."""
     numbers = DimensionNumbers(mechanism, live=False)
     return drawing_data(mechanism, numbers), [float(each) for each in numbers.values]
+
+
+def _circle_data(mechanism: Mechanism) -> dict[str, list[float]]:
+    """Where links stand in the circle diagram, in the order of their numbers, in parts of its radius."""
+    numbers = link_numbers(mechanism)
+    return {link: [x / circle_radius(len(numbers)) for x in at] for link, at in link_points(numbers).items()}
 
 
 def _pair_centres(state: State) -> list[list[str]]:
@@ -300,19 +311,6 @@ def _admissible_bound(mechanism: Mechanism, each: Dimension, value: float, to: f
     return value
 
 
-PAGE_WORDS: dict[str, tuple[str, dict[str, str]]] = {
-    "PinMark": ("Pin", {"positions": "at"}),
-    "GuideMark": ("Guide", {"direction": "way"}),
-    "SliderMark": ("Block", {"position": "at", "direction": "way", "guide_link": "on"}),
-    "SlotMark": ("Opening", {"direction": "way", "pin_link": "pin", "pin_position": "at"}),
-    "WheelMark": ("Wheel", {}),
-    "PitchLineMark": ("PitchLine", {"direction": "way"}),
-    "BeltMark": ("Band", {}),
-    "MassCentreMark": ("Centre", {}),
-}
-"""What the scripts of a page call the marks and their parts."""
-
-
 def _mark_data(mark: DrawingMark | SpringMassMark, numbers: DimensionNumbers) -> dict[str, Any]:
     """A mark with its numbers as places."""
 
@@ -320,8 +318,7 @@ def _mark_data(mark: DrawingMark | SpringMassMark, numbers: DimensionNumbers) ->
         if isinstance(value, Vector):
             return numbers.add_point(value)
         if isinstance(value, tuple) and hasattr(value, "_fields"):
-            kind, keys = PAGE_WORDS.get(type(value).__name__, (type(value).__name__, {}))
-            return {"kind": kind, **{keys.get(name, name): told(part) for name, part in value._asdict().items()}}
+            return {"kind": type(value).__name__, **{name: told(part) for name, part in value._asdict().items()}}
         if isinstance(value, tuple):
             return [told(part) for part in value]
         return value if isinstance(value, str | bool) else {"at": numbers.add(value)}

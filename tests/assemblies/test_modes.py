@@ -14,7 +14,7 @@ from planar.assemblies.polynomial.completeness import Completeness
 from planar.document.files import load_models
 from planar.drawing.paper.picture import Circle, Label
 from planar.drawing.paper.scales import parse_scale
-from planar.drawing.scheme import symbols
+from planar.drawing.scheme import symbol_table
 from planar.drawing.scheme.assemblies import ASSEMBLIES_PER_SHEET, assembly_sheets
 from tests import command
 from tests.bars import bars, four_bar, tower
@@ -288,7 +288,7 @@ def test_the_sheet_has_a_window_for_each_with_its_number(tmp_path):
     assert len({window.points for window in windows}) == 1
     pins = [mark.radius for mark in pictures[0].marks if isinstance(mark, Circle) and mark.about.startswith("pin ")]
     assert pins
-    assert max(pins) < 0.8 * symbols.PIN_RADIUS  # small drawings have small pins
+    assert max(pins) < 0.8 * symbol_table.PIN_RADIUS  # small drawings have small pins
     for picture, mode in zip(pictures, planar.modes(planar.load("jansen-leg"), certify=False), strict=True):
         at = next(np.array(mark.at) for mark in picture.marks if isinstance(mark, Label) and mark.text == "foot")
         assert at * scale.per_mm == pytest.approx(mode.points["foot"])

@@ -14,7 +14,7 @@ import planar
 from planar.drawing.output.animation import PIXELS_PER_MM, animate, plan_animation
 from planar.drawing.paper.pens import PEN_STYLES
 from planar.drawing.paper.picture import Pen
-from planar.drawing.scheme.symbols import PIN_RADIUS
+from planar.drawing.scheme.symbol_table import PIN_RADIUS
 from planar.foundation.errors import BadInput
 
 pytest.importorskip("matplotlib")

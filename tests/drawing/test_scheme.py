@@ -16,7 +16,7 @@ from planar.drawing.output.matplotlib_figure import draw_pictures
 from planar.drawing.paper.picture import Arrow, Circle, Fill, Label, Pen, Picture, Polyline, extent
 from planar.drawing.paper.scales import Scale
 from planar.drawing.paper.scales import parse_scale as reading
-from planar.drawing.scheme import symbols
+from planar.drawing.scheme import symbol_table
 from planar.drawing.scheme.details import AROUND, scheme_with_details
 from planar.drawing.scheme.ground import ground_marks
 from planar.drawing.scheme.link_bodies import convex_hull, link_bodies
@@ -202,7 +202,7 @@ def test_a_fixed_wheel_is_hatched_behind_its_rim():
         centre = state.point("O").position / 1e-3
         circles = [mark for mark in marks if isinstance(mark, Circle) and mark.centre == pytest.approx(tuple(centre))]
         radius = max(mark.radius for mark in circles)
-        assert radius == pytest.approx((80.0 + symbols.RIM_WIDTH) if rim else 60.0)
+        assert radius == pytest.approx((80.0 + symbol_table.RIM_WIDTH) if rim else 60.0)
         hatches = [mark for mark in marks if isinstance(mark, Polyline) and mark.pen is Pen.HATCH]
         assert len(hatches) > 6
         for hatch in hatches:
@@ -253,7 +253,7 @@ def test_joints_lie_at_their_places_to_scale(name):
     for point in together:
         mark = pins.pop(f"pin {point}")
         assert mark.centre == pytest.approx(tuple(state.point(point).position / 2e-3), abs=1e-12)
-        assert (mark.radius, mark.fill) == (symbols.PIN_RADIUS, Fill.PAPER)
+        assert (mark.radius, mark.fill) == (symbol_table.PIN_RADIUS, Fill.PAPER)
     riding = {
         each.name: pair
         for pair in state.mechanism.pairs
@@ -271,7 +271,7 @@ def test_joints_lie_at_their_places_to_scale(name):
         middle = np.mean(mark.points, axis=0)
         np.testing.assert_allclose(middle, state.point(point).position / 2e-3, atol=1e-9)
         (a, b, c, _) = (np.array(each) for each in mark.points)
-        assert (np.linalg.norm(b - a), np.linalg.norm(c - b)) == pytest.approx(symbols.BLOCK_SIZE, rel=1e-9)
+        assert (np.linalg.norm(b - a), np.linalg.norm(c - b)) == pytest.approx(symbol_table.BLOCK_SIZE, rel=1e-9)
 
 
 @every_model
@@ -560,10 +560,10 @@ def test_a_fixed_guide_is_as_long_as_the_travel_of_its_block():
         return mark.points
 
     (a, b), (c, d) = rail(short)
-    assert hypot(c - a, d - b) == pytest.approx(symbols.RAIL_LENGTH)
+    assert hypot(c - a, d - b) == pytest.approx(symbol_table.RAIL_LENGTH)
     (a, b), (c, d) = rail(long)
     assert (min(a, c), max(a, c)) == pytest.approx((1120 - 5.5, 2080 + 5.5))
-    assert abs(b) == pytest.approx(symbols.BLOCK_SIZE[1] / 2.0)  # under the block, whose middle is on the line
+    assert abs(b) == pytest.approx(symbol_table.BLOCK_SIZE[1] / 2.0)  # under the block, whose middle is on the line
     assert b == pytest.approx(d)
 
 
@@ -616,13 +616,14 @@ def test_hatching_leans_away_from_the_line_on_the_far_side_of_the_pin(name):
             base = np.array(marks[1].points)
             down = base.mean(axis=0) - pin.centre
             start, stop = (np.array(spot) - pin.centre for spot in hatch.points)
-            assert np.hypot(*down) == pytest.approx(symbols.SUPPORT_HEIGHT)
-            depths = start @ down / symbols.SUPPORT_HEIGHT, stop @ down / symbols.SUPPORT_HEIGHT
+            assert np.hypot(*down) == pytest.approx(symbol_table.SUPPORT_HEIGHT)
+            depths = start @ down / symbol_table.SUPPORT_HEIGHT, stop @ down / symbol_table.SUPPORT_HEIGHT
             # from the base line outwards at 45 degrees
             assert depths == pytest.approx(
-                (symbols.SUPPORT_HEIGHT, symbols.SUPPORT_HEIGHT + symbols.HATCH_LENGTH / sqrt(2.0)), abs=1e-9
+                (symbol_table.SUPPORT_HEIGHT, symbol_table.SUPPORT_HEIGHT + symbol_table.HATCH_LENGTH / sqrt(2.0)),
+                abs=1e-9,
             )
-            assert np.hypot(*(stop - start)) == pytest.approx(symbols.HATCH_LENGTH)
+            assert np.hypot(*(stop - start)) == pytest.approx(symbol_table.HATCH_LENGTH)
 
 
 def test_a_long_guide_leaves_room_for_the_support_of_a_pin_on_its_way():
@@ -630,7 +631,7 @@ def test_a_long_guide_leaves_room_for_the_support_of_a_pin_on_its_way():
     rails = [mark.points for mark in about(picture, "guide stroke") if mark.pen is Pen.GROUND]
     assert sorted(x for spots in rails for x, _ in spots) == pytest.approx([-80.5, -4.5, 4.5, 80.5])
     base = about(picture, "ground O")[1]
-    assert np.mean(base.points, axis=0) == pytest.approx((0.0, -symbols.SUPPORT_HEIGHT))
+    assert np.mean(base.points, axis=0) == pytest.approx((0.0, -symbol_table.SUPPORT_HEIGHT))
 
 
 def test_a_support_stands_on_the_side_that_no_link_leaves_from():
@@ -650,7 +651,7 @@ def test_a_support_stands_on_the_side_that_no_link_leaves_from():
         middle = np.mean(base.points, axis=0)
         assert middle @ np.array([cos(degrees * pi / 180), sin(degrees * pi / 180)]) < 2.0
         if degrees != -100:
-            np.testing.assert_allclose(middle, np.array(wanted) * symbols.SUPPORT_HEIGHT, atol=1e-9)
+            np.testing.assert_allclose(middle, np.array(wanted) * symbol_table.SUPPORT_HEIGHT, atol=1e-9)
 
 
 def test_a_link_that_slides_through_a_fixed_block_is_drawn_with_the_block_on_the_frame():
@@ -709,7 +710,7 @@ def test_where_symbols_lie_on_each_other_that_part_is_drawn_larger_beside_it(nam
     one, other = detail.title.removeprefix("Detail: ").split(" and ")
     large, small = (reading(picture.notes[0].removeprefix("Space diagram, ")).per_mm for picture in (detail, whole))
     a, b = (state.point(point).position / large for point in (one, other))
-    reach = hypot(*symbols.BLOCK_SIZE) / 2.0 + symbols.PIN_RADIUS
+    reach = hypot(*symbol_table.BLOCK_SIZE) / 2.0 + symbol_table.PIN_RADIUS
     assert hypot(*(a - b)) > reach > hypot(*(a - b)) * large / small
     low, high = np.minimum(a, b) - AROUND, np.maximum(a, b) + AROUND
     assert detail.window == (pytest.approx(low), pytest.approx(high))

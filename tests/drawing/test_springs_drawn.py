@@ -13,7 +13,7 @@ import planar
 from planar.drawing.diagrams.positions import positions
 from planar.drawing.output.animation import plan_animation
 from planar.drawing.paper.picture import Circle, Fill, Label, Polyline
-from planar.drawing.scheme import symbols
+from planar.drawing.scheme import symbol_table
 from planar.drawing.scheme.scheme import scheme
 from planar.foundation.errors import BadInput
 from planar.model.loads import Mass, Spring
@@ -47,8 +47,8 @@ def test_a_spring_is_a_zigzag_between_its_points_and_lengthens_with_them():
         assert lengths[-1] == pytest.approx(lamp_spring(script.run.position[row]), rel=1e-9)
         way = (stop - start) / np.hypot(*(stop - start))
         off = [float(way[0] * y - way[1] * x) for x, y in np.array(spring.points) - start]
-        assert max(off) == pytest.approx(symbols.SPRING_HALF_WIDTH) and min(off) == pytest.approx(
-            -symbols.SPRING_HALF_WIDTH
+        assert max(off) == pytest.approx(symbol_table.SPRING_HALF_WIDTH) and min(off) == pytest.approx(
+            -symbol_table.SPRING_HALF_WIDTH
         )
         assert sum(a * b < -1e-9 for a, b in pairwise(off)) == 11
     assert max(lengths) > 4.0 * min(lengths)
@@ -93,7 +93,9 @@ def test_a_damper_is_a_dashpot_and_beside_a_spring_both_stand_between_cross_bars
     pins = [about(drawn.marks, f"pin {name}", Circle)[0].centre for name in ("LA", "UB")]
     assert length == pytest.approx(np.hypot(*np.subtract(*pins)), rel=1e-9)
     wide = (
-        symbols.SIDE_BY_SIDE_OFFSET + symbols.SPRING_HALF_WIDTH if stiffness and damping else symbols.SPRING_HALF_WIDTH
+        symbol_table.SIDE_BY_SIDE_OFFSET + symbol_table.SPRING_HALF_WIDTH
+        if stiffness and damping
+        else symbol_table.SPRING_HALF_WIDTH
     )
     assert np.abs(off).max() == pytest.approx(wide)
 
@@ -110,7 +112,7 @@ def test_a_torsional_spring_is_wound_by_as_much_as_its_links_turn():
         arms = np.array(spring.points) - centre
         turns = np.unwrap(np.arctan2(arms[:, 1], arms[:, 0]))
         radii = np.hypot(*arms.T)
-        assert (radii[0], radii[-1]) == pytest.approx(symbols.TORSION_SPRING_RADII[::-1])
+        assert (radii[0], radii[-1]) == pytest.approx(symbol_table.TORSION_SPRING_RADII[::-1])
         chassis = atan2(440 - 190, 330 - 250)
         assert np.exp(1j * turns[0]) == pytest.approx(np.exp(1j * chassis))
         assert np.exp(1j * turns[-1]) == pytest.approx(np.exp(1j * radians(degrees)))
@@ -163,15 +165,15 @@ def test_a_spring_or_mass_made_in_python_that_is_nowhere_is_refused_in_a_sentenc
 
 
 ENDS = """() => {
-  const path = document.querySelector(".spring").getAttribute("d");
+  const path = document.querySelector(".mechanism .springs path").getAttribute("d");
   const numbers = path.match(/-?[0-9.]+/g).map(Number), last = numbers.length;
-  const pins = [...document.querySelectorAll(".mechanism .pins .pin")].map((pin) => {
+  const pins = [...document.querySelectorAll(".mechanism .pins .pen-pin.fill-paper")].map((pin) => {
     const box = pin.getBoundingClientRect(), svg = document.getElementById("drawing").getBoundingClientRect();
     return [box.x + box.width / 2 - svg.x, box.y + box.height / 2 - svg.y];
   });
   return {
     ends: [numbers.slice(0, 2), numbers.slice(last - 2)], pins,
-    masses: document.querySelectorAll(".mechanism .mass").length,
+    masses: document.querySelectorAll(".mechanism .sliders circle").length,
     letters: [...document.querySelectorAll(".mechanism .letter")].map((each) => each.textContent),
   };
 }"""

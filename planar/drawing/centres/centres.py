@@ -37,7 +37,7 @@ from planar.drawing.paper.picture import (
 )
 from planar.drawing.paper.scales import Scale, round_scale
 from planar.drawing.scheme.scheme import plain_frames, scheme, space_scale
-from planar.drawing.scheme.symbols import PIN_RADIUS
+from planar.drawing.scheme.symbol_table import PIN_RADIUS
 from planar.foundation.errors import BadInput
 from planar.foundation.units import parse_unit
 from planar.model.mechanism import relative_motions

@@ -39,7 +39,7 @@ def circle_picture(found: Centres, shown: Sequence[Centre]) -> Picture:
     Strokes are `about` "circle", "link AB" and "chord I24", of which there are two parts where its number stands
     between them; letters "number of AB" and "order of I24". A centre that is not determined has no chord.
     """
-    places = _link_points(found)
+    places = link_points(found.numbers)
     drawn = [each for each in shown if each.how in CHORD_STYLES]
     chords = {each.name: np.array([places[link] for link in each.links]) for each in drawn}
     orders = {each.name: str(each.order) for each in drawn if each.how != "pair"}
@@ -70,9 +70,9 @@ def circle_radius(links: int) -> float:
     return min(26.0 + 1.5 * links, 48.0)
 
 
-def _link_points(found: Centres) -> dict[str, PaperPoint]:
-    """The links' points in the order of their numbers, clockwise; of an even number two stand at the top."""
-    links = sorted(found.numbers, key=lambda link: int(found.numbers[link]))
+def link_points(numbers: Mapping[str, str]) -> dict[str, PaperPoint]:
+    """The links' points (mm) in the order of their numbers, clockwise; of an even number two stand at the top."""
+    links = sorted(numbers, key=lambda link: int(numbers[link]))
     count = len(links)
     first = pi / 2.0 + (pi / count if count % 2 == 0 else 0.0)
     return {

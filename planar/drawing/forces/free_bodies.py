@@ -22,7 +22,7 @@ from planar.drawing.paper.picture import (
     paper_point,
 )
 from planar.drawing.paper.scales import Scale, choose_prefix, format_force, parse_scales, round_scale
-from planar.drawing.scheme import symbols
+from planar.drawing.scheme import symbol_table, symbols
 from planar.drawing.scheme.ground import Clearance
 from planar.drawing.scheme.link_bodies import link_bodies, unit_vector
 from planar.drawing.scheme.link_strokes import moving_marks
@@ -100,7 +100,7 @@ class _FreeBody:
         if self.is_two_force_member:
             strokes.insert(0, self._line_of_action())
         for at in dict.fromkeys(self._action_point(each) for each in self.arrows if each.at_mass_centre):
-            strokes += symbols.mass_centre(Vector(*at), "centre of mass")
+            strokes += symbols.symbol_marks("mass centre", "centre of mass", Vector(*at))
         clear, letters = Clearance.from_marks(strokes), list(_point_labels(self.scene, self.link))
         for each in self.arrows:
             arrow = self._force_arrow(each, clear)
@@ -163,7 +163,7 @@ class _FreeBody:
         way, long = unit_vector(along), hypot(*along)
         price = [
             clear.count_in_box(at, way, Vector(low, -1.0), Vector(high, 1.0))
-            for low, high in ((symbols.PIN_RADIUS, long), (-long, -symbols.PIN_RADIUS))
+            for low, high in ((symbol_table.PIN_RADIUS, long), (-long, -symbol_table.PIN_RADIUS))
         ]
         tail = at if price[0] <= price[1] else at - along
         return Arrow(paper_point(tail), paper_point(tail + along), push.pen, f"force {push.symbol}")
@@ -219,23 +219,24 @@ def _body_marks(scene: Scene, link: str) -> Iterator[Mark]:
     for centre, radius, name in {
         (each.centre, each.radius): (each.centre, each.radius, each.name) for each in wheels if each.link == link
     }.values():
-        yield from symbols.wheel(scene.to_paper(link, centre), scene.scale.on_paper(radius), f"gear {name}", Pen.LINK)
+        yield from symbols.wheel(scene.to_paper(link, centre), scene.scale.on_paper(radius), f"gear {name}")
     pins = {}
     for mark in scene.marks:
         if isinstance(mark, SliderMark) and mark.link == link and mark.name not in scene.cylinders:
-            yield symbols.block(
+            yield from symbols.symbol_marks(
+                "block",
+                f"block {scene.running_point_name(mark.name)}",
                 scene.to_paper(link, mark.position),
                 scene.direction_on_paper(link, mark.direction),
-                f"block {scene.running_point_name(mark.name)}",
             )
         elif isinstance(mark, PinMark) and link in mark.links:
             pins.setdefault(mark.name, mark.positions[mark.links.index(link)])
         elif isinstance(mark, SlotMark) and mark.pin_link == link:
             pins.setdefault(scene.running_point_name(mark.name), mark.pin_position)
     for name, at in pins.items():
-        yield symbols.pin(scene.to_paper(link, at), f"pin {name}")
+        yield from symbols.symbol_marks("pin", f"pin {name}", scene.to_paper(link, at))
     for at in scene.bodies[link].dots:
-        yield symbols.dot(scene.to_paper(link, at), f"point of {link}")
+        yield from symbols.symbol_marks("dot", f"point of {link}", scene.to_paper(link, at))
 
 
 def _point_labels(scene: Scene, link: str) -> Iterator[Label]:

@@ -9,7 +9,7 @@ from math import hypot
 from planar.drawing.labels.placement import SAME_POINT_TOLERANCE
 from planar.drawing.paper.picture import Label, Mark, PaperPoint, Pen, Picture, Polyline, extent, paper_point
 from planar.drawing.paper.scales import Scale, round_scale
-from planar.drawing.scheme import symbols
+from planar.drawing.scheme import symbol_table
 from planar.drawing.scheme.link_bodies import all_marks
 from planar.drawing.scheme.scheme import CROWDED_PIN_DISTANCE, plain_frames, scheme, scheme_scale
 from planar.foundation.geometry import Vector
@@ -71,7 +71,7 @@ def _symbols(state: State) -> dict[str, tuple[Vector, float]]:
         block = not riders.isdisjoint(each.members)
         if block or each.name in pins:
             link, point = each.members[0]
-            reach = hypot(*symbols.BLOCK_SIZE) / 2.0 if block else CROWDED_PIN_DISTANCE / 2.0
+            reach = hypot(*symbol_table.BLOCK_SIZE) / 2.0 if block else CROWDED_PIN_DISTANCE / 2.0
             found[each.name] = frames[link].to_world(state.shapes[link].position(point)), reach
     return found
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from planar.drawing.paper.picture import Arrow, Circle, Mark, Pen, Polyline, paper_point
 from planar.drawing.paper.scales import Scale
-from planar.drawing.scheme import symbols
+from planar.drawing.scheme import symbol_table, symbols
 from planar.drawing.scheme.link_bodies import LinkBody, distance_between, unit_vector
 from planar.drawing.scheme.link_strokes import bar_strokes, cylinder_strokes, rack_contact, rack_strokes
 from planar.drawing.scheme.scene import Scene, TravelRanges
@@ -23,7 +23,7 @@ from planar.model.link_shapes import LinkShape
 from planar.model.mechanism import Mechanism
 from planar.model.pairs.symbols import BeltMark, GuideMark, PinMark, PitchLineMark, SliderMark, SlotMark, WheelMark
 
-FIXED_GUIDE_OVERHANG = symbols.BLOCK_SIZE[0] / 2.0 + 2.0
+FIXED_GUIDE_OVERHANG = symbol_table.BLOCK_SIZE[0] / 2.0 + 2.0
 """mm: how far a fixed guide goes on beyond the middle of a block at the end of its travel."""
 GUIDE_LIFT = 0.8
 """mm: how far a guide may be off its block, where a rack lies between them."""
@@ -54,9 +54,10 @@ def fixed_marks(scene: Scene, obstacles: Iterable[Mark] = ()) -> tuple[Mark, ...
     frame = scene.mechanism.frame
     made: list[Mark] = []
     taken = [
-        symbols.pin(scene.to_paper(frame, mark.positions[mark.links.index(frame)]), "")
+        pin
         for mark in scene.marks
         if isinstance(mark, PinMark) and frame in mark.links
+        for pin in symbols.symbol_marks("pin", "", scene.to_paper(frame, mark.positions[mark.links.index(frame)]))
     ]
     moving = (
         *bar_strokes(scene, Pen.LINK),
@@ -92,11 +93,11 @@ def fixed_marks(scene: Scene, obstacles: Iterable[Mark] = ()) -> tuple[Mark, ...
         if isinstance(mark, PinMark) and frame in mark.links and mark.name not in drawn:
             drawn.add(mark.name)
             at = scene.to_paper(frame, mark.positions[mark.links.index(frame)])
-            strokes = symbols.support(at, clear.support_direction(at), f"ground {mark.name}")
+            strokes = tuple(symbols.symbol_marks("support", f"ground {mark.name}", at, clear.support_direction(at)))
             made += strokes
             clear = clear.with_marks(strokes)
     for name, at in _spring_anchors(scene, taken):
-        strokes = symbols.support(at, clear.support_direction(at), f"ground of {name}")
+        strokes = tuple(symbols.symbol_marks("support", f"ground of {name}", at, clear.support_direction(at)))
         made += strokes
         clear = clear.with_marks(strokes)
     return tuple(made)
@@ -132,17 +133,17 @@ def _fixed_guide_strokes(
 ) -> Iterator[Mark]:
     """A hatched line beneath a block; round a pin a slot; a fixed block, through which a link slides."""
     about = f"guide {mark.name}"
-    half = symbols.BLOCK_SIZE[1] / 2.0
+    half = symbol_table.BLOCK_SIZE[1] / 2.0
     if isinstance(mark, SliderMark):
         at, way = scene.to_paper(mark.link, mark.position), scene.direction_on_paper(mark.link, mark.direction)
-        low, high = -symbols.BLOCK_SIZE[0] / 2.0 - 1.0, symbols.BLOCK_SIZE[0] / 2.0 + 1.0
+        low, high = -symbol_table.BLOCK_SIZE[0] / 2.0 - 1.0, symbol_table.BLOCK_SIZE[0] / 2.0 + 1.0
     else:
         rider, point = scene.running_point(mark.name) or (mark.link, mark.through)
         at, way = scene.to_paper(rider, point), scene.direction_on_paper(mark.link, mark.direction)
-        room = symbols.RAIL_LENGTH / 2.0 if mark.name not in scene.travel else 0.0
+        room = symbol_table.RAIL_LENGTH / 2.0 if mark.name not in scene.travel else 0.0
         low, high = _guide_extent(scene, mark.name, mark.through, mark.direction, room)
         if isinstance(mark, SlotMark):
-            half = symbols.SLOT_SIZE[1] / 2.0
+            half = symbol_table.SLOT_SIZE[1] / 2.0
             across = symbols.quarter_turn(way) * half
             for side in (across, across * -1.0):
                 yield symbols.stroke(about, Pen.GROUND, at + way * low + side, at + way * high + side)
@@ -156,16 +157,16 @@ def _rail_segments(
 ) -> list[tuple[float, float]]:
     """A rail along a line (mm from its block), with gaps for the supports of fixed pins that lie on its way."""
     frame, pieces = scene.mechanism.frame, [(low, high)]
-    room = symbols.SUPPORT_WIDTH / 2.0 + 1.0
+    room = symbol_table.SUPPORT_WIDTH / 2.0 + 1.0
     for pin in scene.marks:
         if isinstance(pin, PinMark) and frame in pin.links:
             off = scene.to_paper(frame, pin.positions[pin.links.index(frame)]) - at
             here, beside = off.dot(way), abs(way.cross(off))
-            under = mark.name not in scene.travel and abs(here) < room + symbols.BLOCK_SIZE[0] / 2.0
-            if beside < symbols.SUPPORT_HEIGHT + symbols.HATCH_LENGTH and not under:
+            under = mark.name not in scene.travel and abs(here) < room + symbol_table.BLOCK_SIZE[0] / 2.0
+            if beside < symbol_table.SUPPORT_HEIGHT + symbol_table.HATCH_LENGTH and not under:
                 cut = [(start, min(stop, here - room)) for start, stop in pieces]
                 cut += [(max(start, here + room), stop) for start, stop in pieces]
-                pieces = [(start, stop) for start, stop in cut if stop - start > symbols.HATCH_LENGTH]
+                pieces = [(start, stop) for start, stop in cut if stop - start > symbol_table.HATCH_LENGTH]
     return pieces or [(low, high)]
 
 
@@ -223,8 +224,8 @@ class Clearance:
         def price(index: int, down: Vector) -> tuple[float, int]:
             off = self.points - centre
             along, left = off @ np.array(paper_point(down)), off @ np.array(paper_point(symbols.quarter_turn(down)))
-            inside = (along > 1.4) & (along < symbols.SUPPORT_HEIGHT + symbols.HATCH_LENGTH + 0.8)
-            inside &= np.abs(left) < np.minimum(1.0 + 0.7 * along, symbols.SUPPORT_WIDTH / 2.0 + 0.5)
+            inside = (along > 1.4) & (along < symbol_table.SUPPORT_HEIGHT + symbol_table.HATCH_LENGTH + 0.8)
+            inside &= np.abs(left) < np.minimum(1.0 + 0.7 * along, symbol_table.SUPPORT_WIDTH / 2.0 + 0.5)
             return float(np.sum(inside)) + 1.5 * (index > 0) + 1.5 * (index > 3), index
 
         ways = [*UPRIGHT_DIRECTIONS, *SLANTED_DIRECTIONS]
@@ -238,7 +239,7 @@ class Clearance:
 
         def price(choice: tuple[float, float]) -> tuple[float, float, float]:
             sign, off = choice
-            near, far = sorted((sign * (off - 0.25), sign * (off + symbols.HATCH_LENGTH + 1.0)))
+            near, far = sorted((sign * (off - 0.25), sign * (off + symbol_table.HATCH_LENGTH + 1.0)))
             lifted = 1.0 * (off > half)
             crowded = self.count_in_box(at, way, Vector(low, near), Vector(high, far)) + lifted
             side = left * sign

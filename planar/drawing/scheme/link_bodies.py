@@ -51,13 +51,21 @@ def all_marks(mechanism: Mechanism, shapes: Mapping[str, LinkShape]) -> tuple[Dr
 
 def link_bodies(mechanism: Mechanism, shapes: Mapping[str, LinkShape]) -> dict[str, LinkBody]:
     """The body of every moving link."""
-    marks = all_marks(mechanism, shapes)
-    near = RELATIVE_TOLERANCE * largest_span(shapes)
-    return {
-        link.name: _link_body(link.name, [*shapes[link.name].points.values()], marks, near)
-        for link in mechanism.links
-        if link.name != mechanism.frame
+    moving = {
+        link.name: [*shapes[link.name].points.values()] for link in mechanism.links if link.name != mechanism.frame
     }
+    return bodies_of_points(moving, all_marks(mechanism, shapes), RELATIVE_TOLERANCE * largest_span(shapes))
+
+
+def bodies_of_points(
+    points: Mapping[str, Sequence[Vector]], marks: Sequence[DrawingMark | SpringMassMark], tolerance: float
+) -> dict[str, LinkBody]:
+    """The bodies of links by their points and by what pairs say of how they are drawn.
+
+    Lengths below `tolerance` are none. Numbers may be any that compare as numbers do, such as those that know
+    how they depend on the dimensions.
+    """
+    return {link: _link_body(link, own, marks, tolerance) for link, own in points.items()}
 
 
 def largest_span(shapes: Mapping[str, LinkShape]) -> float:
@@ -201,12 +209,11 @@ def convex_hull(points: Sequence[Vector], tolerance: float) -> tuple[Vector, ...
 
 
 def distinct_points(points: Iterable[Vector], tolerance: float) -> tuple[Vector, ...]:
-    """The points but for those that coincide with an earlier one, as plain numbers."""
+    """The points but for those that coincide with an earlier one."""
     kept: list[Vector] = []
     for point in points:
-        plain = Vector(float(point.x), float(point.y))
-        if all(distance_between(plain, other) > tolerance for other in kept):
-            kept.append(plain)
+        if all(distance_between(point, other) > tolerance for other in kept):
+            kept.append(point)
     return tuple(kept)
 
 

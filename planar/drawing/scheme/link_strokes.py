@@ -8,7 +8,7 @@ from typing import Any
 
 from planar.drawing.paper.picture import Circle, Fill, Mark, Pen, Polyline
 from planar.drawing.paper.scales import Scale
-from planar.drawing.scheme import symbols
+from planar.drawing.scheme import symbol_table, symbols
 from planar.drawing.scheme.link_bodies import LinkBody, distance_from_line
 from planar.drawing.scheme.scene import GUIDE_OVERHANG, Cylinder, Scene, TravelRanges
 from planar.drawing.scheme.spring_mass_strokes import mass_centre_marks, spring_strokes
@@ -90,7 +90,7 @@ def _guide_strokes(scene: Scene, link: str, body: LinkBody, pen: Pen) -> Iterato
             start, stop = (0.0, high + over) if low > 0.0 else (low - over, 0.0)
         if len(body.joints) == 1 and any(hypot(*(at - foot)) <= scene.tolerance for at in slides):
             behind = (
-                over + symbols.BLOCK_SIZE[1] / 2.0 * scene.scale.per_mm
+                over + symbol_table.BLOCK_SIZE[1] / 2.0 * scene.scale.per_mm
             )  # a yoke shows on both sides of its own block
             start, stop = min(start, -behind), max(stop, behind)
         yield symbols.stroke(
@@ -109,7 +109,7 @@ def _wheel_marks(scene: Scene) -> Iterator[Mark]:
             if key not in seen:
                 seen.add(key)
                 at, radius = scene.to_paper(mark.link, mark.centre), scene.scale.on_paper(mark.radius)
-                yield from symbols.wheel(at, radius, f"gear {mark.name}", Pen.LINK)
+                yield from symbols.wheel(at, radius, f"gear {mark.name}")
         elif isinstance(mark, BeltMark):
             both = mark.first, mark.second
             centres = [scene.to_paper(wheel.link, wheel.centre) for wheel in both]
@@ -125,7 +125,9 @@ def rack_strokes(scene: Scene) -> Iterator[Polyline]:
             foot = next(each.foot for each in scene.bodies[mark.link].guides if each.name == mark.name)
             to_foot = (scene.to_paper(mark.link, foot) - at).dot(way)
             low, high = min(-half, to_foot), max(half, to_foot)
-            yield from symbols.rack(at + way * low, at + way * high, back, f"link {mark.link}")
+            yield from symbols.symbol_marks(
+                "rack bar", f"link {mark.link}", at + way * low, way, at + way * high, left=back
+            )
 
 
 def rack_contact(scene: Scene, mark: PitchLineMark) -> tuple[Vector, Vector, Vector, float]:
@@ -160,8 +162,8 @@ def cylinder_strokes(scene: Scene, pen: Pen) -> Iterator[Polyline]:
         ]
         way = scene.direction_on_paper(tube.guide, tube.direction)
         if tube.mouth - tube.base > scene.tolerance:
-            yield symbols.cylinder(spots[0], spots[1], way, f"link {tube.guide}")
-        yield from symbols.piston(spots[2], spots[3], way, f"link {tube.rod}", pen)
+            yield from symbols.symbol_marks("cylinder", f"link {tube.guide}", spots[0], way, spots[1])
+        yield from symbols.symbol_marks("piston", f"link {tube.rod}", spots[2], way, spots[3], pen=pen)
 
 
 def _slider_marks(scene: Scene, pen: Pen) -> Iterator[Mark]:
@@ -173,17 +175,19 @@ def _slider_marks(scene: Scene, pen: Pen) -> Iterator[Mark]:
                 scene.to_paper(mark.pin_link, mark.pin_position),
                 scene.direction_on_paper(mark.link, mark.direction),
             )
-            yield symbols.slot(at, way, f"link {mark.link}", pen)
+            yield from symbols.slot(at, way, f"link {mark.link}", pen)
     for mark in scene.marks:
         if isinstance(mark, SliderMark) and mark.name not in scene.cylinders:
             at, way = scene.to_paper(mark.link, mark.position), scene.direction_on_paper(mark.link, mark.direction)
-            yield symbols.block(at, way, f"block {scene.running_point_name(mark.name)}")
+            yield from symbols.symbol_marks("block", f"block {scene.running_point_name(mark.name)}", at, way)
     yield from mass_centre_marks(scene)
     yield from pin_strokes(scene)
     for link, body in scene.bodies.items():
         for point, at in scene.shapes[link].points.items():
             if any(hypot(*(at - each)) <= scene.tolerance for each in body.dots):
-                yield symbols.dot(scene.to_paper(link, at), f"point {scene.point_names[link, point]}")
+                yield from symbols.symbol_marks(
+                    "dot", f"point {scene.point_names[link, point]}", scene.to_paper(link, at)
+                )
 
 
 def pin_strokes(scene: Scene) -> Iterator[Circle]:
@@ -198,4 +202,4 @@ def pin_strokes(scene: Scene) -> Iterator[Circle]:
             continue
         if name not in drawn:
             drawn.add(name)
-            yield symbols.pin(scene.to_paper(link, at), f"pin {name}")
+            yield from symbols.symbol_marks("pin", f"pin {name}", scene.to_paper(link, at))

@@ -9,7 +9,7 @@ from math import atan2, hypot, pi, remainder
 from planar.drawing.labels.placement import SAME_POINT_TOLERANCE
 from planar.drawing.paper.picture import Arrow, Label, Mark, Pen, Picture, Polyline, paper_point
 from planar.drawing.paper.scales import DRAWING_HEIGHT, DRAWING_WIDTH, Scale, round_scale
-from planar.drawing.scheme import symbols
+from planar.drawing.scheme import symbol_table, symbols
 from planar.drawing.scheme.ground import Clearance, fixed_marks, ground_marks
 from planar.drawing.scheme.link_bodies import LinkBody, all_marks, link_bodies
 from planar.drawing.scheme.link_strokes import body_marks, moving_marks
@@ -28,7 +28,7 @@ from planar.results.motion import State
 
 __all__ = ["body_marks", "ground_marks", "plain_frames", "point_labels", "scheme", "scheme_scale", "space_scale"]
 
-CROWDED_PIN_DISTANCE = 2.2 * symbols.PIN_RADIUS
+CROWDED_PIN_DISTANCE = 2.2 * symbol_table.PIN_RADIUS
 """mm between pins within which they lie on each other."""
 CROWDED_SHEET_SIZE = (240.0, 150.0)
 """mm of a sheet of A4 on its side that a crowded drawing may take, its letters and symbols left out."""
@@ -123,7 +123,8 @@ def _fixed_point_marks(scene: Scene) -> Iterator[Mark]:
     for each in named_points(scene.mechanism):
         at = dict(each.members).get(frame)
         if at is not None and each.name not in pinned:
-            yield symbols.dot(scene.to_paper(frame, scene.shapes[frame].position(at)), f"point {each.name}", Pen.PIN)
+            place = scene.to_paper(frame, scene.shapes[frame].position(at))
+            yield from symbols.symbol_marks("fixed dot", f"point {each.name}", place)
 
 
 def point_labels(scene: Scene, size: float = 9.0) -> Iterator[Label]:
@@ -133,9 +134,9 @@ def point_labels(scene: Scene, size: float = 9.0) -> Iterator[Label]:
     pinned = {mark.name for mark in scene.marks if isinstance(mark, PinMark)}
     for each in named_points(scene.mechanism):
         link, point = each.members[0]
-        away = symbols.PIN_RADIUS + 0.6 if each.name in pinned else 0.9
+        away = symbol_table.PIN_RADIUS + 0.6 if each.name in pinned else 0.9
         if each.name in on_blocks:
-            away = symbols.BLOCK_SIZE[1] / 2.0 + 0.6
+            away = symbol_table.BLOCK_SIZE[1] / 2.0 + 0.6
         at = scene.to_paper(link, scene.shapes[link].position(point))
         yield Label(each.name, paper_point(at), f"point {each.name}", size, away)
 
@@ -154,7 +155,7 @@ def _link_number_labels(scene: Scene, strokes: list[Mark], clear: Clearance) -> 
     if base is not None:
         (a, b), (c, d) = base.points
         yield Label(
-            number[frame], ((a + c) / 2.0, (b + d) / 2.0), f"number of {frame}", 8.0, symbols.HATCH_LENGTH + 0.8
+            number[frame], ((a + c) / 2.0, (b + d) / 2.0), f"number of {frame}", 8.0, symbol_table.HATCH_LENGTH + 0.8
         )
 
 
@@ -176,14 +177,14 @@ def _number_position(scene: Scene, body: LinkBody, clear: Clearance) -> tuple[Ve
             else (max(each.mouth, here + each.piston), here + each.rod_end)
         )
         low, high = (scene.to_paper(each.guide, each.foot + each.direction * s) for s in (low, high))
-        return (low + high) * 0.5, symbols.CYLINDER_WIDTH / 2.0 + 0.8 if link == each.guide else 1.0
+        return (low + high) * 0.5, symbol_table.CYLINDER_WIDTH / 2.0 + 0.8 if link == each.guide else 1.0
     lines = list(body.sides)
     for name, foot, way in body.guides:
         lines.append((foot, foot + way * scene.displacement_along(name, link, foot, way)))
     longest = max(lines, key=lambda side: hypot(*(side[1] - side[0])), default=None)
     if longest is None or scene.scale.on_paper(hypot(*(longest[1] - longest[0]))) < 1.0:
         at = body.joints[0] if body.joints else body.guides[0].foot if body.guides else Vector(0.0, 0.0)
-        return scene.to_paper(link, at), symbols.BLOCK_SIZE[1] / 2.0 + 1.0
+        return scene.to_paper(link, at), symbol_table.BLOCK_SIZE[1] / 2.0 + 1.0
     start, stop = (scene.to_paper(link, p) for p in longest)
     box = Vector(-3.0, -3.0), Vector(3.0, 3.0)
     parts = (0.5, 0.42, 0.58, 0.34, 0.66, 0.26, 0.74)

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from math import atan2, pi, remainder
 
 from planar.drawing.paper.picture import Label, Mark, Polyline, paper_point
-from planar.drawing.scheme import symbols
+from planar.drawing.scheme import symbol_table, symbols
+from planar.drawing.scheme.link_bodies import unit_vector
 from planar.drawing.scheme.scene import Scene
 from planar.drawing.scheme.springs_masses import Coil, MassCentreMark, Spiral
 
@@ -21,14 +22,14 @@ def spring_strokes(scene: Scene) -> Iterator[Polyline]:
             ends = [scene.to_paper(link, at) for link, at in zip(mark.links, mark.at, strict=True)]
             apart = ends[1] - ends[0]
             if apart.dot(apart) > MIN_SPRING_LENGTH**2:
-                yield from symbols.spring(*ends, mark.symbol, mark.name)
+                yield from symbols.symbol_marks(mark.symbol, mark.name, ends[0], unit_vector(apart), ends[1])
         elif isinstance(mark, Spiral):
             turned = [scene.direction_on_paper(link, way) for link, way in zip(mark.links, mark.ways, strict=True)]
             first, second = (atan2(way.y, way.x) for way in turned)
             angles = [scene.frames[link].angle for link in mark.links]
             wound = remainder(angles[1] - angles[0] - mark.free, 2.0 * pi)
             yield from symbols.torsion_spring(
-                scene.to_paper(mark.pin, mark.at), first, second, wound, mark.symbol, mark.name
+                scene.to_paper(mark.pin, mark.at), first, second, wound, f"torsion {mark.symbol}", mark.name
             )
 
 
@@ -36,7 +37,7 @@ def mass_centre_marks(scene: Scene) -> Iterator[Mark]:
     """Centres of mass."""
     for mark in scene.marks:
         if isinstance(mark, MassCentreMark):
-            yield from symbols.mass_centre(scene.to_paper(mark.link, mark.at), mark.name)
+            yield from symbols.symbol_marks("mass centre", mark.name, scene.to_paper(mark.link, mark.at))
 
 
 def mass_centre_labels(scene: Scene, size: float = 9.0) -> Iterator[Label]:
@@ -44,4 +45,4 @@ def mass_centre_labels(scene: Scene, size: float = 9.0) -> Iterator[Label]:
     for mark in scene.marks:
         if isinstance(mark, MassCentreMark) and mark.letter:
             at = scene.to_paper(mark.link, mark.at)
-            yield Label(mark.letter, paper_point(at), mark.name, size, symbols.MASS_CENTRE_RADIUS + 0.5)
+            yield Label(mark.letter, paper_point(at), mark.name, size, symbol_table.MASS_CENTRE_RADIUS + 0.5)

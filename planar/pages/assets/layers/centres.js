@@ -198,10 +198,7 @@ function drawCircle(page, state) {
   state.drawn = drawn;
   svg.replaceChildren();
   const { data } = page, order = byNumber(data), [width, height, radius] = CIRCLE;
-  const at = new Map(order.map((link, k) => {
-    const angle = ((k + 0.5) / order.length) * 2 * Math.PI - Math.PI / 2 - (2 * Math.PI) / order.length;
-    return [link, [width / 2 + radius * Math.cos(angle), height / 2 + radius * Math.sin(angle)]];
-  }));
+  const at = new Map(Object.entries(data.circle).map(([link, [x, y]]) => [link, [width / 2 + radius * x, height / 2 - radius * y]]));
   const ink = new Ink(svg, 1);
   ink.dot([width / 2, height / 2], radius, "circle");
   for (const each of known) ink.line(each.links.map((link) => at.get(link)), `chord ${each.shown ? "shown" : "found"}${kind(each)}`);

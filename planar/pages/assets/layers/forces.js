@@ -6,7 +6,6 @@ const TURN = [8.5, 2.4]; // mm: the radius of a curved arrow, and how much more 
 const FORCES_SLICE = 8;  // ms of work at a time
 const MOSTLY = 0.9;      // of the motion: what is greater in the rest, as at a change point, has a scale of its own
 const FAINT = 1e-9;      // of the greatest: a force below is rounding
-const FORCE_LETTERS = { load: ["P", "M"], weight: ["W", "W"], spring: ["S", "S"], input: ["F", "T"] }; // of force and couple
 
 /** The forces of now and over the course. */
 class PageForces {
@@ -100,12 +99,6 @@ function pairForces({ pairs }, chosen) {
   });
 }
 
-/** A force's index by the numbers of two links: 32, or 12,3 where one has two digits. */
-function indexOf(data, link, by) {
-  const two = [data.numbers[link], data.numbers[by]];
-  return two.join(two.join("").length > 2 ? "," : "");
-}
-
 const forceArrows = {
   key: "forces",
   label: "Forces",
@@ -113,10 +106,10 @@ const forceArrows = {
     const { page } = layers, { data } = page, found = page.forces.now(), chosen = page.chosen.links();
     if (!found.efforts) return `Forces: ${found.why}`;
     const most = greatestForce(found), usual = usualForce(page, most), [nothing, still] = page.forces.least(found);
-    const actions = [...found.acting, ...found.inputs].map((each) => ({ ...each, of: `load ${each.kind}`, letters: FORCE_LETTERS[each.kind], index: actionIndex(data, each) }));
+    const actions = [...found.acting, ...found.inputs].map((each) => ({ ...each, of: `load ${each.kind}`, letters: data.forces.letters[each.kind], index: actionIndex(data, each) }));
     const pushes = [
       ...pairForces(found, chosen).filter((each) => each.at !== null)
-        .map((each) => ({ ...each, of: "reaction", letters: ["F", "M"], index: indexOf(data, each.link, each.by) })),
+        .map((each) => ({ ...each, of: "reaction", letters: ["F", "M"], index: data.forces.indices[each.pair][each.link] })),
       ...actions,
     ];
     const { px, told } = roundScale(most > BEYOND * usual ? most : usual, LONGEST_ARROW, [1, "N"]), turned = [];

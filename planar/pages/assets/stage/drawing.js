@@ -7,6 +7,7 @@ const MARGIN = 12;     // mm about everything that moves
 const FOOT = 6;        // mm below for the bar of the scale
 const FINGER = 24;     // px: as wide a link can be taken hold of
 
+const down = (way) => [way[0], -way[1]]; // as y is downwards on the screen
 class Drawing {
   constructor(page, svg) {
     this.page = page;
@@ -48,7 +49,7 @@ class Drawing {
     svg.style.setProperty("--mm", mm);
     svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
     this.fit();
-    this.tubes = Bodies.tubes(page, this.look, this.marks, this.poses, this.near, (5.5 * mm) / this.scale);
+    this.tubes = Bodies.tubes(page, this.look, this.marks, this.poses, this.near, (GUIDE_OVERHANG * mm) / this.scale);
     this.root.replaceChildren();
     this.levels = Object.fromEntries(HEIGHTS.map((name) => [name, Symbols.element("g", { class: name })]));
     this.root.append(...HEIGHTS.map((name) => this.levels[name]));
@@ -74,7 +75,7 @@ class Drawing {
     };
     for (const frames of poses) {
       for (const [link, places] of Object.entries(this.corners())) for (const at of places) take(Plane.carry(frames[link], at));
-      for (const mark of this.marks) if (mark.kind === "Wheel") take(Plane.carry(frames[mark.link], mark.centre), Math.abs(mark.radius));
+      for (const mark of this.marks) if (mark.kind === "WheelMark") take(Plane.carry(frames[mark.link], mark.centre), Math.abs(mark.radius));
     }
     for (const k of [0, 1]) { low[k] -= this.slack; high[k] += this.slack; }
     const span = [high[0] - low[0], high[1] - low[1]], room = [width - 2 * MARGIN * mm, height - (2 * MARGIN + FOOT) * mm];
@@ -96,9 +97,12 @@ class Drawing {
   corners() {
     const found = Object.create(null);
     for (const [link, body] of Object.entries(this.look)) {
-      found[link] = [...body.sides.flat(), ...body.tracers.flat(), ...body.joints, ...body.dots, ...body.guides.map((each) => each.foot)];
+      found[link] = [...this.points[link].map((point) => point.at), ...body.sides.flat(), ...body.tracers.flat(), ...body.joints, ...body.dots, ...body.guides.map((each) => each.foot)];
     }
-    for (const { link, at } of this.marks.filter((mark) => ["Block", "Centre"].includes(mark.kind))) found[link].push(at);
+    for (const mark of this.marks) {
+      if (mark.kind === "SliderMark") found[mark.link].push(mark.position);
+      if (mark.kind === "MassCentreMark") found[mark.link].push(mark.at);
+    }
     return found;
   }
 
@@ -120,11 +124,18 @@ class Drawing {
   bar(link, pen, a, b) {
     const ends = [this.px(a), this.px(b)];
     this.part("bars", link, Symbols.line(pen, ...ends));
-    this.edge(link, ...ends);
+    this.avoid(link, ...ends);
+    this.grip(link, ...ends);
   }
 
-  edge(link, a, b) {
-    this.avoid(link, a, b);
+  /** A symbol of a link at a place of its axes (px), along a unit vector there; letters keep off it. */
+  symbol(height, link, name, at, way, more) {
+    const strokes = Symbols.symbol(name, this.mm, at, way, more);
+    this.part(height, link, ...strokes.map((each) => each.element));
+    for (const { pen, spots } of strokes) if (pen !== "hatch") this.avoid(link, ...spots);
+  }
+
+  grip(link, a, b) {
     this.part("bars", link, Symbols.element("polyline", { class: "grip", points: Symbols.told([a, b]), "stroke-width": FINGER }));
   }
 
@@ -143,128 +154,111 @@ class Drawing {
 
   /** All that moves. */
   links() {
-    const { frame } = this.page.data, { mm } = this, down = (way) => [way[0], -way[1]];
+    const { frame } = this.page.data;
     const moving = Object.entries(this.look).filter(([link]) => link !== frame);
     for (const [link, body] of moving) {
       if (!body.plate.length) continue;
       const corners = body.plate.map((p) => this.px(p));
-      this.part("plates", link, Symbols.area("plate", ...corners));
+      this.part("plates", link, Symbols.area("link", "link", ...corners));
       this.part("bars", link, Symbols.element("polygon", { class: "grip area", points: Symbols.told(corners) }));
     }
     this.wheels();
     for (const tube of Object.values(this.tubes)) {
       const ends = [tube.base, tube.mouth].map((far) => this.px(Plane.on(tube.foot, tube.way, far)));
       if (tube.mouth - tube.base > this.near) {
-        this.part("tubes", tube.guide, Symbols.cylinder(...ends, down(tube.way), mm));
-        this.edge(tube.guide, ...ends);
+        this.symbol("tubes", tube.guide, "cylinder", ends[0], down(tube.way), { stop: ends[1] });
+        this.grip(tube.guide, ...ends);
       }
       const rod = [tube.rear, tube.front].map((far) => this.px(Plane.on(tube.at, tube.along, far)));
-      this.part("tubes", tube.rod, ...Symbols.piston(...rod, down(tube.along), mm));
-      this.edge(tube.rod, ...rod);
+      this.symbol("tubes", tube.rod, "piston", rod[0], down(tube.along), { stop: rod[1] });
+      this.grip(tube.rod, ...rod);
     }
     for (const [link, body] of moving) {
-      for (const side of body.sides) if (!this.onTube(link, side)) this.bar(link, "bar", ...side);
-      for (const side of body.tracers) this.bar(link, "tracer", ...side);
+      for (const side of body.sides) if (!this.onTube(link, side)) this.bar(link, "link", ...side);
+      for (const side of body.tracers) this.bar(link, "pin", ...side);
       this.guideLines(link, body);
     }
     this.springs = new Springs(this);
-    this.sliders(moving);
+    this.sliders();
   }
 
   /** The lines of a link along which blocks run, from its body to beyond the block wherever it comes. */
   guideLines(link, body) {
-    const { marks, poses, mm } = this, over = (5.5 * mm) / this.scale;
-    const slides = marks.filter((mark) => mark.kind === "Block" && mark.link === link);
+    const { marks, poses, mm } = this, over = (GUIDE_OVERHANG * mm) / this.scale;
+    const slides = marks.filter((mark) => mark.kind === "SliderMark" && mark.link === link);
     for (const { name, foot, way } of body.guides) {
-      const mark = marks.find((each) => each.name === name && each.link === link && ["Guide", "Opening"].includes(each.kind));
+      const mark = marks.find((each) => each.name === name && each.link === link && ["GuideMark", "SlotMark"].includes(each.kind));
       if (!mark || this.tubes[name]) continue;
       const [low, high] = Bodies.range(mark, marks, poses, foot);
       let [start, stop] = [Math.min(0, low - over), Math.max(0, high + over)];
       if (low > over || high < -over) [start, stop] = low > 0 ? [0, high + over] : [low - over, 0]; // to one side only
-      if (body.joints.length === 1 && slides.some(({ at }) => Plane.apart(at, foot) <= this.near)) {
-        const behind = over + ((Symbols.BLOCK[1] / 2) * mm) / this.scale; // a yoke shows on both sides of its own block
+      if (body.joints.length === 1 && slides.some(({ position }) => Plane.apart(position, foot) <= this.near)) {
+        const behind = over + ((BLOCK_SIZE[1] / 2) * mm) / this.scale; // a yoke shows on both sides of its own block
         [start, stop] = [Math.min(start, -behind), Math.max(stop, behind)];
       }
-      this.bar(link, "bar", Plane.on(foot, way, start), Plane.on(foot, way, stop));
+      this.bar(link, "link", Plane.on(foot, way, start), Plane.on(foot, way, stop));
     }
   }
 
   wheels() {
     const { frame } = this.page.data, { marks, mm, scale } = this, seen = new Set();
-    const banded = new Set(marks.filter((mark) => mark.kind === "Band").map((mark) => mark.name));
+    const bands = new Set(marks.filter((mark) => mark.kind === "BeltMark").map((mark) => mark.name));
     for (const mark of marks) {
-      if (mark.kind === "Wheel" && mark.link !== frame) {
+      if (mark.kind === "WheelMark" && mark.link !== frame) {
         const key = [mark.link, ...[...mark.centre, mark.radius].map((value) => Math.round(value / this.near))].join();
         if (seen.has(key)) continue;
         seen.add(key);
-        const at = this.px(mark.centre), all = Symbols.wheel(at, mark.radius * scale, false, mm);
-        this.part("wheels", mark.link, ...(banded.has(mark.name) ? all.slice(-1) : all)); // the band is its circle
+        const at = this.px(mark.centre), banded = bands.has(mark.name); // the band is its circle
+        this.part("wheels", mark.link, ...(banded ? Symbols.wheelMark(at, mark.radius * scale, mm) : Symbols.wheel(at, mark.radius * scale, false, mm)));
         this.round(mark.link, at, Math.abs(mark.radius) * scale);
         this.part("bars", mark.link, Symbols.element("circle", { class: "grip", cx: at[0], cy: at[1], r: Math.abs(mark.radius) * scale, "stroke-width": FINGER }));
-      } else if (mark.kind === "Band") {
+      } else if (mark.kind === "BeltMark") {
         const { first, second } = mark, group = Symbols.element("g"), [f] = this.poses;
         const far = Plane.apart(...[first, second].map((wheel) => Plane.carry(f[wheel.link], wheel.centre)));
         group.append(...Symbols.band(far * scale, ...[first, second].map((wheel) => Math.abs(wheel.radius) * scale), mark.crossed));
         this.levels.wheels.append(group);
         this.bands.push({ first, second, group });
-      } else if (mark.kind === "PitchLine" && mark.link !== frame) {
+      } else if (mark.kind === "PitchLineMark" && mark.link !== frame) {
         const { foot } = this.look[mark.link].guides.find((each) => each.name === mark.name);
         const [low, high] = Bodies.range(mark, marks, this.poses, foot);
         const half = Math.max((10 * mm) / scale, 1.2 * Math.abs(mark.wheel.radius)), side = backOf(mark, marks, this.poses);
-        const ends = [Math.min(0, low - half), Math.max(0, high + half)].map((at) => this.px(Plane.on(foot, mark.way, at)));
-        const back = Plane.times(Symbols.quarter([mark.way[0], -mark.way[1]]), -side);
-        this.part("wheels", mark.link, ...Symbols.rack(...ends, back, mm));
-        const behind = Plane.times(back, Symbols.BAR * mm);
-        this.edge(mark.link, ...ends);
-        this.avoid(mark.link, ...ends.map((end) => Plane.plus(end, behind)));
+        const ends = [Math.min(0, low - half), Math.max(0, high + half)].map((at) => this.px(Plane.on(foot, mark.direction, at)));
+        const way = down(mark.direction), left = Plane.times(Symbols.quarter(way), -side);
+        this.symbol("wheels", mark.link, "rack bar", ends[0], way, { stop: ends[1], left });
+        this.grip(mark.link, ...ends);
       }
     }
   }
 
   /** Slots, blocks, pins and points, in the order in which they hide one another. */
-  sliders(moving) {
+  sliders() {
     const { marks, poses, mm } = this, { frame } = this.page.data, pinned = new Set();
-    for (const mark of marks.filter((each) => each.kind === "Opening" && each.link !== frame)) {
-      const ends = Bodies.range(mark, marks, poses, mark.through).map((far) => this.px(Plane.on(mark.through, mark.way, far)));
-      const way = [mark.way[0], -mark.way[1]], across = Plane.times(Symbols.quarter(way), (Symbols.SLOT / 2) * mm);
-      this.part("sliders", mark.link, Symbols.opening(...ends, way, mm));
-      this.avoid(mark.link, ...ends.map((end) => Plane.plus(end, across)));
-      this.avoid(mark.link, ...ends.map((end) => Plane.minus(end, across)));
+    for (const mark of marks.filter((each) => each.kind === "SlotMark" && each.link !== frame)) {
+      const ends = Bodies.range(mark, marks, poses, mark.through).map((far) => this.px(Plane.on(mark.through, mark.direction, far)));
+      this.symbol("sliders", mark.link, "slot opening", ends[0], down(mark.direction), { stop: ends[1] });
     }
-    for (const mark of marks.filter((each) => each.kind === "Block" && !this.tubes[each.name])) {
-      this.part("sliders", mark.link, Symbols.block(this.px(mark.at), [mark.way[0], -mark.way[1]], mm));
-      const way = [mark.way[0], -mark.way[1]], [far, up] = Symbols.BLOCK.map((each) => (each / 2) * mm), at = this.px(mark.at);
-      const corner = (a, b) => Plane.on(Plane.on(at, way, a * far), Symbols.quarter(way), b * up);
-      this.avoid(mark.link, corner(1, 1), corner(-1, 1), corner(-1, -1), corner(1, -1), corner(1, 1));
-      if (mark.link !== frame) this.edge(mark.link, corner(-1, 0), corner(1, 0));
+    for (const mark of marks.filter((each) => each.kind === "SliderMark" && !this.tubes[each.name])) {
+      const at = this.px(mark.position), way = down(mark.direction), far = (BLOCK_SIZE[0] / 2) * mm;
+      this.symbol("sliders", mark.link, "block", at, way);
+      if (mark.link !== frame) this.grip(mark.link, Plane.on(at, way, far), Plane.on(at, way, -far));
     }
-    massCentres(this);
+    for (const { kind, link, at } of marks) if (kind === "MassCentreMark") this.symbol("sliders", link, "mass centre", this.px(at));
     for (const mark of marks) {
-      const at = { Pin: [mark.links?.[0], mark.at?.[0]], Opening: [mark.pin, mark.at] }[mark.kind];
+      const at = { PinMark: [mark.links?.[0], mark.positions?.[0]], SlotMark: [mark.pin_link, mark.pin_position] }[mark.kind];
       if (!at) continue;
-      const name = mark.kind === "Pin" ? mark.name : this.nameAt(...at) ?? mark.name;
+      const name = mark.kind === "PinMark" ? mark.name : this.page.data.running[mark.name] ?? mark.name;
       if (pinned.has(name)) continue;
       pinned.add(name);
-      this.part("pins", at[0], Symbols.pin(this.px(at[1]), mm));
-      this.round(at[0], this.px(at[1]), Symbols.PIN * mm, 4);
+      this.symbol("pins", at[0], "pin", this.px(at[1]));
     }
     this.pinned = pinned;
-    for (const [link, body] of [...moving, [frame, null]]) {
-      for (const { name, at } of this.points[link]) {
-        const alone = body ? body.dots.some((p) => Plane.apart(p, at) <= this.near) : !pinned.has(name);
-        if (alone) this.part("pins", link, Symbols.dot(this.px(at), mm));
-      }
+    for (const [link, body] of Object.entries(this.look)) {
+      for (const at of body.dots) this.part("pins", link, ...Symbols.symbolParts(link === frame ? "fixed dot" : "dot", mm, this.px(at)));
     }
   }
 
   /** A circle that letters keep off, as a polygon. */
-  round(link, [x, y], r, count = 24) {
-    const spot = (k) => [x + r * Math.cos((2 * Math.PI * k) / count), y + r * Math.sin((2 * Math.PI * k) / count)];
-    this.avoid(link, ...Array.from({ length: count + 1 }, (_, k) => spot(k)));
-  }
-
-  /** The result name of the point of a link at a place. */
-  nameAt(link, at) { return this.points[link].find((point) => Plane.apart(point.at, at) <= this.near)?.name; }
+  round(link, at, r) { this.avoid(link, ...Symbols.round(at, r)); }
 
   /** What stands still, clear of the links over their motion. */
   ground() {
@@ -279,7 +273,7 @@ class Drawing {
     const { elements, lines, sides } = groundOf({ marks, poses, frame, mm, scale, near, strokes });
     this.part("ground", frame, ...elements);
     for (const ends of lines) this.avoid(frame, ...ends);
-    for (const mark of marks) if (mark.kind === "Wheel" && mark.link === frame) this.round(frame, this.px(mark.centre), Math.abs(mark.radius) * scale);
+    for (const mark of marks) if (mark.kind === "WheelMark" && mark.link === frame) this.round(frame, this.px(mark.centre), Math.abs(mark.radius) * scale);
     this.sides = sides;
   }
 
@@ -293,27 +287,28 @@ class Drawing {
     const unit = page.data.inputs.map((_, k) => (k === page.running ? this.sense : 0));
     const moved = page.framesOf(page.linkage.state(unit, unit.map(() => 0)));
     const turn = (link) => (moved[link].v ? moved[link].v[2] : 0);
-    const pin = marks.find((mark) => mark.kind === "Pin" && (mark.name === given.pair || given.pair.startsWith(`${mark.name}:`)));
+    const pin = marks.find((mark) => mark.kind === "PinMark" && (mark.name === given.pair || given.pair.startsWith(`${mark.name}:`)));
     if (pin && !given.slides) {
       const k = cheapest(pin.links.map((_, i) => i), (i) => -Math.abs(turn(pin.links[i]))), link = pin.links[k];
       if (!turn(link)) return;
-      const at = pin.at[k], ends = [...this.look[link].joints, ...this.look[link].dots];
+      const at = pin.positions[k], ends = [...this.look[link].joints, ...this.look[link].dots];
       const far = cheapest(ends, (p) => -Plane.apart(p, at)) ?? at, lies = Math.atan2(far[1] - at[1], far[0] - at[0]);
       const sense = Math.sign(turn(link));
-      this.part("drives", link, ...Symbols.arc(this.px(at), 6 * mm, lies + sense * 1.1, 1.5, sense, mm));
-      const spot = (angle) => Plane.plus(this.px(at), [6 * mm * Math.cos(angle), -6 * mm * Math.sin(angle)]);
-      this.avoid(link, ...[0.35, 0.85, 1.35, 1.85].map((angle) => spot(lies + sense * angle)));
+      const [radius, sweep] = [INPUT_ARC[0] * mm, INPUT_ARC[1]], start = lies + sense * 0.25;
+      this.part("drives", link, ...Symbols.arc(this.px(at), radius, start + (sense * sweep) / 2, sweep, sense, mm));
+      const spot = (part) => [radius * Math.cos(start + sense * sweep * part), -radius * Math.sin(start + sense * sweep * part)];
+      this.avoid(link, ...[0, 0.25, 0.5, 0.75, 1].map((part) => Plane.plus(this.px(at), spot(part))));
     }
-    const guide = marks.find((mark) => mark.kind === "Guide" && mark.name === given.pair);
-    const block = guide && marks.find((mark) => mark.kind === "Block" && mark.name === given.pair);
+    const guide = marks.find((mark) => mark.kind === "GuideMark" && mark.name === given.pair);
+    const block = guide && marks.find((mark) => mark.kind === "SliderMark" && mark.name === given.pair);
     if (block) {
-      const [link, at, way] = block.link === page.data.frame ? [guide.link, guide.through, guide.way] : [block.link, block.at, block.way];
+      const [link, at, way] = block.link === page.data.frame ? [guide.link, guide.through, guide.direction] : [block.link, block.position, block.direction];
       // which way the driven link goes, seen from the other
       const sense = this.sense * (link === block.link ? 1 : -1), along = [sense * way[0], -sense * way[1]];
       const up = Symbols.quarter(along), hatched = this.sides[given.pair]; // beside the hatching there is no room
       const other = hatched ? -Math.sign(Plane.dot(up, hatched)) : up[1] < 0 ? 1 : -1;
-      const side = Plane.times(up, other * 4.5 * mm), middle = Plane.plus(this.px(at), side);
-      const ends = [Plane.on(middle, along, -5 * mm), Plane.on(middle, along, 5 * mm)];
+      const side = Plane.times(up, other * INPUT_ARROW[0] * mm), middle = Plane.plus(this.px(at), side);
+      const ends = [-0.5, 0.5].map((part) => Plane.on(middle, along, part * INPUT_ARROW[1] * mm));
       this.part("drives", link, ...Symbols.arrow(...ends, mm));
       this.avoid(link, ...ends);
     }
@@ -342,13 +337,13 @@ class Drawing {
   /** The letters of all points. */
   named() {
     const { mm, marks } = this, points = Object.entries(this.page.data.points);
-    const blocks = new Set(marks.filter((mark) => mark.kind === "Block" && !this.tubes[mark.name]).map((mark) => this.nameAt(mark.link, mark.at)));
+    const blocks = new Set(marks.filter((mark) => mark.kind === "SliderMark" && !this.tubes[mark.name]).map((mark) => this.page.data.running[mark.name]));
     const items = points.map(([name]) => ({
-      name, away: (blocks.has(name) ? Symbols.BLOCK[1] / 2 + 0.5 : this.pinned.has(name) ? Symbols.PIN + 0.5 : 0.9) * mm,
+      name, away: (blocks.has(name) ? BLOCK_SIZE[1] / 2 + 0.5 : this.pinned.has(name) ? PIN_RADIUS + 0.5 : 0.9) * mm,
     }));
     this.spots = points.map(([, { links, at }]) => [links[0], this.px(at[0].map((k) => this.page.size(k)))]);
-    for (const { link, at, letter } of marks.filter((mark) => mark.kind === "Centre" && mark.letter)) {
-      items.push({ name: letter, away: (Symbols.MASS + 0.4) * mm });
+    for (const { link, at, letter } of marks.filter((mark) => mark.kind === "MassCentreMark" && mark.letter)) {
+      items.push({ name: letter, away: (MASS_CENTRE_RADIUS + 0.4) * mm });
       this.spots.push([link, this.px(at)]);
     }
     this.letters = new Letters(this.levels.letters, items, Math.max(13, 3.3 * mm));

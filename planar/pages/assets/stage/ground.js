@@ -1,6 +1,6 @@
 "use strict";
 /* What stands still, as symbols: supports, fixed guides, racks and wheels, turned so that they are clear of the links
-   over their whole motion; as Python's planar.drawing.ground has it. Places in px from the world's origin, y downwards. */
+   over their whole motion; as Python's planar.drawing.scheme.ground has it. Places in px from the world's origin, y downwards. */
 
 const LEANING = 2.5; // what a support costs that does not stand upright: half a bar that is always in its way
 
@@ -38,7 +38,7 @@ class Clearance {
 
   /** Which way a support stands best: downwards, unless strokes are there. */
   support(at, mm) {
-    const across = (Symbols.BASE / 2 + 0.5) * mm, deep = (Symbols.STAND + Symbols.HATCH + 0.8) * mm, half = Math.SQRT1_2;
+    const across = (SUPPORT_SIZE[1] / 2 + 0.5) * mm, deep = (SUPPORT_SIZE[0] + HATCH_LENGTH + 0.8) * mm, half = Math.SQRT1_2;
     const ways = [[0, 1], [-1, 0], [1, 0], [0, -1], [-half, half], [half, half], [-half, -half], [half, -half]];
     const near = this.points.filter(([x, y]) => Math.abs(x - at[0]) < deep + across && Math.abs(y - at[1]) < deep + across);
     const price = (down) => {
@@ -59,7 +59,7 @@ class Clearance {
     const left = Symbols.quarter(way), choices = [];
     for (const sign of [1, -1]) for (const off of [half, half + 0.8 * mm]) choices.push([sign, off]);
     const price = ([sign, off]) => {
-      const [near, far] = [sign * (off - 0.25 * mm), sign * (off + (Symbols.HATCH + 1) * mm)].sort((a, b) => a - b);
+      const [near, far] = [sign * (off - 0.25 * mm), sign * (off + (HATCH_LENGTH + 1) * mm)].sort((a, b) => a - b);
       const side = Plane.times(left, sign), down = Math.abs(side[1]) > 0.5 ? -side[1] : 0;
       const inward = Plane.dot(Plane.minus(middle, at), side);
       return this.crowd(at, way, [low, near], [high, far]) + (off > half ? 1 : 0) + 1e-3 * down + 1e-9 * inward;
@@ -75,8 +75,8 @@ function groundOf(scene) {
   const { marks, poses, frame, mm, scale, strokes } = scene, { plus, minus, times, on, dot, cross } = Plane;
   const px = (a) => [a[0] * scale, -a[1] * scale], pxWay = (way) => [way[0], -way[1]];
   const made = [], lines = [], sides = Object.create(null), seen = new Set(), middle = strokes.middle();
-  const pinned = marks.filter((mark) => mark.kind === "Pin" && mark.links.includes(frame));
-  const fixed = pinned.map((mark) => px(mark.at[mark.links.indexOf(frame)]));
+  const pinned = marks.filter((mark) => mark.kind === "PinMark" && mark.links.includes(frame));
+  const fixed = pinned.map((mark) => px(mark.positions[mark.links.indexOf(frame)]));
   for (const { kind, name, links, at } of marks) { // where springs hang on the frame, but at its pins
     if (kind === "Coil") links.forEach((link, k) => {
       const spot = px(at[k]);
@@ -85,8 +85,8 @@ function groundOf(scene) {
       fixed.push(spot);
     });
   }
-  for (const at of fixed) strokes.add(on(at, [1, 0], -Symbols.PIN * mm), on(at, [1, 0], Symbols.PIN * mm));
-  const banded = new Set(marks.filter((mark) => mark.kind === "Band").map((mark) => mark.name));
+  for (const at of fixed) strokes.add(on(at, [1, 0], -PIN_RADIUS * mm), on(at, [1, 0], PIN_RADIUS * mm));
+  const banded = new Set(marks.filter((mark) => mark.kind === "BeltMark").map((mark) => mark.name));
 
   /** From where to where a fixed line is drawn, from its foot: a little beyond what runs along it (px). */
   const stretch = (mark, foot, over) => {
@@ -95,14 +95,14 @@ function groundOf(scene) {
   };
 
   for (const mark of marks) {
-    if (mark.kind === "Wheel" && mark.link === frame) {
+    if (mark.kind === "WheelMark" && mark.link === frame) {
       const key = [...mark.centre, mark.radius].map((value) => Math.round(value / scene.near)).join();
       if (seen.has(key)) continue;
       seen.add(key);
       const at = px(mark.centre), radius = mark.radius * scale;
       made.push(...(banded.has(mark.name) ? Symbols.rimHatching(at, radius, mm) : Symbols.wheel(at, radius, true, mm)));
-    } else if (mark.kind === "PitchLine" && mark.link === frame) {
-      const way = pxWay(mark.way), [low, high] = stretch(mark, mark.through, Math.max(10 * mm, 1.2 * Math.abs(mark.wheel.radius) * scale));
+    } else if (mark.kind === "PitchLineMark" && mark.link === frame) {
+      const way = pxWay(mark.direction), [low, high] = stretch(mark, mark.through, Math.max(10 * mm, 1.2 * Math.abs(mark.wheel.radius) * scale));
       const back = times(Symbols.quarter(way), -backOf(mark, marks, poses)), at = px(mark.through);
       made.push(...Symbols.rail(on(at, way, low), on(at, way, high), back, mm));
       lines.push([on(at, way, low), on(at, way, high)]);
@@ -111,30 +111,30 @@ function groundOf(scene) {
 
   /** A rail along a line from a place on it (px), with gaps for the supports of fixed pins that lie on its way. */
   const pieces = (at, way, low, high) => {
-    const room = (Symbols.BASE / 2 + 1) * mm;
+    const room = (SUPPORT_SIZE[1] / 2 + 1) * mm;
     let cut = [[low, high]];
     for (const pin of fixed) {
       const off = minus(pin, at), here = dot(off, way);
-      if (Math.abs(cross(way, off)) >= (Symbols.STAND + Symbols.HATCH) * mm) continue;
+      if (Math.abs(cross(way, off)) >= (SUPPORT_SIZE[0] + HATCH_LENGTH) * mm) continue;
       cut = cut.flatMap(([start, stop]) => [[start, Math.min(stop, here - room)], [Math.max(start, here + room), stop]]);
-      cut = cut.filter(([start, stop]) => stop - start > Symbols.HATCH * mm);
+      cut = cut.filter(([start, stop]) => stop - start > HATCH_LENGTH * mm);
     }
     return cut.length ? cut : [[low, high]];
   };
 
   for (const mark of marks) {
-    if (mark.link !== frame || !["Guide", "Opening", "Block"].includes(mark.kind)) continue;
-    let half = (Symbols.BLOCK[1] / 2) * mm, low, high, at, way;
-    if (mark.kind === "Block") { // a fixed block, through which a link slides
-      [at, way] = [px(mark.at), pxWay(mark.way)];
-      [low, high] = [-(Symbols.BLOCK[0] / 2 + 1) * mm, (Symbols.BLOCK[0] / 2 + 1) * mm];
+    if (mark.link !== frame || !["GuideMark", "SlotMark", "SliderMark"].includes(mark.kind)) continue;
+    let half = (BLOCK_SIZE[1] / 2) * mm, low, high, at, way;
+    if (mark.kind === "SliderMark") { // a fixed block, through which a link slides
+      [at, way] = [px(mark.position), pxWay(mark.direction)];
+      [low, high] = [-(BLOCK_SIZE[0] / 2 + 1) * mm, (BLOCK_SIZE[0] / 2 + 1) * mm];
     } else {
       const [link, place] = Bodies.rider(mark, marks), here = Plane.carry(poses[0][link], place);
-      const foot = on(mark.through, mark.way, dot(minus(here, mark.through), mark.way));
-      [at, way] = [px(here), pxWay(mark.way)];
-      [low, high] = stretch(mark, foot, (Symbols.BLOCK[0] / 2 + 2) * mm);
-      if (mark.kind === "Opening") {
-        half = (Symbols.SLOT / 2) * mm;
+      const foot = on(mark.through, mark.direction, dot(minus(here, mark.through), mark.direction));
+      [at, way] = [px(here), pxWay(mark.direction)];
+      [low, high] = stretch(mark, foot, (BLOCK_SIZE[0] / 2 + 2) * mm);
+      if (mark.kind === "SlotMark") {
+        half = (SLOT_WIDTH / 2) * mm;
         for (const sign of [half, -half]) {
           const side = on(at, Symbols.quarter(way), sign);
           made.push(Symbols.line("ground", on(side, way, low), on(side, way, high)));
@@ -147,7 +147,7 @@ function groundOf(scene) {
       const ends = [on(beside, way, start), on(beside, way, stop)];
       made.push(...Symbols.rail(...ends, side, mm));
       strokes.add(...ends);
-      lines.push(ends, ends.map((end) => on(end, side, Symbols.HATCH * mm)));
+      lines.push(ends, ends.map((end) => on(end, side, HATCH_LENGTH * mm)));
     }
   }
 
@@ -155,9 +155,9 @@ function groundOf(scene) {
   pinned.forEach((mark, k) => {
     if (drawn.has(mark.name)) return;
     drawn.add(mark.name);
-    const down = strokes.support(fixed[k], mm), foot = on(fixed[k], down, Symbols.STAND * mm);
-    made.push(...Symbols.support(fixed[k], down, mm));
-    const across = Symbols.quarter(down), half = (Symbols.BASE / 2) * mm, under = on(foot, down, 0.8 * Symbols.HATCH * mm);
+    const down = strokes.support(fixed[k], mm), foot = on(fixed[k], down, SUPPORT_SIZE[0] * mm);
+    made.push(...Symbols.symbolParts("support", mm, fixed[k], down));
+    const across = Symbols.quarter(down), half = (SUPPORT_SIZE[1] / 2) * mm, under = on(foot, down, 0.8 * HATCH_LENGTH * mm);
     for (const ends of [[fixed[k], foot], [on(foot, across, -half), on(foot, across, half)], [on(under, across, -half), on(under, across, half)]]) {
       strokes.add(...ends);
       lines.push(ends);
@@ -170,5 +170,5 @@ function groundOf(scene) {
 /** On which side of a rack's pitch line its wheel is: 1 to the left of its way, -1 to the right. */
 function backOf(mark, marks, poses) {
   const f = poses[0][mark.link], centre = Plane.local(f, Plane.carry(poses[0][mark.wheel.link], mark.wheel.centre));
-  return Plane.cross(mark.way, Plane.minus(centre, mark.through)) > 0 ? 1 : -1;
+  return Plane.cross(mark.direction, Plane.minus(centre, mark.through)) > 0 ? 1 : -1;
 }

@@ -1,11 +1,11 @@
 "use strict";
-/* Springs and dampers of the drawing, which lengthen and turn with what they hang on, and centres of mass on their links. */
+/* Springs and dampers of the drawing, which lengthen and turn with what they hang on. */
 
 class Springs {
   constructor(drawing) {
     this.drawing = drawing;
     this.all = drawing.marks.filter(({ kind }) => kind === "Coil" || kind === "Spiral").map((mark) => {
-      const path = Symbols.element("path", { class: "spring" }), group = Symbols.element("g");
+      const path = Symbols.element("path", { class: "pen-pin" }), group = Symbols.element("g");
       group.append(Symbols.element("title", {}, mark.name), path);
       drawing.levels.springs.append(group);
       return { mark, path };
@@ -26,7 +26,7 @@ class Springs {
     for (const { mark, path } of this.all) {
       if (mark.kind === "Coil") {
         const ends = this.ends(mark);
-        path.setAttribute("d", Plane.apart(...ends) > 0.01 ? Symbols.coil(...ends, page.data.coils[mark.symbol], mm) : "");
+        path.setAttribute("d", Plane.apart(...ends) > 0.01 ? Symbols.spring(mark.symbol, ...ends, mm) : "");
         continue;
       }
       const [first, second] = mark.links.map((link, k) => {
@@ -35,7 +35,7 @@ class Springs {
       });
       const [a, b] = mark.links.map((link) => page.frames[link].angle), wound = Symbols.wrapped(b - a - mark.free);
       const at = this.drawing.screen(mark.pin, this.drawing.px(mark.at));
-      path.setAttribute("d", Symbols.spiral(at, first, second, wound, mark.symbol, mm));
+      path.setAttribute("d", Symbols.torsionSpring(`torsion ${mark.symbol}`, at, first, second, wound, mm));
     }
   }
 
@@ -43,18 +43,8 @@ class Springs {
   avoided(strokes, from) {
     this.coils.forEach((mark, k) => {
       const ends = this.ends(mark), way = Plane.unit(Plane.minus(...ends));
-      const off = Plane.times(Symbols.quarter(way), Symbols.WIDE * this.drawing.mm);
+      const off = Plane.times(Symbols.quarter(way), SPRING_HALF_WIDTH * this.drawing.mm);
       strokes.set([1, -1].flatMap((side) => ends.flatMap((end) => Plane.on(end, off, side))), from + 8 * k);
     });
-  }
-}
-
-/** The marks of the centres of mass, on their links. */
-function massCentres(drawing) {
-  for (const { kind, link, at } of drawing.marks) {
-    if (kind !== "Centre") continue;
-    const spot = drawing.px(at);
-    drawing.part("sliders", link, ...Symbols.massCentre(spot, drawing.mm));
-    drawing.round(link, spot, Symbols.MASS * drawing.mm, 8);
   }
 }
