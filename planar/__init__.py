@@ -4,6 +4,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from planar.foundation.notebook_display import Displayable
+from planar.foundation.revision import Revisable
 
 if TYPE_CHECKING:
     from planar import plot
@@ -251,7 +252,12 @@ def _present(result: Any) -> str | None:
     return import_module("planar.pages.view").notebook_html(result)
 
 
-Displayable.presenter = _present
+def _revise(mechanism: Any, values: Any) -> Any:
+    """A mechanism with some numbers changed; the reader of files is loaded only where one is."""
+    return import_module("planar.document.dimensions").with_values(mechanism, values)
+
+
+Displayable.presenter, Revisable.reviser = _present, _revise
 
 
 def __getattr__(name: str) -> Any:

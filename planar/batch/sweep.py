@@ -50,11 +50,11 @@ def sweep(
     """The motions of many designs of one mechanism, which differ in dimensions of links or in their inputs.
 
     `designs` maps names to arrays, all of one length, or single numbers (m, rad, per s): `BC.length`, `A.position`,
-    `BC.E.distance`; the dimensions have the names that `planar.model.dimensions` gives them, an input has `.position`,
-    `.velocity` and `.acceleration`. Each design is solved as `planar.cycle` would solve the mechanism so changed: from
-    the assembly nearest to the sketch, at `steps` + 1 positions of one input from `start` to `stop` (rad or m), the
-    others standing still. An angle runs from the design's own position a turn on where they are left out; a slide
-    without a `stop` runs between its limits, each design between its own.
+    `BC.E.distance`; the names are those of `planar.dimensions`, of lengths of links and of inputs. Each design is solved
+    as `planar.cycle` would solve the mechanism so changed: from the assembly nearest to the sketch, at `steps` + 1
+    positions of one input from `start` to `stop` (rad or m), the others standing still. An angle runs from the design's
+    own position a turn on where they are left out; a slide without a `stop` runs between its limits, each design
+    between its own.
 
     `points` are those whose positions are wanted, and with `rates` velocities and accelerations; all that move, if left
     out. A design that comes to a dead point has NaN from there on, and `status` says why.

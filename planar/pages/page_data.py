@@ -18,13 +18,13 @@ from planar.analysis.rich_text import with_double_primes
 from planar.assemblies.circuits.circuits import circuits
 from planar.assemblies.modes import modes
 from planar.codegen.javascript import write_javascript
+from planar.document.dimensions import Dimension, change_dimension, link_lengths
 from planar.drawing.scheme.link_bodies import all_marks
 from planar.drawing.scheme.springs_masses import SpringMassMark
 from planar.drawing.scheme.symbols import SPRING_SYMBOLS
 from planar.equations.functions import scale_lengths, shapes_of_links, slice_length
 from planar.foundation.geometry import Vector
 from planar.foundation.units import display_unit
-from planar.model.dimensions import Dimension, change_dimension, dimensions
 from planar.model.link_graph import link_numbers
 from planar.model.link_shapes import PointPlacementError
 from planar.model.mechanism import Mechanism, links_counting_turns, named_points, pair_misfits
@@ -51,7 +51,7 @@ class DimensionNumbers:
     """Numbers that depend on the dimensions, each with its place in what the page's function `sizes` gives."""
 
     def __init__(self, mechanism: Mechanism, live: bool = True):
-        self.dimensions = list(dimensions(mechanism, frozenset(link.name for link in mechanism.links))) if live else []
+        self.dimensions = list(link_lengths(mechanism, (link.name for link in mechanism.links))) if live else []
         self.d = ca.SX.sym("d", len(self.dimensions))
         for k, each in enumerate(self.dimensions):
             mechanism = change_dimension(mechanism, each, self.d[k])

@@ -38,5 +38,5 @@ def available_runners(backend: str) -> list[tuple[str, DesignRunner]]:
         except ImportError:
             continue
     if backend not in ("auto", *(name for name, _ in found)):
-        raise BadInput("backend", f"the backend {backend!r} is not installed: pip install 'planar[{backend}]'")
+        raise BadInput("backend", f"the backend {backend!r} is not installed: pip install 'planar-linkages[{backend}]'")
     return found
