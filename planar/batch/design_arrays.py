@@ -23,9 +23,7 @@ Array = np.ndarray
 
 def design_variables(mechanism: Mechanism) -> dict[str, Dimension]:
     """Everything that designs may differ in, by name: lengths of links, then inputs (see `document.dimensions`)."""
-    found: dict[str, Dimension] | None = mechanism.__dict__.get(
-        "_design_variables"
-    )  # kept: asked often
+    found: dict[str, Dimension] | None = mechanism.__dict__.get("_design_variables")  # kept: asked often
     if found is None:
         lengths = link_lengths(mechanism, (link.name for link in mechanism.links))
         found = {each.name: each for each in (*lengths, *input_numbers(mechanism))}

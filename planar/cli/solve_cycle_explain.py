@@ -15,6 +15,7 @@ from planar.cli.options import (
     load_model,
     main,
     mode_option,
+    model_argument,
     motion_options,
     output_option,
     parse_drives,
@@ -41,7 +42,7 @@ PAGES = (".pdf", ".png")
 
 
 @main.command()
-@click.argument("model")
+@model_argument()
 @json_option
 @at_option
 @mode_option
@@ -70,7 +71,7 @@ def solve(
 
 
 @main.command()
-@click.argument("model")
+@model_argument()
 @json_option
 @at_option
 @mode_option
@@ -124,7 +125,7 @@ def _solve_model(
 
 
 @main.command()
-@click.argument("model")
+@model_argument()
 @json_option
 @motion_options
 @mode_option

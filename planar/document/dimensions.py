@@ -128,8 +128,8 @@ def change_dimension(mechanism: Mechanism, dimension: Dimension, value: Any) -> 
 def with_values(mechanism: Mechanism, values: Mapping[str, Any], units: FileUnits | None = None) -> Mechanism:
     """The mechanism with some numbers of its file changed, checked as a file is.
 
-    `values` by name as in `dimensions`: a number (SI, or in `units`), or a text with a unit as "400 mm". Raises
-    BadInput with the number's name.
+    `values` by name as in `dimensions`: a number (SI, or in `units`), or a text with a unit as "400 mm". What a book
+    prints of the mechanism is left out where one changes. Raises BadInput with the number's name.
     """
     if not isinstance(values, Mapping):
         raise BadInput("values", f"give the numbers by name, as {{'BC.length': 0.4}}, not {values!r:.60}")
@@ -145,7 +145,8 @@ def with_values(mechanism: Mechanism, values: Mapping[str, Any], units: FileUnit
             moved = given._replace(law=given.law.start_at(given.position, given.velocity))
             changed = _with_value(changed, ("inputs", index), moved)
     _check_as_file(changed, chosen)
-    return changed
+    same = all(_value_at(changed, each.address) == each.value for each in chosen.values())
+    return changed if same else replace(changed, published=())
 
 
 def find_dimension(known: Mapping[str, Dimension], name: str) -> Dimension:

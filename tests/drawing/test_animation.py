@@ -181,7 +181,9 @@ def test_an_mp4_that_is_broken_off_leaves_nothing_behind():
 
 def test_an_mp4_without_ffmpeg_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    with pytest.raises(BadInput, match=re.escape("imageio-ffmpeg: MP4 files need ffmpeg: pip install 'planar-linkages[video]'")):
+    with pytest.raises(
+        BadInput, match=re.escape("imageio-ffmpeg: MP4 files need ffmpeg: pip install 'planar-linkages[video]'")
+    ):
         animate(planar.load("four-bar"), ".mp4")
 
 

@@ -10,13 +10,15 @@ import numpy as np
 from planar.analysis.identity.load_descriptions import ActionDescription, describe_actions
 from planar.analysis.identity.mechanism_names import mechanism_names
 from planar.analysis.identity.mobility import Mobility, gruebler, mobility
+from planar.document.dimensions import Dimension, file_dimensions
 from planar.dynamics.load_attachment import attachment_remarks
 from planar.equations.functions import mechanism_size, shapes_of_links
 from planar.foundation.errors import BadInput, NoAnswer, Outcome, PlanarError
+from planar.foundation.units import SI_UNITS
 from planar.model.link_graph import link_numbers, pair_labels_by_type, unconnected_links
 from planar.model.mechanism import Input, Mechanism, pair_entries
 from planar.model.pairs import MeasureKind
-from planar.model.wording import count_phrase, join_all_names
+from planar.model.wording import amount, count_phrase, join_all_names
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
 from planar.solving.position import solve
@@ -38,12 +40,21 @@ class LinkDescription:
 
 
 @dataclass(frozen=True)
+class NumberDescription:
+    """A number of the file: its value (SI) with the SI unit, empty of a plain number, and how it is printed."""
+
+    value: float
+    unit: str
+    shown: str
+
+
+@dataclass(frozen=True)
 class Inspection:
     """See `inspect`. `mobility` is None where the mechanism cannot be assembled; `open_reason` then says why.
 
     `pairs`: of every type the pairs by the numbers of their links, as ("turning", ("O-1", "1-2")); `lower` and `higher`
     how many; `is_mechanism` and `is_linkage` with the reasons. `actions` are its loads, springs and masses; `remarks`
-    say of which of them another link might have been meant.
+    say of which of them another link might have been meant. `dimensions` are all numbers of its file, by name.
     """
 
     name: str
@@ -62,6 +73,7 @@ class Inspection:
     linkage_reason: str
     actions: tuple[ActionDescription, ...]
     remarks: tuple[str, ...]
+    dimensions: dict[str, NumberDescription]
 
 
 def inspect(mechanism: Mechanism) -> Inspection:
@@ -101,7 +113,14 @@ def inspect(mechanism: Mechanism) -> Inspection:
         linkage_reason=_linkage_reason(is_mechanism, higher),
         actions=describe_actions(mechanism),
         remarks=attachment_remarks(mechanism),
+        dimensions={name: _describe_number(mechanism, each) for name, each in file_dimensions(mechanism).items()},
     )
+
+
+def _describe_number(mechanism: Mechanism, number: Dimension) -> NumberDescription:
+    if number.kind not in SI_UNITS:
+        return NumberDescription(number.value, "", f"{number.value:.6g}")
+    return NumberDescription(number.value, SI_UNITS[number.kind], amount(number.value, number.kind, mechanism.units))
 
 
 def _order_word(pairs: int) -> str:
