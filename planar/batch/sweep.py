@@ -50,9 +50,9 @@ def sweep(
     """The motions of many designs of one mechanism, which differ in dimensions of links or in their inputs.
 
     `designs` maps names to arrays, all of one length, or single numbers (m, rad, per s): `BC.length`, `A.position`,
-    `BC.E.distance`; the names are those of `planar.dimensions`, of lengths of links and of inputs. Each design is solved
-    as `planar.cycle` would solve the mechanism so changed: from the assembly nearest to the sketch, at `steps` + 1
-    positions of one input from `start` to `stop` (rad or m), the others standing still. An angle runs from the design's
+    `BC.E.distance`; the names are those of `planar.dimensions`, of lengths of links and of inputs. Each design is
+    solved as `planar.cycle` would solve the mechanism so changed: from the assembly nearest to the sketch, at `steps`
+    + 1 positions of one input from `start` to `stop` (rad or m), the others standing still. An angle runs from its
     own position a turn on where they are left out; a slide without a `stop` runs between its limits, each design
     between its own.
 

@@ -79,7 +79,7 @@ SETTINGS = "planar.settings"
 def model_argument(*names: str, **more: Any) -> Callable[[Any], Any]:
     """The MODEL of a command, with the option that changes numbers of it; `read_model` reads the one by the other."""
 
-    def keep(context: click.Context, option: click.Parameter, settings: tuple[str, ...]) -> None:
+    def keep(context: click.Context, _: click.Parameter, settings: tuple[str, ...]) -> None:
         context.meta[SETTINGS] = settings
 
     option = click.option(

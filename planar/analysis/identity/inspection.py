@@ -14,11 +14,11 @@ from planar.document.dimensions import Dimension, file_dimensions
 from planar.dynamics.load_attachment import attachment_remarks
 from planar.equations.functions import mechanism_size, shapes_of_links
 from planar.foundation.errors import BadInput, NoAnswer, Outcome, PlanarError
-from planar.foundation.units import SI_UNITS
+from planar.foundation.units import SI_UNITS, display_unit
 from planar.model.link_graph import link_numbers, pair_labels_by_type, unconnected_links
 from planar.model.mechanism import Input, Mechanism, pair_entries
 from planar.model.pairs import MeasureKind
-from planar.model.wording import amount, count_phrase, join_all_names
+from planar.model.wording import count_phrase, join_all_names
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
 from planar.solving.position import solve
@@ -120,7 +120,8 @@ def inspect(mechanism: Mechanism) -> Inspection:
 def _describe_number(mechanism: Mechanism, number: Dimension) -> NumberDescription:
     if number.kind not in SI_UNITS:
         return NumberDescription(number.value, "", f"{number.value:.6g}")
-    return NumberDescription(number.value, SI_UNITS[number.kind], amount(number.value, number.kind, mechanism.units))
+    name, unit = display_unit(number.kind, mechanism.units)
+    return NumberDescription(number.value, SI_UNITS[number.kind], f"{unit.from_si(number.value):.6g} {name}")
 
 
 def _order_word(pairs: int) -> str:
