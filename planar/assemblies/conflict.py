@@ -10,6 +10,7 @@ from math import hypot
 from planar.assemblies.joint_feasibility import JointFeasibility, Requirement
 from planar.assemblies.modes import modes
 from planar.assemblies.polynomial.completeness import Completeness
+from planar.document.first_argument import takes_mechanism
 from planar.foundation.errors import NoAnswer
 from planar.foundation.geometry import Vector
 from planar.model.link_graph import pairs_farthest_first
@@ -83,6 +84,7 @@ class Conflict:
         return tuple(told)
 
 
+@takes_mechanism
 def conflict(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = ()) -> Conflict | None:
     """The pairs and inputs that keep a mechanism from going together at its inputs; None where it goes together.
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from planar.assemblies.polynomial.completeness import Completeness
 from planar.assemblies.search_tree import BEST_TO_WORST, AssemblyPath, AssemblyTree
+from planar.document.first_argument import takes_mechanism
 from planar.equations.functions import frames_from_coordinates, slice_length
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.geometry import Frame
@@ -33,6 +34,7 @@ MAX_CERTIFIED_FOR_CLAIM = 256
 """The same, certified, for the sake of a claim about the whole list."""
 
 
+@takes_mechanism
 def modes(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = (), *, certify: bool = True) -> Modes:
     """Every real assembly of a mechanism at its inputs.
 

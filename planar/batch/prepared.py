@@ -13,6 +13,7 @@ from planar.batch.initial_assembly import find_assemblies
 from planar.batch.march.choice import find_assembly_corrector
 from planar.batch.reference_design import reference_design
 from planar.batch.sweep import check_range, sweep
+from planar.document.first_argument import takes_mechanism
 from planar.foundation.errors import BadInput
 from planar.model.mechanism import Mechanism
 
@@ -31,6 +32,7 @@ class PreparedRun(NamedTuple):
     said: tuple[str, ...] = ()
 
 
+@takes_mechanism
 def prepared(
     mechanism: Mechanism,
     steps: int = 360,

@@ -17,6 +17,7 @@ from planar.batch.march.choice import available_runners
 from planar.batch.reference_design import reference_design
 from planar.batch.results import Sweep
 from planar.batch.stores.store import SweepPlan, open_store
+from planar.document.first_argument import takes_mechanism
 from planar.foundation.errors import BadInput
 from planar.model.mechanism import LARGEST_INPUT_POSITION, Mechanism
 from planar.solving.cycle import MAX_STEPS
@@ -31,6 +32,7 @@ BLOCKS_PER_WORKER = 2
 """Blocks in the hands of an executor for each of its workers."""
 
 
+@takes_mechanism
 def sweep(
     mechanism: Mechanism,
     designs: Mapping[str, Any],

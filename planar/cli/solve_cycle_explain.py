@@ -183,22 +183,22 @@ def cycle(
 def _answers(motion: Motion, name: str) -> tuple[Answers, ...]:
     """What `--of` asks for."""
     from planar.analysis.motion.answers import answers
-    from planar.results.motion import UnknownName
+    from planar.foundation.errors import Unknown
 
     try:
         return answers(motion, name)
-    except UnknownName as problem:
+    except Unknown as problem:
         raise BadInput("--of", str(problem)) from None
 
 
 def _relative_motion(state: State, text: str) -> RelativeState:
     """The relative motion that `--relative` asks for."""
-    from planar.results.motion import UnknownName
+    from planar.foundation.errors import Unknown
 
     names = [name.strip() for name in text.split(",")]
     if len(names) not in (2, 3):
         raise BadInput("--relative", f"{text!r} is not of the form POINT,POINT or POINT,POINT,LINK, such as C,B")
     try:
         return state.relative(*names)
-    except UnknownName as problem:
+    except Unknown as problem:
         raise BadInput("--relative", str(problem)) from None

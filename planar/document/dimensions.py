@@ -20,6 +20,7 @@ from numbers import Real
 from typing import Any, NamedTuple
 
 from planar.document.cursor import Cursor, FileContext, suggest_spelling
+from planar.document.first_argument import takes_mechanism
 from planar.document.loads import write_load, write_mass, write_spring
 from planar.document.reader import read_mechanism
 from planar.document.writer import write_input, write_link, write_mechanism
@@ -103,6 +104,7 @@ def input_numbers(mechanism: Mechanism) -> Iterator[Dimension]:
     return (each for each in _input_dimensions(mechanism) if len(each.address) == 3)
 
 
+@takes_mechanism
 def dimensions(mechanism: Mechanism) -> dict[str, float]:
     """Every number of a mechanism's file by name (SI: m, rad, s, N, kg), those left out with their defaults.
 
@@ -125,6 +127,7 @@ def change_dimension(mechanism: Mechanism, dimension: Dimension, value: Any) -> 
     return replace(mechanism, pairs=tuple(changed))
 
 
+@takes_mechanism
 def with_values(mechanism: Mechanism, values: Mapping[str, Any], units: FileUnits | None = None) -> Mechanism:
     """The mechanism with some numbers of its file changed, checked as a file is.
 

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, TextIO
 
 from planar.document import read_mechanism
+from planar.document.first_argument import takes_mechanism
 from planar.foundation.errors import BadInput, WriteFailure
 from planar.model.mechanism import Mechanism
 
@@ -47,6 +48,7 @@ def from_dict(value: Any) -> Mechanism:
     return read_mechanism(value)
 
 
+@takes_mechanism
 def to_dict(mechanism: Mechanism) -> dict[str, Any]:
     """The JSON value of a mechanism; `from_dict` gives the same mechanism back, to the last bit."""
     from planar.document.writer import write_mechanism
@@ -54,6 +56,7 @@ def to_dict(mechanism: Mechanism) -> dict[str, Any]:
     return write_mechanism(mechanism)
 
 
+@takes_mechanism
 def dumps(mechanism: Mechanism) -> str:
     """The JSON text of a mechanism."""
     return json.dumps(to_dict(mechanism), indent=2, ensure_ascii=False) + "\n"

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from planar.document.first_argument import takes_mechanism
 from planar.dynamics.equations_of_motion import EquationsOfMotion
 from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.lagrangian import lagrangian_functions
@@ -70,6 +71,7 @@ class Simulation:
         return float(np.ptp(whole)) / beside if beside else 0.0
 
 
+@takes_mechanism
 def simulate(
     mechanism: Mechanism,
     duration: float,

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from planar.foundation.errors import BadInput, Outcome, join_names
+from planar.foundation.errors import BadInput, Outcome, Unknown, join_names
 from planar.foundation.geometry import Frame, Vector, frame_at
 from planar.foundation.jets import Jet, value_and_rates
 from planar.foundation.notebook_display import Displayable
@@ -37,13 +37,6 @@ from planar.results.records import (
 )
 
 Array = np.ndarray
-
-
-class UnknownName(KeyError):
-    """A name that the mechanism does not have."""
-
-    def __str__(self) -> str:
-        return str(self.args[0])
 
 
 class KinematicResult(Displayable):
@@ -104,13 +97,13 @@ class KinematicResult(Displayable):
 
     def _frame(self, link: str) -> Frame:
         if link not in self.frames:
-            raise UnknownName(f"there is no link {link!r}; links are {join_names(self.frames)}")
+            raise Unknown(f"there is no link {link!r}; links are {join_names(self.frames)}")
         return self.frames[link]
 
     def _find_relative_motion(self, name: str) -> tuple[Pair, ValueAndRates]:
         """A pair, and the relative motion that its results are of."""
         if name not in self._relative_motions:
-            raise UnknownName(f"there is no pair {name!r}; pairs are {join_names(self._relative_motions)}")
+            raise Unknown(f"there is no pair {name!r}; pairs are {join_names(self._relative_motions)}")
         pair = self._relative_motions[name]
         numbers = pair.measure([self.shapes[link] for link in pair.bodies])
         frames = [self.frames[link] for link in pair.bodies]
@@ -166,7 +159,7 @@ class KinematicResult(Displayable):
                 for rider, base in ((p, q), (q, p)):
                     if rides[0] in rider.members and any(link == rides[1] for link, _ in base.members):
                         return rides[1]
-        raise UnknownName(
+        raise Unknown(
             f"no link carries both {p.name!r} and {q.name!r}, and neither slides on a link that carries the other; "
             f"name the link whose axes are meant"
         )
@@ -174,7 +167,7 @@ class KinematicResult(Displayable):
     def _find_point(self, name: str) -> NamedPoint:
         if name in self._point_names:
             return self._point_names[name]
-        raise UnknownName(f"there is no point {name!r}; points are {join_names(self.point_names)}")
+        raise Unknown(f"there is no point {name!r}; points are {join_names(self.point_names)}")
 
     def _point_position(self, named: NamedPoint) -> Vector:
         link, point = named.members[0]

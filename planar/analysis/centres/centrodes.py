@@ -10,6 +10,7 @@ import numpy as np
 
 from planar.analysis.interpolated_run import InterpolatedRun
 from planar.analysis.relative_motion import RelativeMotion, relative_motion
+from planar.document.first_argument import takes_result
 from planar.foundation.errors import BadInput
 from planar.foundation.geometry import Frame, Vector, frame_at
 from planar.foundation.jets import Jet
@@ -128,6 +129,7 @@ class Centrodes:
         return np.flatnonzero(np.isfinite(self.fixed.homogeneous[:, 2]))
 
 
+@takes_result("Motion")
 def centrodes(motion: Motion, link: str, other: str | None = None) -> Centrodes:
     """The fixed and the moving centrode of a link against another (left out: the frame), from the motion's rates.
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from planar.analysis.centres.centres import Centre, Centres, extent
 from planar.analysis.rate_equations import RateEquation, RateEquations, SlideJoint, rate_equations
+from planar.document.first_argument import takes_result
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.model.mechanism import Drive, replace_inputs
 
@@ -48,6 +49,7 @@ class PointByCentre(NamedTuple):
     by: tuple[str, ...]
 
 
+@takes_result("Centres")
 def velocity_by_centres(centres: Centres, point: str) -> PointByCentre:
     """v_P = w_k (P - I_kf) turned a quarter, w_k from an input's given rate and w_i through I_ik.
 

@@ -11,6 +11,7 @@ from planar.analysis.identity.load_descriptions import ActionDescription, descri
 from planar.analysis.identity.mechanism_names import mechanism_names
 from planar.analysis.identity.mobility import Mobility, gruebler, mobility
 from planar.document.dimensions import Dimension, file_dimensions
+from planar.document.first_argument import takes_mechanism
 from planar.dynamics.load_attachment import attachment_remarks
 from planar.equations.functions import mechanism_size, shapes_of_links
 from planar.foundation.errors import BadInput, NoAnswer, Outcome, PlanarError
@@ -76,6 +77,7 @@ class Inspection:
     dimensions: dict[str, NumberDescription]
 
 
+@takes_mechanism
 def inspect(mechanism: Mechanism) -> Inspection:
     """Everything that can be said of a mechanism before its motion is asked for."""
     try:

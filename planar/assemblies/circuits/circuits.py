@@ -13,6 +13,7 @@ import numpy as np
 from planar.assemblies.circuits.circuit_search import CircuitSearch, InputInterval, is_same_assembly
 from planar.assemblies.circuits.traced_circuit import Branch, TracedCircuit
 from planar.assemblies.modes import Mode
+from planar.document.first_argument import takes_mechanism
 from planar.foundation.notebook_display import Displayable
 from planar.model.mechanism import Drive, Mechanism, replace_inputs, running_input_index
 from planar.results.motion import Motion
@@ -28,6 +29,7 @@ TURN_TOLERANCE = 1e-12
 """rad: what rounding leaves of a turn."""
 
 
+@takes_mechanism
 def circuits(mechanism: Mechanism, pair: str | None = None) -> Circuits:
     """All circuits of a mechanism while one input runs, the others standing still.
 
