@@ -10,6 +10,7 @@ import numpy as np
 from planar.foundation.errors import Unknown
 from planar.foundation.geometry import Frame, Vector
 from planar.foundation.jets import value_and_rates
+from planar.foundation.short_repr import short_repr
 
 Array = np.ndarray
 
@@ -28,6 +29,8 @@ class RelativeMotion(NamedTuple):
     "angular velocity"
     angular_acceleration: Array
     "angular acceleration"
+
+    __repr__ = short_repr
 
     @property
     def fixed_pole(self) -> tuple[Array, Array]:

@@ -19,6 +19,7 @@ from planar.equations.functions import frames_from_coordinates, slice_length
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.geometry import Frame
 from planar.foundation.notebook_display import Displayable
+from planar.foundation.short_repr import short_repr
 from planar.model.link_shapes import LinkShape
 from planar.model.mechanism import Drive, Mechanism, NamedPoint, named_points, replace_inputs
 from planar.model.wording import count_phrase, join_all_names
@@ -310,6 +311,8 @@ class Mode:
     z: Array
     "(unknowns,) of the equations"
     _solver: PositionSolver
+
+    __repr__ = short_repr
 
     def __reduce__(self) -> tuple[Any, ...]:
         # compiled equations stay in their process: another one makes them again

@@ -18,6 +18,7 @@ from planar.equations.functions import mechanism_size
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.foundation.geometry import Frame, frame_at
 from planar.foundation.jets import Jet
+from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import Input, Mechanism
 from planar.model.wording import join_all_names
 from planar.results.motion import Motion, State
@@ -57,6 +58,8 @@ class Simulation:
     potential: Array
     work: Array
     driven: tuple[str, ...]
+
+    __repr__ = short_repr
 
     @property
     def balance(self) -> float:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -278,6 +278,18 @@ class FollowedPath(Protocol):
         """See `Motion.limits`."""
 
 
+class RecordedPath(NamedTuple):
+    """What is known of the path of a motion that came from another process, or is a copy."""
+
+    singular_rows: frozenset[int]
+    fork_positions: tuple[float, ...]
+    known_limits: tuple[Limit, ...]
+
+    def limits(self, motion: Motion) -> tuple[Limit, ...]:
+        """See `Motion.limits`."""
+        return self.known_limits
+
+
 @dataclass(frozen=True)
 class Motion(KinematicResult):
     """A run of positions of a mechanism, n of them, in the order in which its inputs run through them.
@@ -324,6 +336,14 @@ class Motion(KinematicResult):
             return limit
         position = np.atleast_1d(self._find_relative_motion(limit.of)[1][0])
         return limit._replace(value=limit.value + self._turns_of_limit(limit.of, position))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """With its limits solved for, in place of the compiled equations that would solve for them."""
+        state = {each.name: getattr(self, each.name) for each in fields(self)}
+        if self.course is not None:
+            path = self.course
+            state["course"] = RecordedPath(path.singular_rows, path.fork_positions, path.limits(self))
+        return state
 
     def up_to_row(self, row: int) -> Motion:
         """The rows up to one, and that."""

@@ -34,6 +34,7 @@ from planar.analysis.vector_chains import VectorChains
 from planar.document.first_argument import takes_result
 from planar.foundation.errors import Unknown
 from planar.foundation.notebook_display import Displayable
+from planar.foundation.short_repr import short_repr
 from planar.model.link_graph import link_numbers, number_separator
 from planar.model.mechanism import Mechanism, named_points
 from planar.results.motion import State
@@ -66,6 +67,8 @@ class Centre:
     homogeneous: Array | None
     derivation: str
     lines: tuple[CentreLine, ...] = ()
+
+    __repr__ = short_repr
 
     @property
     def position(self) -> Array | None:

@@ -14,6 +14,7 @@ from planar.document.first_argument import takes_result
 from planar.foundation.errors import BadInput
 from planar.foundation.geometry import Frame, Vector, frame_at
 from planar.foundation.jets import Jet
+from planar.foundation.short_repr import short_repr
 from planar.model.link_graph import link_numbers
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import MeasureKind
@@ -45,6 +46,8 @@ class Centrode(NamedTuple):
     "positions of the input that runs (n,)"
     homogeneous: Array
     rate: Array
+
+    __repr__ = short_repr
 
     @property
     def position(self) -> Array:
@@ -113,6 +116,8 @@ class Centrodes:
     motion: RelativeMotion
     "of the link in the axes of the other, at every position"
     reason: str
+
+    __repr__ = short_repr
 
     def placed(self, row: int, points: Array | None = None) -> Array:
         """The moving centrode, or other points of the link's axes, where they are at a position: (n, 2), m.

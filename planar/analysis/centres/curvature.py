@@ -17,6 +17,7 @@ import numpy as np
 from planar.analysis.relative_motion import RelativeMotion, quarter_turn, relative_motion
 from planar.document.first_argument import takes_result
 from planar.foundation.errors import BadInput, Unknown
+from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import Drive, named_points, replace_inputs
 from planar.results.motion import State
 from planar.solving.position import PositionSolver
@@ -34,6 +35,8 @@ class MotionCircle(NamedTuple):
     centre: Array
     diameter: float
 
+    __repr__ = short_repr
+
 
 class PathCurvature(NamedTuple):
     """How the path of a point is curved at a position.
@@ -48,6 +51,8 @@ class PathCurvature(NamedTuple):
     radius: float
     direct: float
     centre: Array | None
+
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True)
@@ -80,6 +85,8 @@ class Curvature:
     "(2,), where the link has no acceleration"
     reason: str
     "why there is no pole or no inflection circle, else empty"
+
+    __repr__ = short_repr
 
     def path(self, point: str | Sequence[float]) -> PathCurvature:
         """The curvature of the path of a point of the link, by name or by its coordinates (m) in the link's axes.

@@ -15,6 +15,7 @@ from planar.document.first_argument import takes_mechanism
 from planar.dynamics.load_attachment import attachment_remarks
 from planar.equations.functions import mechanism_size, shapes_of_links
 from planar.foundation.errors import BadInput, NoAnswer, Outcome, PlanarError
+from planar.foundation.short_repr import short_repr
 from planar.foundation.units import SI_UNITS, display_unit
 from planar.model.link_graph import link_numbers, pair_labels_by_type, unconnected_links
 from planar.model.mechanism import Input, Mechanism, pair_entries
@@ -75,6 +76,8 @@ class Inspection:
     actions: tuple[ActionDescription, ...]
     remarks: tuple[str, ...]
     dimensions: dict[str, NumberDescription]
+
+    __repr__ = short_repr
 
 
 @takes_mechanism

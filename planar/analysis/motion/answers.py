@@ -14,6 +14,7 @@ from planar.analysis.motion.time_ratio import TimeRatio, find_time_ratio
 from planar.analysis.motion.transmission_angle import Transmission, transmission
 from planar.document.first_argument import takes_result
 from planar.foundation.errors import BadInput, Unknown
+from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import relative_motions
 from planar.results.motion import Motion
 
@@ -45,6 +46,8 @@ class Answers:
     transmission: Transmission | None = None
     advantage: AdvantageOver | None = None
     notes: tuple[str, ...] = ()
+
+    __repr__ = short_repr
 
 
 @takes_result("Motion")

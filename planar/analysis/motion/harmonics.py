@@ -12,6 +12,7 @@ from planar.analysis.motion.extremes import Extreme, Stroke, find_stroke
 from planar.document.first_argument import takes_mechanism
 from planar.equations.functions import mechanism_size, shapes_of_links
 from planar.foundation.errors import BadInput, NoAnswer, Outcome, Unknown
+from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import Drive, Mechanism, relative_motions, replace_inputs
 from planar.model.pairs import MeasureKind
 from planar.results.motion import Array, Motion
@@ -49,6 +50,8 @@ class Harmonics:
     positions: int
     rest: float
     stroke: Stroke | None
+
+    __repr__ = short_repr
 
     @property
     def amplitudes(self) -> Array:

@@ -14,6 +14,7 @@ from planar.analysis.motion.zeros import bracket_zeros
 from planar.document.first_argument import takes_result
 from planar.foundation.errors import NoAnswer
 from planar.foundation.root_finding import find_root
+from planar.foundation.short_repr import short_repr
 from planar.model.wording import REST_TOLERANCE
 from planar.results.motion import KinematicResult, Motion
 
@@ -36,6 +37,8 @@ class AdvantageOver(NamedTuple):
     measure: str
     least: Extreme
     infinite: tuple[float, ...]
+
+    __repr__ = short_repr
 
 
 @takes_result("Motion")

@@ -12,6 +12,7 @@ from planar.analysis.motion.zeros import SERIES_TOLERANCE, bracket_maxima, find_
 from planar.document.first_argument import takes_result
 from planar.foundation.errors import BadInput, NoAnswer, Unknown
 from planar.foundation.jets import Jet
+from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import relative_motions
 from planar.model.pairs import MeasureKind, Pair
 from planar.model.wording import join_all_names
@@ -43,6 +44,8 @@ class Transmission(NamedTuple):
     through: tuple[str, ...]
     angle: float | Array
     least: Extreme | None = None
+
+    __repr__ = short_repr
 
 
 @takes_result("State", "Motion")

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import pi
-from typing import overload
+from typing import Any, overload
 
 import numpy as np
 
@@ -56,6 +56,10 @@ class Circuit:
     pair: str
     curve: TracedCircuit = field(repr=False)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # compiled equations stay in their process: another one follows the circuits again
+        return _circuit_again, (self.mechanism, self.pair, self.number)
+
     @cached_property
     def motion(self) -> Motion:
         """The positions all round it, or over the branch from which it was followed where it does not close."""
@@ -73,6 +77,11 @@ class Circuit:
         ways = np.sign(np.diff(self.motion.inputs[self.pair].position))
         passed = np.cumsum(ways[1:] != ways[:-1])
         return np.concatenate([[0, 0], passed])[: len(self.motion)] % len(self.branches) + 1
+
+
+def _circuit_again(mechanism: Mechanism, pair: str, number: int) -> Circuit:
+    """The circuit of this number of a mechanism."""
+    return circuits(mechanism, pair)[number - 1]
 
 
 class Circuits(Displayable, Sequence[Circuit]):
@@ -105,6 +114,9 @@ class Circuits(Displayable, Sequence[Circuit]):
 
     def __len__(self) -> int:
         return len(self._found)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return circuits, (self.mechanism, self.pair)
 
     def __repr__(self) -> str:
         return f"<{len(self)} circuits of {self.mechanism.name!r} over {self.pair}, {self.complete.value}>"
