@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import hypot
+from typing import Any
 
 from planar.assemblies.joint_feasibility import JointFeasibility, Requirement
 from planar.assemblies.modes import modes
@@ -49,6 +50,13 @@ class Conflict:
     "how surely there is no position that meets them: whether the list of these is complete"
     _solver: PositionSolver
     _failure: AssemblySearchFailure
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # compiled equations stay in their process: another one looks for the conflict again
+        return conflict, (self.mechanism,)
+
+    def __repr__(self) -> str:
+        return f"<Conflict in {self.mechanism.name!r} of {quote_names((*self.pairs, *self.inputs))}>"
 
     @cached_property
     def dimensions(self) -> tuple[RemedyChange, ...]:
