@@ -8,7 +8,7 @@ from planar.document.reader import read_mechanism
 from planar.document.writer import write_mechanism
 from planar.foundation.errors import BadInput
 from planar.model.mechanism import FileUnits, Input, Link, Load, Mass, Mechanism, Spring, check_mechanism
-from planar.model.pairs import Pair
+from planar.model.pairs import Pair, joining_entry
 
 
 def build(  # many: one for each list of a file
@@ -55,7 +55,7 @@ def build(  # many: one for each list of a file
     value = write_mechanism(bare)
     written = dict(zip(dict.fromkeys(each.entry_name() for each in bare.pairs), value["pairs"], strict=True))
     entries = dict.fromkeys(each if isinstance(each, str) else each.entry_name() for each in pairs)
-    value["pairs"] = [written.get(each, {"turning": each}) for each in entries]
+    value["pairs"] = [written.get(each) or joining_entry(each) for each in entries]
     joined = read_mechanism(value)
     whole = Mechanism(
         **{key: getattr(joined, key) for key in ("name", "frame", "links", "pairs", "units")},

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import wraps
-from os import PathLike, fspath
+from os import PathLike
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
+from planar.document.files import as_mechanism
 from planar.foundation.errors import BadInput, join_names
 from planar.model.mechanism import Mechanism
 
@@ -16,19 +17,6 @@ MechanismSource = Mechanism | str | PathLike[str]
 P = ParamSpec("P")
 R = TypeVar("R")
 F = TypeVar("F", bound=Callable[..., Any])
-
-
-def as_mechanism(source: Any) -> Mechanism:
-    """The mechanism that is given, or that of a file or of a model's name. Raises BadInput."""
-    if isinstance(source, Mechanism):
-        return source
-    if isinstance(source, str | PathLike):
-        from planar.document.files import load
-
-        path = fspath(source)
-        if isinstance(path, str):
-            return load(path)
-    raise BadInput("mechanism", f"a Mechanism, a file or a model's name is wanted, not {_name_of(source)}")
 
 
 def takes_mechanism(function: Callable[Concatenate[Mechanism, P], R]) -> Callable[Concatenate[MechanismSource, P], R]:
@@ -48,7 +36,7 @@ def takes_result(*classes: str) -> Callable[[F], F]:
         if "Mechanism" in classes and isinstance(source, str | PathLike):
             return as_mechanism(source)
         wanted = join_names([f"a {name}" for name in classes], last_joiner=" or ")
-        raise BadInput("argument", f"{wanted} is wanted, not {_name_of(source)}")
+        raise BadInput("argument", f"{wanted} is wanted, not {type(source).__name__} {source!r:.60}")
 
     return lambda function: _with_first(function, resolve)
 
@@ -65,7 +53,3 @@ def _with_first(function: Any, resolve: Callable[[Any], Any]) -> Any:
         return function(**named)
 
     return call
-
-
-def _name_of(source: Any) -> str:
-    return f"{type(source).__name__} {source!r:.60}"
