@@ -9,7 +9,7 @@ import numpy as np
 import planar
 from benchmarks.entry import Array, Entry
 from benchmarks.swept import Swept
-from planar.model.dimensions import change_dimension, dimensions
+from planar.document.dimensions import change_dimension, link_lengths
 from planar.model.mechanism import Mechanism
 from planar.results.motion import Motion
 from planar.solving.continuation.path import follow_samples
@@ -135,7 +135,7 @@ def _turn(mechanism: Mechanism) -> tuple[float, float]:
 
 
 def _all(mechanism: Mechanism) -> list:
-    return list(dimensions(mechanism, frozenset(link.name for link in mechanism.links)))
+    return list(link_lengths(mechanism, frozenset(link.name for link in mechanism.links)))
 
 
 def _named(swept: Swept, d: Array) -> dict[str, Array]:

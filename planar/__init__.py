@@ -4,6 +4,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from planar.foundation.notebook_display import Displayable
+from planar.foundation.revision import Revisable
 
 if TYPE_CHECKING:
     from planar import plot
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from planar.analysis.motion.coupler_area import Area, area
     from planar.analysis.motion.dwells import Dwell, dwells
     from planar.analysis.motion.extremes import Extremes, Stroke, Swing, extremes, greatest, stroke, swing
-    from planar.analysis.motion.harmonics import harmonics
+    from planar.analysis.motion.harmonics import Harmonics, harmonics
     from planar.analysis.motion.mechanical_advantage import Advantage, advantage
     from planar.analysis.motion.mechanical_advantage_over_motion import AdvantageOver, advantage_over
     from planar.analysis.motion.output import Extreme
@@ -28,23 +29,37 @@ if TYPE_CHECKING:
     from planar.assemblies.conflict import Conflict, conflict
     from planar.assemblies.modes import Mode, Modes, modes
     from planar.batch.mechanisms.results import Each, Swept
-    from planar.batch.prepared import prepared
+    from planar.batch.prepared import PreparedRun, PreparedSweep, prepared
     from planar.batch.results import Sweep
     from planar.batch.sweep import sweep
     from planar.batch.sweep_mechanisms import sweep_each
+    from planar.document.builder import build
+    from planar.document.dimensions import dimensions
     from planar.document.files import dumps, from_dict, load, loads, to_dict
     from planar.document.schema import schema
     from planar.dynamics.flywheel import Flywheel, flywheel
     from planar.dynamics.forces import Forces, forces
     from planar.dynamics.reactions import Reaction
     from planar.dynamics.simulation import Simulation, simulate
-    from planar.foundation.errors import BadInput, NoAnswer, Outcome, PlanarError
+    from planar.foundation.errors import BadInput, NoAnswer, Outcome, PlanarError, Unknown
+    from planar.model.input_laws.cam_rises import (
+        CycloidalRise,
+        HarmonicRise,
+        ModifiedTrapezoidalRise,
+        Polynomial345Rise,
+        Polynomial4567Rise,
+        TrapezoidalRise,
+    )
+    from planar.model.input_laws.constant_rates import ConstantAccelerationSegment, ConstantSpeedSegment, DwellSegment
+    from planar.model.input_laws.input_law import InputLaw
+    from planar.model.input_laws.spline_table import TableSegment
     from planar.model.mechanism import (
         Along,
         At,
         Course,
         Distances,
         Drive,
+        FileUnits,
         Input,
         Link,
         Load,
@@ -53,10 +68,19 @@ if TYPE_CHECKING:
         Point,
         Spring,
     )
+    from planar.model.pairs.base import Pair
+    from planar.model.pairs.belt import BeltPair, ChainPair
+    from planar.model.pairs.gear import GearPair
+    from planar.model.pairs.guide_line import LinkLine
+    from planar.model.pairs.rack import RackPair
+    from planar.model.pairs.sliding import SlidingPair
+    from planar.model.pairs.slot import SlotPair
+    from planar.model.pairs.turning import TurningPair
     from planar.model.pin_linkage import pinned
     from planar.pages.view import view
     from planar.reports.files.xarray_dataset import dataset
     from planar.results.motion import Motion, State
+    from planar.results.records import Limit, LinkMotion, LinkState, PointMotion, PointState, RelativeState
     from planar.solving.cycle import cycle
     from planar.solving.position import solve
 
@@ -70,51 +94,83 @@ _ROOMS = {
     "Area": "analysis.motion.coupler_area",
     "At": "model.mechanism",
     "BadInput": "foundation.errors",
+    "BeltPair": "model.pairs.belt",
     "Branch": "assemblies.circuits.circuits",
     "Centre": "analysis.centres.centres",
     "Centres": "analysis.centres.centres",
     "Centrodes": "analysis.centres.centrodes",
+    "ChainPair": "model.pairs.belt",
     "Circuit": "assemblies.circuits.circuits",
     "Circuits": "assemblies.circuits.circuits",
     "Conflict": "assemblies.conflict",
+    "ConstantAccelerationSegment": "model.input_laws.constant_rates",
+    "ConstantSpeedSegment": "model.input_laws.constant_rates",
     "Course": "model.mechanism",
     "Curvature": "analysis.centres.curvature",
+    "CycloidalRise": "model.input_laws.cam_rises",
     "Distances": "model.mechanism",
     "Drive": "model.mechanism",
     "Dwell": "analysis.motion.dwells",
+    "DwellSegment": "model.input_laws.constant_rates",
     "Each": "batch.mechanisms.results",
     "Extreme": "analysis.motion.output",
     "Extremes": "analysis.motion.extremes",
+    "FileUnits": "model.mechanism",
     "Flywheel": "dynamics.flywheel",
     "Forces": "dynamics.forces",
+    "GearPair": "model.pairs.gear",
+    "HarmonicRise": "model.input_laws.cam_rises",
+    "Harmonics": "analysis.motion.harmonics",
     "Input": "model.mechanism",
+    "InputLaw": "model.input_laws.input_law",
     "Inspection": "analysis.identity.inspection",
+    "Limit": "results.records",
     "Link": "model.mechanism",
+    "LinkLine": "model.pairs.guide_line",
+    "LinkMotion": "results.records",
+    "LinkState": "results.records",
     "Load": "model.mechanism",
     "Mass": "model.mechanism",
     "Mechanism": "model.mechanism",
     "Mobility": "analysis.identity.mobility",
     "Mode": "assemblies.modes",
     "Modes": "assemblies.modes",
+    "ModifiedTrapezoidalRise": "model.input_laws.cam_rises",
     "Motion": "results.motion",
     "NoAnswer": "foundation.errors",
     "Outcome": "foundation.errors",
+    "Pair": "model.pairs.base",
     "PlanarError": "foundation.errors",
     "Point": "model.mechanism",
+    "PointMotion": "results.records",
+    "PointState": "results.records",
+    "Polynomial345Rise": "model.input_laws.cam_rises",
+    "Polynomial4567Rise": "model.input_laws.cam_rises",
+    "PreparedRun": "batch.prepared",
+    "PreparedSweep": "batch.prepared",
+    "RackPair": "model.pairs.rack",
     "Reaction": "dynamics.reactions",
+    "RelativeState": "results.records",
     "Simulation": "dynamics.simulation",
+    "SlidingPair": "model.pairs.sliding",
+    "SlotPair": "model.pairs.slot",
     "Spring": "model.mechanism",
     "State": "results.motion",
     "Stroke": "analysis.motion.extremes",
     "Sweep": "batch.results",
     "Swept": "batch.mechanisms.results",
     "Swing": "analysis.motion.extremes",
+    "TableSegment": "model.input_laws.spline_table",
     "TimeRatio": "analysis.motion.time_ratio",
     "Transmission": "analysis.motion.transmission_angle",
+    "TrapezoidalRise": "model.input_laws.cam_rises",
+    "TurningPair": "model.pairs.turning",
+    "Unknown": "foundation.errors",
     "advantage": "analysis.motion.mechanical_advantage",
     "advantage_over": "analysis.motion.mechanical_advantage_over_motion",
     "answers": "analysis.motion.answers",
     "area": "analysis.motion.coupler_area",
+    "build": "document.builder",
     "centre_of": "analysis.centres.two_directions",
     "centres": "analysis.centres.centres",
     "centrodes": "analysis.centres.centrodes",
@@ -123,6 +179,7 @@ _ROOMS = {
     "curvature": "analysis.centres.curvature",
     "cycle": "solving.cycle",
     "dataset": "reports.files.xarray_dataset",
+    "dimensions": "document.dimensions",
     "dumps": "document.files",
     "dwells": "analysis.motion.dwells",
     "extremes": "analysis.motion.extremes",
@@ -162,51 +219,83 @@ __all__ = [
     "Area",
     "At",
     "BadInput",
+    "BeltPair",
     "Branch",
     "Centre",
     "Centres",
     "Centrodes",
+    "ChainPair",
     "Circuit",
     "Circuits",
     "Conflict",
+    "ConstantAccelerationSegment",
+    "ConstantSpeedSegment",
     "Course",
     "Curvature",
+    "CycloidalRise",
     "Distances",
     "Drive",
     "Dwell",
+    "DwellSegment",
     "Each",
     "Extreme",
     "Extremes",
+    "FileUnits",
     "Flywheel",
     "Forces",
+    "GearPair",
+    "HarmonicRise",
+    "Harmonics",
     "Input",
+    "InputLaw",
     "Inspection",
+    "Limit",
     "Link",
+    "LinkLine",
+    "LinkMotion",
+    "LinkState",
     "Load",
     "Mass",
     "Mechanism",
     "Mobility",
     "Mode",
     "Modes",
+    "ModifiedTrapezoidalRise",
     "Motion",
     "NoAnswer",
     "Outcome",
+    "Pair",
     "PlanarError",
     "Point",
+    "PointMotion",
+    "PointState",
+    "Polynomial345Rise",
+    "Polynomial4567Rise",
+    "PreparedRun",
+    "PreparedSweep",
+    "RackPair",
     "Reaction",
+    "RelativeState",
     "Simulation",
+    "SlidingPair",
+    "SlotPair",
     "Spring",
     "State",
     "Stroke",
     "Sweep",
     "Swept",
     "Swing",
+    "TableSegment",
     "TimeRatio",
     "Transmission",
+    "TrapezoidalRise",
+    "TurningPair",
+    "Unknown",
     "advantage",
     "advantage_over",
     "answers",
     "area",
+    "build",
     "centre_of",
     "centres",
     "centrodes",
@@ -215,6 +304,7 @@ __all__ = [
     "curvature",
     "cycle",
     "dataset",
+    "dimensions",
     "dumps",
     "dwells",
     "extremes",
@@ -251,7 +341,12 @@ def _present(result: Any) -> str | None:
     return import_module("planar.pages.view").notebook_html(result)
 
 
-Displayable.presenter = _present
+def _revise(mechanism: Any, values: Any) -> Any:
+    """A mechanism with some numbers changed; the reader of files is loaded only where one is."""
+    return import_module("planar.document.dimensions").with_values(mechanism, values)
+
+
+Displayable.presenter, Revisable.reviser = _present, _revise
 
 
 def __getattr__(name: str) -> Any:

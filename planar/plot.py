@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from planar.document.first_argument import takes_result
 from planar.drawing.output.matplotlib_figure import draw_on_sheets, draw_pictures, encode_figure
 from planar.drawing.paper.scales import parse_scales
 from planar.foundation.safe_files import save_file as write
@@ -42,6 +43,7 @@ __all__ = [
 ]
 
 
+@takes_result("State")
 def scheme(state: State, scale: ScaleTexts = None) -> Figure:
     """The kinematic scheme of a position: links numbered, points lettered, crowded parts once more and larger.
 
@@ -52,6 +54,7 @@ def scheme(state: State, scale: ScaleTexts = None) -> Figure:
     return draw_pictures(scheme_with_details(state, parse_scales(scale, ["length"]).get("length")))
 
 
+@takes_result("State")
 def velocity(state: State, scale: ScaleTexts = None) -> Figure:
     """The space diagram and the velocity polygon of a position, each to its scale."""
     from planar.drawing.polygons.panels import polygon_panels
@@ -59,6 +62,7 @@ def velocity(state: State, scale: ScaleTexts = None) -> Figure:
     return draw_pictures(polygon_panels(state, scale, 2), state.mechanism.name)
 
 
+@takes_result("State")
 def acceleration(state: State, scale: ScaleTexts = None) -> Figure:
     """The space diagram, the velocity polygon and the acceleration polygon of a position, each to its scale."""
     from planar.drawing.polygons.panels import polygon_panels
@@ -66,6 +70,7 @@ def acceleration(state: State, scale: ScaleTexts = None) -> Figure:
     return draw_pictures(polygon_panels(state, scale, 3), state.mechanism.name)
 
 
+@takes_result("State")
 def centres(
     state: State, scale: ScaleTexts = None, links: str | Sequence[str] | None = None, reach: float | None = None
 ) -> Figure:
@@ -91,6 +96,7 @@ def centres(
     return draw_pictures(pictures, state.mechanism.name)
 
 
+@takes_result("Motion", "Mechanism")
 def positions(
     motion: Motion | Mechanism, count: int = 12, points: Sequence[str] | None = None, scale: ScaleTexts = None
 ) -> Figure:
@@ -100,6 +106,7 @@ def positions(
     return draw_pictures([picture(motion, count, points, parse_scales(scale, ["length"]).get("length"))])
 
 
+@takes_result("Motion", "Mechanism")
 def loci(motion: Motion | Mechanism, points: Sequence[str] | None = None, scale: ScaleTexts = None) -> Figure:
     """The paths of points (left out: of those that no link on the frame carries)."""
     from planar.drawing.diagrams.positions import loci as picture
@@ -107,6 +114,7 @@ def loci(motion: Motion | Mechanism, points: Sequence[str] | None = None, scale:
     return draw_pictures([picture(motion, points, parse_scales(scale, ["length"]).get("length"))])
 
 
+@takes_result("Motion", "Mechanism")
 def centrodes(
     motion: Motion | Mechanism, link: str | None = None, other: str | None = None, scale: ScaleTexts = None
 ) -> Figure:
@@ -119,6 +127,7 @@ def centrodes(
     return draw_pictures([centrodes_picture(motion, link, other, parse_scales(scale, ["length"]).get("length"))])
 
 
+@takes_result("Modes", "Mechanism")
 def modes(assemblies: Modes | Mechanism, scale: ScaleTexts = None) -> list[Figure]:
     """Every assembly drawn small, numbered, to one scale, the sketch's own marked: sheets of 20, 96 at the most.
 
@@ -132,6 +141,7 @@ def modes(assemblies: Modes | Mechanism, scale: ScaleTexts = None) -> list[Figur
     return [draw_pictures(*sheet) for sheet in assembly_sheets(found, parse_scales(scale, ["length"]).get("length"))]
 
 
+@takes_result("Circuits", "Mechanism")
 def circuits(found: Circuits | Mechanism, of: str | None = None, assemblies: Modes | None = None) -> list[Figure]:
     """All circuits, an output over the input that runs: each in a panel of its own, its branches and dead points told.
 
@@ -150,6 +160,7 @@ def circuits(found: Circuits | Mechanism, of: str | None = None, assemblies: Mod
     return circuit_figures(of_all, locate_assemblies(of_all, here), of)
 
 
+@takes_result("Forces", "State")
 def forces(found: Forces | State, scale: ScaleTexts = None) -> list[Figure]:
     """Every moving link as a free body with all that acts on it, and its force polygon, on sheets of A4 on its side.
 
@@ -163,6 +174,7 @@ def forces(found: Forces | State, scale: ScaleTexts = None) -> list[Figure]:
     return draw_on_sheets(*free_bodies(found if isinstance(found, Forces) else all_forces(found), scale))
 
 
+@takes_result("Forces", "Motion", "Mechanism")
 def torque(found: Forces | Motion | Mechanism, of: str | None = None, fluctuation: float | None = None) -> Figure:
     """The torque or force of an input over a cycle at its steady speed: mean, parts, greatest and least, flywheel.
 
@@ -176,6 +188,7 @@ def torque(found: Forces | Motion | Mechanism, of: str | None = None, fluctuatio
     return draw_pictures([torque_picture(found, of, DEFAULT_FLUCTUATION if fluctuation is None else fluctuation)])
 
 
+@takes_result("Forces", "Motion", "Mechanism")
 def bearings(found: Forces | Motion | Mechanism, pairs: Sequence[str] | None = None) -> list[Figure]:
     """The loads of pairs (left out: of all in which points or lines meet) over a cycle, on sheets of A4 on its side.
 
@@ -189,6 +202,7 @@ def bearings(found: Forces | Motion | Mechanism, pairs: Sequence[str] | None = N
     return draw_on_sheets(bearing_pictures(found, pairs), f"{mechanism.name}: loads of the pairs")
 
 
+@takes_result("Motion", "Mechanism")
 def diagrams(
     motion: Motion | Mechanism, of: str | None = None, chords: int | None = None, width: float = 120.0
 ) -> Figure:
@@ -205,6 +219,7 @@ def diagrams(
     return drawn(motion, of, chords, width)
 
 
+@takes_result("State")
 def solution(state: State, scale: ScaleTexts = None) -> list[Figure]:
     """The worked solution of a position on pages of A4."""
     from planar.drawing.output.solution_pages import solution_pages
@@ -212,6 +227,7 @@ def solution(state: State, scale: ScaleTexts = None) -> list[Figure]:
     return solution_pages(state, scales=parse_scales(scale))
 
 
+@takes_result("State")
 def two_directions(state: State, link: str, points: Sequence[str] | None = None, scale: ScaleTexts = None) -> Figure:
     """The construction of a link's centre C from the directions of two of its points' velocities (r, v, and ω = v / r).
 
@@ -224,6 +240,7 @@ def two_directions(state: State, link: str, points: Sequence[str] | None = None,
     return draw_pictures([directions_picture(state, link, points, given.get("length"), given.get("velocity"))])
 
 
+@takes_result("Motion", "Mechanism")
 def animate(
     motion: Motion | Mechanism,
     file: str | Path,

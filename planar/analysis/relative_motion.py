@@ -7,9 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from planar.foundation.errors import Unknown
 from planar.foundation.geometry import Frame, Vector
 from planar.foundation.jets import value_and_rates
-from planar.results.motion import UnknownName
+from planar.foundation.short_repr import short_repr
 
 Array = np.ndarray
 
@@ -28,6 +29,8 @@ class RelativeMotion(NamedTuple):
     "angular velocity"
     angular_acceleration: Array
     "angular acceleration"
+
+    __repr__ = short_repr
 
     @property
     def fixed_pole(self) -> tuple[Array, Array]:
@@ -62,9 +65,9 @@ def relative_motion(frames: Mapping[str, Frame], link: str, other: str) -> Relat
     """The motion of a link against another, from frames that are jets. Raises Unknown."""
     for name in (link, other):
         if name not in frames:
-            raise UnknownName(f"there is no link {name!r}; links are {', '.join(frames)}")
+            raise Unknown(f"there is no link {name!r}; links are {', '.join(frames)}")
     if link == other:
-        raise UnknownName(f"a motion is of one link against another, and both are {link!r}")
+        raise Unknown(f"a motion is of one link against another, and both are {link!r}")
     moved, base = frames[link], frames[other]
     at, angle = base.to_local(Vector(moved.x, moved.y)), moved.angle - base.angle
     x, y, turned = (_value_and_rates(value) for value in (at.x, at.y, angle))

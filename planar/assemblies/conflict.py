@@ -6,10 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import hypot
+from typing import Any
 
 from planar.assemblies.joint_feasibility import JointFeasibility, Requirement
 from planar.assemblies.modes import modes
 from planar.assemblies.polynomial.completeness import Completeness
+from planar.document.first_argument import takes_mechanism
 from planar.foundation.errors import NoAnswer
 from planar.foundation.geometry import Vector
 from planar.model.link_graph import pairs_farthest_first
@@ -49,6 +51,13 @@ class Conflict:
     _solver: PositionSolver
     _failure: AssemblySearchFailure
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # compiled equations stay in their process: another one looks for the conflict again
+        return conflict, (self.mechanism,)
+
+    def __repr__(self) -> str:
+        return f"<Conflict in {self.mechanism.name!r} of {quote_names((*self.pairs, *self.inputs))}>"
+
     @cached_property
     def dimensions(self) -> tuple[RemedyChange, ...]:
         """Changes of one dimension each that let the whole go together, the least first of those found."""
@@ -83,6 +92,7 @@ class Conflict:
         return tuple(told)
 
 
+@takes_mechanism
 def conflict(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = ()) -> Conflict | None:
     """The pairs and inputs that keep a mechanism from going together at its inputs; None where it goes together.
 

@@ -14,11 +14,13 @@ import numpy as np
 
 from planar.assemblies.polynomial.completeness import Completeness
 from planar.assemblies.search_tree import BEST_TO_WORST, AssemblyPath, AssemblyTree
+from planar.document.first_argument import takes_mechanism
 from planar.equations.constraint_equations import slice_length
 from planar.equations.coordinates import frames_from_coordinates
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.geometry import Frame
 from planar.foundation.notebook_display import Displayable
+from planar.foundation.short_repr import short_repr
 from planar.model.link_shapes import LinkShape
 from planar.model.mechanism import Drive, Mechanism, NamedPoint, named_points, replace_inputs
 from planar.model.wording import count_phrase, join_all_names
@@ -34,6 +36,7 @@ MAX_CERTIFIED_FOR_CLAIM = 256
 """The same, certified, for the sake of a claim about the whole list."""
 
 
+@takes_mechanism
 def modes(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = (), *, certify: bool = True) -> Modes:
     """Every real assembly of a mechanism at its inputs.
 
@@ -207,7 +210,7 @@ class Modes(Displayable, Sequence["Mode"]):
         if self._solver.structure.counts:
             told.append("of angles that count turns the least are taken")
         if self._lacks_certifier:
-            told.append("nothing is certified: that needs python-flint (pip install 'planar[modes]')")
+            told.append("nothing is certified: that needs python-flint (pip install 'planar-linkages[modes]')")
         return tuple(told)
 
     @cached_property
@@ -309,6 +312,8 @@ class Mode:
     z: Array
     "(unknowns,) of the equations"
     _solver: PositionSolver
+
+    __repr__ = short_repr
 
     def __reduce__(self) -> tuple[Any, ...]:
         # compiled equations stay in their process: another one makes them again

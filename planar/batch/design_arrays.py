@@ -3,39 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from planar.document.cursor import suggest_spelling
+from planar.document.dimensions import (
+    Dimension,
+    change_dimension,
+    file_dimensions,
+    input_numbers,
+    link_lengths,
+)
 from planar.foundation.errors import BadInput
-from planar.model.dimensions import Dimension, change_dimension, dimensions
 from planar.model.mechanism import LARGEST_INPUT_POSITION, Mechanism
 
 Array = np.ndarray
 
-INPUT_QUANTITIES = ("position", "velocity", "acceleration")
 
-
-class InputQuantity(NamedTuple):
-    """What an input is given by: `pair.position`, `.velocity` or `.acceleration`."""
-
-    name: str
-    pair: str
-    quantity: str
-    value: float
-
-
-def design_variables(mechanism: Mechanism) -> dict[str, Dimension | InputQuantity]:
-    """Everything that designs may differ in, by name: lengths of links as in `planar.model.dimensions`, then inputs."""
-    links = frozenset(link.name for link in mechanism.links)
-    found: dict[str, Dimension | InputQuantity] = {each.name: each for each in dimensions(mechanism, links)}
-    for given in mechanism.inputs:
-        for what in INPUT_QUANTITIES:
-            found[f"{given.pair}.{what}"] = InputQuantity(
-                f"{given.pair}.{what}", given.pair, what, getattr(given, what)
-            )
+def design_variables(mechanism: Mechanism) -> dict[str, Dimension]:
+    """Everything that designs may differ in, by name: lengths of links, then inputs (see `document.dimensions`)."""
+    found: dict[str, Dimension] | None = mechanism.__dict__.get("_design_variables")  # kept: asked often
+    if found is None:
+        lengths = link_lengths(mechanism, (link.name for link in mechanism.links))
+        found = {each.name: each for each in (*lengths, *input_numbers(mechanism))}
+        object.__setattr__(mechanism, "_design_variables", found)
     return found
 
 
@@ -44,7 +36,7 @@ def read_designs(mechanism: Mechanism, designs: Mapping[str, Any]) -> dict[str, 
     if not isinstance(designs, Mapping) or not designs:
         raise BadInput("designs", "name what the designs differ in, with an array each, as {'BC.length': lengths}")
     known = design_variables(mechanism)
-    values = {name: _read_values(name, given, known) for name, given in designs.items()}
+    values = {name: _read_values(name, given, known, mechanism) for name, given in designs.items()}
     many = {name: len(array) for name, array in values.items() if array.ndim}
     if not many:
         many = {next(iter(values)): 1}
@@ -57,8 +49,11 @@ def read_designs(mechanism: Mechanism, designs: Mapping[str, Any]) -> dict[str, 
     return {name: np.broadcast_to(array, (count,)) for name, array in values.items()}
 
 
-def _read_values(name: str, given: Any, known: Mapping[str, Dimension | InputQuantity]) -> Array:
+def _read_values(name: str, given: Any, known: Mapping[str, Dimension], mechanism: Mechanism) -> Array:
     if name not in known:
+        other = file_dimensions(mechanism).get(name)
+        if other is not None:
+            raise BadInput(name, f"designs differ in lengths of links and in inputs, and this is a {other.kind}")
         meant = suggest_spelling(str(name), known, cutoff=0.5) or f"; there are {', '.join(list(known)[:12])}"
         raise BadInput(str(name), f"the mechanism has no such dimension or input{meant}")
     try:
@@ -69,11 +64,7 @@ def _read_values(name: str, given: Any, known: Mapping[str, Dimension | InputQua
         raise BadInput(name, f"one row of numbers is wanted, not an array of {array.ndim} axes; ravel a grid of them")
     if not np.all(np.isfinite(array)):
         raise BadInput(name, "a number here is not finite")
-    if (
-        name.endswith(".position")
-        and isinstance(known[name], InputQuantity)
-        and np.any(np.abs(array) > LARGEST_INPUT_POSITION)
-    ):
+    if known[name].path[-1] == "position" and np.any(np.abs(array) > LARGEST_INPUT_POSITION):
         raise BadInput(name, f"an input moves to {LARGEST_INPUT_POSITION:g} rad or m at most")
     return array
 
@@ -82,14 +73,7 @@ def with_design_values(mechanism: Mechanism, values: Mapping[str, Any]) -> Mecha
     """The mechanism with these numbers, or arrays of them, in place of its own."""
     known = design_variables(mechanism)
     for name, value in values.items():
-        of = known[name]
-        if isinstance(of, Dimension):
-            mechanism = change_dimension(mechanism, of, value)
-        else:
-            given = tuple(
-                each._replace(**{of.quantity: value}) if each.pair == of.pair else each for each in mechanism.inputs
-            )
-            mechanism = replace(mechanism, inputs=given)
+        mechanism = change_dimension(mechanism, known[name], value)
     return mechanism
 
 

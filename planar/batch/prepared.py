@@ -14,7 +14,9 @@ from planar.batch.march.choice import find_runner
 from planar.batch.march.prediction import LONGEST_STEP
 from planar.batch.reference_design import reference_design
 from planar.batch.sweep import check_range, sweep
+from planar.document.first_argument import takes_mechanism
 from planar.foundation.errors import BadInput
+from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import Mechanism
 
 Array = np.ndarray
@@ -31,7 +33,10 @@ class PreparedRun(NamedTuple):
     status: Array
     said: tuple[str, ...] = ()
 
+    __repr__ = short_repr
 
+
+@takes_mechanism
 def prepared(
     mechanism: Mechanism,
     steps: int = 360,
@@ -91,6 +96,14 @@ class PreparedSweep:
         self.solved_status = np.zeros(steps + 1, dtype=np.int8)
         self.solved_status.flags.writeable = False
         self.lock = Lock()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # compiled code stays in its process: another one prepares it again
+        ends = (self.range["start"], self.range["stop"], self.range["pair"])
+        return PreparedSweep, (self.mechanism, self.steps, self.points, self.rates, *ends)
+
+    def __repr__(self) -> str:
+        return f"<PreparedSweep of {self.mechanism.name!r}: {self.steps + 1} positions of {', '.join(self.points)}>"
 
     def _compile_kernel(self) -> Any:
         """The compiled function; None where there is none for this structure."""

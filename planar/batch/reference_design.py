@@ -13,7 +13,6 @@ from planar.document.cursor import suggest_spelling
 from planar.equations.mechanism_numbers import scaled_pair_numbers
 from planar.foundation.errors import BadInput
 from planar.foundation.jets import Scalar
-from planar.model.dimensions import Dimension
 from planar.model.link_shapes import LinkShape, link_shape
 from planar.model.mechanism import (
     Drive,
@@ -126,7 +125,7 @@ class ReferenceDesign:
                 found |= ~np.isfinite(np.asarray(at.x + at.y))
         choosy = [pair for pair in self.mechanism.pairs if type(pair).find_misfit is not Pair.find_misfit]
         known = design_variables(self.mechanism)
-        if choosy and any(isinstance(known[name], Dimension) for name in values):
+        if choosy and any(known[name].link for name in values):
             for index in range(many):
                 own = {name: shape_of_design(each, index) for name, each in shapes.items()}
                 found[index] |= any(pair.find_misfit(self.mechanism.pairs, own, str) for pair in choosy)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from planar.foundation.errors import Outcome
+from planar.foundation.short_repr import short_repr
 
 Array = np.ndarray
 
@@ -36,6 +37,8 @@ class Sweep:
     general: int
     said: tuple[str, ...]
     outcomes: tuple[Outcome, ...] = tuple(Outcome)
+
+    __repr__ = short_repr
 
     def __len__(self) -> int:
         """How many designs there are."""

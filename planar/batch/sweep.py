@@ -17,6 +17,7 @@ from planar.batch.march.choice import available_backends
 from planar.batch.reference_design import reference_design
 from planar.batch.results import Sweep
 from planar.batch.stores.store import SweepPlan, open_store
+from planar.document.first_argument import takes_mechanism
 from planar.foundation.errors import BadInput
 from planar.model.mechanism import LARGEST_INPUT_POSITION, Mechanism
 from planar.model.run_arguments import check_number, check_steps
@@ -27,6 +28,7 @@ BLOCK_MULTIPLE = 16
 """Blocks are multiples of so many designs, where there are enough."""
 
 
+@takes_mechanism
 def sweep(  # many: the public signature; long: its docstring
     mechanism: Mechanism,
     designs: Mapping[str, Any],
@@ -46,11 +48,11 @@ def sweep(  # many: the public signature; long: its docstring
     """The motions of many designs of one mechanism, which differ in dimensions of links or in their inputs.
 
     `designs` maps names to arrays, all of one length, or single numbers (m, rad, per s): `BC.length`, `A.position`,
-    `BC.E.distance`; the dimensions have the names that `planar.model.dimensions` gives them, an input has `.position`,
-    `.velocity` and `.acceleration`. Each design is solved as `planar.cycle` would solve the mechanism so changed: from
-    the assembly nearest to the sketch, at `steps` + 1 positions of one input from `start` to `stop` (rad or m), the
-    others standing still. An angle runs from the design's own position a turn on where they are left out; a slide
-    without a `stop` runs between its limits, each design between its own.
+    `BC.E.distance`; the names are those of `planar.dimensions`, of lengths of links and of inputs. Each design is
+    solved as `planar.cycle` would solve the mechanism so changed: from the assembly nearest to the sketch, at `steps`
+    + 1 positions of one input from `start` to `stop` (rad or m), the others standing still. An angle runs from its
+    own position a turn on where they are left out; a slide without a `stop` runs between its limits, each design
+    between its own.
 
     `points` are those whose positions are wanted, and with `rates` velocities and accelerations; all that move, if left
     out. A design that comes to a dead point has NaN from there on, and `status` says why.

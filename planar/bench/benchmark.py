@@ -23,7 +23,6 @@ from planar.equations.constraint_equations import Block, ConstraintEquations, bu
 from planar.equations.functions import EquationFunctions
 from planar.equations.mechanism_numbers import equation_structure
 from planar.foundation.errors import BadInput
-from planar.model.dimensions import Dimension
 from planar.model.mechanism import Mechanism
 from planar.model.wording import join_all_names
 from planar.solving.cycle import cycle
@@ -113,7 +112,7 @@ def measure_speed(mechanism: Mechanism, rounds: int = 5, seconds: float = SWEEP_
             told.append(_describe_shares("A cycle, which is the general path too", parts))
         cycled /= rows
         if find_spec(BACKEND_LIBRARIES["native"]) is None:
-            told.append("Machine code is not installed; pip install 'planar[native]'")
+            told.append("Machine code is not installed; pip install 'planar-linkages[native]'")
     unknowns, links = len(solver.equations.unknowns), len(mechanism.links)
     return Speed(mechanism.name, links, unknowns, equations, assembly, solved, cycled, swept, tuple(told))
 
@@ -231,7 +230,7 @@ def _time_sweeps(mechanism: Mechanism, input_range: InputRange, seconds: float) 
 def _draw_designs(mechanism: Mechanism, count: int, within: float) -> dict[str, np.ndarray]:
     """Every length within a part of itself, evenly drawn; the input's rate where there is no length."""
     known = design_variables(mechanism)
-    lengths = {name: each.value for name, each in known.items() if isinstance(each, Dimension) and each.value}
+    lengths = {name: each.value for name, each in known.items() if each.link and each.value}
     if not lengths:
         given = mechanism.inputs[0]
         lengths = {f"{given.pair}.velocity": given.velocity}

@@ -13,6 +13,7 @@ from planar.cli.options import (
     load_model,
     main,
     mode_option,
+    model_argument,
     output_option,
     parse_drives,
     print_or_write,
@@ -23,7 +24,7 @@ from planar.foundation.errors import BadInput
 
 
 @main.command()
-@click.argument("model")
+@model_argument()
 @click.option("--pair", "pairs", multiple=True, metavar="NAME", help="A slide; left out, all that the frame guides.")
 @click.option("--point", "points", multiple=True, metavar="NAME", help="A point: harmonics of its x and y.")
 @click.option("--input", "running", metavar="PAIR", help="The input that turns, where there are several.")
@@ -51,7 +52,7 @@ def harmonics(
 
 
 @main.command()
-@click.argument("model")
+@model_argument()
 @json_option
 @at_option
 @mode_option

@@ -14,9 +14,11 @@ from planar.cli.options import (
     input_option,
     json_option,
     main,
+    model_argument,
     output_option,
     parse_drives,
     print_or_write,
+    read_model,
     refuse_overwriting,
     show_status,
 )
@@ -24,7 +26,7 @@ from planar.foundation.errors import BadInput
 
 
 @main.command()
-@click.argument("model")
+@model_argument()
 @json_option
 @input_option
 @at_option
@@ -33,12 +35,11 @@ def circuits(model: str, as_json: bool, pair: str | None, at: tuple[str, ...], o
     """All circuits while an input runs, their branches, and where it goes together."""
     from planar.assemblies.circuits.circuits import circuits as all_circuits
     from planar.assemblies.modes import modes
-    from planar.document.files import load
     from planar.reports.tables.circuits import record, table
 
     if as_json and output is not None:
         raise BadInput("-o", "tables go to a file or SI values are printed with --json; give one of the two")
-    mechanism = load(model)
+    mechanism = read_model(model)
     refuse_overwriting(model, output)
     with show_status(f"{mechanism.name}: circuits"):
         here = modes(mechanism, parse_drives(mechanism, at), certify=False)

@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 
 import click
 
-from planar.foundation.errors import BadInput, MissingGlyphs, NoAnswer, WriteFailure, join_names
+from planar.foundation.errors import BadInput, MissingGlyphs, NoAnswer, Unknown, WriteFailure, join_names
 
 NO_ANSWER, BAD_INPUT, NOT_WRITTEN, INTERRUPTED = 1, 2, 3, 130
 """Exit statuses; 0 is done, 130 what shells give for an interrupt from the keyboard."""
@@ -106,7 +106,7 @@ def _exit_with_status() -> Iterator[None]:
         _exit_unwritable(problem)
     except WriteFailure as problem:
         _exit_refused(str(problem), "not written", str(problem), NOT_WRITTEN)
-    except BadInput as problem:
+    except (BadInput, Unknown) as problem:
         _exit_refused(str(problem), "bad input", str(problem), BAD_INPUT)
     except NoAnswer as problem:
         _exit_refused(str(problem), problem.outcome.value, problem.reason, NO_ANSWER, problem.more)

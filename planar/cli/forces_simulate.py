@@ -16,6 +16,7 @@ from planar.cli.options import (
     load_model,
     main,
     mode_option,
+    model_argument,
     motion_options,
     output_option,
     parse_drives,
@@ -36,7 +37,7 @@ ONE_DESTINATION = "results go to a file or are printed with --json; give one of 
 
 
 @main.command()
-@click.argument("model")
+@model_argument()
 @json_option
 @at_option
 @mode_option
@@ -122,7 +123,7 @@ def _forces_over_motion(
 
 
 @main.command()
-@click.argument("model")
+@model_argument()
 @json_option
 @click.option("--duration", required=True, metavar="TIME", help="How long: 2s, 500ms.")
 @steps_option

@@ -6,18 +6,25 @@ import json
 
 import click
 
-from planar.cli.options import json_option, main, print_or_write, show_status
+from planar.cli.options import (
+    json_option,
+    main,
+    model_argument,
+    print_or_write,
+    read_model,
+    refuse_settings,
+    show_status,
+)
 
 
 @main.command()
-@click.argument("model")
+@model_argument()
 @json_option
 def inspect(model: str, as_json: bool) -> None:
     """What it is: links, pairs, chain, mobility, motions, names."""
     from planar.analysis.identity.inspection import inspect as inspected
-    from planar.document.files import load
 
-    mechanism = load(model)
+    mechanism = read_model(model)
     with show_status(mechanism.name):
         found = inspected(mechanism)
     if as_json:
@@ -54,7 +61,7 @@ def models(as_json: bool) -> None:
 
 
 @main.command()
-@click.argument("model", required=False)
+@model_argument(required=False)
 @click.option(
     "--seconds",
     type=click.FloatRange(0.0, 1e4),
@@ -66,9 +73,10 @@ def models(as_json: bool) -> None:
 def bench(model: str | None, seconds: float, as_json: bool) -> None:
     """How fast it is solved on this machine: one position, a run, many designs, and what bounds it."""
     from planar.bench.benchmark import measure_speed
-    from planar.document.files import load
 
-    mechanisms = [load(name) for name in ([model] if model else ["four-bar", "slider-crank", "double-butterfly"])]
+    if not model:
+        refuse_settings()
+    mechanisms = [read_model(name) for name in ([model] if model else ["four-bar", "slider-crank", "double-butterfly"])]
     speeds = []
     for mechanism in mechanisms:
         with show_status(mechanism.name):

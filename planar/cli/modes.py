@@ -12,9 +12,11 @@ from planar.cli.options import (
     input_option,
     json_option,
     main,
+    model_argument,
     output_option,
     parse_drives,
     print_or_write,
+    read_model,
     refuse_overwriting,
     show_status,
 )
@@ -26,7 +28,7 @@ if TYPE_CHECKING:
 
 
 @main.command()
-@click.argument("model")
+@model_argument()
 @json_option
 @click.option(
     "--at",
@@ -57,14 +59,13 @@ def modes(
     """Every assembly at the given inputs, and whether these are all."""
     from planar.assemblies.circuits.circuits import circuits
     from planar.assemblies.modes import modes as assemblies
-    from planar.document.files import load
     from planar.reports.tables.modes import record, table
 
     if as_json and output is not None:
         raise BadInput("-o", "tables go to a file or SI values are printed with --json; give one of the two")
     if pair is not None and not circled:
         raise BadInput("--input", "without --circuits no input runs")
-    mechanism = load(model)
+    mechanism = read_model(model)
     refuse_overwriting(model, output)
     with show_status(f"{mechanism.name}: assemblies"):
         found = assemblies(mechanism, parse_drives(mechanism, at), certify=certify)

@@ -72,12 +72,63 @@ mode_option = click.option(
 )
 
 
-def load_model(model: str, mode: int | None) -> Mechanism:
-    """The mechanism of a file, the assembly chosen that `--mode` names, else with the number of the sketch's own."""
-    from planar.assemblies.selection import select_assembly, with_assembly_number
+SETTINGS = "planar.settings"
+"""Where a command's context keeps what `--set` says."""
+
+
+def model_argument(*names: str, **more: Any) -> Callable[[Any], Any]:
+    """The MODEL of a command, with the option that changes numbers of it; `read_model` reads the one by the other."""
+
+    def keep(context: click.Context, _: click.Parameter, settings: tuple[str, ...]) -> None:
+        context.meta[SETTINGS] = settings
+
+    option = click.option(
+        "--set",
+        multiple=True,
+        metavar="NUMBER=VALUE",
+        expose_value=False,
+        callback=keep,
+        help="Another value for a number of MODEL: BC.length=400mm, a bare number in its units; `inspect` lists them.",
+    )
+    argument = click.argument(*(names or ("model",)), **more)
+    return lambda command: argument(option(command))
+
+
+def read_model(model: str) -> Mechanism:
+    """The mechanism of a file, or of a model's name, with the numbers that `--set` changes."""
     from planar.document.files import load
 
     mechanism = load(model)
+    settings = click.get_current_context().meta.get(SETTINGS, ())
+    if not settings:
+        return mechanism
+    from planar.document.dimensions import with_values
+
+    values: dict[str, Any] = {}
+    for text in settings:
+        name, equals, value = (part.strip() for part in text.rpartition("="))
+        if not equals or not name:
+            raise BadInput("--set", f"{text!r} is not of the form NUMBER=VALUE, such as BC.length=400mm")
+        if name in values:
+            raise BadInput("--set", f"{name!r} is set twice; say once to what")
+        try:
+            values[name] = float(value)
+        except ValueError:
+            values[name] = value
+    return with_values(mechanism, values, mechanism.units)
+
+
+def refuse_settings() -> None:
+    """Refuse `--set` where no MODEL is named. Raises BadInput."""
+    if click.get_current_context().meta.get(SETTINGS):
+        raise BadInput("--set", "name the MODEL whose numbers are changed")
+
+
+def load_model(model: str, mode: int | None) -> Mechanism:
+    """The mechanism of a file, the assembly chosen that `--mode` names, else with the number of the sketch's own."""
+    from planar.assemblies.selection import select_assembly, with_assembly_number
+
+    mechanism = read_model(model)
     if mode is None:
         return with_assembly_number(mechanism)
     with show_status(f"{mechanism.name}: assemblies"):

@@ -13,6 +13,7 @@ from planar.cli.options import (
     load_model,
     main,
     mode_option,
+    model_argument,
     output_option,
     parse_drives,
     range_options,
@@ -37,7 +38,7 @@ DRAWN_STEPS = 360
 
 
 @main.command()
-@click.argument("model")
+@model_argument()
 @click.argument(
     "what", type=click.Choice((*POSITION_DRAWINGS, *MOTION_DRAWINGS, *ASSEMBLY_DRAWINGS, *CIRCUIT_DRAWINGS))
 )
@@ -149,7 +150,7 @@ def _refuse_range(what: str, pair: str | None, start: str | None, stop: str | No
 
 
 @main.command()
-@click.argument("model")
+@model_argument()
 @output_option("Write the moving picture to a .gif or .mp4 file.", required=True)
 @click.option("--point", "points", multiple=True, metavar="NAME", help="A point whose path is drawn as it moves.")
 @range_options

@@ -15,6 +15,7 @@ from planar.cli.options import (
     load_model,
     main,
     mode_option,
+    model_argument,
     motion_options,
     output_option,
     parse_drives,
@@ -41,7 +42,7 @@ PAGES = (".pdf", ".png")
 
 
 @main.command()
-@click.argument("model")
+@model_argument()
 @json_option
 @at_option
 @mode_option
@@ -70,7 +71,7 @@ def solve(
 
 
 @main.command()
-@click.argument("model")
+@model_argument()
 @json_option
 @at_option
 @mode_option
@@ -124,7 +125,7 @@ def _solve_model(
 
 
 @main.command()
-@click.argument("model")
+@model_argument()
 @json_option
 @motion_options
 @mode_option
@@ -182,22 +183,22 @@ def cycle(
 def _answers(motion: Motion, name: str) -> tuple[Answers, ...]:
     """What `--of` asks for."""
     from planar.analysis.motion.answers import answers
-    from planar.results.motion import UnknownName
+    from planar.foundation.errors import Unknown
 
     try:
         return answers(motion, name)
-    except UnknownName as problem:
+    except Unknown as problem:
         raise BadInput("--of", str(problem)) from None
 
 
 def _relative_motion(state: State, text: str) -> RelativeState:
     """The relative motion that `--relative` asks for."""
-    from planar.results.motion import UnknownName
+    from planar.foundation.errors import Unknown
 
     names = [name.strip() for name in text.split(",")]
     if len(names) not in (2, 3):
         raise BadInput("--relative", f"{text!r} is not of the form POINT,POINT or POINT,POINT,LINK, such as C,B")
     try:
         return state.relative(*names)
-    except UnknownName as problem:
+    except Unknown as problem:
         raise BadInput("--relative", str(problem)) from None

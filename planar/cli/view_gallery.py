@@ -11,9 +11,12 @@ from planar.cli.options import (
     load_model,
     main,
     mode_option,
+    model_argument,
     output_option,
     parse_drives,
+    read_model,
     refuse_overwriting,
+    refuse_settings,
     show_progress,
     show_status,
 )
@@ -23,7 +26,7 @@ SUFFIXES = (".html", ".htm")
 
 
 @main.command()
-@click.argument("model")
+@model_argument()
 @output_option(
     "Write the page to an .html file; left out, it is written to a folder of its own and opened in the browser."
 )
@@ -45,7 +48,7 @@ def view(model: str, output: Path | None, at: tuple[str, ...], mode: int | None)
 
 
 @main.command()
-@click.argument("models", nargs=-1, metavar="[MODEL]...")
+@model_argument("models", nargs=-1, metavar="[MODEL]...")
 @click.option(
     "-o",
     "output",
@@ -56,12 +59,16 @@ def view(model: str, output: Path | None, at: tuple[str, ...], mode: int | None)
 )
 def gallery(models: tuple[str, ...], output: Path) -> None:
     """A page for each model, and an index of small moving pictures; without models of all that come along."""
-    from planar.document.files import find_model_file, load, model_files
+    from planar.document.files import PIPED, find_model_file, model_files
     from planar.pages.gallery import write_gallery as write
 
-    files = [find_model_file(model) for model in models] or list(model_files())
+    if not models:
+        refuse_settings()
+    named = models or tuple(map(str, model_files()))
+    files = ["piped" if model == PIPED else find_model_file(model).stem for model in named]
     with show_progress(f"{len(files)} pages") as progress:
-        index, refused = write([(file.stem, load(file)) for file in files], output, progress)
+        each = [(name, read_model(model)) for name, model in zip(files, named, strict=True)]
+        index, refused = write(each, output, progress)
     for name, problem in refused:
         click.echo(f"planar: {name}: {problem}", err=True)
     click.echo(str(index))

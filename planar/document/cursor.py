@@ -49,7 +49,7 @@ class Cursor:
     # refusing
 
     def error_at(self, key: str | None, sentence: str) -> BadInput:
-        return BadInput(self.path if key is None else self._path_of(key), sentence)
+        return BadInput(self.path if key is None else self.place_of(key), sentence)
 
     def check_keys(self, *keys: str) -> None:
         for key in self.fields():
@@ -58,7 +58,8 @@ class Cursor:
 
     # walking
 
-    def _path_of(self, key: str) -> str:
+    def place_of(self, key: str) -> str:
+        """The place of a member."""
         return f"{self.path}.{key}" if re.fullmatch(r"\w+(\[\d+\])?", key) else f"{self.path}[{key!r}]"
 
     def check_json(self) -> None:
@@ -71,7 +72,7 @@ class Cursor:
                 for key in value:
                     if not isinstance(key, str):
                         raise each.error_at(None, f"keys are texts, but here is {type(key).__name__} {key!r:.40}")
-                    replace(each, path=each._path_of(key))._check_printable(key)
+                    replace(each, path=each.place_of(key))._check_printable(key)
                 waiting += reversed([each[key] for key in value])
             elif isinstance(value, list):
                 waiting += reversed(list(each.items()))
@@ -99,7 +100,7 @@ class Cursor:
         if key not in self.fields():
             near = suggest_spelling(key, self.value, "is written {!r} the key meant?", 0.75)
             raise self.error_at(None, f"the key {key!r} is missing{near}")
-        return replace(self, value=self.value[key], path=self._path_of(key))
+        return replace(self, value=self.value[key], path=self.place_of(key))
 
     def object_at(self, key: str) -> Cursor:
         found = self[key]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from collections import Counter
 from collections.abc import Iterable, Iterator
@@ -32,14 +33,14 @@ def from_dict(value: Any) -> Mechanism:
     return read_mechanism(value)
 
 
-def to_dict(mechanism: Mechanism) -> dict[str, Any]:
+def to_dict(mechanism: Mechanism | str | os.PathLike[str]) -> dict[str, Any]:
     """The JSON value of a mechanism; `from_dict` gives the same mechanism back, to the last bit."""
     from planar.document.writer import write_mechanism
 
-    return write_mechanism(mechanism)
+    return write_mechanism(as_mechanism(mechanism))
 
 
-def dumps(mechanism: Mechanism) -> str:
+def dumps(mechanism: Mechanism | str | os.PathLike[str]) -> str:
     """The JSON text of a mechanism."""
     return json.dumps(to_dict(mechanism), indent=2, ensure_ascii=False) + "\n"
 
@@ -57,6 +58,16 @@ def load(model: str | Path) -> Mechanism:
         told = "name a JSON file that describes a mechanism, or a model that comes along by its name"
         raise BadInput(str(path), f"this is a {path.suffix} file and no mechanism; {told}")
     return loads(content, str(path))
+
+
+def as_mechanism(source: Any) -> Mechanism:
+    """The mechanism that is given, or that of a file or of a model's name. Raises BadInput."""
+    if isinstance(source, Mechanism):
+        return source
+    if isinstance(source, str | os.PathLike) and isinstance(path := os.fspath(source), str):
+        return load(path)
+    told = f"{type(source).__name__} {source!r:.60}"
+    raise BadInput("mechanism", f"a Mechanism, a file or a model's name is wanted, not {told}")
 
 
 def read_asset(name: str) -> str:

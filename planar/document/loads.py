@@ -128,15 +128,16 @@ def write_loads(mechanism: Mechanism, quantity: QuantityWriter) -> dict[str, lis
     """The same as entries of a file; nothing for what there is none of."""
     named = relative_motions(mechanism)
     found = {
-        "loads": [_write_load(load, named, quantity) for load in mechanism.loads],
-        "springs": [_write_spring(spring, quantity) for spring in mechanism.springs],
-        "masses": [_write_mass(mass, quantity) for mass in mechanism.masses],
+        "loads": [write_load(load, named, quantity) for load in mechanism.loads],
+        "springs": [write_spring(spring, quantity) for spring in mechanism.springs],
+        "masses": [write_mass(mass, quantity) for mass in mechanism.masses],
         "gravity": [quantity(each, "acceleration") for each in mechanism.gravity if any(mechanism.gravity)],
     }
     return {key: value for key, value in found.items() if value}
 
 
-def _write_load(load: Load, named: Mapping[str, Pair], quantity: QuantityWriter) -> dict[str, Any]:
+def write_load(load: Load, named: Mapping[str, Pair], quantity: QuantityWriter) -> dict[str, Any]:
+    """A load as a file has it, the relative motions at hand by name."""
     found: dict[str, Any] = {}
     if load.point is not None and load.force is not None:
         found |= {"point": load.point, "force": [quantity(each, "force") for each in load.force]}
@@ -152,12 +153,13 @@ def _write_load(load: Load, named: Mapping[str, Pair], quantity: QuantityWriter)
         kind = "time" if course.input is None else named[course.input].input_quantity_kinds()[0]
         found["varies"] = ({} if course.input is None else {"with": course.input}) | {
             "at": [quantity(each, kind) for each in course.at],
-            "factors": list(course.factors),
+            "factors": [quantity(each, "number") for each in course.factors],
         }
     return found
 
 
-def _write_spring(spring: Spring, quantity: QuantityWriter) -> dict[str, Any]:
+def write_spring(spring: Spring, quantity: QuantityWriter) -> dict[str, Any]:
+    """A spring as a file has it."""
     found: dict[str, Any] = {"links" if spring.is_torsional else "points": list(spring.ends)}
     kinds = ("torsional stiffness", "torsional damping") if spring.is_torsional else ("stiffness", "damping")
     found["stiffness"] = quantity(spring.stiffness, kinds[0])
@@ -167,7 +169,8 @@ def _write_spring(spring: Spring, quantity: QuantityWriter) -> dict[str, Any]:
     return found | ({"damping": quantity(spring.damping, kinds[1])} if spring.damping else {})
 
 
-def _write_mass(mass: Mass, quantity: QuantityWriter) -> dict[str, Any]:
+def write_mass(mass: Mass, quantity: QuantityWriter) -> dict[str, Any]:
+    """A mass as a file has it."""
     at = mass.at if isinstance(mass.at, str) else [quantity(each, "length") for each in mass.at]
     found = {"link": mass.link, "mass": quantity(mass.mass, "mass"), "at": at}
     return found | ({"inertia": quantity(mass.inertia, "moment of inertia")} if mass.inertia else {})

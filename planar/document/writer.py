@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from planar.document.input_laws import write_law
@@ -20,12 +20,12 @@ from planar.model.mechanism import (
     pair_entries,
     relative_motions,
 )
-from planar.model.pairs import QuantityWriter
+from planar.model.pairs import Pair, QuantityWriter
 
 
 def write_mechanism(mechanism: Mechanism) -> dict[str, Any]:
     """The mechanism as a file has it, in its own units; each number reads back to the last bit."""
-    quantity = _quantity_writer(mechanism)
+    quantity, motions = _quantity_writer(mechanism), relative_motions(mechanism)
     value: dict[str, Any] = {"planar": FORMAT_VERSION, "name": mechanism.name}
     value |= _nonempty_fields(
         ids=list(mechanism.ids),
@@ -36,10 +36,10 @@ def write_mechanism(mechanism: Mechanism) -> dict[str, Any]:
     )
     value["units"] = {"length": mechanism.units.length, "angle": mechanism.units.angle}
     value["frame"] = mechanism.frame
-    value["links"] = {link.name: _write_link(link, quantity) for link in mechanism.links}
+    value["links"] = {link.name: write_link(link, quantity) for link in mechanism.links}
     value["pairs"] = [type(group[0]).write(group, quantity) for group in pair_entries(mechanism)]
     value |= _nonempty_fields(
-        inputs=[_write_input(mechanism, given, quantity) for given in mechanism.inputs],
+        inputs=[write_input(given, motions, quantity) for given in mechanism.inputs],
         **write_loads(mechanism, quantity),
         sketch={point: [quantity(x, "length"), quantity(y, "length")] for point, x, y in mechanism.sketch},
         published=[_write_published(item, mechanism, quantity) for item in mechanism.published],
@@ -52,6 +52,8 @@ def _quantity_writer(mechanism: Mechanism) -> QuantityWriter:
 
     def quantity(value: float, kind: str) -> float | str:
         value = float(value)  # a number of numpy would write its type
+        if kind == "count":
+            return int(value)
         if kind in declared:
             return shortest_number(value, declared[kind])
         if kind.startswith("angular") and value != 0.0:
@@ -74,7 +76,8 @@ def _list_or_none(values: Iterable[Any] | None) -> list[Any] | None:
     return None if values is None else list(values)
 
 
-def _write_link(link: Link, quantity: QuantityWriter) -> dict[str, Any]:
+def write_link(link: Link, quantity: QuantityWriter) -> dict[str, Any]:
+    """A link as a file has it."""
     return _nonempty_fields(
         ends=_list_or_none(link.ends),
         length=None if link.length is None else quantity(link.length, "length"),
@@ -101,23 +104,21 @@ def _write_point_definition(place: PointDefinition, quantity: QuantityWriter) ->
     }
 
 
-def _write_input(mechanism: Mechanism, drive: Input, quantity: QuantityWriter) -> dict[str, Any]:
-    law = (
-        None
-        if drive.law is None
-        else write_law(drive.law, relative_motions(mechanism)[drive.pair].input_quantity_kinds(), quantity)
-    )
-    return {"pair": drive.pair} | _write_drive(mechanism, drive, quantity) | _nonempty_fields(law=law)
+def write_input(drive: Input, motions: Mapping[str, Pair], quantity: QuantityWriter) -> dict[str, Any]:
+    """An input as a file has it."""
+    law = None if drive.law is None else write_law(drive.law, motions[drive.pair].input_quantity_kinds(), quantity)
+    return {"pair": drive.pair} | _write_drive(drive, motions, quantity) | _nonempty_fields(law=law)
 
 
-def _write_drive(mechanism: Mechanism, drive: Any, quantity: QuantityWriter) -> dict[str, Any]:
-    kinds = dict(zip(DRIVE_SCHEMA, relative_motions(mechanism)[drive.pair].input_quantity_kinds(), strict=True))
+def _write_drive(drive: Any, motions: Mapping[str, Pair], quantity: QuantityWriter) -> dict[str, Any]:
+    kinds = dict(zip(DRIVE_SCHEMA, motions[drive.pair].input_quantity_kinds(), strict=True))
     told = {key: getattr(drive, key) for key in kinds}
     return {key: quantity(value, kinds[key]) for key, value in told.items() if value is not None}
 
 
 def _write_drives(mechanism: Mechanism, drives: tuple[Drive, ...], quantity: QuantityWriter) -> dict[str, Any]:
-    return {drive.pair: _write_drive(mechanism, drive, quantity) for drive in drives}
+    motions = relative_motions(mechanism) if drives else {}
+    return {drive.pair: _write_drive(drive, motions, quantity) for drive in drives}
 
 
 def _write_published(item: PublishedValue, mechanism: Mechanism, quantity: QuantityWriter) -> dict[str, Any]:

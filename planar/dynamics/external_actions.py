@@ -17,6 +17,7 @@ from planar.dynamics.load_variation import load_factors
 from planar.equations.mechanism_numbers import mechanism_size
 from planar.foundation.geometry import Frame, Vector
 from planar.foundation.jets import value_and_rates
+from planar.foundation.short_repr import short_repr
 from planar.model.link_shapes import LinkShape
 from planar.model.loads import COINCIDENCE_TOLERANCE, Load, Spring
 from planar.model.mechanism import relative_motions
@@ -38,6 +39,8 @@ class ExternalAction(NamedTuple):
     force: Array
     couple: Array | float
     power: Array | float = 0.0
+
+    __repr__ = short_repr
 
 
 class KinematicArrays:

@@ -7,6 +7,7 @@ from math import isclose, pi
 
 import numpy as np
 
+from planar.document.first_argument import takes_result
 from planar.dynamics.forces import Forces
 from planar.foundation.errors import BadInput
 from planar.results.motion import Motion
@@ -44,6 +45,7 @@ class Flywheel:
     inertia: float | None
 
 
+@takes_result("Forces")
 def flywheel(forces: Forces, of: str | None = None, fluctuation: float = DEFAULT_FLUCTUATION) -> Flywheel:
     """The flywheel of an input (left out: the one that runs) after forces over a whole cycle of it.
 

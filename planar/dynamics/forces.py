@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.document.first_argument import takes_result
 from planar.dynamics.external_actions import (
     ActionVelocities,
     ExternalAction,
@@ -103,6 +104,7 @@ class Forces(Displayable):
         return has_length_motion(self.mechanism, name)
 
 
+@takes_result("State", "Motion")
 def forces(moving: State | Motion, inertia: bool = True) -> Forces:
     """What inputs and pairs must supply against loads, weights, springs and the links' inertia.
 

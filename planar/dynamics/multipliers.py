@@ -16,6 +16,7 @@ from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.virtual_work import BalanceFunction, VirtualWorkBalance
 from planar.equations.mechanism_numbers import mechanism_size
 from planar.foundation.geometry import Vector
+from planar.foundation.short_repr import short_repr
 from planar.model.pairs import Pair
 from planar.model.pairs.base import ToothContact
 
@@ -34,6 +35,8 @@ class Wrench(NamedTuple):
 
     force: Array
     moment: Array
+
+    __repr__ = short_repr
 
     def moment_about(self, at: Array) -> Array:
         """The moment about places (..., 2)."""
@@ -55,6 +58,8 @@ class ForceSolution(NamedTuple):
     wrench_changes: dict[str, dict[str, Wrench]]
     causes: tuple[str, ...]
     is_balanced: Array
+
+    __repr__ = short_repr
 
 
 class ReactionSolver:

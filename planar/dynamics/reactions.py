@@ -9,6 +9,7 @@ import numpy as np
 
 from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.multipliers import ForceSolution, ReactionSolver
+from planar.foundation.short_repr import short_repr
 from planar.model.pairs import Pair
 from planar.model.wording import join_all_names
 
@@ -34,6 +35,8 @@ class Reaction(NamedTuple):
     couple: Array | float
     couples: Mapping[str, Array | float]
     why: str
+
+    __repr__ = short_repr
 
 
 def input_efforts(solved: ForceSolution) -> tuple[Array, list[str]]:

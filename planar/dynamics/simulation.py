@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from planar.document.first_argument import takes_mechanism
 from planar.dynamics.equations_of_motion import EquationsOfMotion
 from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.lagrangian import lagrangian_functions
@@ -17,6 +18,7 @@ from planar.equations.mechanism_numbers import mechanism_size
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.foundation.geometry import Frame, frame_at
 from planar.foundation.jets import Jet
+from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import Input, Mechanism
 from planar.model.run_arguments import check_steps
 from planar.model.wording import join_all_names
@@ -58,6 +60,8 @@ class Simulation:
     work: Array
     driven: tuple[str, ...]
 
+    __repr__ = short_repr
+
     @property
     def balance(self) -> float:
         """How well energy is kept: the greatest change of what should not change, beside what goes to and fro.
@@ -71,6 +75,7 @@ class Simulation:
         return float(np.ptp(whole)) / beside if beside else 0.0
 
 
+@takes_mechanism
 def simulate(
     mechanism: Mechanism,
     duration: float,

@@ -71,6 +71,16 @@ class BadInput(PlanarError):
         self.sentence = _printable_line(sentence, MAX_SENTENCE_LENGTH)
         super().__init__(f"{self.place}: {self.sentence}")
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.place, self.sentence)
+
+
+class Unknown(PlanarError, KeyError):
+    """A name of a point, a link, a pair or an input is asked for that the mechanism does not have."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
 
 class WriteFailure(BadInput):
     """A result that was found could not be written whole, as on a full disk; `place` is where it was to go."""
@@ -93,6 +103,9 @@ class NoAnswer(PlanarError):
         self.reason = _printable_line(reason, MAX_REASON_LENGTH)
         super().__init__(f"{outcome.value}: {self.reason}")
         self.more: dict[str, Any] = more
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.outcome, self.reason), {"more": self.more}
 
 
 class MissingGlyphs(UserWarning):

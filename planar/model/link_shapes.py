@@ -62,6 +62,28 @@ class Link:
     length: Scalar | None = None
     axis: tuple[str, str] | None = None
 
+    @classmethod
+    def from_ends(
+        cls, first: str, second: str, length: float, name: str = "", points: Mapping[str, PointDefinition] | None = None
+    ) -> Link:
+        """A link by its ends and its length (m), named by them unless said; further points as they are described.
+
+        >>> Link.from_ends("B", "C", 0.066, points={"E": Along("B", "C", 0.04)}).names
+        ('B', 'C', 'E')
+        """
+        further = tuple(Point(*each) for each in (points or {}).items())
+        return cls(name or f"{first}{second}", further, (first, second), length)
+
+    @classmethod
+    def from_points(cls, name: str, points: Mapping[str, tuple[float, float] | PointDefinition]) -> Link:
+        """A link by its points, each by x and y (m) or as it is described.
+
+        >>> Link.from_points("frame", {"A": (0, 0), "D": (0.1, 0)}).points[1].place
+        At(x=0.1, y=0)
+        """
+        known = (At, Along, Distances)
+        return cls(name, tuple(Point(p, at if isinstance(at, known) else At(*at)) for p, at in points.items()))
+
     @property
     def names(self) -> tuple[str, ...]:
         """The names of all its points, ends first."""

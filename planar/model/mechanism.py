@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from planar.foundation.errors import BadInput, first_unprintable, join_names
 from planar.foundation.notebook_display import Displayable
+from planar.foundation.revision import Revisable
 from planar.foundation.units import parse_unit
 from planar.model.link_shapes import Along, At, Distances, Link, LinkShape, Point, PointDefinition
 from planar.model.loads import Course, Load, Mass, Spring
@@ -132,7 +133,7 @@ class FileUnits(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Mechanism(Displayable):
+class Mechanism(Displayable, Revisable):
     """Links joined by pairs, one of them the frame.
 
     `pairs` are binary: a pin of n links is n - 1 of them. `gravity` is an acceleration (m/s^2). `remarks` are what the
@@ -170,8 +171,8 @@ class Mechanism(Displayable):
         return found
 
     def __getstate__(self) -> dict[str, Any]:
-        """Without the hash, which another process would not share."""
-        return {name: value for name, value in self.__dict__.items() if name != "_hash"}
+        """Without what was worked out from it, as the hash, which another process would not share."""
+        return {name: value for name, value in self.__dict__.items() if not name.startswith("_")}
 
 
 class NamedPoint(NamedTuple):

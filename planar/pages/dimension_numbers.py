@@ -10,9 +10,9 @@ from typing import Any
 import casadi as ca
 
 from planar.codegen.javascript import write_javascript
-from planar.equations.functions import shapes_of_links
+from planar.document.dimensions import change_dimension, link_lengths
+from planar.equations.mechanism_numbers import shapes_of_links
 from planar.foundation.geometry import Vector
-from planar.model.dimensions import change_dimension, dimensions
 from planar.model.mechanism import Mechanism
 
 
@@ -66,7 +66,7 @@ class DimensionNumbers:
     """Numbers that depend on the dimensions, each with its place in what the page's function `sizes` gives."""
 
     def __init__(self, mechanism: Mechanism, live: bool = True):
-        self.dimensions = list(dimensions(mechanism, frozenset(link.name for link in mechanism.links))) if live else []
+        self.dimensions = list(link_lengths(mechanism, (link.name for link in mechanism.links))) if live else []
         self.d = ca.SX.sym("d", len(self.dimensions))
         for k, each in enumerate(self.dimensions):
             mechanism = change_dimension(mechanism, each, self.d[k])

@@ -17,6 +17,7 @@ from planar.analysis.rich_text import with_double_primes
 from planar.assemblies.circuits.circuits import circuits
 from planar.assemblies.modes import modes
 from planar.codegen.javascript import write_javascript
+from planar.document.dimensions import Dimension, change_dimension
 from planar.drawing.centres.circle_diagram import circle_radius, link_points
 from planar.drawing.scheme.link_bodies import RELATIVE_TOLERANCE, LinkBody, all_marks, bodies_of_points, largest_span
 from planar.drawing.scheme.springs_masses import SpringMassMark
@@ -24,7 +25,6 @@ from planar.equations.constraint_equations import slice_length
 from planar.equations.mechanism_numbers import scale_lengths, shapes_of_links
 from planar.foundation.geometry import Vector
 from planar.foundation.units import display_unit
-from planar.model.dimensions import Dimension, change_dimension
 from planar.model.link_graph import link_numbers
 from planar.model.link_shapes import PointPlacementError
 from planar.model.mechanism import Mechanism, links_counting_turns, named_points, pair_misfits

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from planar.document.first_argument import takes_result
 from planar.foundation.errors import BadInput, NoAnswer
 from planar.foundation.geometry import frame_at
 from planar.foundation.jets import Jet, Scalar
@@ -25,6 +26,7 @@ MAX_LISTED_ASSEMBLIES = 12
 """Assemblies of the table that a notebook shows."""
 
 
+@takes_result("Mechanism", "State", "Motion")
 def view(shown: Mechanism | State | Motion, path: str | Path | None = None) -> Path:
     """Write the page of a mechanism, of a position, or of a motion, which keeps its range.
 

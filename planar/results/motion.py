@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from planar.foundation.errors import BadInput, Outcome, join_names
+from planar.foundation.errors import BadInput, Outcome, Unknown, join_names
 from planar.foundation.geometry import Frame, Vector, frame_at
 from planar.foundation.jets import Jet, value_and_rates
 from planar.foundation.notebook_display import Displayable
@@ -37,13 +37,6 @@ from planar.results.records import (
 )
 
 Array = np.ndarray
-
-
-class UnknownName(KeyError):
-    """A name that the mechanism does not have."""
-
-    def __str__(self) -> str:
-        return str(self.args[0])
 
 
 class KinematicResult(Displayable):
@@ -104,13 +97,13 @@ class KinematicResult(Displayable):
 
     def _frame(self, link: str) -> Frame:
         if link not in self.frames:
-            raise UnknownName(f"there is no link {link!r}; links are {join_names(self.frames)}")
+            raise Unknown(f"there is no link {link!r}; links are {join_names(self.frames)}")
         return self.frames[link]
 
     def _find_relative_motion(self, name: str) -> tuple[Pair, ValueAndRates]:
         """A pair, and the relative motion that its results are of."""
         if name not in self._relative_motions:
-            raise UnknownName(f"there is no pair {name!r}; pairs are {join_names(self._relative_motions)}")
+            raise Unknown(f"there is no pair {name!r}; pairs are {join_names(self._relative_motions)}")
         pair = self._relative_motions[name]
         numbers = pair.measure([self.shapes[link] for link in pair.bodies])
         frames = [self.frames[link] for link in pair.bodies]
@@ -166,7 +159,7 @@ class KinematicResult(Displayable):
                 for rider, base in ((p, q), (q, p)):
                     if rides[0] in rider.members and any(link == rides[1] for link, _ in base.members):
                         return rides[1]
-        raise UnknownName(
+        raise Unknown(
             f"no link carries both {p.name!r} and {q.name!r}, and neither slides on a link that carries the other; "
             f"name the link whose axes are meant"
         )
@@ -174,7 +167,7 @@ class KinematicResult(Displayable):
     def _find_point(self, name: str) -> NamedPoint:
         if name in self._point_names:
             return self._point_names[name]
-        raise UnknownName(f"there is no point {name!r}; points are {join_names(self.point_names)}")
+        raise Unknown(f"there is no point {name!r}; points are {join_names(self.point_names)}")
 
     def _point_position(self, named: NamedPoint) -> Vector:
         link, point = named.members[0]
@@ -285,6 +278,18 @@ class FollowedPath(Protocol):
         """See `Motion.limits`."""
 
 
+class RecordedPath(NamedTuple):
+    """What is known of the path of a motion that came from another process, or is a copy."""
+
+    singular_rows: frozenset[int]
+    fork_positions: tuple[float, ...]
+    known_limits: tuple[Limit, ...]
+
+    def limits(self, motion: Motion) -> tuple[Limit, ...]:
+        """See `Motion.limits`."""
+        return self.known_limits
+
+
 @dataclass(frozen=True)
 class Motion(KinematicResult):
     """A run of positions of a mechanism, n of them, in the order in which its inputs run through them.
@@ -331,6 +336,14 @@ class Motion(KinematicResult):
             return limit
         position = np.atleast_1d(self._find_relative_motion(limit.of)[1][0])
         return limit._replace(value=limit.value + self._turns_of_limit(limit.of, position))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """With its limits solved for, in place of the compiled equations that would solve for them."""
+        state = {each.name: getattr(self, each.name) for each in fields(self)}
+        if self.course is not None:
+            path = self.course
+            state["course"] = RecordedPath(path.singular_rows, path.fork_positions, path.limits(self))
+        return state
 
     def up_to_row(self, row: int) -> Motion:
         """The rows up to one, and that."""

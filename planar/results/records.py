@@ -9,6 +9,7 @@ import numpy as np
 
 from planar.foundation.geometry import Frame, Vector
 from planar.foundation.jets import Jet, value_and_rates
+from planar.foundation.short_repr import short_repr
 
 Array = np.ndarray
 
@@ -24,6 +25,8 @@ class PointState(NamedTuple):
     acceleration: Array
     sense: str
 
+    __repr__ = short_repr
+
 
 class LinkState(NamedTuple):
     """A link's angle (rad), angular velocity (rad/s) and angular acceleration (rad/s^2), anticlockwise positive.
@@ -36,6 +39,8 @@ class LinkState(NamedTuple):
     angular_acceleration: float
     sense: str
 
+    __repr__ = short_repr
+
 
 class InputState(NamedTuple):
     """An input's position, velocity and acceleration: rad or m, and per second."""
@@ -43,6 +48,8 @@ class InputState(NamedTuple):
     position: float
     velocity: float
     acceleration: float
+
+    __repr__ = short_repr
 
 
 class PointMotion(NamedTuple):
@@ -52,6 +59,8 @@ class PointMotion(NamedTuple):
     velocity: Array
     acceleration: Array
 
+    __repr__ = short_repr
+
 
 class LinkMotion(NamedTuple):
     """A link's angle (rad, counted on from turn to turn) with its first and second rate, each (n,)."""
@@ -60,6 +69,8 @@ class LinkMotion(NamedTuple):
     angular_velocity: Array
     angular_acceleration: Array
 
+    __repr__ = short_repr
+
 
 class InputMotion(NamedTuple):
     """An input's position, velocity and acceleration (rad or m, and per second), each (n,)."""
@@ -67,6 +78,8 @@ class InputMotion(NamedTuple):
     position: Array
     velocity: Array
     acceleration: Array
+
+    __repr__ = short_repr
 
 
 class Limit(NamedTuple):
@@ -86,6 +99,8 @@ class Limit(NamedTuple):
     value: float
     end: str | None = None
     told: str = ""
+
+    __repr__ = short_repr
 
 
 class RelativeState(NamedTuple):
@@ -108,12 +123,16 @@ class RelativeState(NamedTuple):
     coriolis: Array
     sliding_acceleration: Array
 
+    __repr__ = short_repr
+
 
 class ThirdRates(NamedTuple):
     """Frames of links and own coordinates of pairs over a motion, as jets that have third rates as well."""
 
     frames: Mapping[str, Frame]
     own: Mapping[str, tuple[Jet, ...]]
+
+    __repr__ = short_repr
 
 
 HALF_TURN_TOLERANCE = 1e-9

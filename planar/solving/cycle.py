@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from numbers import Integral
 
+from planar.document.first_argument import takes_mechanism
 from planar.foundation.errors import BadInput
 from planar.model.mechanism import LARGEST_COUNTED_ANGLE, Mechanism
 from planar.model.run_arguments import check_number, check_steps
@@ -18,6 +19,7 @@ MAX_DURATION = 1e6
 """s"""
 
 
+@takes_mechanism
 def cycle(
     mechanism: Mechanism,
     steps: int = 360,

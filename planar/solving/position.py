@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from planar.document.first_argument import takes_mechanism
 from planar.equations.constraint_equations import slice_length
 from planar.equations.coordinates import frames_from_coordinates
 from planar.equations.functions import MAX_CACHED_STRUCTURES, EquationRates, equation_functions
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
 Array = np.ndarray
 
 
+@takes_mechanism
 def solve(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = ()) -> State:
     """The position at the mechanism's inputs, of the assembly nearest to its sketch, with its rates.
 

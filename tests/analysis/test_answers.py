@@ -10,10 +10,9 @@ from click.testing import CliRunner
 
 import planar
 from planar.cli import main
-from planar.foundation.errors import BadInput
+from planar.foundation.errors import BadInput, Unknown
 from planar.model.mechanism import Drive, relative_motions, replace_inputs
 from planar.reports.tables.answers import record, tables
-from planar.results.motion import UnknownName
 from tests.analysis.test_extremes import slider_crank, turn_apart
 from tests.draws import part
 
@@ -276,9 +275,9 @@ def test_an_advantage_is_infinite_at_a_sample_on_an_end_and_without_rates_not_to
 def test_what_there_is_not_is_refused_in_a_sentence():
     motion = planar.cycle(planar.load("crank-rocker"), 12)
     for ask in (planar.swing, planar.time_ratio, planar.dwells, planar.advantage_over, planar.answers, planar.greatest):
-        with pytest.raises(UnknownName, match="there is no"):
+        with pytest.raises(Unknown, match="there is no"):
             ask(motion, "nothing")
-    with pytest.raises(UnknownName, match="there is no point"):
+    with pytest.raises(Unknown, match="there is no point"):
         planar.extremes(motion, "nothing")
     with pytest.raises(BadInput, match="'x', 'y' or a direction"):
         planar.extremes(motion, "A", "z")

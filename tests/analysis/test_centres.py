@@ -19,10 +19,10 @@ from planar.analysis.centres.centres import Centre, Centres, centres
 from planar.analysis.centres.two_directions import centre_of
 from planar.analysis.centres.velocities import links_by_centres, velocity_by_centres
 from planar.document import files
-from planar.foundation.errors import BadInput, NoAnswer, Outcome
+from planar.foundation.errors import BadInput, NoAnswer, Outcome, Unknown
 from planar.model.mechanism import Drive, Mechanism, replace_inputs
 from planar.reports.tables.centres import remarks
-from planar.results.motion import State, UnknownName
+from planar.results.motion import State
 from planar.solving.position import solve
 from tests.command import run
 from tests.draws import draws
@@ -778,9 +778,9 @@ def test_a_sliding_link_moves_by_its_centre_at_infinity():
 def test_points_of_the_frame_rest_and_unknown_ones_are_refused():
     result = found("four-bar")
     assert not velocity_by_centres(result, "A").velocity.any()
-    with pytest.raises(UnknownName, match="there is no point 'X'"):
+    with pytest.raises(Unknown, match="there is no point 'X'"):
         velocity_by_centres(result, "X")
-    with pytest.raises(UnknownName, match="links are"):
+    with pytest.raises(Unknown, match="links are"):
         _ = result["AB", "X"]
 
 

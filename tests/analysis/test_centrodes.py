@@ -13,9 +13,8 @@ from planar.drawing.centres.centrodes import DRAWING_SIZE, MAX_WINDOW_RATIO, cen
 from planar.drawing.paper.clipping import clip_homogeneous_curve, remove_repeated_strokes
 from planar.drawing.paper.picture import Circle, Label, Pen, Polyline, extent
 from planar.drawing.paper.scales import Scale
-from planar.foundation.errors import BadInput
+from planar.foundation.errors import BadInput, Unknown
 from planar.model.mechanism import Drive, replace_inputs
-from planar.results.motion import UnknownName
 from tests import command
 from tests.known import MODELS, some_models
 
@@ -269,9 +268,9 @@ def test_seen_the_other_way_round_the_moving_centrode_is_the_fixed_one():
 
 def test_names_that_are_not_there_are_refused():
     motion = run("four-bar", 4)
-    with pytest.raises(UnknownName, match="no link 'XY'"):
+    with pytest.raises(Unknown, match="no link 'XY'"):
         centrodes(motion, "XY")
-    with pytest.raises(UnknownName, match="both are 'BC'"):
+    with pytest.raises(Unknown, match="both are 'BC'"):
         centrodes(motion, "BC", "BC")
     with pytest.raises(BadInput, match="no link 'XY'"):
         centrodes_picture(MODELS["four-bar"], "BC", "XY")

@@ -9,9 +9,8 @@ import pytest
 import planar
 from planar.analysis.centres.curvature import curvature
 from planar.analysis.relative_motion import quarter_turn, relative_motion
-from planar.foundation.errors import BadInput
+from planar.foundation.errors import BadInput, Unknown
 from planar.model.mechanism import Drive, replace_inputs
-from planar.results.motion import UnknownName
 from tests.known import MODELS, some_models, state_of
 
 
@@ -301,11 +300,11 @@ def test_links_that_move_as_one_are_said_to():
 
 def test_names_that_are_not_there_and_inputs_that_are_all_at_rest_are_refused():
     state = state_of("four-bar")
-    with pytest.raises(UnknownName, match="no link 'XY'"):
+    with pytest.raises(Unknown, match="no link 'XY'"):
         curvature(state, "XY")
-    with pytest.raises(UnknownName, match="both are 'BC'"):
+    with pytest.raises(Unknown, match="both are 'BC'"):
         curvature(state, "BC", "BC")
-    with pytest.raises(UnknownName, match="carries no point 'D'"):
+    with pytest.raises(Unknown, match="carries no point 'D'"):
         curvature(state, "BC").path("D")
     several = next(each for each in MODELS.values() if len(each.inputs) > 1)
     still = replace_inputs(several, tuple(Drive(given.pair, None, 0.0, 0.0) for given in several.inputs))

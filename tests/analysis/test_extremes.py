@@ -11,12 +11,11 @@ from hypothesis import strategies as st
 import planar
 from planar.analysis.interpolated_run import InterpolatedRun
 from planar.analysis.motion.extremes import Extreme, greatest, stroke
-from planar.foundation.errors import BadInput, NoAnswer
+from planar.foundation.errors import BadInput, NoAnswer, Unknown
 from planar.foundation.jets import Jet
 from planar.foundation.root_finding import find_root
 from planar.model.mechanism import Drive, relative_motions, replace_inputs
 from planar.model.pairs import MeasureKind
-from planar.results.motion import UnknownName
 from tests.draws import draws
 
 NEAR = 1e-12
@@ -176,7 +175,7 @@ def test_what_does_not_slide_or_does_not_move_has_no_stroke():
     assert stroke(motion, "A") is None
     held = planar.cycle(planar.load("excavator-arm"), 20, pair="boom cylinder")
     assert stroke(held, "stick cylinder") is None
-    with pytest.raises(UnknownName, match="there is no pair 'nothing'"):
+    with pytest.raises(Unknown, match="there is no pair 'nothing'"):
         stroke(motion, "nothing")
 
 
@@ -288,7 +287,7 @@ def test_the_greatest_velocity_or_acceleration_is_asked_for_and_of_what_there_is
     motion = planar.cycle(planar.load("000-P5"), 12)
     with pytest.raises(BadInput, match="'velocity' or 'acceleration'"):
         greatest(motion, "stroke", "jerk")
-    with pytest.raises(UnknownName, match="there is no point 'nothing'"):
+    with pytest.raises(Unknown, match="there is no point 'nothing'"):
         greatest(motion, "nothing")
 
 

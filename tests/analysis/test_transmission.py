@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import planar
-from planar.foundation.errors import BadInput
-from planar.results.motion import UnknownName
+from planar.foundation.errors import BadInput, Unknown
 from tests.analysis.test_answers import SEEDS, crank_rocker, four_bar
 from tests.analysis.test_extremes import slider_crank, turn_apart
 
@@ -149,5 +148,5 @@ def test_where_no_one_line_of_force_drives_a_link_it_is_refused(name, output, wh
 
 
 def test_another_name_is_refused():
-    with pytest.raises(UnknownName, match="there is no pair and no link"):
+    with pytest.raises(Unknown, match="there is no pair and no link"):
         planar.transmission(planar.cycle(planar.load("crank-rocker"), 12), "nothing")

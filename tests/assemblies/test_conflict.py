@@ -10,8 +10,8 @@ from scipy.optimize import least_squares
 
 import planar
 from planar.assemblies.polynomial.completeness import Completeness
+from planar.document.dimensions import change_dimension, link_lengths
 from planar.foundation.errors import NoAnswer, Outcome
-from planar.model.dimensions import change_dimension, dimensions
 from tests import command
 from tests.assemblies.test_modes import bars, four_bar
 from tests.draws import part
@@ -76,7 +76,7 @@ def check_irreducible(mechanism: planar.Mechanism, found: planar.Conflict) -> No
 
 def check_mends(mechanism: planar.Mechanism, change) -> None:
     """With the change the whole has an assembly in the complete list, with a hundredth less of it none."""
-    every = {each.name: each for each in dimensions(mechanism, frozenset(link.name for link in mechanism.links))}
+    every = {each.name: each for each in link_lengths(mechanism, frozenset(link.name for link in mechanism.links))}
     there, short = (
         change_dimension(mechanism, every[change.name], change.was + part * (change.value - change.was))
         for part in (1.0, 0.99)

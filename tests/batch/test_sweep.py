@@ -14,8 +14,8 @@ from planar.batch.march.design_functions import DesignFunctions
 from planar.batch.march.numpy_backend import NumpyRunner
 from planar.batch.reference_design import reference_design
 from planar.document import files
+from planar.document.dimensions import link_lengths
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
-from planar.model.dimensions import dimensions
 from planar.solving.position import PositionSolver
 from tests.draws import draws, part
 from tests.known import MODELS
@@ -37,7 +37,7 @@ ORDERS = ("position", "velocity", "acceleration")
 def around(mechanism, spread, many=5, seed=0):
     """Random designs: every length that is not zero, and the inputs' rates, changed by so much."""
     rng = np.random.default_rng(seed)
-    own = {each.name: each.value for each in dimensions(mechanism, frozenset(link.name for link in mechanism.links))}
+    own = {each.name: each.value for each in link_lengths(mechanism, frozenset(link.name for link in mechanism.links))}
     own |= {f"{each.pair}.velocity": each.velocity for each in mechanism.inputs}
     own |= {f"{each.pair}.acceleration": each.acceleration for each in mechanism.inputs}
     return {name: value * (1 + spread * rng.uniform(-1, 1, many)) for name, value in own.items() if value}
@@ -349,7 +349,7 @@ def test_wheels_that_do_not_mesh_are_refused_design_by_design():
     mechanism = MODELS["sun-and-planet"]
     name, value = next(
         (each.name, each.value)
-        for each in dimensions(mechanism, frozenset(link.name for link in mechanism.links))
+        for each in link_lengths(mechanism, frozenset(link.name for link in mechanism.links))
         if abs(each.value - 0.6) < 1e-9
     )
     result = planar.sweep(mechanism, {name: np.array([1.0, 1.01]) * value}, 12)

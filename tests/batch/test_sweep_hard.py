@@ -6,8 +6,8 @@ import pytest
 
 import planar
 from planar.batch.design_arrays import values_of_design, with_design_values
+from planar.document.dimensions import link_lengths
 from planar.foundation.errors import BadInput, Outcome
-from planar.model.dimensions import dimensions
 from tests.draws import part
 from tests.linkages import random_linkage
 
@@ -67,7 +67,7 @@ def chain(rng, cells):
 
 
 def around(mechanism, spread, many, rng):
-    lengths = dimensions(mechanism, frozenset(link.name for link in mechanism.links))
+    lengths = link_lengths(mechanism, frozenset(link.name for link in mechanism.links))
     return {each.name: each.value * (1.0 + spread * rng.uniform(-1.0, 1.0, many)) for each in lengths if each.value}
 
 

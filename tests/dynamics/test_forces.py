@@ -16,9 +16,9 @@ import planar
 from planar.analysis.motion.mechanical_advantage import advantage, advantages
 from planar.dynamics.virtual_velocities import has_length_motion, unit_rate_state
 from planar.dynamics.virtual_work import BalanceFunction
-from planar.foundation.errors import BadInput, NoAnswer, Outcome
+from planar.foundation.errors import BadInput, NoAnswer, Outcome, Unknown
 from planar.model.mechanism import Drive, Input, Load, Mechanism
-from planar.results.motion import State, UnknownName
+from planar.results.motion import State
 from planar.solving.position import solve
 from tests.command import run
 from tests.draws import draws, part
@@ -431,9 +431,9 @@ def test_loads_made_in_python_are_checked(load, sentence):
 
 def test_unknown_outputs_and_inputs_are_named():
     state = state_of("four-bar")
-    with pytest.raises(UnknownName, match="there is no point, link or pair 'nothing'"):
+    with pytest.raises(Unknown, match="there is no point, link or pair 'nothing'"):
         advantage(state, "nothing")
-    with pytest.raises(UnknownName, match="there is no input at 'nothing'"):
+    with pytest.raises(Unknown, match="there is no input at 'nothing'"):
         advantage(state, next(iter(state.points)), "nothing")
 
 

@@ -20,11 +20,11 @@ import numpy as np
 import pytest
 
 import planar
+from planar.document.dimensions import change_dimension, link_lengths
 from planar.document.files import read_asset
 from planar.drawing.scheme.link_bodies import link_bodies
-from planar.equations.functions import shapes_of_links
+from planar.equations.mechanism_numbers import shapes_of_links
 from planar.foundation.errors import BadInput, NoAnswer
-from planar.model.dimensions import change_dimension, dimensions
 from planar.model.mechanism import Mechanism
 from planar.pages import gallery, notebook
 from planar.pages.dimension_numbers import DimensionNumbers
@@ -528,7 +528,7 @@ def test_a_changed_mechanism_is_saved_as_a_file_that_planar_solves_to_the_same()
     for stem, found in in_node(SOME, act).items():
         saved = planar.from_dict(found["file"])
         links = frozenset(link.name for link in saved.links)
-        assert [each.value for each in dimensions(saved, links)] == found["d"], stem
+        assert [each.value for each in link_lengths(saved, links)] == found["d"], stem
         assert saved.inputs[0].position == found["u"]
         try:
             state = planar.solve(saved)
@@ -551,7 +551,7 @@ def test_a_mechanism_that_is_not_changed_is_saved_as_it_came():
 def test_a_dimension_is_held_where_a_pair_would_refuse_the_file_with_another(stem):
     mechanism = MODELS[stem]
     links = frozenset(link.name for link in mechanism.links)
-    for each, told_of in zip(dimensions(mechanism, links), page_data(mechanism)[0]["dimensions"], strict=True):
+    for each, told_of in zip(link_lengths(mechanism, links), page_data(mechanism)[0]["dimensions"], strict=True):
         refused = 0
         for end in ("low", "high"):
             other = change_dimension(mechanism, each, each.value + 0.02 * (told_of[end] - each.value))
@@ -802,7 +802,7 @@ def test_other_dimensions_give_pythons_numbers():
     """
     links = frozenset(link.name for link in mechanism.links)
     for each, (reached, points) in zip(
-        dimensions(mechanism, links), in_node({stem: mechanism}, act)[stem], strict=True
+        link_lengths(mechanism, links), in_node({stem: mechanism}, act)[stem], strict=True
     ):
         other = change_dimension(mechanism, each, 1.1 * each.value)
         assert reached == 1

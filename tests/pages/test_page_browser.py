@@ -15,8 +15,8 @@ import pytest
 
 import planar
 from planar.analysis.polygons.construction import acceleration_polygon, velocity_polygon
+from planar.document.dimensions import change_dimension, link_lengths
 from planar.drawing.polygons.polygon import polygon_picture
-from planar.model.dimensions import change_dimension, dimensions
 from planar.pages import gallery, notebook
 from planar.pages.gallery_kinds import KINDS, kind_and_search_text
 from planar.pages.page import page
@@ -201,7 +201,9 @@ def test_a_length_is_changed_by_its_number_and_reset(shown):
     mechanism = MODELS["watt-six-bar"]
     window = shown(mechanism)
     each = next(
-        d for d in dimensions(mechanism, frozenset(link.name for link in mechanism.links)) if d.name.endswith(".length")
+        d
+        for d in link_lengths(mechanism, frozenset(link.name for link in mechanism.links))
+        if d.name.endswith(".length")
     )
     length = planar.foundation.units.parse_unit(mechanism.units.length)
     wanted = float(f"{length.from_si(1.05 * each.value):.4g}")

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 import planar
+from planar.document.dimensions import change_dimension, link_lengths
 from planar.document.files import read_asset
 from planar.dynamics.load_attachment import attachments
-from planar.model.dimensions import change_dimension, dimensions
 from planar.model.loads import Course, Load, Mass, Spring
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.pages.page_data import page_data
@@ -127,7 +127,7 @@ def test_forces_follow_the_input():
 
 def test_forces_follow_the_dimensions():
     mechanism = acted_on(planar.load("000-P2"))
-    every = list(dimensions(mechanism, frozenset(link.name for link in mechanism.links)))
+    every = list(link_lengths(mechanism, frozenset(link.name for link in mechanism.links)))
     values = [each.value * (1.05 if each.name == "BD.length" else 1.0) for each in every]
     longer = change_dimension(mechanism, next(each for each in every if each.name == "BD.length"), 1.05 * 0.54)
     alike(on_page(mechanism, d=values), longer)

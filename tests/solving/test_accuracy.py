@@ -7,10 +7,10 @@ import pytest
 from flint import arb, ctx
 
 import planar
+from planar.document.dimensions import change_dimension, link_lengths
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.geometry import Vector
 from planar.foundation.jets import Jet
-from planar.model.dimensions import change_dimension, dimensions
 from planar.model.pairs.base import sample_shape
 from planar.model.pairs.guide_line import LinkLine
 from planar.solving.continuation import path, predictor_corrector
@@ -338,7 +338,7 @@ def test_a_parallelogram_printed_to_fifteen_digits_runs_through_all_its_rows(off
 def test_a_length_whose_square_is_no_number_is_bad_input_however_it_came(name, value):
     mechanism = planar.load("004-OABQ")
     links = frozenset(link.name for link in mechanism.links)
-    (own,) = (each for each in dimensions(mechanism, links) if each.name == name)
+    (own,) = (each for each in link_lengths(mechanism, links) if each.name == name)
     for ask in (planar.solve, planar.cycle, planar.inspect):
         with pytest.raises(planar.BadInput, match="a place is 0, or from 1e-100"):
             ask(change_dimension(mechanism, own, value))

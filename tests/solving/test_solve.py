@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 import planar
 from planar.document import files
+from planar.foundation.errors import Unknown
 from planar.model.mechanism import Drive
-from planar.results.motion import UnknownName
 
 DEG = np.pi / 180
 
@@ -153,7 +153,7 @@ def test_between_two_points_of_a_link_nothing_slides_and_no_coriolis_part_is_lef
 
 def test_relative_motion_of_points_on_no_common_link_asks_for_axes():
     state = planar.solve(four_bar(0.5, 1.2, 1.0, 1.4, 1.0, 3.0, 1.0, {"C": [1.5, 1.0]}))
-    with pytest.raises(UnknownName, match="name the link"):
+    with pytest.raises(Unknown, match="name the link"):
         state.relative("A", "C")
     parts = state.relative("A", "C", axes="BC")
     assert parts.velocity == pytest.approx(state.point("A").velocity - state.point("C").velocity)
@@ -164,9 +164,9 @@ def test_relative_motion_of_points_on_no_common_link_asks_for_axes():
 @pytest.mark.parametrize("name", ["nobody", "BC", "X.Y"])
 def test_unknown_names_are_answered_with_the_known_ones(name):
     state = planar.solve(four_bar(0.5, 1.2, 1.0, 1.4, 1.0, 3.0, 1.0, {"C": [1.5, 1.0]}))
-    with pytest.raises(UnknownName, match="points are A, D, B and C"):
+    with pytest.raises(Unknown, match="points are A, D, B and C"):
         state.point(name)
-    with pytest.raises(UnknownName, match="pairs are A, B, C and D"):
+    with pytest.raises(Unknown, match="pairs are A, B, C and D"):
         state.pair(name)
 
 

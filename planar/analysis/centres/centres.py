@@ -31,10 +31,13 @@ from planar.analysis.rate_equations import RateEquations
 from planar.analysis.rate_equations import rate_equations as rates_of
 from planar.analysis.rate_ratios import LEAST_ERROR, LinkPoles, solve_link_poles
 from planar.analysis.vector_chains import VectorChains
+from planar.document.first_argument import takes_result
+from planar.foundation.errors import Unknown
 from planar.foundation.notebook_display import Displayable
+from planar.foundation.short_repr import short_repr
 from planar.model.link_graph import link_numbers, number_separator
 from planar.model.mechanism import Mechanism, named_points
-from planar.results.motion import State, UnknownName
+from planar.results.motion import State
 from planar.solving.rest_position import rest_position
 
 Array = np.ndarray
@@ -64,6 +67,8 @@ class Centre:
     homogeneous: Array | None
     derivation: str
     lines: tuple[CentreLine, ...] = ()
+
+    __repr__ = short_repr
 
     @property
     def position(self) -> Array | None:
@@ -113,7 +118,7 @@ class Centres(Displayable):
         two = frozenset(links)
         if two in self._by_links:
             return self._by_links[two]
-        raise UnknownName(f"there are no links {' and '.join(map(repr, links))}; links are {', '.join(self.numbers)}")
+        raise Unknown(f"there are no links {' and '.join(map(repr, links))}; links are {', '.join(self.numbers)}")
 
     def __iter__(self) -> Iterator[Centre]:
         return iter(self.all)
@@ -122,6 +127,7 @@ class Centres(Displayable):
         return len(self.all)
 
 
+@takes_result("State", "Mechanism")
 def centres(position: State | Mechanism) -> Centres:
     """Every instantaneous centre of a position, from positions alone: Kennedy's theorem on what the pairs show.
 

@@ -10,9 +10,11 @@ import numpy as np
 
 from planar.analysis.interpolated_run import InterpolatedRun
 from planar.analysis.relative_motion import RelativeMotion, relative_motion
+from planar.document.first_argument import takes_result
 from planar.foundation.errors import BadInput
 from planar.foundation.geometry import Frame, Vector, frame_at
 from planar.foundation.jets import Jet
+from planar.foundation.short_repr import short_repr
 from planar.model.link_graph import link_numbers
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import MeasureKind
@@ -44,6 +46,8 @@ class Centrode(NamedTuple):
     "positions of the input that runs (n,)"
     homogeneous: Array
     rate: Array
+
+    __repr__ = short_repr
 
     @property
     def position(self) -> Array:
@@ -113,6 +117,8 @@ class Centrodes:
     "of the link in the axes of the other, at every position"
     reason: str
 
+    __repr__ = short_repr
+
     def placed(self, row: int, points: Array | None = None) -> Array:
         """The moving centrode, or other points of the link's axes, where they are at a position: (n, 2), m.
 
@@ -128,6 +134,7 @@ class Centrodes:
         return np.flatnonzero(np.isfinite(self.fixed.homogeneous[:, 2]))
 
 
+@takes_result("Motion")
 def centrodes(motion: Motion, link: str, other: str | None = None) -> Centrodes:
     """The fixed and the moving centrode of a link against another (left out: the frame), from the motion's rates.
 

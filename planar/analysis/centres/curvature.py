@@ -15,9 +15,11 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.analysis.relative_motion import RelativeMotion, quarter_turn, relative_motion
-from planar.foundation.errors import BadInput
+from planar.document.first_argument import takes_result
+from planar.foundation.errors import BadInput, Unknown
+from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import Drive, named_points, replace_inputs
-from planar.results.motion import State, UnknownName
+from planar.results.motion import State
 from planar.solving.position import PositionSolver
 
 Array = np.ndarray
@@ -33,6 +35,8 @@ class MotionCircle(NamedTuple):
     centre: Array
     diameter: float
 
+    __repr__ = short_repr
+
 
 class PathCurvature(NamedTuple):
     """How the path of a point is curved at a position.
@@ -47,6 +51,8 @@ class PathCurvature(NamedTuple):
     radius: float
     direct: float
     centre: Array | None
+
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True)
@@ -80,6 +86,8 @@ class Curvature:
     reason: str
     "why there is no pole or no inflection circle, else empty"
 
+    __repr__ = short_repr
+
     def path(self, point: str | Sequence[float]) -> PathCurvature:
         """The curvature of the path of a point of the link, by name or by its coordinates (m) in the link's axes.
 
@@ -106,7 +114,7 @@ class Curvature:
         if not isinstance(point, str):
             return np.array(point, dtype=float).reshape(2)
         if point not in self.members:
-            raise UnknownName(f"link {self.link!r} carries no point {point!r}; its points are {', '.join(self.shape)}")
+            raise Unknown(f"link {self.link!r} carries no point {point!r}; its points are {', '.join(self.shape)}")
         return self.shape[self.members[point]]
 
     def _radius_from_rates(self, at: Array) -> tuple[float, Array | None]:
@@ -126,6 +134,7 @@ class Curvature:
         return speed**3 / abs(bend), quarter_turn(v) * (speed**2 / bend)
 
 
+@takes_result("State")
 def curvature(state: State, link: str, other: str | None = None) -> Curvature:
     """The motion of a link to second order as seen from another (left out: the frame), for the curvature of paths.
 

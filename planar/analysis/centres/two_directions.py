@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.foundation.errors import BadInput
+from planar.foundation.short_repr import short_repr
 
 Array = np.ndarray
 QUARTER_TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
@@ -28,6 +29,8 @@ class TwoDirections(NamedTuple):
     radius_b: float | None
     angular_velocity: float
     velocity_b: Array
+
+    __repr__ = short_repr
 
     @property
     def position(self) -> Array | None:

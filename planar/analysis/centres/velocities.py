@@ -10,7 +10,9 @@ import numpy as np
 
 from planar.analysis.centres.centres import Centre, Centres, extent
 from planar.analysis.rate_equations import RateEquation, RateEquations, SlideJoint, rate_equations
+from planar.document.first_argument import takes_result
 from planar.foundation.errors import NoAnswer, Outcome
+from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import Drive, replace_inputs
 
 Array = np.ndarray
@@ -27,6 +29,8 @@ class LinkByCentres(NamedTuple):
     motion: Array
     by: tuple[str, ...]
     "the names of the three centres of which it follows from another link's, none for what an input gives"
+
+    __repr__ = short_repr
 
     @property
     def angular_velocity(self) -> float:
@@ -47,7 +51,10 @@ class PointByCentre(NamedTuple):
     radius: float | None
     by: tuple[str, ...]
 
+    __repr__ = short_repr
 
+
+@takes_result("Centres")
 def velocity_by_centres(centres: Centres, point: str) -> PointByCentre:
     """v_P = w_k (P - I_kf) turned a quarter, w_k from an input's given rate and w_i through I_ik.
 

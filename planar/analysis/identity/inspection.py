@@ -10,9 +10,13 @@ import numpy as np
 from planar.analysis.identity.load_descriptions import ActionDescription, describe_actions
 from planar.analysis.identity.mechanism_names import mechanism_names
 from planar.analysis.identity.mobility import Mobility, gruebler, mobility
+from planar.document.dimensions import Dimension, file_dimensions
+from planar.document.first_argument import takes_mechanism
 from planar.dynamics.load_attachment import attachment_remarks
 from planar.equations.mechanism_numbers import mechanism_size, shapes_of_links
 from planar.foundation.errors import BadInput, NoAnswer, Outcome, PlanarError
+from planar.foundation.short_repr import short_repr
+from planar.foundation.units import SI_UNITS, display_unit
 from planar.model.link_graph import link_numbers, pair_labels_by_type, unconnected_links
 from planar.model.mechanism import Input, Mechanism, pair_entries
 from planar.model.pairs import MeasureKind
@@ -38,12 +42,21 @@ class LinkDescription:
 
 
 @dataclass(frozen=True)
+class NumberDescription:
+    """A number of the file: its value (SI) with the SI unit, empty of a plain number, and how it is printed."""
+
+    value: float
+    unit: str
+    shown: str
+
+
+@dataclass(frozen=True)
 class Inspection:
     """See `inspect`. `mobility` is None where the mechanism cannot be assembled; `open_reason` then says why.
 
     `pairs`: of every type the pairs by the numbers of their links, as ("turning", ("O-1", "1-2")); `lower` and `higher`
     how many; `is_mechanism` and `is_linkage` with the reasons. `actions` are its loads, springs and masses; `remarks`
-    say of which of them another link might have been meant.
+    say of which of them another link might have been meant. `dimensions` are all numbers of its file, by name.
     """
 
     name: str
@@ -62,8 +75,12 @@ class Inspection:
     linkage_reason: str
     actions: tuple[ActionDescription, ...]
     remarks: tuple[str, ...]
+    dimensions: dict[str, NumberDescription]
+
+    __repr__ = short_repr
 
 
+@takes_mechanism
 def inspect(mechanism: Mechanism) -> Inspection:
     """Everything that can be said of a mechanism before its motion is asked for."""
     try:
@@ -101,7 +118,15 @@ def inspect(mechanism: Mechanism) -> Inspection:
         linkage_reason=_linkage_reason(is_mechanism, higher),
         actions=describe_actions(mechanism),
         remarks=attachment_remarks(mechanism),
+        dimensions={name: _describe_number(mechanism, each) for name, each in file_dimensions(mechanism).items()},
     )
+
+
+def _describe_number(mechanism: Mechanism, number: Dimension) -> NumberDescription:
+    if number.kind not in SI_UNITS:
+        return NumberDescription(number.value, "", f"{number.value:.6g}")
+    name, unit = display_unit(number.kind, mechanism.units)
+    return NumberDescription(number.value, SI_UNITS[number.kind], f"{unit.from_si(number.value):.6g} {name}")
 
 
 def _order_word(pairs: int) -> str:

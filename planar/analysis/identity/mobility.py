@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planar.document.first_argument import takes_mechanism
 from planar.foundation.errors import NoAnswer
 from planar.model.link_graph import pairs_farthest_first
 from planar.model.mechanism import Mechanism
@@ -37,6 +38,7 @@ class Mobility:
     why: tuple[str, ...]
 
 
+@takes_mechanism
 def mobility(mechanism: Mechanism) -> Mobility:
     """The mobility of a mechanism in the position of its file. Raises NoAnswer where it cannot be assembled."""
     setup = PositionSolver(mechanism)

@@ -11,6 +11,7 @@ from planar.analysis.motion.extremes import Extreme, find_greatest, quantity_and
 from planar.analysis.motion.harmonics import Harmonics, full_turn, harmonics
 from planar.analysis.motion.piston import Deviation, Piston, RodPointMotion, find_piston
 from planar.foundation.errors import BadInput
+from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import Mechanism, named_points, relative_motions
 from planar.model.pairs import MeasureKind
 from planar.results.motion import Array
@@ -58,6 +59,8 @@ class AnalyticalRoute:
     piston: Piston | None = None
     formula: TwoTermComparison | None = None
     rods: tuple[RodPointComparison, ...] = ()
+
+    __repr__ = short_repr
 
 
 def analytical_routes(

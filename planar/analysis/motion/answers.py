@@ -12,9 +12,11 @@ from planar.analysis.motion.mechanical_advantage_over_motion import AdvantageOve
 from planar.analysis.motion.output import Axis, Extreme, Output
 from planar.analysis.motion.time_ratio import TimeRatio, find_time_ratio
 from planar.analysis.motion.transmission_angle import Transmission, transmission
-from planar.foundation.errors import BadInput
+from planar.document.first_argument import takes_result
+from planar.foundation.errors import BadInput, Unknown
+from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import relative_motions
-from planar.results.motion import Motion, UnknownName
+from planar.results.motion import Motion
 
 POINT_AXES: tuple[Axis, ...] = ("x", "y")
 
@@ -45,7 +47,10 @@ class Answers:
     advantage: AdvantageOver | None = None
     notes: tuple[str, ...] = ()
 
+    __repr__ = short_repr
 
+
+@takes_result("Motion")
 def answers(motion: Motion, name: str) -> tuple[Answers, ...]:
     """What there is to tell of a name over a motion: of the pair, the link and the point that bear it.
 
@@ -59,7 +64,7 @@ def answers(motion: Motion, name: str) -> tuple[Answers, ...]:
     if name in motion._point_names:
         found.append(_point_answers(motion, steady, name))
     if not found:
-        raise UnknownName(
+        raise Unknown(
             f"there is no pair, link or point {name!r}; pairs are {', '.join(relative_motions(motion.mechanism))}, "
             f"links {', '.join(motion.frames)}, points {', '.join(motion.point_names)}"
         )

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.analysis.interpolated_run import CLOSED_TOLERANCE, InterpolatedRun
+from planar.document.first_argument import takes_result
 from planar.foundation.errors import BadInput, NoAnswer
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
@@ -29,6 +30,7 @@ class Area(NamedTuple):
     positions: int
 
 
+@takes_result("Motion")
 def area(motion: Motion, point: str) -> Area:
     """The area within the closed curve that a point describes over a motion, in the order of its rows.
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from planar.analysis.interpolated_run import InterpolatedRun
 from planar.analysis.motion.output import Axis, Extreme, Output
+from planar.document.first_argument import takes_result
 from planar.foundation.errors import BadInput, NoAnswer
 from planar.foundation.root_finding import find_root
 from planar.results.motion import Motion
@@ -35,6 +36,7 @@ class Dwell(NamedTuple):
     time: float
 
 
+@takes_result("Motion")
 def dwells(
     motion: Motion, of: str, within: float | None = None, least: float | None = None, axis: Axis | None = None
 ) -> tuple[Dwell, ...]:

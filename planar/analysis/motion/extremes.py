@@ -11,6 +11,7 @@ import numpy as np
 from planar.analysis.interpolated_run import CLOSED_TOLERANCE, InterpolatedRun
 from planar.analysis.motion.output import Axis, Extreme, Output
 from planar.analysis.motion.zeros import SERIES_TOLERANCE, bracket_maxima, bracket_zeros, find_maximum
+from planar.document.first_argument import takes_result
 from planar.foundation.errors import BadInput, NoAnswer
 from planar.foundation.root_finding import find_root
 from planar.model.mechanism import relative_motions
@@ -62,6 +63,7 @@ class Extremes(NamedTuple):
     turning: tuple[bool, bool]
 
 
+@takes_result("Motion")
 def stroke(motion: Motion, pair: str) -> Stroke | None:
     """The ends of a slide's travel, where its velocity is zero, solved for to round-off (about 1e-14 rad of the input).
 
@@ -84,6 +86,7 @@ def find_stroke(steady: InterpolatedRun, pair: str) -> Stroke | None:
     return Stroke(pair, top, bottom, high.value - low.value)
 
 
+@takes_result("Motion")
 def swing(motion: Motion, name: str) -> Swing | None:
     """The extreme angles of a rocker, solved for to round-off: of a turning pair, else of a link, of this name.
 
@@ -97,6 +100,7 @@ def swing(motion: Motion, name: str) -> Swing | None:
     return found and Swing(name, *found, found[1].value - found[0].value)
 
 
+@takes_result("Motion")
 def extremes(motion: Motion, point: str, axis: Axis = "x") -> Extremes:
     """The extreme positions of a point along an axis, "x" or "y" or a direction (rad), solved for to round-off.
 
@@ -118,6 +122,7 @@ def find_extremes(output: Output) -> Extremes:
     return Extremes(output.name, output.axis, least[0], greatest[0], length, (least[1], greatest[1]))
 
 
+@takes_result("Motion")
 def greatest(motion: Motion, of: str | StateMeasure, what: str = "velocity") -> Extreme:
     """Where in a run a slide, a point or anything else is fastest, and how fast, solved for.
 

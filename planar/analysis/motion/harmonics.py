@@ -9,11 +9,13 @@ import numpy as np
 
 from planar.analysis.interpolated_run import InterpolatedRun
 from planar.analysis.motion.extremes import Extreme, Stroke, find_stroke
+from planar.document.first_argument import takes_mechanism
 from planar.equations.mechanism_numbers import mechanism_size, shapes_of_links
-from planar.foundation.errors import BadInput, NoAnswer, Outcome
+from planar.foundation.errors import BadInput, NoAnswer, Outcome, Unknown
+from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import Drive, Mechanism, relative_motions, replace_inputs
 from planar.model.pairs import MeasureKind
-from planar.results.motion import Array, Motion, UnknownName
+from planar.results.motion import Array, Motion
 from planar.solving.cycle import cycle
 
 MIN_SAMPLES, MAX_SAMPLES = 64, 4096
@@ -48,6 +50,8 @@ class Harmonics:
     positions: int
     rest: float
     stroke: Stroke | None
+
+    __repr__ = short_repr
 
     @property
     def amplitudes(self) -> Array:
@@ -105,6 +109,7 @@ class Harmonics:
         ).sum(axis=-1)
 
 
+@takes_mechanism
 def harmonics(mechanism: Mechanism, of: str, axis: str | None = None, pair: str | None = None) -> Harmonics:
     """The harmonics of a motion over a full turn of the crank.
 
@@ -195,7 +200,7 @@ def _quantity_kind(motion: Motion, of: str, axis: str | None) -> str:
             raise BadInput("axis", f"the axis is 'x' or 'y', not {axis!r:.40}")
         try:
             motion.point(of)
-        except UnknownName as problem:
+        except Unknown as problem:
             raise BadInput(of, str(problem)) from None
         return "length"
     named = relative_motions(mechanism)

@@ -12,11 +12,12 @@ import numpy as np
 from planar.analysis.centres.centres import Centres, centres, extent
 from planar.analysis.centres.velocities import LinkByCentres, links_by_centres
 from planar.analysis.rate_equations import Rate, RateEquations, rate_equations
+from planar.document.first_argument import takes_result
 from planar.dynamics.virtual_velocities import has_length_motion, unit_rate_state
-from planar.foundation.errors import BadInput, NoAnswer
+from planar.foundation.errors import BadInput, NoAnswer, Unknown
 from planar.model.mechanism import Input, relative_motions
 from planar.model.wording import REST_TOLERANCE, join_all_names
-from planar.results.motion import State, UnknownName
+from planar.results.motion import State
 
 Array = np.ndarray
 LEAST_SEPARATION = 1e-3
@@ -45,6 +46,7 @@ class Advantage(NamedTuple):
     why: str
 
 
+@takes_result("State")
 def advantage(state: State, output: str, input: str | None = None) -> Advantage:  # noqa: A002
     """The mechanical advantage of a point, a link or a pair (in this order, by name) over an input.
 
@@ -129,7 +131,7 @@ class _AdvantagesOverInput:
                 links,
                 lambda motion: _pair_rate(found, slopes, motion),
             )
-        raise UnknownName(
+        raise Unknown(
             f"there is no point, link or pair {name!r}; points are {', '.join(state.point_names)}, "
             f"links {', '.join(state.frames)}, pairs {', '.join(named)}"
         )
@@ -187,7 +189,7 @@ def _choose_input(state: State, name: str | None) -> str:
     if name is None:
         raise BadInput("input", f"an advantage is over one input; name it: the inputs are at {join_all_names(names)}")
     if name not in names:
-        raise UnknownName(f"there is no input at {name!r}; the inputs are at {join_all_names(names)}")
+        raise Unknown(f"there is no input at {name!r}; the inputs are at {join_all_names(names)}")
     return name
 
 

@@ -11,8 +11,10 @@ from planar.analysis.interpolated_run import InterpolatedRun
 from planar.analysis.motion.extremes import find_greatest, quantity_and_rates
 from planar.analysis.motion.output import Extreme, Output
 from planar.analysis.motion.zeros import bracket_zeros
+from planar.document.first_argument import takes_result
 from planar.foundation.errors import NoAnswer
 from planar.foundation.root_finding import find_root
+from planar.foundation.short_repr import short_repr
 from planar.model.wording import REST_TOLERANCE
 from planar.results.motion import KinematicResult, Motion
 
@@ -36,7 +38,10 @@ class AdvantageOver(NamedTuple):
     least: Extreme
     infinite: tuple[float, ...]
 
+    __repr__ = short_repr
 
+
+@takes_result("Motion")
 def advantage_over(motion: Motion, output: str) -> AdvantageOver:
     """The mechanical advantage of a slide, a point, another pair or a link (in this order, by name) over a motion.
 

@@ -11,12 +11,12 @@ import numpy as np
 
 from planar.analysis.interpolated_run import CLOSED_TOLERANCE, InterpolatedRun
 from planar.analysis.motion.zeros import bracket_near_zeros, bracket_zeros
-from planar.foundation.errors import BadInput, NoAnswer
+from planar.foundation.errors import BadInput, NoAnswer, Unknown
 from planar.foundation.jets import value_and_rates
 from planar.foundation.root_finding import find_root
 from planar.model.mechanism import relative_motions
 from planar.model.pairs import MeasureKind
-from planar.results.motion import KinematicResult, UnknownName, ValueAndRates
+from planar.results.motion import KinematicResult, ValueAndRates
 from planar.results.records import principal_turns
 
 Array = np.ndarray
@@ -50,7 +50,7 @@ class Output:
         elif not self._is_pair and name not in moving.frames:
             if name in moving.point_names:
                 raise BadInput(name, "of a point one coordinate is meant; name the axis, 'x' or 'y', or a direction")
-            raise UnknownName(
+            raise Unknown(
                 f"there is no pair and no link {name!r}; pairs are {', '.join(named)}, links {', '.join(moving.frames)}"
             )
         length = self._direction is not None or (self._is_pair and named[name].input_kind is MeasureKind.LENGTH)

@@ -20,6 +20,7 @@ from planar.foundation.errors import BadInput
 from planar.foundation.geometry import Vector
 from planar.foundation.jets import Jet
 from planar.foundation.root_finding import find_root
+from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import MeasureKind
 from planar.results.motion import Array, State
@@ -42,6 +43,8 @@ class RodPointMotion(NamedTuple):
     position: Array
     velocity: Array
     acceleration: Array
+
+    __repr__ = short_repr
 
 
 class PistonFormulas(Protocol):

@@ -8,6 +8,7 @@ import numpy as np
 
 from planar.analysis.interpolated_run import CLOSED_TOLERANCE, InterpolatedRun
 from planar.analysis.motion.output import Axis, Extreme, Output
+from planar.document.first_argument import takes_result
 from planar.results.motion import Motion
 
 
@@ -32,6 +33,7 @@ class TimeRatio(NamedTuple):
     back: Passage
 
 
+@takes_result("Motion")
 def time_ratio(motion: Motion, of: str, axis: Axis | None = None) -> TimeRatio | None:
     """The time ratio of a pair, a link or (with an axis, "x", "y" or a direction in rad) a point.
 

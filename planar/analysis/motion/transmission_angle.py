@@ -9,12 +9,14 @@ import numpy as np
 from planar.analysis.interpolated_run import InterpolatedRun
 from planar.analysis.motion.output import Extreme
 from planar.analysis.motion.zeros import SERIES_TOLERANCE, bracket_maxima, find_maximum
-from planar.foundation.errors import BadInput, NoAnswer
+from planar.document.first_argument import takes_result
+from planar.foundation.errors import BadInput, NoAnswer, Unknown
 from planar.foundation.jets import Jet
+from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import relative_motions
 from planar.model.pairs import MeasureKind, Pair
 from planar.model.wording import join_all_names
-from planar.results.motion import KinematicResult, Motion, State, UnknownName
+from planar.results.motion import KinematicResult, Motion, State
 from planar.solving.checks.singular_values import SINGULAR_TOLERANCE
 from planar.solving.full_constraints import COMPLEX_STEP, FullConstraints
 from planar.solving.prepared_mechanism import PreparedMechanism
@@ -44,7 +46,10 @@ class Transmission(NamedTuple):
     angle: float | Array
     least: Extreme | None = None
 
+    __repr__ = short_repr
 
+
+@takes_result("State", "Motion")
 def transmission(moving: State | Motion, output: str) -> Transmission:
     """The transmission angle of a link that turns about a fixed pin or slides on the frame: a link, or that pair.
 
@@ -282,7 +287,7 @@ def _find_output_pair(moving: KinematicResult, output: str) -> tuple[str, Pair]:
         candidates = [pair for pair in named.values() if output in pair.links]
     else:
         told = f"pairs are {', '.join(named)}, links {', '.join(moving.frames)}"
-        raise UnknownName(f"there is no pair and no link {output!r}; {told}")
+        raise Unknown(f"there is no pair and no link {output!r}; {told}")
     for pair in candidates:
         others = [link for link in pair.links if link != frame]
         pinned = pair.input_kind is MeasureKind.ANGLE and bool(pair.coincident_points())

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.foundation.short_repr import short_repr
 from planar.results.motion import State
 
 Array = np.ndarray
@@ -50,6 +51,8 @@ class PolygonVector(NamedTuple):
     "of which the magnitude is made"
     towards: str = ""
     "the sense where it is known: the point (A) or the letter (a) that it points to, else words"
+
+    __repr__ = short_repr
 
 
 class Factor(NamedTuple):
@@ -161,3 +164,5 @@ class Polygon:
     "in the order of drawing"
     points_underneath: Mapping[str, tuple[str, str]]
     "for each letter of a point that has no name in the mechanism its link, and the point of another that it lies at"
+
+    __repr__ = short_repr

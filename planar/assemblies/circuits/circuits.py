@@ -6,13 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import pi
-from typing import overload
+from typing import Any, overload
 
 import numpy as np
 
 from planar.assemblies.circuits.circuit_search import CircuitSearch, InputInterval, is_same_assembly
 from planar.assemblies.circuits.traced_circuit import Branch, TracedCircuit
 from planar.assemblies.modes import Mode
+from planar.document.first_argument import takes_mechanism
 from planar.foundation.notebook_display import Displayable
 from planar.model.mechanism import Drive, Mechanism, replace_inputs, running_input_index
 from planar.results.motion import Motion
@@ -28,6 +29,7 @@ TURN_TOLERANCE = 1e-12
 """rad: what rounding leaves of a turn."""
 
 
+@takes_mechanism
 def circuits(mechanism: Mechanism, pair: str | None = None) -> Circuits:
     """All circuits of a mechanism while one input runs, the others standing still.
 
@@ -54,6 +56,10 @@ class Circuit:
     pair: str
     curve: TracedCircuit = field(repr=False)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # compiled equations stay in their process: another one follows the circuits again
+        return _circuit_again, (self.mechanism, self.pair, self.number)
+
     @cached_property
     def motion(self) -> Motion:
         """The positions all round it, or over the branch from which it was followed where it does not close."""
@@ -71,6 +77,11 @@ class Circuit:
         ways = np.sign(np.diff(self.motion.inputs[self.pair].position))
         passed = np.cumsum(ways[1:] != ways[:-1])
         return np.concatenate([[0, 0], passed])[: len(self.motion)] % len(self.branches) + 1
+
+
+def _circuit_again(mechanism: Mechanism, pair: str, number: int) -> Circuit:
+    """The circuit of this number of a mechanism."""
+    return circuits(mechanism, pair)[number - 1]
 
 
 class Circuits(Displayable, Sequence[Circuit]):
@@ -103,6 +114,9 @@ class Circuits(Displayable, Sequence[Circuit]):
 
     def __len__(self) -> int:
         return len(self._found)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return circuits, (self.mechanism, self.pair)
 
     def __repr__(self) -> str:
         return f"<{len(self)} circuits of {self.mechanism.name!r} over {self.pair}, {self.complete.value}>"

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.foundation.errors import Outcome
+from planar.foundation.short_repr import short_repr
 
 Array = np.ndarray
 
@@ -54,6 +55,8 @@ class Swept(NamedTuple):
     reason: str
     general: bool
 
+    __repr__ = short_repr
+
     @property
     def whole(self) -> bool:
         """Whether it was solved at every step."""
@@ -73,6 +76,8 @@ class Each(Sequence[Swept]):
     sent: int
     said: tuple[str, ...]
     outcomes: tuple[Outcome, ...] = tuple(Outcome)
+
+    __repr__ = short_repr
 
     def __len__(self) -> int:
         """How many mechanisms there are."""

@@ -141,7 +141,9 @@ def open_store(store: str | Path | None, plan: SweepPlan) -> BlockStore:
     try:
         import_module(library)
     except ImportError:
-        raise BadInput("store", f"a {path.suffix} store needs {library}: pip install 'planar[{extra}]'") from None
+        raise BadInput(
+            "store", f"a {path.suffix} store needs {library}: pip install 'planar-linkages[{extra}]'"
+        ) from None
     return getattr(import_module(f"planar.batch.stores.{module}"), name)(plan, path)
 
 

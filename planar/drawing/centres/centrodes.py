@@ -15,12 +15,12 @@ from planar.drawing.paper.clipping import clip_homogeneous_curve, remove_repeate
 from planar.drawing.paper.picture import Circle, Fill, Label, Pen, Picture, Polyline, extent, paper_point
 from planar.drawing.paper.scales import Scale, round_scale
 from planar.drawing.scheme.scheme import plain_frames, scheme, space_scale
-from planar.foundation.errors import BadInput, NoAnswer
+from planar.foundation.errors import BadInput, NoAnswer, Unknown
 from planar.foundation.geometry import Vector
 from planar.model.link_graph import link_numbers, number_separator
 from planar.model.mechanism import Drive, Mechanism, replace_inputs
 from planar.model.wording import amount
-from planar.results.motion import Motion, State, UnknownName
+from planar.results.motion import Motion, State
 from planar.solving.cycle import cycle
 from planar.solving.position import solve
 
@@ -74,7 +74,7 @@ def centrodes_picture(
     run = _centrode_run(motion)
     try:
         found = centrodes(run.motion, link, other)
-    except UnknownName as problem:
+    except Unknown as problem:
         raise BadInput("links", str(problem)) from None
     state, pole, moved = _drawn_position(run, found)
     place, inside = _mechanism_extent(state), False

@@ -10,11 +10,11 @@ import numpy as np
 
 from planar.analysis.motion.extremes import Stroke, stroke
 from planar.drawing.scheme.scene import plain_frames
-from planar.foundation.errors import BadInput, Outcome, PlanarError
+from planar.foundation.errors import BadInput, Outcome, PlanarError, Unknown
 from planar.foundation.geometry import Frame
 from planar.model.mechanism import Drive, Input, Mechanism, replace_inputs, running_input_index
 from planar.model.pairs import Pair
-from planar.results.motion import Motion, UnknownName
+from planar.results.motion import Motion
 from planar.results.records import PointMotion
 from planar.solving.cycle import cycle
 
@@ -110,7 +110,7 @@ class DrawnRun(NamedTuple):
         """A point in the order of time. Raises BadInput for a name that is not there."""
         try:
             return PointMotion(*(part[self.time_order] for part in self.motion.point(name)))
-        except UnknownName as problem:
+        except Unknown as problem:
             raise BadInput(name, str(problem)) from None
 
     def path(self, name: str) -> Array:

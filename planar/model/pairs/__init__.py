@@ -5,6 +5,7 @@ from functools import cache
 from importlib import import_module
 from inspect import isabstract
 from pkgutil import iter_modules
+from typing import Any
 
 from planar.model.pairs.base import EntryReader, ExpandedEntry, MeasureKind, Pair, PairSample, QuantityWriter
 
@@ -15,6 +16,7 @@ __all__ = [
     "Pair",
     "PairSample",
     "QuantityWriter",
+    "joining_entry",
     "joining_entry_text",
     "pair_types",
 ]
@@ -28,7 +30,11 @@ def pair_types() -> dict[str, type[Pair]]:
     return {kind.keyword: kind for kind in types if issubclass(kind, Pair) and not isabstract(kind)}
 
 
+def joining_entry(point: str) -> dict[str, Any]:
+    """The entry of a file that joins all links which carry a point of this name."""
+    return next(entry for kind in pair_types().values() if (entry := kind.joining_entry(point)))
+
+
 def joining_entry_text(point: str) -> str:
-    """The entry of a file, as JSON, that joins all links which carry a point of this name."""
-    entry = next(filter(None, (kind.joining_entry(point) for kind in pair_types().values())))
-    return json.dumps(entry, ensure_ascii=False)
+    """The same as JSON."""
+    return json.dumps(joining_entry(point), ensure_ascii=False)

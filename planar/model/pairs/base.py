@@ -248,7 +248,10 @@ def list_schema(item: str, least: int, most: int | None = None) -> Schema:
 
 
 class QuantityWriter(Protocol):
-    """Writes an SI number in the units of a file."""
+    """Writes an SI number in the units of a file: a quantity of this kind, a plain "number", or a whole one, a "count".
+
+    Every number of an entry goes through it, so that the number has a name (see `planar.document.dimensions`).
+    """
 
     def __call__(self, value: float, kind: str) -> float | str: ...
 

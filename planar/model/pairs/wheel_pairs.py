@@ -206,11 +206,11 @@ class WheelPair(Pair):
         (pair,) = group
         entry: dict[str, Any] = {cls.keyword: pair.name, "links": list(pair.links), "carrier": pair.carrier}
         if pair.size_kind == "ratio":
-            entry["ratio"] = pair.sizes[0]
+            entry["ratio"] = quantity(pair.sizes[0], "number")
         elif pair.size_kind == "radii":
             entry["radii"] = [quantity(radius, "length") for radius in pair.sizes]
         else:
-            entry["teeth"] = [int(teeth) for teeth in pair.sizes]
+            entry["teeth"] = [quantity(teeth, "count") for teeth in pair.sizes]
         if pair.mesh_reference != (0.0, 0.0):
             both = zip(pair.links, pair.mesh_reference, strict=True)
             entry["mesh"] = {link: quantity(angle, "angle") for link, angle in both}

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from planar.document.first_argument import takes_result
 from planar.foundation.errors import BadInput
 from planar.foundation.units import SI_UNITS
 from planar.reports.columns import ReportedSeries, reported_series, run_header
@@ -20,6 +21,7 @@ Variable = tuple[tuple[str, ...], Array, dict[str, str]]
 """Dimensions, values and attributes, as xarray takes them."""
 
 
+@takes_result("Motion")
 def dataset(motion: Motion) -> xr.Dataset:
     """The motion as an xarray Dataset in SI, each variable with `units` and `long_name`.
 
@@ -37,7 +39,7 @@ def dataset(motion: Motion) -> xr.Dataset:
     try:
         import xarray as xr
     except ImportError:
-        raise BadInput("xarray", "a Dataset needs xarray: pip install 'planar[xarray]'") from None
+        raise BadInput("xarray", "a Dataset needs xarray: pip install 'planar-linkages[xarray]'") from None
     groups: dict[str, list[ReportedSeries]] = {"inputs": [], "points": [], "links": [], "pairs": []}
     for thing in reported_series(motion):
         groups[thing.group].append(thing)

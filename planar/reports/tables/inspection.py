@@ -27,7 +27,23 @@ def inspection_tables(found: Inspection) -> RenderableType:
         *((" ", f"{len(pairs)} {kind}: {', '.join(pairs)}") for kind, pairs in found.pairs),
         *_mobility_facts(found),
     ]
-    return Group(Text(found.name, style="bold"), Text(), paragraphs(said), Text(), links, *_actions_tables(found))
+    return Group(
+        Text(found.name, style="bold"),
+        Text(),
+        paragraphs(said),
+        Text(),
+        links,
+        *_actions_tables(found),
+        _numbers_table(found),
+    )
+
+
+def _numbers_table(found: Inspection) -> RenderableType:
+    """All numbers of the file by the names that `--set` takes."""
+    table = plain_table("Numbers (NAME=VALUE after --set changes one)", "name", "value", left=(0,), keys=1)
+    for name, number in found.dimensions.items():
+        table.add_row(name, number.shown)
+    return table
 
 
 def _actions_tables(found: Inspection) -> Iterator[RenderableType]:

@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.document.dimensions import change_dimension, link_lengths
 from planar.equations.constraint_equations import Block
 from planar.equations.mechanism_numbers import pair_numbers, shapes_of_links
 from planar.foundation.units import parse_unit
-from planar.model.dimensions import change_dimension, dimensions
 from planar.model.link_shapes import PointPlacementError
 from planar.model.mechanism import Drive, Mechanism, replace_inputs
 from planar.model.wording import amount
@@ -156,7 +156,7 @@ def mending_dimensions(
                 0.0 if each.name == f"{each.link}.length" else -np.inf,
                 lambda value, each=each: change_dimension(mechanism, each, value),
             )
-            for each in islice(dimensions(mechanism, links), MAX_DIMENSIONS)
+            for each in islice(link_lengths(mechanism, links), MAX_DIMENSIONS)
         ],
         thorough,
         budget or BlockBudget(np.inf),

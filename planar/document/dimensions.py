@@ -1,0 +1,343 @@
+"""The numbers of a mechanism's file: the name of each, its value and kind, and the mechanism with some changed.
+
+A number's name is its place in the file, by the names of links, pairs and inputs: `BC.length`, `b.P.angle`, `AD.D.x`,
+`BC.F.B` (the distance of F from B), `stroke.line.angle`, `wheels.radii.0`, `A.velocity`, `A.law.0.by`,
+`loads.0.force.x`, `springs.0.stiffness`, `masses.rod.mass`, `gravity.y`, `sketch.B.x`. What a file leaves out has its
+default. Where two numbers would bear one name, as a point `line` of a link A and the line of a pair A, both have the
+word of their list before it: `links.A.line.x` and `pairs.A.line.x`.
+
+Names, kinds and places are read off what the writer writes of the mechanism's own data, so that a new pair, or motion
+of a law, has its numbers named by being written.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import fields, is_dataclass, replace
+from math import isfinite
+from numbers import Real
+from typing import Any, NamedTuple
+
+from planar.document.cursor import Cursor, FileContext, suggest_spelling
+from planar.document.first_argument import takes_mechanism
+from planar.document.loads import write_load, write_mass, write_spring
+from planar.document.reader import read_mechanism
+from planar.document.writer import write_input, write_link, write_mechanism
+from planar.foundation.errors import BadInput, join_names
+from planar.model.input_laws import SEGMENT_TYPES
+from planar.model.mechanism import (
+    LARGEST_INPUT_POSITION,
+    FileUnits,
+    Mechanism,
+    find_law_problem,
+    pair_entries,
+    relative_motions,
+)
+from planar.model.pairs import Pair
+
+Address = tuple[str | int, ...]
+"""Where a number is in nested data: fields by name, items by number."""
+NAMED_LISTS = ("links", "pairs", "inputs")
+"""Lists of a file whose entries have names of their own."""
+OTHER_LISTS = ("loads", "springs", "masses", "gravity", "sketch")
+SPELLINGS = {("links", 2, "points"): "", ("links", 4, "distances"): "", ("pairs", 3, "through"): ""} | {
+    ("springs", 2, key): "free" for key in ("free_length", "free_angle")
+}
+"""Keys that a name spells otherwise than the file, by their list and depth there."""
+LAW_LISTS = frozenset(name for kind in SEGMENT_TYPES.values() for name, key in kind.keys.items() if key.is_list)
+VARIATION_LISTS = frozenset({"at", "factors"})
+"""Keys whose numbers are counted; of other keys two numbers are x and y."""
+
+
+class Dimension(NamedTuple):
+    """A number of a mechanism's file: its name, its value (SI), and the kind of quantity that it is.
+
+    `link` is the link that it describes, empty where it describes none; `path` its place in the file that is written of
+    the mechanism, `address` its place in the mechanism itself.
+    """
+
+    name: str
+    value: float
+    kind: str
+    link: str
+    path: Address
+    address: Address
+
+
+def file_dimensions(mechanism: Mechanism) -> dict[str, Dimension]:
+    """Every number of a mechanism's file by name, in the order of the file."""
+    found = list(_every_dimension(mechanism))
+    count = Counter(each.name for each in found)
+    named = (
+        each._replace(name=f"{each.path[0]}.{each.name}")
+        if count[each.name] > 1 and each.path[0] in NAMED_LISTS
+        else each
+        for each in found
+    )
+    return {each.name: each for each in named}
+
+
+def link_lengths(mechanism: Mechanism, links: Iterable[str]) -> Iterator[Dimension]:
+    """The lengths (m) by which these links are described, in the order of the file.
+
+    Of a point: x and y; the distance along two points; the distances from two points, under their names.
+    """
+    wanted = frozenset(links)
+    taken = {pair.entry_name() for pair in mechanism.pairs}.union(OTHER_LISTS)
+    if wanted.isdisjoint(taken):  # none of their names can be another number's
+        found = (
+            each
+            for index, link in enumerate(mechanism.links)
+            if link.name in wanted
+            for each in _link_dimensions(mechanism, index)
+        )
+    else:
+        found = (
+            each for each in file_dimensions(mechanism).values() if each.path[0] == "links" and each.link in wanted
+        )
+    return (each for each in found if each.kind == "length")
+
+
+def input_numbers(mechanism: Mechanism) -> Iterator[Dimension]:
+    """The position, velocity and acceleration of every input (rad or m, and per second)."""
+    return (each for each in _input_dimensions(mechanism) if len(each.address) == 3)
+
+
+@takes_mechanism
+def dimensions(mechanism: Mechanism) -> dict[str, float]:
+    """Every number of a mechanism's file by name (SI: m, rad, s, N, kg), those left out with their defaults.
+
+    >>> import planar
+    >>> planar.dimensions(planar.load("four-bar"))["BC.length"]
+    0.066
+    """
+    return {name: each.value for name, each in file_dimensions(mechanism).items()}
+
+
+def change_dimension(mechanism: Mechanism, dimension: Dimension, value: Any) -> Mechanism:
+    """The mechanism with this number at another value (SI), or at an array or a symbol, unchecked."""
+    where, index, *rest = dimension.address
+    if where != "pairs" or not isinstance(index, int):
+        return _with_value(mechanism, dimension.address, value)
+    entry = mechanism.pairs[index].entry_name()  # a pin of several links is several pairs of one entry
+    changed = (
+        _with_value(pair, tuple(rest), value) if pair.entry_name() == entry else pair for pair in mechanism.pairs
+    )
+    return replace(mechanism, pairs=tuple(changed))
+
+
+@takes_mechanism
+def with_values(mechanism: Mechanism, values: Mapping[str, Any], units: FileUnits | None = None) -> Mechanism:
+    """The mechanism with some numbers of its file changed, checked as a file is.
+
+    `values` by name as in `dimensions`: a number (SI, or in `units`), or a text with a unit as "400 mm". What a book
+    prints of the mechanism is left out where one changes. Raises BadInput with the number's name.
+    """
+    if not isinstance(values, Mapping):
+        raise BadInput("values", f"give the numbers by name, as {{'BC.length': 0.4}}, not {values!r:.60}")
+    known = file_dimensions(mechanism)
+    chosen = {name: find_dimension(known, name) for name in values}
+    changed = mechanism
+    for name, each in chosen.items():
+        changed = change_dimension(changed, each, _read_value(name, values[name], each.kind, units))
+    for index, given in enumerate(changed.inputs):
+        if given.law and any(
+            each.address[:2] == ("inputs", index) and len(each.address) == 3 for each in chosen.values()
+        ):
+            moved = given._replace(law=given.law.start_at(given.position, given.velocity))
+            changed = _with_value(changed, ("inputs", index), moved)
+    _check_as_file(changed, chosen)
+    same = all(_value_at(changed, each.address) == each.value for each in chosen.values())
+    return changed if same else replace(changed, published=())
+
+
+def find_dimension(known: Mapping[str, Dimension], name: str) -> Dimension:
+    """The number of this name. Raises BadInput, with both readings where two numbers could be meant."""
+    if name in known:
+        return known[name]
+    meant = [f"{section}.{name}" for section in NAMED_LISTS if f"{section}.{name}" in known]
+    if meant:
+        raise BadInput(
+            str(name), f"two numbers of the mechanism could be meant; write {join_names(meant, last_joiner=' or ')}"
+        )
+    near = suggest_spelling(str(name), known, cutoff=0.5) or f"; there are {', '.join(list(known)[:12])}"
+    raise BadInput(str(name), f"the mechanism has no number of that name{near}")
+
+
+def _read_value(name: str, value: Any, kind: str, units: FileUnits | None) -> float:
+    if isinstance(value, Real) and not isinstance(value, bool):
+        value = float(value)
+        if not isfinite(value):
+            raise BadInput(name, f"a finite number is wanted, not {value!r}")
+    cursor = Cursor(value, name, FileContext(units or FileUnits()))
+    if kind == "count" and not float(cursor.as_number()).is_integer():
+        raise cursor.error_at(None, f"a whole number is wanted here, not {value!r}")
+    if kind in ("number", "count"):
+        return cursor.as_number()
+    return cursor.as_quantity(kind)
+
+
+def _check_as_file(changed: Mechanism, chosen: Mapping[str, Dimension]) -> None:
+    """Refuse what a file would be refused for; the place is the number whose place in the file that is."""
+    wrong = find_law_problem(changed)
+    try:
+        if wrong:
+            raise BadInput(*wrong)
+        for name, each in chosen.items():
+            far = each.path[0] == "inputs" and each.path[-1] == "position"
+            value = _value_at(changed, each.address)
+            if far and abs(value) > LARGEST_INPUT_POSITION:
+                raise BadInput(name, f"an input moves to {LARGEST_INPUT_POSITION:g} rad or m at most")
+        read_mechanism(write_mechanism(changed))
+    except BadInput as problem:
+        at = [name for name, each in chosen.items() if problem.place == _json_place(each.path)]
+        raise BadInput(at[0] if at else ", ".join(chosen), problem.sentence) from None
+
+
+def _json_place(path: Address) -> str:
+    """A place in a file as the reader says it."""
+    cursor = Cursor(None)
+    for key in path:
+        place = f"{cursor.path}[{key}]" if isinstance(key, int) else cursor.place_of(key)
+        cursor = Cursor(None, place)
+    return cursor.path
+
+
+def _every_dimension(mechanism: Mechanism) -> Iterator[Dimension]:
+    for index in range(len(mechanism.links)):
+        yield from _link_dimensions(mechanism, index)
+    yield from _pair_dimensions(mechanism)
+    yield from _input_dimensions(mechanism)
+    yield from _load_dimensions(mechanism)
+    for index, (point, *_) in enumerate(mechanism.sketch):
+        _, x, y = _tagged(mechanism.sketch[index], ("sketch", index))
+        yield from _written_numbers(["sketch", point], [_mark(x, "length"), _mark(y, "length")])
+
+
+def _link_dimensions(mechanism: Mechanism, index: int) -> Iterator[Dimension]:
+    link = mechanism.links[index]
+    written = write_link(_tagged(link, ("links", index)), _mark)
+    return _written_numbers(["links", link.name], written, link.name, link=link.name)
+
+
+def _pair_dimensions(mechanism: Mechanism) -> Iterator[Dimension]:
+    position = {id(pair): index for index, pair in enumerate(mechanism.pairs)}
+    for number, group in enumerate(pair_entries(mechanism)):
+        tagged = [_tagged(pair, ("pairs", position[id(pair)])) for pair in group]
+        kind: type[Pair] = type(group[0])
+        lists = frozenset(key for key, schema in kind.entry_schemas.items() if schema.get("type") == "array")
+        yield from _written_numbers(["pairs", number], kind.write(tagged, _mark), group[0].entry_name(), lists=lists)
+
+
+def _input_dimensions(mechanism: Mechanism) -> Iterator[Dimension]:
+    motions = relative_motions(mechanism)
+    for index, given in enumerate(mechanism.inputs):
+        written = write_input(_tagged(given, ("inputs", index)), motions, _mark)
+        yield from _written_numbers(["inputs", index], written, given.pair, lists=LAW_LISTS)
+
+
+def _load_dimensions(mechanism: Mechanism) -> Iterator[Dimension]:
+    """Of loads and springs by their number, of masses by their link and, of several on it, their number there."""
+    motions = relative_motions(mechanism)
+    for index, load in enumerate(mechanism.loads):
+        written = write_load(_tagged(load, ("loads", index)), motions, _mark)
+        yield from _written_numbers(["loads", index], written, lists=VARIATION_LISTS)
+    for index, spring in enumerate(mechanism.springs):
+        yield from _written_numbers(["springs", index], write_spring(_tagged(spring, ("springs", index)), _mark))
+    count, seen = Counter(mass.link for mass in mechanism.masses), Counter[str]()
+    for index, mass in enumerate(mechanism.masses):
+        own = f"masses.{mass.link}" if count[mass.link] == 1 else f"masses.{mass.link}.{seen[mass.link]}"
+        seen[mass.link] += 1
+        written = write_mass(_tagged(mass, ("masses", index)), _mark)
+        yield from _written_numbers(["masses", index], written, own, link=mass.link)
+    gravity = _tagged(mechanism.gravity, ("gravity",))
+    yield from _written_numbers(["gravity"], [_mark(each, "acceleration") for each in gravity])
+
+
+class _Tagged(float):
+    """A number that knows where it is from, and is like no other, so that no writer leaves it out as a default."""
+
+    address: Address
+
+    def __eq__(self, other: object) -> bool:
+        return False
+
+    def __ne__(self, other: object) -> bool:
+        return True
+
+    def __bool__(self) -> bool:
+        return True
+
+    __hash__ = float.__hash__
+
+
+class _Mark(NamedTuple):
+    number: _Tagged
+    kind: str
+
+
+def _mark(value: float, kind: str) -> Any:
+    """What stands for a number in what is written; nothing for one that is not of the mechanism."""
+    return _Mark(value, kind) if isinstance(value, _Tagged) else None
+
+
+def _tagged(data: Any, address: Address) -> Any:
+    """The same data, its numbers tagged with their places."""
+    if data is None or isinstance(data, str | bool):
+        return data
+    if isinstance(data, tuple):
+        names: Iterable[str | int] = getattr(data, "_fields", range(len(data)))
+        items = [_tagged(each, (*address, name)) for name, each in zip(names, data, strict=True)]
+        make: Callable[[Iterable[Any]], Any] = getattr(type(data), "_make", tuple)
+        return make(items)
+    if isinstance(data, float | Real):
+        found = _Tagged(data)
+        found.address = address
+        return found
+    if is_dataclass(data) and not isinstance(data, type):
+        return replace(
+            data, **{f.name: _tagged(getattr(data, f.name), (*address, f.name)) for f in fields(data) if f.init}
+        )
+    return data
+
+
+def _written_numbers(
+    start: list[str | int], written: Any, own: str | None = None, link: str = "", lists: frozenset[str] = frozenset()
+) -> Iterator[Dimension]:
+    """The marked numbers of what is written at a place of the file.
+
+    `own` is how their names begin, else as the place; `lists` are keys whose numbers are counted, else x and y.
+    """
+    prefix = [own] if own is not None else [str(each) for each in start]
+
+    def walk(value: Any, path: list[str | int], spelled: list[str]) -> Iterator[Dimension]:
+        if isinstance(value, _Mark):
+            yield Dimension(".".join(spelled), float(value.number), value.kind, link, tuple(path), value.number.address)
+        elif isinstance(value, dict):
+            for key, each in value.items():
+                said = SPELLINGS.get((path[0], len(path), key), key)
+                yield from walk(each, [*path, key], [*spelled, *([said] if said else [])])
+        elif isinstance(value, list):
+            counted = path[-1] in lists or len(value) != 2 or not isinstance(value[0], _Mark)
+            for index, each in enumerate(value):
+                yield from walk(each, [*path, index], [*spelled, str(index) if counted else "xy"[index]])
+
+    return walk(written, start, prefix)
+
+
+def _value_at(data: Any, address: Address) -> Any:
+    for step in address:
+        data = getattr(data, step) if isinstance(step, str) else data[step]
+    return data
+
+
+def _with_value(data: Any, address: Address, value: Any) -> Any:
+    """Nested data with one part replaced."""
+    if not address:
+        return value
+    step, rest = address[0], address[1:]
+    if isinstance(step, int):
+        return (*data[:step], _with_value(data[step], rest, value), *data[step + 1 :])
+    part = _with_value(getattr(data, step), rest, value)
+    return data._replace(**{step: part}) if isinstance(data, tuple) else replace(data, **{step: part})

@@ -1,0 +1,55 @@
+"""The first argument of public functions: a mechanism, or what says where one is, or a result; nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+from os import PathLike
+from typing import Any, Concatenate, ParamSpec, TypeVar
+
+from planar.document.files import as_mechanism
+from planar.foundation.errors import BadInput, join_names
+from planar.model.mechanism import Mechanism
+
+MechanismSource = Mechanism | str | PathLike[str]
+"""A mechanism, a file, or the name of a model that comes along."""
+
+P = ParamSpec("P")
+R = TypeVar("R")
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def takes_mechanism(function: Callable[Concatenate[Mechanism, P], R]) -> Callable[Concatenate[MechanismSource, P], R]:
+    """The function with a path or a model's name in place of its mechanism, too; anything else is BadInput."""
+    return _with_first(function, as_mechanism)
+
+
+def takes_result(*classes: str) -> Callable[[F], F]:
+    """The function, which takes results of these classes, by name; with "Mechanism" among them a path or a name, too.
+
+    Anything else is BadInput.
+    """
+
+    def resolve(source: Any) -> Any:
+        if any(each.__name__ in classes for each in type(source).__mro__):
+            return source
+        if "Mechanism" in classes and isinstance(source, str | PathLike):
+            return as_mechanism(source)
+        wanted = join_names([f"a {name}" for name in classes], last_joiner=" or ")
+        raise BadInput("argument", f"{wanted} is wanted, not {type(source).__name__} {source!r:.60}")
+
+    return lambda function: _with_first(function, resolve)
+
+
+def _with_first(function: Any, resolve: Callable[[Any], Any]) -> Any:
+    first = function.__code__.co_varnames[0]
+
+    @wraps(function)
+    def call(*args: Any, **named: Any) -> Any:
+        if args:
+            return function(resolve(args[0]), *args[1:], **named)
+        if first in named:
+            named[first] = resolve(named[first])
+        return function(**named)
+
+    return call

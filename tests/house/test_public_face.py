@@ -1,0 +1,226 @@
+"""What callers meet: names that are exported, arguments that are taken, results that print, pickle and copy."""
+
+import copy
+import doctest
+import inspect
+import io
+import json
+import pickle
+import subprocess
+import sys
+import tomllib
+from concurrent.futures import ProcessPoolExecutor
+from importlib import import_module
+from multiprocessing import get_context
+from pathlib import Path
+
+import click
+import numpy as np
+import pytest
+
+import planar
+from planar.cli import main
+from planar.document.writer import write_mechanism
+from planar.model.input_laws import SEGMENT_TYPES
+from planar.model.pairs import pair_types
+
+ROOT = Path(planar.__file__).parent
+FUNCTIONS = {
+    name: each
+    for name in planar.__all__
+    if not inspect.isclass(each := getattr(planar, name)) and not inspect.ismodule(each)
+}
+DRAWINGS = {name: getattr(planar.plot, name) for name in planar.plot.__all__}
+CLASSES = {name: each for name in planar.__all__ if inspect.isclass(each := getattr(planar, name))}
+FREE = {"schema", "build", "pinned", "centre_of", "from_dict", "load", "loads", "sweep_each", "save"}
+"""Functions whose first argument is neither a mechanism nor a result."""
+COMMANDS = {
+    name: command
+    for name, command in main.commands.items()
+    if any(isinstance(each, click.Argument) and each.name.startswith("model") for each in command.params)
+}
+
+
+def results():
+    """Results of all kinds, by what they are."""
+    slider, bars = planar.load("slider-crank"), planar.load("four-bar")
+    state, motion, turn = planar.solve(slider), planar.cycle(slider, steps=24), planar.cycle(bars, steps=36)
+    engine = planar.load("two-stroke-engine")
+    run, listed, circuits = planar.cycle(engine, steps=60), planar.modes(bars), planar.circuits(bars)
+    apart = planar.load("four-bar").with_values({"BC.length": 0.9, "BC.F.B": 0.5, "BC.F.C": 0.5})
+    swept = planar.sweep_each([bars], steps=6)
+    prepared = planar.prepared(bars, steps=6)
+    yield from (slider, state, motion, planar.solve(planar.load("open-arm")), listed, listed[0], circuits, circuits[0])
+    yield from (state.point("B"), state.link("rod"), state.relative("B", "A"), motion.point("B"), motion.link("rod"))
+    yield from (motion.limits[0], circuits[0].branches[0], planar.inspect(slider), planar.mobility(slider))
+    yield from (centres := planar.centres(state), next(iter(centres)) if hasattr(centres, "__iter__") else centres)
+    yield from (
+        planar.centrodes(motion, "rod"),
+        planar.curvature(state, "rod"),
+        planar.velocity_by_centres(centres, "B"),
+    )
+    yield from (planar.centre_of((0, 0), (1, 0), (0, 1), (-1, 0)), planar.stroke(motion, "stroke"))
+    yield from (planar.swing(motion, "rod"), planar.extremes(turn, "E"), planar.greatest(motion, "stroke"))
+    yield from (
+        planar.time_ratio(motion, "stroke"),
+        planar.transmission(turn, "DC"),
+        planar.transmission(state, "stroke"),
+    )
+    yield from (planar.advantage(state, "stroke"), planar.advantage_over(motion, "stroke"), planar.area(motion, "E"))
+    yield from (planar.dwells(motion, "stroke", within=0.1)[:1], planar.answers(motion, "stroke"))
+    yield from (planar.harmonics(slider, "stroke"), forces := planar.forces(planar.solve(engine)), planar.forces(run))
+    yield from (forces.reactions["stroke"], planar.flywheel(planar.forces(run)), planar.conflict(apart))
+    yield from (
+        planar.simulate("physical-pendulum", 0.05, steps=4),
+        planar.sweep(bars, {"BC.length": [0.066]}, steps=6),
+    )
+    yield from (swept, swept[0], prepared, prepared())
+    yield from (planar.BadInput("here", "wrong"), planar.Unknown("no such point"), planar.Outcome.SOLVED)
+    yield planar.NoAnswer(planar.Outcome.DEAD_POINT, "it stops", links=["a"])
+
+
+@pytest.fixture(scope="module")
+def made():
+    return list(results())
+
+
+def test_what_is_exported_is_there_once_and_typed():
+    assert planar.__all__ == sorted(set(planar.__all__))
+    known = {kind.__name__ for kind in (*pair_types().values(), *SEGMENT_TYPES.values())}
+    assert known | {"InputLaw", "LinkLine", "Unknown", "dimensions", "build"} <= set(planar.__all__)
+    assert not {path.stem for path in ROOT.glob("*.py")} & set(FUNCTIONS)
+    assert issubclass(planar.Unknown, planar.PlanarError) and issubclass(planar.Unknown, KeyError)
+
+
+def test_results_print_in_one_line(made):
+    for result in made:
+        assert "\n" not in repr(result)
+        assert "object at 0x" not in repr(result)
+
+
+@pytest.mark.parametrize("again", [lambda each: pickle.loads(pickle.dumps(each)), copy.copy, copy.deepcopy])
+def test_results_pickle_and_copy(made, again):
+    for result in made:
+        other = again(result)
+        assert type(other) is type(result)
+        assert repr(other) == repr(result)
+
+
+def test_every_public_class_of_results_is_among_them(made):
+    flat = [one for each in made for one in (each if type(each) is tuple else (each,))]
+    shown = {kind for each in flat for kind in type(each).__mro__}
+    rooms = ("planar.model", "planar.foundation")  # of what mechanisms are made of
+    assert not {name for name, each in CLASSES.items() if each not in shown and not each.__module__.startswith(rooms)}
+
+
+def test_a_pickled_motion_keeps_its_limits():
+    motion = planar.cycle("slider-crank", steps=12)
+    again = pickle.loads(pickle.dumps(motion))
+    assert again.limits == motion.limits
+    assert np.array_equal(again.point("B").position, motion.point("B").position)
+    assert planar.stroke(again, "stroke") == planar.stroke(motion, "stroke")
+
+
+def test_a_pool_runs_public_functions():
+    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
+        (motion,) = pool.map(planar.cycle, ["four-bar"])
+        assert repr(motion) == repr(planar.cycle("four-bar"))
+        with pytest.raises(planar.BadInput, match="no model of that name"):
+            list(pool.map(planar.cycle, ["no-such-model"]))
+
+
+@pytest.mark.parametrize("name", sorted({*FUNCTIONS, *(f"plot.{each}" for each in DRAWINGS)} - FREE - {"plot.save"}))
+@pytest.mark.parametrize("wrong", [None, 3, {"links": {}}, ["four-bar"]], ids=repr)
+def test_the_wrong_thing_is_bad_input(name, wrong):
+    function = DRAWINGS[name.removeprefix("plot.")] if name.startswith("plot.") else FUNCTIONS[name]
+    more = [
+        "stroke"
+        for each in list(inspect.signature(function).parameters.values())[1:]
+        if each.default is each.empty and each.kind is not each.KEYWORD_ONLY
+    ]
+    with pytest.raises(planar.BadInput, match="is wanted, not"):
+        function(wrong, *more)
+
+
+def of_mechanism():
+    """Functions of a mechanism alone."""
+    for name, function in FUNCTIONS.items():
+        first, *more = inspect.signature(function).parameters.values() or [None]
+        alone = first and first.annotation.startswith("Mechanism") and name != "view"
+        if alone and all(each.default is not each.empty for each in more):
+            yield name
+
+
+@pytest.mark.parametrize("name", sorted(of_mechanism()))
+def test_a_path_or_a_models_name_is_a_mechanism(name, tmp_path):
+    path = tmp_path / "m.json"
+    path.write_text(json.dumps(write_mechanism(planar.load("four-bar"))))
+    function = FUNCTIONS[name]
+    first = next(iter(inspect.signature(function).parameters))
+    told = [repr(function(each)) for each in (planar.load(path), path, str(path))]
+    assert told[0] == told[1] == told[2] == repr(function(**{first: path}))
+    function("four-bar")
+
+
+def test_names_that_are_not_there_are_unknown():
+    state, motion = planar.solve("four-bar"), planar.cycle("four-bar", steps=4)
+    for ask in (state.point, state.link, state.pair, motion.point, motion.link, motion.pair):
+        with pytest.raises(planar.Unknown):
+            ask("nothing")
+        with pytest.raises(KeyError):
+            ask("nothing")
+
+
+@pytest.mark.parametrize("name", sorted(COMMANDS))
+def test_every_command_of_a_model_takes_set_and_what_is_piped_in(name, tmp_path, monkeypatch, capfd):
+    more = {
+        "plot": ["scheme", "-o", "o.svg"],
+        "view": ["-o", "o.html"],
+        "gallery": ["-o", "pages"],
+        "animate": ["-o", "o.gif"],
+        "simulate": ["--duration", "0.01s", "--steps", "2"],
+        "bench": ["--seconds", "0"],
+        "cycle": ["--steps", "4"],
+    }
+    model = {"forces": "two-stroke-engine", "simulate": "physical-pendulum", "animate": "slider-crank"}
+    monkeypatch.chdir(tmp_path)
+    piped = json.dumps(write_mechanism(planar.load(model.get(name, "slider-crank")))).encode()
+    changed = {"simulate": "O.velocity=2rad/s"}.get(name, "crank.length=25mm")
+    for value, status in ((changed, 0), ("nothing=3", 2)):
+        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(piped)))
+        with pytest.raises(SystemExit) as ended:
+            main([name, "-", *more.get(name, []), "--set", value])
+        assert ended.value.code in (status, None if status == 0 else status)
+    assert "nothing: the mechanism has no number of that name" in capfd.readouterr().err
+
+
+def test_inspect_lists_every_number():
+    told = json.loads(
+        subprocess.run(
+            [sys.executable, "-m", "planar", "inspect", "four-bar", "--json", "--set", "BC.length=70mm"],
+            capture_output=True,
+            check=True,
+        ).stdout
+    )
+    known = planar.dimensions("four-bar")
+    assert list(told["dimensions"]) == list(known)
+    assert told["dimensions"]["BC.length"] == {"value": 0.07, "unit": "m", "shown": "70 mm"}
+
+
+def test_hints_name_the_distribution():
+    project = tomllib.loads((ROOT.parent / "pyproject.toml").read_text())["project"]
+    assert project["name"] == "planar-linkages"
+    assert list(project["scripts"]) == ["planar"]
+    for path in (*ROOT.rglob("*.py"), ROOT.parent / "README.md", ROOT.parent / "pyproject.toml"):
+        text = path.read_text()
+        assert "'planar[" not in text and '"planar[' not in text, path
+
+
+EXAMPLES = sorted(path for path in ROOT.rglob("*.py") if ">>> " in path.read_text())
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_examples_in_docstrings(path):
+    module = import_module(".".join(path.relative_to(ROOT.parent).with_suffix("").parts))
+    found = doctest.testmod(module)
+    assert found.attempted and not found.failed
