@@ -59,7 +59,7 @@ class RelativeMotion(NamedTuple):
 
 
 def relative_motion(frames: Mapping[str, Frame], link: str, other: str) -> RelativeMotion:
-    """The motion of a link against another, from frames that are jets. Raises Unknown."""
+    """The motion of a link against another, from frames that are jets. Raises UnknownName."""
     for name in (link, other):
         if name not in frames:
             raise UnknownName(f"there is no link {name!r}; links are {', '.join(frames)}")

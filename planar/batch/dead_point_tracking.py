@@ -14,9 +14,9 @@ from planar.batch.march.numpy_backend import DesignsAtStep, PointWriter, iterate
 Array = np.ndarray
 
 FIRST_STEP, LONGEST_STEP, SHORTEST_STEP = 0.05, 0.25, 1e-6
-"""Steps of arc length (rad, sizes), as in `solving.walk`."""
+"""Steps of arc length (rad, sizes), as in `CurveTracker`."""
 MAX_TANGENT_TURN, SINGULAR_DISTANCE_RATIO = 0.4, 1.5
-"""How far a tangent may turn in a step, and how far singular slopes must be: as in `solving.walk`."""
+"""How far a tangent may turn in a step, and how far singular slopes must be: as in `CurveTracker`."""
 CROSSING_DISTANCE = 0.01
 """So near to where branches cross a design is left to be followed by itself."""
 DIFFERENCE_STEP = 1e-6
@@ -72,7 +72,7 @@ class _CurveArcs(NamedTuple):
 
 
 class _DesignCurves:
-    """The curves of some designs; `Curve` in `solving` is that of one."""
+    """The curves of some designs; `SolutionCurve` is that of one."""
 
     def __init__(self, march: DesignBatch, design: Array, direction: Array):
         self.functions = DesignFunctions(march.program, march.p[:, design])
@@ -135,7 +135,7 @@ def follow_to_dead_points(
 ) -> FollowedDesigns:
     """Go on from the last of the `good` steps of each design, which are one at least; `reach` tells where that was.
 
-    Each step is under the conditions of `solving.walk`; a design that does not keep them is not settled. `index` is the
+    Each step is under the conditions of `CurveTracker`; a design that does not keep them is not settled. `index` is the
     input that runs.
     """
     with np.errstate(all="ignore"):  # what leads astray ends as what is no number
@@ -158,7 +158,7 @@ class _DeadPointTracker:
         "the place of the dead point"
 
     def follow(self, z: Array) -> FollowedDesigns:
-        """See `stopped`; z (designs, unknowns) at the last good steps."""
+        """See `follow_to_dead_points`; z (designs, unknowns) at the last good steps."""
         self._track(z)
         if self.dead_point_arcs:
             self._find_dead_points()

@@ -111,7 +111,7 @@ class _AssemblySearch:
         "how regular the slopes of the last Newton's method were where it ended, see `volume`"
 
     def search(self) -> DesignAssemblies:
-        """See `assembled`."""
+        """See `find_assemblies`."""
         here, hasty = self._join_blocks(True)
         found = self._choose(here)
         # a group that lies where it is meant may leave the later ones no place near the sketch
@@ -183,7 +183,7 @@ class _AssemblySearch:
     def _extend_clearly(self, stage: Block, here: _PartialAssemblies, roots: Array) -> tuple[_PartialAssemblies, Array]:
         """Every design with one way to add a group, and the designs for which that is not clearly the one meant.
 
-        It is where it lies at the sketch, and the slope is so regular that no other is near: see `Candidates`.
+        It is where it lies at the sketch, and the slope is so regular that no other is near: see `BlockAssemblies`.
         """
         every = np.arange(self.design_count)
         sketched = len(self.candidates.sketched_by_level.get(stage.block_index, ()))
@@ -293,7 +293,8 @@ class _AssemblySearch:
         return np.ascontiguousarray(flat[:, busy].T), self.u.T[each[busy]], self.p.T[each[busy]]
 
     def _wind_back(self, stage: Block, z: Array, closed: Array, each: Array) -> Array:
-        """The same assemblies with angles at the turn nearest to none where that is closed too, as in `Candidates`."""
+        """The same assemblies with angles at the turn nearest to none where that is closed too, as in
+        `BlockAssemblies`."""
         least = z.copy()
         own, angles = least[stage.unknowns], self._is_angle(stage)
         own[angles] = np.arctan2(np.sin(own[angles]), np.cos(own[angles]))

@@ -23,8 +23,7 @@ CLEAR_REGULARITY = 0.2
 """The volume that the columns of a slope span, each of length one, from which on no other assembly is near."""
 NEAR_SKETCH = 0.15
 """Lengths of the size, on average, from the sketch: a large group that lies farther off may have another assembly that
-is
-nearer, of which no start tells."""
+is nearer, of which no start tells."""
 MAX_BLOCK_UNKNOWNS = 4
 """Unknowns of the largest group whose regularity a backend tells as that volume."""
 
@@ -48,8 +47,8 @@ def find_nearest_assemblies(
 
     Costs never fall: where the nearest assembly is taken of every group, and each group's next one alone would cost
     more than all these, there is no nearer one of the whole. A group in closed form has two assemblies; any other as
-    many as
-    the base has, if they are found again, or it lies where it does at the sketch, and so regular that no other is near.
+    many as the base has, if they are found again, or it lies where it does at the sketch, and so regular that no other
+    is near.
     """
     candidates = reference.candidates
     stages = [stage for stage in reference.functions.equations.blocks if slice_length(stage.unknowns)]
@@ -109,7 +108,7 @@ class _NearestAssemblySearch:
         )
 
     def search(self) -> NearestAssemblies:
-        """See `nearby`."""
+        """See `find_nearest_assemblies`."""
         found = self.corrector(self.batch, self.point_blocks, CORRECTIONS)
         costs, others = (np.square(places - self.sketch).sum(axis=1) for places in (found.points, found.other_points))
         clear, total, before = found.converged.copy(), costs.sum(axis=0), np.zeros(self.design_count)

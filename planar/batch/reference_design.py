@@ -102,7 +102,8 @@ class ReferenceDesign:
         return stack_rows(rows, many)
 
     def tolerance(self, p: Array) -> float:
-        """What the gate lets pass for these designs: as `Gate.tolerance`, with the greatest length of any of them."""
+        """What the gate lets pass for these designs: as `ResidualCheck.tolerance`, with the greatest length of any of
+        them."""
         kinds = [kind for pair in self.mechanism.pairs for kind in pair.number_kinds]
         lengths = np.array([kind is MeasureKind.LENGTH for kind in kinds], dtype=bool)
         reach = float(np.nanmax(np.abs(p[lengths]), initial=0.0))

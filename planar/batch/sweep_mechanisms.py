@@ -40,7 +40,7 @@ MAX_STATE_BYTES = 16 * 2**20
 
 
 class _Attempt(NamedTuple):
-    """How linkages are run: with steps so many times finer, `polished` and `quick` as in `running.ran`."""
+    """How linkages are run: with steps so many times finer, `polished` and `quick` as in `march.run_linkages`."""
 
     refinement: int
     polished: bool
@@ -298,7 +298,7 @@ def _partition_linkage(
 
 
 def _shown_points(mechanism: Mechanism, partition: Partition, members: Mapping) -> list[tuple[float, ...]]:
-    """Points of every link that the sketch shows, or that lie on the frame: see `Lot.shown`."""
+    """Points of every link that the sketch shows, or that lie on the frame: see `LinkageArrays`."""
     at = {name: (x, y) for name, x, y in mechanism.sketch}
     found: list[tuple[float, ...]] = []
     for name, both in members.items():

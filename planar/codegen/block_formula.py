@@ -144,7 +144,8 @@ def write_kernel_ir(formula: BlockFormula, layout: KernelLayout) -> str:
 
 
 EXTREME_COUNT = 4
-"""What `_Watch` tells: the greatest left open, the least clear, its greatest second difference, the fastest change."""
+"""What `_ExtremesWriter` writes: the greatest left open, the least clear, its greatest second difference, the fastest
+change."""
 
 
 class _ExtremesWriter:
@@ -221,7 +222,7 @@ class _ExtremesWriter:
 
 
 _INITIAL_EXTREMES = (0.0, 1e300, 0.0, 0.0)
-"""Where what `_Watch` tells begins."""
+"""Where what `_ExtremesWriter` writes begins."""
 
 
 @lru_cache(maxsize=4096)

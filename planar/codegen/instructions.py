@@ -50,7 +50,7 @@ class UnsupportedOperation(Exception):
 
 
 def check_length(instructions: int) -> None:
-    """Raises NotPrinted for more instructions than one function may have."""
+    """Raises UnsupportedOperation for more instructions than one function may have."""
     if instructions > MAX_INSTRUCTIONS:
         raise UnsupportedOperation(f"more than {MAX_INSTRUCTIONS} instructions take too long to compile")
 
@@ -115,7 +115,7 @@ class InstructionList:
         return what == "sub" and of[0] == of[1]
 
     def inline_function(self, function: ca.Function, inputs: list[list[int]]) -> list[list[int]]:
-        """A function of values: the numbers of its results, dense, column by column. Raises NotPrinted."""
+        """A function of values: the numbers of its results, dense, column by column. Raises UnsupportedOperation."""
         work: dict[int, int] = {}
         found = [[self.add_constant(0.0)] * function.numel_out(k) for k in range(function.n_out())]
         places = [function.sparsity_out(k).find() for k in range(function.n_out())]

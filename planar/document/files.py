@@ -77,7 +77,7 @@ def load(model: str | Path) -> Mechanism:
 def save_file(path: Path, content: str | bytes) -> None:
     """Write a text, or bytes, to a file: all of it, or nothing, so that a file that is there stays whole till then.
 
-    Raises BadInput where there can be no such file, NotWritten where its content finds no room.
+    Raises BadInput where there can be no such file, WriteFailure where its content finds no room.
     """
     try:
         write_atomically(path, content.encode() if isinstance(content, str) else content)
@@ -86,7 +86,7 @@ def save_file(path: Path, content: str | bytes) -> None:
 
 
 def write_error(place: str, what: str, problem: Exception, done: str = "written") -> BadInput:
-    """That something cannot be written, as an error: NotWritten where its content found no room, else BadInput."""
+    """That something cannot be written, as an error: WriteFailure where its content found no room, else BadInput."""
     kind = WriteFailure if getattr(problem, "errno", None) in NO_SPACE_ERRORS else BadInput
     return kind(place, f"{what} cannot be {done}: {getattr(problem, 'strerror', None) or problem}")
 
@@ -191,7 +191,8 @@ def _replace_file(
 ) -> None:
     """Write beside a file, then take its place; without a mode it is what new files have.
 
-    Raises OSError, of `NOT_REPLACED` where the file has an owner, or other names, that the new one would not have.
+    Raises OSError, of `NOT_REPLACEABLE_ERRORS` where the file has an owner, or other names, that the new one would not
+    have.
     """
     part = path.with_name(f".{os.urandom(12).hex()}.part")
     try:

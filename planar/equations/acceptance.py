@@ -107,7 +107,7 @@ class AcceptanceFunctions:
         """(z, axis, u, u1, u2, p, by, least) -> (w, w1, w2), verdict, rates along the axis of the inputs, distances.
 
         `by` (rows,): what every row is divided by, `least` (unknowns,): the least sizes of columns, see
-        `solving.freedom`. Distances (stages,) are along the axis: within them no group can become singular.
+        `solving.rates.regularity`. Distances (stages,) are along the axis: within them no group can become singular.
         """
         return BufferedFunction(self._position)
 
@@ -139,7 +139,7 @@ class AcceptanceFunctions:
 
     @cached_property
     def step_check(self) -> BufferedFunction:
-        """(z, u, step of u, p) -> z after the step, and what is judged of the step, see `Stride`."""
+        """(z, u, step of u, p) -> z after the step, and what is judged of the step, see `StepCheck`."""
         e, rates = self.equations, _RateExpressions(self.equations)
         z, u, du, p = (
             ca.SX.sym(name, size.numel())
@@ -172,7 +172,7 @@ class AcceptanceFunctions:
         return BufferedFunction(function_with_cse("stride", [z, u, du, p], [after, ca.densify(judged)]))
 
     def _residual_check(self, *given: ca.SX) -> list[ca.SX]:
-        """What `solving.gate` judges, from coordinates and rates alone: nothing of the elimination is believed."""
+        """What `ResidualCheck` judges, from coordinates and rates alone: nothing of the elimination is believed."""
         e = self.equations
         w, w1, w2 = (ca.SX.sym(name, e.w.numel()) for name in ("w", "w1", "w2"))
         u, u1, u2, p = (
@@ -328,7 +328,7 @@ def _maximum(values: ca.SX) -> ca.SX:
 
 
 def _regularity_bound(block: ca.SX, row_scale: ca.SX, column_floor: ca.SX) -> ca.SX:
-    """No more than the strength of a group, see `solving.freedom`."""
+    """No more than the strength of a group, see `solving.rates.regularity`."""
     scaled = block / ca.repmat(row_scale, 1, block.size2())
     sizes = [ca.fmax(ca.norm_2(scaled[:, k]), column_floor[k]) for k in range(block.size2())]
     low, high = _singular_value_bounds(scaled / ca.repmat(ca.horzcat(*sizes), block.size1(), 1))
@@ -351,7 +351,7 @@ def _singular_value_bounds(matrix: ca.SX) -> tuple[ca.SX, ca.SX]:
 
 def _regular_distance(block: ca.SX, y: ca.SX, direction: ca.SX) -> tuple[ca.SX, ca.SX]:
     """No more than the least singular value of a group, columns of one size, and how far along a way it is one at
-    least (Weyl), see `solving.branch`."""
+    least (Weyl), see `solving.checks.branch_check`."""
     change = ca.reshape(ca.jtimes(ca.vec(block), y, direction), block.shape)
     sizes = ca.horzcat(*(ca.norm_2(block[:, k]) for k in range(block.size2())))
     whole = ca.repmat(sizes, block.size1(), 1)

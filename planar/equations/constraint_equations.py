@@ -238,7 +238,7 @@ def _make_coordinates(mechanism: Mechanism, given: Mapping[str, ca.SX]) -> _Mech
 
 
 def _make_numbers(mechanism: Mechanism) -> tuple[ca.SX, dict[str, list[ca.SX]]]:
-    """A symbol for each number of each pair, in the order in which `program.fitted` fills them."""
+    """A symbol for each number of each pair, in the order in which `functions.pair_numbers` fills them."""
     numbers = {pair.name: [ca.SX.sym(f"of {pair.name}") for _ in pair.number_kinds] for pair in mechanism.pairs}
     return stack_expressions(symbol for each in numbers.values() for symbol in each), numbers
 

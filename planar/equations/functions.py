@@ -31,7 +31,8 @@ RUN_NEWTON_STEPS = 4
 
 
 class EquationRates(NamedTuple):
-    """What `Program.kinematics` returns: F and w with their first and second time derivatives, and dF/dz, dF/du.
+    """What `EquationFunctions.kinematics` returns: F and w with their first and second time derivatives, and dF/dz,
+    dF/du.
 
     Each with a first axis for the samples, if there is one.
     """
@@ -55,7 +56,8 @@ class ClosedFormAssemblies:
         self._unknowns, self._form, self._polished = unknowns, form, polished
 
     def __call__(self, z: Array, u: Array, p: Array) -> tuple[list[Array], float, float]:
-        """Both (unknowns,), what they leave open at most, and how near they are to where they meet (`closed.Closed`).
+        """Both (unknowns,), what they leave open at most, and how near they are to where they meet
+        (`closed_form.ClosedForm`).
 
         What is not there is not a number.
         """
@@ -414,7 +416,7 @@ def frames_from_coordinates(
 ) -> tuple[dict[str, Frame], dict[str, tuple[Scalar, ...]]]:
     """Frames of links and own coordinates of pairs from w, whose entries may be floats, arrays or jets.
 
-    `framed` makes a frame of x, y and angle.
+    `make_frame` makes a frame of x, y and angle.
     """
     frames = {
         link: make_frame(*(w[column[link, part]] for part in ("x", "y", "angle"))) if (link, "x") in column else GROUND

@@ -144,7 +144,7 @@ def _input_data(name: str, rows: BalanceRows, row: int, slide: bool) -> dict[str
 
 
 def _action_data(rows: BalanceRows) -> Iterator[dict[str, Any]]:
-    """Every load, weight and spring, in the order of `Work.acting`: its row, and its places on links."""
+    """Every load, weight and spring, in the order of `collect_actions`: its row, and its places on links."""
     work, mechanism = rows.work, rows.mechanism
     row, _ = rows.add(work.actions_on_links.T)
     for load in mechanism.loads:

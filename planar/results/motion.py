@@ -120,7 +120,7 @@ class KinematicResult(Displayable):
         """How `point` moves against `other`, in the axes of a link.
 
         `axes` left out: the link that carries both points, else the link on whose line one of them slides while it
-        carries the other. Raises Unknown where there is no such link and none is named.
+        carries the other. Raises UnknownName where there is no such link and none is named.
         """
         p, q = self._find_point(point), self._find_point(other)
         axes = axes or self._default_axes(p, q)
@@ -227,11 +227,12 @@ class State(KinematicResult):
         return {name: self.pair(name) for name in self._relative_motions}
 
     def point(self, name: str) -> PointState:
-        """A point by its result name, or as `link.point`. Raises Unknown."""
+        """A point by its result name, or as `link.point`. Raises UnknownName."""
         return self._point_state(self._find_point(name))
 
     def link(self, name: str) -> LinkState:
-        """A link by name; its angle between -pi and pi, or with its turns where a pair counts them. Raises Unknown."""
+        """A link by name; its angle between -pi and pi, or with its turns where a pair counts them. Raises
+        UnknownName."""
         angle, velocity, acceleration = map(float, value_and_rates(self._frame(name).angle))
         fastest, hardest = self.scales_of_links
         sense = _describe_sense(turning_sense(velocity, fastest), velocity * acceleration, abs(velocity) * hardest)
@@ -240,7 +241,7 @@ class State(KinematicResult):
         )
 
     def pair(self, name: str) -> dict[str, float | None]:
-        """What a pair reports of its relative motion (SI). Raises Unknown."""
+        """What a pair reports of its relative motion (SI). Raises UnknownName."""
         pair, parts = self._find_relative_motion(name)
         position, rate, second = map(float, parts)
         return pair.results(position + self._turns_of_pair(name, position), rate, second)
@@ -326,7 +327,7 @@ class Motion(KinematicResult):
         return tuple(map(self._limit_with_turns, self.course.limits(self))) if self.course else ()
 
     def _limit_with_turns(self, limit: Limit) -> Limit:
-        """A limit whose angle is one as positions have it (see `turns_to_least`)."""
+        """A limit whose angle is one as positions have it (see `principal_turns`)."""
         if limit.kind != "stroke end" or limit.of not in self._relative_motions:
             return limit
         position = np.atleast_1d(self._find_relative_motion(limit.of)[1][0])
@@ -373,24 +374,24 @@ class Motion(KinematicResult):
         return {name: self.pair(name) for name in self._relative_motions}
 
     def point(self, name: str) -> PointMotion:
-        """A point by its result name, or as `link.point`. Raises Unknown."""
+        """A point by its result name, or as `link.point`. Raises UnknownName."""
         return self._point_motion(self._find_point(name))
 
     def link(self, name: str) -> LinkMotion:
-        """A link by name. Its angle starts between -pi and pi unless a pair counts its turns. Raises Unknown."""
+        """A link by name. Its angle starts between -pi and pi unless a pair counts its turns. Raises UnknownName."""
         angle, velocity, acceleration = self._broadcast_rows(value_and_rates(self._frame(name).angle))
         if name not in self._links_counting_turns:
             angle = angle - (angle[0] - wrap_angle(float(angle[0])))
         return LinkMotion(angle, velocity, acceleration)
 
     def jerk(self, point: str) -> Array:
-        """A point's third rate (n, 2) (m/s^3). Raises Unknown, and BadInput where the motion was made without."""
+        """A point's third rate (n, 2) (m/s^3). Raises UnknownName, and BadInput where the motion was made without."""
         link, own = self._find_point(point).members[0]
         place = self._require_jerks().frames[link].to_world(self.shapes[link].position(own))
         return np.stack(self._broadcast_rows((third_rate(place.x), third_rate(place.y))), axis=1)
 
     def angular_jerk(self, link: str) -> Array:
-        """A link's third rate (n,) (rad/s^3). Raises Unknown, and BadInput where the motion was made without."""
+        """A link's third rate (n,) (rad/s^3). Raises UnknownName, and BadInput where the motion was made without."""
         self._frame(link)
         return self._broadcast_rows((third_rate(self._require_jerks().frames[link].angle),))[0]
 
@@ -400,7 +401,7 @@ class Motion(KinematicResult):
         return self.jerked
 
     def pair(self, name: str) -> dict[str, Array | None]:
-        """What a pair reports at every position, each (n,) (SI). An angle starts as a link's. Raises Unknown."""
+        """What a pair reports at every position, each (n,) (SI). An angle starts as a link's. Raises UnknownName."""
         pair, parts = self._find_relative_motion(name)
         position, velocity, acceleration = self._broadcast_rows(parts)
         return pair.results(position + self._turns_of_pair(name, float(position[0])), velocity, acceleration)

@@ -132,7 +132,7 @@ def centrodes(motion: Motion, link: str, other: str | None = None) -> Centrodes:
     """The fixed and the moving centrode of a link against another (left out: the frame), from the motion's rates.
 
     The input's speed does not matter; where it is zero in the file, a unit rate takes its place. At the limits of a
-    range, where rates are not determined, the pole is that of the motion that the constraints leave. Raises Unknown
+    range, where rates are not determined, the pole is that of the motion that the constraints leave. Raises UnknownName
     for a link that is not there.
     """
     frame = motion.mechanism.frame

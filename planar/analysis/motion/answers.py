@@ -49,7 +49,7 @@ class Answers:
 def answers(motion: Motion, name: str) -> tuple[Answers, ...]:
     """What there is to tell of a name over a motion: of the pair, the link and the point that bear it.
 
-    Raises Unknown where there is nothing of that name.
+    Raises UnknownName where there is nothing of that name.
     """
     steady, found = InterpolatedRun(motion), []
     if name in relative_motions(motion.mechanism):

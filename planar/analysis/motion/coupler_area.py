@@ -40,7 +40,7 @@ def area(motion: Motion, point: str) -> Area:
     until the sum does not change by more than 1e-10 of itself: of smooth curves it converges like a geometric series
     (L. N. Trefethen, J. A. C. Weideman, The exponentially convergent trapezoidal rule, SIAM Review 56, 2014).
 
-    Raises Unknown for another name, BadInput where the curve is not closed.
+    Raises UnknownName for another name, BadInput where the curve is not closed.
     """
     motion.point(point)  # refuses what there is not
     steady = InterpolatedRun(motion)

@@ -46,7 +46,7 @@ def dwells(
     30 degrees of a turn, if left out) or more: of a harmonic motion 1 % is 23 degrees. The input runs at the file's
     velocity, or 1 rad/s or 1 m/s where that is zero. What moves slowly without ever standing still does not dwell.
 
-    Raises Unknown, BadInput where there is nothing of that name, or for a `within` or `least` that is none.
+    Raises UnknownName, BadInput where there is nothing of that name, or for a `within` or `least` that is none.
     """
     for name, value in (("within", within), ("least", least)):
         if value is None:

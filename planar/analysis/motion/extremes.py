@@ -68,7 +68,7 @@ def stroke(motion: Motion, pair: str) -> Stroke | None:
     Top is the end farther from the driving crank's fixed pin, in the plane; where there is no such pin, or both are as
     far, the end of greater displacement. Of ends that are reached more than once the first in the range is told. None
     where the displacement is greatest or least at an end of the input's range and does not turn back there, where the
-    slide does not move, or where the relative motion at the pair is no length. Raises Unknown for another name.
+    slide does not move, or where the relative motion at the pair is no length. Raises UnknownName for another name.
     """
     motion.pair(pair)  # refuses what there is not
     return find_stroke(InterpolatedRun(motion), pair) if motion.has_length_motion(pair) else None
@@ -101,7 +101,7 @@ def extremes(motion: Motion, point: str, axis: Axis = "x") -> Extremes:
     """The extreme positions of a point along an axis, "x" or "y" or a direction (rad), solved for to round-off.
 
     Over a range that is not closed they may be at its ends. Of places that are alike the first in the range is told.
-    Raises Unknown for another name, BadInput for another axis.
+    Raises UnknownName for another name, BadInput for another axis.
     """
     return find_extremes(Output(InterpolatedRun(motion), point, axis))
 
@@ -131,8 +131,8 @@ def greatest(motion: Motion, of: str | StateMeasure, what: str = "velocity") -> 
     exact values on either side is zero, good to about 1e-11 rad. Of places that are alike the first is told.
 
     Over a range that is not closed the greatest may be at an end; where it grows beyond all bounds towards a limit of
-    the range it is inf, there; where no rates are determined anywhere it is NaN. Raises Unknown where there is nothing
-    of that name, BadInput for another `what`.
+    the range it is inf, there; where no rates are determined anywhere it is NaN. Raises UnknownName where there is
+    nothing of that name, BadInput for another `what`.
     """
     return find_greatest(InterpolatedRun(motion), of, what)
 

@@ -40,7 +40,7 @@ class AdvantageOver(NamedTuple):
 def advantage_over(motion: Motion, output: str) -> AdvantageOver:
     """The mechanical advantage of a slide, a point, another pair or a link (in this order, by name) over a motion.
 
-    Over the input that runs; `planar.advantage` tells that of one position by two ways. Raises Unknown for another
+    Over the input that runs; `planar.advantage` tells that of one position by two ways. Raises UnknownName for another
     name.
     """
     return advantage_over_run(InterpolatedRun(motion), output)

@@ -38,7 +38,7 @@ def time_ratio(motion: Motion, of: str, axis: Axis | None = None) -> TimeRatio |
     Between the ends of its stroke or swing, solved for to round-off, while the input turns steadily at the file's
     velocity, in its sense; at 1 rad/s where that is zero. The position of the input at an end is told in the range of
     the motion. None where the output has no such ends, or the motion does not come back to where it started, so that
-    there is no return. Raises Unknown, BadInput where there is nothing of that name.
+    there is no return. Raises UnknownName, BadInput where there is nothing of that name.
     """
     return find_time_ratio(Output(InterpolatedRun(motion), of, axis))
 

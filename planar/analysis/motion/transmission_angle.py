@@ -56,9 +56,9 @@ def transmission(moving: State | Motion, output: str) -> Transmission:
     F is that of the multipliers of all pairs' constraints, nothing eliminated. The least over a motion is solved for:
     where the derivative of a polynomial through exact values of cos^2 is zero, good to about 1e-8 of the input.
 
-    Raises Unknown for another name; BadInput where the link is not so joined to the frame, nothing but the input itself
-    drives it, a turning link is driven at several places or by a couple, so that no one line of force acts on a pin,
-    or where constraints hold twice, so that the forces are not determined.
+    Raises UnknownName for another name; BadInput where the link is not so joined to the frame, nothing but the input
+    itself drives it, a turning link is driven at several places or by a couple, so that no one line of force acts on a
+    pin, or where constraints hold twice, so that the forces are not determined.
     """
     driven = _DrivenOutput(moving, output)
     through, angle = driven.angles(moving)
@@ -273,7 +273,7 @@ class _DrivenOutput:
 
 
 def _find_output_pair(moving: KinematicResult, output: str) -> tuple[str, Pair]:
-    """The output link, and the pair at which it turns or slides on the frame. Raises Unknown, BadInput."""
+    """The output link, and the pair at which it turns or slides on the frame. Raises UnknownName, BadInput."""
     frame, named = moving.mechanism.frame, relative_motions(moving.mechanism)
     if output in named:
         candidates = [named[output]]

@@ -61,9 +61,8 @@ then their first, then second rates (m, s); gives how many of the first steps pa
 class CorrectedAssemblies(NamedTuple):
     """Where designs are that a backend closed from near by: which are, and how regular the least regular is of the
     groups that Newton's method closed (the volume that the columns of its slope span), both (designs,); the unknowns
-    (unknowns, designs); the points of the march, and the same in the other assembly of their group, infinite where
-    that is not
-    known (points, 2, designs), in sizes."""
+    (unknowns, designs); the points of the march, and the same in the other assembly of their group, infinite where that
+    is not known (points, 2, designs), in sizes."""
 
     converged: Array
     regularity: Array
@@ -74,7 +73,7 @@ class CorrectedAssemblies(NamedTuple):
 
 AssemblyCorrector = Callable[[DesignBatch, Sequence[int], int], CorrectedAssemblies]
 """Takes a march, of which it looks at the start only, the groups that place its points, and how many of Newton's steps
-it may take. Raises NotMarched."""
+it may take. Raises UnsupportedStructure."""
 
 
 LastGoodUnknowns = Callable[[DesignBatch, Array], Array]

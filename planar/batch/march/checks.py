@@ -66,7 +66,7 @@ class DesignBranchCheck(BranchCheck):
             own = positions.jacobians[:, stage.rows, stage.unknowns]
             if own.size:
                 arm = np.minimum(np.linalg.norm(own, axis=1).min(axis=1), 1.0)
-                # short arms lose digits too, see `solving.accuracy`
+                # short arms lose digits too, see `solving.rates.accuracy`
                 least = np.maximum(LEAST_REGULARITY, np.sqrt(EPS / NEGLIGIBLE_ERROR / np.maximum(arm, 1e-300)))
                 found &= column_volume(own) > (least if own.shape[1] <= 2 else least**1.5)
         return found

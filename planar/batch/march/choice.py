@@ -9,7 +9,8 @@ from planar.batch.march.backend import AssemblyCorrector, DesignRunner, LastGood
 from planar.foundation.errors import BadInput
 
 BACKENDS = {"native": "planar.batch.march.llvm_backend", "casadi": "planar.batch.march.numpy_backend"}
-"""The modules of the backends, the faster first; each has a function `run_designs`."""
+"""The modules of the backends, the faster first; each has a function `run_designs`. What users call "casadi"
+is numpy, over functions of casadi."""
 
 
 def find_assembly_corrector(backend: str) -> AssemblyCorrector | None:
@@ -23,7 +24,8 @@ def find_last_good_unknowns(name: str) -> LastGoodUnknowns | None:
 
 
 def available_runners(backend: str) -> list[tuple[str, DesignRunner]]:
-    """The backends to try, in this order, each with its name; one that raises NotMarched leaves it to the next.
+    """The backends to try, in this order, each with its name; one that raises UnsupportedStructure leaves it to the
+    next.
 
     Raises BadInput.
     """

@@ -19,10 +19,10 @@ EXTRA_CORRECTIONS = 2
 
 
 def run_designs(task: DesignBatch, out: Array) -> Array:
-    """See `Marching`. What the usual corrections leave open runs once more with further ones; what does not begin so,
-    by casadi.
+    """See `DesignRunner`. What the usual corrections leave open runs once more with further ones; what does not begin
+    so, by casadi.
 
-    Raises NotMarched where the structure is not for vectors.
+    Raises UnsupportedStructure where the structure is not for vectors.
     """
     good = _run_compiled(task, out, 0)
     least = len(task.input_offsets)
@@ -37,7 +37,7 @@ def run_designs(task: DesignBatch, out: Array) -> Array:
 
 
 def last_good_unknowns(task: DesignBatch, good: Array) -> Array:
-    """See `Reaching`."""
+    """See `LastGoodUnknowns`."""
     return llvm_runner.unknowns_at_steps(
         task.program,
         task.mechanism,
@@ -50,7 +50,7 @@ def last_good_unknowns(task: DesignBatch, good: Array) -> Array:
 
 
 def correct_assemblies(task: DesignBatch, point_blocks: Sequence[int], corrections: int) -> CorrectedAssemblies:
-    """See `Closing`."""
+    """See `AssemblyCorrector`."""
     try:
         found = correct_designs(
             task.program, task.mechanism, _kernel_arrays(task), task.links, point_blocks, task.tolerance, corrections

@@ -41,7 +41,7 @@ start."""
 
 @lru_cache(maxsize=256)
 def kernel_equations(program: EquationFunctions, mechanism: Mechanism) -> KernelEquations:
-    """A structure ready to be printed. Raises NotPrinted."""
+    """A structure ready to be printed. Raises UnsupportedOperation."""
     return KernelEquations(program.equations, mechanism)
 
 
@@ -52,7 +52,7 @@ def designs_kernel(
     rates: bool,
     point_blocks: tuple[int, ...] | None = None,
 ) -> DesignsKernelLayout:
-    """The function for points on links of a structure, see `march`. Raises NotPrinted."""
+    """The function for points on links of a structure, see `march`. Raises UnsupportedOperation."""
     found = _designs_kernel_or_reason(program, mechanism, links, rates, point_blocks)
     if isinstance(found, str):
         raise UnsupportedOperation(found)
@@ -105,7 +105,7 @@ def run_designs_kernel(
     corrections at every step, for designs that are less well predicted. What is told is times `scale`.
 
     Returns (steps, rows, designs), in `out` if that is given: x and y of every point, then with `rates` all first and
-    all second rates; and (designs,). Raises NotPrinted where the structure is not for this backend.
+    all second rates; and (designs,). Raises UnsupportedOperation where the structure is not for this backend.
     """
     longest = float(np.max(np.abs(np.diff(offsets, axis=0)), initial=0.0))
     if longest > LONGEST_STEP or len(offsets) == 2:
@@ -140,8 +140,7 @@ class KernelAssemblies(NamedTuple):
     """Where designs are that were closed from near by: which are, and how regular the least regular is of the groups
     that Newton's method closed (the volume that the columns of its slope span), both (designs,); the unknowns
     (unknowns, designs); the points that were asked for, and the same in the other assembly of their group, infinite
-    where that is
-    not known (points, 2, designs)."""
+    where that is not known (points, 2, designs)."""
 
     converged: Array
     regularity: Array
@@ -161,7 +160,7 @@ def correct_designs(
 ) -> KernelAssemblies:
     """Designs closed from unknowns near by, at the inputs where they start; points on `links` that these groups place.
 
-    Raises NotPrinted.
+    Raises UnsupportedOperation.
     """
     plan = designs_kernel(program, equation_structure(mechanism), tuple(links), False, tuple(point_blocks))
     gone = np.zeros((1, len(designs.u0)))

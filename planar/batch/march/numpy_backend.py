@@ -37,7 +37,7 @@ class DesignsAtStep(NamedTuple):
 
 
 def run_designs(task: DesignBatch, out: Array) -> Array:
-    """See `Marching`. Raises NotMarched where groups hold more constraints than unknowns."""
+    """See `DesignRunner`. Raises UnsupportedStructure where groups hold more constraints than unknowns."""
     steps, designs = len(task.input_offsets), task.p.shape[1]
     good, some, first, part = np.zeros(designs, dtype=int), np.arange(designs), 0, task
     with np.errstate(all="ignore"):  # designs that have failed run on as what is no number

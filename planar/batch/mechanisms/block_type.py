@@ -67,7 +67,7 @@ class BlockEquations:
 
     What it takes, in slots: the given links, the inputs, then the inner links. In numbers: p of the pairs, the cosine
     and sine of those that are angles, then a sign for each group that can be assembled in two ways; where it starts,
-    in their place the sums of the points in the sketch, see `statistics`.
+    in their place the sums of the points in the sketch, see `_sketch_sums` of the initial assembly.
     """
 
     def __init__(self, signature: BlockSignature, samples: Sequence[Pair]):

@@ -39,7 +39,7 @@ class StartAssemblies(NamedTuple):
 
 
 def find_start_assemblies(linkages: LinkageArrays, native: bool) -> StartAssemblies:
-    """See `Started`.
+    """See `StartAssemblies`.
 
     A way to assemble a group is taken where it is nearer to the sketch than any other by more than all groups of the
     linkage together are away from it: whatever else were taken, the whole would lie farther off.
@@ -95,9 +95,10 @@ def _correct_from_sketch(
     batch: BlockBatch, state: Array, index: Array, sketch_sums: tuple[Array, Array], tolerance: Array, native: bool
 ) -> tuple[Array, Array, Array]:
     """Groups that are not in closed form, solved from where they are shown, the points of the sketch and what is shown
-    in `stats`: unknowns there, squared distances to the sketch, and for which of them no other assembly can be meant.
+    in `sketch_sums`: unknowns there, squared distances to the sketch, and for which of them no other assembly can be
+    meant.
 
-    Their points lie at the sketch, and the slope is so regular that no other assembly is near: see `Candidates`.
+    Their points lie at the sketch, and the slope is so regular that no other assembly is near: see `BlockAssemblies`.
     """
     sketch, seen = sketch_sums
     kind, groups = batch.block_type, len(batch.owner)

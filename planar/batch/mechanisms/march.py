@@ -41,7 +41,7 @@ def run_linkages(
     polished: bool = False,
     verdict_only: bool = False,
 ) -> LinkageRuns:
-    """Run linkages whose running inputs go so far (steps,) from where they are, by `step` in each. See `Ran`.
+    """Run linkages whose running inputs go so far (steps,) from where they are, by `step` in each. See `LinkageRuns`.
 
     `polished`: every closed form is followed by a step of Newton's method. `quick`: only whether all steps are good is
     looked at, in machine code.

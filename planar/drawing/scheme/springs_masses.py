@@ -17,7 +17,7 @@ SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
 
 class Coil(NamedTuple):
-    """A spring or a damper between places of two links; `symbol` is a key of `symbols.COILS`."""
+    """A spring or a damper between places of two links; `symbol` is a key of `symbols.SPRING_SYMBOLS`."""
 
     name: str
     links: tuple[str, str]

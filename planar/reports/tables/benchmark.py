@@ -10,8 +10,6 @@ from rich.text import Text
 from planar.bench.benchmark import CYCLE_STEPS, SWEEP_STEPS, Speed
 from planar.reports.tables_of_numbers import paragraphs, plain_table
 
-CALLS = ("solve, new position", "cycle, a position")
-
 
 def table(measured: Iterable[Speed]) -> RenderableType:
     """One position and one run of each, then its sweeps, then what bounds them."""

@@ -22,7 +22,7 @@ point to rounding; also the least rate of the inputs along the curve from which 
 ZERO_INPUT_RATE = 1e-13
 """A rate of the inputs along the curve, for one of what is farthest out, that is rounding."""
 END_TOLERANCE = 1e-9
-"""rad or sizes: so near to the end of a way a change point is at that end."""
+"""rad or sizes: so near to the end of a path a dead point, a change point or the end of a piece is at that end."""
 
 
 class BranchRates(NamedTuple):

@@ -1,6 +1,6 @@
 "use strict";
 /* What each moving link looks like in its own axes (m): the lines between its joints, its plate, its further points,
-   its cylinders; as Python's planar.drawing.bodies and scene have it. Vectors are [x, y]. */
+   its cylinders; as Python's planar.drawing.scheme.link_bodies and scene have it. Vectors are [x, y]. */
 
 const Plane = {
   plus: (a, b) => [a[0] + b[0], a[1] + b[1]],

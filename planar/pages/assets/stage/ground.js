@@ -1,6 +1,6 @@
 "use strict";
 /* What stands still, as symbols: supports, fixed guides, racks and wheels, turned so that they are clear of the links
-   over their whole motion; as Python's planar.drawing.ground has it. Places in px from the world's origin, y downwards. */
+   over their whole motion; as Python's planar.drawing.scheme.ground has it. Places in px from the world's origin, y downwards. */
 
 const LEANING = 2.5; // what a support costs that does not stand upright: half a bar that is always in its way
 

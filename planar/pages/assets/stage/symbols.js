@@ -159,7 +159,7 @@ const Symbols = (() => {
   /** An angle less whole turns, from -half a turn to half a turn. */
   function wrapped(turn) { return turn - 2 * Math.PI * Math.round(turn / (2 * Math.PI)); }
 
-  /** A torsional spring, or damper, about a pin between the directions of two links, as planar.drawing.symbols has it. */
+  /** A torsional spring, or damper, about a pin between the directions of two links, as planar.drawing.scheme.symbols has it. */
   function spiral(at, first, second, wound, symbol, mm) {
     const spot = (turn, radius) => [at[0] + radius * mm * Math.cos(turn), at[1] - radius * mm * Math.sin(turn)], paths = [];
     if (symbol !== "damper") {
