@@ -7,11 +7,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from hypothesis import assume
+from hypothesis import strategies as st
 
+from planar.document import files
+from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.geometry import Frame, Vector, direction, frame_at
 from planar.model.link_shapes import link_shape
 from planar.model.mechanism import Mechanism
 from planar.model.pairs import Pair, pair_types
+from planar.results.motion import State
 from planar.solving.position import PositionSolver
 from planar.solving.rates.regularity import regularity
 
@@ -257,3 +262,26 @@ def _own(built: Built, pair: Pair, numbers: Sequence[float]) -> np.ndarray:
     still = np.array(pair.residual(frames, numbers, [0.0] * count))
     slopes = [np.array(pair.residual(frames, numbers, list(unit))) - still for unit in np.eye(count)]
     return np.linalg.lstsq(np.array(slopes).T, -still, rcond=None)[0] if count else np.zeros(0)
+
+
+seeds = st.integers(0, 10**6)
+shares = st.sampled_from([0.0, 0.0, 0.3])
+"""Of joints made of higher pairs."""
+
+
+def assembled(built: Built, least: float) -> tuple[Mechanism, State]:
+    """The linkage solved; assumed to have determinate rates, with some distance from dead points."""
+    mechanism = files.from_dict(built.value)
+    solver = PositionSolver(mechanism)
+    try:
+        found = solver.find_assembly()
+        state = solver.state(found.z, solver.remarks(found))  # as `solve` does
+    except NoAnswer as problem:
+        # loops drawn at random may hold each other twice, or leave freedom: then that is what must be said, and only
+        # then
+        assert problem.outcome in (Outcome.TOO_FEW_INPUTS, Outcome.INPUT_JAMMED, Outcome.DEAD_POINT)
+        assert not determinate(mechanism, built)
+        assume(False)
+        raise
+    assume(conditioning(solver, found.z) > least)
+    return mechanism, state

@@ -195,6 +195,21 @@ def test_functions_are_short_and_take_few_arguments():
                 assert many <= MOST_PARAMETERS or "# many: " in said, f"{path}:{node.lineno}"
 
 
+def test_no_test_file_imports_another():
+    """What several test files need stands beside the rooms: builders, closed forms, documents, figures ..."""
+    own = Path(__file__).parent.parent
+    tests = {".".join(path.relative_to(own.parent).with_suffix("").parts): path for path in own.rglob("test_*.py")}
+    found = [
+        f"{name} imports {module}"
+        for name, path in tests.items()
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.ImportFrom)
+        for module in (node.module, *(f"{node.module}.{alias.name}" for alias in node.names))
+        if module in tests
+    ]
+    assert found == []
+
+
 def loaded_by(code: str) -> set[str]:
     run = [sys.executable, "-c", f"{code}\nimport sys; print(*sys.modules)"]
     return set(subprocess.run(run, check=True, capture_output=True, text=True).stdout.split())
