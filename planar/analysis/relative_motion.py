@@ -9,7 +9,7 @@ import numpy as np
 
 from planar.foundation.geometry import Frame, Vector
 from planar.foundation.jets import value_and_rates
-from planar.results.motion import UnknownName
+from planar.results.kinematic_result import UnknownName
 
 Array = np.ndarray
 

@@ -64,7 +64,7 @@ def solve(
 
         click.echo(json.dumps(record(state, comparisons, relatives), ensure_ascii=False, indent=1, allow_nan=False))
         return
-    from planar.reports.tables_of_numbers import solution_tables
+    from planar.reports.tables.position import solution_tables
 
     print_or_write(solution_tables(state, comparisons, relatives), output)
 
@@ -182,7 +182,7 @@ def cycle(
 def _answers(motion: Motion, name: str) -> tuple[Answers, ...]:
     """What `--of` asks for."""
     from planar.analysis.motion.answers import answers
-    from planar.results.motion import UnknownName
+    from planar.results.kinematic_result import UnknownName
 
     try:
         return answers(motion, name)
@@ -192,7 +192,7 @@ def _answers(motion: Motion, name: str) -> tuple[Answers, ...]:
 
 def _relative_motion(state: State, text: str) -> RelativeState:
     """The relative motion that `--relative` asks for."""
-    from planar.results.motion import UnknownName
+    from planar.results.kinematic_result import UnknownName
 
     names = [name.strip() for name in text.split(",")]
     if len(names) not in (2, 3):

@@ -20,7 +20,7 @@ from planar.foundation.jets import value_and_rates
 from planar.model.link_shapes import LinkShape
 from planar.model.loads import COINCIDENCE_TOLERANCE, Load, Spring
 from planar.model.mechanism import relative_motions
-from planar.results.motion import KinematicResult
+from planar.results.kinematic_result import KinematicResult
 
 Array = np.ndarray
 

@@ -23,7 +23,7 @@ from planar.foundation.jets import value_and_rates
 from planar.model.loads import COINCIDENCE_TOLERANCE, Load, Mass, Spring
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import Pair
-from planar.results.motion import KinematicResult
+from planar.results.kinematic_result import KinematicResult
 
 Array = np.ndarray
 

@@ -19,7 +19,7 @@ from planar.model.loads import Course, Load, Spring
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import Pair
 from planar.model.pairs.base import ToothContact
-from planar.reports.tables.forces import undetermined_sentences
+from planar.reports.tables.forces.position_forces import undetermined_sentences
 from planar.results.motion import State
 
 

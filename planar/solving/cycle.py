@@ -17,6 +17,7 @@ MAX_DURATION = 1e6
 """s"""
 
 
+# many: what callers may choose of a run; # long: the docstring
 def cycle(
     mechanism: Mechanism,
     steps: int = 360,

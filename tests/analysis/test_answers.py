@@ -13,7 +13,7 @@ from planar.cli import main
 from planar.foundation.errors import BadInput
 from planar.model.mechanism import Drive, relative_motions, replace_inputs
 from planar.reports.tables.answers import record, tables
-from planar.results.motion import UnknownName
+from planar.results.kinematic_result import UnknownName
 from tests.builders import crank_rocker, open_four_bar, slider_crank
 from tests.closed_forms import turn_apart
 from tests.draws import part

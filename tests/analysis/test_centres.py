@@ -22,7 +22,8 @@ from planar.document import files
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.model.mechanism import Drive, Mechanism, replace_inputs
 from planar.reports.tables.centres import remarks
-from planar.results.motion import State, UnknownName
+from planar.results.kinematic_result import UnknownName
+from planar.results.motion import State
 from planar.solving.position import solve
 from tests.command import run
 from tests.draws import draws

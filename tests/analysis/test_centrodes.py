@@ -15,7 +15,7 @@ from planar.drawing.paper.picture import Circle, Label, Pen, Polyline, extent
 from planar.drawing.paper.scales import Scale
 from planar.foundation.errors import BadInput
 from planar.model.mechanism import Drive, replace_inputs
-from planar.results.motion import UnknownName
+from planar.results.kinematic_result import UnknownName
 from tests import command
 from tests.known import MODELS, some_models
 

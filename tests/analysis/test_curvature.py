@@ -11,7 +11,7 @@ from planar.analysis.centres.curvature import curvature
 from planar.analysis.relative_motion import quarter_turn, relative_motion
 from planar.foundation.errors import BadInput
 from planar.model.mechanism import Drive, replace_inputs
-from planar.results.motion import UnknownName
+from planar.results.kinematic_result import UnknownName
 from tests.known import MODELS, some_models, state_of
 
 

@@ -16,7 +16,7 @@ from planar.foundation.jets import Jet
 from planar.foundation.root_finding import find_root
 from planar.model.mechanism import Drive, relative_motions, replace_inputs
 from planar.model.pairs import MeasureKind
-from planar.results.motion import UnknownName
+from planar.results.kinematic_result import UnknownName
 from tests.builders import slider_crank
 from tests.closed_forms import turn_apart
 from tests.draws import draws

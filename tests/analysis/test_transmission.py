@@ -7,7 +7,7 @@ import pytest
 
 import planar
 from planar.foundation.errors import BadInput
-from planar.results.motion import UnknownName
+from planar.results.kinematic_result import UnknownName
 from tests.builders import crank_rocker, open_four_bar, slider_crank
 from tests.closed_forms import turn_apart
 from tests.draws import part

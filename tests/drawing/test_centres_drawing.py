@@ -14,7 +14,8 @@ import planar
 from planar import plot
 from planar.analysis.centres.centres import centres
 from planar.document import files
-from planar.drawing.centres.centres import DRAWING_SIZE, MAX_CENTRES, centres_picture, choose_centres
+from planar.drawing.centres.centres import DRAWING_SIZE, centres_picture
+from planar.drawing.centres.choice import MAX_CENTRES, choose_centres
 from planar.drawing.centres.circle_diagram import circle_picture, circle_radius
 from planar.drawing.centres.two_directions import directions_picture
 from planar.drawing.paper.picture import Arrow, Circle, Label, Pen, Polyline, extent

@@ -18,7 +18,8 @@ from planar.dynamics.virtual_velocities import has_length_motion, unit_rate_stat
 from planar.dynamics.virtual_work import BalanceFunction
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.model.mechanism import Drive, Input, Load, Mechanism
-from planar.results.motion import State, UnknownName
+from planar.results.kinematic_result import UnknownName
+from planar.results.motion import State
 from planar.solving.position import solve
 from tests.command import run
 from tests.draws import draws, part

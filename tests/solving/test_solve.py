@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import planar
 from planar.document import files
 from planar.model.mechanism import Drive
-from planar.results.motion import UnknownName
+from planar.results.kinematic_result import UnknownName
 
 DEG = np.pi / 180
 

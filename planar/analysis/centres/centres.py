@@ -34,7 +34,8 @@ from planar.analysis.vector_chains import VectorChains
 from planar.foundation.notebook_display import Displayable
 from planar.model.link_graph import link_numbers, number_separator
 from planar.model.mechanism import Mechanism, named_points
-from planar.results.motion import State, UnknownName
+from planar.results.kinematic_result import UnknownName
+from planar.results.motion import State
 from planar.solving.rest_position import rest_position
 
 Array = np.ndarray

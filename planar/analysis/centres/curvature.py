@@ -17,7 +17,8 @@ import numpy as np
 from planar.analysis.relative_motion import RelativeMotion, quarter_turn, relative_motion
 from planar.foundation.errors import BadInput
 from planar.model.mechanism import Drive, named_points, replace_inputs
-from planar.results.motion import State, UnknownName
+from planar.results.kinematic_result import UnknownName
+from planar.results.motion import State
 from planar.solving.position import PositionSolver
 
 Array = np.ndarray

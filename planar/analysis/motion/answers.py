@@ -14,7 +14,8 @@ from planar.analysis.motion.time_ratio import TimeRatio, find_time_ratio
 from planar.analysis.motion.transmission_angle import Transmission, transmission
 from planar.foundation.errors import BadInput
 from planar.model.mechanism import relative_motions
-from planar.results.motion import Motion, UnknownName
+from planar.results.kinematic_result import UnknownName
+from planar.results.motion import Motion
 
 POINT_AXES: tuple[Axis, ...] = ("x", "y")
 

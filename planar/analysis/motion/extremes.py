@@ -15,7 +15,8 @@ from planar.foundation.errors import BadInput, NoAnswer
 from planar.foundation.root_finding import find_root
 from planar.model.mechanism import relative_motions
 from planar.model.pairs import MeasureKind
-from planar.results.motion import KinematicResult, Motion, State
+from planar.results.kinematic_result import KinematicResult
+from planar.results.motion import Motion, State
 
 Array = np.ndarray
 StateMeasure = Callable[[State], float | Array]

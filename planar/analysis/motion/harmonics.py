@@ -13,7 +13,8 @@ from planar.equations.functions import mechanism_size, shapes_of_links
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.model.mechanism import Drive, Mechanism, relative_motions, replace_inputs
 from planar.model.pairs import MeasureKind
-from planar.results.motion import Array, Motion, UnknownName
+from planar.results.kinematic_result import UnknownName
+from planar.results.motion import Array, Motion
 from planar.solving.cycle import cycle
 
 MIN_SAMPLES, MAX_SAMPLES = 64, 4096

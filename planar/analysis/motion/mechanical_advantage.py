@@ -16,7 +16,8 @@ from planar.dynamics.virtual_velocities import has_length_motion, unit_rate_stat
 from planar.foundation.errors import BadInput, NoAnswer
 from planar.model.mechanism import Input, relative_motions
 from planar.model.wording import REST_TOLERANCE, join_all_names
-from planar.results.motion import State, UnknownName
+from planar.results.kinematic_result import UnknownName
+from planar.results.motion import State
 
 Array = np.ndarray
 LEAST_SEPARATION = 1e-3

@@ -14,7 +14,8 @@ from planar.foundation.jets import Jet
 from planar.model.mechanism import relative_motions
 from planar.model.pairs import MeasureKind, Pair
 from planar.model.wording import join_all_names
-from planar.results.motion import KinematicResult, Motion, State, UnknownName
+from planar.results.kinematic_result import KinematicResult, UnknownName
+from planar.results.motion import Motion, State
 from planar.solving.full_constraints import COMPLEX_STEP, SINGULAR_TOLERANCE, FullConstraints
 from planar.solving.prepared_mechanism import PreparedMechanism
 

@@ -20,7 +20,8 @@ from planar.foundation.geometry import Vector
 from planar.model.link_graph import link_numbers, number_separator
 from planar.model.mechanism import Drive, Mechanism, replace_inputs
 from planar.model.wording import amount
-from planar.results.motion import Motion, State, UnknownName
+from planar.results.kinematic_result import UnknownName
+from planar.results.motion import Motion, State
 from planar.solving.cycle import cycle
 from planar.solving.position import solve
 

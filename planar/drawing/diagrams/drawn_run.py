@@ -14,7 +14,8 @@ from planar.foundation.errors import BadInput, Outcome, PlanarError
 from planar.foundation.geometry import Frame
 from planar.model.mechanism import Drive, Input, Mechanism, replace_inputs, running_input_index
 from planar.model.pairs import Pair
-from planar.results.motion import Motion, UnknownName
+from planar.results.kinematic_result import UnknownName
+from planar.results.motion import Motion
 from planar.results.records import PointMotion
 from planar.solving.cycle import cycle
 

@@ -16,8 +16,8 @@ from planar.foundation.errors import Outcome
 from planar.foundation.units import parse_unit
 from planar.model.mechanism import relative_motions
 from planar.model.wording import amount, count_phrase, join_all_names
-from planar.reports.fitted_table import FittedTable
-from planar.reports.tables_of_numbers import format_number, paragraphs, plain_table
+from planar.reports.fitted_table import FittedTable, plain_table
+from planar.reports.number_format import format_number, paragraphs
 
 
 def table(circuits: Circuits, modes: Modes) -> RenderableType:
