@@ -58,6 +58,10 @@ def cycle(
     the curve of positions, and 100 more for each turn of the range. `progress(done, total)` is called while a long
     range is followed, in rad or m of the input's way. Raises BadInput for an input or a range that is not there,
     NoAnswer where there is no position to start from.
+
+    >>> import planar
+    >>> len(planar.cycle(planar.load("slider-crank"), steps=12))
+    13
     """
     if isinstance(steps, bool) or not isinstance(steps, Integral) or not 1 <= steps <= MAX_STEPS:
         raise BadInput("steps", f"a whole number of steps from 1 to {MAX_STEPS} is wanted, not {steps!r:.40}")

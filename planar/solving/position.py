@@ -54,6 +54,10 @@ def solve(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = 
 
     Raises NoAnswer, whose outcome says whether the mechanism cannot be assembled, stands on a dead point or a change
     point, or has too few or too many inputs; its text names links, pairs, position and remedy.
+
+    >>> import planar
+    >>> planar.solve(planar.load("four-bar"))
+    <State of 'Four-bar chain' at A = 60 deg>
     """
     if isinstance(drives, Mapping):
         drives = [Drive(pair, position) for pair, position in drives.items()]
