@@ -124,8 +124,36 @@ class Builder:
         if len(self.frames) < 3:
             kinds = [keyword for keyword in kinds if len(pair_types()[keyword].samples()[0].frames) == 2]
         before = len(self.pairs)
-        getattr(self, str(self.rng.choice(kinds)))(first, second)
+        keyword = str(self.rng.choice(kinds))
+        if hasattr(self, keyword):
+            getattr(self, keyword)(first, second)
+        elif self.links[second]["points"]:
+            self.slot(first, second)
+        else:
+            self.as_sampled(keyword, first, second)
         return len(self.pairs) - before
+
+    def as_sampled(self, keyword: str, first: str, second: str) -> str:
+        """A pair of any type of two bodies, as its first sample has it; the second link, still bare, is put to it."""
+        sample, name = pair_types()[keyword].samples()[0], f"X{len(self.pairs)}"
+        one, other = sample.frames
+        at = self.frames[first].to_world(one.to_local(Vector(other.x, other.y)))
+        self.frames[second] = frame_at(at.x, at.y, self.frames[first].angle + other.angle - one.angle)
+        words = {"a": first, "b": second, sample.entry[keyword]: name}
+        for link, shape in zip((first, second), sample.shapes, strict=True):
+            for point, local in shape.points.items():
+                words[point] = f"{name}{point}"
+                self.links[link]["points"][words[point]] = list(local)
+
+        def renamed(value: Any) -> Any:
+            if isinstance(value, dict):
+                return {words.get(key, key): renamed(each) for key, each in value.items()}
+            if isinstance(value, list):
+                return [renamed(each) for each in value]
+            return words.get(value, value) if isinstance(value, str) else value
+
+        self.pairs += [renamed(entry) for entry in (sample.entry, *sample.other_entries)]
+        return name
 
     def drive(self, pair: str, first: str, second: str, velocity: float, acceleration: float) -> None:
         if pair[0] == "T":
