@@ -8,7 +8,7 @@ import numpy as np
 
 import planar
 from benchmarks.entry import Array, Entry
-from benchmarks.swept import Swept
+from planar.batch.mechanisms.results import Swept
 from planar.document.dimensions import change_dimension, link_lengths
 from planar.model.mechanism import Mechanism
 from planar.results.motion import Motion

@@ -9,8 +9,9 @@ import numpy as np
 from benchmarks import by_planar, peers
 from benchmarks.entry import Array, Entry
 from benchmarks.limit import compiled
-from benchmarks.swept import RATES, Stephenson, Swept, SweptFourBar, SweptQuickReturn, Watt, angles
+from benchmarks.swept import RATES, Stephenson, SweptFourBar, SweptQuickReturn, Watt, angles
 from benchmarks.timing import best
+from planar.batch.mechanisms.results import Swept
 
 LIMIT = "C by hand"
 DESIGNS, STEPS, TURN = 10_000, 200, 360

@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from planar.analysis.motion.output import Extreme
     from planar.analysis.motion.time_ratio import TimeRatio, time_ratio
     from planar.analysis.motion.transmission_angle import Transmission, transmission
-    from planar.assemblies.circuits.circuits import Branch, Circuit, Circuits, circuits
+    from planar.assemblies.circuits.circuits import Circuit, Circuits, circuits
+    from planar.assemblies.circuits.traced_circuit import Branch
     from planar.assemblies.conflict import Conflict, conflict
     from planar.assemblies.modes import Mode, Modes, modes
     from planar.batch.mechanisms.results import Each, Swept
@@ -53,21 +54,9 @@ if TYPE_CHECKING:
     from planar.model.input_laws.constant_rates import ConstantAccelerationSegment, ConstantSpeedSegment, DwellSegment
     from planar.model.input_laws.input_law import InputLaw
     from planar.model.input_laws.spline_table import TableSegment
-    from planar.model.mechanism import (
-        Along,
-        At,
-        Course,
-        Distances,
-        Drive,
-        FileUnits,
-        Input,
-        Link,
-        Load,
-        Mass,
-        Mechanism,
-        Point,
-        Spring,
-    )
+    from planar.model.link_shapes import Along, At, Distances, Link, Point
+    from planar.model.loads import Course, Load, Mass, Spring
+    from planar.model.mechanism import Drive, FileUnits, Input, Mechanism
     from planar.model.pairs.base import Pair
     from planar.model.pairs.belt import BeltPair, ChainPair
     from planar.model.pairs.gear import GearPair

@@ -82,7 +82,8 @@ def centres(
     there is not, a scale that is none, and a reach below 1.
     """
     from planar.analysis.centres.centres import centres as all_centres
-    from planar.drawing.centres.centres import DEFAULT_REACH, centres_picture, choose_centres
+    from planar.drawing.centres.centres import DEFAULT_REACH, centres_picture
+    from planar.drawing.centres.choice import choose_centres
     from planar.drawing.centres.circle_diagram import circle_picture
 
     found = all_centres(state)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import io
+import json
 import os
 import subprocess
 import sys
 import warnings
 from contextlib import chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
+from typing import Any
 from unittest.mock import patch
 
 from planar.cli import main
@@ -82,3 +84,8 @@ def process(folder: Path, *words: str, **environment: str) -> Ended:
         timeout=LONGEST,
     )
     return Ended(ended.returncode, ended.stdout, ended.stderr)
+
+
+def written(folder: Path, value: Any, name: str = "m.json") -> str:
+    (folder / name).write_text(value if isinstance(value, str) else json.dumps(value), encoding="utf-8")
+    return name

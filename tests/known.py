@@ -2,8 +2,11 @@
 
 from functools import cache
 
+import numpy as np
+
 from planar.analysis.centres.centres import Centres, centres
 from planar.document.files import load_models
+from planar.model.link_graph import link_pair_graph
 from planar.results.motion import State
 from planar.solving.position import solve
 from tests.draws import part
@@ -34,3 +37,18 @@ def some_models(one_in: int, first: int = 0) -> list[str]:
             chosen.append(stem)
             kinds |= more
     return chosen
+
+
+def state_turned_by(model: str, pair: str, degrees: float):
+    """A model at its own inputs, one of them farther by so much."""
+    mechanism = MODELS[model]
+    start = next(given.position for given in mechanism.inputs if given.pair == pair)
+    return solve(mechanism, {pair: start + np.radians(degrees)})
+
+
+def loop_sizes(model: str) -> list[int]:
+    """The number of links in each loop."""
+    import networkx as nx
+
+    cycles = nx.simple_cycles(link_pair_graph(MODELS[model]))
+    return sorted(sum(kind == "link" for kind, _ in cycle) for cycle in cycles)

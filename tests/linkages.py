@@ -7,11 +7,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from hypothesis import assume
+from hypothesis import strategies as st
 
+from planar.document import files
+from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.geometry import Frame, Vector, direction, frame_at
 from planar.model.link_shapes import link_shape
 from planar.model.mechanism import Mechanism
 from planar.model.pairs import Pair, pair_types
+from planar.results.motion import State
 from planar.solving.position import PositionSolver
 from planar.solving.rates.regularity import regularity
 
@@ -119,8 +124,36 @@ class Builder:
         if len(self.frames) < 3:
             kinds = [keyword for keyword in kinds if len(pair_types()[keyword].samples()[0].frames) == 2]
         before = len(self.pairs)
-        getattr(self, str(self.rng.choice(kinds)))(first, second)
+        keyword = str(self.rng.choice(kinds))
+        if hasattr(self, keyword):
+            getattr(self, keyword)(first, second)
+        elif self.links[second]["points"]:
+            self.slot(first, second)
+        else:
+            self.as_sampled(keyword, first, second)
         return len(self.pairs) - before
+
+    def as_sampled(self, keyword: str, first: str, second: str) -> str:
+        """A pair of any type of two bodies, as its first sample has it; the second link, still bare, is put to it."""
+        sample, name = pair_types()[keyword].samples()[0], f"X{len(self.pairs)}"
+        one, other = sample.frames
+        at = self.frames[first].to_world(one.to_local(Vector(other.x, other.y)))
+        self.frames[second] = frame_at(at.x, at.y, self.frames[first].angle + other.angle - one.angle)
+        words = {"a": first, "b": second, sample.entry[keyword]: name}
+        for link, shape in zip((first, second), sample.shapes, strict=True):
+            for point, local in shape.points.items():
+                words[point] = f"{name}{point}"
+                self.links[link]["points"][words[point]] = list(local)
+
+        def renamed(value: Any) -> Any:
+            if isinstance(value, dict):
+                return {words.get(key, key): renamed(each) for key, each in value.items()}
+            if isinstance(value, list):
+                return [renamed(each) for each in value]
+            return words.get(value, value) if isinstance(value, str) else value
+
+        self.pairs += [renamed(entry) for entry in (sample.entry, *sample.other_entries)]
+        return name
 
     def drive(self, pair: str, first: str, second: str, velocity: float, acceleration: float) -> None:
         if pair[0] == "T":
@@ -257,3 +290,26 @@ def _own(built: Built, pair: Pair, numbers: Sequence[float]) -> np.ndarray:
     still = np.array(pair.residual(frames, numbers, [0.0] * count))
     slopes = [np.array(pair.residual(frames, numbers, list(unit))) - still for unit in np.eye(count)]
     return np.linalg.lstsq(np.array(slopes).T, -still, rcond=None)[0] if count else np.zeros(0)
+
+
+seeds = st.integers(0, 10**6)
+shares = st.sampled_from([0.0, 0.0, 0.3])
+"""Of joints made of higher pairs."""
+
+
+def assembled(built: Built, least: float) -> tuple[Mechanism, State]:
+    """The linkage solved; assumed to have determinate rates, with some distance from dead points."""
+    mechanism = files.from_dict(built.value)
+    solver = PositionSolver(mechanism)
+    try:
+        found = solver.find_assembly()
+        state = solver.state(found.z, solver.remarks(found))  # as `solve` does
+    except NoAnswer as problem:
+        # loops drawn at random may hold each other twice, or leave freedom: then that is what must be said, and only
+        # then
+        assert problem.outcome in (Outcome.TOO_FEW_INPUTS, Outcome.INPUT_JAMMED, Outcome.DEAD_POINT)
+        assert not determinate(mechanism, built)
+        assume(False)
+        raise
+    assume(conditioning(solver, found.z) > least)
+    return mechanism, state

@@ -7,7 +7,7 @@ from python_solvespace import ResultFlag, SolverSystem
 
 from benchmarks.entry import Array, Entry
 from benchmarks.peers.bodies import Bodies, bodies
-from benchmarks.swept import Swept
+from planar.batch.mechanisms.results import Swept
 
 SYSTEM = "SolveSpace"
 

@@ -13,7 +13,8 @@ from planar.foundation.geometry import Frame, frame_at
 from planar.foundation.jets import Jet
 from planar.model.mechanism import Drive, replace_inputs
 from planar.model.pairs import MeasureKind
-from planar.results.motion import KinematicResult, Motion, State
+from planar.results.kinematic_result import KinematicResult
+from planar.results.motion import Motion, State
 from planar.solving.continuation.path import follow_straight
 from planar.solving.position import PositionSolver
 

@@ -1,4 +1,4 @@
-"""Every assembly of one group of links, those before it given, and how surely there is no other."""
+"""Every assembly of one block of links, those before it given, and how surely there is no other."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ SAME_SINGULAR_ROOT_DISTANCE = 1e-3
 
 
 class _BlockStructure(NamedTuple):
-    """What is kept of a group's structure: the slope of equations that are linear; else its form, and an instance with
+    """What is kept of a block's structure: the slope of equations that are linear; else its form, and an instance with
     all its solutions for each set of absent coefficients."""
 
     linear_jacobian: ca.Function | None
@@ -81,7 +81,7 @@ _STRUCTURES: WeakKeyDictionary[EquationFunctions, dict[tuple[int, bytes], _Block
 
 
 def block_roots(setup: PreparedMechanism, stage: Block, z: Array, certify: bool = True) -> BlockRoots:
-    """Every assembly of a group at the setup's inputs, all groups before it standing at z (unknowns,)."""
+    """Every assembly of a block at the setup's inputs, all blocks before it standing at z (unknowns,)."""
     known = _block_structure(setup, stage)
     unknowns = slice_length(stage.unknowns)
     if not unknowns:
@@ -149,7 +149,7 @@ class _ComplexSolutions(NamedTuple):
 
 
 class _BlockRootSolver:
-    """One group with its numbers."""
+    """One block with its numbers."""
 
     def __init__(self, setup: PreparedMechanism, stage: Block, z: Array, known: _BlockStructure):
         self.setup, self.stage, self.z, self.structure = setup, stage, z, known
@@ -268,7 +268,7 @@ class _BlockRootSolver:
         ]
 
     def _is_root(self, root: Array, within: float) -> bool:
-        """Whether all rows are met, those too that a redundant group has more."""
+        """Whether all rows are met, those too that a redundant block has more."""
         return bool(np.max(np.abs(self.residual_function(root[None])[0]), initial=0.0) <= within)
 
     def _is_same_root(self, one: Array, other: Array, within: float = SAME_ASSEMBLY_TOLERANCE) -> bool:
@@ -321,13 +321,13 @@ def _isolated_and_curves(
 
 
 def _is_angle(setup: PreparedMechanism, stage: Block) -> Array:
-    """Which unknowns of a group are angles (unknowns,)."""
+    """Which unknowns of a block are angles (unknowns,)."""
     own = (setup.equations.coordinates[column] for column in setup.equations.unknowns[stage.unknowns])
     return np.array([each.kind is not MeasureKind.LENGTH for each in own], dtype=bool)
 
 
 def _linear_root(setup: PreparedMechanism, stage: Block, z: Array, slope: ca.Function, certify: bool) -> BlockRoots:
-    """The one assembly of a group whose equations are linear."""
+    """The one assembly of a block whose equations are linear."""
     given = (z, setup.inputs.u, setup.inputs.p)
     closing = block_residual_function(setup.functions, stage, z, *given[1:])
     unknowns, rows = slice_length(stage.unknowns), slice_length(stage.rows)
@@ -347,7 +347,7 @@ def _linear_root(setup: PreparedMechanism, stage: Block, z: Array, slope: ca.Fun
 
 
 def _least_singular_ratio(closing: ResidualFunction, real: Array) -> Array:
-    """The least singular value of a group's slope, of the greatest (roots,): none where a direction is open."""
+    """The least singular value of a block's slope, of the greatest (roots,): none where a direction is open."""
     if not real.size:
         return np.ones(len(real))
     values = np.linalg.svd(closing(real)[1], compute_uv=False)

@@ -44,6 +44,10 @@ def modes(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = 
     after group: dimensions, inputs and the groups before it are taken as the floats they are. It needs python-flint.
 
     Raises NoAnswer where the inputs leave links free whatever the dimensions.
+
+    >>> import planar
+    >>> len(planar.modes(planar.load("four-bar"), certify=False))
+    2
     """
     if isinstance(drives, Mapping):
         drives = [Drive(pair, position) for pair, position in drives.items()]

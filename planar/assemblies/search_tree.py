@@ -1,4 +1,4 @@
-"""The tree of assemblies: the groups of links one after the other, each with what the choices before leave it."""
+"""The tree of assemblies: the blocks of links one after the other, each with what the choices before leave it."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ BEST_TO_WORST = (Completeness.PROVED, Completeness.NUMERICALLY, Completeness.NOT
 SAME_ROOT_DISTANCE, SAME_DOUBLE_ROOT_DISTANCE = 1e-6, 1e-4
 """How near to a root unknowns are that root, and one where two meet, which rounding puts farther off."""
 REGULAR_SINGULAR_VALUE = 1e-9
-"""A linear group whose slope is weaker than this part of itself has no single assembly."""
+"""A linear block whose slope is weaker than this part of itself has no single assembly."""
 JACOBIAN_ROUNDING = 1e-12
 """What is rounding in a slope."""
 
 
 class AssemblyPath(NamedTuple):
-    """One assembly of all groups: which root of each (from 0), the unknowns, and what is known of those roots."""
+    """One assembly of all blocks: which root of each (from 0), the unknowns, and what is known of those roots."""
 
     choices: tuple[int, ...]
     z: Array
@@ -37,7 +37,7 @@ class AssemblyPath(NamedTuple):
 
 
 class _CountingNode:
-    """A group on the way of counting: the root that is next, and how many assemblies there are with those before."""
+    """A block on the way of counting: the root that is next, and how many assemblies there are with those before."""
 
     def __init__(self, index: int, key: bytes, real: Array):
         self.index, self.key, self.real = index, key, real
@@ -46,9 +46,9 @@ class _CountingNode:
 
 
 class AssemblyTree:
-    """The assemblies of a mechanism at its inputs, group after group; nothing is solved before it is asked for.
+    """The assemblies of a mechanism at its inputs, block after block; nothing is solved before it is asked for.
 
-    A group that hangs on the same choices before it is solved once.
+    A block that hangs on the same choices before it is solved once.
     """
 
     def __init__(self, setup: PreparedMechanism, certify: bool):
@@ -56,7 +56,7 @@ class AssemblyTree:
         self.stages = setup.equations.blocks
         touched = block_dependencies(setup)
         self._dependencies = [np.array(sorted(columns), dtype=int) for columns in touched]
-        # what is chosen before a group and matters for it or for a later one
+        # what is chosen before a block and matters for it or for a later one
         self._relevant_choices: list[Array] = []
         later: set[int] = set()
         for stage, columns in zip(reversed(self.stages), reversed(touched), strict=True):
@@ -68,7 +68,7 @@ class AssemblyTree:
         self._counted: list[dict[bytes, int]] = [{} for _ in self.stages]
 
     def roots(self, index: int, z: Array) -> BlockRoots:
-        """The assemblies of one group, the unknowns of those before it in z (unknowns,)."""
+        """The assemblies of one block, the unknowns of those before it in z (unknowns,)."""
         key = z[self._dependencies[index]].tobytes()
         known = self._solved[index]
         if key not in known:
@@ -76,12 +76,12 @@ class AssemblyTree:
         return known[key]
 
     def solved_roots(self, index: int) -> tuple[BlockRoots, ...]:
-        """What has been found of one group so far, once for each of the places of those before it."""
+        """What has been found of one block so far, once for each of the places of those before it."""
         return tuple(self._solved[index].values())
 
     @property
     def complete(self) -> Completeness:
-        """How surely what has been solved of the groups is all: of a curve only one place is taken further."""
+        """How surely what has been solved of the blocks is all: of a curve only one place is taken further."""
         found = [self.solved_roots(index) for index in range(len(self.stages))]
         if any(each.has_curve for of in found[:-1] for each in of):
             return Completeness.NOT
@@ -90,7 +90,7 @@ class AssemblyTree:
     def moving_links(self) -> Sequence[str]:
         """Where there is no assembly: links with a curve of them, of which another place might go on to one.
 
-        None of them where some group never goes together that does not hang on any such curve.
+        None of them where some block never goes together that does not hang on any such curve.
         """
         moving: list[str] = []
         hanging: set[int] = set()
@@ -108,12 +108,12 @@ class AssemblyTree:
         return moving
 
     def paths(self) -> Iterator[AssemblyPath]:
-        """All assemblies: of the first group the first, and with it those of the next in order, and so on."""
+        """All assemblies: of the first block the first, and with it those of the next in order, and so on."""
         z = np.zeros(len(self.setup.equations.unknowns))
         if not self.stages:
             yield AssemblyPath((), z, True, False)
             return
-        # of every group on the way: its roots, the one that is next, and whether an earlier one led to an end
+        # of every block on the way: its roots, the one that is next, and whether an earlier one led to an end
         way: list[list] = [[self.roots(0, z), 0, False]]
         while way:
             found, rank, led = way[-1]
@@ -176,14 +176,14 @@ class AssemblyTree:
         return found
 
     def count(self, most: int) -> int | None:
-        """How many assemblies there are, without listing those of groups that do not hang on each other.
+        """How many assemblies there are, without listing those of blocks that do not hang on each other.
 
-        None where that takes more than so many dyads solved, or what larger groups are in dyads.
+        None where that takes more than so many dyads solved, or what larger blocks are in dyads.
         """
         return self._count_from(0, np.zeros(len(self.setup.equations.unknowns)), [most])
 
     def _count_from(self, first: int, z: Array, room: list[int]) -> int | None:
-        """How many assemblies the groups from one on have; `room` runs down as groups are solved."""
+        """How many assemblies the blocks from one on have; `room` runs down as blocks are solved."""
         z = z.copy()
         way: list[_CountingNode] = []
         many = self._count_or_push(first, z, way, room)
@@ -203,7 +203,7 @@ class AssemblyTree:
         return many
 
     def _count_or_push(self, index: int, z: Array, way: list[_CountingNode], room: list[int]) -> int | None:
-        """How many the groups from one on have if that is known, else the group is put on the way to be counted."""
+        """How many the blocks from one on have if that is known, else the block is put on the way to be counted."""
         if index == len(self.stages):
             return 1
         key = self._choice_key(index, z)
@@ -217,12 +217,12 @@ class AssemblyTree:
         return self._counted[index][key]
 
     def _choice_key(self, index: int, z: Array) -> bytes:
-        """What of the choices before a group matters for it and for all later ones."""
+        """What of the choices before a block matters for it and for all later ones."""
         return z[self._relevant_choices[index]].tobytes()
 
 
 def _solve_block(setup: PreparedMechanism, stage: Block, z: Array, certify: bool) -> BlockRoots:
-    """One group: nothing to choose, one linear solution, two in closed form, or a larger group."""
+    """One block: nothing to choose, one linear solution, two in closed form, or a larger block."""
     if not slice_length(stage.unknowns):
         left, _ = setup.functions.block_call(stage)(z, setup.inputs.u, setup.inputs.p)
         stands = int(np.abs(left).max(initial=0.0) <= CLOSED_TOLERANCE)
@@ -230,7 +230,7 @@ def _solve_block(setup: PreparedMechanism, stage: Block, z: Array, certify: bool
     known = _linear_roots(setup, stage, z) or _dyad_roots(setup, stage, z)
     if known is not None and not certify:
         return known
-    # positions of dyads alone are told without what larger groups need
+    # positions of dyads alone are told without what larger blocks need
     from planar.assemblies.block_roots import block_roots
 
     found = block_roots(setup, stage, z, certify)
@@ -238,7 +238,7 @@ def _solve_block(setup: PreparedMechanism, stage: Block, z: Array, certify: bool
 
 
 def _in_known_order(known: BlockRoots, found: BlockRoots) -> BlockRoots:
-    """What has been found and certified, in the order of what was known before, which stays as the group moves."""
+    """What has been found and certified, in the order of what was known before, which stays as the block moves."""
     if len(known.real) != len(found.real) or found.complete is Completeness.NOT:
         return known
     gaps = np.abs(np.exp(1j * known.real[:, None, :]) - np.exp(1j * found.real[None, :, :])).sum(axis=2)
@@ -255,7 +255,7 @@ def _uncertified_roots(real: Array, expected: int, said: str) -> BlockRoots:
 
 
 def is_linear(setup: PreparedMechanism, stage: Block, z: Array) -> bool:
-    """Whether the slope of a group does not depend on its own unknowns, those before it given in z (unknowns,)."""
+    """Whether the slope of a block does not depend on its own unknowns, those before it given in z (unknowns,)."""
     rng, closing, many = np.random.default_rng(0), _residual_function(setup, stage, z), slice_length(stage.unknowns)
     slope = closing(np.zeros(many))[1]
     others = (closing(rng.uniform(0.5, 2.0, many))[1] for _ in range(2))
@@ -263,7 +263,7 @@ def is_linear(setup: PreparedMechanism, stage: Block, z: Array) -> bool:
 
 
 def _residual_function(setup: PreparedMechanism, stage: Block, z: Array) -> Callable[[Array], tuple[Array, Array]]:
-    """What a group leaves open (rows,) and its slope (rows, unknowns) at its own unknowns."""
+    """What a block leaves open (rows,) and its slope (rows, unknowns) at its own unknowns."""
 
     def closing(own: Array) -> tuple[Array, Array]:
         whole = z.copy()
@@ -275,7 +275,7 @@ def _residual_function(setup: PreparedMechanism, stage: Block, z: Array) -> Call
 
 
 def _linear_roots(setup: PreparedMechanism, stage: Block, z: Array) -> BlockRoots | None:
-    """The one assembly of a group whose constraints are linear in its unknowns; None where they are not."""
+    """The one assembly of a block whose constraints are linear in its unknowns; None where they are not."""
     e, many = setup.equations, slice_length(stage.unknowns)
     rows = e.rows[stage.rows]
     if len(rows) != many or (many > 1 and any(row.kind is MeasureKind.ANGLE for row in rows)):
@@ -299,7 +299,7 @@ def _linear_roots(setup: PreparedMechanism, stage: Block, z: Array) -> BlockRoot
 
 
 def _dyad_roots(setup: PreparedMechanism, stage: Block, z: Array) -> BlockRoots | None:
-    """The two assemblies of a group with a closed form, always in the same order; None where they all but meet."""
+    """The two assemblies of a block with a closed form, always in the same order; None where they all but meet."""
     form = setup.functions.block_assemblies(stage)
     if form is None:
         return None

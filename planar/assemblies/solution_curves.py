@@ -1,4 +1,4 @@
-"""Curves of assemblies of one group: links that can move while the inputs are held."""
+"""Curves of assemblies of one block: links that can move while the inputs are held."""
 
 from __future__ import annotations
 

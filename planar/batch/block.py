@@ -85,7 +85,7 @@ class _DesignBlockSolver:
         self.range_length = np.broadcast_to(np.asarray(length, dtype=float), (self.design_count,))
 
     def solve(self) -> SolvedDesigns:
-        """See `solve_block`."""
+        """See `solve_design_block`."""
         block = self.block
         status = np.zeros((self.design_count, block.steps + 1), dtype=np.int8)
         grid = np.linspace(0.0, 1.0, block.steps + 1)

@@ -177,7 +177,7 @@ class _AssemblySearch:
     def _extend_clearly(self, stage: Block, here: _PartialAssemblies, roots: Array) -> tuple[_PartialAssemblies, Array]:
         """Every design with one way to add a group, and the designs for which that is not clearly the one meant.
 
-        It is where it lies at the sketch, and the slope is so regular that no other is near: see `Candidates`.
+        It is where it lies at the sketch, and the slope is so regular that no other is near: see `BlockAssemblies`.
         """
         every = np.arange(self.design_count)
         sketched = len(self.candidates.sketched_by_level.get(stage.block_index, ()))

@@ -46,8 +46,8 @@ def find_nearest_assemblies(
 
     Costs never fall: where the nearest assembly is taken of every group, and each group's next one alone would cost
     more than all these, there is no nearer one of the whole. A group in closed form has two assemblies; any other as
-    many as
-    the base has, if they are found again, or it lies where it does at the sketch, and so regular that no other is near.
+    many as the base has, if they are found again, or it lies where it does at the sketch, and so regular that no other
+    is near.
     """
     candidates = reference.candidates
     stages = [stage for stage in reference.functions.equations.blocks if slice_length(stage.unknowns)]

@@ -21,10 +21,9 @@ class Sweep:
     `position`, `velocity` and `acceleration` map the points' names to arrays (designs, steps + 1, 2); the two latter
     are None where no rates were asked for. NaN where a position is refused; rates also on a dead point itself, where
     none is determined. Written to a store they are read when they are indexed, which raises BadInput where a block of
-    it is missing or damaged.
-    `status` (designs, steps + 1): 0 is solved, any other number k is `outcomes[k]`.
-    `input`: positions of the input that runs, (steps + 1,), or (designs, steps + 1) where they differ.
-    `general`: how many positions the general path solved, one design after the other. `said`: what there is to say.
+    it is missing or damaged. `status` (designs, steps + 1): 0 is solved, any other number k is `outcomes[k]`. `input`:
+    positions of the input that runs, (steps + 1,), or (designs, steps + 1) where they differ. `general`: how many
+    positions the general path solved, one design after the other. `said`: what there is to say.
     """
 
     points: tuple[str, ...]

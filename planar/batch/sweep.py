@@ -66,7 +66,7 @@ def sweep(  # many: the public signature; long: its docstring
     store goes on with the blocks that are missing or damaged. `progress` is called with how many designs are done, and
     how many there are.
 
-    Raises BadInput for a name that is not there, a range or a store that cannot be; NotWritten, which is one, where a
+    Raises BadInput for a name that is not there, a range or a store that cannot be; WriteFailure, which is one, where a
     store finds no more room.
     """
     values = read_designs(mechanism, designs)

@@ -90,7 +90,7 @@ def _forces_at_position(
     from planar.analysis.motion.mechanical_advantage import advantages
     from planar.analysis.worked.published import compare_published
     from planar.dynamics.forces import forces as at_state
-    from planar.reports.tables.forces import record, tables
+    from planar.reports.tables.forces.position_forces import record, tables
     from planar.solving.position import solve
 
     moved = parse_drives(mechanism, at)
@@ -112,7 +112,7 @@ def _forces_over_motion(
     """The forces over a whole motion."""
     from planar.dynamics.forces import forces as over_motion
     from planar.reports.files.run_files import check_writable
-    from planar.reports.tables.forces_over_motion import force_series, run_facts, tables
+    from planar.reports.tables.forces.forces_over_motion import force_series, run_facts, tables
 
     if output is not None:
         check_writable(output.suffix)

@@ -55,7 +55,7 @@ def models(as_json: bool) -> None:
     if as_json:
         click.echo(json.dumps([{"model": n, "ids": ids, "about": about} for n, ids, about in rows], ensure_ascii=False))
         return
-    from planar.reports.tables_of_numbers import models_table as table
+    from planar.reports.tables.inspection import models_table as table
 
     print_or_write(table((name, ", ".join(ids), about) for name, ids, about in rows), None)
 

@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 @click.option("--circuits", "circled", is_flag=True, help="Also the circuit and the branch on which each lies.")
 @input_option
 @output_option("Write the tables to a .txt, .svg or .html file.")
-def modes(
+def modes(  # many: options of a command
     model: str,
     as_json: bool,
     at: tuple[str, ...],

@@ -69,7 +69,7 @@ DRAWN_STEPS = 360
 @click.option("--chords", is_flag=True, help="Diagrams with graphical differentiation beside the curves.")
 @range_options
 @mode_option
-def plot(
+def plot(  # many: options of a command; # long: each has its line
     model: str,
     what: str,
     output: Path,

@@ -65,7 +65,7 @@ def solve(
 
         click.echo(json.dumps(record(state, comparisons, relatives), ensure_ascii=False, indent=1, allow_nan=False))
         return
-    from planar.reports.tables_of_numbers import solution_tables
+    from planar.reports.tables.position import solution_tables
 
     print_or_write(solution_tables(state, comparisons, relatives), output)
 

@@ -52,7 +52,7 @@ class UnsupportedOperation(Exception):
 
 
 def check_length(instructions: int) -> None:
-    """Raises NotPrinted for more instructions than one function may have."""
+    """Raises UnsupportedOperation for more instructions than one function may have."""
     if instructions > MAX_INSTRUCTIONS:
         raise UnsupportedOperation(f"more than {MAX_INSTRUCTIONS} instructions take too long to compile")
 

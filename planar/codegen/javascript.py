@@ -33,7 +33,7 @@ class CaseInstructionList(InstructionList):
 def write_javascript(name: str, function: ca.Function) -> str:
     """A function of arrays, the last of which receives all results, one dense matrix after the other, column by column.
 
-    Raises NotPrinted where it holds an operation that is not known.
+    Raises UnsupportedOperation where it holds an operation that is not known.
     """
     listing = CaseInstructionList()
     inputs = [

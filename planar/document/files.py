@@ -49,6 +49,10 @@ def load(model: str | Path) -> Mechanism:
     """The mechanism in a file, or the model of that name or id that comes along; "-" is what is piped in.
 
     Raises BadInput.
+
+    >>> import planar
+    >>> [link.name for link in planar.load("four-bar").links]
+    ['AD', 'AB', 'BC', 'DC']
     """
     if str(model) == PIPED:
         return loads(_piped(), "standard input")

@@ -23,19 +23,13 @@ from planar.document.schema import (
     UNITS_SCHEMA,
 )
 from planar.foundation.units import UnitError, parse_unit
-from planar.model.link_shapes import PointPlacementError, link_shape
+from planar.model.link_shapes import Along, At, Distances, Link, Point, PointDefinition, PointPlacementError, link_shape
 from planar.model.mechanism import (
     PUBLISHED_QUANTITIES,
-    Along,
-    At,
-    Distances,
     Drive,
     FileUnits,
     Input,
-    Link,
     Mechanism,
-    Point,
-    PointDefinition,
     PublishedValue,
     pair_misfits,
     relative_motions,

@@ -9,12 +9,11 @@ from planar.document.input_laws import write_law
 from planar.document.loads import write_loads
 from planar.document.schema import DRIVE_SCHEMA, FORMAT_VERSION
 from planar.foundation.units import SI_UNITS, Unit, parse_unit, shortest_number
-from planar.model.link_shapes import Along, At, PointDefinition
+from planar.model.link_shapes import Along, At, Link, PointDefinition
 from planar.model.mechanism import (
     PUBLISHED_QUANTITIES,
     Drive,
     Input,
-    Link,
     Mechanism,
     PublishedValue,
     pair_entries,

@@ -21,7 +21,7 @@ from planar.foundation.short_repr import short_repr
 from planar.model.link_shapes import LinkShape
 from planar.model.loads import COINCIDENCE_TOLERANCE, Load, Spring
 from planar.model.mechanism import relative_motions
-from planar.results.motion import KinematicResult
+from planar.results.kinematic_result import KinematicResult
 
 Array = np.ndarray
 

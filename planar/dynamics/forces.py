@@ -113,6 +113,10 @@ def forces(moving: State | Motion, inertia: bool = True) -> Forces:
     rigid bodies do not tell is NaN and named. Raises BadInput where a load, spring or mass is none of this
     mechanism's; NoAnswer where there are more inputs than freedoms, and where no forces in the pairs balance the
     links, as at a dead point (of a motion such rows are NaN).
+
+    >>> import planar
+    >>> list(planar.forces(planar.solve(planar.load("four-bar"))).reactions)
+    ['A', 'B', 'C', 'D']
     """
     mechanism = moving.mechanism
     check_loads(mechanism)

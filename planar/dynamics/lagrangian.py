@@ -24,7 +24,7 @@ from planar.foundation.geometry import Vector
 from planar.foundation.jets import value_and_rates
 from planar.model.loads import COINCIDENCE_TOLERANCE, Load, Mass, Spring
 from planar.model.mechanism import Mechanism, relative_motions
-from planar.results.motion import KinematicResult
+from planar.results.kinematic_result import KinematicResult
 
 Array = np.ndarray
 

@@ -47,8 +47,8 @@ class ForceSolution(NamedTuple):
     """What inputs and pairs do at positions (n).
 
     `efforts` (n, inputs); `wrenches` of every pair on each of its bodies (n), and by `changes` (n, ways) how they may
-    be otherwise; `efforts_change` (n, inputs, ways) alike. `because` has for every way the pair whose share in it is
-    not known, or nothing where links are held more than once. `balanced` (n,) is False where no forces in the pairs
+    be otherwise; `effort_changes` (n, inputs, ways) alike. `causes` has for every way the pair whose share in it is
+    not known, or nothing where links are held more than once. `is_balanced` (n,) is False where no forces in the pairs
     balance the links, as at a dead point.
     """
 
@@ -236,7 +236,7 @@ class ReactionSolver:
 
 
 def _pseudo_inverse(held: Array) -> tuple[Array, Array]:
-    """Those of `Reactions._inverse` by singular values."""
+    """Those of `ReactionSolver._inverse_and_null_space` by singular values."""
     u, s, v = np.linalg.svd(held)
     strong = s > RANK_TOLERANCE * s[:, :1]
     few, back = s.shape[1], v.transpose(0, 2, 1)

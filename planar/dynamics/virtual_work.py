@@ -50,7 +50,7 @@ class BalanceFunction:
 
     def evaluate(self, q: Array, q1: Array, q2: Array, factors: Array, wound: Array) -> VirtualWorkBalance:
         """Everything at coordinates with their rates (n, coordinates), each alike; factors of the loads (n, loads), and
-        `wound` as `Work.wound` has it."""
+        `wound` as `LagrangianFunctions.initial_spring_turns` gives it."""
         parts = self._called.evaluate_batch(len(q), q, q1, q2, factors, wound)
         slopes, drives = (each.transpose(0, 2, 1) for each in parts[:2])
         loads, inertia = (each[:, 0] for each in parts[2:])

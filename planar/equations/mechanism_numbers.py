@@ -7,8 +7,8 @@ from math import hypot
 
 import numpy as np
 
-from planar.model.link_shapes import LinkShape, link_shape
-from planar.model.mechanism import Input, Link, Mechanism, relative_motions
+from planar.model.link_shapes import Link, LinkShape, link_shape
+from planar.model.mechanism import Input, Mechanism, relative_motions
 from planar.model.pairs import MeasureKind, Pair
 
 Array = np.ndarray

@@ -1,8 +1,8 @@
 """Arithmetic that floats, arrays, symbols and jets share, so that a formula is written once.
 
-A *jet* is a quantity together with its time derivatives; running a formula on jets
-gives its velocity and acceleration by the rules of Leibniz and of the chain, without a
-second formula (A. Griewank, A. Walther, Evaluating Derivatives, SIAM 2008, ch. 13).
+A *jet* is a quantity together with its time derivatives; running a formula on jets gives its velocity and acceleration
+by the rules of Leibniz and of the chain, without a second formula (A. Griewank, A. Walther, Evaluating Derivatives,
+SIAM 2008, ch. 13).
 """
 
 from __future__ import annotations

@@ -75,7 +75,7 @@ _LENGTH_RATE_SUFFIXES = {"velocity": "/s", "acceleration": "/s^2", "jerk": "/s^3
 """Kinds of quantities that are lengths by time, and what stands behind the unit of length."""
 
 MAX_QUANTITY_LENGTH = 64
-"""Characters of a quantity; the longest that `shortest` writes takes 33."""
+"""Characters of a quantity; the longest that `shortest_number` writes takes 33."""
 
 _QUANTITY_PATTERN = re.compile(r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*(.*?)\s*", re.DOTALL)
 # a word, with one small exponent at most, joined by a space, a dot, * or /: nothing that could be an expression

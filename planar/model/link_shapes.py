@@ -117,7 +117,7 @@ class LinkShape:
 def link_shape(link: Link) -> LinkShape:
     """Place every point of a link.
 
-    Raises Unplaced where a point rests on itself, on a missing point, or on a triangle that does not close.
+    Raises PointPlacementError where a point rests on itself, on a missing point, or on a triangle that does not close.
     """
     drawn: dict[str, Vector] = {}
     if link.ends is not None:

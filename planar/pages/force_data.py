@@ -21,7 +21,7 @@ from planar.model.loads import Course, Load, Spring
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import Pair
 from planar.model.pairs.base import ToothContact
-from planar.reports.tables.forces import undetermined_sentences
+from planar.reports.tables.forces.position_forces import undetermined_sentences
 from planar.results.motion import State
 
 
@@ -159,7 +159,7 @@ def _input_data(name: str, rows: BalanceRows, row: int, slide: bool) -> dict[str
 
 
 def _action_data(rows: BalanceRows) -> Iterator[dict[str, Any]]:
-    """Every load, weight and spring, in the order of `Work.acting`: its row, and its places on links."""
+    """Every load, weight and spring, in the order of `collect_actions`: its row, and its places on links."""
     work, mechanism = rows.work, rows.mechanism
     row, _ = rows.add(work.actions_on_links.T)
     for load in mechanism.loads:

@@ -105,8 +105,10 @@ def _presentation(shown: Any) -> tuple[Mechanism | State | Motion, tuple[str, ..
     from planar.assemblies.circuits.circuits import Circuits
     from planar.assemblies.modes import Modes, modes
     from planar.dynamics.forces import Forces
-    from planar.reports.tables import centres, circuits, forces, forces_over_motion
+    from planar.reports.tables import centres, circuits
     from planar.reports.tables import modes as assemblies
+    from planar.reports.tables.forces import forces_over_motion
+    from planar.reports.tables.forces import position_forces as forces
 
     if isinstance(shown, Forces):
         over = isinstance(shown.moving, Motion)

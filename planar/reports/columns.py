@@ -13,7 +13,7 @@ from planar.results.motion import Motion
 Array = np.ndarray
 
 POINT_KINDS = {"position": "length", "velocity": "velocity", "acceleration": "acceleration", "jerk": "jerk"}
-"""What is told of a point, and the kind of quantity that each is; a jerk where the run has one."""
+"""What is reported of a point, and the kind of quantity that each is; a jerk where the run has one."""
 
 UNITS_BY_KIND = SI_UNITS | {"power": "W", "energy": "J"}
 """The unit of every kind of quantity that results have."""
@@ -25,11 +25,11 @@ _GROUP_PREFIXES = {"inputs": "input ", "pairs": "pair ", "reactions": "reaction 
 
 
 class ReportedSeries(NamedTuple):
-    """What a run tells of one thing, in SI.
+    """What is reported of one thing over a run, in SI.
 
-    `group` is "inputs", "points", "links" or "pairs", or what else is told beside the run; a name that is empty means
-    the mechanism as a whole. `values` are arrays (n,), or (n, 2) of vectors, under the names of the quantities, None
-    where the thing has no such quantity; `kinds` are the kinds of these quantities (see MEASURES).
+    `group` is "inputs", "points", "links" or "pairs", or what else is reported beside the run; a name that is empty
+    means the mechanism as a whole. `values` are arrays (n,), or (n, 2) of vectors, under the names of the quantities,
+    None where the thing has no such quantity; `kinds` are the kinds of these quantities (see MEASURES).
     """
 
     group: str

@@ -20,6 +20,7 @@ MAX_DURATION = 1e6
 
 
 @takes_mechanism
+# many: what callers may choose of a run; # long: the docstring
 def cycle(
     mechanism: Mechanism,
     steps: int = 360,
@@ -60,6 +61,10 @@ def cycle(
     the curve of positions, and 100 more for each turn of the range. `progress(done, total)` is called while a long
     range is followed, in rad or m of the input's way. Raises BadInput for an input or a range that is not there,
     NoAnswer where there is no position to start from.
+
+    >>> import planar
+    >>> len(planar.cycle(planar.load("slider-crank"), steps=12))
+    13
     """
     check_steps(steps)
     check_number("start", start, LARGEST_COUNTED_ANGLE)

@@ -37,7 +37,8 @@ NEIGHBOUR_DISTANCE = 1e-3
 
 
 class FullConstraints:
-    """The residuals of all pairs, or of some, at coordinates w (coordinates,), as `Equations.coordinates` has them."""
+    """The residuals of all pairs, or of some, at coordinates w (coordinates,), as `ConstraintEquations.coordinates` has
+    them."""
 
     def __init__(self, setup: PreparedMechanism, pairs: Sequence[Pair] | None = None):
         self.setup = setup

@@ -55,6 +55,6 @@ class LazyFrameMapping(Mapping[str, Any]):
 def lazy_frames(
     setup: PreparedMechanism, coordinate_rates: Array | list[Array]
 ) -> tuple[LazyFrameMapping, LazyFrameMapping]:
-    """Frames of links and own coordinates of pairs; see `Placing`."""
+    """Frames of links and own coordinates of pairs; see `LazyFrames`."""
     placing = LazyFrames(setup, coordinate_rates)
     return LazyFrameMapping(placing, 0), LazyFrameMapping(placing, 1)

@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.equations.functions import EquationFunctions, slice_length
+from planar.equations.constraint_equations import slice_length
+from planar.equations.functions import EquationFunctions
 
 Array = np.ndarray
 ResidualFunction = Callable[[Array], tuple[Array, Array]]

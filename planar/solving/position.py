@@ -23,7 +23,8 @@ from planar.solving.assembly.block_assemblies import BlockAssemblies
 from planar.solving.assembly.nearest_assembly import Assembly, AssemblySearchFailure, find_nearest_assembly
 from planar.solving.checks.singular_values import MIN_REGULARITY
 from planar.solving.continuation.fast_path import StraightPathCache, fast_position, is_surely_regular
-from planar.solving.continuation.path import BranchRates, follow_straight
+from planar.solving.continuation.path import follow_straight
+from planar.solving.continuation.path_pieces import BranchRates
 from planar.solving.diagnosis import refusals
 from planar.solving.lazy_frames import lazy_frames
 from planar.solving.prepared_mechanism import PreparedMechanism
@@ -52,6 +53,10 @@ def solve(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = 
 
     Raises NoAnswer, whose outcome says whether the mechanism cannot be assembled, stands on a dead point or a change
     point, or has too few or too many inputs; its text names links, pairs, position and remedy.
+
+    >>> import planar
+    >>> planar.solve(planar.load("four-bar"))
+    <State of 'Four-bar chain' at A = 60 deg>
     """
     if isinstance(drives, Mapping):
         drives = [Drive(pair, position) for pair, position in drives.items()]

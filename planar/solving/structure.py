@@ -11,12 +11,10 @@ from planar.equations.acceptance import AcceptanceFunctions, acceptance_function
 from planar.equations.coordinates import coordinate_columns
 from planar.equations.functions import MAX_CACHED_STRUCTURES, EquationFunctions, equation_functions
 from planar.foundation.errors import BadInput
-from planar.model.link_shapes import At
+from planar.model.link_shapes import At, Link, Point
 from planar.model.mechanism import (
     Input,
-    Link,
     Mechanism,
-    Point,
     check_mechanism,
     find_law_problem,
     links_counting_turns,

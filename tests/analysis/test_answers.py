@@ -2,7 +2,7 @@
 
 import json
 from itertools import pairwise
-from math import acos, asin, atan2, cos, hypot, inf, pi, radians, sin, sqrt
+from math import acos, asin, inf, pi, radians, sin, sqrt
 
 import numpy as np
 import pytest
@@ -13,47 +13,11 @@ from planar.cli import main
 from planar.foundation.errors import BadInput, Unknown
 from planar.model.mechanism import Drive, relative_motions, replace_inputs
 from planar.reports.tables.answers import record, tables
-from tests.analysis.test_extremes import slider_crank, turn_apart
+from tests.builders import crank_rocker, open_four_bar, slider_crank
+from tests.closed_forms import turn_apart
 from tests.draws import part
 
 SEEDS = part(range(8), 2)
-
-
-def four_bar(a, b, c, d, velocity=3.0, position=1.0):
-    """A crank a, a coupler b with a point P, a rocker c and a frame d along x (m), the open assembly."""
-    pin, size = np.array([a * cos(position), a * sin(position)]), None
-    far = hypot(d - pin[0], -pin[1])
-    size = atan2(-pin[1], d - pin[0]) + acos((b * b + far * far - c * c) / (2.0 * b * far))
-    joint = pin + b * np.array([cos(size), sin(size)])
-    return planar.from_dict(
-        {
-            "planar": 1,
-            "name": "Four-bar",
-            "frame": "frame",
-            "links": {
-                "frame": {"points": {"A": [0, 0], "D": [d, 0]}},
-                "AB": {"ends": ["A", "B"], "length": a},
-                "BC": {
-                    "ends": ["B", "C"],
-                    "length": b,
-                    "points": {"P": {"along": ["B", "C"], "distance": b, "angle": 0.7}},
-                },
-                "DC": {"ends": ["D", "C"], "length": c},
-            },
-            "pairs": [{"turning": "A"}, {"turning": "B"}, {"turning": "C"}, {"turning": "D"}],
-            "inputs": [{"pair": "A", "position": position, "velocity": velocity}],
-            "sketch": {"B": list(map(float, pin)), "C": list(map(float, joint))},
-        }
-    )
-
-
-def crank_rocker(seed):
-    """Lengths of a random four-bar whose crank turns and whose rocker swings (Grashof, the crank shortest)."""
-    rng = np.random.default_rng(seed)
-    while True:
-        a, b, c, d = (float(x) for x in rng.uniform(0.1, 1.0, 4))
-        if min(b, c, d) > 1.1 * a and a + max(b, c, d) < 0.95 * (a + b + c + d - a - max(b, c, d)):
-            return a, b, c, d
 
 
 def by_cosines(one, two, opposite):
@@ -64,7 +28,7 @@ def by_cosines(one, two, opposite):
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_crank_rocker_swings_and_returns_as_the_law_of_cosines_says(seed):
     a, b, c, d = crank_rocker(seed)
-    motion = planar.cycle(four_bar(a, b, c, d, velocity=-2.0 if seed % 2 else 3.0), 24)
+    motion = planar.cycle(open_four_bar(a, b, c, d, velocity=-2.0 if seed % 2 else 3.0), 24)
     outer, inner = by_cosines(c, d, a + b), by_cosines(c, d, b - a)  # at D, from the frame
     for name in ("DC", "D"):
         found = planar.swing(motion, name)
@@ -121,7 +85,7 @@ def test_the_shapers_lever_swings_twice_the_angle_of_its_tangent():
 
 
 def test_a_swing_does_not_jump_where_an_angle_passes_half_a_turn():
-    mechanism = planar.to_dict(four_bar(0.2, 0.6, 0.5, 0.7))
+    mechanism = planar.to_dict(open_four_bar(0.2, 0.6, 0.5, 0.7))
     mechanism["links"]["DC"]["ends"] = ["C", "D"]  # the rocker's own angle now passes -180 degrees or not
     found = planar.swing(planar.cycle(planar.from_dict(mechanism), 24), "DC")
     assert found.angle == pytest.approx(by_cosines(0.5, 0.7, 0.8) - by_cosines(0.5, 0.7, 0.4), abs=1e-11)
@@ -135,7 +99,7 @@ def test_a_slide_has_no_swing_and_no_return_without_a_whole_turn():
 
 
 def test_extreme_positions_of_a_crank_pin_are_those_of_its_circle():
-    motion = planar.cycle(four_bar(0.2, 0.6, 0.5, 0.7), 10)
+    motion = planar.cycle(open_four_bar(0.2, 0.6, 0.5, 0.7), 10)
     for axis, way in (("x", 0.0), ("y", pi / 2.0), (0.9, 0.9)):
         found = planar.extremes(motion, "B", axis)
         assert found.greatest.value == pytest.approx(0.2, abs=1e-14)
@@ -146,7 +110,7 @@ def test_extreme_positions_of_a_crank_pin_are_those_of_its_circle():
 
 
 def test_over_a_part_of_a_turn_a_point_may_be_extreme_at_its_ends():
-    motion = planar.cycle(four_bar(0.2, 0.6, 0.5, 0.7), 10, 0.3, 2.0)
+    motion = planar.cycle(open_four_bar(0.2, 0.6, 0.5, 0.7), 10, 0.3, 2.0)
     found = planar.extremes(motion, "B", "y")
     assert found.turning == (False, True)
     assert found.least.input == pytest.approx(0.3, abs=1e-12)
@@ -218,7 +182,7 @@ def test_a_dwell_may_be_cut_by_the_range_and_ripples_make_one_dwell():
 
 
 def test_a_crank_pins_and_a_planets_curve_have_the_areas_of_circle_and_ellipse():
-    motion = planar.cycle(four_bar(0.2, 0.6, 0.5, 0.7), 12)
+    motion = planar.cycle(open_four_bar(0.2, 0.6, 0.5, 0.7), 12)
     found = planar.area(motion, "B")
     assert found.value == pytest.approx(pi * 0.04, rel=1e-14)
     assert found.error <= 1e-10 * found.value
@@ -231,7 +195,7 @@ def test_a_crank_pins_and_a_planets_curve_have_the_areas_of_circle_and_ellipse()
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_area_of_a_coupler_curve_is_half_the_integral_of_x_dy_less_y_dx(seed):
-    mechanism = four_bar(*crank_rocker(seed), velocity=1.0)
+    mechanism = open_four_bar(*crank_rocker(seed), velocity=1.0)
     fine = planar.cycle(mechanism, 720).point("P")
     x, y = fine.position[:-1].T
     u, v = fine.velocity[:-1].T

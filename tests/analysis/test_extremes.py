@@ -10,44 +10,19 @@ from hypothesis import strategies as st
 
 import planar
 from planar.analysis.interpolated_run import InterpolatedRun
-from planar.analysis.motion.extremes import Extreme, greatest, stroke
+from planar.analysis.motion.extremes import greatest, stroke
+from planar.analysis.motion.output import Extreme
 from planar.foundation.errors import BadInput, NoAnswer, Unknown
 from planar.foundation.jets import Jet
 from planar.foundation.root_finding import find_root
 from planar.model.mechanism import Drive, relative_motions, replace_inputs
 from planar.model.pairs import MeasureKind
+from tests.builders import slider_crank
+from tests.closed_forms import turn_apart
 from tests.draws import draws
 
 NEAR = 1e-12
 """rad, and part of a value: rounding of a position solved."""
-
-
-def slider_crank(r, l, e=0.0, **given):  # noqa: E741 - the letters of textbooks
-    """A crank r and a rod l in metres, the stroke e above the crank's pin, to the right."""
-    return planar.from_dict(
-        {
-            "planar": 1,
-            "name": "Slider-crank",
-            "frame": "frame",
-            "links": {
-                "frame": {"points": {"O": [0, 0]}},
-                "OA": {"ends": ["O", "A"], "length": r},
-                "AB": {"ends": ["A", "B"], "length": l},
-            },
-            "pairs": [
-                {"turning": "O"},
-                {"turning": "A"},
-                {"sliding": "stroke", "on": "frame", "block": "B", "line": {"through": [0, e], "angle": 0}},
-            ],
-            "inputs": [{"pair": "O", "position": 1.0, "velocity": 2.0} | given],
-            "sketch": {"B": [r + l, e]},
-        }
-    )
-
-
-def turn_apart(a, b):
-    """The angle between two places of a turn."""
-    return abs((a - b + pi) % (2.0 * pi) - pi)
 
 
 def test_tdc_and_bdc_of_the_engine_are_where_crank_and_rod_are_in_line():

@@ -17,40 +17,12 @@ from planar.analysis.motion.piston import ExactFormulas, Piston, TwoTermFormulas
 from planar.foundation.errors import BadInput, NoAnswer
 from planar.model.mechanism import Drive, relative_motions, replace_inputs
 from planar.reports.tables.analytical import record
+from tests.builders import slider_crank
 from tests.command import run
 from tests.draws import draws
 
 NEAR = 1e-12
 """Part of a value: rounding of a position solved."""
-
-
-def slider_crank(r, l, e=0.0, heading=0.0, **given):  # noqa: E741 - the letters of textbooks
-    """A crank r and a rod l in metres; the stroke at an angle, e to the left of the crank's pin."""
-    way, left = np.array([cos(heading), sin(heading)]), np.array([-sin(heading), cos(heading)])
-    return planar.from_dict(
-        {
-            "planar": 1,
-            "name": "Slider-crank",
-            "frame": "frame",
-            "links": {
-                "frame": {"points": {"O": [0, 0]}},
-                "OA": {"ends": ["O", "A"], "length": r},
-                "AB": {"ends": ["A", "B"], "length": l},
-            },
-            "pairs": [
-                {"turning": "O"},
-                {"turning": "A"},
-                {
-                    "sliding": "stroke",
-                    "on": "frame",
-                    "block": "B",
-                    "line": {"through": list(e * left), "angle": heading},
-                },
-            ],
-            "inputs": [{"pair": "O", "position": 1.0, "velocity": 2.0} | given],
-            "sketch": {"B": list((r + l) * way + e * left)},
-        }
-    )
 
 
 def in_line_series(r, l, count):  # noqa: E741

@@ -18,8 +18,7 @@ from planar.model.link_graph import link_numbers
 from planar.model.mechanism import pair_entries
 from planar.pages.page_data import page_data
 from planar.reports.tables.inspection import inspection_tables, link_orders_text
-from tests.cli.test_commands import written
-from tests.command import ROOT, run
+from tests.command import ROOT, run, written
 from tests.known import MODELS, some_models
 
 SLOW = {"chain-42", "rolling-wheel"}

@@ -28,8 +28,7 @@ from planar.solving.position import solve
 from tests.draws import draws
 from tests.known import some_models
 from tests.known import state_of as solved
-from tests.linkages import random_linkage
-from tests.solving.test_random_linkages import assembled
+from tests.linkages import assembled, random_linkage
 
 KINDS = {"velocity": velocity_polygon, "acceleration": acceleration_polygon}
 TIGHT = 1e-9

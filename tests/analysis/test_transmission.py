@@ -7,8 +7,11 @@ import pytest
 
 import planar
 from planar.foundation.errors import BadInput, Unknown
-from tests.analysis.test_answers import SEEDS, crank_rocker, four_bar
-from tests.analysis.test_extremes import slider_crank, turn_apart
+from tests.builders import crank_rocker, open_four_bar, slider_crank
+from tests.closed_forms import turn_apart
+from tests.draws import part
+
+SEEDS = part(range(8), 2)
 
 
 def acute(angle):
@@ -26,7 +29,7 @@ def between(motion, first, second, third):
 @pytest.mark.parametrize("seed", SEEDS)
 def test_of_a_four_bar_it_is_the_angle_of_the_law_of_cosines(seed):
     a, b, c, d = crank_rocker(seed)
-    motion = planar.cycle(four_bar(a, b, c, d), 24)
+    motion = planar.cycle(open_four_bar(a, b, c, d), 24)
     found = planar.transmission(motion, "DC")
     theta = motion.inputs["A"].position
     expected = acute(np.arccos((b**2 + c**2 - a**2 - d**2 + 2.0 * a * d * np.cos(theta)) / (2.0 * b * c)))

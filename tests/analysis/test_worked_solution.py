@@ -21,6 +21,7 @@ from planar.drawing.paper.scales import parse_scale
 from planar.foundation.errors import PlanarError
 from planar.reports.tables.worked_solution import record, solution_text
 from tests.command import run
+from tests.hostile import NAMES, hostile_document
 from tests.known import some_models, state_of
 from tests.linkages import random_linkage
 
@@ -394,33 +395,10 @@ def test_what_cannot_be_meant_is_refused_in_a_sentence(tmp_path: Path, words: tu
     assert sentence in ended.err
 
 
-HOSTILE = ("$x", "a_b^", "\\frac{", "<b>[red]", "点", "🙂", "name of a point that goes on and on", "%d{}")
-
-
-def hostile() -> dict[str, Any]:
-    """A four-bar whose every name means something to somebody."""
-    a, b, c, d, e, one, two, three = HOSTILE
-    return {
-        "planar": 1,
-        "name": "$\\frac{1}{ [bold]x[/bold] <i> _^ 点🙂",
-        "source": "$$ \\alpha_ {",
-        "frame": "frame $",
-        "links": {
-            "frame $": {"points": {a: [0, 0], d: [0.1, 0]}},
-            one: {"ends": [a, b], "length": 0.05},
-            two: {"ends": [b, c], "length": 0.066, "points": {e: {"along": [b, c], "distance": 0.02}}},
-            three: {"ends": [d, c], "length": 0.056},
-        },
-        "pairs": [{"turning": each} for each in (a, b, c, d)],
-        "inputs": [{"pair": a, "position": 1.0, "velocity": 10.5, "acceleration": -26}],
-        "sketch": {c: [0.08, 0.05]},
-    }
-
-
 def test_names_are_texts_whatever_they_look_like() -> None:
-    solution = worked_solution(planar.solve(planar.from_dict(hostile())))
+    solution = worked_solution(planar.solve(planar.from_dict(hostile_document())))
     text = shown(solution, 140)
-    for name in HOSTILE:
+    for name in NAMES:
         assert name in text
     json.dumps(record(solution))
 

@@ -11,7 +11,7 @@ import pytest
 import planar
 from planar.assemblies.circuits.chebyshev_zeros import SignedLog, find_zeros
 from planar.assemblies.polynomial.completeness import Completeness
-from tests.assemblies.test_modes import four_bar
+from tests.builders import bare_four_bar
 from tests.draws import draws, part
 from tests.linkages import random_linkage
 
@@ -155,7 +155,7 @@ def test_a_linkage_driven_through_a_larger_group_has_as_many_circuits_as_by_its_
 def test_four_bars_have_the_circuits_and_branches_of_grashofs_types(sizes, by_crank, by_rocker):
     crank, coupler, rocker, ground = sizes
     for (driving, driven), expected in (((crank, rocker), by_crank), ((rocker, crank), by_rocker)):
-        found = planar.circuits(four_bar(driving, coupler, driven, ground, 0.8))
+        found = planar.circuits(bare_four_bar(driving, coupler, driven, ground, 0.8))
         assert found.complete is CLAIMED
         assert [len(each.branches) for each in found] == expected
         # at a dead point coupler and driven link are in line; law of cosines
@@ -173,7 +173,7 @@ def test_four_bars_have_the_circuits_and_branches_of_grashofs_types(sizes, by_cr
 def test_near_a_change_point_the_number_is_right_or_not_claimed(off):
     # Grashof: the longest and the shortest together are shorter than the other two
     for sizes, expected in (((2.0, 3.0, 4.0, 5.0 + off), 1 if off > 0.0 else 2), ((1.0, 3.0, 1.0 + off, 3.0), 2)):
-        found = planar.circuits(four_bar(*sizes, 0.8))
+        found = planar.circuits(bare_four_bar(*sizes, 0.8))
         assert found.complete is Completeness.NOT or len(found) == expected
         assert found.complete is CLAIMED or abs(off) < 1e-9
 
@@ -189,16 +189,16 @@ def test_near_a_change_point_the_number_is_right_or_not_claimed(off):
 )
 def test_where_links_all_but_lie_in_line_each_dead_point_is_met_once(sizes, ends):
     """One is longer than the others allow for a whole turn, or all but too long to go together, by 1e-9 or less."""
-    found = planar.circuits(four_bar(*sizes, 1.0))
+    found = planar.circuits(bare_four_bar(*sizes, 1.0))
     assert [len(each.branches) for each in found] == ends
     assert all(branch.high - branch.low > 1e-6 for each in found for branch in each.branches)
 
 
 def test_an_assembly_lies_on_the_branch_of_its_side():
-    found = planar.circuits(four_bar(2.5, 1.0, 3.2, 3.0, 0.8))
+    found = planar.circuits(bare_four_bar(2.5, 1.0, 3.2, 3.0, 0.8))
     sides = {}
     for angle in np.random.default_rng(2).uniform(-7.0, 7.0, draws(20)):
-        for mode in planar.modes(four_bar(2.5, 1.0, 3.2, 3.0, float(angle)), certify=False):
+        for mode in planar.modes(bare_four_bar(2.5, 1.0, 3.2, 3.0, float(angle)), certify=False):
             b, c, d = (mode.points[name] for name in "BCD")
             side = (c - b)[0] * (d - c)[1] - (c - b)[1] * (d - c)[0] > 0.0
             circuit, branch = found.of(mode)
@@ -222,7 +222,7 @@ def test_a_driven_slide_has_its_limits_where_crank_and_rod_are_in_line(off):
 
 
 def test_a_linkage_that_never_goes_together_has_no_circuit():
-    found = planar.circuits(four_bar(1.0, 1.0, 1.0, 5.0, 0.3))
+    found = planar.circuits(bare_four_bar(1.0, 1.0, 1.0, 5.0, 0.3))
     assert len(found) == 0
     assert found.assembles == ()
     assert found.complete is CLAIMED

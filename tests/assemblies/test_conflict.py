@@ -13,7 +13,7 @@ from planar.assemblies.polynomial.completeness import Completeness
 from planar.document.dimensions import change_dimension, link_lengths
 from planar.foundation.errors import NoAnswer, Outcome
 from tests import command
-from tests.assemblies.test_modes import bars, four_bar
+from tests.builders import bar_linkage, bare_four_bar
 from tests.draws import part
 
 TWO_LOOPS = {"A": [0.0, 0.0], "D": [100.0, 0.0], "G": [200.0, 0.0]}
@@ -28,7 +28,7 @@ def six_bar(coupler: float, rocker: float, at: float = pi / 3.0) -> planar.Mecha
         "CF": ("C", "F", coupler),
         "GF": ("G", "F", rocker),
     }
-    return bars(TWO_LOOPS, links, ("A", at))
+    return bar_linkage(TWO_LOOPS, links, ("A", at))
 
 
 def nearest(mechanism: planar.Mechanism, pairs: set[str], inputs: set[str], tries: int) -> float:
@@ -96,7 +96,7 @@ REACH = [
 
 @pytest.mark.parametrize(("crank", "coupler", "rocker", "ground", "at"), REACH)
 def test_a_four_bar_is_mended_by_the_law_of_cosines(crank, coupler, rocker, ground, at):
-    mechanism = four_bar(crank, coupler, rocker, ground, radians(at))
+    mechanism = bare_four_bar(crank, coupler, rocker, ground, radians(at))
     found = planar.conflict(mechanism)
     assert (found.pairs, found.inputs, found.complete) == (("A", "B", "C", "D"), ("A",), Completeness.PROVED)
     far = sqrt(crank**2 + ground**2 - 2.0 * crank * ground * cos(radians(at)))
@@ -132,7 +132,7 @@ def test_a_four_bar_is_mended_by_the_law_of_cosines(crank, coupler, rocker, grou
 
 @pytest.mark.parametrize("at", [150.0, 180.0])  # farthest open at 180: there no small move closes any of it
 def test_of_a_four_bar_the_nearest_position_of_the_crank_is_told(at):
-    mechanism = four_bar(1.0, 1.2, 1.3, 3.0, radians(at))
+    mechanism = bare_four_bar(1.0, 1.2, 1.3, 3.0, radians(at))
     (change,) = planar.conflict(mechanism).positions
     limit = np.arccos((1.0 + 9.0 - 2.5**2) / 6.0)
     assert change.name == "A"
@@ -199,7 +199,7 @@ def test_a_triangle_in_which_a_side_is_too_long_is_a_conflict_by_itself():
     """Beside it on the frame a four-bar that is sound."""
     links = {"AP": ("A", "P", 1.0), "DP": ("D", "P", 1.0)}
     links |= {"EF": ("E", "F", 1.0), "FH": ("F", "H", 3.0), "KH": ("K", "H", 2.5)}
-    value = bars({"A": [0.0, 0.0], "D": [3.0, 0.0], "E": [0.0, -5.0], "K": [3.2, -5.0]}, links, ("E", 0.3))
+    value = bar_linkage({"A": [0.0, 0.0], "D": [3.0, 0.0], "E": [0.0, -5.0], "K": [3.2, -5.0]}, links, ("E", 0.3))
     found = planar.conflict(value)
     assert (set(found.pairs), found.inputs, found.complete) == (set("ADP"), (), Completeness.PROVED)
     check_irreducible(value, found)
@@ -207,7 +207,7 @@ def test_a_triangle_in_which_a_side_is_too_long_is_a_conflict_by_itself():
 
 
 def test_two_inputs_that_disagree_are_both_in_the_conflict():
-    mechanism = four_bar(1.0, 3.0, 2.5, 3.2, 0.8)
+    mechanism = bare_four_bar(1.0, 3.0, 2.5, 3.2, 0.8)
     rocker = planar.solve(mechanism).link("rocker").angle
     both = replace(mechanism, inputs=(*mechanism.inputs, planar.Input("D", rocker + 0.1)))
     found = planar.conflict(both)
@@ -253,7 +253,7 @@ def broken(seed: int) -> planar.Mechanism:
         ends |= {f"{p}{name}": (p, name), f"{q}{name}": (q, name)}
     links = {name: (a, b, hypot(*(at[a] - at[b]))) for name, (a, b) in ends.items()}
     a, b, length = links[short := str(rng.choice([name for name in links if name != "AB"]))]
-    return bars(frame, links | {short: (a, b, length * rng.uniform(0.05, 0.6))}, ("A", angle))
+    return bar_linkage(frame, links | {short: (a, b, length * rng.uniform(0.05, 0.6))}, ("A", angle))
 
 
 @pytest.mark.parametrize("seed", part([0, 2, 4, 5, 6, 9, 13, 15, 17, 21, 23], 3))  # the others go together as well
@@ -276,7 +276,7 @@ def test_there_is_none_where_the_mechanism_goes_together_and_none_is_looked_for_
 
 
 def test_the_command_says_why_before_it_refuses(tmp_path):
-    mechanism = four_bar(1.0, 1.2, 1.3, 3.0, radians(150.0))
+    mechanism = bare_four_bar(1.0, 1.2, 1.3, 3.0, radians(150.0))
     (tmp_path / "far.json").write_text(planar.dumps(mechanism), encoding="utf-8")
     ended = command.run(tmp_path, "modes", "far.json")
     told = ended.refused(1)
@@ -302,7 +302,7 @@ def test_where_two_conflicts_stand_side_by_side_no_single_change_is_offered_and_
         "other rocker": ("E", "F", 120.0),
     }
     frame = {"A": [0.0, 0.0], "D": [300.0, 0.0], "E": [-300.0, 0.0]}
-    found = planar.conflict(bars(frame, links, ("A", 1.7)))
+    found = planar.conflict(bar_linkage(frame, links, ("A", 1.7)))
     assert set(found.pairs) in ({"A", "B", "C", "D"}, {"A", "B", "E", "F"})
     assert (found.dimensions, found.positions) == ((), ())
     assert "no change of one dimension" in found.said[-1]

@@ -17,7 +17,7 @@ from planar.drawing.paper.scales import parse_scale
 from planar.drawing.scheme import symbol_table
 from planar.drawing.scheme.assemblies import ASSEMBLIES_PER_SHEET, assembly_sheets
 from tests import command
-from tests.bars import bars, four_bar, tower
+from tests.builders import bar_linkage, bare_four_bar, tower
 from tests.draws import part
 from tests.linkages import conditioning, determinate, random_linkage
 
@@ -42,7 +42,7 @@ def same_places(state: planar.State, mode: planar.Mode, off: float = 1e-9) -> bo
 
 
 def test_a_four_bar_has_its_two_mirror_images_and_no_more():
-    modes = planar.modes(four_bar(1.0, 3.0, 2.5, 3.2, 0.8))
+    modes = planar.modes(bare_four_bar(1.0, 3.0, 2.5, 3.2, 0.8))
     assert len(modes) == modes.bound == 2
     b, d = np.array([cos(0.8), sin(0.8)]), np.array([3.2, 0.0])
     expected = meeting(b, d, 3.0, 2.5)
@@ -56,7 +56,7 @@ def test_a_four_bar_has_its_two_mirror_images_and_no_more():
 def test_the_number_of_an_assembly_stays_as_the_crank_turns():
     sides = []
     for at in np.linspace(0.0, 2.0 * pi, 13):
-        mode = planar.modes(four_bar(1.0, 3.0, 2.5, 3.2, float(at)), certify=False)[0]
+        mode = planar.modes(bare_four_bar(1.0, 3.0, 2.5, 3.2, float(at)), certify=False)[0]
         b, c, d = (mode.points[name] for name in "BCD")
         sides.append(np.sign((d - b)[0] * (c - b)[1] - (d - b)[1] * (c - b)[0]))
     assert abs(sum(sides)) == 13
@@ -89,7 +89,7 @@ def test_a_watt_six_bar_has_four_two_for_each_of_the_first_loop():
         "last": ("F", "E", 3.0),
     }
     frame = {"A": [0.0, 0.0], "D": [3.2, 0.0], "F": [5.0, 0.3]}
-    modes = planar.modes(bars(frame, links, ("A", 0.8)))
+    modes = planar.modes(bar_linkage(frame, links, ("A", 0.8)))
     assert len(modes) == modes.bound == 4
     expected = [
         (*c, *e) for c in meeting([cos(0.8), sin(0.8)], frame["D"], 3.0, 2.5) for e in meeting(c, frame["F"], 3.0, 3.0)
@@ -161,7 +161,7 @@ def test_several_inputs_and_moved_ones_are_heeded():
 
 
 def test_what_the_inputs_leave_free_is_refused():
-    five = bars(
+    five = bar_linkage(
         {"A": [0.0, 0.0], "E": [3.0, 0.0]},
         {"1": ("A", "B", 1.0), "2": ("B", "C", 2.0), "3": ("C", "D", 2.0), "4": ("D", "E", 1.0)},
         ("A", 1.0),
@@ -198,7 +198,7 @@ def test_groups_that_do_not_hang_on_each_other_are_counted_without_listing():
         angle = 2.0 * pi * k / count
         frame[f"O{k}"] = [3.0 * cos(angle), 3.0 * sin(angle)]
         links |= {f"rod{k}": ("B", f"C{k}", 3.0), f"rocker{k}": (f"O{k}", f"C{k}", 2.5)}
-    modes = planar.modes(bars(frame, links, ("A", 0.5)), certify=False)
+    modes = planar.modes(bar_linkage(frame, links, ("A", 0.5)), certify=False)
     assert modes.total == modes.bound == 2**20
     assert [group.solved for group in modes.groups] == [1] * count
     number = sum((choice - 1) << place for place, choice in enumerate(reversed(modes.nearest.choices[-count:])))
@@ -212,7 +212,7 @@ def test_a_group_that_never_goes_together_ends_the_search_at_once():
         frame[f"O{k}"] = [3.0, 0.1 * k]
         length = 2.5 if k < count - 1 else 0.1
         links |= {f"rod{k}": ("B", f"C{k}", length), f"rocker{k}": (f"O{k}", f"C{k}", length)}
-    modes = planar.modes(bars(frame, links, ("A", 0.5)), certify=False)
+    modes = planar.modes(bar_linkage(frame, links, ("A", 0.5)), certify=False)
     assert not modes
     assert modes.total == 0
     assert sum(group.solved for group in modes.groups) == count
@@ -243,7 +243,7 @@ def test_the_command_lists_them_in_a_process_of_its_own(tmp_path):
 
 
 def test_the_command_refuses_in_a_sentence(tmp_path):
-    (tmp_path / "far.json").write_text(planar.dumps(four_bar(1.0, 0.5, 0.5, 3.2, 0.8)), encoding="utf-8")
+    (tmp_path / "far.json").write_text(planar.dumps(bare_four_bar(1.0, 0.5, 0.5, 3.2, 0.8)), encoding="utf-8")
     assert "cannot be joined" in command.run(tmp_path, "modes", "far.json").refused(1)
     assert "cannot be joined" in command.run(tmp_path, "solve", "far.json", "--mode", "1").refused(1)
     assert "there are 2 assemblies" in command.run(tmp_path, "solve", "four-bar", "--mode", "3").refused(2)

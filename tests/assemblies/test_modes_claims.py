@@ -6,7 +6,7 @@ import pytest
 
 import planar
 from planar.assemblies.polynomial.completeness import Completeness
-from tests.bars import bars, four_bar, tower
+from tests.builders import bar_linkage, bare_four_bar, tower
 
 
 def test_without_certifying_nothing_is_called_proved():
@@ -24,7 +24,7 @@ def test_without_the_library_of_intervals_that_is_said(monkeypatch):
 
 def test_a_dead_point_is_an_assembly_without_rates():
     # B at (0, 3), D at (4, 0), so that coupler and rocker are in line
-    stretched = four_bar(3.0, 2.0, 3.0, 4.0, pi / 2.0)
+    stretched = bare_four_bar(3.0, 2.0, 3.0, 4.0, pi / 2.0)
     modes = planar.modes(stretched)
     assert modes
     assert all(mode.state is None and mode.outcome is planar.Outcome.DEAD_POINT for mode in modes)
@@ -34,7 +34,7 @@ def test_a_dead_point_is_an_assembly_without_rates():
 
 
 def test_what_cannot_be_assembled_has_none_and_a_sentence():
-    mechanism = four_bar(1.0, 0.5, 0.5, 3.2, 0.8)
+    mechanism = bare_four_bar(1.0, 0.5, 0.5, 3.2, 0.8)
     modes = planar.modes(mechanism)
     assert not modes
     assert len(modes) == 0
@@ -47,26 +47,26 @@ def test_what_cannot_be_assembled_has_none_and_a_sentence():
 
 
 def test_two_assemblies_that_lie_very_near_are_two():
-    modes = planar.modes(four_bar(1.0, 1.7, 1.3 + 1e-11, 4.0, 0.0))
+    modes = planar.modes(bare_four_bar(1.0, 1.7, 1.3 + 1e-11, 4.0, 0.0))
     assert [(mode.certified, mode.double) for mode in modes] == [(True, False)] * 2
     assert modes.complete.value == "complete"
 
 
 def test_a_double_root_that_rounding_does_not_explain_is_none():
     """Coupler and rocker are 1e-11 too short to meet: what comes nearest is no assembly, as `solve` says too."""
-    short = four_bar(1.0, 1.7, 1.3 - 1e-11, 4.0, 0.0)
+    short = bare_four_bar(1.0, 1.7, 1.3 - 1e-11, 4.0, 0.0)
     modes = planar.modes(short)
     assert list(iter(modes)) == []
     assert modes.complete is Completeness.PROVED
     with pytest.raises(planar.NoAnswer) as refused:
         planar.solve(short)
     assert modes.reason == refused.value.reason
-    assert [mode.double for mode in planar.modes(four_bar(1.0, 1.7, 1.3, 4.0, 0.0))] == [True]
+    assert [mode.double for mode in planar.modes(bare_four_bar(1.0, 1.7, 1.3, 4.0, 0.0))] == [True]
 
 
 def test_two_assemblies_beside_a_curve_are_far_apart_and_not_double():
     for certify in (True, False):
-        modes = planar.modes(four_bar(1.0, 2.0, 2.0, 1.0, 1e-7), certify=certify)
+        modes = planar.modes(bare_four_bar(1.0, 2.0, 2.0, 1.0, 1e-7), certify=certify)
         assert [mode.double for mode in modes] == [False] * 2
         assert sorted(mode.points["C"][0] for mode in modes) == pytest.approx([-1.0, 3.0])
 
@@ -81,7 +81,7 @@ def hung_on_a_kite(more: dict | None = None) -> planar.Mechanism:
         "e": ("C", "E", 0.9),
         "f": ("Q", "E", 0.9),
     }
-    return bars(frame, links | (more or {}), ("A", 0.0), {"C": [2.0, 0.0]})
+    return bar_linkage(frame, links | (more or {}), ("A", 0.0), {"C": [2.0, 0.0]})
 
 
 def test_a_curve_ahead_of_another_group_leaves_the_list_open():

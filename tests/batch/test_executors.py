@@ -12,7 +12,8 @@ import pytest
 import planar
 from planar.batch import sweep_mechanisms
 from planar.foundation.errors import BadInput
-from tests.solving.test_cycle import ROCKER, four_bar
+from tests.builders import four_bar
+from tests.closed_forms import ROCKER
 
 MANY = 48
 STEPS = 24

@@ -6,7 +6,7 @@ import pytest
 import planar
 from planar.batch.design_arrays import design_variables
 from planar.foundation.errors import BadInput
-from tests.analysis.test_answers import four_bar
+from tests.builders import open_four_bar
 from tests.draws import part
 from tests.known import MODELS
 
@@ -59,7 +59,7 @@ def test_a_design_that_stops_says_so():
 
 def test_positions_between_which_a_dead_point_lies_are_not_told():
     # at every step the rocker could be there, but the crank cannot get across from one to the other
-    mechanism = four_bar(0.4999, 0.8, 0.7, 1.0)
+    mechanism = open_four_bar(0.4999, 0.8, 0.7, 1.0)
     ready, swept = (
         planar.prepared(mechanism, 13),
         planar.sweep(mechanism, {"AB.length": [0.4999]}, 13, backend="casadi"),

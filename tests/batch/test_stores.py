@@ -10,13 +10,14 @@ import pytest
 import planar
 from planar.document import files
 from planar.foundation.errors import BadInput, WriteFailure
-from tests.batch.test_sweep import ORDERS, around
-from tests.solving.test_cycle import ROCKER, TRIPLE, TURN, four_bar
+from tests.builders import designs_around, four_bar
+from tests.checks import ORDERS
+from tests.closed_forms import ROCKER, TRIPLE, TURN
 
 
 def swept(store, **more):
     mechanism = four_bar(*TRIPLE, 1.2)
-    return planar.sweep(mechanism, around(mechanism, 0.05, 9), 20, ["E", "C"], block=4, store=store, **more)
+    return planar.sweep(mechanism, designs_around(mechanism, 0.05, 9), 20, ["E", "C"], block=4, store=store, **more)
 
 
 @pytest.fixture(params=["zarr", "parquet"])

@@ -17,30 +17,12 @@ from planar.document import files
 from planar.document.dimensions import link_lengths
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.solving.position import PositionSolver
+from tests.builders import block_slider_crank, designs_around, four_bar
+from tests.checks import ORDERS
+from tests.closed_forms import PARALLELOGRAM, ROCKER, TRIPLE, TURN, rates, rocker
 from tests.draws import draws, part
 from tests.known import MODELS
 from tests.linkages import random_linkage
-from tests.solving.test_cycle import (
-    PARALLELOGRAM,
-    ROCKER,
-    TRIPLE,
-    TURN,
-    four_bar,
-    rates,
-    rocker,
-    slider_crank,
-)
-
-ORDERS = ("position", "velocity", "acceleration")
-
-
-def around(mechanism, spread, many=5, seed=0):
-    """Random designs: every length that is not zero, and the inputs' rates, changed by so much."""
-    rng = np.random.default_rng(seed)
-    own = {each.name: each.value for each in link_lengths(mechanism, frozenset(link.name for link in mechanism.links))}
-    own |= {f"{each.pair}.velocity": each.velocity for each in mechanism.inputs}
-    own |= {f"{each.pair}.acceleration": each.acceleration for each in mechanism.inputs}
-    return {name: value * (1 + spread * rng.uniform(-1, 1, many)) for name, value in own.items() if value}
 
 
 def cycles(mechanism, designs, result, steps, pair=None, start=None, stop=None):
@@ -82,7 +64,7 @@ def cycles(mechanism, designs, result, steps, pair=None, start=None, stop=None):
 SAME = {
     "four-bar": (four_bar(*ROCKER, 0.8), 0.05, 0),
     "other assembly": (four_bar(*ROCKER, 0.8, -1), 0.05, 0),
-    "slider-crank": (slider_crank(), 0.05, 0),
+    "slider-crank": (block_slider_crank(), 0.05, 0),
     "quick return": (MODELS["004-QR"], 0.03, 0),
     "six-bar": (MODELS["stephenson-1-six-bar"], 0.02, 0),
     "six-bar of four unknowns at once": (MODELS["double-butterfly"], 0.01, 0),
@@ -99,7 +81,7 @@ SAME = {
 @pytest.mark.parametrize("name", part(SAME, 2))
 def test_every_design_is_the_cycle_of_the_mechanism_so_changed(name):
     mechanism, spread, general = SAME[name]
-    designs = around(mechanism, spread, 4)
+    designs = designs_around(mechanism, spread, 4)
     result = planar.sweep(mechanism, designs, 48, pair=mechanism.inputs[0].pair)
     # beside a change point the last digits of a position are lost in the rates
     allowed = 1e-8 if name == "through change points" else 1e-10
@@ -125,7 +107,7 @@ def test_random_linkages_of_dimensions_changed_by_a_hundredth(seed, links, highe
     mechanism = files.from_dict(random_linkage(seed, links, higher=higher).value)
     pair = mechanism.inputs[0].pair
     here = mechanism.inputs[0].position
-    designs = around(mechanism, 0.01, 3, seed)
+    designs = designs_around(mechanism, 0.01, 3, seed)
     result = planar.sweep(mechanism, designs, 10, pair=pair, start=here, stop=here + 0.2)
     assert cycles(mechanism, designs, result, 10, pair, here, here + 0.2) < 1e-7
 
@@ -281,7 +263,7 @@ def test_designs_that_one_runner_does_not_begin_are_begun_by_the_next(monkeypatc
 
 
 def test_designs_in_blocks_are_the_designs_together():
-    mechanism, designs = four_bar(*TRIPLE, 1.2), around(four_bar(*TRIPLE, 1.2), 0.05, 7)
+    mechanism, designs = four_bar(*TRIPLE, 1.2), designs_around(four_bar(*TRIPLE, 1.2), 0.05, 7)
     told = []
     parts = planar.sweep(mechanism, designs, 20, "E", block=3, progress=lambda *done: told.append(done))
     whole = planar.sweep(mechanism, designs, 20, "E")

@@ -17,9 +17,10 @@ from planar.document import files
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.model.pairs import pair_types
 from planar.solving.position import PositionSolver
+from tests.builders import block_slider_crank, four_bar
+from tests.closed_forms import ROCKER, TURN, rocker
 from tests.known import MODELS
 from tests.linkages import random_linkage
-from tests.solving.test_cycle import ROCKER, TURN, four_bar, rocker, slider_crank
 
 ORDERS = ("position", "velocity", "acceleration")
 BACKENDS = ("native", "casadi")
@@ -236,7 +237,7 @@ def test_few_steps_are_as_good_as_many(steps):
 def test_what_the_general_path_does_is_counted_and_said():
     unsketched = replace(four_bar(*ROCKER, 0.8), sketch=())
     mechanisms = [four_bar(*ROCKER, 0.8), MODELS["geared-five-bar"], unsketched, MODELS["elliptical-trammel"]]
-    mechanisms.append(slider_crank())
+    mechanisms.append(block_slider_crank())
     result = planar.sweep_each(mechanisms, 12)
     assert [each.general for each in result] == [False, True, True, True, True]
     assert (result.general, result.sent) == (4 * 13, 4)

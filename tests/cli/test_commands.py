@@ -14,7 +14,7 @@ import pytest
 
 import planar
 from planar.document.files import MAX_FILE_BYTES, load_models
-from tests.command import ROOT, process, run
+from tests.command import ROOT, process, run, written
 
 FAR = 1e-12
 """A result printed in full and read again is the same number; one solved again is so to round-off."""
@@ -61,11 +61,6 @@ def changed(value: dict[str, Any], **names: str) -> dict[str, Any]:
     for old, new in names.items():
         text = text.replace(json.dumps(old.replace("_", " ")), json.dumps(new))
     return json.loads(text)
-
-
-def written(folder: Path, value: Any, name: str = "m.json") -> str:
-    (folder / name).write_text(value if isinstance(value, str) else json.dumps(value), encoding="utf-8")
-    return name
 
 
 def row(table: str, first: str) -> list[str]:

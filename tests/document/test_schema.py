@@ -16,9 +16,10 @@ from planar.document.files import model_files
 from planar.document.schema import schema
 from planar.foundation.errors import BadInput
 from planar.model.pairs import pair_types
-from tests.document import test_document as document
+from tests import documents as document
+from tests import random_documents
+from tests import wheel_documents as wheels
 from tests.draws import draws
-from tests.model import test_wheel_pairs as wheels
 
 VALIDATOR = Draft202012Validator(schema())
 MODELS = {file.stem: json.loads(file.read_text(encoding="utf-8")) for file in model_files()}
@@ -131,7 +132,7 @@ def test_of_all_that_a_schema_cannot_say_there_are_examples():
 
 
 @settings(searching, max_examples=draws(40))
-@given(document.documents())
+@given(random_documents.documents())
 def test_any_mechanism_is_valid_as_it_is_written_and_as_it_is_written_back(value):
     assert wrong(value) is None
     assert wrong(planar.to_dict(planar.from_dict(value))) is None
@@ -144,8 +145,8 @@ def test_what_the_schema_refuses_the_reader_refuses(value, times, data):
     if data.draw(st.booleans()):
         value.pop("published", None)  # long, and so most changes would fall on it
     for _ in range(times):
-        if document.places(value):
-            document.mutilated(value, data.draw)
+        if random_documents.places(value):
+            random_documents.mutilated(value, data.draw)
     if refusal(value) is None:
         assert wrong(value) is None
 

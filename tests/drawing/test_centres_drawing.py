@@ -14,12 +14,13 @@ import planar
 from planar import plot
 from planar.analysis.centres.centres import centres
 from planar.document import files
-from planar.drawing.centres.centres import DRAWING_SIZE, MAX_CENTRES, centres_picture, choose_centres
+from planar.drawing.centres.centres import DRAWING_SIZE, centres_picture
+from planar.drawing.centres.choice import MAX_CENTRES, choose_centres
 from planar.drawing.centres.circle_diagram import circle_picture, circle_radius
 from planar.drawing.centres.two_directions import directions_picture
 from planar.drawing.paper.picture import Arrow, Circle, Label, Pen, Polyline, extent
 from tests.command import run
-from tests.drawing.test_plot import texts
+from tests.figures import visible_texts
 from tests.known import MODELS as ALL
 from tests.known import found_centres as found
 from tests.known import some_models
@@ -306,7 +307,7 @@ def test_a_scale_is_kept_and_a_wider_reach_shows_more():
     assert "centre I13" not in marks(near, "centre ", Circle)
     assert "centre I13" in marks(far, "centre ", Circle)
     figure = plot.centres(every.state, "1 cm = 25 mm", reach=1.2)
-    assert "1 cm = 25 mm" in [text for text, _ in texts(figure)]
+    assert "1 cm = 25 mm" in [text for text, _ in visible_texts(figure)]
     for wrong in (0.5, float("nan"), float("inf")):
         with pytest.raises(planar.BadInput, match="reach"):
             plot.centres(every.state, reach=wrong)
@@ -327,7 +328,7 @@ SAMPLE = (
 def test_texts_lie_on_the_sheet_and_apart_and_the_circle_beside_the_scheme(stem):
     figure = plot.centres(found(stem).state)
     width, height = figure.get_size_inches() * figure.dpi
-    said = texts(figure)
+    said = visible_texts(figure)
     for text, box in said:
         assert min(box.x0, box.y0, width - box.x1, height - box.y1) > -1.0, text
     for (one, a), (other, b) in combinations(said, 2):

@@ -18,6 +18,8 @@ pytest.importorskip("matplotlib")
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 
+from tests.figures import text_boxes
+
 MM = 25.4
 
 
@@ -322,13 +324,6 @@ def test_several_inputs_have_to_be_told_apart():
         diagrams(planar.load("excavator-arm"))
 
 
-def boxes(figure):
-    canvas = FigureCanvasAgg(figure)
-    canvas.draw()
-    shown = [text for text in figure.findobj(Text) if text.get_text().strip() and text.get_visible()]
-    return canvas.get_width_height(), [(text.get_text(), text.get_window_extent()) for text in shown]
-
-
 @pytest.mark.parametrize(
     ("model", "of", "width", "chords"),
     [
@@ -341,7 +336,7 @@ def boxes(figure):
     ],
 )
 def test_no_text_lies_on_another_or_leaves_the_sheet(model, of, width, chords):
-    (wide, high), found = boxes(diagrams(planar.load(model), of, chords, width))
+    (wide, high), found = text_boxes(diagrams(planar.load(model), of, chords, width))
     for _, box in found:
         assert min(box.x0, box.y0) >= 0.0
         assert box.x1 <= wide
@@ -354,7 +349,7 @@ def test_no_text_lies_on_another_or_leaves_the_sheet(model, of, width, chords):
 @pytest.mark.filterwarnings("ignore::planar.foundation.errors.MissingGlyphs")
 @pytest.mark.parametrize("name", ["$x_{\n\\frac{1", "机构 \U0001f600", "x" * 400])
 def test_hostile_names_are_shown_as_texts(name):
-    (wide, _), found = boxes(diagrams(replace(planar.load("004-SC12"), name=name)))
+    (wide, _), found = text_boxes(diagrams(replace(planar.load("004-SC12"), name=name)))
     assert all(box.x0 >= 0.0 and box.x1 <= wide for _, box in found)
 
 

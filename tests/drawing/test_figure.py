@@ -20,9 +20,9 @@ from planar.drawing.output.solution_pages import encode_sheets
 from planar.drawing.paper.pens import ARROW_HEAD_LENGTH, ARROW_HEAD_WIDTH, FILL_COLOURS, PEN_STYLES, require_matplotlib
 from planar.drawing.paper.picture import Arrow, Circle, Fill, Label, Pen, Picture, Polyline
 from planar.foundation.errors import BadInput
-from tests.drawing.test_labels import HOSTILE
 from tests.draws import draws
 from tests.fonts import own_fonts  # noqa: F401
+from tests.hostile import TEXTS
 
 INCH = 25.4
 FINE = 508.0
@@ -288,7 +288,7 @@ def test_letters_are_drawn_exactly_in_their_boxes():
 
 @pytest.mark.filterwarnings("ignore::planar.foundation.errors.MissingGlyphs")
 def test_a_plain_text_is_never_read_as_mathtext(own_fonts):  # noqa: F811
-    marks = tuple(Label(text, (0.0, 9.0 * n), f"letter {n}") for n, text in enumerate(HOSTILE))
+    marks = tuple(Label(text, (0.0, 9.0 * n), f"letter {n}") for n, text in enumerate(TEXTS))
     made = draw_pictures([Picture(marks, "$\\frac{$ <b>", ("a_b^ $x$", "中文 \ud800"))], "$title$ &amp;")
     for kind in ("png", "svg", "pdf"):
         assert encode_figure(made, kind)
@@ -313,7 +313,7 @@ def test_a_plain_text_is_never_read_as_mathtext(own_fonts):  # noqa: F811
 def test_hostile_names_of_marks_leave_a_page_that_can_be_read():
     from xml.etree import ElementTree
 
-    marks = tuple(Polyline(((0.0, n), (9.0, n)), Pen.LINK, f'link "{text}"') for n, text in enumerate(HOSTILE))
+    marks = tuple(Polyline(((0.0, n), (9.0, n)), Pen.LINK, f'link "{text}"') for n, text in enumerate(TEXTS))
     page = encode_figure(
         draw_pictures([Picture(marks, "\x00<&>"), Picture((Label("$--_1$", (0.0, 0.0), "--", math=True),))]), "svg"
     )

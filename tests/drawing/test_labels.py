@@ -9,31 +9,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planar.drawing.labels.fonts import UNKNOWN_CHARACTER, font_properties, printable_text
-from planar.drawing.labels.placement import LEADER_DISTANCE, Box, PlacedLabel, place_labels
+from planar.drawing.labels.placement import LEADER_DISTANCE, PlacedLabel, place_labels
 from planar.drawing.labels.text_metrics import text_size, wrap_text
+from planar.drawing.paper.boxes import Box
 from planar.drawing.paper.pens import MM_PER_POINT
 from planar.drawing.paper.picture import Arrow, Circle, Label, Pen, Polyline
 from planar.foundation.errors import MissingGlyphs
 from tests.draws import draws
 from tests.fonts import own_fonts  # noqa: F401
+from tests.hostile import TEXTS
 from tests.work import calls
-
-HOSTILE = [
-    "$x",
-    "$x$",
-    "a_b^",
-    "\\frac{",
-    "<b>",
-    "&amp;",
-    "--",
-    "$\\frac{$",
-    "中文",
-    "a\nb\tc",
-    "\ud800",
-    "\x00",
-    "𝔄",
-    "x" * 500,
-]
 
 
 def gap(box: Box, spot: tuple[float, float]) -> float:
@@ -220,7 +205,7 @@ def test_twice_as_many_letters_among_strokes_take_about_twice_the_work():
 
 
 @pytest.mark.filterwarnings("ignore::planar.foundation.errors.MissingGlyphs")
-@pytest.mark.parametrize("text", HOSTILE)
+@pytest.mark.parametrize("text", TEXTS)
 def test_any_text_can_be_measured_and_is_one_line_of_what_the_font_has(text):
     (only,) = place_labels([Label(text, (0.0, 0.0))], [])
     assert not only.label.math

@@ -6,7 +6,6 @@ from itertools import combinations
 
 import pypdfium2
 import pytest
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from PIL import Image
 
 import planar
@@ -14,6 +13,7 @@ from planar import plot
 from tests.command import run
 from tests.contact_sheet import DRAWINGS, MODELS, drawn
 from tests.draws import part
+from tests.figures import visible_texts
 
 RUNS = ("positions", "loci", "diagrams")
 # velocity is part of acceleration; of the drawings of a run, which take long, every model has one after the other
@@ -24,20 +24,11 @@ CELLS = [
 ]
 
 
-def texts(figure):
-    """Every text that can be seen, with its box in pixels."""
-    canvas = FigureCanvasAgg(figure)
-    figure.draw_without_rendering()
-    renderer = canvas.get_renderer()
-    found = [text for text in figure.findobj(lambda each: hasattr(each, "get_text")) if text.get_visible()]
-    return [(text.get_text(), text.get_window_extent(renderer)) for text in found if text.get_text().strip()]
-
-
 @pytest.mark.parametrize(("model", "what"), part(sorted(CELLS, key=lambda cell: cell[1]), 4))
 def test_texts_lie_on_the_sheet_and_apart_and_axes_have_units(model, what):
     figure = drawn(model, what)
     width, height = figure.get_size_inches() * figure.dpi
-    found = texts(figure)
+    found = visible_texts(figure)
     assert found
     for text, box in found:
         assert box.x0 > -1.0, text
@@ -96,7 +87,7 @@ def _shown(pins, name, vertices):
 def test_scales_are_taken_by_what_they_measure(tmp_path):
     state = planar.solve(planar.load("002-E3.1"))
     figure = plot.acceleration(state, ["1 cm = 50 mm", "1 cm = 2 m/s^2", "1 cm = 0.2 m/s"])
-    said = " ".join(text for text, _ in texts(figure))
+    said = " ".join(text for text, _ in visible_texts(figure))
     for scale in ("1 cm = 50 mm", "1 cm = 0.2 m/s", "1 cm = 2 m/s²"):
         assert scale in said
     for wrong in ("1 cm = 3 kg", "3", "0:1", "1 cm = 0 m", "1 s = 2 m"):

@@ -20,7 +20,9 @@ from planar.drawing.scheme import symbol_table
 from planar.drawing.scheme.details import AROUND, scheme_with_details
 from planar.drawing.scheme.ground import ground_marks
 from planar.drawing.scheme.link_bodies import convex_hull, link_bodies
-from planar.drawing.scheme.scheme import body_marks, plain_frames, scheme
+from planar.drawing.scheme.link_strokes import body_marks
+from planar.drawing.scheme.scene import plain_frames
+from planar.drawing.scheme.scheme import scheme
 from planar.foundation.geometry import Vector, frame_at
 from planar.model.link_graph import link_numbers
 from planar.model.link_shapes import link_shape

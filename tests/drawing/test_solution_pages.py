@@ -31,8 +31,8 @@ from planar.drawing.output.page_layout import (
 from planar.drawing.output.solution_pages import encode_sheets, solution_pages
 from planar.drawing.paper.scales import parse_scale, parse_scales
 from planar.foundation.errors import BadInput
-from tests.analysis.test_worked_solution import HOSTILE, hostile
 from tests.command import run
+from tests.hostile import NAMES, hostile_document
 
 A4 = (210.0, 297.0)
 POINT = 25.4 / 72.0
@@ -187,11 +187,11 @@ def test_a_scale_too_large_for_a_page_is_refused() -> None:
 
 @pytest.mark.filterwarnings("ignore::planar.foundation.errors.MissingGlyphs")
 def test_hostile_names_are_set_as_they_are() -> None:
-    figures = solution_pages(planar.solve(planar.from_dict(hostile())))
+    figures = solution_pages(planar.solve(planar.from_dict(hostile_document())))
     text = "".join(
         page.get_textpage().get_text_range() for page in pypdfium2.PdfDocument(encode_sheets(figures, ".pdf"))
     )
-    for name in HOSTILE[:4]:
+    for name in NAMES[:4]:
         assert name in text
     encode_sheets(figures, ".png")
 

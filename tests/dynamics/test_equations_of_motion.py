@@ -12,70 +12,23 @@ import pytest
 import planar
 from planar.dynamics.forces import Forces
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
+from tests.builders import (
+    BODIES,
+    Value,
+    bracket_document,
+    four_bar_document,
+    lever_document,
+    masses,
+    slider_crank_document,
+)
+from tests.checks import forces_of
 
-Value = dict[str, Any]
 STEP = 1e-30
 """Of the complex step: f'(x) = Im f(x + ih) / h, without cancellation."""
 
 
-def of(value: Value, **options: Any) -> Forces:
-    return planar.forces(planar.solve(planar.from_dict(value)), **options)
-
-
 def over(value: Value, steps: int, **options: Any) -> Forces:
     return planar.forces(planar.cycle(planar.from_dict(value), steps=steps, **options))
-
-
-def four_bar(crank: float, coupler: float, rocker: float, base: float, **more: Any) -> Value:
-    return {
-        "planar": 1,
-        "frame": "f",
-        "links": {
-            "f": {"points": {"O": [0, 0], "Q": [base, 0]}},
-            "crank": {"ends": ["O", "A"], "length": crank},
-            "coupler": {"ends": ["A", "B"], "length": coupler},
-            "rocker": {"ends": ["Q", "B"], "length": rocker},
-        },
-        "pairs": [{"turning": each} for each in "OABQ"],
-        "inputs": [{"pair": "O", "position": 0.6, "velocity": 7.0, "acceleration": -3.0}],
-        "sketch": {"B": [base, 2.0 * rocker]},
-        **more,
-    }
-
-
-def slider_crank(crank: float, rod: float, **more: Any) -> Value:
-    """The line of the slide is the world's x-axis, through the shaft."""
-    return {
-        "planar": 1,
-        "frame": "f",
-        "links": {
-            "f": {"points": {"O": [0, 0]}},
-            "crank": {"ends": ["O", "A"], "length": crank},
-            "rod": {"ends": ["A", "B"], "length": rod},
-            "piston": {"points": {"B": [0, 0]}},
-        },
-        "pairs": [
-            {"turning": "O"},
-            {"turning": "A"},
-            {"turning": "B"},
-            {"sliding": "stroke", "links": ["f", "piston"], "line": {"through": "O"}, "point": "B"},
-        ],
-        "inputs": [{"pair": "O", "position": 0.4, "velocity": 9.0, "acceleration": 5.0}],
-        "sketch": {"B": [crank + rod, 0.0]},
-        **more,
-    }
-
-
-def lever(points: dict[str, list[float]], angle: float = 0.0, **more: Any) -> Value:
-    """A link `lever` that turns about O."""
-    return {
-        "planar": 1,
-        "frame": "f",
-        "links": {"f": {"points": {"O": [0, 0]}}, "lever": {"points": {"O": [0, 0], **points}}},
-        "pairs": [{"turning": "O"}],
-        "inputs": [{"pair": "O", "position": angle, "velocity": 3.0, "acceleration": 2.0}],
-        **more,
-    }
 
 
 # the torque of an inertia, by Lagrange: T = M a + M' w^2 / 2 + V', with M(t) w^2 / 2 the kinetic energy
@@ -95,16 +48,7 @@ def carried(at, way, rate, along, off):
     )
 
 
-BODIES = {"crank": (1.3, 0.11, -0.04, 0.02), "second": (0.7, 0.17, 0.06, 0.03), "third": (2.1, 0.05, 0.08, 0.05)}
-"""Masses (kg), where they are centred along their links and off them (m), and their inertias (kg m^2)."""
 WEIGHT = (3.0, -9.0)
-
-
-def masses(*names: str) -> list[Value]:
-    return [
-        {"link": name, "mass": m, "at": [x, y], "inertia": j}
-        for name, (m, x, y, j) in zip(names, BODIES.values(), strict=True)
-    ]
 
 
 def summed(moving):
@@ -128,7 +72,7 @@ def test_the_torque_of_a_slider_crank_with_mass_is_lagranges():
         end = carried(pin, way, rate, rod, 0.0)
         return summed([(((0.0, 0.0), (0.0, 0.0)), (c, s), 1.0), (pin, way, rate), (end, (1.0, 0.0), 0.0)])
 
-    found = over(slider_crank(r, rod, masses=masses("crank", "rod", "piston"), gravity=list(WEIGHT)), 48)
+    found = over(slider_crank_document(r, rod, masses=masses("crank", "rod", "piston"), gravity=list(WEIGHT)), 48)
     angle = found.moving.inputs["O"].position
     wanted = lagrange(lambda t: all_of(t)[0], lambda t: all_of(t)[1], angle, 9.0, 5.0)
     np.testing.assert_allclose(found.inputs["O"], wanted, atol=1e-12 * np.abs(wanted).max())
@@ -160,7 +104,7 @@ def test_the_torque_of_a_four_bar_with_mass_is_lagranges(sketched):
             ]
         )
 
-    value = four_bar(a, b, c, d, masses=masses("crank", "coupler", "rocker"), gravity=list(WEIGHT))
+    value = four_bar_document(a, b, c, d, masses=masses("crank", "coupler", "rocker"), gravity=list(WEIGHT))
     value["sketch"] = {"B": [d, sketched]}
     found = over(value, 48)
     wanted = lagrange(lambda t: all_of(t)[0], lambda t: all_of(t)[1], found.moving.inputs["O"].position, 7.0, -3.0)
@@ -169,26 +113,28 @@ def test_the_torque_of_a_four_bar_with_mass_is_lagranges(sketched):
 
 def test_the_shaking_force_is_the_mass_times_the_acceleration_of_its_centre():
     """A crank alone, turning steadily: m r w^2 outwards, and no torque to turn it."""
-    value = lever({"A": [0.2, 0]}, 0.5, masses=[{"link": "lever", "mass": 3.0, "at": "A", "inertia": 0.4}])
+    value = lever_document({"A": [0.2, 0]}, 0.5, masses=[{"link": "lever", "mass": 3.0, "at": "A", "inertia": 0.4}])
     value["inputs"][0]["acceleration"] = 0.0
-    found = of(value)
+    found = forces_of(value)
     outwards = 3.0 * 0.2 * 3.0**2
     assert found.shaking[0] == pytest.approx([outwards * cos(0.5), outwards * sin(0.5)], rel=1e-12)
     assert found.shaking[1] == pytest.approx(0.0, abs=1e-12)
     assert found.inputs["O"] == pytest.approx(0.0, abs=1e-12)
     assert found.reactions["O"].force == pytest.approx(-found.shaking[0], rel=1e-12)
-    assert of(value, inertia=False).reactions["O"].force == pytest.approx([0.0, 0.0])
+    assert forces_of(value, inertia=False).reactions["O"].force == pytest.approx([0.0, 0.0])
 
 
 def test_inertia_without_a_place_of_its_own_adds_up():
     """Two entries of one link are as their sum about the common centre (the parallel axes of Steiner)."""
     two = [{"link": "lever", "mass": 2.0, "at": [0.3, 0.1], "inertia": 0.2}, {"link": "lever", "mass": 1.0, "at": "A"}]
-    found = of(lever({"A": [0.6, 0.4]}, 0.3, masses=two))
+    found = forces_of(lever_document({"A": [0.6, 0.4]}, 0.3, masses=two))
     inertia = 0.2 + 2.0 * (0.3**2 + 0.1**2) + 1.0 * (0.6**2 + 0.4**2)
     assert found.inputs["O"] == pytest.approx(2.0 * inertia, rel=1e-13)
     centre = [(2.0 * 0.3 + 0.6) / 3.0, (2.0 * 0.1 + 0.4) / 3.0]
     own = inertia - 3.0 * (centre[0] ** 2 + centre[1] ** 2)
-    as_one = of(lever({"A": [0.6, 0.4]}, 0.3, masses=[{"link": "lever", "mass": 3.0, "at": centre, "inertia": own}]))
+    as_one = forces_of(
+        lever_document({"A": [0.6, 0.4]}, 0.3, masses=[{"link": "lever", "mass": 3.0, "at": centre, "inertia": own}])
+    )
     assert as_one.inputs["O"] == pytest.approx(found.inputs["O"], rel=1e-13)
     assert as_one.reactions["O"].force == pytest.approx(found.reactions["O"].force, rel=1e-12)
 
@@ -196,10 +142,11 @@ def test_inertia_without_a_place_of_its_own_adds_up():
 def test_a_place_of_a_mass_is_in_the_axes_in_which_the_link_was_drawn():
     """An `axis` turns the link's angle, not where the drawing has its mass; and a file in mm says it in mm."""
     drawn = {"O": [0, 0], "A": [0, 300], "G": [120, 80]}
-    value = lever(drawn, pi / 6, units={"length": "mm", "angle": "rad"}, gravity=[0, "-10 m/s^2"])
+    value = lever_document(drawn, pi / 6, units={"length": "mm", "angle": "rad"}, gravity=[0, "-10 m/s^2"])
     value["links"]["lever"]["axis"] = ["O", "A"]
     by_name, by_place = (
-        of(value | {"masses": [{"link": "lever", "mass": 2.0, "at": at, "inertia": 0.3}]}) for at in ("G", [120, 80])
+        forces_of(value | {"masses": [{"link": "lever", "mass": 2.0, "at": at, "inertia": 0.3}]})
+        for at in ("G", [120, 80])
     )
     # along the axis 80, to its right 120
     across = 0.08 * cos(pi / 6) + 0.12 * sin(pi / 6)
@@ -211,25 +158,9 @@ def test_a_place_of_a_mass_is_in_the_axes_in_which_the_link_was_drawn():
 # reactions by hand
 
 
-def bracket(**more: Any) -> Value:
-    """Two bars from the frame to C."""
-    return {
-        "planar": 1,
-        "frame": "f",
-        "links": {
-            "f": {"points": {"P": [0, 0], "Q": [0, 3]}},
-            "strut": {"ends": ["P", "C"], "length": 4},
-            "tie": {"ends": ["Q", "C"], "length": 5},
-        },
-        "pairs": [{"turning": each} for each in "PQC"],
-        "sketch": {"C": [4, 0]},
-        **more,
-    }
-
-
 def test_the_bars_of_a_truss_carry_what_the_method_of_joints_says():
     """A bracket of two bars under a load: both feel forces along themselves."""
-    found = of(bracket(loads=[{"point": "C", "force": [70, -900]}]))
+    found = forces_of(bracket_document(loads=[{"point": "C", "force": [70, -900]}]))
     tie = 900 * 5 / 3
     strut = -(70 - tie * 4 / 5)
     assert found.reactions["Q"].force == pytest.approx([-tie * 4 / 5, tie * 3 / 5], rel=1e-13)
@@ -262,7 +193,7 @@ def test_a_warren_truss_with_a_driven_foot_by_joints():
         "loads": [{"point": "C", "force": [0, -300]}],
         "sketch": {"B": [1, h], "C": [3, h], "R": [2, 0]},
     }
-    found = of(value)
+    found = forces_of(value)
     assert found.moving.point("C").position == pytest.approx([3.0, h], rel=1e-12)
     # moments about R: the foot P holds down 300 N * 1 m / 2 m, along its bar at 60 degrees; at joint C stands CR alone
     assert found.reactions["P"].force == pytest.approx([-150 / tan(pi / 3), -150], rel=1e-12)
@@ -279,7 +210,7 @@ def test_a_lever_of_three_forces_rests_on_its_pin():
         {"point": "P", "force": [0, 30], "axes": "lever"},
     ]
     angle = 0.4
-    found = of(lever({"P": [0.5, 0.1], "Q": [-2, 0.3]}, angle, loads=loads), inertia=False)
+    found = forces_of(lever_document({"P": [0.5, 0.1], "Q": [-2, 0.3]}, angle, loads=loads), inertia=False)
     turned = np.array([-30 * sin(angle), 30 * cos(angle)])
     assert found.reactions["O"].force == pytest.approx(-(np.array([-15.0, -100.0]) + turned), rel=1e-13)
     moment = 0.0
@@ -291,7 +222,7 @@ def test_a_lever_of_three_forces_rests_on_its_pin():
 
 
 def test_a_force_that_turns_with_its_link_takes_the_same_torque_everywhere():
-    value = lever({"P": [0.5, 0]}, loads=[{"point": "P", "force": [3, 4], "axes": "lever"}])
+    value = lever_document({"P": [0.5, 0]}, loads=[{"point": "P", "force": [3, 4], "axes": "lever"}])
     found = over(value, 12)
     np.testing.assert_allclose(found.inputs["O"], -0.5 * 4, rtol=1e-13)
     force = found.reactions["O"].force
@@ -315,7 +246,7 @@ def block(at: list[float], force: list[float], line: float = 0.3, **more: Any) -
 
 def test_a_guide_takes_an_eccentric_load_as_a_force_and_a_couple():
     """Of 50 N along and 80 N across at 0.6 m along and 0.25 m off: across 80 N, and a couple 80*0.6 - 50*0.25."""
-    found = of(block([0.6, 0.25], [50, -80]))
+    found = forces_of(block([0.6, 0.25], [50, -80]))
     assert found.inputs["way"] == pytest.approx(-50.0, rel=1e-13)
     assert found.reactions["way"].force == pytest.approx([-80 * sin(0.3), 80 * cos(0.3)], rel=1e-13)
     assert found.reactions["way"].couple == pytest.approx(80 * 0.6 + 50 * 0.25, rel=1e-13)
@@ -341,7 +272,7 @@ def test_a_slot_takes_only_what_is_square_to_it():
         "loads": [{"link": "bar", "torque": 6.0}],
         "sketch": {"E": [1, 0.2]},
     }
-    found = of(value)
+    found = forces_of(value)
     at = np.array([0.5 + 0.2 * cos(0.8), 0.2 * sin(0.8)])
     apart = float(np.hypot(*at))
     across = np.array([-at[1], at[0]]) / apart
@@ -357,12 +288,12 @@ def test_a_slot_takes_only_what_is_square_to_it():
 
 @pytest.mark.parametrize("name", ["way", "O"])
 def test_an_effort_at_a_pair_is_the_same_as_the_input_that_it_spares(name):
-    value = block([0.6, 0.25], [50, -80]) if name == "way" else lever({"P": [1, 0]}, 0.3)
+    value = block([0.6, 0.25], [50, -80]) if name == "way" else lever_document({"P": [1, 0]}, 0.3)
     key = "force" if name == "way" else "torque"
     value.setdefault("loads", []).append({"pair": name, key: 33.0})
-    with_it = of(value)
+    with_it = forces_of(value)
     value["loads"].pop()
-    without = of(value)
+    without = forces_of(value)
     assert with_it.inputs[name] == pytest.approx(without.inputs[name] - 33.0, rel=1e-12)
     np.testing.assert_allclose(with_it.reactions[name].force, without.reactions[name].force, atol=1e-11)
     np.testing.assert_allclose(with_it.reactions[name].couple, without.reactions[name].couple, atol=1e-11)
@@ -382,10 +313,10 @@ def test_an_effort_between_two_moving_links_acts_on_both():
         "inputs": [{"pair": "O", "position": 0.4}, {"pair": "E", "position": 0.9}],
         "loads": [{"pair": "E", "torque": 5.0}],
     }
-    found = of(value)
+    found = forces_of(value)
     assert found.inputs == pytest.approx({"O": 0.0, "E": -5.0}, abs=1e-13)
     value["loads"] = [{"point": "H", "force": [0, -10]}]
-    found = of(value)
+    found = forces_of(value)
     elbow = 0.3 * cos(1.3)
     assert found.inputs == pytest.approx({"O": 10 * (0.4 * cos(0.4) + elbow), "E": 10 * elbow}, rel=1e-13)
     assert found.reactions["E"].force == pytest.approx([0.0, 10.0], abs=1e-12)
@@ -407,7 +338,7 @@ def test_loads_on_a_pin_of_three_links_and_their_reactions_by_name():
         "loads": [{"point": "D", "force": [0, -100]}],
         "sketch": {"C": [1, 1], "D": [1, 0]},
     }
-    found = of(value)
+    found = forces_of(value)
     assert list(found.reactions) == ["P", "Q", "C:a,b", "C:a,hanger"]
     assert found.reactions["C:a,hanger"].force == pytest.approx([0.0, 100.0], abs=1e-11)
     assert found.reactions["C:a,b"].force == pytest.approx([50.0, -50.0], rel=1e-12)
@@ -428,7 +359,7 @@ def test_an_input_may_drive_a_motion_of_a_pin_that_is_no_pair_by_itself():
         "inputs": [{"pair": "C:f,a", "position": 0.2}, {"pair": "C:a,b", "position": 0.3}],
         "loads": [{"point": "D", "force": [0, -8]}],
     }
-    found = of(value)
+    found = forces_of(value)
     torque = 8 * cos(0.5)
     assert found.inputs == pytest.approx({"C:f,a": torque, "C:a,b": torque}, rel=1e-13)
     assert found.proof.equilibrium < 1e-14
@@ -439,9 +370,9 @@ def test_an_input_may_drive_a_motion_of_a_pin_that_is_no_pair_by_itself():
 
 def test_a_spring_pulls_by_its_length_and_a_damper_by_how_fast_it_grows():
     spring = {"points": ["W", "A"], "stiffness": 40.0, "free_length": 0.3, "damping": 2.5}
-    value = lever({"A": [0.5, 0]}, 0.7, springs=[spring])
+    value = lever_document({"A": [0.5, 0]}, 0.7, springs=[spring])
     value["links"]["f"]["points"]["W"] = [1.2, -0.1]
-    found = of(value)
+    found = forces_of(value)
     away = np.array([1.2 - 0.5 * cos(0.7), -0.1 - 0.5 * sin(0.7)])
     length = np.hypot(*away)
     growing = -3.0 * 0.5 * (-sin(0.7) * away[0] + cos(0.7) * away[1]) / length
@@ -451,13 +382,13 @@ def test_a_spring_pulls_by_its_length_and_a_damper_by_how_fast_it_grows():
 
 
 def test_a_spring_without_free_length_pulls_nothing_where_its_ends_meet_and_any_other_has_no_direction():
-    value = lever({"A": [0.5, 0]}, 0.0, springs=[{"points": ["W", "A"], "stiffness": 40.0}])
+    value = lever_document({"A": [0.5, 0]}, 0.0, springs=[{"points": ["W", "A"], "stiffness": 40.0}])
     value["links"]["f"]["points"]["W"] = [0.5, 0.0]
-    assert of(value).reactions["O"].force == pytest.approx([0.0, 0.0], abs=1e-14)
+    assert forces_of(value).reactions["O"].force == pytest.approx([0.0, 0.0], abs=1e-14)
     for more in ({"free_length": 0.1}, {"damping": 1.0}):
         value["springs"][0] = {"points": ["W", "A"], "stiffness": 40.0, **more}
         with pytest.raises(NoAnswer, match="the ends of a spring or damper meet here"):
-            of(value)
+            forces_of(value)
         found = over(value, 4)
         assert list(np.isnan(found.inputs["O"])) == [True, False, False, False, True]
 
@@ -467,8 +398,8 @@ def test_a_spring_without_free_length_pulls_nothing_where_its_ends_meet_and_any_
     [(0.2, 0.9, 0.7), (3.0, -3.0, 2 * pi - 6.0), (-1.5 * pi, 0.4, 0.4 + 1.5 * pi), (5 * pi, 0.1, 0.1 - 5 * pi)],
 )
 def test_a_torsional_spring_is_wound_up_the_least_unless_it_is_set_with_turns(free, angle, wound):
-    value = lever({}, angle, springs=[{"links": ["f", "lever"], "stiffness": 7.0, "free_angle": free}])
-    found = of(value)
+    value = lever_document({}, angle, springs=[{"links": ["f", "lever"], "stiffness": 7.0, "free_angle": free}])
+    found = forces_of(value)
     assert found.inputs["O"] == pytest.approx(7.0 * wound, rel=1e-12)
     assert found.proof.equilibrium < 1e-14
     two_turns = planar.cycle(planar.from_dict(value), steps=12, start=angle, stop=angle + 4 * pi)
@@ -480,8 +411,10 @@ def test_a_torsional_spring_is_wound_up_the_least_unless_it_is_set_with_turns(fr
 
 
 def test_loads_of_time_are_refused_of_a_motion_without():
-    value = lever({"P": [1, 0]}, loads=[{"link": "lever", "torque": 2, "varies": {"at": [0, 1], "factors": [1, 3]}}])
-    assert of(value).inputs["O"] == pytest.approx(-2.0)
+    value = lever_document(
+        {"P": [1, 0]}, loads=[{"link": "lever", "torque": 2, "varies": {"at": [0, 1], "factors": [1, 3]}}]
+    )
+    assert forces_of(value).inputs["O"] == pytest.approx(-2.0)
     with pytest.raises(BadInput, match="varies with time") as refused:
         over(value, 4)
     assert refused.value.place == "loads"
@@ -491,11 +424,11 @@ def test_loads_of_time_are_refused_of_a_motion_without():
 
 def test_a_dead_point_is_said_and_in_a_motion_not_a_number():
     """A slider-crank driven by its slide towards its dead point: its pull grows as T / (r sin), and there is none."""
-    value = slider_crank(0.3, 0.9, loads=[{"link": "crank", "torque": 5.0}])
+    value = slider_crank_document(0.3, 0.9, loads=[{"link": "crank", "torque": 5.0}])
     value["inputs"] = [{"pair": "stroke", "position": 1.2, "velocity": 0.1}]
     value["sketch"]["A"] = [0.3, 0.01]
     with pytest.raises(NoAnswer) as refused:
-        of(value)
+        forces_of(value)
     assert refused.value.outcome is Outcome.DEAD_POINT
     value["inputs"][0]["position"] = 1.0
     found = over(value, 20)

@@ -17,7 +17,8 @@ from planar.analysis.motion.mechanical_advantage import advantage, advantages
 from planar.dynamics.virtual_velocities import has_length_motion, unit_rate_state
 from planar.dynamics.virtual_work import BalanceFunction
 from planar.foundation.errors import BadInput, NoAnswer, Outcome, Unknown
-from planar.model.mechanism import Drive, Input, Load, Mechanism
+from planar.model.loads import Load
+from planar.model.mechanism import Drive, Input, Mechanism
 from planar.results.motion import State
 from planar.solving.position import solve
 from tests.command import run

@@ -12,7 +12,8 @@ import pytest
 import planar
 from planar.dynamics.forces import Forces
 from planar.model.loads import Load
-from tests.dynamics.test_equations_of_motion import of, slider_crank
+from tests.builders import slider_crank_document
+from tests.checks import forces_of
 
 Value = dict[str, Any]
 OFF = tan(radians(20))
@@ -57,7 +58,7 @@ def wheels(apart: float, **mesh: Any) -> Value:
 def test_teeth_press_with_the_torque_by_the_radius_and_push_each_other_off(apart, mesh, at, tangential, off, sense):
     value = wheels(apart, **mesh)
     value["loads"][0]["torque"] *= sense
-    found = of(value)
+    found = forces_of(value)
     on_second = found.reactions["mesh"]
     assert on_second.at == pytest.approx([at, 0.0], abs=1e-12)
     assert on_second.force == pytest.approx([off, tangential * sense], rel=1e-12)
@@ -72,7 +73,7 @@ def test_teeth_press_with_the_torque_by_the_radius_and_push_each_other_off(apart
 def test_the_planet_of_a_gear_set_is_pressed_alike_from_both_sides():
     """Of a torque on the arm: F = T / (2 * arm) at each mesh, twice that at the planet's pin, F r on the sun."""
     value = planar.to_dict(planar.load("planetary-gear-set")) | {"loads": [{"link": "arm", "torque": -12.0}]}
-    found = of(value)
+    found = forces_of(value)
     press = 12.0 / (2 * 0.060)
     turn = found.moving.link("arm").angle
     across, outwards = np.array([-sin(turn), cos(turn)]), np.array([cos(turn), sin(turn)])
@@ -112,7 +113,7 @@ def test_a_pinion_and_its_rack_push_each_other_off():
         "inputs": [{"pair": "O", "position": 0.3}],
         "loads": [{"point": "P", "force": [-90, 7]}],
     }
-    found = of(value)
+    found = forces_of(value)
     off = 90 * OFF
     assert found.reactions["teeth"].force == pytest.approx([-90, off], rel=1e-12)
     assert found.reactions["teeth"].at == pytest.approx([0, 0], abs=1e-15)
@@ -130,7 +131,7 @@ def test_a_pinion_and_its_rack_push_each_other_off():
 def test_of_wheels_given_by_ratio_couples_are_told_and_bearings_named(keyword):
     value = wheels(0.8)
     value["pairs"][2] = {keyword: "mesh", "links": ["a", "b"], "ratio": -0.6}
-    found = of(value)
+    found = forces_of(value)
     assert found.inputs["P"] == pytest.approx(6.0, rel=1e-12)
     assert found.reactions["mesh"].couples == pytest.approx({"a": -6.0, "b": -10.0, "f": 16.0}, rel=1e-12)
     assert set(found.undetermined) == {"P", "Q"}
@@ -142,14 +143,14 @@ def test_of_wheels_given_by_ratio_couples_are_told_and_bearings_named(keyword):
 
 def test_a_bearing_beyond_the_wheels_is_told_all_the_same():
     """Behind wheel b a crank drives a piston: what runs in the shafts is open, what runs in the rod is not."""
-    value = slider_crank(0.3, 0.9, loads=[{"point": "B", "force": [100, 0]}])
-    whole = of(value)
+    value = slider_crank_document(0.3, 0.9, loads=[{"point": "B", "force": [100, 0]}])
+    whole = forces_of(value)
     value["links"]["f"]["points"]["Q"] = [-0.5, 0.0]
     value["links"]["motor"] = {"points": {"Q": [0, 0]}}
     value["pairs"] += [{"turning": "Q"}, {"belt": "loop", "links": ["motor", "crank"], "ratio": 0.5}]
     value["inputs"] = [{"pair": "Q", "position": 0.8}]
     value["sketch"]["A"] = [0.3 * cos(0.4), 0.3 * sin(0.4)]
-    found = of(value)
+    found = forces_of(value)
     assert found.inputs["Q"] == pytest.approx(0.5 * whole.inputs["O"], rel=1e-12)
     assert set(found.undetermined) == {"O", "Q"}
     for name in ("A", "B", "stroke"):
@@ -168,7 +169,7 @@ def test_wheels_whose_shafts_are_not_in_the_carrier_load_bearings_that_are_not_k
         pair.pop("radii")
         pair["ratio"] = -2.0 if pair["gear"] == "inner mesh" else 4.0
     value["inputs"][0]["pair"] = "S0"
-    found = of(value)
+    found = forces_of(value)
     assert found.inputs["S0"] == pytest.approx(4.0, rel=1e-12)
     assert set(found.undetermined) == {"O", "S0", "P"}
 
@@ -192,11 +193,11 @@ def agreeing(ways: list[Forces]) -> set[str]:
 
 
 def test_of_a_piston_in_two_guides_only_the_guides_are_not_told():
-    value = slider_crank(0.3, 0.9, loads=[{"point": "B", "force": [-100, 0]}, {"point": "A", "force": [3, 5]}])
+    value = slider_crank_document(0.3, 0.9, loads=[{"point": "B", "force": [-100, 0]}, {"point": "A", "force": [3, 5]}])
     again = {"sliding": "again", "links": ["f", "piston"], "line": {"through": "O"}, "point": "B"}
-    broken = [of(value)]
-    whole = of(value | {"pairs": [*value["pairs"], again]})
-    broken.append(of(value | {"pairs": [*value["pairs"][:-1], again]}))
+    broken = [forces_of(value)]
+    whole = forces_of(value | {"pairs": [*value["pairs"], again]})
+    broken.append(forces_of(value | {"pairs": [*value["pairs"][:-1], again]}))
     assert set(whole.undetermined) == {"stroke", "again"}
     assert agreeing(broken) == {"O", "A", "B"}
     for name in "OAB":
@@ -221,8 +222,8 @@ def parallel(*cranks: str) -> Value:
 
 
 def test_of_a_rod_on_three_parallel_cranks_what_hangs_on_it_is_told():
-    whole = of(parallel("A", "B", "C"))
-    broken = [of(parallel("A", "B")), of(parallel("A", "C"))]
+    whole = forces_of(parallel("A", "B", "C"))
+    broken = [forces_of(parallel("A", "B")), forces_of(parallel("A", "C"))]
     assert agreeing(broken) == {"E"}
     assert {name for name, each in whole.reactions.items() if told(each)} == {"E"}
     assert whole.reactions["E"].force == pytest.approx(broken[0].reactions["E"].force, rel=1e-10)
@@ -232,11 +233,11 @@ def test_of_a_rod_on_three_parallel_cranks_what_hangs_on_it_is_told():
 
 
 def test_a_shaft_in_two_bearings_at_one_place_has_no_telling_which_carries():
-    value = slider_crank(0.3, 0.9, loads=[{"point": "B", "force": [-100, 0]}])
+    value = slider_crank_document(0.3, 0.9, loads=[{"point": "B", "force": [-100, 0]}])
     value["links"]["f"]["points"]["O2"] = [0, 0]
     value["links"]["crank"]["points"] = {"O2": [0, 0]}
     value["pairs"].append({"turning": "O2", "links": ["f", "crank"]})
-    found = of(value)
+    found = forces_of(value)
     assert set(found.undetermined) == {"O", "O2"}
     assert np.isnan(found.reactions["O"].force).all()
 
@@ -253,7 +254,7 @@ def test_two_pins_in_line_hold_a_rigid_body_twice_only_along_their_line():
         "pairs": [{"turning": "P"}, {"turning": "Q"}],
         "loads": [{"point": "R", "force": [0, -8]}],
     }
-    found = of(value)
+    found = forces_of(value)
     assert set(found.undetermined) == {"P", "Q"}
     for name in "PQ":
         assert np.isnan(found.reactions[name].force).all()
@@ -280,13 +281,13 @@ def test_teeth_that_mesh_twice_leave_open_how_hard_they_push_their_bearings_apar
         "inputs": [{"pair": "P", "position": 0}],
         "loads": [{"link": "b", "torque": -10}],
     }
-    found = of(value)
+    found = forces_of(value)
     assert found.inputs["P"] == pytest.approx(-5.0, rel=1e-12)
     assert set(found.undetermined) == {"P", "Q", "one", "two"}
     for each in found.reactions.values():
         assert np.isnan(each.force).all()
     value["pairs"].pop()
-    once = of(value)
+    once = forces_of(value)
     assert not once.undetermined
     # T / s across the centres at each, and its tangent along them, off each other
     assert once.reactions["Q"].force == pytest.approx([-5.0 * tan(radians(20)), 5.0], rel=1e-12)

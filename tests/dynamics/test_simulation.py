@@ -13,7 +13,7 @@ from scipy.special import ellipk
 import planar
 from planar.dynamics.simulation import Simulation
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
-from tests.dynamics.test_equations_of_motion import bracket, four_bar, lever, masses, slider_crank
+from tests.builders import bracket_document, four_bar_document, lever_document, masses, slider_crank_document
 
 Value = dict[str, Any]
 G = 9.81
@@ -40,7 +40,7 @@ LENGTH, ABOUT_PIN = 0.4, 0.05 + 2.0 * 0.4**2
 def test_a_physical_pendulum_has_the_period_of_the_elliptic_integral(swing):
     """T = 4 K(sin(swing / 2)) sqrt(J / m g l); after half of it it stands on the other side, and so on."""
     period = 4.0 * ellipk(sin(swing / 2) ** 2) * sqrt(ABOUT_PIN / (2.0 * G * LENGTH))
-    found = run(lever({"G": [LENGTH, 0]}, swing - pi / 2, **PENDULUM), 2.0 * period)
+    found = run(lever_document({"G": [LENGTH, 0]}, swing - pi / 2, **PENDULUM), 2.0 * period)
     wanted = np.array([swing, 0.0, -swing, 0.0, swing, 0.0, -swing, 0.0, swing]) - pi / 2
     np.testing.assert_allclose(angle(found), wanted, atol=2e-9)
     assert found.balance < 1e-10
@@ -48,7 +48,7 @@ def test_a_physical_pendulum_has_the_period_of_the_elliptic_integral(swing):
 
 def test_the_pin_of_a_pendulum_carries_its_weight_and_its_swing():
     """Along it m (g cos + l w^2), by energy w^2 = 2 m g l (cos - cos swing) / J; across m g sin (1 - m l^2 / J)."""
-    found = run(lever({"G": [LENGTH, 0]}, 1.2 - pi / 2, **PENDULUM), 1.5, 30)
+    found = run(lever_document({"G": [LENGTH, 0]}, 1.2 - pi / 2, **PENDULUM), 1.5, 30)
     off = angle(found) + pi / 2
     along = 2.0 * G * (np.cos(off) + 4.0 * LENGTH**2 * (np.cos(off) - cos(1.2)) / ABOUT_PIN)
     across = 2.0 * G * np.sin(off) * (1.0 - 2.0 * LENGTH**2 / ABOUT_PIN)
@@ -119,7 +119,7 @@ def test_a_step_of_a_load_is_met_in_time():
 
 def test_a_torsional_spring_swings_a_wheel_over_several_turns():
     """J a'' = -k a: from three turns off it swings three turns to the other side, at one frequency."""
-    value = lever({"A": [1, 0]}, 0.0)
+    value = lever_document({"A": [1, 0]}, 0.0)
     value["masses"] = [{"link": "lever", "mass": 1.0, "at": "O", "inertia": 0.5}]
     value["springs"] = [{"links": ["f", "lever"], "stiffness": 2.0}]
     value["inputs"][0] |= {"velocity": 6.0 * pi * 2.0, "acceleration": 0.0}
@@ -177,8 +177,8 @@ def test_a_double_pendulum_goes_as_its_equations_in_the_books_say():
 @pytest.mark.parametrize(
     "value",
     [
-        four_bar(0.3, 0.7, 0.6, 0.9, masses=masses("crank", "coupler", "rocker"), gravity=[0, -G]),
-        slider_crank(0.3, 0.9, masses=masses("crank", "rod", "piston"), gravity=[0, -G]),
+        four_bar_document(0.3, 0.7, 0.6, 0.9, masses=masses("crank", "coupler", "rocker"), gravity=[0, -G]),
+        slider_crank_document(0.3, 0.9, masses=masses("crank", "rod", "piston"), gravity=[0, -G]),
     ],
     ids=["four-bar", "slider-crank"],
 )
@@ -196,7 +196,7 @@ def test_what_falls_freely_keeps_its_energy_for_ten_seconds(value):
 
 def test_a_double_rocker_that_is_let_go_passes_the_limits_of_its_crank():
     """Its input angle is no coordinate there, for it turns back: energy and closure do not notice."""
-    value = four_bar(0.7, 0.35, 0.6, 0.9, masses=masses("crank", "coupler", "rocker"), gravity=[0, -G])
+    value = four_bar_document(0.7, 0.35, 0.6, 0.9, masses=masses("crank", "coupler", "rocker"), gravity=[0, -G])
     value["inputs"][0] |= {"position": 1.0, "velocity": 0.0, "acceleration": 0.0}
     value["sketch"] = {"B": [0.4, 0.6]}
     found = run(value, 4.0, 400)
@@ -284,7 +284,9 @@ def test_a_mechanism_held_twice_falls_as_without_the_second_holding():
 
 def test_a_parallelogram_stays_one_where_its_branches_cross():
     """Let go with some speed it passes flat through its change points, twice a turn, and stays a parallelogram."""
-    value = four_bar(0.3, 0.9, 0.3, 0.9, masses=[{"link": "coupler", "mass": 2.0, "at": [0.45, 0], "inertia": 0.1}])
+    value = four_bar_document(
+        0.3, 0.9, 0.3, 0.9, masses=[{"link": "coupler", "mass": 2.0, "at": [0.45, 0], "inertia": 0.1}]
+    )
     value["sketch"] = {"B": [1.15, 0.17]}
     value["inputs"][0]["velocity"] = 5.0
     found = run(value, 3.0, 60, moving=True)
@@ -294,7 +296,9 @@ def test_a_parallelogram_stays_one_where_its_branches_cross():
 
 def test_a_parallelogram_that_falls_passes_every_change_point_on_its_way():
     """Its rod translates all the time, so that it is a pendulum of its mass on the cranks: energy tells its speed."""
-    value = four_bar(0.3, 0.9, 0.3, 0.9, masses=[{"link": "coupler", "mass": 2.0, "at": [0.45, 0], "inertia": 0.1}])
+    value = four_bar_document(
+        0.3, 0.9, 0.3, 0.9, masses=[{"link": "coupler", "mass": 2.0, "at": [0.45, 0], "inertia": 0.1}]
+    )
     value |= {"gravity": [0, -G], "sketch": {"B": [1.15, 0.17]}}
     found = run(value, 2.0, 50)
     assert np.count_nonzero(np.diff(np.sign(np.sin(angle(found))))) >= 3
@@ -329,7 +333,7 @@ def test_a_step_that_ends_beyond_a_change_point_takes_no_speed_away():
 
 
 def test_a_link_that_nothing_makes_heavy_is_named():
-    value = lever({"A": [1, 0]}, gravity=[0, -G])
+    value = lever_document({"A": [1, 0]}, gravity=[0, -G])
     with pytest.raises(NoAnswer, match="'lever' can move without anything that has a mass") as refused:
         run(value, 1.0)
     assert refused.value.outcome is Outcome.TOO_FEW_INPUTS
@@ -372,25 +376,25 @@ def test_where_what_can_move_loses_its_mass_on_the_way_the_rows_before_are_kept(
 @pytest.mark.parametrize("duration", [0.0, -1.0, float("nan"), float("inf"), True, "2s"])
 def test_durations_that_are_none_are_refused(duration):
     with pytest.raises(BadInput) as refused:
-        planar.simulate(planar.from_dict(lever({"A": [1, 0]})), duration)
+        planar.simulate(planar.from_dict(lever_document({"A": [1, 0]})), duration)
     assert refused.value.place == "duration"
 
 
 @pytest.mark.parametrize("steps", [0, 2.5, True, 10**6])
 def test_steps_that_are_none_are_refused(steps):
     with pytest.raises(BadInput) as refused:
-        planar.simulate(planar.from_dict(lever({"A": [1, 0]})), 1.0, steps)
+        planar.simulate(planar.from_dict(lever_document({"A": [1, 0]})), 1.0, steps)
     assert refused.value.place == "steps"
 
 
 def test_inputs_to_be_driven_are_known_by_name():
     with pytest.raises(BadInput, match="no input at 'X' to be driven; the inputs are at O"):
-        planar.simulate(planar.from_dict(lever({"A": [1, 0]})), 1.0, driven=["X"])
+        planar.simulate(planar.from_dict(lever_document({"A": [1, 0]})), 1.0, driven=["X"])
 
 
 def test_a_driven_input_that_jams_ends_the_motion_with_a_sentence():
     """The double rocker's crank, driven past where it can go."""
-    value = four_bar(0.7, 0.35, 0.6, 0.9, masses=masses("crank", "coupler", "rocker"))
+    value = four_bar_document(0.7, 0.35, 0.6, 0.9, masses=masses("crank", "coupler", "rocker"))
     value["inputs"][0] |= {"position": 0.8, "velocity": 2.0, "acceleration": 0.0}
     value["sketch"] = {"B": [0.4, 0.6]}
     found = planar.simulate(planar.from_dict(value), 3.0, 300, driven=["O"], moving=True)
@@ -403,7 +407,7 @@ def test_a_driven_input_that_jams_ends_the_motion_with_a_sentence():
 
 
 def test_a_spring_whose_ends_meet_at_the_start_is_said_to_have_no_direction():
-    value = lever({"A": [1, 0]}, 0.0, springs=[{"points": ["W", "A"], "stiffness": 10, "free_length": 0.3}])
+    value = lever_document({"A": [1, 0]}, 0.0, springs=[{"points": ["W", "A"], "stiffness": 10, "free_length": 0.3}])
     value["links"]["f"]["points"]["W"] = [1, 0]
     value["masses"] = [{"link": "lever", "mass": 1, "at": "A"}]
     found = planar.simulate(planar.from_dict(value), 1.0)
@@ -414,10 +418,10 @@ def test_a_spring_whose_ends_meet_at_the_start_is_said_to_have_no_direction():
 
 def test_what_rests_stays_and_keeps_its_energy():
     """A pendulum that hangs, and a bracket of two bars that cannot move."""
-    hanging = run(lever({"G": [LENGTH, 0]}, -pi / 2, **PENDULUM), 2.0)
+    hanging = run(lever_document({"G": [LENGTH, 0]}, -pi / 2, **PENDULUM), 2.0)
     np.testing.assert_allclose(angle(hanging), -pi / 2, atol=1e-12)
     assert hanging.balance < 1e-14
-    value = bracket(masses=[{"link": "strut", "mass": 2.0, "at": "C"}], gravity=[0, -G])
+    value = bracket_document(masses=[{"link": "strut", "mass": 2.0, "at": "C"}], gravity=[0, -G])
     still = planar.simulate(planar.from_dict(value), 1.0, 4)
     assert still.motion.outcome is Outcome.SOLVED
     assert still.balance < 1e-14
@@ -427,9 +431,9 @@ def test_what_rests_stays_and_keeps_its_energy():
 
 def test_a_motion_does_not_depend_on_units_or_size():
     """The same pendulum a million times smaller, in a gravity as much smaller, swings alike."""
-    found = run(lever({"G": [LENGTH, 0]}, 0.2, **PENDULUM), 2.0, 10)
+    found = run(lever_document({"G": [LENGTH, 0]}, 0.2, **PENDULUM), 2.0, 10)
     for by in (1e-6, 1e6):
-        value = lever({"G": [LENGTH * by, 0]}, 0.2, gravity=[0, -G * by])
+        value = lever_document({"G": [LENGTH * by, 0]}, 0.2, gravity=[0, -G * by])
         value["masses"] = [{"link": "lever", "mass": 2.0, "at": "G", "inertia": 0.05 * by**2}]
         other = run(value, 2.0, 10)
         np.testing.assert_allclose(angle(other), angle(found), atol=1e-9)

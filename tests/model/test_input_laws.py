@@ -35,7 +35,8 @@ from planar.model.input_laws import (
     TrapezoidalRise,
 )
 from planar.model.mechanism import Drive, Input, replace_inputs
-from tests.document import test_document as document
+from tests import documents as document
+from tests import random_documents
 from tests.draws import draws
 
 H, T = -0.7, 0.3
@@ -563,8 +564,8 @@ def test_a_law_made_in_python_is_held_to_the_same_rules(pieces, place):
 def test_a_mutilated_law_is_read_or_refused_and_nothing_else(law, times, data):
     law = {"law": deepcopy(law)}
     for _ in range(times):
-        if document.places(law):
-            document.mutilated(law, data.draw)
+        if random_documents.places(law):
+            random_documents.mutilated(law, data.draw)
     value = filed(None)
     value["inputs"][0] |= law
     try:

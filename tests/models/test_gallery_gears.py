@@ -8,7 +8,7 @@ import pytest
 from numpy.polynomial import Chebyshev
 
 import planar
-from tests.models.test_models import turned
+from tests.known import state_turned_by
 
 
 def meeting(p, r, q, s):
@@ -55,21 +55,21 @@ def five_bar(a):
 
 @pytest.mark.parametrize("degrees", [-700, -300, -100, 0, 45, 170, 290, 360, 500, 719])
 def test_the_geared_five_bar_goes_where_circles_meet_turn_after_turn(degrees):
-    state = turned("geared-five-bar", "O", degrees)
+    state = state_turned_by("geared-five-bar", "O", degrees)
     for index, name in enumerate("ABCP"):
         agrees(state, name, lambda a, index=index: five_bar(a)[index])
     assert state.link("QB").angle == pytest.approx(np.radians(100 - 1.5 * degrees), abs=1e-12)
 
 
 def test_the_geared_five_bar_closes_after_two_turns_but_not_after_one():
-    start, once, twice = (turned("geared-five-bar", "O", d).point("P").position for d in (0, 360, 720))
+    start, once, twice = (state_turned_by("geared-five-bar", "O", d).point("P").position for d in (0, 360, 720))
     np.testing.assert_allclose(twice, start, atol=1e-14)
     assert np.hypot(*(once - start)) > 0.01
 
 
 @pytest.mark.parametrize("degrees", [0, 77, 180, 310, 800])
 def test_cartwrights_crosshead_runs_straight(degrees):
-    state = turned("cartwright", "O", degrees)
+    state = state_turned_by("cartwright", "O", degrees)
     c = state.point("C")
     assert [c.position[0], c.velocity[0], c.acceleration[0]] == pytest.approx([0.08, 0, 0], abs=1e-12)
     agrees(state, "C", lambda a: 0.08 + 1j * (0.06 * np.sin(a) + np.sqrt(0.3**2 - (0.08 - 0.06 * np.cos(a)) ** 2)))
@@ -80,7 +80,7 @@ def test_cartwrights_crosshead_runs_straight(degrees):
 
 @pytest.mark.parametrize("degrees", [0, 60, 150, 240, 330, 1000, -500])
 def test_the_epicyclic_gears_planet_obeys_willis_and_its_rod_meets_the_rocker(degrees):
-    state = turned("epicyclic-coupler", "O", degrees)
+    state = state_turned_by("epicyclic-coupler", "O", degrees)
     arm, planet = state.link("arm"), state.link("planet")
     for part in (0, 1, 2):  # angle, angular velocity, angular acceleration
         assert planet[part] - arm[part] == pytest.approx(-60 / 30 * (0 - arm[part]), rel=1e-14)
@@ -95,7 +95,7 @@ def test_the_epicyclic_gears_planet_obeys_willis_and_its_rod_meets_the_rocker(de
 
 @pytest.mark.parametrize("degrees", [0, 100, 2000])
 def test_the_planetary_gear_set_obeys_willis(degrees):
-    state = turned("planetary-gear-set", "O:frame,sun", degrees)
+    state = state_turned_by("planetary-gear-set", "O:frame,sun", degrees)
     sun, planet, arm = (state.link(name) for name in ("sun", "planet", "arm"))
     for part in (0, 1, 2):
         assert arm[part] == pytest.approx(sun[part] / (1 + 80 / 40), rel=1e-14)
@@ -115,7 +115,7 @@ def test_the_planetary_differential_adds_its_two_inputs(sun_at, ring_at):
 
 @pytest.mark.parametrize("degrees", [0, 25, 91, 200, 700])
 def test_cardans_wheel_draws_straight_lines_and_an_ellipse(degrees):
-    state = turned("cardan-gears", "O", degrees)
+    state = state_turned_by("cardan-gears", "O", degrees)
     a = state.inputs["O"].position
     agrees(state, "T", lambda a: 0.1 * np.cos(a) + 0j * a)
     assert [part[1] for part in state.point("T")[:3]] == pytest.approx([0, 0, 0], abs=1e-12)
@@ -128,7 +128,7 @@ def test_cardans_wheel_draws_straight_lines_and_an_ellipse(degrees):
 
 @pytest.mark.parametrize("degrees", [-150, -60, 0, 10, 30, 60, 150])
 def test_the_hypocycloid_draws_the_slider_by_its_closed_form(degrees):
-    state = turned("hypocycloid-dwell", "O", degrees)
+    state = state_turned_by("hypocycloid-dwell", "O", degrees)
 
     def e(a):
         return 0.1 * turn(a) + 0.01 * turn(-2 * a)
@@ -139,18 +139,18 @@ def test_the_hypocycloid_draws_the_slider_by_its_closed_form(degrees):
 
 def test_the_hypocycloids_slider_dwells():
     """The rod is as long as the radius of curvature, so only the fourth power of the angle moves the slider."""
-    there = turned("hypocycloid-dwell", "O", 30)
+    there = state_turned_by("hypocycloid-dwell", "O", 30)
     rest = [there.point("B").velocity[0], there.point("B").acceleration[0], there.link("rod").angular_velocity]
     assert rest[:2] == pytest.approx([0, 0], abs=1e-13)
     assert abs(rest[2]) > 1
-    small, large = (turned("hypocycloid-dwell", "O", 30 + d).point("B").position[0] - 0.15 for d in (2, 4))
+    small, large = (state_turned_by("hypocycloid-dwell", "O", 30 + d).point("B").position[0] - 0.15 for d in (2, 4))
     assert large / small == pytest.approx(16, rel=0.01)
-    assert turned("hypocycloid-dwell", "O", 10).point("B").position[0] - 0.15 < 0.00025
+    assert state_turned_by("hypocycloid-dwell", "O", 10).point("B").position[0] - 0.15 < 0.00025
 
 
 @pytest.mark.parametrize("degrees", [0, 90, 200, 500, 1000])
 def test_watts_flywheel_turns_twice_a_cycle(degrees):
-    state, next_cycle = (turned("sun-and-planet", "O:arm,frame", d) for d in (degrees, degrees + 360))
+    state, next_cycle = (state_turned_by("sun-and-planet", "O:arm,frame", d) for d in (degrees, degrees + 360))
     wheel, arm, rod = (state.link(name) for name in ("flywheel", "arm", "rod"))
     assert next_cycle.link("flywheel").angle - wheel.angle == pytest.approx(4 * np.pi, abs=1e-12)
     assert next_cycle.link("rod").angle == pytest.approx(rod.angle, abs=1e-12)
@@ -168,7 +168,7 @@ def test_watts_flywheel_turns_twice_a_cycle(degrees):
 
 @pytest.mark.parametrize("degrees", [-400, -100, 0, 33, 380])
 def test_the_steering_rack_moves_by_radius_times_angle_and_turns_both_arms(degrees):
-    state = turned("rack-steering", "O", degrees)
+    state = state_turned_by("rack-steering", "O", degrees)
     agrees(state, "S", lambda a: 0.008 * a - 0.128j, reach=1.0)
     assert state.pair("travel")["displacement"] == pytest.approx(0.008 * np.radians(degrees), abs=1e-15)
     assert state.pair("mesh")["displacement"] == pytest.approx(-0.008 * np.radians(degrees), abs=1e-15)
@@ -181,9 +181,9 @@ def test_the_steering_rack_moves_by_radius_times_angle_and_turns_both_arms(degre
 
 
 def test_the_steering_arms_mirror_each_other():
-    middle = turned("rack-steering", "O", 0)
+    middle = state_turned_by("rack-steering", "O", 0)
     assert middle.link("left arm").angle + middle.link("right arm").angle == pytest.approx(-np.pi, abs=1e-13)
-    one, other = (turned("rack-steering", "O", d) for d in (300, -300))
+    one, other = (state_turned_by("rack-steering", "O", d) for d in (300, -300))
     assert one.link("left arm").angle + other.link("right arm").angle == pytest.approx(-np.pi, abs=1e-13)
     inner, outer = (one.link(arm).angle - middle.link(arm).angle for arm in ("left arm", "right arm"))
     assert inner > outer + np.radians(1) > np.radians(10)
@@ -226,7 +226,7 @@ def test_the_centre_between_two_racks_moves_by_their_mean(lower, upper):
 
 @pytest.mark.parametrize("degrees", [0, 50, 130, 222, 300])
 def test_a_pin_in_a_slot_moves_as_a_pin_with_a_block(degrees):
-    slot, block = turned("slotted-lever", "O", degrees), turned("004-QR", "O", degrees)
+    slot, block = state_turned_by("slotted-lever", "O", degrees), state_turned_by("004-QR", "O", degrees)
     for name in "ADR":
         for one, other in zip(slot.point(name)[:3], block.point(name)[:3], strict=True):
             np.testing.assert_allclose(one, other, atol=1e-11)
@@ -237,7 +237,7 @@ def test_a_pin_in_a_slot_moves_as_a_pin_with_a_block(degrees):
 
 @pytest.mark.parametrize("degrees", [0, 55, 90, 200, 305])
 def test_the_scotch_yoke_moves_harmonically(degrees):
-    state = turned("slotted-yoke", "O", degrees)
+    state = state_turned_by("slotted-yoke", "O", degrees)
     agrees(state, "Y", lambda a: 0.08 * np.cos(a) + 0j)
     assert state.pair("slot")["displacement"] == pytest.approx(0.08 * np.sin(state.inputs["O"].position), abs=1e-15)
     assert state.link("yoke")[:3] == pytest.approx((0, 0, 0), abs=1e-13)
@@ -260,7 +260,7 @@ def test_the_drafting_head_keeps_its_angle(upper, elbow):
 
 @pytest.mark.parametrize("degrees", [0, 30, 50, 100, 275, 1200])
 def test_the_belt_arms_tip_runs_straight(degrees):
-    state = turned("belt-arm", "O", degrees)
+    state = state_turned_by("belt-arm", "O", degrees)
     assert [part[1] for part in state.point("T")[:3]] == pytest.approx([0, 0, 0], abs=1e-12)
     agrees(state, "T", lambda a: 0.6 * np.cos(a) + 0j)
 

@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import brentq
 
 import planar
-from tests.models.test_models import turned
+from tests.known import state_turned_by
 
 NEAR = 1e-12  # of lengths in metres that are of the size of one
 
@@ -48,7 +48,7 @@ def rate(curve, t: float, h: float = 1e-3) -> complex:
 
 @pytest.mark.parametrize("degrees", [-100, -60, -20, 0, 20])
 def test_harts_inversor_draws_a_straight_line(degrees):
-    state = turned("hart-inversor", "B", degrees)
+    state = state_turned_by("hart-inversor", "B", degrees)
     g, p = at(state, "G"), at(state, "P")
     # the diagonals are parallel with the product 120^2 - 60^2, and AG and AP are half of them
     assert abs(g) * abs(p) == pytest.approx((0.120**2 - 0.060**2) / 4, rel=NEAR)
@@ -61,7 +61,7 @@ def test_harts_inversor_draws_a_straight_line(degrees):
 
 @pytest.mark.parametrize("degrees", [-40, -25, -15, 0, 8])
 def test_harts_a_frame_draws_the_bisector_of_its_base(degrees):
-    state = turned("hart-a-frame", "A", degrees)
+    state = state_turned_by("hart-a-frame", "A", degrees)
     assert at(state, "E").real == pytest.approx(0.1, abs=NEAR)
     assert speed(state, "E").real == pytest.approx(0, abs=NEAR)
     assert bend(state, "E").real == pytest.approx(0, abs=1e-11)
@@ -70,7 +70,7 @@ def test_harts_a_frame_draws_the_bisector_of_its_base(degrees):
 
 @pytest.mark.parametrize("degrees", [-135, -80, -40, 0, 35])
 def test_scott_russells_rod_ends_move_on_perpendicular_lines(degrees):
-    state = turned("scott-russell", "O", degrees)
+    state = state_turned_by("scott-russell", "O", degrees)
     angle, turn = math.radians(50 + degrees), 2 * math.pi
     expected = 0.3j * np.array([math.sin(angle), turn * math.cos(angle), -(turn**2) * math.sin(angle)])
     for found, value, size in zip((at, speed, bend), expected, (1, turn, turn**2), strict=True):
@@ -92,7 +92,7 @@ def test_roberts_point_is_on_the_base_at_three_places_and_near_it_between():
 
 @pytest.mark.parametrize("degrees", [-50, -30, -11, 0, 10, 17])
 def test_watts_point_runs_on_watts_curve_and_the_piston_rod_copies_it(degrees):
-    state = turned("watt-parallel-motion", "A0", degrees)
+    state = state_turned_by("watt-parallel-motion", "A0", degrees)
     p = at(state, "P")
     # r^2 = b^2 - (a sin t +- sqrt(c^2 - a^2 cos^2 t))^2 from the middle of the pivots, squared until no root is left
     a, b, c = abs(complex(0.2, 0.05)), 0.2, 0.05
@@ -118,7 +118,7 @@ def test_watts_line_leaves_the_straight_by_the_fifth_power_of_the_way():
 @pytest.mark.parametrize("degrees", range(-150, 210, 45))
 def test_hoeckens_curve_in_closed_form_and_as_that_of_its_cognate(degrees):
     """AP is a diameter about B through C, so CP is square to CA; and Chebyshev's 5 : 4 : 2 draws the same curve."""
-    state = turned("hoeken-straight-line", "O", degrees)
+    state = state_turned_by("hoeken-straight-line", "O", degrees)
     turn = way(math.radians(150 + degrees))
     arm = 0.1 * turn - 0.2
     p = at(state, "P")
@@ -128,7 +128,7 @@ def test_hoeckens_curve_in_closed_form_and_as_that_of_its_cognate(degrees):
 
 
 def test_hoeckens_line_is_straight_and_its_speed_even():
-    states = [turned("hoeken-straight-line", "O", degrees - 150) for degrees in range(90, 271, 10)]
+    states = [state_turned_by("hoeken-straight-line", "O", degrees - 150) for degrees in range(90, 271, 10)]
     points = [at(state, "P") for state in states]
     for place, x in ((0, 0.4), (9, 0.2), (18, 0.0)):
         assert points[place] == pytest.approx(complex(x, 0.4), abs=NEAR)
@@ -140,7 +140,7 @@ def test_hoeckens_line_is_straight_and_its_speed_even():
 
 @pytest.mark.parametrize("degrees", [-39, -20, -5, 0, 9])
 def test_evans_beam_keeps_a_right_angle_at_the_radius_bars_pivot(degrees):
-    state = turned("evans-grasshopper", "O", degrees)
+    state = state_turned_by("evans-grasshopper", "O", degrees)
     e, p = at(state, "E"), at(state, "P")
     assert (p * e.conjugate()).real == pytest.approx(0, abs=NEAR)  # Thales: A is as far from O as from E and P
     a = 0.3 * way(math.radians(15 + degrees))
@@ -178,7 +178,7 @@ LEGS = [("jansen-leg", 60, jansen), ("klann-leg", 180, klann)]
 @pytest.mark.parametrize("degrees", range(0, 360, 40))
 @pytest.mark.parametrize(("leg", "start", "curve"), LEGS, ids=["jansen", "klann"])
 def test_a_legs_foot_as_circles_meet(leg, start, curve, degrees):
-    state = turned(leg, "O", degrees)
+    state = state_turned_by(leg, "O", degrees)
     angle = math.radians(start + degrees)
     assert at(state, "foot") == pytest.approx(curve(angle), abs=NEAR)
     assert speed(state, "foot") == pytest.approx(-2 * math.pi * rate(curve, angle), abs=1e-9)
@@ -198,7 +198,7 @@ def test_a_leg_steps_flat_for_half_the_turn(leg, turn, stride, lift, low):
     run = planar.cycle(mechanism, 72, start, start + 2.0 * math.pi).point("foot").position[:-1]
     feet = run @ np.array([1, 1j])
     for index in (7, 40):  # a position of the run is that to which the crank leads alone
-        assert feet[index] == pytest.approx(at(turned(leg, "O", 5 * index), "foot"), abs=NEAR)
+        assert feet[index] == pytest.approx(at(state_turned_by(leg, "O", 5 * index), "foot"), abs=NEAR)
     down = feet.imag < feet.imag.min() + low
     assert stride[0] < np.ptp(feet.real) < stride[1]
     assert lift[0] < np.ptp(feet.imag) < lift[1]
@@ -237,7 +237,7 @@ def eyelet(t: float) -> complex:
 
 @pytest.mark.parametrize("degrees", range(0, 360, 45))
 def test_needle_and_take_up_of_a_sewing_machine_in_closed_form(degrees):
-    state = turned("sewing-machine", "O", degrees)
+    state = state_turned_by("sewing-machine", "O", degrees)
     t, turn = math.radians(60 + degrees), 40 * math.pi
     x, y = 0.016 * math.cos(t), 0.016 * math.sin(t)
     drop = math.sqrt(0.05**2 - x**2)
@@ -249,7 +249,7 @@ def test_needle_and_take_up_of_a_sewing_machine_in_closed_form(degrees):
 
 def test_the_take_up_is_highest_after_the_needle_and_rises_faster_than_it_falls():
     angles = np.arange(0, 360, 5)
-    heights = [at(turned("sewing-machine", "O", degrees - 60), "eyelet").imag for degrees in angles]
+    heights = [at(state_turned_by("sewing-machine", "O", degrees - 60), "eyelet").imag for degrees in angles]
     top, bottom = angles[np.argmax(heights)], angles[np.argmin(heights)]
     assert 50 <= top - 90 <= 70  # the needle is highest at 90 and lowest at 270 degrees
     assert 60 <= bottom - 270 <= 90
@@ -369,7 +369,7 @@ def test_davis_gear_is_right_at_every_angle(slide):
 
 @pytest.mark.parametrize("degrees", [-10, -5, 0, 6, 14])
 def test_a_double_wishbones_wheel_turns_about_the_point_where_its_arms_lines_meet(degrees):
-    state = turned("double-wishbone", "LA", degrees)
+    state = state_turned_by("double-wishbone", "LA", degrees)
     la, ua = complex(0.25, 0.19), complex(0.33, 0.44)
     lower = way(math.radians(degrees - 3))
     lb = la + 0.38 * lower
@@ -389,7 +389,7 @@ def test_a_double_wishbones_wheel_turns_about_the_point_where_its_arms_lines_mee
 
 
 def test_a_double_wishbone_tilts_the_rising_wheels_top_inward():
-    tilts = [turned("double-wishbone", "LA", degrees).link("knuckle").angle for degrees in (0, 5, 10, 15)]
+    tilts = [state_turned_by("double-wishbone", "LA", degrees).link("knuckle").angle for degrees in (0, 5, 10, 15)]
     assert tilts == sorted(tilts)
     assert math.radians(2) < tilts[-1] - tilts[0] < math.radians(3)
 
@@ -429,7 +429,7 @@ def test_a_landing_gear_goes_no_further_than_its_straight_brace():
 def test_a_level_luffing_cranes_hook_stays_level_over_its_reach():
     hooks = []
     for degrees in np.linspace(62.1, 85.8, 21):
-        state = turned("level-luffing-crane", "O", degrees - 74)
+        state = state_turned_by("level-luffing-crane", "O", degrees - 74)
         a = 24 * way(math.radians(degrees))
         b = meet(a, 2.6, complex(-1, 7.7), 18.6, -1)
         hooks.append(at(state, "hook"))

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 import planar
 from planar.foundation.errors import Outcome
 from planar.model.link_graph import link_pair_graph
-from tests.models.test_models import loops, turned
+from tests.known import loop_sizes, state_turned_by
 
 
 def at(model: str, position: float):
@@ -63,7 +63,7 @@ TURN = range(0, 360, 30)
 
 @pytest.mark.parametrize("degrees", TURN)
 def test_the_crank_rockers_output_in_closed_form(degrees):
-    state = turned("crank-rocker", "A0", degrees)
+    state = state_turned_by("crank-rocker", "A0", degrees)
     crank = 0.050 * np.exp(1j * np.radians(60 + degrees))
     rocker = state.link("rocker")
     same_direction(rocker.angle, np.angle(corner(crank, 0.180, 0.200, 0.120) - 0.200))
@@ -81,14 +81,14 @@ def test_the_crank_rocker_swings_between_its_two_triangles():
         assert state.link("rocker").angular_velocity == pytest.approx(0.0, abs=1e-12)
     swing = folded.link("rocker").angle - stretched.link("rocker").angle
     assert np.degrees(swing) == pytest.approx(49.6, abs=0.05)
-    angles = [turned("crank-rocker", "A0", degrees).link("rocker").angle for degrees in range(0, 360, 10)]
+    angles = [state_turned_by("crank-rocker", "A0", degrees).link("rocker").angle for degrees in range(0, 360, 10)]
     assert stretched.link("rocker").angle < min(angles)
     assert max(angles) < folded.link("rocker").angle
 
 
 def test_both_cranks_of_the_drag_link_turn_fully():
     """The follower never turns back, and is a whole turn on after one of the driver, which it does not share evenly."""
-    angles = [turned("drag-link", "A0", degrees).link("follower").angle for degrees in range(0, 361, 15)]
+    angles = [state_turned_by("drag-link", "A0", degrees).link("follower").angle for degrees in range(0, 361, 15)]
     steps = increments(angles)
     assert min(steps) > 0
     assert sum(steps) == pytest.approx(2 * np.pi, abs=1e-12)
@@ -97,7 +97,7 @@ def test_both_cranks_of_the_drag_link_turn_fully():
 
 @pytest.mark.parametrize("degrees", TURN)
 def test_the_drag_links_speeds_are_as_the_distances_of_the_shafts_from_the_couplers_line(degrees):
-    state = turned("drag-link", "A0", degrees)
+    state = state_turned_by("drag-link", "A0", degrees)
     a, b = place(state, "A"), place(state, "B")
     across = 1j * (b - a) / abs(b - a)
     ratio = dot(a, across) / dot(a - 0.040, across)
@@ -105,7 +105,7 @@ def test_the_drag_links_speeds_are_as_the_distances_of_the_shafts_from_the_coupl
 
 
 def test_the_double_rockers_coupler_turns_fully_and_its_rockers_do_not():
-    states = [turned("double-rocker", "A", degrees) for degrees in range(0, 361, 15)]
+    states = [state_turned_by("double-rocker", "A", degrees) for degrees in range(0, 361, 15)]
     coupler, left, right = (
         np.array([state.link(name).angle for state in states]) for name in ("coupler", "left rocker", "right rocker")
     )
@@ -224,7 +224,7 @@ def test_the_offset_slider_cranks_stroke_and_times():
 
 @pytest.mark.parametrize("degrees", TURN)
 def test_the_oscillating_cylinder_points_at_the_crank_pin(degrees):
-    state = turned("oscillating-cylinder", "O", degrees)
+    state = state_turned_by("oscillating-cylinder", "O", degrees)
     pin = 0.050 * np.exp(1j * np.radians(60 + degrees))
     way, moved = pin - 0.180, 4j * np.pi * pin
     cylinder, stroke = state.link("cylinder"), state.pair("stroke")
@@ -259,7 +259,7 @@ def test_the_shaper_returns_in_half_the_time():
 
 @pytest.mark.parametrize("degrees", TURN)
 def test_the_scotch_yokes_motion_is_harmonic(degrees):
-    state = turned("scotch-yoke", "O", degrees)
+    state = state_turned_by("scotch-yoke", "O", degrees)
     w, angle = 10 * np.pi, np.radians(60 + degrees)
     wanted = 0.075 * np.array([np.cos(angle), -w * np.sin(angle), -w * w * np.cos(angle)])
     stroke = state.pair("stroke")
@@ -271,7 +271,7 @@ def test_the_scotch_yokes_motion_is_harmonic(degrees):
 
 @pytest.mark.parametrize("degrees", TURN)
 def test_the_rotary_engines_pistons_move_as_in_an_engine_at_rest(degrees):
-    state = turned("rotary-engine", "O", degrees)
+    state = state_turned_by("rotary-engine", "O", degrees)
     r, rod, w = 0.060, 0.200, 40 * np.pi
     for k in range(7):
         turn = np.radians(60 + degrees + 360 * k / 7)
@@ -289,7 +289,7 @@ def test_the_rotary_engines_pistons_move_as_in_an_engine_at_rest(degrees):
 
 @pytest.mark.parametrize("degrees", [-60, -20, 0, 15, 50, 90])
 def test_the_hand_pumps_plunger_goes_straight(degrees):
-    state = turned("hand-pump", "O", degrees)
+    state = state_turned_by("hand-pump", "O", degrees)
     a, w = state.link("handle").angle, np.radians(60)
     assert a == pytest.approx(np.radians(15 + degrees), abs=1e-13)  # the plunger's own axis points upwards
     r, rod = 0.090, 0.260
@@ -319,7 +319,7 @@ def test_rapsons_slide_pulls_the_harder_the_further_the_helm(slide):
 
 @pytest.mark.parametrize("degrees", TURN)
 def test_the_toggle_press_follows_its_triangles(degrees):
-    state = turned("toggle-press", "A0", degrees)
+    state = state_turned_by("toggle-press", "A0", degrees)
     centre, angle, w = 0.260 - 0.160j, np.radians(60 + degrees), 2 * np.pi
     pin = centre + 0.040 * np.exp(1j * angle)
     knee = corner(pin, 0.216, 0, 0.200)
@@ -364,7 +364,7 @@ def test_each_wiper_swings_between_its_two_triangles(wiper, pivot, rod, side, sw
         same_direction(state.link(wiper).angle, np.angle(-pivot) - side * between(base, lever, reach))
         assert state.link(wiper).angular_velocity == pytest.approx(0.0, abs=1e-12)
         ends.append(state.link(wiper).angle)
-    angles = [turned("windscreen-wiper", "M", degrees).link(wiper).angle for degrees in range(0, 360, 10)]
+    angles = [state_turned_by("windscreen-wiper", "M", degrees).link(wiper).angle for degrees in range(0, 360, 10)]
     assert min(ends) < min(angles)
     assert max(angles) < max(ends)
     assert np.degrees(max(ends) - min(ends)) == pytest.approx(swing, abs=0.05)
@@ -388,7 +388,7 @@ def atkinsons_piston(angle: float) -> tuple[float, float]:
 
 @pytest.mark.parametrize("degrees", TURN)
 def test_atkinsons_piston_in_closed_form(degrees):
-    state = turned("atkinson-cycle-engine", "O", degrees)
+    state = state_turned_by("atkinson-cycle-engine", "O", degrees)
     x, slope = atkinsons_piston(np.radians(60 + degrees))
     assert place(state, "P") == pytest.approx(x, abs=1e-13)
     assert velocity(state, "P") == pytest.approx(-slope * np.radians(130 * 6), abs=1e-12)
@@ -412,7 +412,9 @@ def test_atkinsons_piston_makes_four_unequal_strokes_in_a_turn():
     # suction, compression, expansion, exhaust
     assert strokes == pytest.approx([-0.1527, 0.1262, -0.2787, 0.3052], abs=5e-5)
     # and nowhere else does it turn back
-    moving = [np.sign(turned("atkinson-cycle-engine", "O", d).pair("stroke")["velocity"]) for d in range(0, 361, 10)]
+    moving = [
+        np.sign(state_turned_by("atkinson-cycle-engine", "O", d).pair("stroke")["velocity"]) for d in range(0, 361, 10)
+    ]
     assert sum(one != other for one, other in pairwise(moving)) == 4
 
 
@@ -435,7 +437,7 @@ def test_six_bars_are_the_inversions_that_their_names_say():
         ("stephenson-1-six-bar", [4, 5, 5]),
         ("stephenson-2-six-bar", [4, 5, 5]),
     ):
-        assert loops(model) == chain
+        assert loop_sizes(model) == chain
         frame, three, near = ternary(model)
         assert len(three) == 2
         assert frame not in three
@@ -468,7 +470,7 @@ BARS = {
 @pytest.mark.parametrize("model", BARS)
 def test_six_bars_keep_every_length_while_they_move(model, degrees):
     """Squared distances, and their first and second derivatives, without any angle."""
-    state = turned(model, planar.load(model).inputs[0].pair, degrees)
+    state = state_turned_by(model, planar.load(model).inputs[0].pair, degrees)
     for bar, length in BARS[model].items():
         first, second = (state.point(name) for name in (bar[:-1], bar[-1]))
         r, v, a = (getattr(second, part) - getattr(first, part) for part in ("position", "velocity", "acceleration"))
@@ -481,13 +483,13 @@ def test_six_bars_keep_every_length_while_they_move(model, degrees):
 def test_watt_1_and_stephenson_1_fall_into_two_dyads(degrees):
     """Each dyad's pin is the corner of a triangle on what was found before."""
     crank = np.exp(1j * np.radians(60 + degrees))
-    watt = turned("watt-1-six-bar", "A0", degrees)
+    watt = state_turned_by("watt-1-six-bar", "A0", degrees)
     b = corner(0.080 * crank, 0.220, 0.230, 0.160)
     d = 0.080 * crank + 0.180 * np.exp(1j * (np.angle(b - 0.080 * crank) + np.radians(50)))
     c = 0.110 * crank * np.exp(1j * np.radians(60))
     assert place(watt, "B") == pytest.approx(b, abs=1e-13)
     assert place(watt, "E") == pytest.approx(corner(c, 0.200, d, 0.170), abs=1e-13)
-    stephenson = turned("stephenson-1-six-bar", "A0", degrees)
+    stephenson = state_turned_by("stephenson-1-six-bar", "A0", degrees)
     b = corner(0.070 * crank, 0.240, 0.250, 0.150)
     d = 0.250 + 0.140 * np.exp(1j * (np.angle(b - 0.250) - np.radians(45)))
     c = 0.090 * crank * np.exp(1j * np.radians(40))

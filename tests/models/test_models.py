@@ -1,22 +1,15 @@
 """The models that come along, each with a fact that it is known for."""
 
-import networkx as nx
 import numpy as np
 import pytest
 
 import planar
-from planar.model.link_graph import link_pair_graph
-
-
-def turned(model: str, pair: str, degrees: float):
-    mechanism = planar.load(model)
-    start = next(given.position for given in mechanism.inputs if given.pair == pair)
-    return planar.solve(mechanism, {pair: start + np.radians(degrees)})
+from tests.known import loop_sizes, state_turned_by
 
 
 @pytest.mark.parametrize("degrees", [-40, -15, 0, 20, 38])
 def test_peaucellier_and_lipkin_draw_a_straight_line(degrees):
-    point = turned("peaucellier-lipkin", "C", degrees).point("Q")
+    point = state_turned_by("peaucellier-lipkin", "C", degrees).point("Q")
     # OP * OQ = L^2 - l^2, with P on the circle of diameter 2 * 100 mm through O
     assert point.position[0] == pytest.approx((0.250**2 - 0.120**2) / 0.200, abs=1e-12)
     assert point.velocity[0] == pytest.approx(0.0, abs=1e-12)
@@ -25,7 +18,7 @@ def test_peaucellier_and_lipkin_draw_a_straight_line(degrees):
 
 @pytest.mark.parametrize("degrees", [-30, 0, 40])
 def test_a_pantograph_copies_at_three_times_the_size(degrees):
-    state = turned("pantograph", "O", degrees)
+    state = state_turned_by("pantograph", "O", degrees)
     small, large = state.point("P"), state.point("Q")
     for part in ("position", "velocity", "acceleration"):
         np.testing.assert_allclose(getattr(large, part), 3 * getattr(small, part), atol=1e-13)
@@ -33,7 +26,7 @@ def test_a_pantograph_copies_at_three_times_the_size(degrees):
 
 @pytest.mark.parametrize("degrees", [0, 70, 180, 300])
 def test_an_oldham_coupling_turns_both_shafts_alike_and_its_cross_on_a_circle(degrees):
-    state = turned("oldham", "O1", degrees)
+    state = state_turned_by("oldham", "O1", degrees)
     first, second = state.link("disc 1"), state.link("disc 2")
     assert np.exp(1j * first.angle) == pytest.approx(np.exp(1j * second.angle), abs=1e-13)
     assert second.angular_velocity == pytest.approx(first.angular_velocity, rel=1e-12)
@@ -62,14 +55,14 @@ def test_the_scissor_lift_rises_three_times_one_stage_and_stays_level(slide):
 
 def test_chebyshevs_point_stays_within_a_thousandth_of_its_base_of_a_straight_line():
     """Near the middle, y of P leaves 4/5 of the rocker's length by less than 0.35 % of the base."""
-    heights = [turned("chebyshev-straight-line", "A0", d).point("P").position[1] for d in range(-20, 21, 5)]
+    heights = [state_turned_by("chebyshev-straight-line", "A0", d).point("P").position[1] for d in range(-20, 21, 5)]
     assert max(heights) - min(heights) < 0.0035 * 0.4
     assert np.mean(heights) == pytest.approx(0.4, abs=0.002)
 
 
 @pytest.mark.parametrize("degrees", [0, 90, 180, 270])
 def test_whitworths_slotted_link_points_from_its_pivot_at_the_crank_pin(degrees):
-    state = turned("whitworth", "O", degrees)
+    state = state_turned_by("whitworth", "O", degrees)
     way = state.point("A").position - state.point("C").position
     assert state.link("slotted link").angle == pytest.approx(np.arctan2(way[1], way[0]), abs=1e-13)
 
@@ -87,17 +80,11 @@ def test_the_excavators_cylinders_are_as_long_as_given_and_all_three_move_the_bu
         assert np.hypot(*(moved.point("tip").position - state.point("tip").position)) > 0.005
 
 
-def loops(model: str) -> list[int]:
-    """The number of links in each loop."""
-    cycles = nx.simple_cycles(link_pair_graph(planar.load(model)))
-    return sorted(sum(kind == "link" for kind, _ in cycle) for cycle in cycles)
-
-
 def test_structures_are_what_their_names_say():
-    assert loops("double-butterfly") == [5, 5, 5, 5, 6, 6, 8]
-    assert loops("stephenson-3-five-bar") == [4, 5, 5]
-    assert loops("watt-six-bar") == [4, 4, 6]
-    assert min(loops("ten-link")) == 5
+    assert loop_sizes("double-butterfly") == [5, 5, 5, 5, 6, 6, 8]
+    assert loop_sizes("stephenson-3-five-bar") == [4, 5, 5]
+    assert loop_sizes("watt-six-bar") == [4, 4, 6]
+    assert min(loop_sizes("ten-link")) == 5
     for model in ("double-butterfly", "single-flier", "double-flier"):
         mechanism = planar.load(model)
         assert (len(mechanism.links), len(mechanism.pairs)) == (8, 10)

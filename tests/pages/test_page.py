@@ -25,7 +25,6 @@ from planar.document.files import read_asset
 from planar.drawing.scheme.link_bodies import link_bodies
 from planar.equations.mechanism_numbers import shapes_of_links
 from planar.foundation.errors import BadInput, NoAnswer
-from planar.model.mechanism import Mechanism
 from planar.pages import gallery, notebook
 from planar.pages.dimension_numbers import DimensionNumbers
 from planar.pages.gallery_kinds import KINDS, kind_and_search_text, search_text
@@ -38,55 +37,17 @@ from planar.reports.files.run_files import encode_run
 from planar.solving.position import solved_mechanism
 from planar.solving.rates.regularity import regularity
 from tests import command
+from tests.builders import triangle
 from tests.draws import part
+from tests.hostile import HARMFUL, HARMFUL_LINE, harmful_mechanism
 from tests.known import MODELS, some_models
 from tests.page_scripts import in_node, needs_node
 
 LARGEST = 1_500_000
-HARMFUL = (
-    "</script><script>window.hacked=1</script><img src=x onerror='window.hacked=1'>"
-    "\"'`${window.hacked=1}&lt;\u2028\u2029🦾{data}{scripts}"
-)
-HARMFUL_LINE = HARMFUL.replace("\u2028\u2029", "")
-"""The same for what stands in one line."""
-HARMFUL_NAME = "</script><img src=x onerror='hacked=1'>\"`${hacked=1}&lt;🦾"
 SOME = dict(list(MODELS.items())[::4])
 """Models for what takes long for each."""
 CLOSE = 1e-12
 """Of the size, or of the greatest rate of a kind."""
-
-
-def hostile() -> Mechanism:
-    """A four-bar linkage all of whose texts would do harm if they were taken for anything but texts."""
-    value = planar.to_dict(planar.load("four-bar"))
-    text = json.dumps(value)
-    pins = sorted({pair["turning"] for pair in value["pairs"]})
-    new = ["constructor", "__proto__", "toString", *(f"{k}{HARMFUL_NAME}" for k in range(20))]
-    for k, name in enumerate([*value["links"], *pins]):
-        text = text.replace(json.dumps(name), f'"\\u0001{k}"')  # first aside: a new name may be an old one
-    for k in range(len(value["links"]) + len(pins)):
-        text = text.replace(f'"\\u0001{k}"', json.dumps(new[k]))
-    value = json.loads(text)
-    return planar.from_dict(value | {"name": HARMFUL_LINE, "about": HARMFUL, "source": HARMFUL, "notes": [HARMFUL]})
-
-
-def triangle(base: float) -> Mechanism:
-    """Links of 70 and 80 mm on a base (mm), which does not move."""
-    return planar.from_dict(
-        {
-            "planar": 1,
-            "name": "Triangle",
-            "units": {"length": "mm", "angle": "deg"},
-            "frame": "base",
-            "links": {
-                "base": {"ends": ["A", "B"], "length": base},
-                "left": {"ends": ["A", "C"], "length": 70},
-                "right": {"ends": ["B", "C"], "length": 80},
-            },
-            "pairs": [{"turning": "A"}, {"turning": "B"}, {"turning": "C"}],
-            "sketch": {"C": [50, 50]},
-        }
-    )
 
 
 class Elements(HTMLParser):
@@ -143,7 +104,7 @@ def test_a_page_may_load_nothing():
 
 def test_texts_of_a_file_stay_texts():
     value = planar.to_dict(planar.load("four-bar")) | {"about": "a", "source": "s", "notes": ["n"]}
-    plain, harmful = Elements(page(planar.from_dict(value))), Elements(page(hostile()))
+    plain, harmful = Elements(page(planar.from_dict(value))), Elements(page(harmful_mechanism()))
     assert [tag for tag, _ in harmful.tags] == [tag for tag, _ in plain.tags]
     assert (harmful.data()["name"], harmful.data()["about"]) == (HARMFUL_LINE, HARMFUL)
     assert harmful.data()["document"]["value"]["notes"] == [HARMFUL]
@@ -279,7 +240,7 @@ def test_tables_in_a_notebook_have_the_numbers_of_the_results_and_escaped_names(
     forces = results()["forces"]
     cells = {text.strip() for text in Elements(forces._repr_html_()).texts.values()}
     assert f"{forces.inputs['O']:.6g}" in {cell.replace("\u2212", "-") for cell in cells}
-    harmful = planar.centres(planar.solve(hostile()))
+    harmful = planar.centres(planar.solve(harmful_mechanism()))
     assert not {"script"} & {tag for tag, _ in Elements(harmful._repr_html_()).tags}
 
 
@@ -393,7 +354,7 @@ def test_the_view_command_refuses_other_files_and_its_own(tmp_path):
 def test_a_gallery_has_a_page_for_each_and_an_index_that_moves(tmp_path):
     told_of = []
     models = [
-        ("../<b>.x", hostile()),
+        ("../<b>.x", harmful_mechanism()),
         ("index", planar.load("slider-crank")),
         ("INDEX", planar.load("rack-steering")),
         ("apart", triangle(200)),

@@ -22,9 +22,10 @@ from planar.pages.gallery_kinds import KINDS, kind_and_search_text
 from planar.pages.page import page
 from planar.pages.still_picture import still_svg
 from planar.pages.view import view
+from tests.builders import triangle
+from tests.hostile import harmful_mechanism
 from tests.known import MODELS
 from tests.page_scripts import browser, opened
-from tests.pages.test_page import hostile, triangle
 
 CLOSE = 1e-12
 STEMS = ("crank-rocker", "slider-crank", "scotch-yoke", "watt-six-bar", "whitworth", "planetary-gear-set", "open-arm")
@@ -340,7 +341,7 @@ def test_circuit_and_branch_of_an_assembly_are_told_where_they_are_known_soon(sh
 
 
 def test_texts_of_a_file_are_shown_and_never_run(shown, chromium, tmp_path):
-    mechanism = hostile()
+    mechanism = harmful_mechanism()
     window = shown(mechanism)
     for box in window.locator("#layers").get_by_role("checkbox").all():
         box.check()

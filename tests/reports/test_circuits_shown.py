@@ -20,8 +20,8 @@ from planar.drawing.circuits.equal_curves import merge_equal_charts
 from planar.drawing.labels.text_metrics import format_tick
 from planar.model.wording import number_ranges
 from tests import command
-from tests.drawing.test_diagrams import boxes
 from tests.draws import part
+from tests.figures import text_boxes
 from tests.fonts import own_fonts  # noqa: F401
 
 pytestmark = pytest.mark.filterwarnings("ignore::planar.foundation.errors.MissingGlyphs")
@@ -291,7 +291,7 @@ def test_of_a_point_there_is_a_sheet_for_x_and_one_for_y():
 )
 def test_no_text_lies_on_another_or_leaves_the_sheet(name, pair):
     for figure in sheets(name, None, pair):
-        (wide, high), shown = boxes(figure)
+        (wide, high), shown = text_boxes(figure)
         for _, box in shown:
             assert min(box.x0, box.y0) >= 0.0
             assert box.x1 <= wide

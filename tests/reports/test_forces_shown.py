@@ -16,7 +16,7 @@ from planar.drawing.diagrams.positions import loci, positions
 from planar.drawing.output.animation import plan_animation
 from planar.dynamics import simulation
 from planar.foundation.errors import Outcome
-from planar.model.mechanism import Load, Mass, Spring
+from planar.model.loads import Load, Mass, Spring
 from tests.command import run
 from tests.known import MODELS
 

@@ -21,9 +21,10 @@ from planar.model.pairs import pair_types
 from planar.reports.columns import reported_series, run_columns
 from planar.reports.files.run_files import CSV_BLOCK_ROWS, check_writable, encode_run, record
 from planar.results.records import InputMotion, Limit, ThirdRates
-from tests.cli.test_commands import run
-from tests.cli.test_commands import written as in_file
-from tests.solving.test_cycle import TRIPLE, TURN, four_bar
+from tests.builders import four_bar
+from tests.closed_forms import TRIPLE, TURN
+from tests.command import run
+from tests.command import written as in_file
 
 MODELS = [
     "crank-rocker",

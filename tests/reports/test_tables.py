@@ -27,7 +27,7 @@ from planar.drawing.scheme.scheme import scheme
 from planar.pages.page_data import page_data
 from planar.reports.files.table_files import encode_tables
 from planar.reports.fitted_table import plain_table
-from planar.reports.tables_of_numbers import paragraphs, precision_text, vector_direction
+from planar.reports.number_format import paragraphs, precision_text, vector_direction
 from tests.command import FROM_OUTSIDE, ROOT, run
 from tests.draws import part
 

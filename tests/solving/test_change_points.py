@@ -6,33 +6,12 @@ import pytest
 import planar
 from planar.document import files
 from planar.foundation.errors import NoAnswer, Outcome
-from tests.solving.test_cycle import (
-    PARALLELOGRAM,
-    TURN,
-    coupler,
-    four_bar,
-    passes_gate,
-    rates,
-    rocker,
-    same_angles,
-    slider_crank,
-)
+from tests.builders import block_slider_crank, four_bar
+from tests.checks import passes_residual_check, same_angles
+from tests.closed_forms import PARALLELOGRAM, TURN, antiparallelogram, coupler, rates, rocker
 
 GRIDS = [(0.0, 4), (0.0, 60), (0.3, 1), (0.3, 7), (0.3, 61), (np.pi, 6), (-1.0, 45), (np.pi - 1e-6, 12), (1e-9, 8)]
 """Starts and steps of a turn: some hit the flat positions at 0 and pi, some step over them, some come very near."""
-
-
-def crossed(theta):
-    """The angle of DC in the antiparallelogram 1, 2, 1, 2, with its rates at angular velocity 2 and acceleration 1.
-
-    tan(phi / 2) = -tan(theta / 2) (d + a) / (d - a), so phi = 2 atan2(-3 sin(theta / 2), cos(theta / 2)): no pole.
-    """
-    s, c = np.sin(theta / 2), np.cos(theta / 2)
-    phi = 2 * np.arctan2(-3 * s, c)
-    below = c * c + 9 * s * s
-    first = -3 / below
-    second = 3 * (-c * s + 9 * s * c) / below**2
-    return phi, 2.0 * first, 4.0 * second + first
 
 
 def with_third_crank(start, at=0.7):
@@ -78,7 +57,7 @@ def test_a_parallelogram_stays_one_on_any_grid(start, steps):
     same_rates(motion, "DC", 2.0, 1.0)
     np.testing.assert_allclose(motion.angular_jerk("DC"), 0.0, atol=1e-5)
     np.testing.assert_allclose(motion.jerk("C"), motion.jerk("B"), atol=1e-5)
-    assert passes_gate(mechanism, motion)
+    assert passes_residual_check(mechanism, motion)
 
 
 @pytest.mark.parametrize(("start", "steps"), GRIDS)
@@ -87,11 +66,11 @@ def test_an_antiparallelogram_stays_one_on_any_grid(start, steps):
     motion = planar.cycle(mechanism, steps, start, start + TURN)
     theta = motion.inputs["A"].position
     assert motion.outcome is Outcome.SOLVED
-    phi, first, second = crossed(theta)
+    phi, first, second = antiparallelogram(theta)
     same_angles(motion.link("DC").angle, phi, 1e-12)
     same_rates(motion, "DC", first, second)
     same_angles(motion.link("BC").angle, coupler(*PARALLELOGRAM, theta, phi), 1e-12)
-    assert passes_gate(mechanism, motion)
+    assert passes_residual_check(mechanism, motion)
 
 
 @pytest.mark.parametrize(("start", "steps"), GRIDS)
@@ -104,7 +83,7 @@ def test_a_third_crank_goes_through_the_flat_positions_with_the_others(start, st
         same_angles(motion.link(name).angle, theta, 1e-12)
         same_rates(motion, name, 2.0, 1.0)
     same_angles(motion.link("BC").angle, 0 * theta, 1e-12)
-    assert passes_gate(mechanism, motion)
+    assert passes_residual_check(mechanism, motion)
 
 
 def test_no_other_motion_leads_from_the_flat_positions_of_three_cranks():
@@ -127,12 +106,12 @@ def test_the_other_branch_at_a_flat_position_is_taken_where_it_is_asked_for(star
         motion = planar.cycle(mechanism, steps, 0.3, 0.3 + TURN, branches=branches)
         assert motion.outcome is Outcome.SOLVED
         theta = motion.inputs["A"].position
-        phi, first, second = crossed(theta)
+        phi, first, second = antiparallelogram(theta)
         kinds = np.array([[k for at, k in parts if x > at][-1] for x in theta])
         is_crossed = kinds == "crossed"
         same_angles(motion.link("DC").angle, np.where(is_crossed, phi, theta), 1e-11)
         same_rates(motion, "DC", np.where(is_crossed, first, 2.0), np.where(is_crossed, second, 1.0))
-        assert passes_gate(mechanism, motion)
+        assert passes_residual_check(mechanism, motion)
         went = [
             "another one was taken, as asked for" if number == 2 else "this one goes on smoothly" for number in branches
         ]
@@ -181,14 +160,14 @@ def test_a_kite_goes_through_its_flat_position_by_its_own_motion(steps):
 
 @pytest.mark.parametrize(("start", "steps"), [(1.0, 12), (0.0, 4), (0.0, 12), (1.0, 7), (1.5, 360)])
 def test_a_slider_crank_of_equal_lengths_passes_the_cranks_pin_or_stays_on_it(start, steps):
-    mechanism = slider_crank(0.05, 0.05, 0.0, 1.0)
+    mechanism = block_slider_crank(0.05, 0.05, 0.0, 1.0)
     motion = planar.cycle(mechanism, steps, start, start + TURN)
     theta = motion.inputs["O"].position
     slide = motion.pair("s")
     np.testing.assert_allclose(slide["displacement"], 0.1 * np.cos(theta), atol=1e-14)
     np.testing.assert_allclose(slide["velocity"], -0.3 * np.sin(theta), atol=1e-10)
     np.testing.assert_allclose(slide["acceleration"], -0.9 * np.cos(theta) + 0.1 * np.sin(theta), atol=1e-9)
-    assert passes_gate(mechanism, motion)
+    assert passes_residual_check(mechanism, motion)
     folded = planar.cycle(mechanism, steps, start, start + TURN, branches=[2])
     beyond = theta > np.pi / 2 + 1e-9
     np.testing.assert_allclose(folded.pair("s")["displacement"], np.where(beyond, 0.0, 0.1 * np.cos(theta)), atol=1e-14)
@@ -246,12 +225,12 @@ def test_what_is_greatest_on_a_change_point_is_found_there():
 
 def test_limits_are_those_of_the_branches_that_the_rows_take():
     """The piston of equal crank and rod rests on the crank's pin where that branch is taken: no end of a stroke."""
-    motion = planar.cycle(slider_crank(1.0, 1.0, 0.0, 1.0), 40, start=1.2, stop=4.0, branches=[2])
+    motion = planar.cycle(block_slider_crank(1.0, 1.0, 0.0, 1.0), 40, start=1.2, stop=4.0, branches=[2])
     resting = motion.inputs["O"].position > TURN / 4 + 1e-9
     assert np.ptp(motion.pair("s")["displacement"][resting]) < 1e-12
     assert [limit.kind for limit in motion.limits] == ["change point"]
     assert motion.limits[0].input == pytest.approx(TURN / 4, abs=1e-12)
-    beyond = planar.cycle(slider_crank(1.0, 1.0, 0.0, 1.0), 40, start=2.0, stop=4.0, branches=[2])
+    beyond = planar.cycle(block_slider_crank(1.0, 1.0, 0.0, 1.0), 40, start=2.0, stop=4.0, branches=[2])
     assert beyond.limits == ()
 
 
@@ -297,10 +276,10 @@ def test_a_flat_start_goes_on_as_parallelogram_or_crossed_as_its_number_says(num
     motion = planar.cycle(mechanism, 6, at + away[0], at + away[1], branches=[number])
     theta = motion.inputs["A"].position
     assert (motion.outcome, len(motion)) == (Outcome.SOLVED, 7)
-    phi, first, second = crossed(theta) if (number == 1) is crossed_first else (theta, 2.0, 1.0)
+    phi, first, second = antiparallelogram(theta) if (number == 1) is crossed_first else (theta, 2.0, 1.0)
     same_angles(motion.link("DC").angle, phi, 1e-12)
     same_rates(motion, "DC", first, second)
-    assert passes_gate(mechanism, motion)
+    assert passes_residual_check(mechanism, motion)
     assert [each.input for each in motion.limits if each.kind == "change point"][:1] == pytest.approx([at], abs=1e-9)
     assert any(f"starts there by number {number}" in each for each in motion.remarks)
 
@@ -311,14 +290,14 @@ def test_the_circuit_from_a_flat_start_and_the_run_in_time_take_the_way_of_that_
     for given in ({"circuit": True}, {"duration": 1.0}):
         motion = planar.cycle(mechanism, 6, branches=[number], **given)
         theta = motion.inputs["A"].position
-        same_angles(motion.link("DC").angle, crossed(theta)[0] if number == 2 else theta, 1e-12)
+        same_angles(motion.link("DC").angle, antiparallelogram(theta)[0] if number == 2 else theta, 1e-12)
         assert np.isfinite(motion.link("DC").angular_velocity).all()
 
 
 def test_numbers_after_the_first_are_of_the_change_points_that_are_met_then():
     motion = planar.cycle(four_bar(*PARALLELOGRAM, 0.0), 8, branches=[2, 2])
     theta = motion.inputs["A"].position
-    expected = np.where(theta < np.pi - 1e-9, crossed(theta)[0], theta)
+    expected = np.where(theta < np.pi - 1e-9, antiparallelogram(theta)[0], theta)
     same_angles(motion.link("DC").angle, expected, 1e-11)
 
 
@@ -342,7 +321,7 @@ def test_a_rhombus_that_starts_flat_stays_one_or_keeps_its_follower_at_rest():
 def test_a_slider_crank_of_equal_lengths_that_starts_upright_goes_on_folded_or_passes():
     upright = np.pi / 2
     for number, reach in ((1, 0.0), (2, 0.1)):
-        mechanism = slider_crank(0.05, 0.05, 0.0, upright)
+        mechanism = block_slider_crank(0.05, 0.05, 0.0, upright)
         motion = planar.cycle(mechanism, 8, upright - 1.0, upright + 1.0, branches=[number])
         theta = motion.inputs["O"].position
         np.testing.assert_allclose(motion.pair("s")["displacement"], reach * np.cos(theta), atol=1e-13)

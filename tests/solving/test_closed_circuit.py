@@ -6,25 +6,22 @@ import pytest
 import planar
 from planar.document import files
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
-from tests.solving.test_change_points import crossed
-from tests.solving.test_cycle import (
+from tests.builders import block_slider_crank, four_bar
+from tests.checks import passes_residual_check, same_angles
+from tests.closed_forms import (
     PARALLELOGRAM,
     ROCKER,
     TRIPLE,
+    TRIPLE_LIMIT,
     TURN,
+    antiparallelogram,
     coupler,
-    four_bar,
-    passes_gate,
     rates,
     rocker,
-    same_angles,
-    slider_crank,
 )
 
 DEAD = "input dead point"
 A, B, C, D = TRIPLE
-LIMIT = float(np.arccos((A * A + D * D - (B + C) ** 2) / (2 * A * D)))
-"""The crank of the triple rocker moves between plus and minus this, where coupler and follower stretch."""
 
 
 def comes_back(mechanism, motion, far=1e-9):
@@ -39,7 +36,7 @@ def comes_back(mechanism, motion, far=1e-9):
 
 def halves(theta, first):
     """The assembly of the triple rocker at every row of its circuit: `first` up to the first dead point, and so on."""
-    turns = np.flatnonzero(np.isclose(np.abs(theta), LIMIT, atol=1e-9) & (np.arange(len(theta)) > 0))
+    turns = np.flatnonzero(np.isclose(np.abs(theta), TRIPLE_LIMIT, atol=1e-9) & (np.arange(len(theta)) > 0))
     return first * (-1) ** np.searchsorted(turns, np.arange(len(theta)), side="right"), turns
 
 
@@ -51,11 +48,11 @@ def test_the_circuit_of_a_triple_rocker_goes_through_both_assemblies(closed, ste
     assert (motion.outcome, motion.reason) == (Outcome.SOLVED, "")
     theta = motion.inputs["A"].position
     kinds, turns = halves(theta, closed)
-    np.testing.assert_allclose(theta[turns], [LIMIT, -LIMIT], atol=1e-13)
+    np.testing.assert_allclose(theta[turns], [TRIPLE_LIMIT, -TRIPLE_LIMIT], atol=1e-13)
     np.testing.assert_allclose(theta[[0, -1]], 0.6, atol=1e-12)
     # the longest stretch, from limit to limit, is divided into so many steps, and the others about as finely
     assert turns[1] - turns[0] == steps
-    np.testing.assert_array_equal(np.abs(np.diff(theta)) <= 2 * LIMIT / steps * (1 + 1e-9), True)
+    np.testing.assert_array_equal(np.abs(np.diff(theta)) <= 2 * TRIPLE_LIMIT / steps * (1 + 1e-9), True)
     inner = np.ones(len(theta), dtype=bool)
     inner[turns] = False
     phi = np.where(kinds > 0, rocker(*TRIPLE, theta, 1), rocker(*TRIPLE, theta, -1))
@@ -76,7 +73,7 @@ def test_the_circuit_of_a_triple_rocker_goes_through_both_assemblies(closed, ste
     # within the circuit the follower swings from its one end to its other without a jump
     assert np.abs(np.diff(motion.link("DC").angle)).max() < 5.0 / min(steps, 10)
     comes_back(mechanism, motion)
-    assert passes_gate(mechanism, motion)
+    assert passes_residual_check(mechanism, motion)
 
 
 def test_the_limits_of_a_circuit_come_in_its_order():
@@ -85,7 +82,7 @@ def test_the_limits_of_a_circuit_come_in_its_order():
     swing = np.arccos((D * D + (A + B) ** 2 - C * C) / (2 * D * (A + B)))
     found = motion.limits
     assert [(each.kind, each.of) for each in found] == 2 * [(DEAD, "A"), ("stroke end", "D")]
-    np.testing.assert_allclose([each.input for each in found], [LIMIT, -swing, -LIMIT, swing], atol=1e-12)
+    np.testing.assert_allclose([each.input for each in found], [TRIPLE_LIMIT, -swing, -TRIPLE_LIMIT, swing], atol=1e-12)
 
 
 def test_a_crank_that_turns_round_has_its_turn_as_circuit():
@@ -119,7 +116,7 @@ def test_the_circuit_of_a_trammel_is_its_whole_turn():
 @pytest.mark.parametrize("rod", [0.3, 1.6])
 def test_the_circuit_of_a_slider_crank_driven_by_its_block(rod):
     """With a long rod the crank turns round; with a short one it swings, and the block stays on its side."""
-    value = files.to_dict(slider_crank(0.48, rod, 0.1, 1.0))
+    value = files.to_dict(block_slider_crank(0.48, rod, 0.1, 1.0))
     value["inputs"] = [{"pair": "s", "position": 0.5 + 0.75 * (rod - 0.3), "velocity": 2.0}]
     value["sketch"] = {"A": [0.3, 0.4]}
     mechanism = files.from_dict(value)
@@ -134,7 +131,7 @@ def test_the_circuit_of_a_slider_crank_driven_by_its_block(rod):
     assert len(rows) == 2
     np.testing.assert_allclose(np.sin(angle - motion.link("rod").angle)[rows], 0.0, atol=1e-12)
     comes_back(mechanism, motion)
-    assert passes_gate(mechanism, motion)
+    assert passes_residual_check(mechanism, motion)
 
 
 def test_gears_come_back_after_the_turns_that_their_teeth_need():
@@ -155,7 +152,7 @@ def test_a_circuit_keeps_to_its_branch_through_change_points_or_takes_another():
     over = planar.cycle(mechanism, 24, circuit=True, branches=[2, 2])
     theta = over.inputs["A"].position
     beyond = (theta > np.pi) & (theta < TURN)
-    same_angles(over.link("DC").angle, np.where(beyond, crossed(theta)[0], theta), 1e-11)
+    same_angles(over.link("DC").angle, np.where(beyond, antiparallelogram(theta)[0], theta), 1e-11)
     comes_back(mechanism, over)
 
 
@@ -175,19 +172,19 @@ def test_a_circuit_that_does_not_come_back_says_so():
 @pytest.mark.parametrize("side", [1, -1])
 def test_a_start_on_a_dead_point_goes_inwards_by_either_way(side, number, steps):
     """Both assemblies meet there; numbers 1 and 2 take one each."""
-    mechanism = four_bar(*TRIPLE, side * LIMIT)
-    motion = planar.cycle(mechanism, steps, side * LIMIT, 0.2 * side, branches=[number])
+    mechanism = four_bar(*TRIPLE, side * TRIPLE_LIMIT)
+    motion = planar.cycle(mechanism, steps, side * TRIPLE_LIMIT, 0.2 * side, branches=[number])
     theta = motion.inputs["A"].position
-    np.testing.assert_allclose(theta, np.linspace(side * LIMIT, 0.2 * side, steps + 1), atol=1e-14)
+    np.testing.assert_allclose(theta, np.linspace(side * TRIPLE_LIMIT, 0.2 * side, steps + 1), atol=1e-14)
     ways = [np.abs(np.exp(1j * motion.link("DC").angle) - np.exp(1j * rocker(*TRIPLE, theta, k))) for k in (1, -1)]
     gaps = [float(each[1:].max()) for each in ways]
     assert min(gaps) < 1e-10
     assert max(gaps) > 0.1
-    other = planar.cycle(mechanism, steps, side * LIMIT, 0.2 * side, branches=[3 - number])
+    other = planar.cycle(mechanism, steps, side * TRIPLE_LIMIT, 0.2 * side, branches=[3 - number])
     assert abs(np.exp(1j * other.link("DC").angle[-1]) - np.exp(1j * motion.link("DC").angle[-1])) > 0.1
     assert np.isnan(motion.link("DC").angular_velocity).tolist() == [True] + steps * [False]
     same_angles(motion.link("DC").angle[:1], rocker(*TRIPLE, theta[:1], 0), 1e-7)
-    default = planar.cycle(mechanism, steps, side * LIMIT, 0.2 * side)
+    default = planar.cycle(mechanism, steps, side * TRIPLE_LIMIT, 0.2 * side)
     if number == 1:
         np.testing.assert_array_equal(default.link("DC").angle, motion.link("DC").angle)
 
@@ -195,11 +192,13 @@ def test_a_start_on_a_dead_point_goes_inwards_by_either_way(side, number, steps)
 @pytest.mark.parametrize("number", [1, 2])
 @pytest.mark.parametrize("side", [1, -1])
 def test_the_circuit_from_a_dead_point_ends_there_whichever_way_round(side, number):
-    mechanism = four_bar(*TRIPLE, side * LIMIT)
+    mechanism = four_bar(*TRIPLE, side * TRIPLE_LIMIT)
     motion = planar.cycle(mechanism, 20, circuit=True, branches=[number])
     theta = motion.inputs["A"].position
     assert len(theta) == 41
-    np.testing.assert_allclose(theta[[0, 20, 40]], [side * LIMIT, -side * LIMIT, side * LIMIT], atol=1e-12)
+    np.testing.assert_allclose(
+        theta[[0, 20, 40]], [side * TRIPLE_LIMIT, -side * TRIPLE_LIMIT, side * TRIPLE_LIMIT], atol=1e-12
+    )
     for rate in motion.link("DC")[1:]:
         assert np.flatnonzero(np.isnan(rate)).tolist() == [0, 20, 40]
     # the start is as near to the dead point as the file's number says: in other angles the root of that
@@ -238,9 +237,9 @@ def test_a_start_on_a_dead_point_to_the_last_bit_goes_either_way(number):
 def test_the_whole_range_from_a_dead_point_is_that_from_elsewhere():
     """Without a range of its own it is one assembly from limit to limit."""
     for number in (1, 2):
-        motion = planar.cycle(four_bar(*TRIPLE, LIMIT), 16, branches=[number])
+        motion = planar.cycle(four_bar(*TRIPLE, TRIPLE_LIMIT), 16, branches=[number])
         theta = motion.inputs["A"].position
-        np.testing.assert_allclose(theta, np.linspace(-LIMIT, LIMIT, 17), atol=1e-12)
+        np.testing.assert_allclose(theta, np.linspace(-TRIPLE_LIMIT, TRIPLE_LIMIT, 17), atol=1e-12)
         gaps = [
             np.abs(np.exp(1j * motion.link("DC").angle) - np.exp(1j * rocker(*TRIPLE, theta, k)))[1:-1].max()
             for k in (1, -1)
@@ -276,7 +275,7 @@ def test_there_and_back_is_the_way_there_and_its_mirror_image(given, steps):
             same(both.link(name)[k], there.link(name)[k], sense)
         same(both.point("E")[k], there.point("E")[k], sense)
     same(both.angular_jerk("DC"), there.angular_jerk("DC"), odd)
-    assert passes_gate(mechanism, both)
+    assert passes_residual_check(mechanism, both)
 
 
 def test_there_and_back_through_a_change_point_comes_back_as_it_went():
@@ -284,7 +283,7 @@ def test_there_and_back_through_a_change_point_comes_back_as_it_went():
         motion = planar.cycle(four_bar(*PARALLELOGRAM, 0.3), 10, 0.3, 4.5, there_and_back=True, branches=branches)
         theta = motion.inputs["A"].position
         np.testing.assert_array_equal(theta, theta[::-1])
-        phi = np.where((theta > np.pi) & (kind < 0), crossed(theta)[0], theta)
+        phi = np.where((theta > np.pi) & (kind < 0), antiparallelogram(theta)[0], theta)
         same_angles(motion.link("DC").angle, phi, 1e-11)
 
 

@@ -12,93 +12,11 @@ from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.solving.checks.branch_check import BranchCheck
 from planar.solving.position import PositionSolver
 from planar.solving.runs import samples as motion_rows
-from tests.cli.test_commands import run
+from tests.builders import block_slider_crank, four_bar
+from tests.checks import passes_residual_check, same_angles
+from tests.closed_forms import PARALLELOGRAM, ROCKER, TRIPLE, TURN, coupler, rates, rocker
+from tests.command import run
 from tests.draws import part
-
-TURN = 2 * np.pi
-
-
-def four_bar(a, b, c, d, theta, closed=1, omega=2.0, alpha=1.0, unit="m"):
-    """A four-bar with the crank at theta, sketched in one of its two assemblies."""
-    phi = float(rocker(a, b, c, d, theta, closed))
-    value = {
-        "planar": 1,
-        "name": "four-bar",
-        "units": {"length": unit},
-        "frame": "AD",
-        "links": {
-            "AD": {"points": {"A": [0, 0], "D": [d, 0]}},
-            "AB": {"ends": ["A", "B"], "length": a},
-            "BC": {"ends": ["B", "C"], "length": b, "points": {"E": {"along": ["B", "C"], "distance": 0.4 * b}}},
-            "DC": {"ends": ["D", "C"], "length": c},
-        },
-        "pairs": [{"turning": name} for name in "ABCD"],
-        "inputs": [{"pair": "A", "position": theta, "velocity": omega, "acceleration": alpha}],
-        "sketch": {"C": [d + c * np.cos(phi), c * np.sin(phi)]},
-    }
-    return files.from_dict(value)
-
-
-def rocker(a, b, c, d, theta, closed=1):
-    """The angle of DC by the law of cosines in the triangle BCD."""
-    r = np.hypot(d - a * np.cos(theta), a * np.sin(theta))
-    back = np.arctan2(a * np.sin(theta), a * np.cos(theta) - d)
-    return back - closed * np.arccos(np.clip((c * c + r * r - b * b) / (2 * c * r), -1.0, 1.0))
-
-
-def coupler(a, b, c, d, theta, phi):
-    return np.angle(d + c * np.exp(1j * phi) - a * np.exp(1j * theta))
-
-
-def rates(a, b, c, theta, beta, phi, omega, alpha):
-    """First and second rates of BC and DC: the loop's equation differentiated, resolved along and across each bar."""
-    beta1 = a * omega * np.sin(theta - phi) / (b * np.sin(phi - beta))
-    phi1 = a * omega * np.sin(theta - beta) / (c * np.sin(phi - beta))
-    # what the loop's second derivative leaves for b beta'' i e^(i beta) - c phi'' i e^(i phi)
-    known = -a * (1j * alpha - omega**2) * np.exp(1j * theta)
-    known += b * beta1**2 * np.exp(1j * beta) - c * phi1**2 * np.exp(1j * phi)
-    beta2 = (known * np.exp(-1j * phi)).real / (b * np.sin(phi - beta))
-    phi2 = (known * np.exp(-1j * beta)).real / (c * np.sin(phi - beta))
-    return beta1, phi1, beta2, phi2
-
-
-def slider_crank(r=0.48, rod=1.6, offset=0.1, theta=1.0):
-    links = {
-        "frame": {"points": {"O": [0, 0]}},
-        "crank": {"ends": ["O", "A"], "length": r},
-        "rod": {"ends": ["A", "B"], "length": rod},
-    }
-    pairs = [{"turning": "O"}, {"turning": "A"}]
-    pairs.append({"sliding": "s", "on": "frame", "block": "B", "line": {"through": [0, offset]}})
-    inputs = [{"pair": "O", "position": theta, "velocity": 3.0, "acceleration": -1.0}]
-    return files.from_dict({"planar": 1, "frame": "frame", "links": links, "pairs": pairs, "inputs": inputs})
-
-
-PARALLELOGRAM = (1.0, 2.0, 1.0, 2.0)
-ROCKER = (0.3, 0.9, 0.7, 1.0)
-TRIPLE = (0.9, 0.7, 0.85, 1.5)
-
-
-def same_angles(found, wanted, far):
-    np.testing.assert_allclose(np.exp(1j * found), np.exp(1j * np.asarray(wanted)), atol=far, rtol=0)
-
-
-def passes_gate(mechanism, motion):
-    """Whether every row is closed by the pairs' own formulas, run on plain numbers."""
-    solver = PositionSolver(mechanism)
-
-    def still(frame):
-        if frame.fixed:
-            return frame
-        angle = frame.angle.parts[0]
-        return frame._replace(x=frame.x.parts[0], y=frame.y.parts[0], angle=angle, cos=np.cos(angle), sin=np.sin(angle))
-
-    frames = {name: still(frame) for name, frame in motion.frames.items()}
-    own = {name: [jet.parts[0] for jet in each] for name, each in motion.own.items()}
-    u = np.array([given.position for given in motion.inputs.values()])
-    gaps = solver.residual_check.residuals(frames, own, u)
-    return gaps.shape[1] == len(motion) and bool(np.all(gaps <= solver.tolerance))
-
 
 # closed forms all along
 
@@ -128,12 +46,12 @@ def test_a_crank_rocker_at_every_row(closed):
     for found, wanted in zip(motion.point("E"), (e, e1, e2), strict=True):
         np.testing.assert_allclose(found @ [1, 1j], wanted, atol=1e-11)
     assert motion.residual < 1e-14
-    assert passes_gate(mechanism, motion)
+    assert passes_residual_check(mechanism, motion)
 
 
 def test_an_offset_slider_crank_at_every_row():
     r, rod, e = 0.48, 1.6, 0.1
-    motion = planar.cycle(slider_crank())
+    motion = planar.cycle(block_slider_crank())
     t = 1.0 + np.linspace(0, TURN, 361)
     s, c = np.sin(t), np.cos(t)
     g = r * s - e
@@ -184,7 +102,7 @@ def test_a_trammels_slide_runs_from_limit_to_limit():
         assert np.isnan(values[[0, -1]]).all()
         assert np.isfinite(values[1:-1]).all()
     assert np.isfinite(link.angle).all()
-    assert passes_gate(mechanism, motion)
+    assert passes_residual_check(mechanism, motion)
 
 
 @pytest.mark.parametrize("closed", [1, -1])
@@ -215,7 +133,7 @@ def test_a_rockers_range_ends_where_coupler_and_follower_stretch(closed):
             np.testing.assert_array_equal(np.isnan(values), [True] + 119 * [False] + [True])
     for values in motion.point("C")[1:]:
         assert np.isnan(values[[0, -1]]).all()
-    assert passes_gate(mechanism, motion)
+    assert passes_residual_check(mechanism, motion)
 
 
 # single rows
@@ -378,7 +296,7 @@ def test_a_run_past_a_limit_stops_there_and_keeps_its_rows(steps, stop):
     same_angles(motion.link("DC").angle[:-1], rocker(*TRIPLE, theta[:-1]), 1e-12)
     # at the limit itself B, C and D lie in line
     same_angles(motion.link("DC").angle[-1:], rocker(*TRIPLE, theta[-1:], 0), 1e-12)
-    assert passes_gate(mechanism, motion)
+    assert passes_residual_check(mechanism, motion)
 
 
 @pytest.mark.parametrize("steps", [1, 2, 3, 10, 45, 360, 361])
@@ -395,7 +313,7 @@ def test_a_parallelogram_stays_one_through_its_flat_positions(start, steps):
     for name, rate in (("BC", 0.0), ("DC", 1.0)):
         np.testing.assert_allclose(motion.link(name).angular_velocity, 2.0 * rate, atol=1e-10)
         np.testing.assert_allclose(motion.link(name).angular_acceleration, rate, atol=1e-9)
-    assert passes_gate(mechanism, motion)
+    assert passes_residual_check(mechanism, motion)
     assert any("2 branches of the motion cross; this one goes on smoothly" in each for each in motion.remarks)
 
 
@@ -404,7 +322,7 @@ def test_a_parallelogram_stays_one_through_its_flat_positions(start, steps):
 )
 def test_a_slider_crank_of_equal_lengths_goes_on_where_it_could_change_over(start, steps):
     """Its slide goes on through the crank's centre; at 90 deg the rod could as well turn with the crank there."""
-    mechanism = slider_crank(0.05, 0.05, 0.0, np.radians(start))
+    mechanism = block_slider_crank(0.05, 0.05, 0.0, np.radians(start))
     motion = planar.cycle(mechanism, steps, np.radians(start), np.radians(start + 180))
     theta = motion.inputs["O"].position
     assert motion.outcome is Outcome.SOLVED
@@ -413,7 +331,7 @@ def test_a_slider_crank_of_equal_lengths_goes_on_where_it_could_change_over(star
     np.testing.assert_allclose(motion.point("B").position[:, 0], 0.1 * np.cos(theta), atol=1e-12)
     np.testing.assert_allclose(slide["velocity"], -0.3 * np.sin(theta), atol=1e-10)
     np.testing.assert_allclose(slide["acceleration"], -0.9 * np.cos(theta) + 0.1 * np.sin(theta), atol=1e-9)
-    assert passes_gate(mechanism, motion)
+    assert passes_residual_check(mechanism, motion)
 
 
 def limited(rng):
@@ -491,7 +409,7 @@ def test_a_trammel_started_beside_its_limit_stays_on_its_side(inside, side):
 def test_every_row_of_a_run_passes_the_gate(model):
     mechanism = planar.load(model)
     motion = planar.cycle(mechanism, 60, pair=mechanism.inputs[0].pair)
-    assert passes_gate(mechanism, motion)
+    assert passes_residual_check(mechanism, motion)
     assert len(motion) == 61 or motion.outcome is not Outcome.SOLVED
     # what is given of the input is what every row has
     (given, *_) = mechanism.inputs

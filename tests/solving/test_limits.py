@@ -10,15 +10,8 @@ from planar.document import files
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.solving.continuation.predictor_corrector import ArcBudget
 from tests import ranges
-from tests.solving.test_cycle import (
-    PARALLELOGRAM,
-    ROCKER,
-    TRIPLE,
-    TURN,
-    four_bar,
-    rocker,
-    slider_crank,
-)
+from tests.builders import block_slider_crank, four_bar
+from tests.closed_forms import PARALLELOGRAM, ROCKER, TRIPLE, TURN, rocker
 
 EPS = float(np.finfo(float).eps)
 
@@ -85,7 +78,7 @@ def test_a_full_turn_is_kept_where_the_range_misses_a_dead_point_by_little_and_l
 def test_both_dead_points_of_a_slider_crank_that_all_but_turns_are_told(short):
     """l = r - short: the rod reaches its line up to sin(theta) = l / r."""
     for r, theta in ((1.0, 1.0), (1.0, -0.3), (0.7, 0.4)):
-        motion = planar.cycle(slider_crank(r, r - short, 0.0, theta), 3)
+        motion = planar.cycle(block_slider_crank(r, r - short, 0.0, theta), 3)
         limit = np.arctan2(r - short, np.sqrt(short * (2.0 * r - short)))
         far = 32.0 * EPS / np.sqrt(2.0 * short)  # an ulp of a length moves the limit by that
         np.testing.assert_allclose(places(motion, DEAD), [-limit, limit], atol=far, rtol=0)
@@ -460,7 +453,7 @@ def test_the_swing_of_a_rocker(closed):
 def test_top_and_bottom_dead_centre_of_a_slider_crank(start, steps, offset):
     """Crank and rod in line: the block is l + r, and l - r, from the crank's pin."""
     r, rod = 0.48, 1.6
-    motion = planar.cycle(slider_crank(r, rod, offset, start), steps)
+    motion = planar.cycle(block_slider_crank(r, rod, offset, start), steps)
     top, bottom = np.arcsin(offset / (rod + r)), np.pi + np.arcsin(offset / (rod - r))
     wanted = {"TDC": (top, np.sqrt((rod + r) ** 2 - offset**2)), "BDC": (bottom, np.sqrt((rod - r) ** 2 - offset**2))}
     found = motion.limits
@@ -476,7 +469,7 @@ def test_top_and_bottom_dead_centre_of_a_slider_crank(start, steps, offset):
 
 
 def test_top_is_farther_from_the_crank_whichever_way_the_line_points():
-    value = files.to_dict(slider_crank(0.48, 1.6, 0.1, 1.0))
+    value = files.to_dict(block_slider_crank(0.48, 1.6, 0.1, 1.0))
     (slide,) = (pair for pair in value["pairs"] if "sliding" in pair)
     slide["line"] = {"through": [0, 0.1], "angle": np.pi}
     value["sketch"] = {"B": [1.8, 0.1]}
@@ -533,7 +526,7 @@ def test_change_points_of_a_parallelogram(steps, start):
 
 def test_a_slide_that_passes_change_points_has_its_ends_between():
     """Crank and rod of one length: the block goes on through the crank's pin, x = 2 r cos(theta)."""
-    motion = planar.cycle(slider_crank(0.05, 0.05, 0.0, 1.0), 12)
+    motion = planar.cycle(block_slider_crank(0.05, 0.05, 0.0, 1.0), 12)
     assert [(each.kind, each.of, each.end) for each in motion.limits] == [
         (CHANGE, "O", None),
         (STROKE, "s", "BDC"),

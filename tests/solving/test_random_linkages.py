@@ -11,32 +11,12 @@ from planar.model.mechanism import Drive, Mechanism, links_counting_turns
 from planar.results.motion import State
 from planar.solving.position import PositionSolver, solve
 from tests.draws import draws
-from tests.linkages import Built, conditioning, determinate, random_linkage
+from tests.linkages import Built, assembled, conditioning, random_linkage, seeds, shares
 
-seeds = st.integers(0, 10**6)
 sizes = st.integers(1, 12)
-shares = st.sampled_from([0.0, 0.0, 0.3])  # of joints made of higher pairs
 many = settings(
     max_examples=draws(20), deadline=None, suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow]
 )
-
-
-def assembled(built: Built, least: float) -> tuple[Mechanism, State]:
-    """The linkage solved; assumed to have determinate rates, with some distance from dead points."""
-    mechanism = files.from_dict(built.value)
-    solver = PositionSolver(mechanism)
-    try:
-        found = solver.find_assembly()
-        state = solver.state(found.z, solver.remarks(found))  # as `solve` does
-    except NoAnswer as problem:
-        # loops drawn at random may hold each other twice, or leave freedom: then that is what must be said, and only
-        # then
-        assert problem.outcome in (Outcome.TOO_FEW_INPUTS, Outcome.INPUT_JAMMED, Outcome.DEAD_POINT)
-        assert not determinate(mechanism, built)
-        assume(False)
-        raise
-    assume(conditioning(solver, found.z) > least)
-    return mechanism, state
 
 
 def distance(mechanism: Mechanism, state: State, place) -> float:

@@ -14,8 +14,7 @@ from planar.solving.assembly.block_assemblies import BlockAssemblies
 from planar.solving.assembly.nearest_assembly import AssemblySearchFailure, find_nearest_assembly
 from planar.solving.diagnosis import remedy
 from planar.solving.prepared_mechanism import PreparedMechanism
-from tests.cli.test_commands import written
-from tests.command import run
+from tests.command import run, written
 from tests.draws import part
 
 DEG = np.pi / 180

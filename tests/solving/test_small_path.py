@@ -18,7 +18,7 @@ from planar.solving.assembly.block_assemblies import BlockAssemblies
 from planar.solving.continuation import fast_path, path
 from planar.solving.continuation.fast_path import fast_position, fast_run
 from planar.solving.position import PositionSolver, SolvedMechanism
-from tests.solving.test_cycle import four_bar
+from tests.builders import four_bar
 
 ROCKER = (0.3, 0.8, 0.7, 1.0)
 CLOSED = ("crank-rocker", "crank-and-slotted-lever", "offset-slider-crank", "sewing-machine")

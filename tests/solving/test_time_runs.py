@@ -6,18 +6,9 @@ import pytest
 import planar
 from planar.document import files
 from planar.foundation.errors import BadInput, Outcome
-from tests.solving.test_change_points import crossed
-from tests.solving.test_closed_circuit import LIMIT
-from tests.solving.test_cycle import (
-    PARALLELOGRAM,
-    ROCKER,
-    TRIPLE,
-    four_bar,
-    passes_gate,
-    rocker,
-    same_angles,
-    slider_crank,
-)
+from tests.builders import block_slider_crank, four_bar
+from tests.checks import passes_residual_check, same_angles
+from tests.closed_forms import PARALLELOGRAM, ROCKER, TRIPLE, TRIPLE_LIMIT, antiparallelogram, rocker
 
 RISES = ["3-4-5", "4-5-6-7", "cycloidal", "harmonic", "trapezoidal", "modified trapezoidal"]
 
@@ -107,7 +98,7 @@ def test_rates_of_two_inputs_by_their_laws_are_differences_at_order_two():
     runs = [planar.cycle(mechanism, steps, jerk=True) for steps in (400, 800)]
     for run in runs:
         assert run.outcome is Outcome.SOLVED
-        assert passes_gate(mechanism, run)
+        assert passes_residual_check(mechanism, run)
 
     def smooth(run):
         return (np.abs(run.time - 1.0) > 0.02) & (run.time > 0.02) & (run.time < 1.98)
@@ -139,7 +130,7 @@ def test_inputs_run_by_their_laws_and_one_without_by_the_files_own_rates():
     c = motion.point("C").position
     np.testing.assert_allclose(np.hypot(*(c - b).T), 1.0, atol=1e-13)
     np.testing.assert_allclose(np.hypot(*(c - d).T), 1.1, atol=1e-13)
-    assert passes_gate(mechanism, motion)
+    assert passes_residual_check(mechanism, motion)
 
 
 @pytest.mark.parametrize(("given", "duration"), [(None, 2.0), (0.7, 0.7), (3.5, 3.5)])
@@ -204,12 +195,12 @@ def test_a_run_in_time_ends_when_it_comes_to_its_dead_point(rates, steps):
     omega, alpha = rates
     mechanism = four_bar(*TRIPLE, 0.6, 1, omega, alpha)
     motion = planar.cycle(mechanism, steps, duration=5.0)
-    gone = np.sign(omega) * LIMIT - 0.6
+    gone = np.sign(omega) * TRIPLE_LIMIT - 0.6
     roots = np.roots([0.5 * alpha, omega, -gone]) if alpha else np.array([gone / omega])
     when = float(min(each for each in roots.real if each > 0))
     assert motion.outcome is Outcome.DEAD_POINT
     assert motion.time[-1] == pytest.approx(when, abs=1e-12)
-    assert motion.inputs["A"].position[-1] == pytest.approx(np.sign(omega) * LIMIT, abs=1e-13)
+    assert motion.inputs["A"].position[-1] == pytest.approx(np.sign(omega) * TRIPLE_LIMIT, abs=1e-13)
     grid = np.linspace(0.0, 5.0, steps + 1)
     np.testing.assert_allclose(motion.time[:-1], grid[grid < when], atol=1e-14)
     nan = np.isnan(motion.link("DC").angular_velocity)
@@ -218,14 +209,14 @@ def test_a_run_in_time_ends_when_it_comes_to_its_dead_point(rates, steps):
     same_angles(motion.link("DC").angle[-1:], rocker(*TRIPLE, motion.inputs["A"].position[-1:], 0), 1e-10)
     (dead,) = (each for each in motion.limits if each.kind == "input dead point")
     assert (dead.of, dead.input) == ("A", pytest.approx(when, abs=1e-12))
-    assert dead.value == pytest.approx(np.sign(omega) * LIMIT, abs=1e-13)
-    assert passes_gate(mechanism, motion)
+    assert dead.value == pytest.approx(np.sign(omega) * TRIPLE_LIMIT, abs=1e-13)
+    assert passes_residual_check(mechanism, motion)
 
 
 def test_a_run_that_turns_back_short_of_its_dead_point_goes_on():
     """v^2 / 2a = 0.7 from 0.6 leaves 0.02 to the limit, and then it goes back to the other one."""
     alpha = -1.0
-    omega = float(np.sqrt(2.0 * (LIMIT - 0.6 - 0.02)))
+    omega = float(np.sqrt(2.0 * (TRIPLE_LIMIT - 0.6 - 0.02)))
     motion = planar.cycle(four_bar(*TRIPLE, 0.6, 1, omega, alpha), 90, duration=3.0)
     assert motion.outcome is Outcome.SOLVED
     same_angles(motion.link("DC").angle, rocker(*TRIPLE, motion.inputs["A"].position), 1e-11)
@@ -279,7 +270,7 @@ def test_a_law_that_carries_a_parallelogram_over_its_flat_position(steps, branch
     first = np.pi / 2 * (1 - np.cos(np.pi * t))
     np.testing.assert_allclose(motion.inputs["A"].velocity, first, atol=1e-13)
     over = bool(branches) & (theta > np.pi + 1e-9)
-    phi, slope, _ = crossed(theta)
+    phi, slope, _ = antiparallelogram(theta)
     same_angles(motion.link("DC").angle, np.where(over, phi, theta), 1e-11)
     np.testing.assert_allclose(motion.link("DC").angular_velocity, np.where(over, slope / 2.0, 1.0) * first, atol=1e-10)
     np.testing.assert_allclose(motion.angular_jerk("DC")[~over], (np.pi**3 / 2 * np.cos(np.pi * t))[~over], atol=1e-5)
@@ -296,7 +287,7 @@ def test_a_law_that_carries_a_parallelogram_over_its_flat_position(steps, branch
 def test_ends_of_strokes_have_their_times(steps):
     """The block turns back where crank and rod are in line, and where the crank itself turns back."""
     r, rod, e = 0.48, 1.6, 0.1
-    motion = planar.cycle(slider_crank(r, rod, e, 1.0), steps, duration=5.0)
+    motion = planar.cycle(block_slider_crank(r, rod, e, 1.0), steps, duration=5.0)
     inner, outer = np.pi + np.arcsin(e / (rod - r)), 2 * np.pi + np.arcsin(e / (rod + r))
     assert outer > 1.0 + 9 / 2  # the crank turns back at 5.5, short of the outer one
     times = [3 - np.sqrt(9 - 2 * (inner - 1)), 3.0]
@@ -327,7 +318,7 @@ def test_third_rates_over_a_range_are_differences_at_order_two():
 def test_third_rates_of_a_slider_crank_are_those_of_its_closed_form():
     """x = r cos(theta) + sqrt(l^2 - (r sin(theta) - e)^2); its third rate by a complex step of the second."""
     r, rod, e = 0.48, 1.6, 0.1
-    motion = planar.cycle(slider_crank(), 36, jerk=True)
+    motion = planar.cycle(block_slider_crank(), 36, jerk=True)
 
     def second(t):
         # theta = theta0 + 3 t - t^2 / 2, at every row from its own theta0

@@ -10,10 +10,10 @@ from planar.document import files
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.model.pairs import MeasureKind
 from planar.solving.position import PositionSolver
+from tests.checks import passes_residual_check
+from tests.closed_forms import TURN, rocker
 from tests.draws import draws
-from tests.linkages import conditioning, random_linkage
-from tests.solving.test_cycle import TURN, passes_gate, rocker
-from tests.solving.test_random_linkages import seeds, shares
+from tests.linkages import conditioning, random_linkage, seeds, shares
 
 few = settings(
     max_examples=draws(6), deadline=None, suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow]
@@ -100,7 +100,7 @@ def test_a_six_bar_turns_back_where_its_second_loop_can_reach_no_further(part, s
     np.testing.assert_allclose([each.input for each in dead], wanted, atol=1e-11)
     # at both ends the second dyad is stretched, and the first loop is nowhere near
     np.testing.assert_allclose(np.hypot(*(motion.point("F").position - motion.point("G").position)[[0, -1]].T), reach)
-    assert passes_gate(mechanism, motion)
+    assert passes_residual_check(mechanism, motion)
     # the whole circuit goes through both, with H on the other side of FG in between
     circuit = planar.cycle(mechanism, 30, circuit=True)
     h, f, g = (circuit.point(name).position @ [1, 1j] for name in "HFG")
@@ -172,7 +172,7 @@ def test_every_row_passes_the_gate_and_no_row_jumps(seed, links, higher):
     mechanism, pair, here = drawn(seed, links, higher)
     steps = 60
     motion = ranged(mechanism, pair, steps, here, here + 0.6)
-    assert passes_gate(mechanism, motion)
+    assert passes_residual_check(mechanism, motion)
     speed = next(each.velocity for each in mechanism.inputs if each.pair == pair)
     rows = np.flatnonzero(np.isfinite(frames(motion, 1)).all(axis=1))
     rows = rows[np.isin(rows + 1, rows)]
@@ -247,7 +247,7 @@ def test_a_circuit_comes_back_to_its_start_or_says_why_not(seed, links):
         assert any(each in problem.reason for each in told)
         return
     assert motion.outcome is Outcome.SOLVED
-    assert passes_gate(mechanism, motion)
+    assert passes_residual_check(mechanism, motion)
     place = frames(motion)
     assert same_place(place[-1:], place[:1], 1e-8)
     # at dead points, and only there, no velocity is determined; they are what the limits say

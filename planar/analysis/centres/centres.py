@@ -135,6 +135,10 @@ def centres(position: State | Mechanism) -> Centres:
     where the mechanism can move in several ways it is that of the inputs' given rates. Of a mechanism only the
     position is assembled, so that it may stand where `solve` finds no velocities: on a dead point of its inputs or on
     a change point. Raises NoAnswer where it cannot be assembled.
+
+    >>> import planar
+    >>> sorted(each.name for each in planar.centres(planar.load("four-bar")))
+    ['I12', 'I13', 'I14', 'I23', 'I24', 'I34']
     """
     found = _CentreSearch(rest_position(position) if isinstance(position, Mechanism) else position)
     found.search()

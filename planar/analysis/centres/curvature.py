@@ -138,8 +138,9 @@ class Curvature:
 def curvature(state: State, link: str, other: str | None = None) -> Curvature:
     """The motion of a link to second order as seen from another (left out: the frame), for the curvature of paths.
 
-    Where the only input is at rest, rates are per unit of it (1 rad/s or 1 m/s, no acceleration). Raises Unknown for a
-    link that is not there, BadInput where several inputs are all at rest, so that no ratio of their rates is given.
+    Where the only input is at rest, rates are per unit of it (1 rad/s or 1 m/s, no acceleration). Raises Unknown
+    for a link that is not there, BadInput where several inputs are all at rest, so that no ratio of their rates is
+    given.
     """
     other = state.mechanism.frame if other is None else other
     relative_motion(state.frames, link, other)  # refuses what there is not

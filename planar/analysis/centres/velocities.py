@@ -58,8 +58,8 @@ class PointByCentre(NamedTuple):
 def velocity_by_centres(centres: Centres, point: str) -> PointByCentre:
     """v_P = w_k (P - I_kf) turned a quarter, w_k from an input's given rate and w_i through I_ik.
 
-    Of the links that carry the point the first moving one is taken. Raises Unknown where there is no such point, and
-    NoAnswer where the input's rate does not determine the velocity.
+    Of the links that carry the point the first moving one is taken. Raises Unknown where there is no such point,
+    and NoAnswer where the input's rate does not determine the velocity.
     """
     state = centres.state
     named = state._find_point(point)

@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from planar.analysis.interpolated_run import InterpolatedRun
-from planar.analysis.motion.extremes import Extreme, find_greatest, quantity_and_rates
+from planar.analysis.motion.extremes import find_greatest, quantity_and_rates
 from planar.analysis.motion.harmonics import Harmonics, full_turn, harmonics
+from planar.analysis.motion.output import Extreme
 from planar.analysis.motion.piston import Deviation, Piston, RodPointMotion, find_piston
 from planar.foundation.errors import BadInput
 from planar.foundation.short_repr import short_repr

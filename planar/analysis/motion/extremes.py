@@ -16,7 +16,8 @@ from planar.foundation.errors import BadInput, NoAnswer
 from planar.foundation.root_finding import find_root
 from planar.model.mechanism import relative_motions
 from planar.model.pairs import MeasureKind
-from planar.results.motion import KinematicResult, Motion, State
+from planar.results.kinematic_result import KinematicResult
+from planar.results.motion import Motion, State
 
 Array = np.ndarray
 StateMeasure = Callable[[State], float | Array]
@@ -136,8 +137,8 @@ def greatest(motion: Motion, of: str | StateMeasure, what: str = "velocity") -> 
     exact values on either side is zero, good to about 1e-11 rad. Of places that are alike the first is told.
 
     Over a range that is not closed the greatest may be at an end; where it grows beyond all bounds towards a limit of
-    the range it is inf, there; where no rates are determined anywhere it is NaN. Raises Unknown where there is nothing
-    of that name, BadInput for another `what`.
+    the range it is inf, there; where no rates are determined anywhere it is NaN. Raises Unknown where there is
+    nothing of that name, BadInput for another `what`.
     """
     return find_greatest(InterpolatedRun(motion), of, what)
 

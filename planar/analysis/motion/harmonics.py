@@ -8,7 +8,8 @@ from math import pi
 import numpy as np
 
 from planar.analysis.interpolated_run import InterpolatedRun
-from planar.analysis.motion.extremes import Extreme, Stroke, find_stroke
+from planar.analysis.motion.extremes import Stroke, find_stroke
+from planar.analysis.motion.output import Extreme
 from planar.document.first_argument import takes_mechanism
 from planar.equations.mechanism_numbers import mechanism_size, shapes_of_links
 from planar.foundation.errors import BadInput, NoAnswer, Outcome, Unknown

@@ -50,8 +50,8 @@ class Advantage(NamedTuple):
 def advantage(state: State, output: str, input: str | None = None) -> Advantage:  # noqa: A002
     """The mechanical advantage of a point, a link or a pair (in this order, by name) over an input.
 
-    With the input alone moving at unit rate; `input` may be left out where there is one. Raises Unknown where there is
-    no such output or input, BadInput where an input has to be named, NoAnswer where none can move alone.
+    With the input alone moving at unit rate; `input` may be left out where there is one. Raises Unknown where there
+    is no such output or input, BadInput where an input has to be named, NoAnswer where none can move alone.
     """
     return _AdvantagesOverInput(state, _choose_input(state, input)).advantage_of(output)
 

@@ -16,7 +16,8 @@ from planar.foundation.errors import NoAnswer
 from planar.foundation.root_finding import find_root
 from planar.foundation.short_repr import short_repr
 from planar.model.wording import REST_TOLERANCE
-from planar.results.motion import KinematicResult, Motion
+from planar.results.kinematic_result import KinematicResult
+from planar.results.motion import Motion
 
 Array = np.ndarray
 

@@ -16,7 +16,7 @@ from planar.foundation.jets import value_and_rates
 from planar.foundation.root_finding import find_root
 from planar.model.mechanism import relative_motions
 from planar.model.pairs import MeasureKind
-from planar.results.motion import KinematicResult, ValueAndRates
+from planar.results.kinematic_result import KinematicResult, ValueAndRates
 from planar.results.records import principal_turns
 
 Array = np.ndarray

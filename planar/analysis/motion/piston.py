@@ -248,7 +248,10 @@ def find_piston(mechanism: Mechanism, pair: str) -> Piston | None:
     if not chains:
         return None
     state = solve(mechanism)
-    return next((found for each in chains if (found := _measure_piston(state, chain, slide, *each)) is not None), None)
+    found = (
+        _measure_piston(state, chain, (slide, a, b, c), rod, crank, given) for a, rod, b, crank, c, given in chains
+    )
+    return next((each for each in found if each is not None), None)
 
 
 def _rod_and_crank_chains(
@@ -282,15 +285,13 @@ def _driving_input(mechanism: Mechanism, pin: SchemeJoint, crank: str) -> str | 
 def _measure_piston(
     state: State,
     scheme: KinematicScheme,
-    slide: SchemeJoint,
-    a: SchemeJoint,
+    joints: tuple[SchemeJoint, SchemeJoint, SchemeJoint, SchemeJoint],
     rod: str,
-    b: SchemeJoint,
     crank: str,
-    c: SchemeJoint,
     given: str,
 ) -> Piston | None:
-    """The dimensions of a piston, if its crank turns fully."""
+    """The dimensions of a piston, if its crank turns fully; `joints` from the slide to the crank's pin on the frame."""
+    slide, a, b, c = joints
     frame = scheme.frame
     r, l = pin_distance(b.locations[crank], c.locations[crank]), pin_distance(a.locations[rod], b.locations[rod])  # noqa: E741
     axis, pin = c.locations[frame].point, _world_point(state, rod, a.locations[rod].point)

@@ -16,7 +16,8 @@ from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import relative_motions
 from planar.model.pairs import MeasureKind, Pair
 from planar.model.wording import join_all_names
-from planar.results.motion import KinematicResult, Motion, State
+from planar.results.kinematic_result import KinematicResult
+from planar.results.motion import Motion, State
 from planar.solving.checks.singular_values import SINGULAR_TOLERANCE
 from planar.solving.full_constraints import COMPLEX_STEP, FullConstraints
 from planar.solving.prepared_mechanism import PreparedMechanism
@@ -62,9 +63,9 @@ def transmission(moving: State | Motion, output: str) -> Transmission:
     F is that of the multipliers of all pairs' constraints, nothing eliminated. The least over a motion is solved for:
     where the derivative of a polynomial through exact values of cos^2 is zero, good to about 1e-8 of the input.
 
-    Raises Unknown for another name; BadInput where the link is not so joined to the frame, nothing but the input itself
-    drives it, a turning link is driven at several places or by a couple, so that no one line of force acts on a pin,
-    or where constraints hold twice, so that the forces are not determined.
+    Raises Unknown for another name; BadInput where the link is not so joined to the frame, nothing but the input
+    itself drives it, a turning link is driven at several places or by a couple, so that no one line of force acts on a
+    pin, or where constraints hold twice, so that the forces are not determined.
     """
     driven = _DrivenOutput(moving, output)
     through, angle = driven.angles(moving)

@@ -7,11 +7,10 @@ from itertools import combinations
 
 import numpy as np
 
-from planar.analysis.polygons.lettering import Lettering, line_name
+from planar.analysis.polygons.lettering import Lettering
 from planar.analysis.polygons.loop_equations import loop_equations
 from planar.analysis.polygons.polygon import (
     DrawingStage,
-    Factor,
     Meeting,
     MeetingSide,
     PointImage,
@@ -22,6 +21,7 @@ from planar.analysis.polygons.polygon import (
     TurningRate,
     VectorPart,
 )
+from planar.analysis.polygons.vector_parts import NEGLIGIBLE_RATIO, VectorParts
 from planar.analysis.rate_equations import PinJoint, Rate, SlideJoint, moving_links, rate_equations, turning_classes
 from planar.analysis.vector_chains import (
     COINCIDENT_TOLERANCE,
@@ -33,12 +33,10 @@ from planar.analysis.vector_chains import (
 )
 from planar.equations.functions import equation_functions
 from planar.model.mechanism import named_points
-from planar.model.wording import REST_TOLERANCE, direction_sense, turning_sense
+from planar.model.wording import REST_TOLERANCE, turning_sense
 from planar.results.motion import State
 
 Array = np.ndarray
-NEGLIGIBLE_RATIO = 1e-10
-"""A rate below this part of the greatest of its kind is none."""
 
 
 def velocity_polygon(state: State) -> Polygon:
@@ -71,12 +69,7 @@ class _PolygonConstruction:
         self.letters: dict[str, Array] = {}
         self.pole: list[str] = []
         self.stages: list[DrawingStage] = []
-        links = moving_links(state.mechanism)
-        self.greatest_angular_velocity = max((abs(self.equations.value(Rate(link))) for link in links), default=0.0)
-        self.greatest_angular_acceleration = max(
-            (abs(self.equations.value(Rate(link), 2)) for link in links), default=0.0
-        )
-        self.greatest_angular_acceleration = max(self.greatest_angular_acceleration, self.greatest_angular_velocity**2)
+        self.parts = VectorParts(state, self.equations, self.chains, self.lettering, self._is_known)
 
     def draw(self) -> Polygon:
         """The whole polygon."""
@@ -142,7 +135,7 @@ class _PolygonConstruction:
         if rate.is_angular:
             value = self.equations.value(rate, self.order)
             still = NEGLIGIBLE_RATIO * (
-                self.greatest_angular_velocity if self.order == 1 else self.greatest_angular_acceleration
+                self.parts.greatest_angular_velocity if self.order == 1 else self.parts.greatest_angular_acceleration
             )
             self.stages.append(TurningRate(rate.owner, value, turning_sense(value, still / REST_TOLERANCE), by=pair))
 
@@ -229,7 +222,7 @@ class _PolygonConstruction:
             self._image_scale(spot.link),
         )
         if self._image_scale(spot.link) <= NEGLIGIBLE_RATIO * max(
-            reach, self.greatest_angular_acceleration if self.order == 2 else self.greatest_angular_velocity
+            reach, self.parts.greatest_angular_acceleration if self.order == 2 else self.parts.greatest_angular_velocity
         ):
             self.letters[letter] = value
             moves_alike = self.lettering.points[base[0]]
@@ -282,7 +275,7 @@ class _PolygonConstruction:
         drawn = next(v for v in vectors if {v.tail, v.head} & {tail, head} and self._is_vector_of(v, leg))
         length = float(np.hypot(*(self.chains.point_position(leg.head) - self.chains.point_position(leg.tail))))
         still = NEGLIGIBLE_RATIO * (
-            self.greatest_angular_velocity if self.order == 1 else self.greatest_angular_acceleration
+            self.parts.greatest_angular_velocity if self.order == 1 else self.parts.greatest_angular_acceleration
         )
         self.stages.append(
             TurningRate(
@@ -311,7 +304,7 @@ class _PolygonConstruction:
         head = self.lettering.letter(leg.head)
         drawn = head in self.letters
         vectors = []
-        parts = self._velocity_parts(leg) if self.order == 1 else self._acceleration_parts(leg)
+        parts = self.parts.velocity_parts(leg) if self.order == 1 else self.parts.acceleration_parts(leg)
         for index, vector in enumerate(parts):
             end = head
             if index < len(parts) - 1:
@@ -322,87 +315,6 @@ class _PolygonConstruction:
         if not drawn:
             self.letters[head] = self.equations.point_motion(leg.head.link, leg.head.local, self.order)
         return vectors, head
-
-    def _velocity_parts(self, leg: ChainVector) -> list[PolygonVector]:
-        rate = self.equations.value(leg.rate)
-        if leg.slide is not None:
-            vector = self._directed_vector(leg, VectorPart.SLIDING, rate * self.chains.unit_rate_velocity(leg))
-            return [self._with_magnitude(vector, leg, Factor(f"v at {leg.slide.name}", abs(rate), 1, "velocity"))]
-        vector = self._directed_vector(leg, VectorPart.ROTATION, rate * self.chains.unit_rate_velocity(leg))
-        turns = Factor(f"ω_{leg.rate.owner}", abs(rate), 1, "angular velocity")
-        return [self._with_magnitude(vector, leg, turns, self._length_factor(leg))]
-
-    def _acceleration_parts(self, leg: ChainVector) -> list[PolygonVector]:
-        return self._slide_parts(leg, leg.slide) if leg.slide is not None else self._turning_parts(leg)
-
-    def _turning_parts(self, leg: ChainVector) -> list[PolygonVector]:
-        """Centripetal and tangential part."""
-        rate, second = (self.equations.value(leg.rate, order) for order in (1, 2))
-        length = self._length_factor(leg)
-        tangential = self._directed_vector(leg, VectorPart.TANGENTIAL, second * self.chains.unit_rate_velocity(leg))
-        turns = Factor(f"α_{leg.rate.owner}", abs(second), 1, "angular acceleration")
-        tangential = self._with_magnitude(tangential, leg, turns, length)
-        if abs(rate) <= NEGLIGIBLE_RATIO * self.greatest_angular_velocity:
-            return [tangential]
-        if tangential.known:
-            growing = rate * second > 0.0
-            tangential = tangential._replace(towards=self.lettering.velocity_letter(leg.head if growing else leg.tail))
-        speed = Factor(f"({self._velocity_chord(leg)})", abs(rate) * length.value, 2, "velocity")
-        reach = self.chains.point_position(leg.head) - self.chains.point_position(leg.tail)
-        centripetal = self._directed_vector(leg, VectorPart.CENTRIPETAL, -(rate**2) * reach)._replace(
-            known=True,
-            is_perpendicular=False,
-            factors=(speed, length._replace(power=-1)),
-            towards=self.lettering.point_name(leg.tail),
-        )
-        if tangential.known and abs(second) <= NEGLIGIBLE_RATIO * self.greatest_angular_acceleration:
-            return [centripetal]
-        return [centripetal, tangential]
-
-    def _slide_parts(self, leg: ChainVector, slide: SlideJoint) -> list[PolygonVector]:
-        """Coriolis part, where the line turns, and what is along the line."""
-        rate, second = (self.equations.value(leg.rate, order) for order in (1, 2))
-        way = self.chains.unit_rate_velocity(leg)
-        sliding = self._directed_vector(leg, VectorPart.SLIDING, second * way)
-        sliding = self._with_magnitude(sliding, leg, Factor(f"a at {slide.name}", abs(second), 1, "acceleration"))
-        turns = self.equations.value(Rate(slide.guide))
-        if abs(turns) <= NEGLIGIBLE_RATIO * self.greatest_angular_velocity:
-            return [sliding]
-        value = 2.0 * turns * rate * np.array([-way[1], way[0]])
-        factors = (
-            Factor("2", 2.0, 1, "pure"),
-            Factor(f"ω_{slide.guide}", abs(turns), 1, "angular velocity"),
-            Factor(f"({self._velocity_chord(leg)})", abs(rate), 1, "velocity"),
-        )
-        coriolis = self._directed_vector(leg, VectorPart.CORIOLIS, value)
-        return [
-            coriolis._replace(known=True, is_perpendicular=True, factors=factors, towards=direction_sense(value)),
-            sliding,
-        ]
-
-    def _velocity_chord(self, leg: ChainVector) -> str:
-        """The vector of the velocity polygon between a leg's points."""
-        return f"{self.lettering.velocity_letter(leg.tail)}{self.lettering.velocity_letter(leg.head)}"
-
-    def _length_factor(self, leg: ChainVector) -> Factor:
-        length = float(np.hypot(*(self.chains.point_position(leg.head) - self.chains.point_position(leg.tail))))
-        return Factor(line_name(self.lettering.point_name(leg.tail), self.lettering.point_name(leg.head)), length)
-
-    def _directed_vector(self, leg: ChainVector, part: VectorPart, value: Array) -> PolygonVector:
-        """A vector whose direction alone is known."""
-        of, against = self.lettering.point_name(leg.head), self.lettering.point_name(leg.tail)
-        if leg.slide is None:
-            return PolygonVector(part, of, against, "", "", value, False, True, line_name(against, of))
-        rider = of if leg.sign > 0.0 else against
-        fixed = leg.slide.guide == self.frame
-        line = f"line of motion of {rider}" if fixed else f"line on {leg.slide.guide}"
-        return PolygonVector(part, of, against, "", "", value, False, False, line)
-
-    def _with_magnitude(self, vector: PolygonVector, leg: ChainVector, *factors: Factor) -> PolygonVector:
-        """The vector with its magnitude, where the rate behind it is known."""
-        if not self._is_known(leg.rate):
-            return vector
-        return vector._replace(known=True, factors=factors, towards=direction_sense(vector.value))
 
     def _next_block(self, left: Sequence[str]) -> tuple[str, ...]:
         """The links that are solved together next: of the groups in which positions are solved, the first open one."""

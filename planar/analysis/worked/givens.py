@@ -10,7 +10,8 @@ import numpy as np
 from planar.analysis.rate_equations import SlideJoint, rate_equations
 from planar.analysis.rich_text import MeasuredValue, Phrase, list_phrases
 from planar.foundation.units import parse_unit, unit_of_kind
-from planar.model.mechanism import Along, At, Distances, FileUnits, Link, Mechanism, pair_entries, relative_motions
+from planar.model.link_shapes import Along, At, Distances, Link
+from planar.model.mechanism import FileUnits, Mechanism, pair_entries, relative_motions
 from planar.model.pairs import MeasureKind, Pair
 from planar.model.wording import amount, turning_sense
 from planar.results.motion import State

@@ -5,7 +5,8 @@ from __future__ import annotations
 from itertools import islice
 from typing import NamedTuple
 
-from planar.assemblies.circuits.circuits import Branch, Circuit, Circuits
+from planar.assemblies.circuits.circuits import Circuit, Circuits
+from planar.assemblies.circuits.traced_circuit import Branch
 from planar.assemblies.modes import Mode, Modes
 
 MAX_LOCATED = 64

@@ -1,8 +1,8 @@
-"""All positions of an input at which assemblies meet: its dead points, found group after group.
+"""All positions of an input at which assemblies meet: its dead points, found block after block.
 
-Of a group the function N = product of the slope's determinant over all its solutions, complex ones included, vanishes
-just where two of them meet. It is an analytic function of the input where the groups before it are, and real. Where
-those have several assemblies it is taken for each choice of a dyad's sign, and multiplied over those of larger groups;
+Of a block the function N = product of the slope's determinant over all its solutions, complex ones included, vanishes
+just where two of them meet. It is an analytic function of the input where the blocks before it are, and real. Where
+those have several assemblies it is taken for each choice of a dyad's sign, and multiplied over those of larger blocks;
 where these come and go, at their own dead points, it has square roots.
 """
 
@@ -30,12 +30,12 @@ from planar.solving.prepared_mechanism import PreparedMechanism
 Array = np.ndarray
 
 DyadChoices = tuple[int, ...]
-"""Of every group on the way which of its two closed forms is taken, 0 where there is no choice to make."""
+"""Of every block on the way which of its two closed forms is taken, 0 where there is no choice to make."""
 
 TURN_START = -1.2345
 """rad: where a turn is cut, at no position that means anything."""
 MAX_SOLVED_BLOCKS = 60_000
-"""Groups solved before the search for dead points is given up."""
+"""Blocks solved before the search for dead points is given up."""
 SLIDE_REACH_RATIO = 2.0
 """Of what all links together reach: further a slide cannot be out, if nothing else slides."""
 SAME_POSITION_DISTANCE = 1e-10
@@ -96,7 +96,7 @@ class _DeadPointSearch:
                 doubts.append(f"dead points of the group with {', '.join(stage.links)} may be missing: {why}")
             found.append(_distinct(crossed))
             crossings.append(_distinct(touched))
-        # where two groups have a dead point at once, two ways lead on from it
+        # where two blocks have a dead point at once, two ways lead on from it
         every = sorted(at for part in found for at in part)
         if any(crossings) or any(high - low < SAME_POSITION_DISTANCE for low, high in pairwise(every)):
             doubts.append(BRANCHES_CROSS)
@@ -124,7 +124,7 @@ class _DeadPointSearch:
         )
 
     def _zeros(self, level: int, low: float, high: float) -> Iterator[Zeros]:
-        """The zeros of N of a group between two places where the groups before it have dead points, for each choice."""
+        """The zeros of N of a block between two places where the blocks before it have dead points, for each choice."""
         kept: dict[float, dict[DyadChoices, SignedLog]] = {}
 
         def values(at: float) -> dict[DyadChoices, SignedLog]:
@@ -144,7 +144,7 @@ class _DeadPointSearch:
             yield find_zeros(value, low, high)
 
     def _discriminants(self, level: int, at: float) -> dict[DyadChoices, SignedLog]:
-        """N of a group with the input at a place, for each choice before it."""
+        """N of a block with the input at a place, for each choice before it."""
         found: dict[DyadChoices, SignedLog] = {}
         u = self._inputs_at(at)
         for choices, z in self._earlier_assemblies(level, at):
@@ -159,7 +159,7 @@ class _DeadPointSearch:
         return u
 
     def _earlier_assemblies(self, level: int, at: float) -> list[tuple[DyadChoices, Array]]:
-        """Every assembly of the groups on which one hangs."""
+        """Every assembly of the blocks on which one hangs."""
         found = [((), np.zeros(len(self.setup.equations.unknowns)))]
         u = self._inputs_at(at)
         earlier = tuple(sorted(self.dependencies[level]))
@@ -183,7 +183,7 @@ class _DeadPointSearch:
             raise DeadPointsUnclaimed("there are too many choices before it")
 
     def _assemblies(self, level: int, z: Array, u: Array) -> list[tuple[int, Array]]:
-        """The assemblies of one group, those before it given: which of two closed forms, and the unknowns."""
+        """The assemblies of one block, those before it given: which of two closed forms, and the unknowns."""
         stage, setup = self.stages[level], self.setup
         self._spend(1)
         closed = setup.functions.block_assemblies(stage)
@@ -202,7 +202,7 @@ class _DeadPointSearch:
         return [(0, each) for each in found.real]
 
     def _discriminant(self, level: int, z: Array, u: Array) -> SignedLog:
-        """N of one group, those before it given."""
+        """N of one block, those before it given."""
         stage, setup = self.stages[level], self.setup
         if slice_length(stage.rows) != slice_length(stage.unknowns):
             raise DeadPointsUnclaimed("it holds more than it needs")
@@ -257,7 +257,7 @@ def _with_inputs(setup: PreparedMechanism, u: Array) -> PreparedMechanism:
 
 
 def _earlier_blocks(setup: PreparedMechanism) -> list[set[int]]:
-    """The earlier groups on which each group hangs, itself or through others."""
+    """The earlier blocks on which each block hangs, itself or through others."""
     stages = setup.equations.blocks
     of = {column: k for k, stage in enumerate(stages) for column in range(stage.unknowns.start, stage.unknowns.stop)}
     found: list[set[int]] = []

@@ -1,4 +1,4 @@
-"""How far the solutions of a group are from where two of them meet: the product of slopes over all, complex ones too.
+"""How far the solutions of a block are from where two of them meet: the product of slopes over all, complex ones too.
 
 They are found at once, as eigenvalues, or else followed from the position before: not straight, where on real ways
 solutions meet, but by a complex place beside it.
@@ -29,11 +29,11 @@ INFINITY_TOLERANCE = 1e-4
 
 
 class DeadPointsUnclaimed(Exception):
-    """Why dead points of a group are not all found."""
+    """Why dead points of a block are not all found."""
 
 
 class MovingSolutions:
-    """The solutions of one group as what is given moves."""
+    """The solutions of one block as what is given moves."""
 
     def __init__(self, equations: ConstraintEquations, form: IsotropicForm):
         self.equations, self.form = equations, form
@@ -44,7 +44,7 @@ class MovingSolutions:
     def discriminant(self, z: Array, u: Array, p: Array) -> SignedLog:
         """The product of the slope's determinant, X0 = Y0 = 1, over all solutions at finite places.
 
-        Real up to a constant phase: the group is its own mirror image. Zero where some meet, or all but meet. Raises
+        Real up to a constant phase: the block is its own mirror image. Zero where some meet, or all but meet. Raises
         Unclaimed where there are not always as many.
         """
         numbers, many = self.form.polynomials(z, u, p), self.form.entry_count

@@ -1,8 +1,8 @@
-"""Solutions of a group's polynomials certified: by Krawczyk's operator in ball arithmetic, outward rounded.
+"""Solutions of a block's polynomials certified: by Krawczyk's operator in ball arithmetic, outward rounded.
 
 The dimensions are the floats that they are; their cosines, sines and sums are enclosed. Each solution gets a box in
 which there is one, and one only (R. Krawczyk, Computing 4, 1969; S. M. Rump, Verification methods, Acta Numerica 19,
-2010, sec. 13), boxes apart from each other. The group is its own mirror image under X <-> conjugate of Y: a solution
+2010, sec. 13), boxes apart from each other. The block is its own mirror image under X <-> conjugate of Y: a solution
 whose mirror image lies in its own box is its own mirror image, so an assembly; one whose box and its image are apart is
 none.
 """
@@ -37,7 +37,7 @@ class Certificate(NamedTuple):
 
 
 def certify_solutions(form: IsotropicForm, given: Sequence[Array], V: Array) -> Certificate:
-    """What is proved of solutions V (solutions, 2 many) of a group at (z, u, p)."""
+    """What is proved of solutions V (solutions, 2 many) of a block at (z, u, p)."""
     from flint import ctx
 
     before, ctx.prec = ctx.prec, BALL_PRECISION_BITS
@@ -101,7 +101,7 @@ def is_regular(slope: ca.Function, given: Sequence[Array]) -> bool:
 
 
 class _BallPolynomials:
-    """The polynomials of a group as balls, and what is left of them once the rows linear in X, and in Y, are solved.
+    """The polynomials of a block as balls, and what is left of them once the rows linear in X, and in Y, are solved.
 
     Then X = P x and Y = conj(P) y, where x are some entries of X; they are measured so that c x = 1, conj(c) y = 1.
     """

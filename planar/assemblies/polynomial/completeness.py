@@ -1,4 +1,4 @@
-"""What is told of all assemblies of one group of links, and how surely there is no other."""
+"""What is told of all assemblies of one block of links, and how surely there is no other."""
 
 from __future__ import annotations
 
@@ -19,14 +19,13 @@ class Completeness(Enum):
 
 
 class BlockRoots(NamedTuple):
-    """All assemblies of one group of links, those before it given.
+    """All assemblies of one block of links, those before it given.
 
-    `real`: (roots, unknowns) as in z[stage.unknowns] (rad, sizes), sorted, angles between -pi and pi or, if
-    they count turns, the least; `double`:
-    (roots,) where two meet, at a dead point; `certified`: (roots,) whether a box of its own is proved to hold each;
-    `expected`: complex solutions at finite places that the structure has, None where no number is known; `found`: those
-    that were found, as often as they count; `curve`: whether a whole curve of assemblies is there, or several, of each
-    of which `real` has one place at least; `said`: how it was solved.
+    `real`: (roots, unknowns) as in z[stage.unknowns] (rad, sizes), sorted, angles between -pi and pi or, if they count
+    turns, the least; `double`: (roots,) where two meet, at a dead point; `certified`: (roots,) whether a box of its own
+    is proved to hold each; `expected`: complex solutions at finite places that the structure has, None where no number
+    is known; `found`: those that were found, as often as they count; `curve`: whether a whole curve of assemblies is
+    there, or several, of each of which `real` has one place at least; `said`: how it was solved.
     """
 
     real: Array

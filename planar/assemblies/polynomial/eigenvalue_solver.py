@@ -1,10 +1,10 @@
-"""All solutions of a group's polynomials at once, as eigenvalues.
+"""All solutions of a block's polynomials at once, as eigenvalues.
 
 In x alone, Y eliminated, they are where a matrix M(x) of 2d rows and d + 1 columns, linear in x, has a column too many:
 its largest minors, of degree d + 1, vanish. Where Bezout's number C(2d, d) of solutions is reached, the minors leave
 just so many values of the monomials of degree d + 1 open, and multiplying those of degree d by a linear form is an
 eigenvalue problem of that size (D. Cox, J. Little, D. O'Shea, Using Algebraic Geometry, 2005, ch. 3; the matrix is
-that of the Dixon determinant in Wampler's paper, see `isotropic`).
+that of the Dixon determinant in Wampler's paper, see `isotropic_form`).
 """
 
 from __future__ import annotations

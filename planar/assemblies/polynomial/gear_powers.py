@@ -2,7 +2,7 @@
 
 Where cosines and sines are of a[j] theta + c[j] with rational a[j], these span a lattice: with a basis of it as new
 angles phi, a[j] theta = n[j] phi for whole n[j], and with t = exp(i phi) a direction is exp(i c[j]) t^n[j]. The powers
-are entries of X and Y of their own (see `isotropic`), each the product or the quotient of two before it:
+are entries of X and Y of their own (see `isotropic_form`), each the product or the quotient of two before it:
 
     X[m] Y[b] = X[a] Y[0],  X[b] Y[m] = X[0] Y[a]     m = a b
     X[a] Y[b] = X[m] Y[0],  X[b] Y[a] = X[0] Y[m]     m = a / b
@@ -33,9 +33,9 @@ RATIONAL_TOLERANCE = 1e-12
 
 
 class AngleArguments(NamedTuple):
-    """What the cosines and sines in a group's rows are of: `symbols` stand for them in `rows`.
+    """What the cosines and sines in a block's rows are of: `symbols` stand for them in `rows`.
 
-    `rates`: how they change with the group's angles (arguments, angles); `relations`: what rows between angles alone
+    `rates`: how they change with the block's angles (arguments, angles); `relations`: what rows between angles alone
     are multiplied by (relations, angles), which hold at `start` (angles,); `still`: what the arguments are there.
     """
 
@@ -50,8 +50,8 @@ class AngleArguments(NamedTuple):
 class GearPowers(NamedTuple):
     """How directions are powers of those of new angles.
 
-    `places`: of every argument the place of its direction in X; `powers`: how many entries of X are directions, the
-    new angles' first; `products`: (equations, 4) as in `isotropic`; `back`: angles from new ones (angles, new angles);
+    `places`: of every argument the place of its direction in X; `powers`: how many entries of X are directions, the new
+    angles' first; `products`: (equations, 4) as in `isotropic_form`; `back`: angles from new ones (angles, new angles);
     `exact`: whether that is so of the ratios as the floats that they are.
     """
 
@@ -71,11 +71,11 @@ class GearPowers(NamedTuple):
 
 
 class _NonlinearArgument(Exception):
-    """A cosine of something that is not linear in a group's angles."""
+    """A cosine of something that is not linear in a block's angles."""
 
 
 def angle_arguments(e: ConstraintEquations, stage: Block, angles: Sequence[int], p: Array) -> AngleArguments | None:
-    """What a group's cosines and sines are of, for numbers p of the pairs; None where that is not linear in angles."""
+    """What a block's cosines and sines are of, for numbers p of the pairs; None where that is not linear in angles."""
     own, rng = e.z[stage.unknowns], np.random.default_rng(2)
     place = [rng.uniform(0.5, 2.0, symbol.numel()) for symbol in (e.z, e.u)]
     found: dict[tuple[float, ...], tuple[ca.SX, Array, ca.SX]] = {}

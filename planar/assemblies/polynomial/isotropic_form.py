@@ -1,19 +1,19 @@
-"""The equations of one group as polynomials in isotropic coordinates: e = exp(i angle) and its conjugate.
+"""The equations of one block as polynomials in isotropic coordinates: e = exp(i angle) and its conjugate.
 
 A pair of rows (x, y) that closes a loop is F = Fx + i Fy, linear in the e of its angles, and its conjugate linear in
 their 1/e (C. Wampler, Solving the kinematics of planar mechanisms by Dixon determinant and a complex-plane
 formulation, J. Mech. Des. 123, 2001). A length s along a direction that turns with e is S = s e, its conjugate s/e.
 
-With X = (1, e's, S's) and Y = (1, 1/e's, conjugates of the S's), both up to a factor, the group is
+With X = (1, e's, S's) and Y = (1, 1/e's, conjugates of the S's), both up to a factor, the block is
 
     A X = 0, B Y = 0                                  its paired rows
     (a X) Y0 + X0 (b Y) = 0                           rows that have no other half
     X[j] Y[j] = X0 Y0                                 an angle
     X[m] Y[j] = X[j] Y[m]   or   X[m] Y0 = X0 Y[m]    a length along a direction that turns with e[j], or is known
 
-and where gears tie angles, powers of e are entries too (see `gears`). Once A and B are solved, X and Y lie in
+and where gears tie angles, powers of e are entries too (see `gear_powers`). Once A and B are solved, X and Y lie in
 projective spaces of some dimension d each, and 2d equations of bidegree (1, 1) remain: by Bezout's theorem for two
-groups of unknowns C(2d, d) isolated solutions at most, counted as often as they stand for, those at infinity with the
+blocks of unknowns C(2d, d) isolated solutions at most, counted as often as they stand for, those at infinity with the
 others.
 """
 
@@ -41,7 +41,7 @@ RANDOM_POINTS = 4
 
 
 class BlockPolynomials(NamedTuple):
-    """One group with numbers filled in; see the module for the letters."""
+    """One block with numbers filled in; see the module for the letters."""
 
     A: Array
     B: Array
@@ -58,9 +58,9 @@ class BlockPolynomials(NamedTuple):
 
 
 class IsotropicForm(NamedTuple):
-    """How the group of one structure is written.
+    """How the block of one structure is written.
 
-    `angles`, `lengths`: the group's unknowns whose directions and which are X[1:] in this order; `turning`: for each
+    `angles`, `lengths`: the block's unknowns whose directions and which are X[1:] in this order; `turning`: for each
     length the place in X of the direction that it turns with, 0 for a direction that is known; `real`: what X is
     multiplied by in every real row, as a function of (z, u, p): twice its factors (rows, X) with half the constants;
     `combined`: the rows put together to loops (loops, rows); `single`: to rows of which the other half is missing
@@ -113,7 +113,7 @@ class IsotropicForm(NamedTuple):
         return np.array([*turned, *slid], dtype=int).reshape(-1, 4)
 
     def polynomials(self, z: Array, u: Array, p: Array) -> BlockPolynomials:
-        """The group where all before it stands at z, for inputs u and numbers p."""
+        """The block where all before it stands at z, for inputs u and numbers p."""
         real, imaginary = (each.T for each in self.factors_call(z, u, p))
         alpha = real + 1j * imaginary
         loops = self.combined @ alpha
@@ -122,7 +122,7 @@ class IsotropicForm(NamedTuple):
         return BlockPolynomials(loops, loops.conj(), self.single @ alpha, self.single @ alpha.conj())
 
     def nearest_real_unknowns(self, X: Array, Y: Array, given: Sequence[Array]) -> Array:
-        """The real unknowns of the group (solutions, unknowns) that lie nearest to solutions at finite places, at
+        """The real unknowns of the block (solutions, unknowns) that lie nearest to solutions at finite places, at
         (z, u, p)."""
         found = np.zeros((len(X), len(self.angles) + len(self.lengths)))
         X, Y = X / X[:, :1], Y / Y[:, :1]
@@ -145,7 +145,7 @@ class IsotropicForm(NamedTuple):
 
 
 def isotropic_form(e: ConstraintEquations, stage: Block, p: Array | None = None) -> IsotropicForm | None:
-    """How a group is written; None where its equations are no such polynomials, or leave it free.
+    """How a block is written; None where its equations are no such polynomials, or leave it free.
 
     Where angles count turns the numbers p of the pairs are needed: the form is that for their ratios.
     """
@@ -175,8 +175,8 @@ def isotropic_form(e: ConstraintEquations, stage: Block, p: Array | None = None)
 
 
 def constant_jacobian(e: ConstraintEquations, stage: Block) -> ca.Function | None:
-    """The slope (rows, unknowns) of a group in its own unknowns as a function of (z, u, p); None where it depends on
-    them: such a group is linear."""
+    """The slope (rows, unknowns) of a block in its own unknowns as a function of (z, u, p); None where it depends on
+    them: such a block is linear."""
     if stage.is_free or any(row.kind is MeasureKind.ANGLE for row in e.rows[stage.rows]):
         return None
     own, slope = e.z[stage.unknowns], ca.densify(ca.jacobian(e.F[stage.rows], e.z[stage.unknowns]))
@@ -186,7 +186,7 @@ def constant_jacobian(e: ConstraintEquations, stage: Block) -> ca.Function | Non
 
 
 class _RowFactors:
-    """The rows of a group taken apart: by what the cos and sin of angles, and lengths along directions, multiply."""
+    """The rows of a block taken apart: by what the cos and sin of angles, and lengths along directions, multiply."""
 
     def __init__(
         self,

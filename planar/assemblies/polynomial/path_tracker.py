@@ -1,4 +1,4 @@
-"""Solutions of a group's polynomials followed from those of others of its structure, all paths side by side.
+"""Solutions of a block's polynomials followed from those of others of its structure, all paths side by side.
 
 Predictor by Runge and Kutta's fourth order, corrector by Newton, in homogeneous coordinates, so that what goes to
 infinity is followed like the rest; each path takes steps of its own. A. P. Morgan, A. J. Sommese,

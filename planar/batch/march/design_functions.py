@@ -27,9 +27,9 @@ class DesignFunctions:
         return np.ascontiguousarray(self.program.coordinates(z, u, self.p).T)
 
     def jacobians(self, z: Array, u: Array, p: Array | None = None) -> tuple[Array, Array]:
-        """dF/dz (designs, rows, unknowns) and dF/du (designs, rows, inputs), as `Program.slopes`."""
+        """dF/dz (designs, rows, unknowns) and dF/du (designs, rows, inputs), as `EquationFunctions.jacobians`."""
         return self.program.jacobians(z, u, self.p)
 
     def kinematics(self, y: Array, y1: Array, y2: Array) -> EquationRates:
-        """As `Program.kinematics`, with an entry for each design."""
+        """As `EquationFunctions.kinematics`, with an entry for each design."""
         return self.program.kinematics(y, y1, y2, self.p)

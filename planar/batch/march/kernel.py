@@ -2,8 +2,7 @@
 
 The angles' cos and sin are carried, never the angles. A group in closed form is written as that; any other is solved by
 Newton's method, whose step turns an angle by the first terms of its cos and sin; what is not quite of length one then
-is
-brought to it. So no sine stands in the loop, and few divisions.
+is brought to it. So no sine stands in the loop, and few divisions.
 """
 
 from __future__ import annotations
@@ -65,7 +64,8 @@ class KernelBlock(NamedTuple):
 
 
 class KernelEquations:
-    """A mechanism's equations with the groups' closed forms. Raises NotPrinted where a group holds itself twice."""
+    """A mechanism's equations with the groups' closed forms. Raises UnsupportedOperation where a group holds itself
+    twice."""
 
     def __init__(self, equations: ConstraintEquations, mechanism: Mechanism, given: Sequence[str] = ()):
         e = self.equations = equations
@@ -156,7 +156,7 @@ class KernelWriter:
         return leaf in self.carried
 
     def write_values(self, outputs: Sequence[ca.SX], names: Mapping[Operand, str]) -> list[str]:
-        """The values of expressions where numbers stand under these names. Raises Outside, NotPrinted."""
+        """The values of expressions where numbers stand under these names. Raises BareAngle, UnsupportedOperation."""
         function = ca.Function("part", list(self.symbols.values()), [ca.densify(ca.vertcat(*outputs))], {"cse": True})
         check_length(self.ir.count + function.n_instructions())
         listing = InstructionList()

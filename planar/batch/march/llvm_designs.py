@@ -51,12 +51,12 @@ def write_designs_kernel(
     lanes: int,
     point_blocks: tuple[int, ...] | None = None,
 ) -> DesignsKernelLayout:
-    """The function for points on these links, none of which is the frame. Raises NotPrinted.
+    """The function for points on these links, none of which is the frame. Raises UnsupportedOperation.
 
     A step gives x and y of every point, then with `rates` all first and all second rates. With `levels`, of the group
     that places each point, it gives more: x and y of every point in the other assembly of its group (infinite where
-    that is
-    not in closed form), the state, and how regular the least regular of the groups is that Newton's method solves.
+    that is not in closed form), the state, and how regular the least regular of the groups is that Newton's method
+    solves.
     """
     carried: frozenset[Operand] = frozenset()
     while True:

@@ -154,7 +154,8 @@ class _PositionsKernelWriter(PointKernelWriter):
 
 @lru_cache(maxsize=256)
 def write_positions_kernel(structure: KernelEquations, links: tuple[str, ...], rates: bool) -> PositionsKernelLayout:
-    """The function of a structure for points on these links, none of which is the frame. Raises NotPrinted."""
+    """The function of a structure for points on these links, none of which is the frame. Raises
+    UnsupportedOperation."""
     try:
         return _PositionsKernelWriter(structure, links, rates).write()
     except BareAngle as angle:
@@ -164,7 +165,7 @@ def write_positions_kernel(structure: KernelEquations, links: tuple[str, ...], r
 class PositionsKernel:
     """A function ready to be called, always at the same positions u (positions, inputs) of the inputs, three at least.
 
-    Raises NotPrinted.
+    Raises UnsupportedOperation.
     """
 
     def __init__(self, structure: KernelEquations, links: tuple[str, ...], rates: bool, u: Array):

@@ -37,7 +37,7 @@ COARSE_STEPS = (COARSE_STEP, 0.12)
 
 @lru_cache(maxsize=256)
 def kernel_equations(program: EquationFunctions, mechanism: Mechanism) -> KernelEquations:
-    """A structure ready to be printed. Raises NotPrinted."""
+    """A structure ready to be printed. Raises UnsupportedOperation."""
     return KernelEquations(program.equations, mechanism)
 
 
@@ -48,7 +48,7 @@ def designs_kernel(
     rates: bool,
     point_blocks: tuple[int, ...] | None = None,
 ) -> DesignsKernelLayout:
-    """The function for points on links of a structure, see `march`. Raises NotPrinted."""
+    """The function for points on links of a structure, see `march`. Raises UnsupportedOperation."""
     found = _designs_kernel_or_reason(program, mechanism, links, rates, point_blocks)
     if isinstance(found, str):
         raise UnsupportedOperation(found)

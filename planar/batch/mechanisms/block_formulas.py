@@ -100,7 +100,7 @@ class FormulaBuilder:
         return SymbolicAssembly(z, turned, bends)
 
     def newton_formula(self, rates: bool | None) -> BlockFormula:
-        """One of the formulas of `Near`: None for the step, else what is told."""
+        """One of the formulas of `NewtonFormulas`: None for the step, else what is told."""
         e, kind = self.equations, self.block_equations
         z, turned = [], {}
         for k, is_angle in enumerate(kind.unknown_is_angle):
@@ -221,7 +221,7 @@ class FormulaBuilder:
         return [values[3 * k : 3 * k + 3] + values[many + 3 * k : many + 3 * k + 3] for k in range(many // 3)]
 
     def sketch_distance(self, poses: list[list[int]], sketch_sums: list[list[int]]) -> int:
-        """The squared distance of the links' points to the sketch, from the sums of these: see `statistics`."""
+        """The squared distance of the links' points to the sketch, from the sums of its points, see `BlockType`."""
         add = self.instructions.add
         whole = self.instructions.add_constant(0.0)
         for (x, y, c, s), (many, px, py, tx, ty, along, across, squares) in zip(poses, sketch_sums, strict=True):
@@ -235,7 +235,8 @@ class FormulaBuilder:
         return whole
 
     def make_formula(self, wanted: list[int]) -> BlockFormula:
-        """The formula of wanted values. Raises NotPrinted where an angle stands outside cos and sin, or it is long."""
+        """The formula of wanted values. Raises UnsupportedOperation where an angle stands outside cos and sin, or it is
+        long."""
         made, numbers = expand_angle_sums(self.instructions, wanted, self.cos_sin)
         leaves: dict[int, FormulaInput] = {}
         order = required_values(made, numbers)

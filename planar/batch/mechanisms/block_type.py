@@ -10,7 +10,8 @@ import casadi as ca
 from planar.equations.closed_form import ClosedForm, find_closed_form
 from planar.equations.constraint_equations import Block, ConstraintEquations, build_equations, slice_length
 from planar.equations.linear import solve_by_determinants
-from planar.model.mechanism import Input, Link, Mechanism
+from planar.model.link_shapes import Link
+from planar.model.mechanism import Input, Mechanism
 from planar.model.pairs import MeasureKind as Measure
 from planar.model.pairs import Pair
 
@@ -66,7 +67,7 @@ class BlockEquations:
 
     What it takes, in slots: the given links, the inputs, then the inner links. In numbers: p of the pairs, the cosine
     and sine of those that are angles, then a sign for each group that can be assembled in two ways; where it starts,
-    in their place the sums of the points in the sketch, see `statistics`.
+    in their place the sums of the points in the sketch, see `_sketch_sums` of the initial assembly.
     """
 
     def __init__(self, signature: BlockSignature, samples: Sequence[Pair]):

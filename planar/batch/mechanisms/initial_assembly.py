@@ -99,9 +99,10 @@ def _correct_from_sketch(
     runner: BlockRunner,
 ) -> tuple[Array, Array, Array]:
     """Groups that are not in closed form, solved from where they are shown, the points of the sketch and what is shown
-    in `stats`: unknowns there, squared distances to the sketch, and for which of them no other assembly can be meant.
+    in `sketch_sums`: unknowns there, squared distances to the sketch, and for which of them no other assembly can be
+    meant.
 
-    Their points lie at the sketch, and the slope is so regular that no other assembly is near: see `Candidates`.
+    Their points lie at the sketch, and the slope is so regular that no other assembly is near: see `BlockAssemblies`.
     """
     sketch, seen = sketch_sums
     kind, groups = batch.block_type, len(batch.owner)

@@ -127,7 +127,7 @@ class LinkageArrays:
 class PartitionedLinkage(NamedTuple):
     """A parted linkage with what runs it: of every input position (rad or sizes), whether it is an angle, whether it
     runs, velocity and acceleration; points of the sketch, points that are wanted, and points that are
-    shown, each with its place first: see `Lot`."""
+    shown, each with its place first: see `LinkageArrays`."""
 
     partition: Partition
     inputs: list[tuple[float, bool, bool, float, float]]

@@ -47,7 +47,7 @@ class PartitionBlock(NamedTuple):
 class Partition(NamedTuple):
     """A mechanism as data, its lengths in units of `unit` (m).
 
-    Places: 0 is the frame, then every input, then the links as they are solved; `place_of` tells those of the links.
+    Places: 0 is the frame, then every input, then the links as they are solved; `link_index` tells those of the links.
     """
 
     mechanism: Mechanism
@@ -114,7 +114,8 @@ def quick_link_shape(link: Link) -> LinkShape:
 
 
 def partition_mechanism(mechanism: Mechanism) -> Partition:
-    """The groups of a mechanism. Raises Unparted where it needs the whole, BadInput and Unplaced where it is none."""
+    """The groups of a mechanism. Raises NotPartitionable where it needs the whole, BadInput and PointPlacementError
+    where it is none."""
     try:
         return _Partitioner(mechanism).partition()
     except (KeyError, AttributeError):
@@ -163,7 +164,7 @@ class _Partitioner:
         self.index_count = 1 + len(mechanism.inputs)
 
     def partition(self) -> Partition:
-        """See `parted`."""
+        """See `partition_mechanism`."""
         self._add_links_and_dyads()
         if len(self.blocks) == 0 or -1 in self.link_index:
             self._add_remaining_blocks()

@@ -64,7 +64,8 @@ class BlockType(BlockEquations):
 
     @property
     def newton_formulas(self) -> NewtonFormulas:
-        """The formulas by which Newton's method follows a kind that is not in closed form. Raises NotPrinted."""
+        """The formulas by which Newton's method follows a kind that is not in closed form. Raises
+        UnsupportedOperation."""
         if self._newton_formulas is None:
             self._newton_formulas = NewtonFormulas(
                 *(FormulaBuilder(self).newton_formula(what) for what in (None, False, True))

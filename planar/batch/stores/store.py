@@ -149,7 +149,7 @@ def open_store(store: str | Path | None, plan: SweepPlan) -> BlockStore:
 
 @contextmanager
 def reporting_write_errors(path: Path) -> Iterator[None]:
-    """What the system refuses of a store is one sentence: BadInput, or NotWritten where there is no room."""
+    """What the system refuses of a store is one sentence: BadInput, or WriteFailure where there is no room."""
     try:
         yield
     except OSError as problem:

@@ -14,6 +14,7 @@ from planar.analysis.centres.centres import Centre, Centres
 from planar.analysis.centres.centres import CentreLine as Known
 from planar.analysis.centres.pair_centres import primary_centres
 from planar.analysis.rate_equations import rate_equations
+from planar.drawing.centres.choice import CROWDED_CENTRES
 from planar.drawing.centres.circle_diagram import circle_radius
 from planar.drawing.paper.boxes import Box
 from planar.drawing.paper.lines_on_paper import (
@@ -36,15 +37,14 @@ from planar.drawing.paper.picture import (
     paper_point,
 )
 from planar.drawing.paper.scales import Scale, round_scale
-from planar.drawing.scheme.scheme import plain_frames, scheme, space_scale
+from planar.drawing.scheme.scene import plain_frames
+from planar.drawing.scheme.scheme import scheme, space_scale
 from planar.drawing.scheme.symbol_table import PIN_RADIUS
 from planar.foundation.errors import BadInput
 from planar.foundation.units import parse_unit
 from planar.model.mechanism import relative_motions
 
 Array = np.ndarray
-MAX_CENTRES, CROWDED_CENTRES = 28, 15
-"""Of more centres than that only some are drawn; with more than the second the points' names are left out."""
 DEFAULT_REACH = 2.0
 """Of the mechanism's greater extent: how wide and high the window is in which centres are drawn."""
 DRAWING_SIZE = 211.0, 125.0
@@ -66,27 +66,6 @@ METHOD_WORDS = {
     "ratio": "by ratios of wheels",
     "equations": "by loop equations",
 }
-
-
-def choose_centres(found: Centres, links: str | Sequence[str] | None = None) -> tuple[Centre, ...]:
-    """The centres to be drawn, in the order in which they were found.
-
-    Of one link: all its centres; of several: those between any two of them; always with the centres on whose lines
-    they were found. Without `links` all of them, or of more than MANY those that pairs show and those against the
-    frame. Raises BadInput for a link that there is not.
-    """
-    if links:
-        links = [links] if isinstance(links, str) else links
-        wanted = set(links)
-        for link in links:
-            if link not in found.numbers:
-                raise BadInput(link, f"there is no link of this name; links are {', '.join(found.numbers)}")
-        picked = [each for each in found if wanted & {*each.links} == (wanted if len(wanted) == 1 else {*each.links})]
-        names = {name for each in picked for name in (each.name, *(n for line in each.lines for n in line.centres))}
-        return tuple(each for each in found if each.name in names)
-    frame = found.state.mechanism.frame
-    few = len(found) <= MAX_CENTRES
-    return tuple(each for each in found if few or each.how == "pair" or frame in each.links)
 
 
 def centres_picture(

@@ -14,7 +14,8 @@ from planar.drawing.diagrams.drawn_run import DrawnRun, closed_run, steady_run
 from planar.drawing.paper.clipping import clip_homogeneous_curve, remove_repeated_strokes
 from planar.drawing.paper.picture import Circle, Fill, Label, Pen, Picture, Polyline, extent, paper_point
 from planar.drawing.paper.scales import Scale, round_scale
-from planar.drawing.scheme.scheme import plain_frames, scheme, space_scale
+from planar.drawing.scheme.scene import plain_frames
+from planar.drawing.scheme.scheme import scheme, space_scale
 from planar.foundation.errors import BadInput, NoAnswer, Unknown
 from planar.foundation.geometry import Vector
 from planar.model.link_graph import link_numbers, number_separator

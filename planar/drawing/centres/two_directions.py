@@ -23,7 +23,8 @@ from planar.drawing.paper.picture import (
     paper_point,
 )
 from planar.drawing.paper.scales import Scale
-from planar.drawing.scheme.scheme import plain_frames, scheme, space_scale
+from planar.drawing.scheme.scene import plain_frames
+from planar.drawing.scheme.scheme import scheme, space_scale
 from planar.foundation.errors import BadInput
 from planar.foundation.units import length_unit_of_rates, unit_of_kind
 from planar.model.mechanism import named_points

@@ -153,6 +153,16 @@ def _draw_panel(
     axes: Axes, sheet: PanelLayout, chart: CircuitChart, others: Sequence[CircuitChart], with_ordinate: bool
 ) -> None:
     """One circuit with its axes, the other circuits in grey behind it."""
+    _draw_axes(axes, sheet, with_ordinate)
+    _draw_gaps(axes, sheet)
+    _draw_branch_curves(axes, sheet, chart, others)
+    label_numbers(axes, sheet, chart)
+    label_dead_points(axes, sheet, chart)
+    _write_panel_title(axes, sheet, chart)
+
+
+def _draw_axes(axes: Axes, sheet: PanelLayout, with_ordinate: bool) -> None:
+    """The axes over the window, with ticks, a grid and names; the upright one is named and numbered if wanted."""
     across, up = parse_unit(sheet.input_unit), parse_unit(sheet.output_unit)
     axes.set_xlim(across.from_si(sheet.window.low), across.from_si(sheet.window.high))
     axes.set_ylim(up.from_si(sheet.output_low), up.from_si(sheet.output_high))
@@ -179,7 +189,11 @@ def _draw_panel(
         axes.set_ylabel(
             f"{y_name} ({sheet.output_unit})", fontsize=NORMAL_TEXT, labelpad=2.0, **text_settings("output", y_name)
         )
-    _draw_gaps(axes, sheet)
+
+
+def _draw_branch_curves(axes: Axes, sheet: PanelLayout, chart: CircuitChart, others: Sequence[CircuitChart]) -> None:
+    """The branches of a circuit, each in its own line, those of the others in grey, and where the file's input is."""
+    across, up = parse_unit(sheet.input_unit), parse_unit(sheet.output_unit)
     axes.axvline(across.from_si(sheet.window.input_position), zorder=2, gid="file", **INPUT_LINE)
     for other in others:
         for strand in other.branch_curves:
@@ -197,8 +211,10 @@ def _draw_panel(
             zorder=4,
             gid=f"branch {strand.branch}",
         )
-    label_numbers(axes, sheet, chart)
-    label_dead_points(axes, sheet, chart)
+
+
+def _write_panel_title(axes: Axes, sheet: PanelLayout, chart: CircuitChart) -> None:
+    """Which circuits the panel is of."""
     numbers = [each.number for each in (chart.circuit, *chart.equal_circuits)]
     named = f"Circuit{'s' * (len(numbers) > 1)} {number_ranges(numbers)}"
     title = clip_text(

@@ -54,7 +54,7 @@ def fit_axis(
     end_at_ticks: bool = True,
     degrees: bool = False,
 ) -> Axis:
-    """An axis for values with ticks at least so far apart (mm), from tick to tick where it is `tidy`."""
+    """An axis for values with ticks at least so far apart (mm), from tick to tick where it is `end_at_ticks`."""
     told = values[np.isfinite(values)]
     low, high = float(told.min(initial=np.inf)), float(told.max(initial=-np.inf))
     if not low <= high:

@@ -199,7 +199,7 @@ def steady_run(
 
 
 def closed_run(run: DrawnRun) -> DrawnRun:
-    """The same run over so many turns that it closes, at most `MOST_TURNS`; one turn where it does not, or makes none.
+    """The same run over so many turns that it closes, at most `MAX_TURNS`; one turn where it does not, or makes none.
 
     Gears may bring a mechanism back only after several turns of its input.
     """

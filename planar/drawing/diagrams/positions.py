@@ -13,8 +13,10 @@ from planar.drawing.diagrams.drawn_run import DrawnRun, closed_run, steady_run
 from planar.drawing.labels.text_line import LETTER_PATTERN
 from planar.drawing.paper.picture import Circle, Fill, Label, Mark, Pen, Picture, Polyline, paper_point
 from planar.drawing.paper.scales import DRAWING_HEIGHT, DRAWING_WIDTH, Scale, round_scale
+from planar.drawing.scheme.ground import ground_marks
 from planar.drawing.scheme.link_bodies import link_bodies
-from planar.drawing.scheme.scheme import body_marks, ground_marks, scheme
+from planar.drawing.scheme.link_strokes import body_marks
+from planar.drawing.scheme.scheme import scheme
 from planar.foundation.errors import BadInput
 from planar.model.mechanism import Drive, Mechanism, NamedPoint, named_points, relative_motions, replace_inputs
 from planar.model.pairs import MeasureKind

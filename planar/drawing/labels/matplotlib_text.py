@@ -74,6 +74,7 @@ class TextLineArtist(Text):
         return Bbox.from_extents(*(shift * each for each in box))
 
 
+# many: how it looks, as for matplotlib's own texts
 def draw_text(
     on: Figure | Axes,
     text: str,

@@ -19,8 +19,9 @@ from planar.drawing.labels.fonts import font_families, printable_text
 from planar.drawing.paper.pens import FILL_COLOURS, PEN_STYLES, require_matplotlib
 from planar.drawing.paper.picture import Circle, Fill, Mark, PaperPoint, Pen, Polyline, extent
 from planar.drawing.paper.scales import Scale
+from planar.drawing.scheme.ground import ground_marks
 from planar.drawing.scheme.link_bodies import link_bodies
-from planar.drawing.scheme.scheme import body_marks, ground_marks
+from planar.drawing.scheme.link_strokes import body_marks
 from planar.foundation.errors import BadInput, unknown_format_error
 from planar.model.mechanism import Mechanism
 from planar.model.wording import amount

@@ -37,7 +37,8 @@ from planar.drawing.paper.pens import require_matplotlib
 from planar.drawing.paper.picture import Label, Picture, extent
 from planar.drawing.paper.scales import Scale, round_scale
 from planar.drawing.polygons.polygon import polygon_picture
-from planar.drawing.scheme.scheme import plain_frames, scheme, space_scale
+from planar.drawing.scheme.scene import plain_frames
+from planar.drawing.scheme.scheme import scheme, space_scale
 from planar.dynamics.load_attachment import attachment_remarks
 from planar.foundation.errors import BadInput
 from planar.foundation.units import display_unit, parse_unit, unit_of_kind
@@ -256,6 +257,19 @@ def _section_strips(section: Section, half: WorkedPolygon, scales: Mapping[str, 
 
 
 def _result_strips(solution: WorkedSolution) -> Iterator[Strip]:
+    """What was found: links, points, slides, and rubbing speeds at the pins."""
+    yield from _link_strips(solution)
+    yield from _point_strips(solution)
+    yield from _slide_strips(solution)
+    if solution.rubbing:
+        yield from paragraph(
+            ("Rubbing speeds at the pins",), TextStyle(10.0, heavy=True), space_before=4.0, keep_with_next=True
+        )
+    for phrase in solution.rubbing:
+        yield from paragraph(phrase, indent=4.0)
+
+
+def _link_strips(solution: WorkedSolution) -> Iterator[Strip]:
     if solution.links:
         heads = [
             PageColumn("Link"),
@@ -275,6 +289,9 @@ def _result_strips(solution: WorkedSolution) -> Iterator[Strip]:
             for link in solution.links
         ]
         yield from table_strips(heads, cells, title="Links")
+
+
+def _point_strips(solution: WorkedSolution) -> Iterator[Strip]:
     (v, velocity), (a, acceleration) = (
         display_unit(kind, solution.state.mechanism.units) for kind in ("velocity", "acceleration")
     )
@@ -285,7 +302,7 @@ def _result_strips(solution: WorkedSolution) -> Iterator[Strip]:
         PageColumn(f"a ({a})", True),
         PageColumn(""),
     ]
-    cells = [
+    cells: list[Sequence[Phrase]] = [
         (
             (Name(point.point),),
             (format_number(velocity.from_si(point.velocity)),),
@@ -296,10 +313,16 @@ def _result_strips(solution: WorkedSolution) -> Iterator[Strip]:
         for point in solution.points
     ]
     yield from table_strips(heads, cells, title="Points", space_before=4.0)
+
+
+def _slide_strips(solution: WorkedSolution) -> Iterator[Strip]:
     if solution.slides:
+        (v, velocity), (a, acceleration) = (
+            display_unit(kind, solution.state.mechanism.units) for kind in ("velocity", "acceleration")
+        )
         length = solution.state.mechanism.units.length
         names = ("Pair", f"s ({length})", f"v ({v})", f"a ({a})")
-        cells = [
+        cells: list[Sequence[Phrase]] = [
             (
                 (slide.pair,),
                 (f"{parse_unit(length).from_si(slide.displacement):.6g}".replace("-", "−"),),
@@ -310,12 +333,6 @@ def _result_strips(solution: WorkedSolution) -> Iterator[Strip]:
         ]
         heads = [PageColumn(name, index > 0) for index, name in enumerate(names)]
         yield from table_strips(heads, cells, title="Slides, along their lines", space_before=4.0)
-    if solution.rubbing:
-        yield from paragraph(
-            ("Rubbing speeds at the pins",), TextStyle(10.0, heavy=True), space_before=4.0, keep_with_next=True
-        )
-    for phrase in solution.rubbing:
-        yield from paragraph(phrase, indent=4.0)
 
 
 def _comparison_strips(solution: WorkedSolution) -> Iterator[Strip]:

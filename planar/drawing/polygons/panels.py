@@ -10,8 +10,9 @@ from planar.analysis.polygons.construction import acceleration_polygon, velocity
 from planar.drawing.paper import scales as paper
 from planar.drawing.paper.picture import Picture, extent
 from planar.drawing.polygons.polygon import polygon_picture
-from planar.drawing.scheme.scheme import plain_frames, space_scale
+from planar.drawing.scheme.scene import plain_frames
 from planar.drawing.scheme.scheme import scheme as scheme_picture
+from planar.drawing.scheme.scheme import space_scale
 from planar.foundation.units import unit_of_kind
 from planar.results.motion import State
 

@@ -11,7 +11,8 @@ from planar.drawing.paper.picture import Label, Mark, PaperPoint, Pen, Picture, 
 from planar.drawing.paper.scales import Scale, round_scale
 from planar.drawing.scheme import symbol_table
 from planar.drawing.scheme.link_bodies import all_marks
-from planar.drawing.scheme.scheme import CROWDED_PIN_DISTANCE, plain_frames, scheme, scheme_scale
+from planar.drawing.scheme.scene import plain_frames
+from planar.drawing.scheme.scheme import CROWDED_PIN_DISTANCE, scheme, scheme_scale
 from planar.foundation.geometry import Vector
 from planar.model.mechanism import named_points
 from planar.model.pairs.symbols import PinMark, SliderMark

@@ -54,7 +54,7 @@ class Pair(ABC):
     acts_at_distance: ClassVar[bool] = False
     """Whether something runs between the two links, which do not touch themselves."""
     open_contact_hint: ClassVar[str] = ""
-    """What to know of a contact that is open, see `apart`."""
+    """What to know of a contact that is open, see `contact_gap`."""
     counts_turns: ClassVar[bool] = False
     """Whether the angles of its bodies count whole turns."""
     residual_kinds: ClassVar[tuple[MeasureKind, ...]]
@@ -68,7 +68,7 @@ class Pair(ABC):
     input_kind: ClassVar[MeasureKind]
     """Whether its input is an angle or a length."""
     ties_angles: ClassVar[bool] = False
-    """Whether it ties angles alone: what holds it are couples, whatever forces they come from (see `contact`)."""
+    """Whether it ties angles alone: what holds it are couples, whatever forces they come from (see `tooth_contact`)."""
 
     @property
     def bodies(self) -> tuple[str, ...]:

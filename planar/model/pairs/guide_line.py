@@ -32,7 +32,7 @@ LINE_SCHEMA: Schema = {
 }
 """What JSON Schema says of a line."""
 LINE_NUMBER_KINDS = (MeasureKind.LENGTH, MeasureKind.LENGTH, MeasureKind.PURE, MeasureKind.PURE)
-"""What `Line.measure` gives: a point of the line, and the line's direction."""
+"""What `measure_line` gives: a point of the line, and the line's direction."""
 
 
 class LinkLine(NamedTuple):

@@ -15,7 +15,8 @@ from planar.analysis.motion.harmonics import Harmonics
 from planar.foundation.units import length_unit_of_rates, parse_unit
 from planar.model.mechanism import FileUnits, Mechanism
 from planar.model.wording import amount, count_phrase
-from planar.reports.tables_of_numbers import paragraphs, plain_table
+from planar.reports.fitted_table import plain_table
+from planar.reports.number_format import paragraphs
 from planar.results.motion import Array
 
 NEGLIGIBLE_RATIO, DIGITS = 1e-5, 6

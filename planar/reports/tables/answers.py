@@ -15,8 +15,9 @@ from planar.analysis.motion.output import Axis, Extreme
 from planar.foundation.units import length_unit_of_rates, parse_unit
 from planar.model.mechanism import FileUnits
 from planar.model.wording import amount
-from planar.reports.tables.mechanical_advantage import ADVANTAGE_UNITS
-from planar.reports.tables_of_numbers import DIGITS, plain_table
+from planar.reports.fitted_table import plain_table
+from planar.reports.number_format import DIGITS
+from planar.reports.tables.forces.mechanical_advantage import ADVANTAGE_UNITS
 from planar.results.motion import Motion
 
 AnswerRow = tuple[str, str, str, str]

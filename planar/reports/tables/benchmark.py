@@ -8,9 +8,8 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planar.bench.benchmark import CYCLE_STEPS, SWEEP_STEPS, Speed
-from planar.reports.tables_of_numbers import paragraphs, plain_table
-
-CALLS = ("solve, new position", "cycle, a position")
+from planar.reports.fitted_table import plain_table
+from planar.reports.number_format import paragraphs
 
 
 def table(measured: Iterable[Speed]) -> RenderableType:

@@ -14,8 +14,8 @@ from planar.foundation.units import parse_unit
 from planar.model.link_graph import link_label
 from planar.model.mechanism import relative_motions
 from planar.model.wording import amount, count_phrase, join_all_names
-from planar.reports.fitted_table import FittedTable
-from planar.reports.tables_of_numbers import DIGITS, SIZE_PHRASE, paragraphs, plain_table, precision_text
+from planar.reports.fitted_table import FittedTable, plain_table
+from planar.reports.number_format import DIGITS, SIZE_PHRASE, paragraphs, precision_text
 from planar.results.motion import State
 
 ZERO_RATIO = 1e-12

@@ -10,14 +10,15 @@ from rich.console import RenderableType
 from rich.text import Text
 
 from planar.assemblies.circuits.circuit_of_assembly import MAX_LOCATED, LocatedAssembly, locate_assemblies
-from planar.assemblies.circuits.circuits import Branch, Circuit, Circuits
+from planar.assemblies.circuits.circuits import Circuit, Circuits
+from planar.assemblies.circuits.traced_circuit import Branch
 from planar.assemblies.modes import Modes
 from planar.foundation.errors import Outcome
 from planar.foundation.units import parse_unit
 from planar.model.mechanism import relative_motions
 from planar.model.wording import amount, count_phrase, join_all_names
-from planar.reports.fitted_table import FittedTable
-from planar.reports.tables_of_numbers import format_number, paragraphs, plain_table
+from planar.reports.fitted_table import FittedTable, plain_table
+from planar.reports.number_format import format_number, paragraphs
 
 
 def table(circuits: Circuits, modes: Modes) -> RenderableType:

@@ -13,7 +13,8 @@ from planar.assemblies.conflict import Conflict
 from planar.assemblies.polynomial.completeness import Completeness
 from planar.model.mechanism import relative_motions
 from planar.model.wording import amount, join_all_names
-from planar.reports.tables_of_numbers import paragraphs, plain_table
+from planar.reports.fitted_table import plain_table
+from planar.reports.number_format import paragraphs
 from planar.solving.diagnosis.remedy import RemedyChange
 
 

@@ -1,15 +1,16 @@
-"""What a mechanism is, as text for a terminal."""
+"""What a mechanism is, and which models there are, as text for a terminal."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planar.analysis.identity.inspection import Inspection
 from planar.model.wording import count_phrase, join_all_names
-from planar.reports.tables_of_numbers import paragraphs, plain_table
+from planar.reports.fitted_table import plain_table
+from planar.reports.number_format import paragraphs
 
 
 def inspection_tables(found: Inspection) -> RenderableType:
@@ -72,3 +73,11 @@ def link_orders_text(found: Inspection) -> str:
     for link in found.links.values():
         counts[link.order] = counts.get(link.order, 0) + 1
     return join_all_names([f"{count} {order}" for order, count in counts.items()])
+
+
+def models_table(rows: Iterable[tuple[str, str, str]]) -> RenderableType:
+    """The models that come along: name, other ids, what each is."""
+    table = plain_table(None, "model", "also", "what it is", left=(0, 1, 2))
+    for row in rows:
+        table.add_row(*row)
+    return table

@@ -16,8 +16,8 @@ from planar.foundation.errors import BadInput, Outcome
 from planar.foundation.units import parse_unit
 from planar.model.mechanism import relative_motions
 from planar.model.wording import amount, count_phrase, join_all_names
-from planar.reports.fitted_table import FittedTable
-from planar.reports.tables_of_numbers import DIGITS, paragraphs, plain_table
+from planar.reports.fitted_table import FittedTable, plain_table
+from planar.reports.number_format import DIGITS, paragraphs
 
 MAX_POINT_COLUMNS = 4
 """Points whose places are printed unless they are named."""

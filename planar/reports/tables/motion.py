@@ -10,14 +10,13 @@ from rich.text import Text
 
 from planar.foundation.units import display_unit, parse_unit
 from planar.model.wording import amount, count_phrase, join_all_names
-from planar.reports.fitted_table import FittedTable
-from planar.reports.tables_of_numbers import (
+from planar.reports.fitted_table import FittedTable, plain_table
+from planar.reports.number_format import (
     SIZE_PHRASE,
     column_heading,
     format_number,
     format_or_zero,
     paragraphs,
-    plain_table,
     precision_text,
 )
 from planar.results.motion import Motion

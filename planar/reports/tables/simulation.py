@@ -11,9 +11,9 @@ from rich.console import Group, RenderableType
 from planar.dynamics.simulation import Simulation
 from planar.foundation.units import display_unit, parse_unit
 from planar.reports.columns import ReportedSeries
-from planar.reports.fitted_table import FittedTable
+from planar.reports.fitted_table import FittedTable, plain_table
+from planar.reports.number_format import format_number, format_or_zero, paragraphs
 from planar.reports.tables.motion import motion_tables
-from planar.reports.tables_of_numbers import format_number, format_or_zero, paragraphs, plain_table
 
 ENERGIES = ("kinetic", "potential", "work")
 

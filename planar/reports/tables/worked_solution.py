@@ -14,7 +14,9 @@ from planar.analysis.worked.sections import Section
 from planar.analysis.worked.solution import LinkResult, PointResult, SlideResult, WorkedPolygon, WorkedSolution
 from planar.dynamics.load_attachment import attachment_remarks
 from planar.foundation.units import Unit, display_unit, parse_unit
-from planar.reports.tables_of_numbers import column_heading, paragraphs, plain_table, published_table
+from planar.reports.fitted_table import plain_table
+from planar.reports.number_format import column_heading, paragraphs
+from planar.reports.tables.position import published_table
 
 Scales = Mapping[str, PaperScale]
 

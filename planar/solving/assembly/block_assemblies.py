@@ -86,7 +86,7 @@ class BlockAssemblies:
 
         Where one lies clearly at the sketch others are looked for only if `every` one is wanted.
 
-        With all unknowns at the end of the best start, whether it closes the group or not.
+        The second is all unknowns at the end of the best start, whether it closes the block or not.
         """
         both = self._closed_form(stage, z)
         if both is not None:

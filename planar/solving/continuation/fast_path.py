@@ -17,7 +17,7 @@ Array = np.ndarray
 
 MIN_FAST_REGULARITY = 1e-3
 """Strength of a group from which on its rates are taken as they come; what is weaker is looked at in doubles' whole
-precision, see `freedom.SINGULAR`."""
+precision, see `regularity.SINGULAR_TOLERANCE`."""
 MIN_SINGULAR_VALUE = 0.05
 """Least singular value (columns of one size) at both ends of a stride: no change point is near, not even of a
 neighbouring linkage."""

@@ -142,7 +142,7 @@ class PathFollower:
 
 
 def follow_to(solver: PathSolver, p: Array, z: Array, start: Array, stop: Array) -> Array:
-    """The unknowns at inputs `stop`; see `followed`."""
+    """The unknowns at inputs `stop`; see `follow_straight`."""
     return follow_straight(solver, p, z, start, stop).z[-1]
 
 

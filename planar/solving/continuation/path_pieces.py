@@ -18,7 +18,7 @@ Array = np.ndarray
 MAX_CORRECTION_RATIO = 0.1
 """A correction longer than this part of an arc has gone astray."""
 END_TOLERANCE = 1e-9
-"""rad or sizes: so near to the end of a way a change point is at that end."""
+"""rad or sizes: so near to the end of a path a dead point, a change point or the end of a piece is at that end."""
 
 
 class BranchRates(NamedTuple):

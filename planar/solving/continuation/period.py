@@ -44,7 +44,8 @@ class Period(NamedTuple):
         return float(self.growth[-1])
 
     def unknowns_at(self, curve: SolutionCurve, position: float) -> tuple[Array, BranchRates | None]:
-        """The unknowns where the inputs are at a place beyond the start, with rates as `Piece.at` has them."""
+        """The unknowns where the inputs are at a place beyond the start, with rates as `PathPiece.unknowns_at` has
+        them."""
         times = float(np.floor(position / self.length))
         within = position - times * self.length
         index = min(bisect_left([piece.stop for piece in self.pieces], within), len(self.pieces) - 1)

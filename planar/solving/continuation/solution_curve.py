@@ -201,8 +201,8 @@ def _solve_regular(system: Array, known: Array) -> Array | None:
 class Arc(NamedTuple):
     """The curve from one point to the next: a polynomial in how far one is along an axis.
 
-    Between two points it is near the curve and `Curve.corrected` carries it there. Beside a change point it is the
-    curve to round-off, and nothing can correct it: there the slope is singular. `lost` is how much rank it lacks at
+    Between two points it is near the curve and `SolutionCurve.correct` carries it there. Beside a change point it is
+    the curve to round-off, and nothing can correct it: there the slope is singular. `lost` is how much rank it lacks at
     that change point, and 0 where there is none.
     """
 

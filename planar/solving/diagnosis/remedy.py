@@ -64,7 +64,7 @@ class BlockBudget:
         self.blocks_left = groups
 
     def spend(self, groups: float) -> None:
-        """Count groups. Raises Spent where there are none left."""
+        """Count groups. Raises BlockBudgetSpent where there are none left."""
         self.blocks_left -= groups
         if self.blocks_left < 0.0:
             raise BlockBudgetSpent
@@ -140,8 +140,8 @@ def mending_dimensions(
     """Changes of one dimension of these links each that let the whole go together, the least first.
 
     Each is the least with which the assembly goes together that comes nearest without it; only a `thorough` search
-    looks whether another does with less, and tries all changes on the whole. Raises Spent where there is an end to the
-    `effort`.
+    looks whether another does with less, and tries all changes on the whole. Raises BlockBudgetSpent where there is an
+    end to the `effort`.
     """
     mechanism = setup.mechanism
     return _smallest_changes_first(
@@ -170,7 +170,7 @@ def mending_inputs(
     thorough: bool = False,
     budget: BlockBudget | None = None,
 ) -> Iterator[RemedyChange]:
-    """Positions of one input each, of these or of all, at which the whole goes together: as `mending`."""
+    """Positions of one input each, of these or of all, at which the whole goes together: as `mending_dimensions`."""
     mechanism = setup.mechanism
     return _smallest_changes_first(
         setup,
@@ -349,7 +349,7 @@ def _rounded_beyond(value: float, up: bool) -> float:
 
 
 def can_be_assembled(mechanism: Mechanism, effort: BlockBudget) -> bool:
-    """Whether the whole can be assembled at its inputs. Raises Spent."""
+    """Whether the whole can be assembled at its inputs. Raises BlockBudgetSpent."""
     try:
         return isinstance(find_nearest_assembly(_BudgetedAssemblies(PreparedMechanism(mechanism), effort)), Assembly)
     except PointPlacementError:

@@ -22,7 +22,7 @@ NEIGHBOUR_DISTANCE = 1e-2
 
 
 class SingularPosition(Exception):
-    """A position with one freedom more than inputs, to first order; `refused` says what to say if it is so in truth."""
+    """A position with one freedom more than inputs, to first order; `refusal` says what to say if it is so in truth."""
 
     def __init__(self, refused: Callable[[], NoAnswer]):
         super().__init__()
@@ -32,7 +32,7 @@ class SingularPosition(Exception):
 def mobility_by_rank(setup: PreparedMechanism, z: Array, motion: EquationRates) -> int:
     """The mobility at a position by rank; raises NoAnswer where the velocity is not determined, or contradicted.
 
-    Raises Crossing where the next orders have to tell whether it is determined.
+    Raises SingularPosition where the next orders have to tell whether it is determined.
 
     With the inputs' positions counted as unknowns, what the pairs leave free is unknowns + inputs - rank.
     """

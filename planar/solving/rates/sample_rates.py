@@ -9,7 +9,7 @@ import numpy as np
 
 from planar.equations.linear import solve_vectors
 from planar.solving.checks.singular_values import MIN_REGULARITY
-from planar.solving.continuation.path import BranchRates
+from planar.solving.continuation.path_pieces import BranchRates
 from planar.solving.newton import truncated_step
 from planar.solving.prepared_mechanism import PreparedMechanism
 from planar.solving.rates.accuracy import AccuracyDoubts, find_accuracy_doubts

@@ -18,7 +18,8 @@ from planar.solving.assembly.nearest_assembly import Assembly
 from planar.solving.checks.residual_check import MAX_RATE_ERROR
 from planar.solving.continuation.change_point_remarks import change_point_remarks
 from planar.solving.continuation.fast_path import FastSamples, concatenate_samples
-from planar.solving.continuation.path import BranchRates, FollowedSamples, PathBifurcation
+from planar.solving.continuation.path import FollowedSamples
+from planar.solving.continuation.path_pieces import BranchRates, PathBifurcation
 from planar.solving.continuation.predictor_corrector import NearbyBifurcation
 from planar.solving.diagnosis import refusals
 from planar.solving.lazy_frames import lazy_frames

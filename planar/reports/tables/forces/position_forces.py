@@ -19,17 +19,11 @@ from planar.foundation.units import display_unit
 from planar.model.link_graph import link_label, link_numbers
 from planar.model.mechanism import relative_motions
 from planar.model.wording import amount, join_all_names
-from planar.reports.fitted_table import FittedTable
-from planar.reports.tables import loads
-from planar.reports.tables import mechanical_advantage as ratios
-from planar.reports.tables_of_numbers import (
-    ROUNDING_RATIO,
-    format_or_zero,
-    paragraphs,
-    plain_table,
-    precision_text,
-    published_table,
-)
+from planar.reports.fitted_table import FittedTable, plain_table
+from planar.reports.number_format import ROUNDING_RATIO, format_or_zero, paragraphs, precision_text
+from planar.reports.tables.forces import loads
+from planar.reports.tables.forces import mechanical_advantage as ratios
+from planar.reports.tables.position import published_table
 
 
 def tables(forces: Forces, advantages: ratios.Advantages, comparisons: Sequence[Comparison] = ()) -> RenderableType:

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from planar.analysis.motion.mechanical_advantage import Advantage
-from planar.reports.fitted_table import FittedTable
-from planar.reports.tables_of_numbers import format_or_zero, plain_table
+from planar.reports.fitted_table import FittedTable, plain_table
+from planar.reports.number_format import format_or_zero
 
 Advantages = Mapping[str, Mapping[str, Advantage]]
 """By output and input."""

@@ -1,4 +1,4 @@
-"""Results as tables for a terminal."""
+"""Tables of one position: links, points, pairs, and printed values beside those that are found."""
 
 from __future__ import annotations
 
@@ -6,24 +6,25 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 from rich.console import Group, RenderableType
-from rich.table import Table
 from rich.text import Text
 
 from planar.analysis.worked.published import Comparison
-from planar.foundation.units import Unit, display_unit, parse_unit
+from planar.foundation.units import display_unit, parse_unit
 from planar.model.mechanism import PUBLISHED_QUANTITIES, FileUnits, relative_motions
 from planar.model.pairs import Pair
 from planar.model.wording import amount, join_all_names
 from planar.reports.fitted_table import FittedTable, plain_table
-from planar.results.motion import RelativeState, State
-
-DIGITS = 6
-"""Significant digits printed; `--json` has all of them."""
-SIZE_PHRASE = "of the mechanism's size"
-ROUND_OFF_THRESHOLD = 1e-10
-"""Of what it is told beside: a proof that leaves less is as good as numbers are."""
-ROUNDING_RATIO = 1e-12
-"""What is less than this part of what it is told beside is printed as 0."""
+from planar.reports.number_format import (
+    SIZE_PHRASE,
+    _polar_cells,
+    _report_cell,
+    column_heading,
+    format_number,
+    paragraphs,
+    precision_text,
+)
+from planar.results.motion import State
+from planar.results.records import RelativeState
 
 
 def solution_tables(
@@ -66,24 +67,6 @@ def published_table(comparisons: Iterable[Comparison], units: FileUnits) -> Rend
     return Group(table, paragraphs(reasons))
 
 
-def paragraphs(rows: Iterable[tuple[str, str]]) -> Table:
-    """Paragraphs with what they are about before them."""
-    grid = Table.grid(padding=(0, 1))
-    for _ in range(3):
-        grid.add_column(overflow="fold")
-    for about, text in rows:
-        grid.add_row("", Text(about), Text(text))
-    return grid
-
-
-def models_table(rows: Iterable[tuple[str, str, str]]) -> RenderableType:
-    """The models that come along: name, other ids, what each is."""
-    table = plain_table(None, "model", "also", "what it is", left=(0, 1, 2))
-    for row in rows:
-        table.add_row(*row)
-    return table
-
-
 def _state_heading(state: State) -> RenderableType:
     mechanism = state.mechanism
     lines = [Text(mechanism.name, style="bold")]
@@ -99,11 +82,6 @@ def _state_heading(state: State) -> RenderableType:
         Text(f"{at}; mobility {state.mobility}; every pair closes {precision_text(state.residual, SIZE_PHRASE)}")
     )
     return Group(*lines)
-
-
-def column_heading(name: str, kind: str, units: FileUnits) -> str:
-    """The heading of a column: its name and the unit in which its kind of quantity is shown."""
-    return f"{name}, {display_unit(kind, units)[0]}"
 
 
 def _links_table(state: State) -> FittedTable:
@@ -156,13 +134,6 @@ def _points_table(state: State) -> FittedTable:
     return table
 
 
-def _polar_cells(vector: np.ndarray, of: Unit, units: FileUnits) -> tuple[str, str]:
-    """A vector's magnitude and direction; without a direction where it is nothing."""
-    size = float(np.hypot(*vector))
-    way = format_number(parse_unit(units.angle).from_si(vector_direction(vector))) if size > 1e-14 else ""
-    return format_number(of.from_si(size)), way
-
-
 def _pair_tables(state: State) -> RenderableType:
     kinds: dict[type[Pair], list[Pair]] = {}
     for pair in relative_motions(state.mechanism).values():
@@ -204,37 +175,3 @@ def _relative_table(text: str, relative: RelativeState, state: State) -> Rendera
         size, way = _polar_cells(part, of, units)
         table.add_row(name, size, measure, way, *(format_number(of.from_si(float(each))) for each in part))
     return table
-
-
-def _report_cell(value: float | None, kind: str, units: FileUnits) -> str:
-    return "-" if value is None else format_number(display_unit(kind, units)[1].from_si(value))
-
-
-def vector_direction(vector: np.ndarray) -> float:
-    """The direction of a vector (rad), above -pi up to pi; what rounding leaves of a part is none."""
-    least = ROUNDING_RATIO * float(np.hypot(*vector))
-    x, y = (float(part) if abs(part) > least else 0.0 for part in vector)
-    return float(np.arctan2(y, x))
-
-
-def precision_text(value: float, reference: str = "") -> str:
-    """How well something holds that leaves `value` of another thing open: exactly, to round-off, or but for that."""
-    beside = f"{value:.1e} {reference}".rstrip()
-    return (
-        "exactly"
-        if value == 0.0
-        else f"to round-off ({beside})"
-        if value < ROUND_OFF_THRESHOLD
-        else f"but for {beside}"
-    )
-
-
-def format_number(value: float) -> str:
-    return "0" if abs(value) < 1e-14 else f"{value:#.{DIGITS}g}".rstrip(".")
-
-
-def format_or_zero(value: float | None, beside: float = 0.0) -> str:
-    """A number, nothing where it is only what rounding leaves of another beside it; a dash where there is none."""
-    if value is None or not np.isfinite(value):
-        return "-"
-    return f"{value:#.{DIGITS}g}".rstrip(".") if abs(value) > ROUNDING_RATIO * abs(beside) else "0"

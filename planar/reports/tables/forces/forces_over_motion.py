@@ -14,11 +14,11 @@ from planar.dynamics.load_attachment import attachment_remarks
 from planar.dynamics.reactions import Reaction
 from planar.model.wording import count_phrase, join_all_names
 from planar.reports.columns import ReportedSeries
-from planar.reports.fitted_table import FittedTable
-from planar.reports.tables import forces as at_one
-from planar.reports.tables import loads
+from planar.reports.fitted_table import FittedTable, plain_table
+from planar.reports.number_format import format_or_zero, paragraphs
+from planar.reports.tables.forces import loads
+from planar.reports.tables.forces import position_forces as at_one
 from planar.reports.tables.motion import motion_heading, position_cell, position_heading, running_pair
-from planar.reports.tables_of_numbers import format_or_zero, paragraphs, plain_table
 
 Array = np.ndarray
 

@@ -1,0 +1,40 @@
+"""What several test files ask of results: angles alike, residuals closed, forces of a document."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+import planar
+from planar.dynamics.forces import Forces
+from planar.solving.position import PositionSolver
+from tests.builders import Value
+
+
+def same_angles(found, wanted, far):
+    np.testing.assert_allclose(np.exp(1j * found), np.exp(1j * np.asarray(wanted)), atol=far, rtol=0)
+
+
+def passes_residual_check(mechanism, motion):
+    """Whether every row is closed by the pairs' own formulas, run on plain numbers."""
+    solver = PositionSolver(mechanism)
+
+    def still(frame):
+        if frame.fixed:
+            return frame
+        angle = frame.angle.parts[0]
+        return frame._replace(x=frame.x.parts[0], y=frame.y.parts[0], angle=angle, cos=np.cos(angle), sin=np.sin(angle))
+
+    frames = {name: still(frame) for name, frame in motion.frames.items()}
+    own = {name: [jet.parts[0] for jet in each] for name, each in motion.own.items()}
+    u = np.array([given.position for given in motion.inputs.values()])
+    gaps = solver.residual_check.residuals(frames, own, u)
+    return gaps.shape[1] == len(motion) and bool(np.all(gaps <= solver.tolerance))
+
+
+def forces_of(value: Value, **options: Any) -> Forces:
+    return planar.forces(planar.solve(planar.from_dict(value)), **options)
+
+
+ORDERS = ("position", "velocity", "acceleration")
