@@ -29,7 +29,7 @@ BLOCK_MULTIPLE = 16
 
 
 @takes_mechanism
-def sweep(  # many: the public signature; long: its docstring
+def sweep(  # many: the public signature; # long: its docstring
     mechanism: Mechanism,
     designs: Mapping[str, Any],
     steps: int = 200,

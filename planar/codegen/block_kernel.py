@@ -17,6 +17,7 @@ LANES = 8
 """Numbers that are worked on at once; rows of memory are multiples of so many."""
 
 
+# long: the text of one function, written from its head to its end
 def write_kernel_ir(formula: BlockFormula, layout: KernelLayout) -> str:
     """LLVM IR: for each instance, over all its steps; `gives` are the slot and row of the first wanted values.
 

@@ -52,6 +52,7 @@ SHOWN_KINDS = ("length", "angle", "velocity", "acceleration", "angular velocity"
 """Of quantities that a page shows."""
 
 
+# long: one record after the other, as the scripts read them
 def page_data(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[str, Any], str]:
     """The data of a page, and its functions.
 

@@ -325,7 +325,7 @@ def test_view_writes_where_it_is_told_or_opens_a_browser(tmp_path, monkeypatch):
     assert shown == [path.as_uri()]
     assert path.read_text(encoding="utf-8") == page(mechanism)
     with pytest.raises(BadInput, match="a Mechanism, a State or a Motion"):
-        planar.view("four-bar")
+        planar.view(3)
 
 
 def test_the_view_command_writes_a_page_at_a_position_and_of_an_assembly(tmp_path):
