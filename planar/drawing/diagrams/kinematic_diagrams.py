@@ -118,8 +118,9 @@ def _fit_ordinate(sheet: DiagramSheet, index: int) -> Ordinate:
     of_time = timed or not sheet.run.is_sliding_input or angle
     name = unit_of_kind(kind, sheet.units)[0] if index == 0 or of_time else SI_UNITS[kind]
     scale = round_scale(kind, name, high - low, high - low, (MAX_CURVE_HEIGHT, MAX_CURVE_HEIGHT))
-    top = 5.0 * max(ceil((scale.on_paper(high) + 2.0) / 5.0), 0) if high > 0.0 else 0.0
-    foot = 5.0 * min(floor((scale.on_paper(low) - 2.0) / 5.0), 0) if low < 0.0 else 0.0
+    nothing = 1e-9 * max(high, -low)  # what rounding leaves of zero asks for no room
+    top = 5.0 * max(ceil((scale.on_paper(high) + 2.0) / 5.0 - 1e-9), 0) if high > nothing else 0.0
+    foot = 5.0 * min(floor((scale.on_paper(low) - 2.0) / 5.0 + 1e-9), 0) if low < -nothing else 0.0
     if top - foot < 10.0:
         top, foot = max(top, 5.0), min(foot, -5.0)
     told, of = coherent_unit(SI_UNITS[kind] if angle else name)
