@@ -5,6 +5,7 @@ import subprocess
 import sys
 from collections import Counter
 from collections.abc import Iterable
+from functools import cache
 from pathlib import Path
 
 import networkx as nx
@@ -70,10 +71,17 @@ def room(path: Path) -> str:
     return path.relative_to(ROOT).with_suffix("").parts[0]
 
 
+@cache
+def parse(path: Path) -> ast.Module:
+    """The syntax tree of a file."""
+    return ast.parse(path.read_text())
+
+
+@cache
 def imports(path: Path) -> set[str]:
     """Every module that a file imports, lazily, or by a text with its name: files of planar, or other packages."""
     modules = set()
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(parse(path)):
         if isinstance(node, ast.Import):
             modules |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -149,7 +157,7 @@ def test_no_pair_type_is_named_outside_the_pairs():
     for path in FILES:
         if path.parent == ROOT / "model" / "pairs":
             continue
-        tree = ast.parse(path.read_text())
+        tree = parse(path)
         names = {kind.__name__ for kind in pair_types().values()}
         said = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
         texts = {
@@ -165,7 +173,7 @@ def test_only_two_files_open_files():
     for path in FILES:
         called = {
             node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
-            for node in ast.walk(ast.parse(path.read_text()))
+            for node in ast.walk(parse(path))
             if isinstance(node, ast.Call)
         }
         if called & opening:
@@ -174,7 +182,7 @@ def test_only_two_files_open_files():
 
 def test_files_are_small_and_say_their_job_first():
     for path in FILES:
-        tree = ast.parse(path.read_text())
+        tree = parse(path)
         text = ast.get_docstring(tree)
         assert text
         assert len(text.splitlines()[0]) < 130
@@ -185,7 +193,7 @@ def test_functions_are_short_and_take_few_arguments():
     """What is longer, or takes more, says why in a comment beside its first line: `# long: ...` or `# many: ...`."""
     for path in FILES:
         lines = path.read_text().splitlines()
-        for node in ast.walk(ast.parse(path.read_text())):
+        for node in ast.walk(parse(path)):
             if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
                 said = " ".join(lines[node.lineno - 2 : node.body[0].lineno])
                 given = node.args
@@ -203,7 +211,7 @@ def test_no_test_file_imports_another():
     found = [
         f"{name} imports {module}"
         for name, path in tests.items()
-        for node in ast.walk(ast.parse(path.read_text()))
+        for node in ast.walk(parse(path))
         if isinstance(node, ast.ImportFrom)
         for module in (node.module, *(f"{node.module}.{alias.name}" for alias in node.names))
         if module in tests

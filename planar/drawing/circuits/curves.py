@@ -92,7 +92,16 @@ class InputWindow(NamedTuple):
         return float(x - FULL_TURN * self.turns_ahead(np.array(x)))
 
 
-def choose_output(circuits: Circuits, shown: InputWindow) -> str:
+class DrawnMotion(NamedTuple):
+    """What is drawn of a circuit, the branch of each row, and whether that is not the whole of it."""
+
+    circuit: Circuit
+    motion: Motion
+    branch: Array
+    left_out: bool
+
+
+def choose_output(circuits: Circuits, motions: Sequence[DrawnMotion], shown: InputWindow) -> str:
     """The output in which circuits and branches differ most: that of diagrams if it tells them apart, else a link."""
     mechanism = circuits.mechanism
     order = sorted(link_numbers(mechanism).items(), key=lambda each: -int(each[1]))
@@ -100,15 +109,17 @@ def choose_output(circuits: Circuits, shown: InputWindow) -> str:
     # of several that are as good the first is taken
     return min(
         [default_subject(mechanism), *links],
-        key=lambda of: _count_indistinguishable(circuits, plotted_outputs(mechanism, of)[0], shown),
+        key=lambda of: _count_indistinguishable(circuits, motions, plotted_outputs(mechanism, of)[0], shown),
     )
 
 
-def _count_indistinguishable(circuits: Circuits, reading: PlottedOutput, shown: InputWindow) -> int:
+def _count_indistinguishable(
+    circuits: Circuits, motions: Sequence[DrawnMotion], reading: PlottedOutput, shown: InputWindow
+) -> int:
     """How many pairs of strands cannot be told apart."""
     strands = [
         strand
-        for each in circuits[:MAX_COMPARED_CIRCUITS]
+        for each in motions[:MAX_COMPARED_CIRCUITS]
         for strand in _circuit_chart(circuits, each, reading, shown).branch_curves
     ][:MAX_COMPARED_CURVES]
     places = np.linspace(shown.low, shown.high, COMPARED_POSITIONS)
@@ -193,13 +204,13 @@ def _gaps_between(going: Sequence[tuple[float, float]], low: float, high: float)
 
 def circuit_charts(
     circuits: Circuits,
-    drawn: Sequence[Circuit],
+    motions: Sequence[DrawnMotion],
     reading: PlottedOutput,
     shown: InputWindow,
     assemblies: Sequence[LocatedAssembly],
 ) -> list[CircuitChart]:
     """Some of the circuits in the plane of the input and an output, angles where all lie nearest together."""
-    found = [_circuit_chart(circuits, each, reading, shown) for each in drawn]
+    found = [_circuit_chart(circuits, each, reading, shown) for each in motions]
     if reading.is_angle:
         found = _align_angles(found)
     return [
@@ -214,9 +225,9 @@ def circuit_charts(
     ]
 
 
-def _circuit_chart(circuits: Circuits, circuit: Circuit, reading: PlottedOutput, shown: InputWindow) -> CircuitChart:
+def _circuit_chart(circuits: Circuits, drawn: DrawnMotion, reading: PlottedOutput, shown: InputWindow) -> CircuitChart:
     """A circuit without marks; an angle has the turns with which it was followed."""
-    motion, branch, left_out = _drawn_motion(circuits, circuit, shown.is_length)
+    circuit, motion, branch, left_out = drawn
     closed = circuit.closed and not left_out
     x, y = _input_positions(circuits, motion), np.array(reading.read(motion), dtype=float)
     gain = FULL_TURN * round(float(y[-1] - y[0]) / FULL_TURN) if reading.is_angle and closed else 0.0
@@ -240,22 +251,22 @@ def _circuit_chart(circuits: Circuits, circuit: Circuit, reading: PlottedOutput,
     )
 
 
-def _drawn_motion(circuits: Circuits, circuit: Circuit, slides: bool) -> tuple[Motion, Array, bool]:
-    """What is drawn of a circuit, the branch of each row, and whether that is not the whole of it.
+def drawn_motion(circuits: Circuits, circuit: Circuit, shown: InputWindow) -> DrawnMotion:
+    """The motion that is drawn of a circuit.
 
     Where the input makes many turns there are rows for every turn, and some turns are left out.
     """
     low, high = min(each.low for each in circuit.branches), max(each.high for each in circuit.branches)
     turns = ceil((high - low) / FULL_TURN - MIN_GAP_RATIO)
-    if slides or len(circuit.branches) > 1 or turns <= FINE_TURNS:
-        return circuit.motion, circuit.branch, False
-    shown = min(turns, MAX_TURNS)
+    if shown.is_length or len(circuit.branches) > 1 or turns <= FINE_TURNS:
+        return DrawnMotion(circuit, circuit.motion, circuit.branch, False)
+    drawn = min(turns, MAX_TURNS)
     start, stop = low, high
-    if circuit.closed or shown < turns:
+    if circuit.closed or drawn < turns:
         start = next(given.position for given in circuit.mechanism.inputs if given.pair == circuits.pair)
-        stop = start + shown * FULL_TURN
-    motion = cycle(circuit.mechanism, shown * ROWS_PER_TURN, start, stop, circuits.pair)
-    return motion, np.full(len(motion), circuit.branches[0].number), shown < turns
+        stop = start + drawn * FULL_TURN
+    motion = cycle(circuit.mechanism, drawn * ROWS_PER_TURN, start, stop, circuits.pair)
+    return DrawnMotion(circuit, motion, np.full(len(motion), circuit.branches[0].number), drawn < turns)
 
 
 def _align_angles(found: Sequence[CircuitChart]) -> list[CircuitChart]:

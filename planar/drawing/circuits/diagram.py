@@ -17,6 +17,7 @@ from planar.drawing.circuits.curves import (
     PlottedOutput,
     choose_output,
     circuit_charts,
+    drawn_motion,
     input_window,
     plotted_outputs,
 )
@@ -73,10 +74,11 @@ def circuit_figures(circuits: Circuits, assemblies: Sequence[LocatedAssembly], o
     if not len(circuits):
         raise NoAnswer(Outcome.CANNOT_BE_ASSEMBLED, "no position of the input was found at which it goes together")
     shown = input_window(circuits)
-    outputs = plotted_outputs(circuits.mechanism, choose_output(circuits, shown) if of is None else of)
+    motions = [drawn_motion(circuits, each, shown) for each in circuits[:MAX_CIRCUITS]]
+    outputs = plotted_outputs(circuits.mechanism, choose_output(circuits, motions, shown) if of is None else of)
     figures = []
     for reading in outputs:
-        drawn = merge_equal_charts(circuit_charts(circuits, circuits[:MAX_CIRCUITS], reading, shown, assemblies), shown)
+        drawn = merge_equal_charts(circuit_charts(circuits, motions, reading, shown, assemblies), shown)
         sheets = [drawn[first : first + MAX_PANELS_PER_SHEET] for first in range(0, len(drawn), MAX_PANELS_PER_SHEET)]
         columns, *size = next(rest for most, *rest in PANEL_GRIDS if min(len(drawn), MAX_PANELS_PER_SHEET) <= most)
         figures += [_sheet_figure(circuits, reading, shown, sheet, columns, (size[0], size[1])) for sheet in sheets]
