@@ -10,7 +10,7 @@ SEARCH = os.environ.get("PLANAR_TESTS") == "search"
 TIMES = 10
 """As many more where one searches."""
 
-settings.register_profile("repeatable", derandomize=True, deadline=None, max_examples=40)
+settings.register_profile("repeatable", derandomize=True, deadline=None, max_examples=25)
 settings.register_profile("search", deadline=None, max_examples=100 * TIMES)
 
 
