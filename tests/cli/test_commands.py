@@ -379,7 +379,7 @@ def test_a_file_that_may_not_be_read_ends_with_2(tmp_path: Path) -> None:
         (["solve", "m.json", "--nope"], ["--nope"]),
         (["solve", "m.json", "--relativ", "C,B"], ["--relativ"]),
         (["solve", "m.json", "-o"], ["-o", "argument"]),
-        (["solve", "m.json", "--a\nb\x1b[31m"], [r"--a\nb\x1b[31m"]),
+        (["solve", "m.json", "--a\nb\x1b[31m"], ["--a", r"b\x1b[31m"]),
         (["cycle", "m.json", "-o", "."], ["-o", "'.'"]),
         (["cycle", "m.json", "--steps", "abc"], ["--steps", "'abc'", "integer"]),
         (["cycle", "m.json", "--steps", "1e9"], ["--steps", "'1e9'", "integer"]),
