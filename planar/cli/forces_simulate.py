@@ -111,7 +111,7 @@ def _forces_over_motion(
 ) -> None:
     """The forces over a whole motion."""
     from planar.dynamics.forces import forces as over_motion
-    from planar.reports.files.run_files import check_writable
+    from planar.reports.files.run_formats import check_writable
     from planar.reports.tables.forces.forces_over_motion import force_series, run_facts, tables
 
     if output is not None:
@@ -150,7 +150,7 @@ def simulate(
     """The mechanism let go: its motion in time under loads, weights and springs."""
     from planar.document import read_time
     from planar.dynamics.simulation import simulate as let_go
-    from planar.reports.files.run_files import check_writable
+    from planar.reports.files.run_formats import check_writable
     from planar.reports.tables.simulation import energy_series, simulation_facts, tables
 
     if as_json and output is not None:

@@ -282,7 +282,7 @@ def report_motion(
 
     Ends with a sentence and a status where the motion did not come to its end.
     """
-    from planar.reports.files.run_files import encode_run, record
+    from planar.reports.files.run_formats import encode_run, record
 
     if as_json:
         click.echo(json.dumps(record(motion, more, facts or {}), ensure_ascii=False, allow_nan=False))

@@ -154,7 +154,7 @@ def cycle(
     mechanism = load_model(model, mode)
     refuse_overwriting(model, output)
     if output is not None:
-        from planar.reports.files.run_files import check_writable
+        from planar.reports.files.run_formats import check_writable
 
         check_writable(output.suffix)
     with show_progress(f"{mechanism.name}: {steps} steps", transient=True) as progress:

@@ -33,7 +33,7 @@ from planar.pages.page_data import drawing_data, page_data
 from planar.pages.still_picture import still_svg
 from planar.pages.view import notebook_html, page_of, view
 from planar.reports.columns import run_columns
-from planar.reports.files.run_files import encode_run
+from planar.reports.files.run_formats import encode_run
 from planar.solving.position import solved_mechanism
 from planar.solving.rates.regularity import regularity
 from tests import command

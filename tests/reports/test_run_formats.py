@@ -19,7 +19,8 @@ from planar.foundation.jets import Jet
 from planar.foundation.units import SI_UNITS
 from planar.model.pairs import pair_types
 from planar.reports.columns import reported_series, run_columns
-from planar.reports.files.run_files import CSV_BLOCK_ROWS, check_writable, encode_run, record
+from planar.reports.files.csv import CSV_BLOCK_ROWS
+from planar.reports.files.run_formats import check_writable, encode_run, record
 from planar.results.records import InputMotion, Limit, ThirdRates
 from tests.builders import four_bar
 from tests.closed_forms import TRIPLE, TURN

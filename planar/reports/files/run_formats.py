@@ -1,8 +1,7 @@
-"""A run of positions in the formats that other programs read."""
+"""A run of positions as the content of a file, by its suffix: CSV, npz, Parquet, or JSON, which is made here."""
 
 from __future__ import annotations
 
-import io
 import json
 from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
@@ -11,18 +10,14 @@ from typing import Any
 import numpy as np
 
 from planar.foundation.errors import unknown_format_error
-from planar.reports.columns import UNITS_BY_KIND, ReportedSeries, reported_series, run_columns, run_header
-from planar.reports.files import parquet
+from planar.reports.columns import ReportedSeries, reported_series, run_header
+from planar.reports.files import csv, npz, parquet
 from planar.results.motion import Motion
 from planar.results.records import Limit
 
 Array = np.ndarray
 
 _NO_FACTS: Mapping[str, Any] = MappingProxyType({})
-FORMULA_STARTS = ("=", "+", "-", "@", "'")
-"""What a formula begins with in spreadsheets, and what marks a text there."""
-CSV_BLOCK_ROWS = 500
-"""Of a CSV file that are made at a time: enough to be quick, few enough for the memory of many columns."""
 
 
 def check_writable(suffix: str) -> None:
@@ -94,51 +89,9 @@ def _encode_json(motion: Motion, more: Iterable[ReportedSeries], facts: Mapping[
     return (json.dumps(whole, default=_to_list, ensure_ascii=False, allow_nan=False) + "\n").encode()
 
 
-def _encode_csv(motion: Motion, more: Iterable[ReportedSeries]) -> bytes:
-    """A row a position; positions and angles in the units of the mechanism's file, rates in SI, as the heads say."""
-    all_columns = tuple(run_columns(motion, more))
-    text = io.BytesIO()
-    text.write((",".join(_csv_cell(column.head) for column in all_columns) + "\n").encode())
-    for first in range(0, len(motion), CSV_BLOCK_ROWS):
-        block = np.column_stack([column.values[first : first + CSV_BLOCK_ROWS] for column in all_columns]).tolist()
-        rows = "".join(",".join(map(repr, row)) + "\n" for row in block)
-        text.write(rows.replace("nan", "").encode())  # what is not determined is a blank cell
-    return text.getvalue()
-
-
-def _csv_cell(text: str) -> str:
-    """A text as a cell, in quotes where it holds what ends a cell (RFC 4180).
-
-    What a spreadsheet would take for a formula has an apostrophe before it, and so has what begins with one: a reader
-    takes one apostrophe off.
-    """
-    text = f"'{text}" if text[:1] in FORMULA_STARTS else text
-    return '"' + text.replace('"', '""') + '"' if any(mark in text for mark in ',"\n\r') else text
-
-
-def _encode_npz(motion: Motion, more: Iterable[ReportedSeries]) -> bytes:
-    """SI arrays under names such as "points/C/velocity", and texts; "units" are rows of an array's name and its unit.
-
-    `dict(arrays["units"])["points/C/velocity"]` is "m/s".
-    """
-    arrays: dict[str, Any] = {}
-    units: dict[str, str] = {}
-    if motion.time is not None:
-        arrays["time"], units["time"] = motion.time, UNITS_BY_KIND["time"]
-    for thing in (*reported_series(motion), *more):
-        for what, values in thing.values.items():
-            if values is not None:
-                name = "/".join(filter(None, (thing.group, thing.name, what)))
-                arrays[name], units[name] = values, UNITS_BY_KIND[thing.kinds[what]]
-    texts = {what: np.array(text) for what, text in run_header(motion).items()}
-    content = io.BytesIO()
-    np.savez(content, **arrays, **texts, units=np.array(list(units.items())))
-    return content.getvalue()
-
-
 _FORMATS: dict[str, Callable[..., bytes]] = {
-    ".csv": _encode_csv,
+    ".csv": csv.encode_csv,
     ".json": _encode_json,
-    ".npz": _encode_npz,
+    ".npz": npz.encode_npz,
     ".parquet": parquet.encode_parquet,
 }
