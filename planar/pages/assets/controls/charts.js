@@ -2,8 +2,6 @@
 /* Diagrams under the drawing, over the range of the input: one for each quantity, with a line for each point or link
    chosen, and a marker that runs along. A press in a diagram takes the mechanism there. */
 
-const SERIES = 6;        // colours of lines
-const DEGREES = [1, 2, 5, 10, 15, 30, 45, 60, 90, 180, 360, 720]; // between numbers of an axis
 const HEIGHT = 240;      // px
 const PAPER = 660;       // px: the width of a diagram that fits any paper
 
@@ -115,8 +113,8 @@ class Charts {
       width: this.width(), height: HEIGHT,
       scales: { x: { time: false, range: [xs[0], xs[xs.length - 1]] }, y: { range: () => made.limits } },
       axes: [
-        { ...axis, size: 34 * em, label: `${pair}, ${inputUnit}`, incrs: inputUnit === "deg" ? DEGREES : undefined },
-        { ...axis, size: 64 * em, label: `${label}, ${unitName}` },
+        { ...axis, size: 34 * em, label: `${pair}, ${inputUnit}`, incrs: inputUnit === "deg" ? DEGREE_VALUES : STEP_VALUES },
+        { ...axis, size: 64 * em, label: `${label}, ${unitName}`, incrs: STEP_VALUES },
       ],
       series: [{}, ...names.map((_, i) => ({
         stroke: colour(`--series${i % SERIES}`), width: 2, dash: i < SERIES ? undefined : [6, 4], points: { show: false },
@@ -194,10 +192,11 @@ function rangeOf(lines, least) {
   for (const line of lines) for (const each of line) if (Number.isFinite(each)) [low, high] = [Math.min(low, each), Math.max(high, each)];
   if (!(high >= low)) return [0, 1];
   // what stands still but for rounding is a straight line in the middle
-  const room = Math.max(0.06 * (high - low), 1e-9 * least, 1e-9 * Math.max(Math.abs(low), Math.abs(high)), 1e-12);
-  if (high - low < 1e-9 * Math.max(Math.abs(low), Math.abs(high), least)) {
-    const wide = 0.1 * (Math.abs(low) || 1);
+  const { flat, half, room: part, near_zero: near } = AXIS, most = Math.max(Math.abs(low), Math.abs(high));
+  const room = Math.max(part * (high - low), flat * least, flat * most, 1e-12);
+  if (high - low < flat * Math.max(most, least)) {
+    const wide = half * (Math.abs(low) || 1);
     return [low - wide, high + wide];
   }
-  return [low >= 0 && low < 0.3 * high ? 0 : low - room, high <= 0 && high > 0.3 * low ? 0 : high + room];
+  return [low >= 0 && low < near * high ? 0 : low - room, high <= 0 && high > near * low ? 0 : high + room];
 }

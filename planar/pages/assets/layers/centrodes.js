@@ -28,12 +28,12 @@ const centrodes = {
       for (const arc of arcs) {
         const places = arc.map(([x, y]) => layers.at([f.x + f.cos * x - f.sin * y, f.y + f.sin * x + f.cos * y]));
         if (places.length > 1) ink.line(places, `centrode ${kind}`);
-        else ink.dot(places[0], 3, `centrode ${kind}`);
+        else ink.dot(places[0], DOT_RADIUS, `centrode ${kind}`);
       }
     }
     const motions = motionsOf(standardFrames(page), page.data);
     const pole = motions && poleOf(motions[other], motions[link], page.data.size, 0);
-    if (pole && pole[2] !== 0) ink.dot(layers.at([pole[0] / pole[2], pole[1] / pole[2]]), 3.5, "centre shown");
+    if (pole && pole[2] !== 0) ink.dot(layers.at([pole[0] / pole[2], pole[1] / pole[2]]), CENTRE_RADII.shown, "centre shown");
     return `full: fixed to ${other}; dashed: moving with ${link}, rolling on it`;
   },
 };
