@@ -28,6 +28,7 @@ from planar.drawing.paper.picture import Pen
 from planar.drawing.paper.scales import DECIMAL_STEPS, DEGREE_STEPS, ROUND_SLACK, SCREEN_DIGITS, round_values
 from planar.drawing.paper.stroke_shapes import LINE_END_IN_HEAD, head_length, head_of_length
 from planar.drawing.polygons.polygon import FEW_POLE_LETTERS, MAX_POLE_LETTERS, POLE_RADIUS
+from planar.drawing.scheme.scheme import INPUT_ARC_RADII
 
 POWERS = range(-15, 19)
 """Of ten, between which round values are offered."""
@@ -75,10 +76,15 @@ LAYER_PENS = {
 LAYER_AREAS = ":is(#drawing .layers, #layers .beside)"
 """Where layers are drawn."""
 
+INPUT_ARC_ROOM = 2.0
+"""mm between the arrow of an input, which the mechanism's drawing has about the same pins, and that of a couple."""
 SIZES: Mapping[str, Any] = {
     "PANEL_MM": PANEL_MM,
     "LINE_END_IN_HEAD": LINE_END_IN_HEAD,
-    "COUPLE_ARC": {"radii": COUPLE_RADII, "sweep": COUPLE_SWEEP},
+    "COUPLE_ARC": {
+        "radii": [each for each in COUPLE_RADII if each >= INPUT_ARC_RADII[0] + INPUT_ARC_ROOM],
+        "sweep": COUPLE_SWEEP,
+    },
     "FORCE_ROUND_OFF": ROUND_OFF_RATIO,
     "POLE_RADIUS": POLE_RADIUS,
     "DOT_RADIUS": 0.36,

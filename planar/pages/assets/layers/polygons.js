@@ -22,7 +22,7 @@ function polygon(rate) {
         const { told, why } = drawPolygon(page, svg, rate, state);
         if (why) svg.style.display = "none";
         none.hidden = !why;
-        none.textContent = why ? `No ${word} polygon: ${why}` : "";
+        none.textContent = `None: ${why}`;
         return told;
       } };
     },
@@ -73,7 +73,7 @@ function drawPolygon(page, svg, rate, state) {
     ink.keepClear(at, 3);
     const { all, few } = MAX_LETTERS, shown = letters.length > all ? [...letters.slice(0, few), "…", letters[letters.length - 1]] : letters;
     const text = shown.map((letter, k) => [k ? `, ${letter}` : letter, letter === "…" ? "" : index]);
-    ink.letter(at, text, "letter", { away: pole ? null : [at[0] - fit.pole[0], at[1] - fit.pole[1]], key: letters[0] });
+    ink.letter(at, text, "letter", { away: pole ? [1, 0] : [at[0] - fit.pole[0], at[1] - fit.pole[1]], key: letters[0] });
   }
   ink.set(state.stood, [0, 0, ...POLYGON_SHEET.size]);
   // what letters stand for that are of no point in the drawing
