@@ -9,13 +9,15 @@ from typing import Any
 
 import casadi as ca
 
-from planar.analysis.centres.centrodes import AS_ONE_RATIO, INFINITY_RATIO
+from planar.analysis.centres.centrodes import AS_ONE_RATIO, INFINITY_RATIO, STANDSTILL_RATIO
 from planar.codegen.javascript import write_javascript
 from planar.drawing.centres.centres import (
     ARROW_LENGTH,
     ARROW_MARGIN,
+    FEW_NAMES,
     FOUND_CENTRE_RADIUS,
     LINE_OVERHANG,
+    MAX_LISTED_NAMES,
     PAIR_CENTRE_RADIUS,
 )
 from planar.drawing.centres.choice import MAX_CENTRES
@@ -76,6 +78,8 @@ LAYER_PENS = {
 LAYER_AREAS = ":is(#drawing .layers, #layers .beside)"
 """Where layers are drawn."""
 
+LETTER_PARTS = {"index_size": 0.7, "drop": 0.25, "told_size": 0.9}
+"""Of a letter's height: that of its index and how far this is set low, and that of what is said of it."""
 INPUT_ARC_ROOM = 2.0
 """mm between the arrow of an input, which the mechanism's drawing has about the same pins, and that of a couple."""
 SIZES: Mapping[str, Any] = {
@@ -94,12 +98,28 @@ SIZES: Mapping[str, Any] = {
     "INFINITY_RATIO": INFINITY_RATIO,
     "AS_ONE_RATIO": AS_ONE_RATIO,
     "MAX_CENTRES": MAX_CENTRES,
-    "MAX_LETTERS": {"all": MAX_POLE_LETTERS, "few": FEW_POLE_LETTERS},
+    "LEAST_SINES": {"apart": 1e-6, "crossing": 1e-3},
+    "CENTRE_NAMES": {"most": MAX_LISTED_NAMES, "few": FEW_NAMES},
+    "POLYGON_LETTERS": {"most": MAX_POLE_LETTERS, "few": FEW_POLE_LETTERS},
+    # of the mechanism: how far out a centrode goes, between which rows it passes through infinity, what stands still
+    "CENTRODE": {"farthest": 30, "leap": 8, "still": STANDSTILL_RATIO},
+    # over a turn, or about as many over another range
+    "PATH_MARKS": 24,
     "SERIES": len(SERIES_COLOURS),
     "AXIS": {"flat": FLAT_TOLERANCE, "half": FLAT_HALF_RATIO, "room": 0.06, "near_zero": 0.3},
     # px, as texts are: the height of letters, and how far from its place one may stand
-    "LETTER": {"height": 13, "width": 0.6, "reach": [9, 15, 23, 33], "turns": 16},
+    "LETTER": {"height": 13, "width": 0.6, "reach": [9, 15, 23, 33], "turns": 16, **LETTER_PARTS},
     "MAX_ARROW_LENGTH": 80,
+    "CHART": {
+        "height": 240,
+        "narrowest": 280,
+        "printed": 660,
+        "font": 12,
+        "head": 24,
+        "axes": (34, 64),
+        "line": 2,
+        "dash": (6, 4),
+    },
     "POLYGON_SHEET": {"size": [400, 330], "border": 34},
     "CIRCLE_SHEET": {"size": [260, 260], "radius": 96, "number": 14},
 }

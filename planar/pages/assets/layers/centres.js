@@ -3,8 +3,6 @@
    of `planar centres`; a centre picked shows the lines of Kennedy's theorem on which it lies, and its chord in the
    circle diagram beside. */
 
-const SAME_LINE = [1e-6, 1e-3]; // sines: of centres that are one; of lines that cross badly
-
 /** The motion of every link as [ux, uy, w], velocity (ux − w y, uy + w x) at (x, y); null where not determined. */
 function motionsOf(frames, data) {
   const found = {};
@@ -50,7 +48,7 @@ function kennedyLines(all, centre, { size }) {
   for (const two of centre.lines.map((line) => line.map((k) => all[k]))) {
     if (found.length === 2 || two.some((each) => each.at === null)) continue;
     const [line, sine] = unit(cross(...two.map(({ at: [x, y, w] }) => unit([x, y, w * size])[0])));
-    if (sine > SAME_LINE[0] && found.every((each) => Math.hypot(...cross(each.line, line)) > SAME_LINE[1])) found.push({ two, line });
+    if (sine > LEAST_SINES.apart && found.every((each) => Math.hypot(...cross(each.line, line)) > LEAST_SINES.crossing)) found.push({ two, line });
   }
   return found;
 }
@@ -93,7 +91,7 @@ const centres = {
       state.places.push([each.name, place]);
     }
     for (const { place, names, outside, away } of drawn.values()) {
-      ink.letter(place, names.map((name, k) => [k ? ", I" : "I", name]), "letter centre", { told: outside, away });
+      ink.letter(place, fewNames(names, CENTRE_NAMES).map((name, k) => [`${k ? ", " : ""}${name === "…" ? name : "I"}`, name === "…" ? "" : name]), "letter centre", { told: outside, away });
     }
     if (picked === null) return "";
     const lines = state.lines.map(({ two }) => two.map(({ name }) => `I${name}`).join(" "));

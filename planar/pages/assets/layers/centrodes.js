@@ -2,9 +2,6 @@
 /* The centrodes of two links over the motion: the paths of their instantaneous centre in each. The moving one is
    carried along with its link and rolls on the fixed one. */
 
-const FARTHEST_POLE = 30;   // sizes: a centrode is not drawn farther out
-const LEAP = 8;             // sizes: between two rows this far apart the pole passed through infinity
-
 const centrodes = {
   key: "centrodes",
   label: "Centrodes",
@@ -50,8 +47,8 @@ function polePaths(page, course, link, other) {
     if (!pole || pole[2] === 0) { open = false; before = null; continue; }
     turns++;
     const at = [pole[0] / pole[2], pole[1] / pole[2]], here = local(frames[other], at), own = local(frames[link], at);
-    const sign = Math.sign(pole[2]), far = Math.hypot(...here) > FARTHEST_POLE * size;
-    const leapt = before !== null && sign !== beforeSign && Math.hypot(here[0] - before[0], here[1] - before[1]) > LEAP * size;
+    const sign = Math.sign(pole[2]), far = Math.hypot(...here) > CENTRODE.farthest * size;
+    const leapt = before !== null && sign !== beforeSign && Math.hypot(here[0] - before[0], here[1] - before[1]) > CENTRODE.leap * size;
     if (far || leapt) open = false;
     [before, beforeSign] = [here, sign];
     if (far) continue;
@@ -66,6 +63,6 @@ function polePaths(page, course, link, other) {
   };
   if (!turns) return { reason: known ? `${link} and ${other} only slide on each other, or move as one` : "the motion is not determined" };
   if (!fixed.length) return { reason: "their pole is far outside the picture all the way" };
-  if (span(fixed) < 1e-8 * size) return { reason: `${link} and ${other} turn about one point` };
+  if (span(fixed) < CENTRODE.still * size) return { reason: `${link} and ${other} turn about one point` };
   return { fixed, moving, reason: "" };
 }

@@ -109,8 +109,8 @@ class Ink {
   /** Set all letters where they cover least; `before` remembers where each stood, so that none jumps while things move. */
   set(before, bounds = null) {
     for (const each of this.letters) {
-      const height = LETTER.height * this.zoom, { reach, turns } = LETTER;
-      const many = each.letters.reduce((sum, [text, index]) => sum + text.length + 0.7 * index.length, 0.9 * each.told.length);
+      const height = LETTER.height * this.zoom, { reach, turns, index_size, told_size, drop } = LETTER;
+      const many = each.letters.reduce((sum, [text, index]) => sum + text.length + index_size * index.length, told_size * each.told.length);
       const width = many * LETTER.width * height + 2;
       const box = (turn, far) => {
         const angle = (turn * 2 * Math.PI) / turns, x = each.at[0] + Math.cos(angle) * (far + width / 2), y = each.at[1] + Math.sin(angle) * (far + height / 2);
@@ -136,16 +136,19 @@ class Ink {
       }, this.group);
       // an index stands lower, and what follows as high as before
       let low = 0;
-      const spans = each.letters.flatMap(([text, index]) => [[text, 1, 0, null], [index, 0.7, 0.25, null]]);
-      for (const [text, size, drop, kind] of [...spans, [each.told, 0.9, 0, "told"]]) {
+      const spans = each.letters.flatMap(([text, index]) => [[text, 1, 0, null], [index, index_size, drop, null]]);
+      for (const [text, size, down, kind] of [...spans, [each.told, told_size, 0, "told"]]) {
         if (!text) continue;
-        svgPart("tspan", { dy: (drop - low) * height, "font-size": size * height, class: kind }, node, text);
-        low = drop;
+        svgPart("tspan", { dy: (down - low) * height, "font-size": size * height, class: kind }, node, text);
+        low = down;
       }
     }
   }
 
 }
+
+/** Names, of very many the first few and the last. */
+function fewNames(names, { most, few }) { return names.length > most ? [...names.slice(0, few), "…", names[names.length - 1]] : names; }
 
 /** How much of a box others cover. */
 function covered([x0, y0, x1, y1], boxes) {

@@ -2,8 +2,7 @@
 /* Layers of the points chosen: their paths with marks at equal parts of the input's range, and arrows of their velocity
    or acceleration. */
 
-const MARKS = 24;        // of a path over a turn, or about as many over another range
-const BEYOND = 2;        // times the usual: beside a dead point the scale is that of now
+const BEYOND = 2; // times the usual: beside a dead point the scale is that of now
 
 const RATES = {
   velocity: { word: "velocity", unit: "velocity", parts: ["vx", "vy"] },
@@ -18,7 +17,7 @@ const paths = {
     const { page } = layers, { course } = page, names = page.chosen.points();
     if (course === null) return page.data.inputs.length ? "Paths: the motion is being solved" : "Paths: no input runs";
     const { inputs, count } = course, [by] = unitOf(page, page.data.inputs[course.input].slides ? "length" : "angle");
-    const range = inputs[count - 1] - inputs[0], step = course.whole ? range / MARKS : roundUp((range * by) / MARKS) / by;
+    const range = inputs[count - 1] - inputs[0], step = course.whole ? range / PATH_MARKS : roundUp((range * by) / PATH_MARKS) / by;
     names.forEach((name, k) => {
       const { x, y } = course.point(name), place = (i) => layers.at([x[i], y[i]]);
       ink.line(Array.from({ length: count }, (_, i) => place(i)), `path series${k % SERIES}`);

@@ -71,8 +71,7 @@ function drawPolygon(page, svg, rate, state) {
     const { at, letters } = place, pole = place === places[0];
     if (!pole) ink.dot(at, DOT_RADIUS, `place ${rate}`);
     ink.keepClear(at, 3);
-    const { all, few } = MAX_LETTERS, shown = letters.length > all ? [...letters.slice(0, few), "…", letters[letters.length - 1]] : letters;
-    const text = shown.map((letter, k) => [k ? `, ${letter}` : letter, letter === "…" ? "" : index]);
+    const text = fewNames(letters, POLYGON_LETTERS).map((letter, k) => [k ? `, ${letter}` : letter, letter === "…" ? "" : index]);
     ink.letter(at, text, "letter", { away: pole ? [1, 0] : [at[0] - fit.pole[0], at[1] - fit.pole[1]], key: letters[0] });
   }
   ink.set(state.stood, [0, 0, ...POLYGON_SHEET.size]);
