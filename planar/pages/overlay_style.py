@@ -178,7 +178,7 @@ def overlay_styles() -> str:
         style = PEN_STYLES[pen]
         dashes = " ".join(f"calc(var(--mm) * {each:g}px)" for each in style.dashes)
         dashed = f" stroke-dasharray: {dashes};" if dashes else ""
-        # a line is never wider than its arrow's head allows
-        width = f"min(calc(var(--mm) * {style.width:g}px), var(--widest, 1em))"
+        # not too thin for a screen, nor wider than its arrow's head allows
+        width = f"min(max(1px, var(--mm) * {style.width:g}px), var(--widest, 1em))"
         lines.append(f"{LAYER_AREAS} {selector} {{ stroke-width: {width};{dashed} }}")
     return "\n".join(lines)
