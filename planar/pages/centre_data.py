@@ -12,7 +12,7 @@ from planar.analysis.centres.pair_centres import primary_centres
 from planar.analysis.rate_equations import rate_equations
 from planar.drawing.centres.choice import MAX_CENTRES
 from planar.drawing.centres.circle_diagram import circle_radius, link_points
-from planar.model.link_graph import link_numbers, number_separator
+from planar.model.link_graph import link_label, link_numbers, number_separator
 from planar.results.motion import State
 
 MAX_LINES = 5
@@ -20,7 +20,7 @@ MAX_LINES = 5
 
 
 def centre_data(state: State, points: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """Every two links' centre in the order of their numbers, and where links stand in the circle diagram.
+    """Every two links' centre in the order of their numbers, and links with their places in the circle diagram.
 
     `shown` is whether a pair of theirs shows it, `point` the one that both links have. Any three links have their
     centres on one line: `lines` has, by their numbers in the list, the two other centres of each, first those on which
@@ -46,7 +46,15 @@ def centre_data(state: State, points: Mapping[str, Mapping[str, Any]]) -> dict[s
             }
             for two in combinations(links, 2)
         ],
-        "circle": _places_on_circle(numbers),
+        "links": [
+            {
+                "link": link,
+                "number": numbers[link],
+                "label": link_label(numbers[link], link),
+                "place": [part / circle_radius(len(links)) for part in at],
+            }
+            for link, at in link_points(numbers).items()
+        ],
     }
 
 
@@ -67,8 +75,3 @@ def _third_links(links: Sequence[str], primary: PrimaryCentres) -> dict[tuple[st
         ordered = dict.fromkeys(third for rank in ranks for third in links if third in rank and third not in two)
         chosen[two] = [*ordered][:MAX_LINES]
     return chosen
-
-
-def _places_on_circle(numbers: Mapping[str, str]) -> dict[str, list[float]]:
-    """Where links stand in the circle diagram, in the order of their numbers, in parts of its radius."""
-    return {link: [x / circle_radius(len(numbers)) for x in at] for link, at in link_points(numbers).items()}

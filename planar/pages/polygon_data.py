@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
-from planar.analysis.polygons.lettering import PARTS, PRIME, legend, small_letters
+from planar.analysis.polygons.lettering import PRIME, legend, small_letters
 from planar.analysis.rich_text import with_double_primes
 from planar.equations.mechanism_numbers import shapes_of_links
 from planar.foundation.geometry import Vector
@@ -33,6 +33,7 @@ def polygon_data(mechanism: Mechanism, points: Mapping[str, Mapping[str, Any]]) 
     fixed or not, or one of a guide (`link`) below a point that slides (`over`). A stroke goes `from` a point `to`
     another; it is an `image`, or a vector from the pole (`absolute`) or between two points (`relative`). That of two
     points of one `link` has a part along their line and one across, of which the first ends in what is lettered `end`.
+    `legends` say what letters stand for, without such ends and with them.
     """
     frame, letters = mechanism.frame, small_letters(points)
     rests = any(frame in each["links"] for each in points.values())
@@ -63,8 +64,8 @@ def polygon_data(mechanism: Mechanism, points: Mapping[str, Mapping[str, Any]]) 
         strokes += (_vector(vertices, *ends, link) for ends in _vector_ends(vertices, members, joints, guided))
         strokes += ({"kind": "image", "from": a, "to": b, "link": link} for a, b in outline_sides(members))
     orders = {"velocity": 1, "acceleration": 2}
-    legends = {kind: legend(order, below, frame, parts=False) for kind, order in orders.items()}
-    return {"vertices": vertices, "strokes": strokes, "legends": legends | {"parts": PARTS}}
+    legends = {kind: [legend(order, below, frame, parts) for parts in (False, True)] for kind, order in orders.items()}
+    return {"vertices": vertices, "strokes": strokes, "legends": legends}
 
 
 def _riders(mechanism: Mechanism) -> list[tuple[str, str]]:

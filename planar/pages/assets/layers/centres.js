@@ -60,7 +60,7 @@ const centres = {
     const { page } = layers, { data } = page;
     htmlPart("h2", {}, part, "Circle diagram");
     const svg = svgPart("svg", { viewBox: `0 0 ${CIRCLE_SHEET.size.join(" ")}`, role: "img", "aria-label": "circle diagram" }, part);
-    const which = chooser(part, "Centres", [["all", "all"], ...byNumber(data).map((link) => [link, `of ${numberAndName(data, link)}`])]);
+    const which = chooser(part, "Centres", [["all", "all"], ...data.centres.links.map(({ link, label }) => [link, `of ${label}`])]);
     which.value = data.centres.all.length > MAX_CENTRES ? data.frame : "all";
     const pick = chooser(part, "Lines of Kennedy's theorem for", []);
     for (const each of [which, pick]) each.addEventListener("change", () => layers.draw());
@@ -171,27 +171,19 @@ function drawCircle(page, state) {
   if (state.drawn === drawn) return state.told;
   state.drawn = drawn;
   svg.replaceChildren();
-  const { data } = page, order = byNumber(data), { size: [width, height], radius, number } = CIRCLE_SHEET;
-  const spot = ([x, y], far) => [width / 2 + far * x, height / 2 - far * y], places = Object.entries(data.centres.circle);
-  const at = new Map(places.map(([link, place]) => [link, spot(place, radius)]));
+  const { links } = page.data.centres, { size: [width, height], radius, number } = CIRCLE_SHEET;
+  const spot = ([x, y], far) => [width / 2 + far * x, height / 2 - far * y], size = LETTER.height;
+  const at = new Map(links.map(({ link, place }) => [link, spot(place, radius)]));
   const ink = new Ink(svg, PANEL_MM);
   ink.dot([width / 2, height / 2], radius / PANEL_MM, "circle");
   for (const each of known) ink.line(each.links.map((link) => at.get(link)), `chord ${each.shown ? "shown" : "found"}${kind(each)}`);
-  for (const [link, place] of places) {
+  for (const { link, place, number: name } of links) {
     ink.dot(at.get(link), 2 * DOT_RADIUS, "place");
-    const [x, y] = spot(place, radius + number), { height: size } = LETTER;
-    svgPart("text", { x, y: y + 0.35 * size, "text-anchor": "middle", "font-size": size, class: "letter" }, svg, data.numbers[link]);
+    const [x, y] = spot(place, radius + number);
+    svgPart("text", { x, y: y + 0.35 * size, "text-anchor": "middle", "font-size": size, class: "letter" }, svg, name);
   }
-  const links = order.map((link) => numberAndName(data, link)).join(", ");
-  state.told = `${known.length} centres; full chords: shown by pairs. Links: ${links}`;
+  state.told = `${known.length} centres; full chords: shown by pairs. Links: ${links.map(({ label }) => label).join(", ")}`;
   return state.told;
-}
-
-/** A link by its number and its name, once where they are the same. */
-function numberAndName(data, link) { return data.numbers[link] === link ? link : `${data.numbers[link]} ${link}`; }
-
-function byNumber(data) {
-  return [...data.links].sort((a, b) => data.numbers[a] - data.numbers[b]);
 }
 
 /** A labelled choice. */

@@ -6,7 +6,7 @@ const centrodes = {
   key: "centrodes",
   label: "Centrodes",
   beside(layers, part) {
-    const { page } = layers, { data } = page, links = byNumber(data).map((link) => [link, numberAndName(data, link)]);
+    const { page } = layers, { data } = page, links = data.centres.links.map(({ link, label }) => [link, label]);
     htmlPart("h2", {}, part, "Centrodes");
     const [link, other] = ["Of link", "against"].map((label) => chooser(part, label, links));
     if (data.rolling !== null) [link.value, other.value] = data.rolling;

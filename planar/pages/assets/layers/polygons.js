@@ -75,9 +75,7 @@ function drawPolygon(page, svg, rate, state) {
     ink.letter(at, text, "letter", { away: pole ? [1, 0] : [at[0] - fit.pole[0], at[1] - fit.pole[1]], key: letters[0] });
   }
   ink.set(state.stood, [0, 0, ...POLYGON_SHEET.size]);
-  // what letters stand for that are of no point in the drawing
-  const [first, ...below] = rate === "acceleration" ? legends[rate] : ["", ...legends[rate]];
-  return { told: [fit.told, first, ends ? legends.parts : "", ...below].filter(Boolean).join("; "), why: "" };
+  return { told: [fit.told, ...legends[rate][Number(ends)]].join("; "), why: "" };
 }
 
 /** Where the points of a polygon are, in m/s or m/s²; null where rates are not determined. */
