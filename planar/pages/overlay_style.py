@@ -135,6 +135,9 @@ ROUND_VALUES: Mapping[str, Any] = {
 }
 """What scales, and steps between the numbers of an axis or a bar, are chosen from."""
 
+HEAD_ARGUMENTS = {"room": 1, "mm": 1, "tip": 2, "way": 2, "length": 1}
+"""Of the functions of an arrow's head, by how many numbers each has."""
+
 
 @cache
 def round_value_script() -> str:
@@ -158,9 +161,6 @@ def overlay_script() -> str:
     )
     written = [write_javascript(each.name(), each) for each in functions]
     return "\n".join([_constants(SIZES), round_value_script(), *written])
-
-
-HEAD_ARGUMENTS = {"room": 1, "mm": 1, "tip": 2, "way": 2, "length": 1}
 
 
 @cache

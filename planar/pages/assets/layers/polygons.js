@@ -33,7 +33,7 @@ function polygon(rate) {
 function drawPolygon(page, svg, rate, state) {
   svg.replaceChildren();
   const values = polygonPoints(page, rate), { vertices, strokes, legends } = page.data.polygons;
-  if (values === null) return { told: "", why: page.undetermined };
+  if (values === null) return { told: "", why: page.undetermined || "no rates are determined" };
   const fit = polygonFit(page, svg, rate, values, state);
   if (fit === null) return { told: "", why: "everything is at rest at the inputs' rates" };
   const ink = new Ink(svg, PANEL_MM), spot = ([x, y]) => [fit.pole[0] + x * fit.px, fit.pole[1] - y * fit.px];
@@ -84,7 +84,7 @@ function polygonPoints(page, rate) {
     if (fixed) return [0, 0];
     return (link === undefined ? page.point(point) : page.rates(link, page.point(over).position))[rate];
   });
-  return page.undetermined || found.some((each) => each === null) ? null : found;
+  return found.includes(null) ? null : found;
 }
 
 /** Where the centripetal part of a relative acceleration ends: what it would be if its link turned steadily. */
