@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from planar.document.files import read_asset
+from planar.pages.overlay_style import overlay_script
 from planar.pages.page import script_safe_json
 from planar.pages.page_data import page_data
 
@@ -27,7 +28,7 @@ needs_node = pytest.mark.skipif(NODE is None, reason="there is no Node to run th
 
 def in_node(mechanisms: dict[str, Any], act: str, *more: str) -> dict[str, Any]:
     """What the asynchronous `act(page, name)` returns for the page of each mechanism, with `more` scripts."""
-    shared = "\n".join(read_asset(name) for name in (*LOGIC, *more))
+    shared = "\n".join([overlay_script(), *(read_asset(name) for name in (*LOGIC, *more))])
     runs = []
     for name, mechanism in mechanisms.items():
         data, functions = _carried(mechanism)

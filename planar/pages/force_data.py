@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import permutations
 from typing import Any
 
 import casadi as ca
 
 from planar.codegen.javascript import write_javascript
-from planar.drawing.forces.action_arrows import ACTION_LETTERS, link_pair_index
+from planar.drawing.forces.action_arrows import ActionSymbol, action_symbols, reaction_symbols
 from planar.dynamics.forces import forces
 from planar.dynamics.lagrangian import LagrangianFunctions
 from planar.dynamics.load_attachment import attachment_remarks
@@ -97,9 +98,8 @@ def force_data(mechanism: Mechanism, d: ca.SX, state: State, unit: float) -> tup
         "timed": any(load.varies is not None and load.varies.input is None for load in mechanism.loads),
         "untold": _undetermined_sentences(state),
         "choices": list(attachment_remarks(mechanism)),
-        "letters": ACTION_LETTERS,
-        "indices": _index_data(mechanism),
     }
+    data["symbols"] = _symbol_data(mechanism, data)
     data["inertia"] = rows.add(work.inertia.T)[0]
     table = ca.vertcat(*rows.rows)
     data["row"], data["column"] = (list(each) for each in table.sparsity().get_triplet())
@@ -109,15 +109,23 @@ def force_data(mechanism: Mechanism, d: ca.SX, state: State, unit: float) -> tup
     return data, write_javascript("balance", ca.Function("balance", given, [told]))
 
 
-def _index_data(mechanism: Mechanism) -> dict[str, dict[str, str]]:
-    """The index of what each link feels of the other in a pair, by pair and link."""
+def _symbol_data(mechanism: Mechanism, data: Mapping[str, Any]) -> dict[str, Any]:
+    """The letters of force and couple, each with its index, by kind, name and link that feels them."""
     number = link_numbers(mechanism)
-    return {
-        pair.name: {
-            link: link_pair_index(number[link], number[other]) for link, other in (pair.links, pair.links[::-1])
-        }
-        for pair in mechanism.pairs
-    }
+    found: dict[str, Any] = {"reaction": {}}
+    for pair in mechanism.pairs:
+        felt = {link: reaction_symbols(number[link], number[other]) for link, other in permutations(pair.links)}
+        found["reaction"][pair.name] = {link: _plain_symbols(both) for link, both in felt.items()}
+    inputs = [("input", given["pair"], (given["on"], given["against"])) for given in data["inputs"]]
+    acting = [(each["kind"], each["name"], [link for link, _ in each["on"]]) for each in data["acting"]]
+    for kind, name, links in (*inputs, *acting):
+        of = found.setdefault(kind, {}).setdefault(name, {})
+        of |= {link: _plain_symbols(action_symbols(kind, name, link, number)) for link in links}
+    return found
+
+
+def _plain_symbols(symbols: Iterable[ActionSymbol]) -> list[tuple[str, str]]:
+    return [(each.base, each.index) for each in symbols]
 
 
 def _pair_data(pair: Pair, rows: BalanceRows, held: list[int]) -> dict[str, Any]:

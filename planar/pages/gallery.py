@@ -16,6 +16,7 @@ from planar.foundation.safe_files import save_file, write_error
 from planar.model.mechanism import Mechanism
 from planar.pages.drawing_style import pen_styles, symbol_script
 from planar.pages.gallery_kinds import KINDS, kind_and_search_text
+from planar.pages.overlay_style import round_value_script
 from planar.pages.page import fill_template, page, script_safe_json
 from planar.pages.page_data import fixed_drawing_data
 from planar.results.motion import Motion
@@ -78,7 +79,7 @@ def index_page(shown: list[dict[str, Any]]) -> str:
     kinds = [(kind, own) for kind, own in kinds if own]
     links = "".join(f'<a href="#kind-{KINDS.index(kind)}">{escape(kind)}</a> ' for kind, _ in kinds)
     title = escape(f"{len(shown)} mechanisms" if len(shown) != 1 else "1 mechanism")
-    scripts = "\n".join([symbol_script(), *map(read_asset, SCRIPTS)])
+    scripts = "\n".join([symbol_script(), round_value_script(), *map(read_asset, SCRIPTS)])
     styles = "\n".join([*map(read_asset, STYLES), pen_styles()]).replace("#drawing", ".small")  # a page has one drawing
     parts = {
         "title": title,

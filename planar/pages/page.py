@@ -12,6 +12,7 @@ from planar.document.files import read_asset
 from planar.model.mechanism import Mechanism
 from planar.pages.drawing_style import pen_styles, symbol_script
 from planar.pages.notebook import pack_scripts
+from planar.pages.overlay_style import overlay_script, overlay_styles
 from planar.pages.page_data import page_data
 from planar.pages.still_picture import still_svg
 
@@ -84,8 +85,8 @@ def page(
     """
     data, functions = page_data(mechanism, z)
     data["window"], data["layers"] = window and window._asdict(), layers
-    styles = "\n".join([*map(read_asset, STYLES), pen_styles()])
-    scripts = "\n".join([symbol_script(), *map(read_asset, SCRIPTS)])
+    styles = "\n".join([overlay_styles(), *map(read_asset, STYLES), pen_styles()])
+    scripts = "\n".join([symbol_script(), overlay_script(), *map(read_asset, SCRIPTS)])
     start = f"{functions}\n{START_SCRIPT}"
     if library is not None:
         key, carrying = pack_scripts(styles, scripts)

@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import islice
 from typing import Any
 
 import numpy as np
 
-from planar.analysis.centres.centres import extent
 from planar.analysis.centres.centrodes import usual_links
-from planar.analysis.centres.pair_centres import primary_centres
-from planar.analysis.polygons.lettering import PARTS, PRIME, legend, small_letters
-from planar.analysis.rate_equations import rate_equations
-from planar.analysis.rich_text import with_double_primes
 from planar.assemblies.circuits.circuits import circuits
 from planar.assemblies.modes import modes
 from planar.codegen.javascript import write_javascript
 from planar.document.dimensions import Dimension, change_dimension
-from planar.drawing.centres.circle_diagram import circle_radius, link_points
 from planar.drawing.scheme.link_bodies import RELATIVE_TOLERANCE, LinkBody, all_marks, bodies_of_points, largest_span
 from planar.drawing.scheme.springs_masses import SpringMassMark
 from planar.equations.constraint_equations import slice_length
@@ -31,11 +25,12 @@ from planar.model.mechanism import Mechanism, links_counting_turns, named_points
 from planar.model.pairs import MeasureKind, Pair
 from planar.model.pairs.symbols import DrawingMark, PinMark
 from planar.model.wording import amount
+from planar.pages.centre_data import centre_data
 from planar.pages.column_data import column_heads, reported_function, uncounted_angles
 from planar.pages.dimension_numbers import DimensionNumbers
 from planar.pages.document_data import dimension_words, document_data, is_positive_length
 from planar.pages.force_data import force_data
-from planar.results.motion import State
+from planar.pages.polygon_data import polygon_data
 from planar.solving.position import PositionSolver, solved_mechanism
 from planar.solving.rest_position import rest_position
 
@@ -62,7 +57,6 @@ def page_data(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[s
     known = solved_mechanism(mechanism)
     solver, z = known.solver, known.assembly.z if z is None else z
     e, program, state = solver.equations, solver.functions, rest_position(mechanism)
-    named = {member: name for name, members in named_points(mechanism) for member in members}
     numbers = DimensionNumbers(mechanism)
     measured = [
         value
@@ -73,7 +67,8 @@ def page_data(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[s
     ]
     for value in measured:
         numbers.add(value)
-    data = drawing_data(mechanism, numbers) | {
+    drawn = drawing_data(mechanism, numbers)
+    data = drawn | {
         "name": mechanism.name,
         "about": mechanism.about,
         "units": _unit_data(mechanism),
@@ -107,9 +102,8 @@ def page_data(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[s
         "dimensions": [_dimension_data(mechanism, each, solver.unit) for each in numbers.dimensions],
         "numbers": link_numbers(mechanism),
         "counting": sorted(links_counting_turns(mechanism)),
-        "centred": _pair_centres(state),
-        "circle": _circle_data(mechanism),
-        **_lettered(mechanism, named),
+        "centres": centre_data(state, drawn["points"]),
+        "polygons": polygon_data(mechanism, drawn["points"]),
         "rolling": list(usual_links(mechanism)) if len(mechanism.links) > 1 else None,
         "document": document_data(mechanism, numbers.dimensions),
         "columns": column_heads(mechanism, solver),
@@ -132,29 +126,6 @@ def page_data(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[s
     functions.append(acting[1] if acting else "const balance=null;")
     functions.append(f"const program={{sizes,positions,kinematics,reported,balance,stages:[{stages}]}};")
     return data, "\n".join(functions)
-
-
-def _lettered(mechanism: Mechanism, named: Mapping[tuple[str, str], str]) -> dict[str, Any]:
-    """The letters of polygons: of points, of guides' own points below what slides on them, and what they stand for.
-
-    `rides` has for each slide the point that slides, the link with its guide, and that link's point's letter.
-    """
-    letters = small_letters(each.name for each in named_points(mechanism))
-    taken, rides, below = set(letters.values()), [], {}
-    for rider, guide in filter(None, (pair.point_on_line() for pair in mechanism.pairs)):
-        point = named[rider]
-        own = None
-        if guide != mechanism.frame:
-            own = letters[point] + PRIME
-            while with_double_primes(own) in taken:
-                own += PRIME
-            own = with_double_primes(own)
-            taken.add(own)
-            below[own] = guide, point
-        rides.append([point, guide, own])
-    kinds = {"velocity": 1, "acceleration": 2}
-    legends = {kind: legend(order, below, mechanism.frame, parts=False) for kind, order in kinds.items()}
-    return {"letters": letters, "rides": rides, "legends": legends | {"parts": PARTS}}
 
 
 def drawing_data(mechanism: Mechanism, numbers: DimensionNumbers) -> dict[str, Any]:
@@ -209,17 +180,6 @@ def fixed_drawing_data(mechanism: Mechanism) -> tuple[dict[str, Any], list[float
     """What a drawing needs whose dimensions stay as they are, and the numbers themselves."""
     numbers = DimensionNumbers(mechanism, live=False)
     return drawing_data(mechanism, numbers), [float(each) for each in numbers.values]
-
-
-def _circle_data(mechanism: Mechanism) -> dict[str, list[float]]:
-    """Where links stand in the circle diagram, in the order of their numbers, in parts of its radius."""
-    numbers = link_numbers(mechanism)
-    return {link: [x / circle_radius(len(numbers)) for x in at] for link, at in link_points(numbers).items()}
-
-
-def _pair_centres(state: State) -> list[list[str]]:
-    """Every two links whose instantaneous centre a pair of theirs shows."""
-    return [sorted(two) for two in primary_centres(rate_equations(state), *extent(state)).centres]
 
 
 def _input_data(given: Any, slides: bool) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from planar.model.mechanism import NamedPoint
 GUIDE_LETTERS = ("G", "H", "K", "S", "X")
 """What the fixed point below a slider is called; the first that is no point's own name."""
 PRIME = "′"
-PARTS = "other indices: ends of their parts"
+PART_ENDS_NOTE = "other indices: ends of their parts"
 """Of accelerations."""
 
 
@@ -36,7 +36,7 @@ def legend(order: int, below: Mapping[str, tuple[str, str]], frame: str, parts: 
     """
     found = []
     if order == 2:
-        found.append("index 1: accelerations of points" + (f"; {PARTS}" if parts else ""))
+        found.append("index 1: accelerations of points" + (f"; {PART_ENDS_NOTE}" if parts else ""))
     links: dict[str, list[str]] = {}
     for letter, (link, _) in below.items():
         links.setdefault(link, []).append(letter)

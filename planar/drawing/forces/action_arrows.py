@@ -23,8 +23,9 @@ SIMPLE_INDEX = re.compile(r"[A-Za-z0-9,: ]+")
 ACTION_PENS = {"input": Pen.LOAD, "inertia": Pen.INERTIA, "load": Pen.LOAD, "spring": Pen.LOAD, "weight": Pen.LOAD}
 MASS_ACTIONS = ("weight", "inertia")
 """What acts at a centre of mass."""
+REACTION_LETTERS = ("F", "M")
 ACTION_LETTERS = {"load": ("P", "M"), "weight": ("W", "W"), "spring": ("S", "S"), "input": ("F", "T")}
-"""Of the force and of the couple that each kind of action is."""
+"""Of the force and of the couple that a pair exerts, and that each kind of action is."""
 
 
 class ActionSymbol(NamedTuple):
@@ -97,6 +98,13 @@ def link_pair_index(link: str, other: str) -> str:
     return ("," if len(link + other) > 2 else "").join((link, other))
 
 
+def reaction_symbols(link: str, other: str) -> tuple[ActionSymbol, ActionSymbol]:
+    """The letters of the force and of the couple that a link feels of another, by their numbers."""
+    index = link_pair_index(link, other)
+    force, couple = REACTION_LETTERS
+    return ActionSymbol(force, index), ActionSymbol(couple, index)
+
+
 def _reaction_arrows(forces: Forces, link: str, number: Mapping[str, str]) -> Iterator[ActionArrow]:
     for name, pair in forces.reactions.items():
         if pair.couples:
@@ -107,16 +115,16 @@ def _reaction_arrows(forces: Forces, link: str, number: Mapping[str, str]) -> It
             continue
         first, second = pair.links
         sense, other = (1.0, first) if link == second else (-1.0, second)
-        index = link_pair_index(number[link], number[other])
-        yield ActionArrow(ActionSymbol("F", index), Pen.REACTION, pair.at, sense * np.asarray(pair.force))
-        yield ActionArrow(ActionSymbol("M", index), Pen.REACTION, pair.at, couple=sense * float(pair.couple))
+        force, couple = reaction_symbols(number[link], number[other])
+        yield ActionArrow(force, Pen.REACTION, pair.at, sense * np.asarray(pair.force))
+        yield ActionArrow(couple, Pen.REACTION, pair.at, couple=sense * float(pair.couple))
 
 
 def _load_arrows(forces: Forces, link: str, number: Mapping[str, str]) -> Iterator[ActionArrow]:
     for each in forces.acting:
         if each.link != link:
             continue
-        force, couple = _action_symbols(each, number)
+        force, couple = _symbols_of_action(each, number)
         pen, massive = ACTION_PENS[each.kind], each.kind in MASS_ACTIONS
         yield ActionArrow(force, pen, np.asarray(each.at), np.asarray(each.force), at_mass_centre=massive)
         driven = forces.reactions.get(each.name) if each.kind == "input" else None
@@ -124,14 +132,20 @@ def _load_arrows(forces: Forces, link: str, number: Mapping[str, str]) -> Iterat
         yield ActionArrow(couple, pen, at, couple=float(each.couple))
 
 
-def _action_symbols(acting: ExternalAction, number: Mapping[str, str]) -> tuple[ActionSymbol, ActionSymbol]:
-    """The letters of the force and of the couple of an action."""
+def _symbols_of_action(acting: ExternalAction, number: Mapping[str, str]) -> tuple[ActionSymbol, ActionSymbol]:
+    """The letters of the force and of the couple of an action, or of inertia."""
     own = number[acting.link]
     if acting.kind == "inertia":
         return ActionSymbol("-ma", own), ActionSymbol("-Iα", own)
-    index = {"weight": own, "spring": acting.name.removeprefix("spring ")}.get(acting.kind, acting.name)
-    force, couple = ACTION_LETTERS[acting.kind]
-    return ActionSymbol(force, index), ActionSymbol(couple, own if acting.name == acting.link else index)
+    name = acting.name.removeprefix("spring ") if acting.kind == "spring" else acting.name
+    return action_symbols(acting.kind, name, acting.link, number)
+
+
+def action_symbols(kind: str, name: str, link: str, number: Mapping[str, str]) -> tuple[ActionSymbol, ActionSymbol]:
+    """The letters of the force and of the couple of a load, weight, input or spring (its number) on a link."""
+    index = number[link] if kind == "weight" else name
+    force, couple = ACTION_LETTERS[kind]
+    return ActionSymbol(force, index), ActionSymbol(couple, number[link] if name == link else index)
 
 
 def _magnitude_at_arm(push: ActionArrow, arm: float) -> float:

@@ -17,6 +17,10 @@ ROUND_DIGITS = (1.0, 2.0, 5.0, 10.0)
 DECIMAL_STEPS = (1.0, 2.0, 5.0)
 DEGREE_STEPS = (1.0, 2.0, 3.0, 4.5, 6.0, 9.0, 1.5)
 """First digits of the step between two numbers of an axis."""
+SCREEN_DIGITS = (1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)
+"""First digits of a scale on a screen, where room is short and nobody lays a ruler on."""
+ROUND_SLACK = 1e-9
+"""A part by which something may be more than what fits: what fits exactly fits."""
 LARGE_PREFIXES = (("G", 1e9), ("M", 1e6), ("k", 1e3))
 PREFIX_THRESHOLD, MILLI_THRESHOLD = 10.0, 0.01
 """A force or a couple is said in the next larger unit from so many of these on, below so many in thousandths."""
@@ -62,8 +66,7 @@ def round_scale(
     if not isfinite(per_cm) or per_cm <= 0.0:
         return Scale(kind, size.to_si(1.0) / 10.0, unit_name)
     power = 10.0 ** floor(log10(per_cm))
-    # a hair of slack, so that what fits exactly fits
-    first = next(digit for digit in ROUND_DIGITS if digit * power >= per_cm * (1.0 - 1e-9))
+    first = next(digit for digit in ROUND_DIGITS if digit * power >= per_cm * (1.0 - ROUND_SLACK))
     return Scale(kind, size.to_si(first * power) / 10.0, unit_name)
 
 
@@ -71,7 +74,12 @@ def round_step(least: float, first_digits: Sequence[float] = DECIMAL_STEPS) -> f
     """The smallest step of the form first * 10^k that is not below the least."""
     power = 10.0 ** (floor(log10(least)) - 1)
     steps = sorted(first * power * more for first in first_digits for more in (1.0, 10.0, 100.0))
-    return next(step for step in steps if step >= least * (1.0 - 1e-9))
+    return next(step for step in steps if step >= least * (1.0 - ROUND_SLACK))
+
+
+def round_values(first_digits: Sequence[float], powers: range) -> list[float]:
+    """All values of the form first * 10^k with k among the powers, rising."""
+    return sorted({float(f"{first:g}e{power}") for first in first_digits for power in powers})
 
 
 def choose_prefix(value: float) -> tuple[str, float]:

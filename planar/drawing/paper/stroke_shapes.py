@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from math import ceil, cos, degrees, hypot, pi, radians, sin, sqrt
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -55,19 +55,30 @@ def check_finite(mark: Polyline | Arrow | Circle | Label) -> None:
 
 
 def arrow_head(tail: PaperPoint, tip: PaperPoint, length_available: float) -> ArrowHead | None:
-    """The head at the tip of a line that comes from the tail and is `room` long (mm), or none where that is zero."""
+    """The head at the tip of a line that comes from the tail and is so long (mm), or none where that is zero."""
     x, y = tip[0] - tail[0], tip[1] - tail[1]
     far = hypot(x, y)
     if far < 1e-9 or length_available < 1e-9:
         return None
-    x, y = x / far, y / far
-    length = min(ARROW_HEAD_LENGTH, length_available / 2.0)
+    return head_of_length(tip, (x / far, y / far), head_length(length_available))
+
+
+def head_length(length_available: Any, mm: Any = 1.0, least: Callable[[Any, Any], Any] = min) -> Any:
+    """How long the head of a line is that is so long, where a millimetre of paper has so many units.
+
+    It takes numbers, or symbols with their `least`.
+    """
+    return least(ARROW_HEAD_LENGTH * mm, length_available / 2.0)
+
+
+def head_of_length(tip: Sequence[Any], direction: Sequence[Any], length: Any) -> ArrowHead:
+    """The head so long at a tip, where its line comes in a unit direction: of numbers, or of symbols."""
+    x, y = direction[0], direction[1]
     half = length * ARROW_HEAD_WIDTH / ARROW_HEAD_LENGTH / 2.0
     foot = tip[0] - length * x, tip[1] - length * y
     barbs = (foot[0] - half * y, foot[1] + half * x), (foot[0] + half * y, foot[1] - half * x)
-    return ArrowHead(
-        (tip, *barbs), (tip[0] - LINE_END_IN_HEAD * length * x, tip[1] - LINE_END_IN_HEAD * length * y), 1.2 * half
-    )
+    line_end = tip[0] - LINE_END_IN_HEAD * length * x, tip[1] - LINE_END_IN_HEAD * length * y
+    return ArrowHead(((tip[0], tip[1]), *barbs), line_end, 1.2 * half)
 
 
 def sweep_angle(circle: Circle) -> float:
@@ -88,7 +99,7 @@ def arc_arrow_head(circle: Circle) -> tuple[ArrowHead, float, float] | None:
     room = radius * radians(turn)
     if not circle.arrow_end or room < 1e-9:
         return None
-    back = degrees(min(ARROW_HEAD_LENGTH, room / 2.0) / radius)
+    back = degrees(head_length(room) / radius)
     start, stop = circle.start, circle.start + turn
     if circle.arrow_end > 0:
         made = arrow_head(point_on_circle(circle, stop - back), point_on_circle(circle, stop), room)

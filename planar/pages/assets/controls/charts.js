@@ -2,11 +2,6 @@
 /* Diagrams under the drawing, over the range of the input: one for each quantity, with a line for each point or link
    chosen, and a marker that runs along. A press in a diagram takes the mechanism there. */
 
-const SERIES = 6;        // colours of lines
-const DEGREES = [1, 2, 5, 10, 15, 30, 45, 60, 90, 180, 360, 720]; // between numbers of an axis
-const HEIGHT = 240;      // px
-const PAPER = 660;       // px: the width of a diagram that fits any paper
-
 /** Quantities over the course of points, links and inputs: {key, label, unit, kind, of(columns)}. */
 const DIAGRAMS = [
   { key: "x", label: "x", unit: "length", kind: "point", of: (c, i) => c.x[i] },
@@ -107,19 +102,20 @@ class Charts {
     const style = getComputedStyle(document.documentElement), colour = (name) => style.getPropertyValue(name).trim();
     const [from, to] = [course.inputs[0], course.inputs[course.count - 1]].map((each) => inputTold(page, each, k));
     const figure = htmlPart("figure", { "aria-label": `${label} of ${names.join(", ")} over ${pair}, from ${from} to ${to}` }, place);
-    const em = parseFloat(getComputedStyle(document.body).fontSize) / 16, font = `${12 * em}px system-ui, sans-serif`;
+    const em = parseFloat(getComputedStyle(document.body).fontSize) / 16, { font: size, head, axes: [below, beside], line: wide, dash } = CHART;
+    const font = `${size * em}px system-ui, sans-serif`;
     const line = { stroke: colour("--line"), width: 1 };
     const values = (_, splits) => splits.map((each) => (each === null ? "" : short(each)));
-    const axis = { font, labelFont: `600 ${font}`, labelSize: 24 * em, stroke: colour("--ink"), grid: line, ticks: line, values };
+    const axis = { font, labelFont: `600 ${font}`, labelSize: head * em, stroke: colour("--ink"), grid: line, ticks: line, values };
     const plot = new uPlot({
-      width: this.width(), height: HEIGHT,
+      width: this.width(), height: CHART.height,
       scales: { x: { time: false, range: [xs[0], xs[xs.length - 1]] }, y: { range: () => made.limits } },
       axes: [
-        { ...axis, size: 34 * em, label: `${pair}, ${inputUnit}`, incrs: inputUnit === "deg" ? DEGREES : undefined },
-        { ...axis, size: 64 * em, label: `${label}, ${unitName}` },
+        { ...axis, size: below * em, label: `${pair}, ${inputUnit}`, incrs: inputUnit === "deg" ? DEGREE_VALUES : STEP_VALUES },
+        { ...axis, size: beside * em, label: `${label}, ${unitName}`, incrs: STEP_VALUES },
       ],
       series: [{}, ...names.map((_, i) => ({
-        stroke: colour(`--series${i % SERIES}`), width: 2, dash: i < SERIES ? undefined : [6, 4], points: { show: false },
+        stroke: colour(`--series${i % SERIES}`), width: wide, dash: i < SERIES ? undefined : dash, points: { show: false },
       }))],
       legend: { show: false },
       cursor: { drag: { x: false, y: false }, sync: { key: "motion" } },
@@ -150,11 +146,11 @@ class Charts {
   }
 
   /** Of a diagram, px. */
-  width() { return this.printed ? PAPER : Math.max(280, Math.floor(this.place.clientWidth)); }
+  width() { return this.printed ? CHART.printed : Math.max(CHART.narrowest, Math.floor(this.place.clientWidth)); }
 
   fit() {
     const width = this.width();
-    for (const { plot } of this.charts) if (this.place.clientWidth && plot.width !== width) plot.setSize({ width, height: HEIGHT });
+    for (const { plot } of this.charts) if (this.place.clientWidth && plot.width !== width) plot.setSize({ width, height: CHART.height });
     this.mark();
   }
 
@@ -194,10 +190,11 @@ function rangeOf(lines, least) {
   for (const line of lines) for (const each of line) if (Number.isFinite(each)) [low, high] = [Math.min(low, each), Math.max(high, each)];
   if (!(high >= low)) return [0, 1];
   // what stands still but for rounding is a straight line in the middle
-  const room = Math.max(0.06 * (high - low), 1e-9 * least, 1e-9 * Math.max(Math.abs(low), Math.abs(high)), 1e-12);
-  if (high - low < 1e-9 * Math.max(Math.abs(low), Math.abs(high), least)) {
-    const wide = 0.1 * (Math.abs(low) || 1);
+  const { flat, half, room: part, near_zero: near } = AXIS, most = Math.max(Math.abs(low), Math.abs(high));
+  const room = Math.max(part * (high - low), flat * least, flat * most, 1e-12);
+  if (high - low < flat * Math.max(most, least)) {
+    const wide = half * (Math.abs(low) || 1);
     return [low - wide, high + wide];
   }
-  return [low >= 0 && low < 0.3 * high ? 0 : low - room, high <= 0 && high > 0.3 * low ? 0 : high + room];
+  return [low >= 0 && low < near * high ? 0 : low - room, high <= 0 && high > near * low ? 0 : high + room];
 }

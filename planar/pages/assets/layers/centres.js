@@ -1,12 +1,7 @@
 "use strict";
-/* Instantaneous centres of every two links, from the links' rates: where both have one velocity. The letters are those
+/* Instantaneous centres of every two links, from the links' rates: where both have one velocity. Their letters are those
    of `planar centres`; a centre picked shows the lines of Kennedy's theorem on which it lies, and its chord in the
    circle diagram beside. */
-
-const AT_INFINITY = 1e-9;     // of the size: a turning this small beside the sliding has its centre at infinity
-const TOGETHER = 1e-9;        // of the greatest motion: links that move as one have no centre
-const ALL_SHOWN = 36;         // of more centres than that only those of one link are shown, unless all are asked for
-const CIRCLE = [260, 260, 96]; // px: the circle diagram and its radius
 
 /** The motion of every link as [ux, uy, w], velocity (ux − w y, uy + w x) at (x, y); null where not determined. */
 function motionsOf(frames, data) {
@@ -23,8 +18,8 @@ function motionsOf(frames, data) {
 /** Where two motions are one: homogeneous [x, y, w], w = 0 at infinity; null where both are one altogether. */
 function poleOf(a, b, size, greatest) {
   const [x, y, w] = b.map((each, k) => each - a[k]), slide = Math.hypot(x, y);
-  if (Math.max(slide / size, Math.abs(w)) <= TOGETHER * greatest) return null;
-  return Math.abs(w) * size <= AT_INFINITY * slide ? [-y, x, 0] : [-y, x, w];
+  if (Math.max(slide / size, Math.abs(w)) <= AS_ONE_RATIO * greatest) return null;
+  return Math.abs(w) * size <= INFINITY_RATIO * slide ? [-y, x, 0] : [-y, x, w];
 }
 
 /** The greatest motion of a link: how fast it turns, or would turn at the size's distance. */
@@ -32,52 +27,30 @@ function greatestOf(motions, size) {
   return Math.max(...Object.values(motions).map(([x, y, w]) => Math.max(Math.hypot(x, y) / size, Math.abs(w))));
 }
 
-/** All centres: {links, numbers, name, at}, in the order of the numbers. */
+/** All centres that the page carries, each with where it is (`at`); null where motions are not determined. */
 function centresOf(page, frames) {
   const { data } = page, motions = motionsOf(frames, data);
   if (motions === null) return null;
-  const order = [...data.links].sort((a, b) => data.numbers[a] - data.numbers[b]);
   const greatest = greatestOf(motions, data.size);
-  const found = [], centred = new Set(data.centred.map((links) => JSON.stringify([...links].sort())));
-  order.forEach((a, i) => order.slice(i + 1).forEach((b) => {
-    const numbers = [data.numbers[a], data.numbers[b]];
-    // a comma parts the numbers where one of all has two digits
-    const name = numbers.join(order.some((link) => data.numbers[link].length > 1) ? "," : "");
-    const shown = centred.has(JSON.stringify([a, b].sort()));
-    const at = poleOf(motions[a], motions[b], data.size, greatest) ?? (shown ? pinOf(page, a, b) : null);
-    found.push({ links: [a, b], name, at, shown });
-  }));
-  return found;
-}
-
-/** The point that both links have, be it that they move as one just now; null where there is none. */
-function pinOf(page, a, b) {
-  const name = Object.keys(page.data.points).find((each) => [a, b].every((link) => page.data.points[each].links.includes(link)));
-  return name === undefined ? null : [...page.point(name).position, 1];
-}
-
-/** Two lines of centres on which a centre lies: [[centre, centre], ...], those first that pairs show. */
-function kennedyLines(all, centre, data) {
-  const [a, b] = centre.links, of = (one, other) => all.find(({ links }) => links.includes(one) && links.includes(other));
-  const found = [];
-  for (const c of data.links) {
-    if (c === a || c === b) continue;
-    const two = [of(a, c), of(b, c)];
-    if (two.some((each) => each.at === null)) continue;
-    // unit vectors of the projective plane in the mechanism's size: centres that coincide give no line
-    const [p, q] = two.map(({ at: [x, y, w] }) => {
-      const length = Math.hypot(x, y, w * data.size);
-      return [x / length, y / length, (w * data.size) / length];
-    });
-    const line = [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]], sine = Math.hypot(...line);
-    if (sine > 1e-6) found.push({ two, through: c, line: line.map((each) => each / sine), rank: two.filter((each) => each.shown).length });
-  }
-  found.sort((one, other) => other.rank - one.rank);
-  const second = found.slice(1).find(({ line: [x, y, z] }) => {
-    const [u, v, w] = found[0].line;
-    return Math.hypot(y * w - z * v, z * u - x * w, x * v - y * u) > 1e-3;
+  return data.centres.all.map((each) => {
+    const at = poleOf(...each.links.map((link) => motions[link]), data.size, greatest);
+    // links that move as one just now turn about the point that both have, where a pair shows it
+    return { ...each, at: at ?? (each.shown && each.point !== null ? [...page.point(each.point).position, 1] : null) };
   });
-  return found.length ? [found[0], ...(second ? [second] : [])] : [];
+}
+
+/** Of the lines of centres on which a centre lies the first two that cross: [[centre, centre], ...]. */
+function kennedyLines(all, centre, { size }) {
+  const found = [];
+  // unit vectors of the projective plane in the mechanism's size: centres that coincide give no line
+  const unit = (vector) => { const length = Math.hypot(...vector); return [vector.map((each) => each / length), length]; };
+  const cross = ([a, b, c], [x, y, z]) => [b * z - c * y, c * x - a * z, a * y - b * x];
+  for (const two of centre.lines.map((line) => line.map((k) => all[k]))) {
+    if (found.length === 2 || two.some((each) => each.at === null)) continue;
+    const [line, sine] = unit(cross(...two.map(({ at: [x, y, w] }) => unit([x, y, w * size])[0])));
+    if (sine > LEAST_SINES.apart && found.every((each) => Math.hypot(...cross(each.line, line)) > LEAST_SINES.crossing)) found.push({ two, line });
+  }
+  return found;
 }
 
 const centres = {
@@ -86,10 +59,9 @@ const centres = {
   beside(layers, part) {
     const { page } = layers, { data } = page;
     htmlPart("h2", {}, part, "Circle diagram");
-    const svg = svgPart("svg", { viewBox: `0 0 ${CIRCLE[0]} ${CIRCLE[1]}`, role: "img", "aria-label": "circle diagram" }, part);
-    const which = chooser(part, "Centres", [["all", "all"], ...byNumber(data).map((link) => [link, `of ${numberAndName(data, link)}`])]);
-    const many = (data.links.length * (data.links.length - 1)) / 2 > ALL_SHOWN;
-    which.value = many ? data.frame : "all";
+    const svg = svgPart("svg", { viewBox: `0 0 ${CIRCLE_SHEET.size.join(" ")}`, role: "img", "aria-label": "circle diagram" }, part);
+    const which = chooser(part, "Centres", [["all", "all"], ...data.centres.links.map(({ link, label }) => [link, `of ${label}`])]);
+    which.value = data.centres.all.length > MAX_CENTRES ? data.frame : "all";
     const pick = chooser(part, "Lines of Kennedy's theorem for", []);
     for (const each of [which, pick]) each.addEventListener("change", () => layers.draw());
     this.state = { which, pick, svg, all: null, picked: null, lines: [], places: [], drawn: "", told: "" };
@@ -119,7 +91,7 @@ const centres = {
       state.places.push([each.name, place]);
     }
     for (const { place, names, outside, away } of drawn.values()) {
-      ink.letter(place, names.map((name, k) => [k ? ", I" : "I", name]), "letter centre", { told: outside, away });
+      ink.letter(place, fewNames(names, CENTRE_NAMES).map((name, k) => [`${k ? ", " : ""}${name === "…" ? name : "I"}`, name === "…" ? "" : name]), "letter centre", { told: outside, away });
     }
     if (picked === null) return "";
     const lines = state.lines.map(({ two }) => two.map(({ name }) => `I${name}`).join(" "));
@@ -137,7 +109,7 @@ function standardFrames(page) {
 
 /** A centre as a dot where a pair shows it, else a ring; one beyond the picture as an arrow at its edge. Where that is. */
 function drawCentre(ink, layers, room, { name, at, shown }, drawn, picked) {
-  const [x, y, w] = at, middle = [(room[0] + room[2]) / 2, (room[1] + room[3]) / 2], edge = 30 * ink.unit;
+  const [x, y, w] = at, middle = [(room[0] + room[2]) / 2, (room[1] + room[3]) / 2], edge = CENTRE_ARROW.margin * ink.mm;
   const there = w === 0 ? null : layers.at([x / w, y / w]);
   const inside = there !== null && there[0] > room[0] && there[0] < room[2] && there[1] > room[1] && there[1] < room[3];
   const add = (key, place, outside, away) => {
@@ -146,9 +118,9 @@ function drawCentre(ink, layers, room, { name, at, shown }, drawn, picked) {
     return true;
   };
   if (inside) {
-    const key = there.map((each) => Math.round(each / ink.unit / 2)).join();
+    const key = there.map((each) => Math.round(each / 2)).join();
     if (add(key, there, "", null)) {
-      ink.dot(there, shown ? 3.5 : 4.5, `centre ${shown ? "shown" : "found"}${picked ? " picked" : ""}`);
+      ink.dot(there, CENTRE_RADII[shown ? "shown" : "found"], `centre ${shown ? "shown" : "found"}${picked ? " picked" : ""}`);
       ink.keepClear(there, 5);
     }
     return there;
@@ -156,10 +128,10 @@ function drawCentre(ink, layers, room, { name, at, shown }, drawn, picked) {
   const start = w === 0 ? layers.at([0, 0]) : middle, along = (there ?? layers.at([x, y])).map((each, k) => each - start[k]);
   const length = Math.hypot(...along), [dx, dy] = along.map((each) => each / length);
   const reach = Math.min(...[[dx, 0], [dy, 1]].map(([d, k]) => (d ? (room[k + 2] - room[k] - 2 * edge) / 2 / Math.abs(d) : Infinity)));
-  const tip = [middle[0] + dx * reach, middle[1] + dy * reach], tail = [tip[0] - 22 * ink.unit * dx, tip[1] - 22 * ink.unit * dy];
+  const tip = [middle[0] + dx * reach, middle[1] + dy * reach], tail = [dx, dy].map((each, k) => tip[k] - CENTRE_ARROW.length * ink.mm * each);
   const { page } = layers, beyond = there === null ? 0 : Math.hypot(there[0] - tip[0], there[1] - tip[1]) / page.view.scale;
   const far = w === 0 ? " at ∞" : ` at ${lengthTold(page, beyond)}`;
-  const key = `${tip.map((each) => Math.round(each / ink.unit / 6)).join()}${far}`;
+  const key = `${tip.map((each) => Math.round(each / 6)).join()}${far}`;
   if (add(key, tail, far, [-dx, -dy])) ink.arrow(tail, tip, `arrow centre${picked ? " picked" : ""}`);
   return tip;
 }
@@ -176,7 +148,9 @@ function drawLine(ink, layers, room, three) {
   }
   const along = [0, 1].map((axis) => finite[finite.length - 1][axis] - finite[0][axis]);
   const order = finite.sort((a, b) => (a[0] - b[0]) * along[0] + (a[1] - b[1]) * along[1]);
-  ink.line([order[0], order[order.length - 1]].map((each) => within(each, order, size * 50)), "kennedy");
+  const ends = [order[0], order[order.length - 1]].map((each) => within(each, order, size * 50));
+  const way = [0, 1].map((axis) => ends[1][axis] - ends[0][axis]), over = (LINE_OVERHANG * ink.mm) / Math.hypot(...way);
+  ink.line(ends.map((end, k) => end.map((each, axis) => each + (k ? over : -over) * way[axis])), "kennedy");
 }
 
 /** A place that is not absurdly far for a screen's numbers. */
@@ -197,27 +171,19 @@ function drawCircle(page, state) {
   if (state.drawn === drawn) return state.told;
   state.drawn = drawn;
   svg.replaceChildren();
-  const { data } = page, order = byNumber(data), [width, height, radius] = CIRCLE;
-  const at = new Map(Object.entries(data.circle).map(([link, [x, y]]) => [link, [width / 2 + radius * x, height / 2 - radius * y]]));
-  const ink = new Ink(svg, 1);
-  ink.dot([width / 2, height / 2], radius, "circle");
+  const { links } = page.data.centres, { size: [width, height], radius, number } = CIRCLE_SHEET;
+  const spot = ([x, y], far) => [width / 2 + far * x, height / 2 - far * y], size = LETTER.height;
+  const at = new Map(links.map(({ link, place }) => [link, spot(place, radius)]));
+  const ink = new Ink(svg, PANEL_MM);
+  ink.dot([width / 2, height / 2], radius / PANEL_MM, "circle");
   for (const each of known) ink.line(each.links.map((link) => at.get(link)), `chord ${each.shown ? "shown" : "found"}${kind(each)}`);
-  for (const [link, [x, y]] of at) {
-    ink.dot([x, y], 3, "place");
-    const by = 1 + 14 / radius;
-    const [X, Y] = [width / 2 + (x - width / 2) * by, height / 2 + (y - height / 2) * by + 0.35 * LETTER];
-    svgPart("text", { x: X, y: Y, "text-anchor": "middle", "font-size": LETTER, class: "letter" }, svg, data.numbers[link]);
+  for (const { link, place, number: name } of links) {
+    ink.dot(at.get(link), 2 * DOT_RADIUS, "place");
+    const [x, y] = spot(place, radius + number);
+    svgPart("text", { x, y: y + 0.35 * size, "text-anchor": "middle", "font-size": size, class: "letter" }, svg, name);
   }
-  const links = order.map((link) => numberAndName(data, link)).join(", ");
-  state.told = `${known.length} centres; full chords: shown by pairs. Links: ${links}`;
+  state.told = `${known.length} centres; full chords: shown by pairs. Links: ${links.map(({ label }) => label).join(", ")}`;
   return state.told;
-}
-
-/** A link by its number and its name, once where they are the same. */
-function numberAndName(data, link) { return data.numbers[link] === link ? link : `${data.numbers[link]} ${link}`; }
-
-function byNumber(data) {
-  return [...data.links].sort((a, b) => data.numbers[a] - data.numbers[b]);
 }
 
 /** A labelled choice. */

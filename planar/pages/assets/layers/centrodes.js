@@ -2,14 +2,11 @@
 /* The centrodes of two links over the motion: the paths of their instantaneous centre in each. The moving one is
    carried along with its link and rolls on the fixed one. */
 
-const FARTHEST_POLE = 30;   // sizes: a centrode is not drawn farther out
-const LEAP = 8;             // sizes: between two rows this far apart the pole passed through infinity
-
 const centrodes = {
   key: "centrodes",
   label: "Centrodes",
   beside(layers, part) {
-    const { page } = layers, { data } = page, links = byNumber(data).map((link) => [link, numberAndName(data, link)]);
+    const { page } = layers, { data } = page, links = data.centres.links.map(({ link, label }) => [link, label]);
     htmlPart("h2", {}, part, "Centrodes");
     const [link, other] = ["Of link", "against"].map((label) => chooser(part, label, links));
     if (data.rolling !== null) [link.value, other.value] = data.rolling;
@@ -28,12 +25,12 @@ const centrodes = {
       for (const arc of arcs) {
         const places = arc.map(([x, y]) => layers.at([f.x + f.cos * x - f.sin * y, f.y + f.sin * x + f.cos * y]));
         if (places.length > 1) ink.line(places, `centrode ${kind}`);
-        else ink.dot(places[0], 3, `centrode ${kind}`);
+        else ink.dot(places[0], DOT_RADIUS, `centrode ${kind}`);
       }
     }
     const motions = motionsOf(standardFrames(page), page.data);
     const pole = motions && poleOf(motions[other], motions[link], page.data.size, 0);
-    if (pole && pole[2] !== 0) ink.dot(layers.at([pole[0] / pole[2], pole[1] / pole[2]]), 3.5, "centre shown");
+    if (pole && pole[2] !== 0) ink.dot(layers.at([pole[0] / pole[2], pole[1] / pole[2]]), CENTRE_RADII.shown, "centre shown");
     return `full: fixed to ${other}; dashed: moving with ${link}, rolling on it`;
   },
 };
@@ -50,8 +47,8 @@ function polePaths(page, course, link, other) {
     if (!pole || pole[2] === 0) { open = false; before = null; continue; }
     turns++;
     const at = [pole[0] / pole[2], pole[1] / pole[2]], here = local(frames[other], at), own = local(frames[link], at);
-    const sign = Math.sign(pole[2]), far = Math.hypot(...here) > FARTHEST_POLE * size;
-    const leapt = before !== null && sign !== beforeSign && Math.hypot(here[0] - before[0], here[1] - before[1]) > LEAP * size;
+    const sign = Math.sign(pole[2]), far = Math.hypot(...here) > CENTRODE.farthest * size;
+    const leapt = before !== null && sign !== beforeSign && Math.hypot(here[0] - before[0], here[1] - before[1]) > CENTRODE.leap * size;
     if (far || leapt) open = false;
     [before, beforeSign] = [here, sign];
     if (far) continue;
@@ -66,6 +63,6 @@ function polePaths(page, course, link, other) {
   };
   if (!turns) return { reason: known ? `${link} and ${other} only slide on each other, or move as one` : "the motion is not determined" };
   if (!fixed.length) return { reason: "their pole is far outside the picture all the way" };
-  if (span(fixed) < 1e-8 * size) return { reason: `${link} and ${other} turn about one point` };
+  if (span(fixed) < CENTRODE.still * size) return { reason: `${link} and ${other} turn about one point` };
   return { fixed, moving, reason: "" };
 }

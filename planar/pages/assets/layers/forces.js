@@ -2,10 +2,8 @@
 /* The layer of forces: arrows in the pairs, of loads, weights and springs, and curved ones of couples and of the torques
    of inputs, with what they are found by on the page. */
 
-const TURN = [8.5, 2.4]; // mm: the radius of a curved arrow, and how much more one about the same place has
 const FORCES_SLICE = 8;  // ms of work at a time
 const MOSTLY = 0.9;      // of the motion: what is greater in the rest, as at a change point, has a scale of its own
-const FAINT = 1e-9;      // of the greatest: a force below is rounding
 
 /** The forces of now and over the course. */
 class PageForces {
@@ -44,7 +42,7 @@ class PageForces {
   /** The force and the couple below which there is rounding alone. */
   least(found) {
     const { size } = this.page.data, couple = Math.max(torqueOf(found), greatestForce(found) * size);
-    return [(FAINT * couple) / size, FAINT * couple];
+    return [(FORCE_ROUND_OFF * couple) / size, FORCE_ROUND_OFF * couple];
   }
 
   /** Over the course: of every input its efforts, and at each row the greatest force (N); null until that is known, which
@@ -106,26 +104,25 @@ const forceArrows = {
     const { page } = layers, { data } = page, found = page.forces.now(), chosen = page.chosen.links();
     if (!found.efforts) return `Forces: ${found.why}`;
     const most = greatestForce(found), usual = usualForce(page, most), [nothing, still] = page.forces.least(found);
-    const actions = [...found.acting, ...found.inputs].map((each) => ({ ...each, of: `load ${each.kind}`, letters: data.forces.letters[each.kind], index: actionIndex(data, each) }));
     const pushes = [
-      ...pairForces(found, chosen).filter((each) => each.at !== null)
-        .map((each) => ({ ...each, of: "reaction", letters: ["F", "M"], index: data.forces.indices[each.pair][each.link] })),
-      ...actions,
+      ...pairForces(found, chosen).filter((each) => each.at !== null).map((each) => ({ ...each, kind: "reaction", name: each.pair, of: "reaction" })),
+      ...[...found.acting, ...found.inputs].map((each) => ({ ...each, of: `load ${each.kind}` })),
     ];
-    const { px, told } = roundScale(most > BEYOND * usual ? most : usual, LONGEST_ARROW, [1, "N"]), turned = [];
-    for (const { at, force, couple, of, letters: [letter, turning], index, link } of pushes) {
-      const tail = layers.at(at), length = Math.hypot(...force), key = `${of} ${letter} ${index} ${link}`;
+    const { px, told } = roundScale(most > BEYOND * usual ? most : usual, MAX_ARROW_LENGTH, [1, "N"]), turned = [];
+    for (const { at, force, couple, of, kind, name, link } of pushes) {
+      const tail = layers.at(at), length = Math.hypot(...force), [symbol, turning] = data.forces.symbols[kind][name][link];
+      const key = `${of} ${symbol} ${link}`;
       if (length > nothing) {
-        const by = px * ink.unit, tip = [tail[0] + force[0] * by, tail[1] - force[1] * by];
+        const tip = [tail[0] + force[0] * px, tail[1] - force[1] * px];
         ink.arrow(tail, tip, `arrow ${of}`);
         // an arrow too short to be seen is in the table
-        if (length * px > 2) ink.letter(tip, [[letter, index]], `letter ${of}`, { away: [force[0], -force[1]], key });
+        if (length * px > 2) ink.letter(tip, [symbol], `letter ${of}`, { away: [force[0], -force[1]], key });
       }
       if (Math.abs(couple) > still) {
-        const there = turned.filter((each) => Math.hypot(each[0] - tail[0], each[1] - tail[1]) < ink.unit).length;
+        const there = turned.filter((each) => Math.hypot(each[0] - tail[0], each[1] - tail[1]) < 1).length;
         turned.push(tail);
-        const { at: place, away } = ink.turn(tail, (TURN[0] + there * TURN[1]) * page.view.mm, Math.sign(couple), `arrow ${of}`);
-        ink.letter(place, [[turning, index]], `letter ${of}`, { away, key: `${key} turned`, told: ` = ${figures3(Math.abs(couple))} N·m` });
+        const { at: place, away } = ink.turn(tail, there, Math.sign(couple), `arrow ${of}`);
+        ink.letter(place, [turning], `letter ${of}`, { away, key: `${key} turned`, told: ` = ${figures3(Math.abs(couple))} N·m` });
       }
     }
     const on = chosen.length ? `of the pairs on ${chosen.join(", ")}` : "of every pair on its second link";
@@ -138,9 +135,6 @@ function forceNotes(page, found) {
   const { timed, choices } = page.data.forces;
   return [found.why, timed ? "loads that vary with time are those at 0 s" : "", ...choices].filter(Boolean);
 }
-
-/** The index of a load's, weight's, spring's or input's letter. */
-function actionIndex(data, { kind, name }) { return kind === "weight" ? data.numbers[name] : name; }
 
 /** The greatest couple (N m) of a position. */
 function torqueOf({ pairs, acting, inputs }) {

@@ -6,7 +6,6 @@
 
 const CLOSE = 14;   // px: a click as near as that picks a point
 const LARGE = 60;   // px
-const UNIT = 1;     // px: the drawing's user unit
 const STILL = 4;    // px: a pointer that went farther has dragged
 
 /** Part of the address after #, shared by all who remember something there. */
@@ -118,7 +117,7 @@ class Layers {
           this.group.append(kept.ink.group);
           ({ text } = kept);
         } else {
-          const ink = new Ink(svgPart("g", { class: layer.key }, this.group), UNIT);
+          const ink = new Ink(svgPart("g", { class: layer.key }, this.group), now.mm);
           text = layer.draw(ink, this) ?? "";
           shapes.push([layer.key, ink]);
           if (layer.still) this.kept.set(layer.key, { of: [course, chosen.list, now], ink, text });
@@ -149,16 +148,13 @@ class Layers {
       if (!box.width || (box.width > LARGE && box.height > LARGE)) continue;
       found.push([box.left - left, box.top - top, box.right - left, box.bottom - top]);
     }
-    const { data } = this.page, ink = new Ink(this.group, UNIT);
+    const { data } = this.page, ink = new Ink(this.group, this.page.view.mm);
     ink.taken = found;
     const places = new Map(Object.keys(data.points).map((name) => [name, this.at(this.page.point(name).position)]));
     for (const place of places.values()) ink.keepClear(place, 8);
     // along the sides of links, which are strong strokes
-    for (const link of data.links) {
-      if (link === data.frame) continue;
-      const own = [...places].filter(([name]) => data.points[name].links.includes(link)).map(([, place]) => place), at = outline(own);
-      for (let k = 0; k < (at.length > 2 ? at.length : at.length - 1); k++) ink.keepOff(own[at[k]], own[at[(k + 1) % at.length]]);
-    }
+    const { vertices, strokes } = data.polygons;
+    for (const { kind, from, to } of strokes) if (kind === "image") ink.keepOff(places.get(vertices[from].point), places.get(vertices[to].point));
     return found;
   }
 

@@ -2,9 +2,7 @@
 /* Layers of the points chosen: their paths with marks at equal parts of the input's range, and arrows of their velocity
    or acceleration. */
 
-const MARKS = 24;        // of a path over a turn, or about as many over another range
-const LONGEST_ARROW = 80; // px
-const BEYOND = 2;        // times the usual: beside a dead point the scale is that of now
+const BEYOND = 2; // times the usual: beside a dead point the scale is that of now
 
 const RATES = {
   velocity: { word: "velocity", unit: "velocity", parts: ["vx", "vy"] },
@@ -19,7 +17,7 @@ const paths = {
     const { page } = layers, { course } = page, names = page.chosen.points();
     if (course === null) return page.data.inputs.length ? "Paths: the motion is being solved" : "Paths: no input runs";
     const { inputs, count } = course, [by] = unitOf(page, page.data.inputs[course.input].slides ? "length" : "angle");
-    const range = inputs[count - 1] - inputs[0], step = course.whole ? range / MARKS : roundUp((range * by) / MARKS) / by;
+    const range = inputs[count - 1] - inputs[0], step = course.whole ? range / PATH_MARKS : roundUp((range * by) / PATH_MARKS) / by;
     names.forEach((name, k) => {
       const { x, y } = course.point(name), place = (i) => layers.at([x[i], y[i]]);
       ink.line(Array.from({ length: count }, (_, i) => place(i)), `path series${k % SERIES}`);
@@ -27,7 +25,7 @@ const paths = {
         const row = Math.max(0, Math.min(count - 1, ((m * step - inputs[0]) / range) * (count - 1)));
         const i = Math.min(count - 2, Math.floor(row));
         const [a, b] = [place(i), place(i + 1)];
-        ink.dot([0, 1].map((axis) => a[axis] + (row - i) * (b[axis] - a[axis])), 2, `mark series${k % SERIES}`);
+        ink.dot([0, 1].map((axis) => a[axis] + (row - i) * (b[axis] - a[axis])), DOT_RADIUS, `mark series${k % SERIES}`);
       }
     });
     if (!names.length) return "Paths: choose points to see them";
@@ -48,10 +46,10 @@ function arrows(rate) {
       if (now[0][rate] === null) return `${Word}: ${page.undetermined}`;
       const usual = greatest(page, names, parts), most = Math.max(...now.map((point) => Math.hypot(...point[rate])));
       if (!(usual > 0)) return `${Word}: none of these points has one at the inputs' rates`;
-      const { px, told } = roundScale(most > BEYOND * usual ? most : usual, LONGEST_ARROW, unitOf(page, unit));
+      const { px, told } = roundScale(most > BEYOND * usual ? most : usual, MAX_ARROW_LENGTH, unitOf(page, unit));
       now.forEach((point) => {
-        const tail = layers.at(point.position), [x, y] = point[rate], by = px * ink.unit;
-        ink.arrow(tail, [tail[0] + x * by, tail[1] - y * by], `arrow ${rate}`);
+        const tail = layers.at(point.position), [x, y] = point[rate];
+        ink.arrow(tail, [tail[0] + x * px, tail[1] - y * px], `arrow ${rate}`);
       });
       return `${Word}: ${told}`;
     },

@@ -324,8 +324,9 @@ class Drawing {
 
   scaleBar() {
     const { mm, width, height, scale } = this, { name, si } = this.page.data.units.length;
-    const most = Math.min(0.3 * width, 40 * mm) / scale / si, power = 10 ** Math.floor(Math.log10(most));
-    const round = [5, 2, 1].find((digit) => digit * power <= most) * power, far = round * si * scale, x = 3 * mm, y = height - 3 * mm;
+    const most = Math.min(0.3 * width, 40 * mm) / scale / si, round = STEP_VALUES.findLast((each) => each <= most);
+    if (round === undefined) return; // no room
+    const far = round * si * scale, x = 3 * mm, y = height - 3 * mm;
     const bar = Symbols.element("g", { class: "scale" });
     bar.append(
       Symbols.line("ground", [x, y - mm], [x, y + mm]), Symbols.line("ground", [x + far, y - mm], [x + far, y + mm]), Symbols.line("ground", [x, y], [x + far, y]),
