@@ -1,0 +1,225 @@
+"""The scheme that a page moves: strokes of links, their numbers functions of dimensions, travel and scale."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from enum import Enum
+from functools import cached_property
+from itertools import chain
+from typing import Any, ClassVar
+
+import numpy as np
+
+from planar.drawing.paper.scales import Scale
+from planar.drawing.scheme.clearance import Clearance
+from planar.drawing.scheme.ground import fixed_pins, fixed_point_strokes, fixed_strokes, obstructing_strokes
+from planar.drawing.scheme.input_arrows import moving_input_arrow
+from planar.drawing.scheme.link_bodies import RELATIVE_TOLERANCE, LinkBody, all_marks, bodies_of_points, largest_span
+from planar.drawing.scheme.link_strokes import moving_strokes
+from planar.drawing.scheme.placed_strokes import PlacedSpring, PlacedStroke, PlacedTorsionSpring, stroke_marks
+from planar.drawing.scheme.scene import Scene, plain_frames
+from planar.drawing.scheme.scheme import extent_corners, extent_places, mass_centre_names, point_names
+from planar.drawing.scheme.springs_masses import SpringMassMark
+from planar.equations.coordinates import frames_from_coordinates
+from planar.equations.mechanism_numbers import shapes_of_links
+from planar.foundation.errors import BadInput, NoAnswer
+from planar.foundation.geometry import Frame, Vector
+from planar.model.mechanism import Mechanism, relative_motions
+from planar.model.pairs import Pair
+from planar.model.pairs.symbols import DrawingMark
+from planar.pages.dimension_numbers import DimensionNumber, DimensionNumbers, DrawingNumbers
+from planar.results.motion import Motion
+from planar.solving.cycle import cycle
+from planar.solving.position import solved_mechanism
+
+Positions = Sequence[Mapping[str, Frame]]
+"""Where the links are, in some positions; first where the page begins."""
+
+MOTION_STEPS = 24
+"""Steps over the range of every input for which a drawing has room."""
+FREE_SLIDE_RATIO = 0.3
+"""Of the mechanism's size: how far a slide without limits is shown."""
+MAX_OBSTACLE_POSITIONS = 8
+"""Positions of the links that supports keep clear of."""
+OBSTACLE_WEIGHT = 0.3
+"""What strokes count beside the cost of a support that leans: they are not everywhere at once."""
+USUAL_ROOM = 126.0, 80.0
+"""mm in which a page usually draws; sides and gaps are chosen for it."""
+SMALLEST_RATIO = 0.02
+"""Of the mechanism's size: what is smaller is not blown up to fill the room."""
+
+
+@dataclass(frozen=True)
+class MovingScene(Scene):
+    """A scene for the whole motion: its numbers follow dimensions, travel and scale; choices hold for the file's."""
+
+    is_moving: ClassVar[bool] = True
+
+    numbers: DrawingNumbers = field(kw_only=True)
+    own_marks: tuple[DrawingMark | SpringMassMark, ...] = field(kw_only=True)
+    own_places: Mapping[str, Mapping[str, Vector]] = field(kw_only=True)
+    positions: Positions = field(kw_only=True)
+    measured: list[dict[str, Any]] = field(default_factory=list)
+    _ranges: dict[Any, tuple[DimensionNumber, DimensionNumber]] = field(default_factory=dict)
+
+    @property
+    def per_mm(self) -> DimensionNumber:
+        return self.numbers.per_mm
+
+    @property
+    def places(self) -> Mapping[str, Mapping[str, Vector]]:
+        return self.own_places
+
+    @cached_property
+    def marks(self) -> tuple[DrawingMark | SpringMassMark, ...]:
+        return self.own_marks
+
+    def place(self, link: str, point: str) -> Vector:
+        return self.own_places[link][point]
+
+    def knows_travel(self, name: str) -> bool:
+        return True
+
+    def pair_marks(self, pair: Pair) -> Sequence[DrawingMark]:
+        dimensions = self.numbers.dimensions
+        own = relative_motions(dimensions.mechanism)[pair.name]
+        return dimensions.with_values(own.drawing_marks(dimensions.shapes, dimensions.mechanism.pairs))
+
+    def shown_range(self, name: str, link: str, foot: Vector, way: Vector) -> tuple[DimensionNumber, DimensionNumber]:
+        """From where to where a point goes in the whole motion, which a page measures."""
+        key = name, link, *map(float, (*foot, *way))
+        if key not in self._ranges:
+            rider, at = self.running_point(name) or (link, foot)
+            far = [
+                float((frames[link].to_local(frames[rider].to_world(at)) - foot).dot(way)) for frames in self.positions
+            ]
+            self._ranges[key] = self.numbers.add_travel(min(far), max(far))
+            self.measured.append(
+                {
+                    "link": link,
+                    "foot": self.numbers.add_point(foot),
+                    "direction": self.numbers.add_point(way),
+                    "rider": rider,
+                    "at": self.numbers.add_point(at),
+                }
+            )
+        return self._ranges[key]
+
+    def travel_range(
+        self, name: str, link: str, through: Vector, foot: Vector, way: Vector
+    ) -> tuple[DimensionNumber, DimensionNumber]:
+        return self.shown_range(name, link, foot, way)
+
+
+def motion_positions(mechanism: Mechanism, z: np.ndarray) -> Positions:
+    """Where the links are at the unknowns z, and over the motion of every input from the sketch's assembly."""
+    solver = solved_mechanism(mechanism).solver
+    w = solver.functions.coordinate_function(z, solver.inputs.u, solver.inputs.p).full().ravel()
+    first, _ = frames_from_coordinates((w * solver.scale).tolist(), solver.column, solver.shapes, solver.pairs)
+    found = [plain_frames(first)]
+    for given in mechanism.inputs:
+        with suppress(NoAnswer):
+            found += frames_of_rows(input_motion(mechanism, given.pair, MOTION_STEPS, FREE_SLIDE_RATIO))
+    return found
+
+
+def input_motion(mechanism: Mechanism, pair: str, steps: int, free: float) -> Motion:
+    """The motion of an input over its own range; of a slide without limits, so many sizes either way.
+
+    Where inputs have laws, the motion in time. Raises NoAnswer.
+    """
+    lawful = any(given.law is not None for given in mechanism.inputs)
+    try:
+        return cycle(mechanism, steps) if lawful else cycle(mechanism, steps, pair=pair)
+    except BadInput:
+        far = free * solved_mechanism(mechanism).solver.unit
+        at = next(given.position for given in mechanism.inputs if given.pair == pair)
+        return cycle(mechanism, steps, at - far, at + far, pair)
+
+
+def frames_of_rows(motion: Motion) -> list[dict[str, Frame]]:
+    """The links' frames at every row of a motion, as plain numbers."""
+    return [plain_frames(motion.frames, row) for row in range(len(motion))]
+
+
+def scheme_data(
+    mechanism: Mechanism, dimensions: DimensionNumbers, positions: Positions, digits: int | None = None
+) -> tuple[dict[str, Any], DrawingNumbers]:
+    """Strokes, arrows of inputs and letters by their links, and the numbers that they refer to.
+
+    `measures` are displacements along lines whose ranges a page finds, `extent` is what has to be seen.
+    """
+    scene = _moving_scene(mechanism, dimensions, positions, digits)
+    numbers = scene.numbers
+    levels: dict[str, list[PlacedStroke]] = {level: list(each) for level, each in moving_strokes(scene).items()}
+    levels["pins"] += fixed_point_strokes(scene)
+    seen = positions[:: -(-len(positions) // MAX_OBSTACLE_POSITIONS)]
+    moving, per_mm, weight = list(obstructing_strokes(scene)), scene.scale.per_mm, OBSTACLE_WEIGHT
+    clear = Clearance.from_marks(stroke_marks(fixed_pins(scene), scene.frames, per_mm), weight)
+    for frames in seen:
+        clear = clear.with_marks(stroke_marks(moving, frames, per_mm), weight / len(seen))
+    levels = {"ground": fixed_strokes(scene, clear)} | levels
+    clear = clear.with_marks(stroke_marks(levels["ground"], scene.frames, per_mm), weight)
+    arrows = [[moving_input_arrow(scene, given, sense, clear) for sense in (1.0, -1.0)] for given in mechanism.inputs]
+    points, bodies = scene.own_places, scene.bodies
+    data = {
+        "levels": {level: [_stroke_data(each, numbers) for each in strokes] for level, strokes in levels.items()},
+        "arrows": [[each and _stroke_data(each, numbers) for each in both] for both in arrows],
+        "letters": [
+            {"text": each.text, "link": each.link, "at": numbers.add_point(each.at), "clearance": each.clearance}
+            for each in chain(point_names(scene), mass_centre_names(scene))
+        ],
+        "extent": [
+            {"link": link, "at": numbers.add_point(at), "radius": numbers.add(radius)}
+            for link, at, radius in extent_places(points, bodies, scene.marks)
+        ],
+        "measures": scene.measured,
+    }
+    return data | {"count": len(numbers.values)}, numbers
+
+
+def _moving_scene(
+    mechanism: Mechanism, dimensions: DimensionNumbers, positions: Positions, digits: int | None
+) -> MovingScene:
+    """Bodies chosen at the file's dimensions, at the scale at which all positions fit the usual room."""
+    shapes = shapes_of_links(mechanism)
+    own = {link.name: dict(dimensions.shapes[link.name].points) for link in mechanism.links}
+    own, marks = dimensions.with_values((own, all_marks(dimensions.mechanism, dimensions.shapes)))
+    size = largest_span(shapes)
+    moving = {link: list(points.values()) for link, points in own.items() if link != mechanism.frame}
+    bodies: dict[str, LinkBody] = bodies_of_points(moving, marks, RELATIVE_TOLERANCE * size)
+    low, high = extent_corners(extent_places(own, bodies, marks), positions)
+    spans = [(far / room) for far, room in zip(high - low, USUAL_ROOM, strict=True)]
+    per_mm = max(*spans, SMALLEST_RATIO * size / (0.6 * min(USUAL_ROOM)))
+    return MovingScene(
+        mechanism,
+        bodies,
+        positions[0],
+        shapes,
+        Scale("length", per_mm, mechanism.units.length),
+        numbers=DrawingNumbers(dimensions, per_mm, digits),
+        own_marks=tuple(marks),
+        own_places=own,
+        positions=positions,
+    )
+
+
+def _stroke_data(stroke: PlacedStroke, numbers: DrawingNumbers) -> dict[str, Any]:
+    """A stroke with its numbers as places; without what is as usual."""
+
+    def plain(value: Any) -> Any:
+        if isinstance(value, Vector):
+            return numbers.add_point(value)
+        if isinstance(value, tuple | list):
+            return [plain(part) for part in value]
+        if isinstance(value, Enum):
+            return value.value
+        return value if isinstance(value, str | bool) else numbers.add(value)
+
+    named = isinstance(stroke, PlacedSpring | PlacedTorsionSpring)
+    usual = stroke._field_defaults
+    own = {name: value for name, value in stroke._asdict().items() if name not in usual or value != usual[name]}
+    side = {"side": own.pop("side")} if "side" in own else {}
+    return side | {name: plain(value) for name, value in own.items() if named or name != "about"}
