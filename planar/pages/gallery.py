@@ -11,14 +11,16 @@ from urllib.parse import quote
 import numpy as np
 
 from planar.document.files import read_asset
-from planar.foundation.errors import NoAnswer
+from planar.foundation.errors import BadInput, NoAnswer
 from planar.foundation.safe_files import save_file, write_error
 from planar.model.mechanism import Mechanism
 from planar.pages.dimension_numbers import DimensionNumbers
 from planar.pages.drawing_style import pen_styles, symbol_script
 from planar.pages.gallery_kinds import KINDS, kind_and_search_text
 from planar.pages.page import fill_template, page, script_safe_json
-from planar.pages.scheme_data import frames_of_rows, input_motion, scheme_data
+from planar.pages.scheme_data import frames_of_rows, scheme_data
+from planar.results.motion import Motion
+from planar.solving.cycle import cycle
 from planar.solving.position import solved_mechanism
 
 SCRIPTS = (
@@ -108,7 +110,7 @@ def small_picture_data(mechanism: Mechanism) -> dict[str, Any]:
     `closed` says whether the motion comes back to its start, so that it goes round, not to and fro; `drawn` is a
     function of scripts.
     """
-    motion = input_motion(mechanism, mechanism.inputs[0].pair, PICTURE_STEPS, 1.0)
+    motion = _picture_motion(mechanism)
     fixed = DimensionNumbers(mechanism, live=False)
     scheme, numbers = scheme_data(mechanism, fixed, frames_of_rows(motion), PICTURE_DIGITS)
     links = [link.name for link in mechanism.links]
@@ -129,6 +131,17 @@ def small_picture_data(mechanism: Mechanism) -> dict[str, Any]:
         "closed": closed and len(motion) > 1,
         "drawn": numbers.to_javascript(),
     }
+
+
+def _picture_motion(mechanism: Mechanism) -> Motion:
+    """The motion of the first input over its own range; of a slide without limits, its own size either way."""
+    given = mechanism.inputs[0]
+    lawful = any(each.law is not None for each in mechanism.inputs)
+    try:
+        return cycle(mechanism, PICTURE_STEPS) if lawful else cycle(mechanism, PICTURE_STEPS, pair=given.pair)
+    except BadInput:
+        far = solved_mechanism(mechanism).solver.unit
+        return cycle(mechanism, PICTURE_STEPS, given.position - far, given.position + far, given.pair)
 
 
 def _round_digits(value: float) -> float:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
 from itertools import chain
+from math import pi
 from typing import Any, ClassVar
 
 import numpy as np
@@ -24,14 +25,14 @@ from planar.drawing.scheme.scheme import extent_corners, extent_places, mass_cen
 from planar.drawing.scheme.springs_masses import SpringMassMark
 from planar.equations.coordinates import frames_from_coordinates
 from planar.equations.mechanism_numbers import shapes_of_links
-from planar.foundation.errors import BadInput, NoAnswer
+from planar.foundation.errors import NoAnswer
 from planar.foundation.geometry import Frame, Vector
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import Pair
 from planar.model.pairs.symbols import DrawingMark
 from planar.pages.dimension_numbers import DimensionNumber, DimensionNumbers, DrawingNumbers
 from planar.results.motion import Motion
-from planar.solving.cycle import cycle
+from planar.solving.continuation.path import follow_samples
 from planar.solving.position import solved_mechanism
 
 Positions = Sequence[Mapping[str, Frame]]
@@ -40,7 +41,7 @@ Positions = Sequence[Mapping[str, Frame]]
 MOTION_STEPS = 24
 """Steps over the range of every input for which a drawing has room."""
 FREE_SLIDE_RATIO = 0.3
-"""Of the mechanism's size: how far a slide without limits is shown."""
+"""Of the mechanism's size: how far a slide is followed either way."""
 MAX_OBSTACLE_POSITIONS = 8
 """Positions of the links that supports keep clear of."""
 OBSTACLE_WEIGHT = 0.3
@@ -114,29 +115,28 @@ class MovingScene(Scene):
 
 
 def motion_positions(mechanism: Mechanism, z: np.ndarray) -> Positions:
-    """Where the links are at the unknowns z, and over the motion of every input from the sketch's assembly."""
+    """Where the links are at the unknowns z, and over the motion of every input from there."""
     solver = solved_mechanism(mechanism).solver
-    w = solver.functions.coordinate_function(z, solver.inputs.u, solver.inputs.p).full().ravel()
-    first, _ = frames_from_coordinates((w * solver.scale).tolist(), solver.column, solver.shapes, solver.pairs)
-    found = [plain_frames(first)]
-    for given in mechanism.inputs:
-        with suppress(NoAnswer):
-            found += frames_of_rows(input_motion(mechanism, given.pair, MOTION_STEPS, FREE_SLIDE_RATIO))
-    return found
+    u, p = solver.inputs.u, solver.inputs.p
 
+    def frames(z: np.ndarray, u: np.ndarray) -> Mapping[str, Frame]:
+        w = solver.functions.coordinate_function(z, u, p).full().ravel()
+        found, _ = frames_from_coordinates((w * solver.scale).tolist(), solver.column, solver.shapes, solver.pairs)
+        return plain_frames(found)
 
-def input_motion(mechanism: Mechanism, pair: str, steps: int, free: float) -> Motion:
-    """The motion of an input over its own range; of a slide without limits, so many sizes either way.
-
-    Where inputs have laws, the motion in time. Raises NoAnswer.
-    """
-    lawful = any(given.law is not None for given in mechanism.inputs)
-    try:
-        return cycle(mechanism, steps) if lawful else cycle(mechanism, steps, pair=pair)
-    except BadInput:
-        far = free * solved_mechanism(mechanism).solver.unit
-        at = next(given.position for given in mechanism.inputs if given.pair == pair)
-        return cycle(mechanism, steps, at - far, at + far, pair)
+    positions = [frames(z, u)]
+    for number, given in enumerate(mechanism.inputs):
+        step = np.zeros_like(u)
+        sliding = solver.is_sliding(given.pair)
+        step[number] = (FREE_SLIDE_RATIO if sliding else 2.0 * pi) / MOTION_STEPS
+        for sense in (1.0, -1.0):
+            samples = u + sense * step * np.arange(MOTION_STEPS + 1)[:, None]
+            with suppress(NoAnswer):
+                found = follow_samples(solver, p, z, samples).z
+                positions += map(frames, found[1:], samples[1 : len(found)])
+                if len(found) == len(samples) and not sliding:
+                    break  # a whole turn: nothing is left for the other way
+    return positions
 
 
 def frames_of_rows(motion: Motion) -> list[dict[str, Frame]]:
