@@ -13,6 +13,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from planar.drawing.paper.picture import paper_point
 from planar.drawing.paper.scales import Scale
 from planar.drawing.scheme.clearance import Clearance
 from planar.drawing.scheme.ground import fixed_pins, fixed_point_strokes, fixed_strokes, obstructing_strokes
@@ -93,8 +94,9 @@ class MovingScene(Scene):
         key = name, link, *map(float, (*foot, *way))
         if key not in self._ranges:
             rider, at = self.running_point(name) or (link, foot)
+            start, along, place = (Vector(*paper_point(each)) for each in (foot, way, at))
             far = [
-                float((frames[link].to_local(frames[rider].to_world(at)) - foot).dot(way)) for frames in self.positions
+                (frames[link].to_local(frames[rider].to_world(place)) - start).dot(along) for frames in self.positions
             ]
             self._ranges[key] = self.numbers.add_travel(min(far), max(far))
             self.measured.append(

@@ -77,10 +77,10 @@ def stroke_marks(strokes: Iterable[PlacedStroke], frames: Mapping[str, Frame], p
     """Strokes on paper (mm) where the links have these frames, with so many metres to a millimetre."""
 
     def to_paper(link: str, at: Vector) -> Vector:
-        return Vector(*paper_point(frames[link].to_world(at) * (1.0 / per_mm)))
+        return frames[link].to_world(Vector(*paper_point(at))) * (1.0 / per_mm)
 
     def turned(link: str, way: Vector) -> Vector:
-        return Vector(*paper_point(frames[link].rotate_to_world(way)))
+        return frames[link].rotate_to_world(Vector(*paper_point(way)))
 
     for each in strokes:
         if isinstance(each, PlacedLine):

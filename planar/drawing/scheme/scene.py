@@ -10,6 +10,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from planar.drawing.paper.picture import paper_point
 from planar.drawing.paper.scales import Scale
 from planar.drawing.scheme.link_bodies import RELATIVE_TOLERANCE, LinkBody, all_marks, distance_from_line, largest_span
 from planar.drawing.scheme.springs_masses import SpringMassMark
@@ -122,11 +123,11 @@ class Scene:
 
     def to_paper(self, link: str, at: Vector) -> Vector:
         """A place of a link on paper (mm)."""
-        return self.frames[link].to_world(at) * (1.0 / self.scale.per_mm)
+        return self.frames[link].to_world(Vector(*paper_point(at))) * (1.0 / self.scale.per_mm)
 
     def direction_on_paper(self, link: str, way: Vector) -> Vector:
         """A direction of a link on paper."""
-        return self.frames[link].rotate_to_world(way)
+        return self.frames[link].rotate_to_world(Vector(*paper_point(way)))
 
     def running_point(self, name: str) -> tuple[str, Vector] | None:
         """The link whose point runs along a line, and the point in its axes."""

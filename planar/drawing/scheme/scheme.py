@@ -117,10 +117,11 @@ def extent_places(
 def extent_corners(places: Sequence[ExtentPlace], positions: Iterable[Mapping[str, Frame]]) -> tuple[Vector, Vector]:
     """The lower left and the upper right corner (m) of places in some positions of the links."""
     corners = [(0.0, 0.0)] if not places else []
+    spots = [(link, Vector(*paper_point(at)), float(radius)) for link, at, radius in places]
     for frames in positions:
-        for link, at, radius in places:
-            (x, y), r = frames[link].to_world(at), float(radius)
-            corners += [(float(x) - r, float(y) - r), (float(x) + r, float(y) + r)]
+        for link, at, r in spots:
+            x, y = frames[link].to_world(at)
+            corners += [(x - r, y - r), (x + r, y + r)]
     xs, ys = zip(*corners, strict=True)
     return Vector(min(xs), min(ys)), Vector(max(xs), max(ys))
 
