@@ -34,7 +34,7 @@ from planar.model.pairs.symbols import DrawingMark
 from planar.pages.dimension_numbers import DimensionNumber, DimensionNumbers, DrawingNumbers
 from planar.results.motion import Motion
 from planar.solving.continuation.path import follow_samples
-from planar.solving.position import solved_mechanism
+from planar.solving.position import PositionSolver, solved_mechanism
 
 Positions = Sequence[Mapping[str, Frame]]
 """Where the links are, in some positions; first where the page begins."""
@@ -133,12 +133,22 @@ def motion_positions(mechanism: Mechanism, z: np.ndarray) -> Positions:
         step[number] = (FREE_SLIDE_RATIO if sliding else 2.0 * pi) / MOTION_STEPS
         for sense in (1.0, -1.0):
             samples = u + sense * step * np.arange(MOTION_STEPS + 1)[:, None]
-            with suppress(NoAnswer):
-                found = follow_samples(solver, p, z, samples).z
-                positions += map(frames, found[1:], samples[1 : len(found)])
-                if len(found) == len(samples) and not sliding:
-                    break  # a whole turn: nothing is left for the other way
+            found = _followed(solver, z, samples)
+            positions += map(frames, found, samples[1:])
+            if len(found) == MOTION_STEPS and not sliding:
+                break  # a whole turn: nothing is left for the other way
     return positions
+
+
+def _followed(solver: PositionSolver, z: np.ndarray, samples: np.ndarray) -> np.ndarray:
+    """The unknowns at inputs after the first, as far as they are quickly found: to near a dead point, at the most."""
+    if not solver.functions.is_square:
+        with suppress(NoAnswer):
+            return follow_samples(solver, solver.inputs.p, z, samples).z[1:]
+        return z[None, :0]
+    found = solver.functions.run_samples(z, samples[1:], solver.inputs.p)
+    closed = solver.max_residuals(found, samples[1:]) <= solver.tolerance
+    return found if closed.all() else found[: int(np.argmin(closed))]
 
 
 def frames_of_rows(motion: Motion) -> list[dict[str, Frame]]:
