@@ -163,7 +163,7 @@ def scheme_data(
 
     `measures` are displacements along lines whose ranges a page finds, `extent` is what has to be seen.
     """
-    scene = _moving_scene(mechanism, dimensions, positions, digits)
+    scene = moving_scene(mechanism, dimensions, positions, digits)
     numbers = scene.numbers
     levels: dict[str, list[PlacedStroke]] = {level: list(each) for level, each in moving_strokes(scene).items()}
     levels["pins"] += fixed_point_strokes(scene)
@@ -192,10 +192,14 @@ def scheme_data(
     return data | {"count": len(numbers.values)}, numbers
 
 
-def _moving_scene(
-    mechanism: Mechanism, dimensions: DimensionNumbers, positions: Positions, digits: int | None
+def moving_scene(
+    mechanism: Mechanism,
+    dimensions: DimensionNumbers,
+    positions: Positions,
+    digits: int | None = None,
+    per_mm: float | None = None,
 ) -> MovingScene:
-    """Bodies chosen at the file's dimensions, at the scale at which all positions fit the usual room."""
+    """Bodies chosen at the file's dimensions, at the scale at which all positions fit the usual room unless given."""
     shapes = shapes_of_links(mechanism)
     own = {link.name: dict(dimensions.shapes[link.name].points) for link in mechanism.links}
     own, marks = dimensions.with_values((own, all_marks(dimensions.mechanism, dimensions.shapes)))
@@ -204,7 +208,7 @@ def _moving_scene(
     bodies: dict[str, LinkBody] = bodies_of_points(moving, marks, RELATIVE_TOLERANCE * size)
     low, high = extent_corners(extent_places(own, bodies, marks), positions)
     spans = [(far / room) for far, room in zip(high - low, USUAL_ROOM, strict=True)]
-    per_mm = max(*spans, SMALLEST_RATIO * size / (0.6 * min(USUAL_ROOM)))
+    per_mm = per_mm or max(*spans, SMALLEST_RATIO * size / (0.6 * min(USUAL_ROOM)))
     return MovingScene(
         mechanism,
         bodies,

@@ -15,23 +15,17 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-import casadi as ca
 import numpy as np
 import pytest
 
 import planar
 from planar.document.dimensions import change_dimension, link_lengths
 from planar.document.files import read_asset
-from planar.drawing.scheme.link_bodies import link_bodies
-from planar.drawing.scheme.scene import plain_frames
-from planar.equations.mechanism_numbers import shapes_of_links
 from planar.foundation.errors import BadInput, NoAnswer
 from planar.pages import gallery, notebook
-from planar.pages.dimension_numbers import DimensionNumbers
 from planar.pages.gallery_kinds import KINDS, kind_and_search_text, search_text
 from planar.pages.page import SCRIPTS, fill_template, page, script_safe_json
 from planar.pages.page_data import page_data
-from planar.pages.scheme_data import scheme_data
 from planar.pages.still_picture import still_svg
 from planar.pages.view import notebook_html, page_of, view
 from planar.reports.columns import run_columns
@@ -156,32 +150,6 @@ def test_no_two_scripts_of_a_page_give_one_name_to_two_things(scripts):
         )
     ]
     assert sorted(named) == sorted(set(named))
-
-
-@pytest.mark.parametrize("name", ["watt-1-six-bar", "oscillating-cylinder", "crank-and-slotted-lever", "jansen-leg"])
-def test_links_on_a_page_are_those_of_a_drawing_for_other_dimensions_too(name):
-    mechanism = MODELS[name]
-    dimensions = DimensionNumbers(mechanism)
-    frames = plain_frames(planar.solve(mechanism).frames)
-    carried, numbers = scheme_data(mechanism, dimensions, [frames])
-    travel = [0.0] * len(numbers.travel)
-    given = [dimensions.d, ca.vertcat(*numbers.travel), numbers.per_mm.expression]
-    drawn = ca.Function("drawn", given, [ca.vertcat(*map(ca.SX, numbers.values))])
-    first = dimensions.dimensions[0]
-    for by in (1.0, 1.01):
-        other = change_dimension(mechanism, first, by * first.value)
-        sizes = [each.value * (by if each == first else 1.0) for each in dimensions.dimensions]
-        values = drawn(sizes, travel, 1e-3).full().ravel()
-        lines = [each for level in ("plates", "bars") for each in carried["levels"][level]]
-        found = {link: [] for link in link_bodies(other, shapes_of_links(other))}
-        for each in lines:
-            found[each["link"]].append(values[np.array(each["points"])])
-        for link, body in link_bodies(other, shapes_of_links(other)).items():
-            for wanted in (*body.sides, *body.tracers, *([body.plate] if body.plate else [])):
-                assert any(
-                    len(line) == len(wanted) and np.abs(line - np.array(wanted, dtype=float)).max() <= 1e-12
-                    for line in found[link]
-                ) or any(link in (each["link"]) for each in carried["levels"]["tubes"]), f"{link} {wanted}"
 
 
 # what Python shows as a page
