@@ -41,14 +41,16 @@ Positions = Sequence[Mapping[str, Frame]]
 
 MOTION_STEPS = 24
 """Steps over the range of every input for which a drawing has room."""
+STEP_PARTS = 6
+"""Parts of such a step in which the motion is followed."""
 FREE_SLIDE_RATIO = 0.3
 """Of the mechanism's size: how far a slide is followed either way."""
 MAX_OBSTACLE_POSITIONS = 8
 """Positions of the links that supports keep clear of."""
 OBSTACLE_WEIGHT = 0.3
 """What strokes count beside the cost of a support that leans: they are not everywhere at once."""
-USUAL_ROOM = 126.0, 80.0
-"""mm in which a page usually draws; sides and gaps are chosen for it."""
+SMALL_ROOM = 96.0, 66.0
+"""mm in which a page draws in a small window; sides and gaps are chosen for it, and serve in larger ones too."""
 SMALLEST_RATIO = 0.02
 """Of the mechanism's size: what is smaller is not blown up to fill the room."""
 
@@ -132,10 +134,10 @@ def motion_positions(mechanism: Mechanism, z: np.ndarray) -> Positions:
         sliding = solver.is_sliding(given.pair)
         step[number] = (FREE_SLIDE_RATIO if sliding else 2.0 * pi) / MOTION_STEPS
         for sense in (1.0, -1.0):
-            samples = u + sense * step * np.arange(MOTION_STEPS + 1)[:, None]
+            samples = u + sense * step * np.arange(MOTION_STEPS * STEP_PARTS + 1)[:, None] / STEP_PARTS
             found = _followed(solver, z, samples)
-            positions += map(frames, found, samples[1:])
-            if len(found) == MOTION_STEPS and not sliding:
+            positions += map(frames, found[STEP_PARTS - 1 :: STEP_PARTS], samples[STEP_PARTS::STEP_PARTS])
+            if len(found) == len(samples) - 1 and not sliding:
                 break  # a whole turn: nothing is left for the other way
     return positions
 
@@ -199,7 +201,7 @@ def moving_scene(
     digits: int | None = None,
     per_mm: float | None = None,
 ) -> MovingScene:
-    """Bodies chosen at the file's dimensions, at the scale at which all positions fit the usual room unless given."""
+    """Bodies chosen at the file's dimensions, at the scale at which all positions fit a small room unless given."""
     shapes = shapes_of_links(mechanism)
     own = {link.name: dict(dimensions.shapes[link.name].points) for link in mechanism.links}
     own, marks = dimensions.with_values((own, all_marks(dimensions.mechanism, dimensions.shapes)))
@@ -207,8 +209,8 @@ def moving_scene(
     moving = {link: list(points.values()) for link, points in own.items() if link != mechanism.frame}
     bodies: dict[str, LinkBody] = bodies_of_points(moving, marks, RELATIVE_TOLERANCE * size)
     low, high = extent_corners(extent_places(own, bodies, marks), positions)
-    spans = [(far / room) for far, room in zip(high - low, USUAL_ROOM, strict=True)]
-    per_mm = per_mm or max(*spans, SMALLEST_RATIO * size / (0.6 * min(USUAL_ROOM)))
+    spans = [(far / room) for far, room in zip(high - low, SMALL_ROOM, strict=True)]
+    per_mm = per_mm or max(*spans, SMALLEST_RATIO * size / (0.6 * min(SMALL_ROOM)))
     return MovingScene(
         mechanism,
         bodies,

@@ -48,7 +48,7 @@ def ground_marks(
 ) -> tuple[Mark, ...]:
     """What stands still: supports, fixed guides and wheels, turned so that they are clear of the links' position.
 
-    `beside` are further strokes to be clear of, such as the links in other positions.
+    `obstacles` are further strokes to be clear of, such as the links in other positions.
     """
     return fixed_marks(Scene(mechanism, bodies, frames, shapes, scale, travel or {}), obstacles)
 
@@ -206,8 +206,7 @@ def _rail_segments(
     pieces, way, per_mm = [(low, high)], mark.direction, scene.per_mm
     room = (symbol_table.SUPPORT_WIDTH / 2.0 + 1.0) * per_mm
     deep = (symbol_table.SUPPORT_HEIGHT + symbol_table.HATCH_LENGTH) * per_mm
-    under = 0.0
-    block = 0.0
+    block = under = 0.0
     if not scene.knows_travel(mark.name):
         block = 0.0 if isinstance(mark, SliderMark) else scene.shown_range(mark.name, mark.link, at, way)[0]
         under = room + symbol_table.BLOCK_SIZE[0] / 2.0 * per_mm

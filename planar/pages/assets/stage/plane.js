@@ -2,7 +2,6 @@
 /* Vectors [x, y], the axes of links, and the least of a list. */
 
 const Plane = {
-  plus: (a, b) => [a[0] + b[0], a[1] + b[1]],
   minus: (a, b) => [a[0] - b[0], a[1] - b[1]],
   times: (a, by) => [a[0] * by, a[1] * by],
   on: (a, way, far) => [a[0] + way[0] * far, a[1] + way[1] * far],

@@ -71,5 +71,5 @@ const Symbols = (() => {
     })));
   }
 
-  return { element, quarter, told, line, symbol, stroke, spring, torsionSpring, wrapped };
+  return { element, told, line, symbol, stroke, spring, torsionSpring, wrapped };
 })();
