@@ -49,7 +49,7 @@ MAX_OBSTACLE_POSITIONS = 8
 """Positions of the links that supports keep clear of."""
 OBSTACLE_WEIGHT = 0.3
 """What strokes count beside the cost of a support that leans: they are not everywhere at once."""
-SMALL_ROOM = 96.0, 66.0
+SMALL_ROOM = 104.0, 70.0
 """mm in which a page draws in a small window; sides and gaps are chosen for it, and serve in larger ones too."""
 SMALLEST_RATIO = 0.02
 """Of the mechanism's size: what is smaller is not blown up to fill the room."""
@@ -135,22 +135,33 @@ def motion_positions(mechanism: Mechanism, z: np.ndarray) -> Positions:
         step[number] = (FREE_SLIDE_RATIO if sliding else 2.0 * pi) / MOTION_STEPS
         for sense in (1.0, -1.0):
             samples = u + sense * step * np.arange(MOTION_STEPS * STEP_PARTS + 1)[:, None] / STEP_PARTS
-            found = _followed(solver, z, samples)
-            positions += map(frames, found[STEP_PARTS - 1 :: STEP_PARTS], samples[STEP_PARTS::STEP_PARTS])
-            if len(found) == len(samples) - 1 and not sliding:
+            places, found = _followed_samples(solver, z, samples, through=not sliding)
+            positions += map(frames, found, places)
+            if len(found) == MOTION_STEPS and not sliding:
                 break  # a whole turn: nothing is left for the other way
     return positions
 
 
-def _followed(solver: PositionSolver, z: np.ndarray, samples: np.ndarray) -> np.ndarray:
-    """The unknowns at inputs after the first, as far as they are quickly found: to near a dead point, at the most."""
-    if not solver.functions.is_square:
+def _followed_samples(
+    solver: PositionSolver, z: np.ndarray, samples: np.ndarray, through: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """The inputs at every step after the first of the samples, as far as they are reached, and the unknowns there.
+
+    Quickly as far as that goes; from there on by the general path, `through` change points, where that is wanted.
+    """
+    p, places, reached = solver.inputs.p, samples[STEP_PARTS::STEP_PARTS], 0
+    found = np.empty((0, z.size))
+    if solver.functions.is_square:
+        every = solver.functions.run_samples(z, samples[1:], p)
+        closed = solver.max_residuals(every, samples[1:]) <= solver.tolerance
+        reached = (len(closed) if closed.all() else int(np.argmin(closed))) // STEP_PARTS
+        found = every[STEP_PARTS - 1 :: STEP_PARTS][:reached]
+    if through and reached < len(places):
+        ahead = samples[reached * STEP_PARTS :: STEP_PARTS]
         with suppress(NoAnswer):
-            return follow_samples(solver, solver.inputs.p, z, samples).z[1:]
-        return z[None, :0]
-    found = solver.functions.run_samples(z, samples[1:], solver.inputs.p)
-    closed = solver.max_residuals(found, samples[1:]) <= solver.tolerance
-    return found if closed.all() else found[: int(np.argmin(closed))]
+            rest = follow_samples(solver, p, found[-1] if reached else z, ahead).z[1:]
+            found = np.concatenate([found, rest])
+    return places[: len(found)], found
 
 
 def frames_of_rows(motion: Motion) -> list[dict[str, Frame]]:

@@ -103,6 +103,6 @@ class Clearance:
             lifted = 1.0 * (off > half)
             crowded = self.count_in_box(at, way, Vector(low, near), Vector(high, far)) + lifted
             side = left * sign
-            return crowded, side.y if abs(side.y) > 0.5 else 0.0, (middle - at).dot(side)
+            return round(crowded), side.y if abs(side.y) > 0.5 else 0.0, (middle - at).dot(side)
 
         return min(product((1.0, -1.0), (half, half + GUIDE_LIFT)), key=price)
