@@ -52,7 +52,7 @@ def greatest(first: Scalar, second: Scalar) -> Scalar:
 
 
 class Cylinder(NamedTuple):
-    """A slide between moving links that is drawn as a cylinder with a piston and its rod; lengths in m along `way`."""
+    """A slide between moving links that is drawn as a cylinder with piston and rod; lengths in m along `direction`."""
 
     guide: str
     rod: str
