@@ -13,9 +13,9 @@ from typing import Any
 import pytest
 
 from planar.document.files import read_asset
+from planar.pages.data.page_data import page_data
 from planar.pages.overlay_style import overlay_script
 from planar.pages.page import script_safe_json
-from planar.pages.page_data import page_data
 
 NODE = shutil.which("node") or shutil.which("nodejs")
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")

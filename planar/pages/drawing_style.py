@@ -1,4 +1,4 @@
-"""What scripts and styles of a page have from Python's drawing: the table of symbols, sizes, and the pens."""
+"""What scripts and styles of a page have from Python's drawing: the table of symbols, and the pens."""
 
 from __future__ import annotations
 
@@ -7,11 +7,9 @@ from enum import Enum
 from functools import cache
 from typing import Any
 
-from planar.drawing.paper.pens import ARROW_HEAD_LENGTH, ARROW_HEAD_WIDTH, PEN_STYLES
+from planar.drawing.paper.pens import PEN_STYLES
 from planar.drawing.paper.picture import Fill, Pen
 from planar.drawing.scheme import symbol_table
-from planar.drawing.scheme.scene import CYLINDER_LENGTH_RATIO, GUIDE_OVERHANG, MAX_CYLINDER_LENGTH_RATIO
-from planar.drawing.scheme.scheme import INPUT_ARC_RADII, INPUT_ARC_SWEEP, INPUT_ARROW_LENGTH, INPUT_ARROW_OFFSET
 
 DIGITS = 5
 """Of the numbers of symbols (mm, rad)."""
@@ -22,24 +20,9 @@ FILL_TONES = {Fill.PAPER: "paper", Fill.LINK: "link", Fill.SOLID: "ink"}
 
 @cache
 def symbol_script() -> str:
-    """The constants of the scripts: the strokes of every symbol, and the sizes of what is counted or chosen."""
+    """The constants of the scripts: the strokes of every symbol."""
     symbols = {name: [_plain(stroke._asdict()) for stroke in strokes] for name, strokes in symbol_table.SYMBOLS.items()}
-    constants = {
-        "SYMBOLS": symbols,
-        "PIN_RADIUS": symbol_table.PIN_RADIUS,
-        "BLOCK_SIZE": symbol_table.BLOCK_SIZE,
-        "SUPPORT_SIZE": (symbol_table.SUPPORT_HEIGHT, symbol_table.SUPPORT_WIDTH),
-        "HATCH_LENGTH": symbol_table.HATCH_LENGTH,
-        "RIM_WIDTH": symbol_table.RIM_WIDTH,
-        "SLOT_WIDTH": symbol_table.SLOT_SIZE[1],
-        "MASS_CENTRE_RADIUS": symbol_table.MASS_CENTRE_RADIUS,
-        "SPRING_HALF_WIDTH": symbol_table.SPRING_HALF_WIDTH,
-        "GUIDE_OVERHANG": GUIDE_OVERHANG,
-        "CYLINDER_RATIOS": (CYLINDER_LENGTH_RATIO, MAX_CYLINDER_LENGTH_RATIO),
-        "ARROW_HEAD": (ARROW_HEAD_LENGTH, ARROW_HEAD_WIDTH),
-        "INPUT_ARC": (INPUT_ARC_RADII[0], INPUT_ARC_SWEEP),
-        "INPUT_ARROW": (INPUT_ARROW_OFFSET, INPUT_ARROW_LENGTH),
-    }
+    constants = {"SYMBOLS": symbols}
     return "\n".join(f"const {name} = {json.dumps(value, separators=(',', ':'))};" for name, value in constants.items())
 
 

@@ -14,20 +14,20 @@ from planar.document.files import read_asset
 from planar.foundation.errors import BadInput, NoAnswer
 from planar.foundation.safe_files import save_file, write_error
 from planar.model.mechanism import Mechanism
+from planar.pages.data.dimension_numbers import DimensionNumbers
+from planar.pages.data.scheme_data import frames_of_rows, scheme_data
 from planar.pages.drawing_style import pen_styles, symbol_script
 from planar.pages.gallery_kinds import KINDS, kind_and_search_text
 from planar.pages.overlay_style import round_value_script
 from planar.pages.page import fill_template, page, script_safe_json
-from planar.pages.page_data import fixed_drawing_data
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
 from planar.solving.position import solved_mechanism
 
 SCRIPTS = (
-    "stage/bodies.js",
+    "stage/plane.js",
     "stage/symbols.js",
-    "stage/ground.js",
-    "stage/springs.js",
+    "stage/strokes.js",
     "stage/letters.js",
     "stage/drawing.js",
     "gallery.js",
@@ -79,7 +79,9 @@ def index_page(shown: list[dict[str, Any]]) -> str:
     kinds = [(kind, own) for kind, own in kinds if own]
     links = "".join(f'<a href="#kind-{KINDS.index(kind)}">{escape(kind)}</a> ' for kind, _ in kinds)
     title = escape(f"{len(shown)} mechanisms" if len(shown) != 1 else "1 mechanism")
-    scripts = "\n".join([symbol_script(), round_value_script(), *map(read_asset, SCRIPTS)])
+    drawn = ",\n".join(each["drawn"] for each in shown)
+    shown = [{name: value for name, value in each.items() if name != "drawn"} for each in shown]
+    scripts = "\n".join([symbol_script(), round_value_script(), f"const DRAWN = [{drawn}];", *map(read_asset, SCRIPTS)])
     styles = "\n".join([*map(read_asset, STYLES), pen_styles()]).replace("#drawing", ".small")  # a page has one drawing
     parts = {
         "title": title,
@@ -106,43 +108,41 @@ def _kind_section(kind: str, shown: Sequence[dict[str, Any]]) -> str:
 def small_picture_data(mechanism: Mechanism) -> dict[str, Any]:
     """What a small picture is drawn from: how the links look, and where they are at every step.
 
-    `closed` says whether the motion comes back to its start, so that it goes round, not to and fro.
+    `closed` says whether the motion comes back to its start, so that it goes round, not to and fro; `drawn` is a
+    function of scripts.
     """
-    looks, sizes = fixed_drawing_data(mechanism)
     motion = _picture_motion(mechanism)
+    fixed = DimensionNumbers(mechanism, live=False)
+    scheme, numbers = scheme_data(mechanism, fixed, frames_of_rows(motion), PICTURE_DIGITS)
+    links = [link.name for link in mechanism.links]
     paths = [
         np.stack([np.broadcast_to(part.parts[0], (len(motion),)) for part in (frame.x, frame.y, frame.angle)], axis=1)
-        for frame in (motion.frames[link] for link in looks["links"] if link != mechanism.frame)
+        for frame in (motion.frames[link] for link in links if link != mechanism.frame)
     ]
     whole = 2.0 * np.pi
     closed = all(
         np.abs(p[-1] - p[0] - [0.0, 0.0, whole * round((p[-1, 2] - p[0, 2]) / whole)]).max() < 1e-6 for p in paths
     )
-    return looks | {
+    return {
+        "frame": mechanism.frame,
+        "links": links,
+        "scheme": scheme | {"arrows": [], "letters": []},
         "size": solved_mechanism(mechanism).solver.unit,
-        "inputs": [{"pair": given.pair} for given in mechanism.inputs],
-        "sizes": [_round_digits(value) for value in sizes],
         "frames": [[_round_digits(value) for value in path.ravel()] for path in paths],
         "closed": closed and len(motion) > 1,
+        "drawn": numbers.to_javascript(),
     }
 
 
 def _picture_motion(mechanism: Mechanism) -> Motion:
     """The motion of the first input over its own range; of a slide without limits, its own size either way."""
     given = mechanism.inputs[0]
+    lawful = any(each.law is not None for each in mechanism.inputs)
     try:
-        return (
-            cycle(mechanism, PICTURE_STEPS, pair=given.pair)
-            if _has_no_laws(mechanism)
-            else cycle(mechanism, PICTURE_STEPS)
-        )
+        return cycle(mechanism, PICTURE_STEPS) if lawful else cycle(mechanism, PICTURE_STEPS, pair=given.pair)
     except BadInput:
         far = solved_mechanism(mechanism).solver.unit
         return cycle(mechanism, PICTURE_STEPS, given.position - far, given.position + far, given.pair)
-
-
-def _has_no_laws(mechanism: Mechanism) -> bool:
-    return not any(given.law is not None for given in mechanism.inputs)
 
 
 def _round_digits(value: float) -> float:

@@ -30,7 +30,7 @@ from planar.drawing.paper.picture import Pen
 from planar.drawing.paper.scales import DECIMAL_STEPS, DEGREE_STEPS, ROUND_SLACK, SCREEN_DIGITS, round_values
 from planar.drawing.paper.stroke_shapes import LINE_END_IN_HEAD, head_length, head_of_length
 from planar.drawing.polygons.polygon import FEW_POLE_LETTERS, MAX_POLE_LETTERS, POLE_RADIUS
-from planar.drawing.scheme.scheme import INPUT_ARC_RADII
+from planar.drawing.scheme.symbol_table import INPUT_ARC_RADII
 
 POWERS = range(-15, 19)
 """Of ten, between which round values are offered."""

@@ -10,10 +10,10 @@ import numpy as np
 
 from planar.document.files import read_asset
 from planar.model.mechanism import Mechanism
+from planar.pages.data.page_data import page_data
 from planar.pages.drawing_style import pen_styles, symbol_script
 from planar.pages.notebook import pack_scripts
 from planar.pages.overlay_style import overlay_script, overlay_styles
-from planar.pages.page_data import page_data
 from planar.pages.still_picture import still_svg
 
 
@@ -40,10 +40,9 @@ SCRIPTS = (
     "solve/linkage.js",
     "page.js",
     "solve/course.js",
-    "stage/bodies.js",
+    "stage/plane.js",
     "stage/symbols.js",
-    "stage/ground.js",
-    "stage/springs.js",
+    "stage/strokes.js",
     "stage/letters.js",
     "solve/poses.js",
     "stage/drawing.js",

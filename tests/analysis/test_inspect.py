@@ -16,7 +16,7 @@ from planar.drawing.paper.picture import Label
 from planar.drawing.scheme.scheme import scheme
 from planar.model.link_graph import link_numbers
 from planar.model.mechanism import pair_entries
-from planar.pages.page_data import page_data
+from planar.pages.data.page_data import page_data
 from planar.reports.tables.inspection import inspection_tables, link_orders_text
 from tests.command import ROOT, run, written
 from tests.known import MODELS, some_models

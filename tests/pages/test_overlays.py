@@ -18,9 +18,9 @@ from planar.drawing.paper.stroke_shapes import arrow_head
 from planar.equations.mechanism_numbers import mechanism_size
 from planar.foundation.errors import NoAnswer
 from planar.foundation.geometry import Vector
+from planar.pages.data.page_data import page_data
+from planar.pages.data.polygon_data import outline_sides
 from planar.pages.overlay_style import LAYER_PENS, overlay_styles
-from planar.pages.page_data import page_data
-from planar.pages.polygon_data import outline_sides
 from tests.known import MODELS, found_centres, some_models
 from tests.page_scripts import in_node, needs_node
 

@@ -15,21 +15,17 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-import casadi as ca
 import numpy as np
 import pytest
 
 import planar
 from planar.document.dimensions import change_dimension, link_lengths
 from planar.document.files import read_asset
-from planar.drawing.scheme.link_bodies import link_bodies
-from planar.equations.mechanism_numbers import shapes_of_links
 from planar.foundation.errors import BadInput, NoAnswer
 from planar.pages import gallery, notebook
-from planar.pages.dimension_numbers import DimensionNumbers
+from planar.pages.data.page_data import page_data
 from planar.pages.gallery_kinds import KINDS, kind_and_search_text, search_text
 from planar.pages.page import SCRIPTS, fill_template, page, script_safe_json
-from planar.pages.page_data import drawing_data, page_data
 from planar.pages.still_picture import still_svg
 from planar.pages.view import notebook_html, page_of, view
 from planar.reports.columns import run_columns
@@ -154,23 +150,6 @@ def test_no_two_scripts_of_a_page_give_one_name_to_two_things(scripts):
         )
     ]
     assert sorted(named) == sorted(set(named))
-
-
-@pytest.mark.parametrize("name", ["watt-1-six-bar", "oscillating-cylinder", "crank-and-slotted-lever", "jansen-leg"])
-def test_links_on_a_page_are_those_of_a_drawing_for_other_dimensions_too(name):
-    mechanism = MODELS[name]
-    numbers = DimensionNumbers(mechanism)
-    carried = drawing_data(mechanism, numbers)["bodies"]
-    sizes = ca.Function("sizes", [numbers.d], [ca.vertcat(*map(ca.SX, numbers.values))])
-    first = numbers.dimensions[0]
-    for by in (1.0, 1.01):
-        other = change_dimension(mechanism, first, by * first.value)
-        values = sizes([each.value * (by if each == first else 1.0) for each in numbers.dimensions]).full().ravel()
-        for link, body in link_bodies(other, shapes_of_links(other)).items():
-            for what in ("sides", "plate", "tracers", "joints", "dots"):
-                places = np.array(carried[link][what], dtype=int)
-                found = np.array(getattr(body, what), dtype=float)
-                np.testing.assert_allclose(values[places], found, atol=1e-12, err_msg=f"{link} {what}")
 
 
 # what Python shows as a page

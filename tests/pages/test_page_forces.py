@@ -17,7 +17,7 @@ from planar.document.files import read_asset
 from planar.dynamics.load_attachment import attachments
 from planar.model.loads import Course, Load, Mass, Spring
 from planar.model.mechanism import Mechanism, relative_motions
-from planar.pages.page_data import page_data
+from planar.pages.data.page_data import page_data
 
 pytestmark = pytest.mark.skipif(shutil.which("node") is None, reason="there is no node here to run a page's scripts")
 

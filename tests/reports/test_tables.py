@@ -24,7 +24,7 @@ from planar.cli import main
 from planar.drawing.paper.picture import Label
 from planar.drawing.polygons.panels import polygon_panels
 from planar.drawing.scheme.scheme import scheme
-from planar.pages.page_data import page_data
+from planar.pages.data.page_data import page_data
 from planar.reports.files.table_files import encode_tables
 from planar.reports.fitted_table import plain_table
 from planar.reports.number_format import paragraphs, precision_text, vector_direction

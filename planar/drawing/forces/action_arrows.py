@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.drawing.paper.picture import Pen
-from planar.drawing.scheme.scheme import SUBSCRIPTS
+from planar.drawing.scheme.springs_masses import SUBSCRIPTS
 from planar.dynamics.external_actions import ExternalAction
 from planar.dynamics.forces import Forces
 from planar.model.link_graph import link_numbers

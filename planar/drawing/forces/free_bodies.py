@@ -23,9 +23,10 @@ from planar.drawing.paper.picture import (
 )
 from planar.drawing.paper.scales import Scale, choose_prefix, format_force, parse_scales, round_scale
 from planar.drawing.scheme import symbol_table, symbols
-from planar.drawing.scheme.ground import Clearance
+from planar.drawing.scheme.clearance import Clearance
 from planar.drawing.scheme.link_bodies import link_bodies, unit_vector
-from planar.drawing.scheme.link_strokes import moving_marks
+from planar.drawing.scheme.link_strokes import moving_marks, wheel_symbols
+from planar.drawing.scheme.placed_strokes import stroke_marks
 from planar.drawing.scheme.scene import Scene, plain_frames
 from planar.drawing.scheme.scheme import point_labels, scheme, space_scale
 from planar.dynamics.forces import Forces
@@ -216,10 +217,8 @@ def _body_marks(scene: Scene, link: str) -> Iterator[Mark]:
     yield from (mark for mark in moving_marks(scene) if mark.about == f"link {link}")
     wheels = [mark for mark in scene.marks if isinstance(mark, WheelMark)]
     wheels += [wheel for mark in scene.marks if isinstance(mark, BeltMark) for wheel in (mark.first, mark.second)]
-    for centre, radius, name in {
-        (each.centre, each.radius): (each.centre, each.radius, each.name) for each in wheels if each.link == link
-    }.values():
-        yield from symbols.wheel(scene.to_paper(link, centre), scene.scale.on_paper(radius), f"gear {name}")
+    for wheel in {(each.centre, each.radius): each for each in wheels if each.link == link}.values():
+        yield from stroke_marks(wheel_symbols(wheel, f"gear {wheel.name}"), scene.frames, scene.scale.per_mm)
     pins = {}
     for mark in scene.marks:
         if isinstance(mark, SliderMark) and mark.link == link and mark.name not in scene.cylinders:

@@ -1,36 +1,40 @@
-"""What stands still of a mechanism as strokes on paper: supports, fixed guides, racks and wheels."""
+"""What stands still of a mechanism as strokes of its frame: supports, fixed guides, racks and wheels."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from itertools import pairwise, product
-from math import pi
-from typing import Self
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import chain
+from math import ceil, pi
 
-import numpy as np
-
-from planar.drawing.paper.picture import Arrow, Circle, Mark, Pen, Polyline, paper_point
+from planar.drawing.paper.picture import Mark, Pen
 from planar.drawing.paper.scales import Scale
 from planar.drawing.scheme import symbol_table, symbols
-from planar.drawing.scheme.link_bodies import LinkBody, distance_between, unit_vector
-from planar.drawing.scheme.link_strokes import bar_strokes, cylinder_strokes, rack_contact, rack_strokes
-from planar.drawing.scheme.scene import Scene, TravelRanges
-from planar.drawing.scheme.spring_mass_strokes import spring_strokes
+from planar.drawing.scheme.clearance import Clearance
+from planar.drawing.scheme.link_bodies import LinkBody, distance_between
+from planar.drawing.scheme.link_strokes import (
+    bar_strokes,
+    cylinder_strokes,
+    rack_half_length,
+    rack_side,
+    rack_strokes,
+    spring_strokes,
+    wheel_symbols,
+)
+from planar.drawing.scheme.placed_strokes import PlacedLine, PlacedStroke, PlacedSymbol, stroke_marks
+from planar.drawing.scheme.scene import Scene, TravelRanges, greatest, least
 from planar.drawing.scheme.springs_masses import Coil
-from planar.foundation.geometry import Frame, Vector
+from planar.foundation.geometry import Frame, Vector, direction
+from planar.foundation.jets import Scalar
 from planar.model.link_shapes import LinkShape
-from planar.model.mechanism import Mechanism
+from planar.model.mechanism import Mechanism, named_points
 from planar.model.pairs.symbols import BeltMark, GuideMark, PinMark, PitchLineMark, SliderMark, SlotMark, WheelMark
 
 FIXED_GUIDE_OVERHANG = symbol_table.BLOCK_SIZE[0] / 2.0 + 2.0
 """mm: how far a fixed guide goes on beyond the middle of a block at the end of its travel."""
-GUIDE_LIFT = 0.8
-"""mm: how far a guide may be off its block, where a rack lies between them."""
 SAME_POINT_TOLERANCE = 0.05
 """mm: places nearer than this are one."""
-UPRIGHT_DIRECTIONS = (Vector(0, -1), Vector(-1, 0), Vector(1, 0), Vector(0, 1))
-SLANTED_DIRECTIONS = tuple(Vector(x / 2**0.5, y / 2**0.5) for x, y in ((-1, -1), (1, -1), (-1, 1), (1, 1)))
+
+GuideOfFrame = GuideMark | SlotMark | SliderMark
 
 
 def ground_marks(
@@ -44,206 +48,172 @@ def ground_marks(
 ) -> tuple[Mark, ...]:
     """What stands still: supports, fixed guides and wheels, turned so that they are clear of the links' position.
 
-    `beside` are further strokes to be clear of, such as the links in other positions.
+    `obstacles` are further strokes to be clear of, such as the links in other positions.
     """
     return fixed_marks(Scene(mechanism, bodies, frames, shapes, scale, travel or {}), obstacles)
 
 
 def fixed_marks(scene: Scene, obstacles: Iterable[Mark] = ()) -> tuple[Mark, ...]:
     """Supports, guides, racks and wheels of the frame, clear of the links and of further strokes where that can be."""
+    on_paper = scene.frames, scene.scale.per_mm
+    moving = stroke_marks(obstructing_strokes(scene), *on_paper)
+    pins = stroke_marks(fixed_pins(scene), *on_paper)
+    return tuple(stroke_marks(fixed_strokes(scene, Clearance.from_marks((*moving, *pins, *obstacles))), *on_paper))
+
+
+def obstructing_strokes(scene: Scene) -> Iterator[PlacedStroke]:
+    """The strokes of links that what stands still keeps clear of."""
+    return chain(bar_strokes(scene), cylinder_strokes(scene), rack_strokes(scene), spring_strokes(scene))
+
+
+def fixed_pins(scene: Scene) -> list[PlacedSymbol]:
+    """The pins on the frame."""
     frame = scene.mechanism.frame
-    made: list[Mark] = []
-    taken = [
-        pin
+    return [
+        PlacedSymbol(mark.name, frame, "pin", mark.positions[mark.links.index(frame)])
         for mark in scene.marks
         if isinstance(mark, PinMark) and frame in mark.links
-        for pin in symbols.symbol_marks("pin", "", scene.to_paper(frame, mark.positions[mark.links.index(frame)]))
     ]
-    moving = (
-        *bar_strokes(scene, Pen.LINK),
-        *cylinder_strokes(scene, Pen.LINK),
-        *rack_strokes(scene),
-        *spring_strokes(scene),
-    )
-    clear = Clearance.from_marks((*moving, *taken, *obstacles))
+
+
+def fixed_strokes(scene: Scene, clear: Clearance) -> list[PlacedStroke]:
+    """What stands still; its sides are chosen clear of strokes on paper, and of one another."""
+    frame, made = scene.mechanism.frame, list(_fixed_wheels(scene))
     middle = clear.centre()
-    wheels: set[tuple[Vector | float, ...]] = set()
-    banded = {mark.name for mark in scene.marks if isinstance(mark, BeltMark)}
+
+    def add(strokes: Iterable[PlacedStroke]) -> None:
+        nonlocal clear
+        told = list(strokes)
+        made.extend(told)
+        clear = clear.with_marks(stroke_marks(told, scene.frames, float(scene.per_mm)))
+
+    clear = clear.with_marks(stroke_marks(made, scene.frames, float(scene.per_mm)))
     for mark in scene.marks:
-        if isinstance(mark, WheelMark) and mark.link == frame and mark[2:] not in wheels:
-            wheels.add(mark[2:])
-            at, radius = scene.to_paper(frame, mark.centre), scene.scale.on_paper(mark.radius)
-            if mark.name in banded:
-                made += symbols.rim_hatching(at, radius, f"band {mark.name}")
-            else:
-                made += symbols.fixed_wheel(at, radius, f"gear {mark.name}")
-        elif isinstance(mark, PitchLineMark) and mark.link == frame:
-            at, way, back, half = rack_contact(scene, mark)
-            low, high = _guide_extent(scene, mark.name, mark.through, mark.direction, half)
-            made += symbols.rail(at + way * low, at + way * high, back, f"guide {mark.name}")
-    clear = clear.with_marks(made)
-    for mark in scene.marks:
-        on_frame = isinstance(mark, GuideMark | SlotMark) and mark.link == frame
-        if on_frame or (isinstance(mark, SliderMark) and mark.link == frame):
-            strokes = tuple(_fixed_guide_strokes(scene, mark, clear, middle))
-            made += strokes
-            clear = clear.with_marks(strokes)
+        if isinstance(mark, GuideOfFrame) and mark.link == frame:
+            add(_fixed_guide_strokes(scene, mark, clear, middle))
     drawn: set[str] = set()
-    for mark in scene.marks:
-        if isinstance(mark, PinMark) and frame in mark.links and mark.name not in drawn:
-            drawn.add(mark.name)
-            at = scene.to_paper(frame, mark.positions[mark.links.index(frame)])
-            strokes = tuple(symbols.symbol_marks("support", f"ground {mark.name}", at, clear.support_direction(at)))
-            made += strokes
-            clear = clear.with_marks(strokes)
-    for name, at in _spring_anchors(scene, taken):
-        strokes = tuple(symbols.symbol_marks("support", f"ground of {name}", at, clear.support_direction(at)))
-        made += strokes
-        clear = clear.with_marks(strokes)
-    return tuple(made)
+    for pin in fixed_pins(scene):
+        if pin.about not in drawn:
+            drawn.add(pin.about)
+            add([_support(scene, f"ground {pin.about}", pin.at, clear)])
+    for name, at in _spring_anchors(scene):
+        add([_support(scene, f"ground of {name}", at, clear)])
+    return made
 
 
-def _spring_anchors(scene: Scene, pins: Sequence[Circle]) -> Iterator[tuple[str, Vector]]:
+def fixed_point_strokes(scene: Scene) -> Iterator[PlacedSymbol]:
+    """Points of the frame at which nothing is pinned."""
+    frame = scene.mechanism.frame
+    pinned = {mark.name for mark in scene.marks if isinstance(mark, PinMark)}
+    for each in named_points(scene.mechanism):
+        point = dict(each.members).get(frame)
+        if point is not None and each.name not in pinned:
+            yield PlacedSymbol(f"point {each.name}", frame, "fixed dot", scene.place(frame, point))
+
+
+def _support(scene: Scene, about: str, at: Vector, clear: Clearance) -> PlacedSymbol:
+    frame = scene.mechanism.frame
+    return PlacedSymbol(about, frame, "support", at, clear.support_direction(scene.to_paper(frame, at)))
+
+
+def _spring_anchors(scene: Scene) -> Iterator[tuple[str, Vector]]:
     """Where springs hang on the frame, but at its pins; once where several do."""
-    met = [Vector(*pin.centre) for pin in pins]
+    frame, near = scene.mechanism.frame, SAME_POINT_TOLERANCE * float(scene.per_mm)
+    met = [pin.at for pin in fixed_pins(scene)]
     for mark in scene.marks:
         if isinstance(mark, Coil):
-            for link, place in zip(mark.links, mark.at, strict=True):
-                at = scene.to_paper(link, place)
-                if link == scene.mechanism.frame and all(
-                    distance_between(at, other) > SAME_POINT_TOLERANCE for other in met
-                ):
+            for link, at in zip(mark.links, mark.at, strict=True):
+                if link == frame and all(distance_between(at, other) > near for other in met):
                     met.append(at)
                     yield mark.name, at
 
 
-def _guide_extent(scene: Scene, name: str, through: Vector, way: Vector, half: float) -> tuple[float, float]:
-    """From where to where a fixed line is drawn, from beside what runs along it (mm)."""
-    frame = scene.mechanism.frame
-    here = scene.displacement_along(name, frame, through, way)
-    low, high = scene.travel_range(name, frame, through, through, way)
-    paper = scene.scale.on_paper
-    return min(paper(min(low, here) - here) - FIXED_GUIDE_OVERHANG, -half), max(
-        paper(max(high, here) - here) + FIXED_GUIDE_OVERHANG, half
-    )
+def _fixed_wheels(scene: Scene) -> Iterator[PlacedStroke]:
+    """Wheels and racks of the frame."""
+    frame, seen = scene.mechanism.frame, set()
+    banded = {mark.name for mark in scene.marks if isinstance(mark, BeltMark)}
+    for mark in scene.marks:
+        if isinstance(mark, WheelMark) and mark.link == frame and mark[2:] not in seen:
+            seen.add(mark[2:])
+            about = f"band {mark.name}" if mark.name in banded else f"gear {mark.name}"
+            if mark.name not in banded:
+                yield from wheel_symbols(mark, about, "fixed rim")
+            yield from _rim_hatching(scene, mark, about)
+        elif isinstance(mark, PitchLineMark) and mark.link == frame:
+            half = rack_half_length(scene, mark)
+            low, high = _guide_extent(scene, mark.name, mark.through, mark.direction, half)
+            yield _rail(f"guide {mark.name}", frame, mark.through, mark.direction, low, high, rack_side(scene, mark))
 
 
-def _fixed_guide_strokes(
-    scene: Scene, mark: GuideMark | SlotMark | SliderMark, clear: Clearance, middle: Vector
-) -> Iterator[Mark]:
+def _rim_hatching(scene: Scene, mark: WheelMark, about: str) -> Iterator[PlacedSymbol]:
+    """Hatching in three places inside the circle of a wheel, of an internal wheel outside its rim."""
+    inside = mark.radius > 0.0
+    rim = abs(mark.radius) if inside else abs(mark.radius) + symbol_table.RIM_WIDTH * scene.per_mm
+    length = float(rim) / float(scene.per_mm)
+    if inside and length < 3.0 * symbol_table.HATCH_LENGTH:
+        return
+    arc = min(pi / 5.0, 12.0 / length)
+    count = max(2, ceil(arc * length / symbol_table.HATCH_LENGTH))
+    for middle in (pi / 2.0, pi * 7.0 / 6.0, pi * 11.0 / 6.0):
+        for k in range(count + 1):
+            out = direction(middle + arc * (k / count - 0.5))
+            way = symbols.quarter_turn(out) * -1.0
+            yield PlacedSymbol(about, mark.link, "hatch", mark.centre + out * rim, way, side=-1.0 if inside else 1.0)
+
+
+def _guide_extent(scene: Scene, name: str, through: Vector, way: Vector, half: Scalar) -> tuple[Scalar, Scalar]:
+    """From where to where a fixed line is drawn (m), `half` beside what is seen to run along it at least."""
+    frame, over = scene.mechanism.frame, FIXED_GUIDE_OVERHANG * scene.per_mm
+    first, last = scene.shown_range(name, frame, through, way)
+    low, high = scene.drawn_range(name, frame, through, through, way)
+    return least(low - over, first - half), greatest(high + over, last + half)
+
+
+def _rail(about: str, link: str, at: Vector, way: Vector, start: Scalar, stop: Scalar, side: float) -> PlacedSymbol:
+    """A line of what does not move, hatched on one side, between distances along it (m)."""
+    return PlacedSymbol(about, link, "rail", at + way * start, way, at + way * stop, side)
+
+
+def _fixed_guide_strokes(scene: Scene, mark: GuideOfFrame, clear: Clearance, middle: Vector) -> Iterator[PlacedStroke]:
     """A hatched line beneath a block; round a pin a slot; a fixed block, through which a link slides."""
-    about = f"guide {mark.name}"
-    half = symbol_table.BLOCK_SIZE[1] / 2.0
+    about, per_mm = f"guide {mark.name}", scene.per_mm
+    half, link, way = symbol_table.BLOCK_SIZE[1] / 2.0, mark.link, mark.direction
     if isinstance(mark, SliderMark):
-        at, way = scene.to_paper(mark.link, mark.position), scene.direction_on_paper(mark.link, mark.direction)
-        low, high = -symbol_table.BLOCK_SIZE[0] / 2.0 - 1.0, symbol_table.BLOCK_SIZE[0] / 2.0 + 1.0
+        at = mark.position
+        low, high = (sign * (symbol_table.BLOCK_SIZE[0] / 2.0 + 1.0) * per_mm for sign in (-1.0, 1.0))
     else:
-        rider, point = scene.running_point(mark.name) or (mark.link, mark.through)
-        at, way = scene.to_paper(rider, point), scene.direction_on_paper(mark.link, mark.direction)
-        room = symbol_table.RAIL_LENGTH / 2.0 if mark.name not in scene.travel else 0.0
-        low, high = _guide_extent(scene, mark.name, mark.through, mark.direction, room)
+        at = mark.through
+        room = 0.0 if scene.knows_travel(mark.name) else symbol_table.RAIL_LENGTH / 2.0
+        low, high = _guide_extent(scene, mark.name, at, way, room * per_mm)
         if isinstance(mark, SlotMark):
             half = symbol_table.SLOT_SIZE[1] / 2.0
-            across = symbols.quarter_turn(way) * half
+            across = symbols.quarter_turn(way) * (half * per_mm)
             for side in (across, across * -1.0):
-                yield symbols.stroke(about, Pen.GROUND, at + way * low + side, at + way * high + side)
-    side, off = clear.hatching_side(at, way, low, high, half, middle)
-    for start, stop in _rail_segments(scene, mark, at, way, low, high):
-        yield from symbols.rail(at + way * start + side * off, at + way * stop + side * off, side, about)
+                yield PlacedLine(about, link, Pen.GROUND, (at + way * low + side, at + way * high + side))
+    here = 0.0 if isinstance(mark, SliderMark) else float(scene.shown_range(mark.name, link, at, way)[0])
+    spot, along = scene.to_paper(link, at + way * here), scene.direction_on_paper(link, way)
+    first, last = ((float(end) - here) / float(per_mm) for end in (low, high))
+    sign, off = clear.hatching_side(spot, along, first, last, half, middle)
+    beside = at + symbols.quarter_turn(way) * (sign * off * per_mm)
+    for start, stop in _rail_segments(scene, mark, at, low, high):
+        yield _rail(about, link, beside, way, start, stop, sign)
 
 
 def _rail_segments(
-    scene: Scene, mark: GuideMark | SlotMark | SliderMark, at: Vector, way: Vector, low: float, high: float
-) -> list[tuple[float, float]]:
-    """A rail along a line (mm from its block), with gaps for the supports of fixed pins that lie on its way."""
-    frame, pieces = scene.mechanism.frame, [(low, high)]
-    room = symbol_table.SUPPORT_WIDTH / 2.0 + 1.0
-    for pin in scene.marks:
-        if isinstance(pin, PinMark) and frame in pin.links:
-            off = scene.to_paper(frame, pin.positions[pin.links.index(frame)]) - at
-            here, beside = off.dot(way), abs(way.cross(off))
-            under = mark.name not in scene.travel and abs(here) < room + symbol_table.BLOCK_SIZE[0] / 2.0
-            if beside < symbol_table.SUPPORT_HEIGHT + symbol_table.HATCH_LENGTH and not under:
-                cut = [(start, min(stop, here - room)) for start, stop in pieces]
-                cut += [(max(start, here + room), stop) for start, stop in pieces]
-                pieces = [(start, stop) for start, stop in cut if stop - start > symbol_table.HATCH_LENGTH]
+    scene: Scene, mark: GuideOfFrame, at: Vector, low: Scalar, high: Scalar
+) -> list[tuple[Scalar, Scalar]]:
+    """A rail along a line (m from a place on it), with gaps for the supports of fixed pins that lie on its way."""
+    pieces, way, per_mm = [(low, high)], mark.direction, scene.per_mm
+    room = (symbol_table.SUPPORT_WIDTH / 2.0 + 1.0) * per_mm
+    deep = (symbol_table.SUPPORT_HEIGHT + symbol_table.HATCH_LENGTH) * per_mm
+    block = under = 0.0
+    if not scene.knows_travel(mark.name):
+        block = 0.0 if isinstance(mark, SliderMark) else scene.shown_range(mark.name, mark.link, at, way)[0]
+        under = room + symbol_table.BLOCK_SIZE[0] / 2.0 * per_mm
+    for pin in fixed_pins(scene):
+        here, beside = (pin.at - at).dot(way), abs(way.cross(pin.at - at))
+        if beside < deep and not abs(here - block) < under:
+            cut = [(start, least(stop, here - room)) for start, stop in pieces]
+            cut += [(greatest(start, here + room), stop) for start, stop in pieces]
+            pieces = [each for each in cut if each[1] - each[0] > symbol_table.HATCH_LENGTH * per_mm]
     return pieces or [(low, high)]
-
-
-@dataclass(frozen=True)
-class Clearance:
-    """Points of strokes (n, 2) in mm, from which the freest side for a symbol is told."""
-
-    points: np.ndarray
-
-    @classmethod
-    def from_marks(cls, marks: Iterable[Mark]) -> Self:
-        """Strokes as points at most half a millimetre apart."""
-        rows = [np.zeros((0, 2))]
-        for mark in marks:
-            if isinstance(mark, Circle):
-                turns = np.radians(np.linspace(mark.start, mark.stop, 2 + int(4.0 * pi * mark.radius)))
-                rows.append(np.array(mark.centre) + mark.radius * np.stack([np.cos(turns), np.sin(turns)], axis=1))
-            elif isinstance(mark, Polyline | Arrow):
-                spots = mark.points if isinstance(mark, Polyline) else (mark.tail, mark.head)
-                closing = spots[:1] if isinstance(mark, Polyline) and mark.closed else ()
-                for a, b in pairwise(np.array((*spots, *closing))):
-                    parts = np.linspace(0.0, 1.0, 2 + int(np.hypot(*(b - a)) / 0.5))
-                    rows.append(a + (b - a) * parts[:, None])
-        return cls(np.concatenate(rows))
-
-    def with_marks(self, marks: Iterable[Mark]) -> Self:
-        """The same with more strokes."""
-        return type(self)(np.concatenate([self.points, self.from_marks(marks).points]))
-
-    def centre(self) -> Vector:
-        """The middle of all strokes."""
-        if not len(self.points):
-            return Vector(0.0, 0.0)
-        low, high = self.points.min(axis=0), self.points.max(axis=0)
-        return Vector(*map(float, (low + high) / 2.0))
-
-    def count_in_box(self, at: Vector, way: Vector, low: Vector, high: Vector) -> int:
-        """How many points lie in a box: from `low` to `high` along a unit vector and to its left."""
-        off = self.points - np.array(paper_point(at))
-        along = off @ np.array(paper_point(way))
-        left = off @ np.array(paper_point(symbols.quarter_turn(way)))
-        return int(np.sum((along > low.x) & (along < high.x) & (left > low.y) & (left < high.y)))
-
-    def count_near_arc(self, at: Vector, radius: float, middle: float, sweep: float) -> int:
-        """How many points lie near an arc about a place (mm, rad)."""
-        off = self.points - np.array(paper_point(at))
-        turned = (np.arctan2(off[:, 1], off[:, 0]) - middle + np.pi) % (2.0 * np.pi) - np.pi
-        near = np.abs(np.hypot(off[:, 0], off[:, 1]) - radius) < 1.3
-        return int(np.sum(near & (np.abs(turned) < sweep / 2.0 + 0.15)))
-
-    def support_direction(self, at: Vector) -> Vector:
-        """Which way a support stands best: downwards, unless strokes are there."""
-        centre = np.array(paper_point(at))
-
-        def price(index: int, down: Vector) -> tuple[float, int]:
-            off = self.points - centre
-            along, left = off @ np.array(paper_point(down)), off @ np.array(paper_point(symbols.quarter_turn(down)))
-            inside = (along > 1.4) & (along < symbol_table.SUPPORT_HEIGHT + symbol_table.HATCH_LENGTH + 0.8)
-            inside &= np.abs(left) < np.minimum(1.0 + 0.7 * along, symbol_table.SUPPORT_WIDTH / 2.0 + 0.5)
-            return float(np.sum(inside)) + 1.5 * (index > 0) + 1.5 * (index > 3), index
-
-        ways = [*UPRIGHT_DIRECTIONS, *SLANTED_DIRECTIONS]
-        return ways[min(range(len(ways)), key=lambda index: price(index, ways[index]))]
-
-    def hatching_side(
-        self, at: Vector, way: Vector, low: float, high: float, half: float, middle: Vector
-    ) -> tuple[Vector, float]:
-        """On which side of a line, and how far off, its hatching is clearest; else below, else away from the middle."""
-        left = unit_vector(symbols.quarter_turn(way))
-
-        def price(choice: tuple[float, float]) -> tuple[float, float, float]:
-            sign, off = choice
-            near, far = sorted((sign * (off - 0.25), sign * (off + symbol_table.HATCH_LENGTH + 1.0)))
-            lifted = 1.0 * (off > half)
-            crowded = self.count_in_box(at, way, Vector(low, near), Vector(high, far)) + lifted
-            side = left * sign
-            return crowded, side.y if abs(side.y) > 0.5 else 0.0, (middle - at).dot(side)
-
-        sign, off = min(product((1.0, -1.0), (half, half + GUIDE_LIFT)), key=price)
-        return left * sign, off

@@ -1,23 +1,35 @@
-"""What moves of a mechanism as strokes on paper: plates, wheels, bars, springs, slots, blocks, masses and pins."""
+"""What moves of a mechanism as strokes of its links: plates, wheels, bars, springs, slots, blocks, masses and pins."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from itertools import chain
 from math import hypot
 from typing import Any
 
-from planar.drawing.paper.picture import Circle, Fill, Mark, Pen, Polyline
+from planar.drawing.paper.picture import Fill, Mark, Pen
 from planar.drawing.paper.scales import Scale
 from planar.drawing.scheme import symbol_table, symbols
 from planar.drawing.scheme.link_bodies import LinkBody, distance_from_line
-from planar.drawing.scheme.scene import GUIDE_OVERHANG, Cylinder, Scene, TravelRanges
-from planar.drawing.scheme.spring_mass_strokes import mass_centre_marks, spring_strokes
+from planar.drawing.scheme.placed_strokes import (
+    PlacedLine,
+    PlacedSpring,
+    PlacedStroke,
+    PlacedSymbol,
+    PlacedTorsionSpring,
+    stroke_marks,
+)
+from planar.drawing.scheme.scene import GUIDE_OVERHANG, Cylinder, Scene, TravelRanges, greatest, least
+from planar.drawing.scheme.springs_masses import Coil, MassCentreMark, Spiral
+from planar.foundation import jets
 from planar.foundation.geometry import Frame, Vector
+from planar.foundation.jets import Scalar
 from planar.model.link_shapes import LinkShape
 from planar.model.mechanism import Mechanism
 from planar.model.pairs.symbols import BeltMark, GuideMark, PinMark, PitchLineMark, SliderMark, SlotMark, WheelMark
 
 
+# many: what a scene is made of, and how it is drawn
 def body_marks(
     mechanism: Mechanism,
     bodies: Mapping[str, LinkBody],
@@ -30,168 +42,204 @@ def body_marks(
 ) -> tuple[Mark, ...]:
     """What moves, in one position (frames of plain numbers), with all pins; lines alone where no symbols are wanted."""
     scene = Scene(mechanism, bodies, frames, shapes, scale, travel or {})
-    return moving_marks(scene, pen) if with_symbols else (*bar_strokes(scene, pen), *_cylinder_centre_lines(scene, pen))
+    if with_symbols:
+        return moving_marks(scene, pen)
+    lines = (*bar_strokes(scene, pen), *_cylinder_centre_lines(scene, pen))
+    return tuple(stroke_marks(lines, frames, scale.per_mm))
 
 
 def moving_marks(scene: Scene, pen: Pen = Pen.LINK) -> tuple[Mark, ...]:
-    """Plates, wheels, bars, springs, slots, blocks, centres of mass and pins of a scene."""
-    plates = [
-        symbols.filled_area(f"link {body.link}", pen, Fill.LINK, *(scene.to_paper(body.link, p) for p in body.plate))
-        for body in scene.bodies.values()
-        if body.plate
-    ]
-    solid = (
-        *plates,
-        *_wheel_marks(scene),
-        *rack_strokes(scene),
-        *cylinder_strokes(scene, pen),
-        *bar_strokes(scene, pen),
-    )
-    return (*solid, *spring_strokes(scene), *_slider_marks(scene, pen))
+    """Plates, wheels, bars, springs, slots, blocks, centres of mass and pins of a scene on paper."""
+    strokes = chain.from_iterable(moving_strokes(scene, pen).values())
+    return tuple(stroke_marks(strokes, scene.frames, scene.scale.per_mm))
 
 
-def bar_strokes(scene: Scene, pen: Pen) -> Iterator[Polyline]:
+def moving_strokes(scene: Scene, pen: Pen = Pen.LINK) -> dict[str, Iterator[PlacedStroke]]:
+    """The same as strokes of links by their level; each level hides those before it."""
+    return {
+        "plates": _plate_strokes(scene, pen),
+        "wheels": chain(_wheel_strokes(scene), rack_strokes(scene)),
+        "tubes": cylinder_strokes(scene, pen),
+        "bars": bar_strokes(scene, pen),
+        "springs": spring_strokes(scene),
+        "sliders": _slider_strokes(scene, pen),
+        "pins": pin_strokes(scene),
+    }
+
+
+def _plate_strokes(scene: Scene, pen: Pen) -> Iterator[PlacedLine]:
+    for body in scene.bodies.values():
+        if body.plate:
+            yield PlacedLine(f"link {body.link}", body.link, pen, body.plate, True, Fill.LINK)
+
+
+def bar_strokes(scene: Scene, pen: Pen = Pen.LINK) -> Iterator[PlacedLine]:
     """The lines of the bodies, with guides as far as their blocks and thin lines to points beside."""
     thin = Pen.PIN if pen is Pen.LINK else pen
     for link, body in scene.bodies.items():
         about = f"link {link}"
-        tubes = [tube for tube in scene.cylinders.values() if link == tube.guide]
-        rods = [tube for tube in scene.cylinders.values() if link == tube.rod]
+        lines = [
+            *((tube.foot, tube.direction) for tube in scene.cylinders.values() if link == tube.guide),
+            *((tube.rod_place, tube.rod_direction) for tube in scene.cylinders.values() if link == tube.rod),
+        ]
         for side in body.sides:
-            if not any(_lies_on_cylinder(scene, link, side, tube) for tube in (*tubes, *rods)):
-                yield symbols.stroke(about, pen, *(scene.to_paper(link, p) for p in side))
+            # what lies on the centre line of a cylinder is drawn as the cylinder
+            if not any(all(distance_from_line(p, *line) <= 2.0 * scene.tolerance for p in side) for line in lines):
+                yield PlacedLine(about, link, pen, side)
         for side in body.tracers:
-            yield symbols.stroke(about, thin, *(scene.to_paper(link, p) for p in side))
+            yield PlacedLine(about, link, thin, side)
         yield from _guide_strokes(scene, link, body, pen)
 
 
-def _lies_on_cylinder(scene: Scene, link: str, side: tuple[Vector, Vector], tube: Cylinder) -> bool:
-    """Whether a side lies on the centre line of a cylinder, which is drawn in its place."""
-    frame, world = scene.frames[tube.guide], scene.frames[link]
-    return all(
-        distance_from_line(frame.to_local(world.to_world(p)), tube.foot, tube.direction) <= 2.0 * scene.tolerance
-        for p in side
-    )
-
-
-def _guide_strokes(scene: Scene, link: str, body: LinkBody, pen: Pen) -> Iterator[Polyline]:
+def _guide_strokes(scene: Scene, link: str, body: LinkBody, pen: Pen) -> Iterator[PlacedLine]:
     """The lines of a link along which blocks run, from its body to beyond the block."""
     through = {mark.name: mark.through for mark in scene.marks if isinstance(mark, GuideMark | SlotMark)}
-    over = GUIDE_OVERHANG * scene.scale.per_mm
+    over = GUIDE_OVERHANG * scene.per_mm
     slides = {mark.position for mark in scene.marks if isinstance(mark, SliderMark) and mark.link == link}
     for name, foot, way in body.guides:
         if name in scene.cylinders or name not in through:
             continue
-        low, high = scene.travel_range(name, link, through[name], foot, way)
-        here = scene.displacement_along(name, link, foot, way)
-        low, high = min(low, here), max(high, here)
-        start, stop = min(0.0, low - over), max(0.0, high + over)
-        if low > over or high < -over:  # to one side of the body only
-            start, stop = (0.0, high + over) if low > 0.0 else (low - over, 0.0)
+        low, high = scene.drawn_range(name, link, through[name], foot, way)
+        start, stop = least(0.0, low - over), greatest(0.0, high + over)
         if len(body.joints) == 1 and any(hypot(*(at - foot)) <= scene.tolerance for at in slides):
-            behind = (
-                over + symbol_table.BLOCK_SIZE[1] / 2.0 * scene.scale.per_mm
-            )  # a yoke shows on both sides of its own block
-            start, stop = min(start, -behind), max(stop, behind)
-        yield symbols.stroke(
-            f"link {link}", pen, scene.to_paper(link, foot + way * start), scene.to_paper(link, foot + way * stop)
-        )
+            behind = over + symbol_table.BLOCK_SIZE[1] / 2.0 * scene.per_mm
+            start, stop = least(start, -behind), greatest(stop, behind)  # a yoke shows on both sides of its own block
+        yield PlacedLine(f"link {link}", link, pen, (foot + way * start, foot + way * stop))
 
 
-def _wheel_marks(scene: Scene) -> Iterator[Mark]:
-    """Wheels that move, and bands."""
+def _wheel_strokes(scene: Scene) -> Iterator[PlacedSymbol]:
+    """Wheels that move, and bands. In a moving picture a mark shows that a wheel turns."""
     frame = scene.mechanism.frame
     seen: set[tuple[Any, ...]] = set()
     banded = {mark.name for mark in scene.marks if isinstance(mark, BeltMark)}
     for mark in scene.marks:
-        if isinstance(mark, WheelMark) and mark.link != frame and mark.name not in banded:
-            key = mark.link, *(round(value / scene.tolerance) for value in (*mark.centre, mark.radius))
-            if key not in seen:
-                seen.add(key)
-                at, radius = scene.to_paper(mark.link, mark.centre), scene.scale.on_paper(mark.radius)
-                yield from symbols.wheel(at, radius, f"gear {mark.name}")
-        elif isinstance(mark, BeltMark):
-            both = mark.first, mark.second
-            centres = [scene.to_paper(wheel.link, wheel.centre) for wheel in both]
-            radii = [scene.scale.on_paper(abs(wheel.radius)) for wheel in both]
-            yield from symbols.band(centres, radii, mark.crossed, f"band {mark.name}")
+        if isinstance(mark, BeltMark):
+            yield from _band_strokes(mark)
+        if not isinstance(mark, WheelMark) or mark.link == frame:
+            continue
+        about, radius, loose = f"gear {mark.name}", abs(mark.radius), mark.name not in banded
+        key = mark.link, loose, *(round(float(value) / scene.tolerance) for value in (*mark.centre, mark.radius))
+        if key in seen:
+            continue
+        seen.add(key)
+        if loose:
+            yield from wheel_symbols(mark, about)
+        if scene.is_moving:
+            rim = mark.centre + symbols.EAST * radius
+            yield PlacedSymbol(about, mark.link, "wheel mark", mark.centre, stop=rim, radius=radius)
 
 
-def rack_strokes(scene: Scene) -> Iterator[Polyline]:
+def wheel_symbols(mark: WheelMark, about: str, rim: str = "rim") -> Iterator[PlacedSymbol]:
+    """A pitch circle; of an internal wheel (radius below zero) also its rim."""
+    for name in ("wheel", rim) if mark.radius < 0.0 else ("wheel",):
+        yield PlacedSymbol(about, mark.link, name, mark.centre, radius=abs(mark.radius))
+
+
+def _band_strokes(mark: BeltMark) -> Iterator[PlacedStroke]:
+    """A loop round two wheels: both circles and their outer, if crossed their inner, common tangents."""
+    about, (p, q), (r, s) = f"band {mark.name}", mark.centres, (abs(mark.first.radius), abs(mark.second.radius))
+    for at, radius in ((p, r), (q, s)):
+        yield PlacedSymbol(about, mark.carrier, "band circle", at, radius=radius)
+    length = jets.hypot(*(q - p))
+    far = -s if mark.crossed else s
+    if length <= 0.0 or abs(r - far) > length:
+        return
+    way = (q - p) * (1.0 / length)
+    along = (r - far) / length
+    aside = jets.sqrt(1.0 - along * along)
+    for sign in (1.0, -1.0):
+        out = way * along + symbols.quarter_turn(way) * (sign * aside)
+        yield PlacedLine(about, mark.carrier, Pen.BAND, (p + out * r, q + out * far))
+
+
+def rack_strokes(scene: Scene) -> Iterator[PlacedSymbol]:
     """Racks that move, from the link's body to beneath the wheel."""
     for mark in scene.marks:
         if isinstance(mark, PitchLineMark) and mark.link != scene.mechanism.frame:
-            at, way, back, half = rack_contact(scene, mark)
-            foot = next(each.foot for each in scene.bodies[mark.link].guides if each.name == mark.name)
-            to_foot = (scene.to_paper(mark.link, foot) - at).dot(way)
-            low, high = min(-half, to_foot), max(half, to_foot)
-            yield from symbols.symbol_marks(
-                "rack bar", f"link {mark.link}", at + way * low, way, at + way * high, left=back
+            foot, way = next(each[1:] for each in scene.bodies[mark.link].guides if each.name == mark.name)
+            first, last = scene.shown_range(mark.name, mark.link, foot, way)
+            half, side = rack_half_length(scene, mark), rack_side(scene, mark)
+            low, high = least(first - half, 0.0), greatest(last + half, 0.0)
+            yield PlacedSymbol(
+                f"link {mark.link}",
+                mark.link,
+                "rack bar",
+                foot + way * low,
+                way,
+                foot + way * high,
+                side,
             )
 
 
-def rack_contact(scene: Scene, mark: PitchLineMark) -> tuple[Vector, Vector, Vector, float]:
-    """Of a rack the place beneath its wheel, its way, which way the wheel is not, and half the length drawn (mm)."""
-    through, way = scene.to_paper(mark.link, mark.through), scene.direction_on_paper(mark.link, mark.direction)
-    centre = scene.to_paper(mark.wheel.link, mark.wheel.centre)
-    at = through + way * (centre - through).dot(way)
-    left = symbols.quarter_turn(way)
-    back = left * (-1.0 if (centre - through).dot(left) > 0.0 else 1.0)
-    return at, way, back, max(10.0, scene.scale.on_paper(1.2 * mark.wheel.radius))
+def rack_half_length(scene: Scene, mark: PitchLineMark) -> Scalar:
+    """How far a rack is drawn at least to either side of where its wheel touches it (m)."""
+    return greatest(10.0 * scene.per_mm, 1.2 * mark.wheel.radius)
 
 
-def _cylinder_centre_lines(scene: Scene, pen: Pen) -> Iterator[Polyline]:
+def rack_side(scene: Scene, mark: PitchLineMark) -> float:
+    """On which side of its pitch line a rack's wheel is not: 1 to the left of its direction, -1 to the right."""
+    centre = scene.to_paper(mark.wheel.link, mark.wheel.centre) - scene.to_paper(mark.link, mark.through)
+    left = symbols.quarter_turn(scene.direction_on_paper(mark.link, mark.direction))
+    return -1.0 if centre.dot(left) > 0.0 else 1.0
+
+
+def _cylinder_centre_lines(scene: Scene, pen: Pen) -> Iterator[PlacedLine]:
     """Cylinders and rods by their centre lines alone."""
-    for name, tube in scene.cylinders.items():
-        here = scene.displacement_along(name, tube.guide, tube.foot, tube.direction)
-        for link, low, high in (
-            (tube.guide, tube.base, tube.mouth),
-            (tube.rod, here + tube.piston, here + tube.rod_end),
-        ):
-            ends = (scene.to_paper(tube.guide, tube.foot + tube.direction * s) for s in (low, high))
-            yield symbols.stroke(f"link {link}", pen, *ends)
+    for tube in scene.cylinders.values():
+        for link, ends in ((tube.guide, _cylinder_ends(tube)), (tube.rod, _rod_ends(tube))):
+            yield PlacedLine(f"link {link}", link, pen, ends)
 
 
-def cylinder_strokes(scene: Scene, pen: Pen) -> Iterator[Polyline]:
+def _cylinder_ends(tube: Cylinder) -> tuple[Vector, Vector]:
+    return tube.foot + tube.direction * tube.base, tube.foot + tube.direction * tube.mouth
+
+
+def _rod_ends(tube: Cylinder) -> tuple[Vector, Vector]:
+    place, way = tube.rod_place, tube.rod_direction
+    return place + way * tube.piston, place + way * tube.rod_end
+
+
+def cylinder_strokes(scene: Scene, pen: Pen = Pen.LINK) -> Iterator[PlacedSymbol]:
     """Cylinders with their pistons and rods."""
-    for name, tube in scene.cylinders.items():
-        here = scene.displacement_along(name, tube.guide, tube.foot, tube.direction)
-        spots = [
-            scene.to_paper(tube.guide, tube.foot + tube.direction * s)
-            for s in (tube.base, tube.mouth, here + tube.piston, here + tube.rod_end)
-        ]
-        way = scene.direction_on_paper(tube.guide, tube.direction)
+    for tube in scene.cylinders.values():
         if tube.mouth - tube.base > scene.tolerance:
-            yield from symbols.symbol_marks("cylinder", f"link {tube.guide}", spots[0], way, spots[1])
-        yield from symbols.symbol_marks("piston", f"link {tube.rod}", spots[2], way, spots[3], pen=pen)
+            start, stop = _cylinder_ends(tube)
+            yield PlacedSymbol(f"link {tube.guide}", tube.guide, "cylinder", start, tube.direction, stop)
+        start, stop = _rod_ends(tube)
+        yield PlacedSymbol(f"link {tube.rod}", tube.rod, "piston", start, tube.rod_direction, stop, pen=pen)
 
 
-def _slider_marks(scene: Scene, pen: Pen) -> Iterator[Mark]:
-    """Slots, blocks, pins and points, in the order in which they hide one another."""
+def spring_strokes(scene: Scene) -> Iterator[PlacedSpring | PlacedTorsionSpring]:
+    """Springs and dampers, each as long as it is in this position."""
+    for mark in scene.marks:
+        if isinstance(mark, Coil):
+            yield PlacedSpring(mark.name, mark.links, mark.symbol, mark.at)
+        elif isinstance(mark, Spiral):
+            symbol = f"torsion {mark.symbol}"
+            yield PlacedTorsionSpring(mark.name, mark.links, symbol, mark.pin, mark.at, mark.ways, mark.free)
+
+
+def _slider_strokes(scene: Scene, pen: Pen) -> Iterator[PlacedSymbol]:
+    """Slots, blocks and centres of mass."""
     frame = scene.mechanism.frame
+    spare = 0.0 if scene.is_moving else (symbol_table.SLOT_SIZE[0] - symbol_table.SLOT_SIZE[1]) / 2.0 * scene.per_mm
     for mark in scene.marks:
         if isinstance(mark, SlotMark) and mark.link != frame:
-            at, way = (
-                scene.to_paper(mark.pin_link, mark.pin_position),
-                scene.direction_on_paper(mark.link, mark.direction),
-            )
-            yield from symbols.slot(at, way, f"link {mark.link}", pen)
+            at, way = mark.through, mark.direction
+            low, high = scene.shown_range(mark.name, mark.link, at, way)
+            start, stop = at + way * (low - spare), at + way * (high + spare)
+            yield PlacedSymbol(f"link {mark.link}", mark.link, "slot opening", start, way, stop, pen=pen)
     for mark in scene.marks:
         if isinstance(mark, SliderMark) and mark.name not in scene.cylinders:
-            at, way = scene.to_paper(mark.link, mark.position), scene.direction_on_paper(mark.link, mark.direction)
-            yield from symbols.symbol_marks("block", f"block {scene.running_point_name(mark.name)}", at, way)
-    yield from mass_centre_marks(scene)
-    yield from pin_strokes(scene)
-    for link, body in scene.bodies.items():
-        for point, at in scene.shapes[link].points.items():
-            if any(hypot(*(at - each)) <= scene.tolerance for each in body.dots):
-                yield from symbols.symbol_marks(
-                    "dot", f"point {scene.point_names[link, point]}", scene.to_paper(link, at)
-                )
+            about = f"block {scene.running_point_name(mark.name)}"
+            yield PlacedSymbol(about, mark.link, "block", mark.position, mark.direction)
+    for mark in scene.marks:
+        if isinstance(mark, MassCentreMark):
+            yield PlacedSymbol(mark.name, mark.link, "mass centre", mark.at, symbols.EAST if scene.is_moving else None)
 
 
-def pin_strokes(scene: Scene) -> Iterator[Circle]:
-    """Every pin, once however many links it joins."""
+def pin_strokes(scene: Scene) -> Iterator[PlacedSymbol]:
+    """Every pin, once however many links it joins, and points that are no joints."""
     drawn: set[str] = set()
     for mark in scene.marks:
         if isinstance(mark, PinMark):
@@ -202,4 +250,8 @@ def pin_strokes(scene: Scene) -> Iterator[Circle]:
             continue
         if name not in drawn:
             drawn.add(name)
-            yield from symbols.symbol_marks("pin", f"pin {name}", scene.to_paper(link, at))
+            yield PlacedSymbol(f"pin {name}", link, "pin", at)
+    for link, body in scene.bodies.items():
+        for point, at in scene.places[link].items():
+            if any(hypot(*(at - each)) <= scene.tolerance for each in body.dots):
+                yield PlacedSymbol(f"point {scene.point_names[link, point]}", link, "dot", at)

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, reduce
 from math import copysign
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from planar.drawing.paper.picture import paper_point
 from planar.drawing.paper.scales import Scale
 from planar.drawing.scheme.link_bodies import RELATIVE_TOLERANCE, LinkBody, all_marks, distance_from_line, largest_span
 from planar.drawing.scheme.springs_masses import SpringMassMark
 from planar.foundation.geometry import Frame, Vector
-from planar.foundation.jets import Jet
+from planar.foundation.jets import Jet, Scalar
 from planar.model.link_shapes import LinkShape
 from planar.model.mechanism import Mechanism, named_points
+from planar.model.pairs import Pair
 from planar.model.pairs.symbols import DrawingMark, GuideMark, SliderMark
 
 TravelRanges = Mapping[str, tuple[float, float]]
@@ -37,18 +39,33 @@ def plain_frames(frames: Mapping[str, Frame], index: int | None = None) -> dict[
     return {link: Frame(*(number(value) for value in frame[:5]), frame.fixed) for link, frame in frames.items()}
 
 
+def least(first: Scalar, second: Scalar) -> Scalar:
+    """The lesser of two numbers, or of functions of the dimensions and of the motion."""
+    if hasattr(first, "minimum"):
+        return first.minimum(second)
+    return second.minimum(first) if hasattr(second, "minimum") else min(first, second)
+
+
+def greatest(first: Scalar, second: Scalar) -> Scalar:
+    """The greater of both."""
+    return -least(-first, -second)
+
+
 class Cylinder(NamedTuple):
-    """A slide between moving links that is drawn as a cylinder with a piston and its rod; lengths in m along `way`."""
+    """A slide between moving links that is drawn as a cylinder with piston and rod; lengths in m along `direction`."""
 
     guide: str
     rod: str
     foot: Vector
     direction: Vector
-    base: float
-    mouth: float
-    piston: float
+    base: Scalar
+    mouth: Scalar
+    piston: Scalar
     "from the foot, before the rod is moved to where it is"
-    rod_end: float
+    rod_end: Scalar
+    rod_place: Vector
+    "of the rod's own axes, from which piston and end are as far along `rod_direction`"
+    rod_direction: Vector
 
 
 @dataclass(frozen=True)
@@ -62,10 +79,23 @@ class Scene:
     scale: Scale
     travel: TravelRanges = field(default_factory=dict)
 
+    is_moving: ClassVar[bool] = False
+    "whether its strokes are drawn for the whole motion, not for one position"
+
+    @property
+    def per_mm(self) -> Scalar:
+        """How many metres a millimetre on paper is."""
+        return self.scale.per_mm
+
     @cached_property
     def marks(self) -> tuple[DrawingMark | SpringMassMark, ...]:
         """What its pairs say of how they are drawn, and its springs and masses."""
         return all_marks(self.mechanism, self.shapes)
+
+    @property
+    def places(self) -> Mapping[str, Mapping[str, Vector]]:
+        """The points of every link in its own axes, by their names in the link."""
+        return {link: shape.points for link, shape in self.shapes.items()}
 
     @cached_property
     def cylinders(self) -> Mapping[str, Cylinder]:
@@ -87,23 +117,35 @@ class Scene:
         """((link, point), link) of each pair in which a point runs along a line."""
         return {pair.name: pair.point_on_line() for pair in self.mechanism.pairs}
 
+    def place(self, link: str, point: str) -> Vector:
+        """A point of a link in its own axes."""
+        return self.shapes[link].position(point)
+
     def to_paper(self, link: str, at: Vector) -> Vector:
         """A place of a link on paper (mm)."""
-        return self.frames[link].to_world(at) * (1.0 / self.scale.per_mm)
+        return self.frames[link].to_world(Vector(*paper_point(at))) * (1.0 / self.scale.per_mm)
 
     def direction_on_paper(self, link: str, way: Vector) -> Vector:
         """A direction of a link on paper."""
-        return self.frames[link].rotate_to_world(way)
+        return self.frames[link].rotate_to_world(Vector(*paper_point(way)))
 
     def running_point(self, name: str) -> tuple[str, Vector] | None:
         """The link whose point runs along a line, and the point in its axes."""
         rides = self.running_points[name]
-        return None if rides is None else (rides[0][0], self.shapes[rides[0][0]].position(rides[0][1]))
+        return None if rides is None else (rides[0][0], self.place(*rides[0]))
 
     def running_point_name(self, name: str) -> str:
         """The result name of the point that runs along a line."""
         rides = self.running_points[name]
         return name if rides is None else self.point_names.get(rides[0], name)
+
+    def knows_travel(self, name: str) -> bool:
+        """Whether it is known from where to where the displacement of a slide goes."""
+        return name in self.travel
+
+    def pair_marks(self, pair: Pair) -> Sequence[DrawingMark]:
+        """What one pair, or the motion of two of several links on one pin, says of how it is drawn."""
+        return pair.drawing_marks(self.shapes, self.mechanism.pairs)
 
     def displacement_along(self, name: str, link: str, foot: Vector, way: Vector) -> float:
         """How far (m) from a foot on a line of a link the point is that runs along it."""
@@ -111,13 +153,24 @@ class Scene:
         local = self.frames[link].to_local(self.frames[rider].to_world(at))
         return float((local - foot).dot(way))
 
-    def travel_range(self, name: str, link: str, through: Vector, foot: Vector, way: Vector) -> tuple[float, float]:
-        """From where to where that point goes, from the foot; here and no farther where that is not known."""
+    def shown_range(self, name: str, link: str, foot: Vector, way: Vector) -> tuple[Scalar, Scalar]:
+        """From where to where that point is seen in the drawing: at one place, unless it is of the whole motion."""
         here = self.displacement_along(name, link, foot, way)
-        if name not in self.travel:
-            return here, here
+        return here, here
+
+    def travel_range(self, name: str, link: str, through: Vector, foot: Vector, way: Vector) -> tuple[Scalar, Scalar]:
+        """From where to where that point goes, from the foot; here and no farther where that is not known."""
+        if not self.knows_travel(name):
+            return self.shown_range(name, link, foot, way)
         start = float((through - foot).dot(way))
-        return tuple(sorted(start + value for value in self.travel[name]))
+        low, high = sorted(start + value for value in self.travel[name])
+        return low, high
+
+    def drawn_range(self, name: str, link: str, through: Vector, foot: Vector, way: Vector) -> tuple[Scalar, Scalar]:
+        """The same, and where it is now."""
+        low, high = self.travel_range(name, link, through, foot, way)
+        first, last = self.shown_range(name, link, foot, way)
+        return least(low, first), greatest(high, last)
 
     def _find_cylinders(self) -> Iterator[tuple[str, Cylinder]]:
         """Slides that look like cylinders: driven ones between moving links, and those whose block has a rod."""
@@ -142,17 +195,22 @@ class Scene:
             )
             sense = copysign(1.0, low + high)
             near, far = sorted((sense * low, sense * high))
-            ends = [sense * float((p - mark.position).dot(mark.direction)) for p in lying]
-            covers = [sense * float((p - line.foot).dot(line.direction)) for p in guide.dots]
+            ends = [sense * (p - mark.position).dot(mark.direction) for p in lying]
+            covers = [sense * (p - line.foot).dot(line.direction) for p in guide.dots]
             rear, front = min(ends), max(ends)
             stroke = far - near
-            mouth = min(max(CYLINDER_LENGTH_RATIO * near, 1.15 * stroke), MAX_CYLINDER_LENGTH_RATIO * near)
+            mouth = greatest(CYLINDER_LENGTH_RATIO * near, 1.15 * stroke)
+            mouth = least(mouth, MAX_CYLINDER_LENGTH_RATIO * near)
             if rear == front:
                 rear = (mouth - stroke) / 2.0 - near  # the piston as far from either end of its way
             else:
-                mouth = max(far + rear + GUIDE_OVERHANG * self.scale.per_mm, 0.0)
-            base, mouth = min((0.0, *covers)), max((mouth, *covers))
+                mouth = greatest(far + rear + GUIDE_OVERHANG * self.per_mm, 0.0)
+            base = reduce(least, covers, 0.0)
+            mouth = reduce(greatest, covers, mouth)
+            ways = line.direction * sense, mark.direction * sense
             yield (
                 mark.name,
-                Cylinder(mark.guide_link, mark.link, line.foot, line.direction * sense, base, mouth, rear, front),
+                Cylinder(
+                    mark.guide_link, mark.link, line.foot, ways[0], base, mouth, rear, front, mark.position, ways[1]
+                ),
             )

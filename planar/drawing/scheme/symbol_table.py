@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import cos, pi, sin, sqrt
+from math import cos, degrees, hypot, pi, sin, sqrt
 from typing import NamedTuple
 
-from planar.drawing.paper.picture import Fill, Pen
+from planar.drawing.paper.picture import Circle, Fill, PaperPoint, Pen
+from planar.drawing.paper.stroke_shapes import arc_arrow_head, arc_points, arrow_head
 
 PIN_RADIUS = 1.2
 """mm: the radius of a pin."""
@@ -40,6 +41,15 @@ TORSION_SPRING_TURNS = 2
 TORSION_DAMPER_SIZE = 5.4, 7.8, 1.9
 """mm: the radii between which a torsional damper is drawn; rad: how far it reaches round."""
 
+INPUT_ARC_SWEEP, INPUT_ARC_LEAD = 1.75, 0.25
+"""rad: how far the arrow of a turning input reaches round, and how far ahead of the driven link it starts at best."""
+INPUT_ARC_RADII = (6.0, 8.0, 10.5)
+"""mm: how far from the pin it may be."""
+INPUT_ARROW_LENGTH = 10.0
+"""mm: the length of the arrow of a sliding input."""
+INPUT_ARROW_OFFSET = 4.5
+"""mm: how far it is from the line of the slide."""
+
 SymbolPoint = tuple[float, float, float]
 """A point of a symbol: the part of the way to its second place, and so far along its direction and to the left (mm)."""
 TurnedPoint = tuple[float, float, float, float]
@@ -70,6 +80,14 @@ class TurnedStroke(NamedTuple):
 
     pen: Pen
     turned: tuple[TurnedPoint, ...]
+
+
+class Hatching(NamedTuple):
+    """The symbol "hatch" all along the way between a symbol's two places."""
+
+    length: float = HATCH_LENGTH
+    end: float = 0.2
+    "mm: how far before the second place the last stroke starts"
 
 
 SPRING_HALF_WIDTH = 1.9
@@ -113,8 +131,9 @@ def _arc(part: float, radius: float, start: float, stop: float, steps: int = 8) 
 
 def hatching_feet(length: float) -> list[float]:
     """Where along a line of some length (mm) the strokes of its hatching start."""
-    count = max(1, round((length - HATCH_LENGTH / 2.0) / HATCH_LENGTH))
-    return [length - (count - 1 - k) * HATCH_LENGTH - 0.2 for k in range(count)]
+    step, end = Hatching()
+    count = max(1, round((length - step / 2.0) / step))
+    return [length - (count - 1 - k) * step - end for k in range(count)]
 
 
 def _box(half_length: float, half_width: float) -> tuple[SymbolPoint, ...]:
@@ -167,6 +186,29 @@ def _torsion_damper() -> tuple[TurnedStroke, ...]:
     )
 
 
+def _arrow(*places: PaperPoint) -> tuple[SymbolStroke, ...]:
+    """An arrow along places (mm from the symbol's place), its head at the last of them."""
+    head = arrow_head(places[-2], places[-1], hypot(*(b - a for a, b in zip(*places[-2:], strict=True))))
+    assert head is not None, "an arrow has a length"
+    lines = (*places[:-1], head.line_end), head.corners
+    line, corners = (tuple((0.0, *each) for each in spots) for spots in lines)
+    return SymbolStroke(Pen.INPUT, line), SymbolStroke(Pen.INPUT, corners, True, Fill.SOLID)
+
+
+def _arc_arrow(radius: float, start: float, sweep: float) -> tuple[SymbolStroke, ...]:
+    """An arc about the symbol's place with an arrow head at its end (mm, rad)."""
+    whole = Circle((0.0, 0.0), radius, Pen.INPUT, start=degrees(start), stop=degrees(start + sweep), arrow_end=1)
+    found = arc_arrow_head(whole)
+    assert found is not None, "an arc has a length"
+    head, first, last = found
+    line = arc_points(whole._replace(start=first, stop=last)).tolist()
+    corners = tuple((0.0, *corner) for corner in head.corners)
+    return (
+        SymbolStroke(Pen.INPUT, tuple((0.0, x, y) for x, y in line)),
+        SymbolStroke(Pen.INPUT, corners, True, Fill.SOLID),
+    )
+
+
 def _mass_centre() -> tuple[SymbolCircle | SymbolStroke, ...]:
     """A circle of which two opposite quarters are black."""
     quarters = (
@@ -178,7 +220,7 @@ def _mass_centre() -> tuple[SymbolCircle | SymbolStroke, ...]:
     return SymbolCircle(Pen.PIN, MASS_CENTRE_RADIUS, fill=Fill.PAPER), *quarters
 
 
-SYMBOLS: dict[str, Sequence[SymbolStroke | SymbolCircle | TurnedStroke]] = {
+SYMBOLS: dict[str, Sequence[SymbolStroke | SymbolCircle | TurnedStroke | Hatching]] = {
     "pin": (SymbolCircle(Pen.PIN, PIN_RADIUS, fill=Fill.PAPER),),
     "dot": (SymbolCircle(Pen.LINK, DOT_RADIUS),),
     "fixed dot": (SymbolCircle(Pen.PIN, DOT_RADIUS),),
@@ -186,6 +228,7 @@ SYMBOLS: dict[str, Sequence[SymbolStroke | SymbolCircle | TurnedStroke]] = {
     "slot opening": (_slot(),),
     "support": _support(),
     "hatch": (SymbolStroke(Pen.HATCH, ((0.0, 0.0, 0.0), (0.0, -HATCH_LENGTH / sqrt(2.0), HATCH_LENGTH / sqrt(2.0)))),),
+    "rail": (SymbolStroke(Pen.GROUND, ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))), Hatching()),
     "cylinder": (SymbolStroke(Pen.LINK, _between(CYLINDER_WIDTH / 2.0), True, Fill.PAPER),),
     "piston": (
         SymbolStroke(Pen.LINK, ((0.0, 0.0, 0.7 - CYLINDER_WIDTH / 2.0), (0.0, 0.0, CYLINDER_WIDTH / 2.0 - 0.7))),
@@ -204,6 +247,11 @@ SYMBOLS: dict[str, Sequence[SymbolStroke | SymbolCircle | TurnedStroke]] = {
     "rim": (SymbolCircle(Pen.LINK, RIM_WIDTH, 1.0),),
     "fixed rim": (SymbolCircle(Pen.GROUND, RIM_WIDTH, 1.0),),
     "wheel mark": (SymbolStroke(Pen.PIN, ((0.8, 0.0, 0.0), (1.0, 0.0, 0.0))),),
+    "band circle": (SymbolCircle(Pen.BAND, 0.0, 1.0),),
+    "turning input": _arc_arrow(INPUT_ARC_RADII[0], INPUT_ARC_LEAD, INPUT_ARC_SWEEP),
+    "sliding input": _arrow(
+        (-INPUT_ARROW_LENGTH / 2.0, INPUT_ARROW_OFFSET), (INPUT_ARROW_LENGTH / 2.0, INPUT_ARROW_OFFSET)
+    ),
     "mass centre": _mass_centre(),
     "spring": (_zigzag(0.0, 1.0, 0.0),),
     "damper": _dashpot(0.0, 1.0, 0.0),

@@ -65,11 +65,13 @@ class PitchLineMark(NamedTuple):
 
 
 class BeltMark(NamedTuple):
-    """A loop round two wheels; where it is crossed they turn opposite ways."""
+    """A loop round two wheels, whose centres are places of `carrier`; where it is crossed they turn opposite ways."""
 
     name: str
     first: WheelMark
     second: WheelMark
+    carrier: str
+    centres: tuple[Vector, Vector]
     crossed: bool
 
 

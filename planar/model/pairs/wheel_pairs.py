@@ -112,14 +112,19 @@ class WheelPair(Pair):
         pins = [self._centre_pin(wheel, all_pairs) for wheel in self.links]
         if None in pins:
             return ()
-        carrier = shapes[self.carrier]
-        apart = carrier.position(pins[1][self.carrier]) - carrier.position(pins[0][self.carrier])
+        first, second = self._carrier_centres(shapes, all_pairs)
+        apart = second - first
         radii = self.sizes if self.size_kind == "radii" else self._pitch_radii(sqrt(apart.dot(apart)))
         return tuple(
             WheelMark(self.name, link, shapes[link].position(pin[link]), radius)
             for link, pin, radius in zip(self.links, pins, radii, strict=True)
             if not (isinstance(radius, float) and radius == 0.0)
         )
+
+    def _carrier_centres(self, shapes: Mapping[str, LinkShape], all_pairs: Sequence[Pair]) -> list[Vector]:
+        """Where both wheels are pinned to the carrier, in its axes; fewer where one is not."""
+        pins = [self._centre_pin(wheel, all_pairs) for wheel in self.links]
+        return [shapes[self.carrier].position(pin[self.carrier]) for pin in pins if pin is not None]
 
     @abstractmethod
     def _pitch_radii(self, centre_distance: Scalar) -> tuple[Scalar, ...]:

@@ -6,8 +6,9 @@ const ROUND = 6; // s, one way through a motion
 
 /** What a drawing looks at, in the place of a page: a mechanism that is only played. */
 class Recording {
-  constructor(data) {
+  constructor(data, drawn) {
     this.data = data;
+    this.drawn = (travel, perMm, values) => drawn([], travel, [perMm], values);
     const [first = []] = data.frames;
     this.steps = first.length / 3 - 1;
     this.poses = Array.from({ length: this.steps + 1 }, (_, k) => this.at(k));
@@ -16,7 +17,6 @@ class Recording {
 
   on() {}
   emit() {}
-  size(at) { return this.data.sizes[at]; }
 
   /** Where all links are at a step, or between two. */
   at(step) {
@@ -51,7 +51,6 @@ class Small extends Drawing {
   named() {
     this.spots = [];
     this.letters = { place: () => true };
-    this.strokes = new Float64Array(4 * this.edges.length);
   }
 
   drive() {}
@@ -65,12 +64,12 @@ const shownModels = JSON.parse(document.getElementById("data").textContent).map(
   svg.setAttribute("class", "small");
   svg.setAttribute("aria-hidden", "true"); // its name stands below it
   item.firstElementChild.prepend(svg);
-  return { data, item, svg, seen: false, recording: null, drawing: null };
+  return { data, drawn: DRAWN[k], item, svg, seen: false, recording: null, drawing: null };
 });
 
 function draw(model) {
   if (model.drawing) return;
-  model.recording = new Recording(model.data);
+  model.recording = new Recording(model.data, model.drawn);
   model.drawing = new Small(model.recording, model.svg);
 }
 

@@ -106,6 +106,9 @@ class Page {
     this.emit("move");
   }
 
+  /** Fill in the numbers of the drawing: by how far displacements go, and the metres of a millimetre. */
+  drawn(travel, perMm, values) { return this.linkage.program.drawn(this.linkage.d, travel, [perMm], values); }
+
   /** A number that depends on the dimensions. */
   size(at) { return this.linkage.sizes[at]; }
 

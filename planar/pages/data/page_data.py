@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import islice
 from typing import Any
 
@@ -13,24 +12,21 @@ from planar.assemblies.circuits.circuits import circuits
 from planar.assemblies.modes import modes
 from planar.codegen.javascript import write_javascript
 from planar.document.dimensions import Dimension, change_dimension
-from planar.drawing.scheme.link_bodies import RELATIVE_TOLERANCE, LinkBody, all_marks, bodies_of_points, largest_span
-from planar.drawing.scheme.springs_masses import SpringMassMark
 from planar.equations.constraint_equations import slice_length
 from planar.equations.mechanism_numbers import scale_lengths, shapes_of_links
-from planar.foundation.geometry import Vector
 from planar.foundation.units import display_unit
 from planar.model.link_graph import link_numbers
 from planar.model.link_shapes import PointPlacementError
 from planar.model.mechanism import Mechanism, links_counting_turns, named_points, pair_misfits
 from planar.model.pairs import MeasureKind, Pair
-from planar.model.pairs.symbols import DrawingMark, PinMark
 from planar.model.wording import amount
-from planar.pages.centre_data import centre_data
-from planar.pages.column_data import column_heads, reported_function, uncounted_angles
-from planar.pages.dimension_numbers import DimensionNumbers
-from planar.pages.document_data import dimension_words, document_data, is_positive_length
-from planar.pages.force_data import force_data
-from planar.pages.polygon_data import polygon_data
+from planar.pages.data.centre_data import centre_data
+from planar.pages.data.column_data import column_heads, reported_function, uncounted_angles
+from planar.pages.data.dimension_numbers import DimensionNumbers
+from planar.pages.data.document_data import dimension_words, document_data, is_positive_length
+from planar.pages.data.force_data import force_data
+from planar.pages.data.polygon_data import polygon_data
+from planar.pages.data.scheme_data import motion_positions, scheme_data
 from planar.solving.position import PositionSolver, solved_mechanism
 from planar.solving.rest_position import rest_position
 
@@ -67,8 +63,10 @@ def page_data(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[s
     ]
     for value in measured:
         numbers.add(value)
-    drawn = drawing_data(mechanism, numbers)
-    data = drawn | {
+    scheme, drawing = scheme_data(mechanism, numbers, motion_positions(mechanism, z))
+    named = _point_data(mechanism, numbers)
+    data = named | {
+        "scheme": scheme,
         "name": mechanism.name,
         "about": mechanism.about,
         "units": _unit_data(mechanism),
@@ -102,8 +100,8 @@ def page_data(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[s
         "dimensions": [_dimension_data(mechanism, each, solver.unit) for each in numbers.dimensions],
         "numbers": link_numbers(mechanism),
         "counting": sorted(links_counting_turns(mechanism)),
-        "centres": centre_data(state, drawn["points"]),
-        "polygons": polygon_data(mechanism, drawn["points"]),
+        "centres": centre_data(state, named["points"]),
+        "polygons": polygon_data(mechanism, named["points"]),
         "rolling": list(usual_links(mechanism)) if len(mechanism.links) > 1 else None,
         "document": document_data(mechanism, numbers.dimensions),
         "columns": column_heads(mechanism, solver),
@@ -117,6 +115,7 @@ def page_data(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[s
     data["forces"] = acting and acting[0]
     functions = [
         numbers.to_javascript(),
+        drawing.to_javascript(),
         write_javascript("positions", program.coordinate_function),
         write_javascript("kinematics", program.kinematics_function),
     ]
@@ -124,13 +123,12 @@ def page_data(mechanism: Mechanism, z: np.ndarray | None = None) -> tuple[dict[s
     functions.append(reported_function(mechanism, solver, numbers.d, numbers.shapes))
     stages = ",".join(f"closing{k}" for k in range(len(e.blocks)))
     functions.append(acting[1] if acting else "const balance=null;")
-    functions.append(f"const program={{sizes,positions,kinematics,reported,balance,stages:[{stages}]}};")
+    functions.append(f"const program={{sizes,drawn,positions,kinematics,reported,balance,stages:[{stages}]}};")
     return data, "\n".join(functions)
 
 
-def drawing_data(mechanism: Mechanism, numbers: DimensionNumbers) -> dict[str, Any]:
-    """What a drawing of the mechanism needs: its links, points, bodies and marks, their numbers as places."""
-    named = {member: name for name, members in named_points(mechanism) for member in members}
+def _point_data(mechanism: Mechanism, numbers: DimensionNumbers) -> dict[str, Any]:
+    """The links and the points of a mechanism, their numbers as places."""
     points = {
         name: {
             "links": [member[0] for member in members],
@@ -138,48 +136,12 @@ def drawing_data(mechanism: Mechanism, numbers: DimensionNumbers) -> dict[str, A
         }
         for name, members in named_points(mechanism)
     }
-    marks = all_marks(numbers.mechanism, numbers.shapes)
     return {
         "frame": mechanism.frame,
         "links": [link.name for link in mechanism.links],
         "points": points,
         "names": list(points),
-        "marks": [_mark_data(mark, numbers) for mark in marks],
-        "bodies": _body_data(mechanism, marks, numbers),
-        "running": {
-            pair.name: named[rides[0]] for pair in mechanism.pairs if (rides := pair.point_on_line()) is not None
-        },
     }
-
-
-def _body_data(mechanism: Mechanism, marks: Sequence[DrawingMark | SpringMassMark], numbers: DimensionNumbers) -> Any:
-    """What each link looks like in its own axes, chosen at the file's dimensions; of the frame its free points."""
-    shapes = shapes_of_links(mechanism)
-    own = {link.name: numbers.shapes[link.name].points for link in mechanism.links}
-    own, marks = numbers.with_values((own, marks))
-    moving = {link: list(points.values()) for link, points in own.items() if link != mechanism.frame}
-    bodies = bodies_of_points(moving, marks, RELATIVE_TOLERANCE * largest_span(shapes))
-    pinned = {mark.name for mark in marks if isinstance(mark, PinMark)}
-    alone = (dict(each.members).get(mechanism.frame) for each in named_points(mechanism) if each.name not in pinned)
-    dots = tuple(own[mechanism.frame][point] for point in alone if point is not None)
-    places: dict[int, list[int]] = {}
-
-    def place(value: Any) -> Any:
-        if isinstance(value, Vector):
-            return places[id(value)] if id(value) in places else places.setdefault(id(value), numbers.add_point(value))
-        if isinstance(value, tuple):
-            parts = [place(part) for part in value]
-            return dict(zip(value._fields, parts, strict=True)) if hasattr(value, "_fields") else parts
-        return value
-
-    bodies[mechanism.frame] = LinkBody(mechanism.frame, dots=dots)
-    return {link: place(body) for link, body in bodies.items()}
-
-
-def fixed_drawing_data(mechanism: Mechanism) -> tuple[dict[str, Any], list[float]]:
-    """What a drawing needs whose dimensions stay as they are, and the numbers themselves."""
-    numbers = DimensionNumbers(mechanism, live=False)
-    return drawing_data(mechanism, numbers), [float(each) for each in numbers.values]
 
 
 def _input_data(given: Any, slides: bool) -> dict[str, Any]:
@@ -270,18 +232,3 @@ def _admissible_bound(mechanism: Mechanism, each: Dimension, value: float, to: f
         middle = 0.5 * (value + to)
         value, to = (value, middle) if _misfit(mechanism, each, middle) else (middle, to)
     return value
-
-
-def _mark_data(mark: DrawingMark | SpringMassMark, numbers: DimensionNumbers) -> dict[str, Any]:
-    """A mark with its numbers as places."""
-
-    def told(value: Any) -> Any:
-        if isinstance(value, Vector):
-            return numbers.add_point(value)
-        if isinstance(value, tuple) and hasattr(value, "_fields"):
-            return {"kind": type(value).__name__, **{name: told(part) for name, part in value._asdict().items()}}
-        if isinstance(value, tuple):
-            return [told(part) for part in value]
-        return value if isinstance(value, str | bool) else {"at": numbers.add(value)}
-
-    return told(mark)

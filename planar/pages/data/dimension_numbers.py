@@ -1,10 +1,10 @@
-"""Numbers that depend on the dimensions: their values in the file, and what a page works them out by."""
+"""Numbers that depend on the dimensions, and on the motion: their values in the file, and what a page has them from."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import total_ordering
+from functools import cached_property, total_ordering
 from typing import Any
 
 import casadi as ca
@@ -28,11 +28,19 @@ class DimensionNumber:
     value: float
     make_expression: Callable[[], Any]
 
+    @cached_property
+    def expression(self) -> Any:
+        """What it is worked out by."""
+        return self.make_expression()
+
     def __float__(self) -> float:
         return self.value
 
-    def __abs__(self) -> float:
-        return abs(self.value)
+    def __abs__(self) -> DimensionNumber:
+        return -self if self.value < 0.0 else self
+
+    def __neg__(self) -> DimensionNumber:
+        return DimensionNumber(-self.value, lambda: -self.expression)
 
     def __eq__(self, other: object) -> bool:
         return self.value == float(other)  # type: ignore[arg-type]
@@ -44,22 +52,37 @@ class DimensionNumber:
         return hash(self.value)
 
     def __add__(self, other: Any) -> DimensionNumber:
-        return DimensionNumber(self.value + float(other), lambda: self.make_expression() + _expression(other))
+        return DimensionNumber(self.value + float(other), lambda: self.expression + _expression(other))
 
     def __sub__(self, other: Any) -> DimensionNumber:
-        return DimensionNumber(self.value - float(other), lambda: self.make_expression() - _expression(other))
+        return DimensionNumber(self.value - float(other), lambda: self.expression - _expression(other))
 
     def __mul__(self, other: Any) -> DimensionNumber:
-        return DimensionNumber(self.value * float(other), lambda: self.make_expression() * _expression(other))
+        return DimensionNumber(self.value * float(other), lambda: self.expression * _expression(other))
 
     def __truediv__(self, other: Any) -> DimensionNumber:
-        return DimensionNumber(self.value / float(other), lambda: self.make_expression() / _expression(other))
+        return DimensionNumber(self.value / float(other), lambda: self.expression / _expression(other))
 
     __radd__, __rmul__ = __add__, __mul__
 
+    def __rsub__(self, other: Any) -> DimensionNumber:
+        return -self + other
+
+    def __rtruediv__(self, other: Any) -> DimensionNumber:
+        return DimensionNumber(float(other) / self.value, lambda: _expression(other) / self.expression)
+
+    def sqrt(self) -> DimensionNumber:
+        """Its square root."""
+        return DimensionNumber(self.value**0.5, lambda: ca.sqrt(self.expression))
+
+    def minimum(self, other: Any) -> DimensionNumber:
+        """The lesser of both, whatever the dimensions are."""
+        least = min(self.value, float(other))
+        return DimensionNumber(least, lambda: ca.fmin(self.expression, _expression(other)))
+
 
 def _expression(number: Any) -> Any:
-    return number.make_expression() if isinstance(number, DimensionNumber) else number
+    return number.expression if isinstance(number, DimensionNumber) else number
 
 
 class DimensionNumbers:
@@ -93,6 +116,49 @@ class DimensionNumbers:
             [each.value for each in self.dimensions]
         )
         return _replace_numbers(tree, iter(known.full().ravel().tolist()))
+
+
+class DrawingNumbers:
+    """Numbers of a drawing: functions of the dimensions, of how far slides go, and of the scale.
+
+    `per_mm` is how many metres a millimetre is; as everything that is compared it has the value of a usual window.
+    """
+
+    def __init__(self, dimensions: DimensionNumbers, per_mm: float, digits: int | None = None):
+        self.dimensions, self.digits = dimensions, digits
+        scale = ca.SX.sym("per_mm")
+        self.per_mm = DimensionNumber(per_mm, lambda: scale)
+        self._scale = scale
+        self.travel: list[ca.SX] = []
+        self.values: list[Any] = []
+        self._numbers: dict[int, tuple[Any, int]] = {}
+
+    def add(self, value: Any) -> int:
+        """The place of a number."""
+        known = self._numbers.get(id(value))
+        if known is None:
+            known = self._numbers[id(value)] = value, len(self.values)
+            self.values.append(self._rounded(_expression(value)))
+        return known[1]
+
+    def add_point(self, at: Vector) -> list[int]:
+        """The places of x and y."""
+        return [self.add(at.x), self.add(at.y)]
+
+    def add_travel(self, low: float, high: float) -> tuple[DimensionNumber, DimensionNumber]:
+        """Both ends of what a page finds to be the range of something over the motion, in the order of the calls."""
+        first, last = ca.SX.sym("low"), ca.SX.sym("high")
+        self.travel += [first, last]
+        return DimensionNumber(low, lambda: first), DimensionNumber(high, lambda: last)
+
+    def to_javascript(self) -> str:
+        """drawn(d, travel, per_mm): all numbers."""
+        given = [self.dimensions.d, ca.vertcat(*self.travel), self._scale]
+        return write_javascript("drawn", ca.Function("drawn", given, [ca.vertcat(*map(ca.SX, self.values))]))
+
+    def _rounded(self, value: Any) -> Any:
+        constant = self.digits is not None and ca.SX(value).is_constant()
+        return float(f"{float(value):.{self.digits}g}") if constant else value
 
 
 def _numbers_of(tree: Any) -> Iterator[Any]:
