@@ -337,12 +337,37 @@ def test_a_link_that_nothing_makes_heavy_is_named():
     with pytest.raises(NoAnswer, match="'lever' can move without anything that has a mass") as refused:
         run(value, 1.0)
     assert refused.value.outcome is Outcome.TOO_FEW_INPUTS
+    assert refused.value.reason.endswith("give it a mass with an inertia, or let an input drive it (--drive O)")
     # its weight alone at the pin is no inertia either
     value["masses"] = [{"link": "lever", "mass": 1.0, "at": "O"}]
     with pytest.raises(NoAnswer, match="can move without"):
         run(value, 1.0)
     driven = run(value, 1.0, driven=["O"], moving=True)
     assert angle(driven)[-1] == pytest.approx(3.0 + 1.0, rel=1e-12)
+
+
+def test_where_nothing_is_let_go_that_is_said_with_the_option_that_drives_it():
+    value = lever_document({"A": [1, 0]}, gravity=[0, -G], masses=[{"link": "lever", "mass": 1.0, "at": "A"}])
+    assert not any("nothing" in each for each in run(value, 0.1).motion.remarks)
+    (told,) = run(value, 0.1, driven=["O"]).motion.remarks
+    assert told.startswith("nothing moves freely: the driven inputs at 'O' determine the whole motion")
+    assert told.endswith("to let it go leave out --drive O")
+    value["inputs"][0]["law"] = [{"motion": "constant speed", "by": 1, "in": 1}]
+    told = run(value, 0.1).motion.remarks[-1]
+    assert told.endswith("to let it go take the law of 'O' out of the file")
+
+
+def test_of_a_truss_it_is_said_that_nothing_can_move():
+    bars = {"AC": {"ends": ["A", "C"], "length": 1.5}, "BC": {"ends": ["B", "C"], "length": 1.5}}
+    value = {
+        "planar": 1,
+        "frame": "f",
+        "links": {"f": {"points": {"A": [0, 0], "B": [2, 0]}}, **bars},
+        "pairs": [{"turning": name} for name in "ABC"],
+        "sketch": {"C": [1, 1]},
+        "masses": [{"link": "AC", "mass": 2, "at": "C"}],
+    }
+    assert "nothing can move: the pairs hold every link" in run(value, 0.1).motion.remarks
 
 
 def test_where_what_can_move_loses_its_mass_on_the_way_the_rows_before_are_kept():
