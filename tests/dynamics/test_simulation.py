@@ -464,3 +464,30 @@ def test_a_motion_does_not_depend_on_units_or_size():
         np.testing.assert_allclose(angle(other), angle(found), atol=1e-9)
         np.testing.assert_allclose(other.kinetic, found.kinetic * by**2, atol=1e-10 * by**2)
         assert other.balance < 1e-10
+
+
+# a model with a damper
+
+
+def test_a_door_with_a_closer_is_critically_damped():
+    """J = m b^2 / 3, c = 2 sqrt(k J): it shuts by the closed form, and never swings through."""
+    door = planar.load("door-closer")
+    (spring,), (mass,) = door.springs, door.masses
+    inertia = mass.inertia + mass.mass * 0.4**2
+    assert inertia == pytest.approx(mass.mass * 0.8**2 / 3.0, rel=1e-14)
+    assert spring.damping == pytest.approx(2.0 * sqrt(spring.stiffness * inertia), rel=1e-14)
+    found = planar.simulate(door, 5.0, 50)
+    omega, time = sqrt(spring.stiffness / inertia), found.motion.time
+    np.testing.assert_allclose(angle(found, "H"), pi / 2 * (1.0 + omega * time) * np.exp(-omega * time), atol=1e-10)
+    assert np.all(np.diff(angle(found, "H")) < 0.0)
+    # with a quarter of the damping it would: ratio 0.25, by the decrement of what it swings out beyond
+    found = planar.simulate(door.with_values({"springs.0.damping": 4.0}), 12.0, 1200)
+    swings = angle(found, "H")
+    ends = swings[1:-1][np.diff(np.sign(np.diff(swings))) != 0]
+    decrement = np.log(ends[:-1] / -ends[1:])
+    np.testing.assert_allclose(decrement, pi * 0.25 / sqrt(1.0 - 0.25**2), rtol=1e-3)
+
+
+def test_a_door_with_a_closer_stands_in_a_wind_where_its_spring_balances_it():
+    door = planar.load("door-closer").with_values({"H.velocity": 0.0, "H.position": 0.5})
+    assert planar.forces(planar.solve(door)).inputs["H"] == pytest.approx(12.0 * 0.5, rel=1e-12)
