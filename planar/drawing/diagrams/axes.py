@@ -17,6 +17,8 @@ TICK_LENGTH, NUMBER_SIZE, NAME_SIZE = 1.2, 7.0, 8.0
 """mm that a tick is long; points of the numbers and of an axis's name."""
 NUMBER_GAP = 0.6
 """mm between a tick and its number."""
+LEAST_VALUE = 1e-290
+"""Values below this are drawn as none: their steps would be no numbers any more."""
 
 USUAL_QUANTILE, OUTLIER_RATIO, SHOWN_RATIO = 0.8, 10.0, 3.0
 """So many of all values are usual; one that is so many times the greatest of these is beyond the axis, and so many are
@@ -60,6 +62,8 @@ def fit_axis(
     if not low <= high:
         low, high = 0.0, 0.0
     most = max(abs(low), abs(high))
+    if most < LEAST_VALUE:
+        low, high, most = 0.0, 0.0, 0.0
     if high - low <= 1e-9 * most or most == 0.0:
         low, high = low - 0.5 * (most or 1.0), high + 0.5 * (most or 1.0)
     step = round_step((high - low) * tick_distance / length, DEGREE_STEPS if degrees else DECIMAL_STEPS)
