@@ -161,5 +161,8 @@ def simulate(
         check_writable(output.suffix)
     with show_progress(mechanism.name) as progress:
         tick = None if progress is None else lambda done: progress(done, 1.0)
-        found = let_go(mechanism, read_time(duration, "--duration"), steps, driven, moving=moving, tick=tick)
+        try:
+            found = let_go(mechanism, read_time(duration, "--duration"), steps, driven, moving=moving, tick=tick)
+        except BadInput as problem:
+            raise (BadInput("--drive", problem.sentence) if problem.place == "driven" else problem) from None
     report_motion(found.motion, as_json, output, lambda: [tables(found)], energy_series(found), simulation_facts(found))

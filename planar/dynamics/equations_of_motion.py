@@ -50,6 +50,7 @@ class DrivenInputs:
         names = [given.pair for given in work.mechanism.inputs]
         self.index = [names.index(pair) for pair in pairs]
         self.inputs = [work.mechanism.inputs[k] for k in self.index]
+        self.let_go = tuple(name for name in names if name not in pairs)
 
     def motion_at(self, time: float) -> Array:
         """Position, velocity and acceleration (3, driven)."""
@@ -161,9 +162,11 @@ class EquationsOfMotion:
         """That something moves whose inertia is nothing."""
         way = np.abs(ways @ np.linalg.eigh(free)[1][:, 0])
         moved = [link for link, at in self.work.link_columns.items() if way[at : at + 3].max() > 0.1 * way.max()]
+        let_go = self.driven.let_go
+        driving = ", ".join(f"--drive {name}" for name in let_go)
         return NoAnswer(
             Outcome.TOO_FEW_INPUTS,
             f"link{'s' * (len(moved) != 1)} {quote_names(moved)} can move without anything that "
             f"has a mass, so nothing tells how fast; give {'one of them' if len(moved) > 1 else 'it'} a mass with an "
-            f"inertia, or let an input drive it",
+            f"inertia{f', or let an input drive it ({driving})' if let_go else ''}",
         )

@@ -19,6 +19,7 @@ from planar.dynamics.external_actions import (
     collect_actions,
 )
 from planar.dynamics.free_body_check import free_body_imbalance
+from planar.dynamics.imbalance import explain_imbalance, imbalance_refusal
 from planar.dynamics.load_validation import check_loads
 from planar.dynamics.load_variation import load_factors
 from planar.dynamics.multipliers import ReactionSolver
@@ -28,7 +29,6 @@ from planar.dynamics.virtual_work import BalanceFunction, balance_function
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.foundation.notebook_display import Displayable
 from planar.model.mechanism import Mechanism
-from planar.model.wording import quote_names
 from planar.results.motion import Motion, State
 
 Array = np.ndarray
@@ -135,12 +135,10 @@ def forces(moving: State | Motion, inertia: bool = True) -> Forces:
             Outcome.DEAD_POINT,
             "the ends of a spring or damper meet here, so that its force has no direction; move the input",
         )
-    if one and not solved.is_balanced.all():
-        told = quote_names([given.pair for given in mechanism.inputs])
-        raise NoAnswer(
-            Outcome.DEAD_POINT,
-            f"no forces in the pairs balance the links here, which the inputs at {told} cannot hold; move the input",
-        )
+    if not solved.is_balanced.all():
+        if one:
+            raise imbalance_refusal(reactions)
+        solved = solved._replace(imbalance=explain_imbalance(reactions))
     supplied, whys = input_efforts(solved)
     all_of = collect_actions(field, time, supplied, inertia)
     moved = action_velocities(field, all_of)

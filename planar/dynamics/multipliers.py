@@ -49,7 +49,7 @@ class ForceSolution(NamedTuple):
     `efforts` (n, inputs); `wrenches` of every pair on each of its bodies (n), and by `changes` (n, ways) how they may
     be otherwise; `effort_changes` (n, inputs, ways) alike. `causes` has for every way the pair whose share in it is
     not known, or nothing where links are held more than once. `is_balanced` (n,) is False where no forces in the pairs
-    balance the links, as at a dead point.
+    balance the links, as at a dead point; `imbalance` says why.
     """
 
     efforts: Array
@@ -58,6 +58,7 @@ class ForceSolution(NamedTuple):
     wrench_changes: dict[str, dict[str, Wrench]]
     causes: tuple[str, ...]
     is_balanced: Array
+    imbalance: str = ""
 
     __repr__ = short_repr
 

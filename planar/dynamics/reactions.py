@@ -105,5 +105,5 @@ def _explain_undetermined(solved: ForceSolution, changes: Sequence[Array]) -> st
             f"what {join_all_names(names)} put{'s' * (len(names) == 1)} on it is not known: only the couples are"
         )
     if not solved.is_balanced.all():
-        told.append("no forces in the pairs balance the links there, as at a dead point")
+        told.append(solved.imbalance)
     return "; ".join(told)

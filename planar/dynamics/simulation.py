@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from numbers import Real
 from typing import Any
@@ -12,6 +12,7 @@ import numpy as np
 from planar.document.first_argument import takes_mechanism
 from planar.dynamics.equations_of_motion import EquationsOfMotion
 from planar.dynamics.external_actions import KinematicArrays
+from planar.dynamics.imbalance import explain_loose_links
 from planar.dynamics.lagrangian import lagrangian_functions
 from planar.dynamics.load_validation import check_loads
 from planar.equations.mechanism_numbers import mechanism_size
@@ -21,7 +22,7 @@ from planar.foundation.jets import Jet
 from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import Input, Mechanism
 from planar.model.run_arguments import check_steps
-from planar.model.wording import join_all_names
+from planar.model.wording import join_all_names, quote_names
 from planar.results.motion import Motion, State
 from planar.results.records import InputMotion
 from planar.solving.position import PositionSolver, solve
@@ -152,6 +153,22 @@ class _SimulationRun:
         motion = replace(self._make_motion(time, q, q1, q2), outcome=outcome, reason=reason)
         return Simulation(motion, energies[:, 0], energies[:, 1], rows[:, -1], self.driven)
 
+    def _freedom_remark(self) -> Iterator[str]:
+        """That nothing moves freely, where that is so."""
+        if self.equations.rank != self.coordinate_count:
+            return
+        if not self.driven:
+            yield "nothing can move: the pairs hold every link"
+            return
+        by_law = [given.pair for given in self.mechanism.inputs if given.law is not None]
+        options = [f"--drive {name}" for name in self.driven if name not in by_law]
+        ways = [f"leave out {' or '.join(options)}"] if options else []
+        ways += [f"take the law of {quote_names(by_law)} out of the file"] if by_law else []
+        yield (
+            f"nothing moves freely: the driven inputs at {quote_names(self.driven)} determine the whole motion, and "
+            f"loads, weights and springs only what these supply; to let it go {', or '.join(ways)}"
+        )
+
     def _accelerations(self, time: float, q: Array, q1: Array) -> Array:
         """Those of a row; not a number where nothing tells them."""
         try:
@@ -236,6 +253,9 @@ class _SimulationRun:
         return DOP853(self._state_rate, time, y, last, rtol=RELATIVE_TOLERANCE, atol=RELATIVE_TOLERANCE * scales)
 
     def _explain_failure(self, time: float, y: Array) -> str:
+        loose = explain_loose_links(self.mechanism)
+        if loose:
+            return f": {loose}"
         pushed = self.equations.accelerations_at(time, *self._split_state(y))
         if pushed.regularity < CHANGE_POINT_REGULARITY:
             driven = f"a dead point of what is driven at {join_all_names(self.driven)}, or " if self.driven else ""
@@ -316,7 +336,7 @@ class _SimulationRun:
             outcome=Outcome.SOLVED,
             reason="",
             residual=0.0,
-            remarks=self.start.remarks,
+            remarks=(*self.start.remarks, *self._freedom_remark()),
             frames=frames,
             own=own,
             shapes=self.start.shapes,

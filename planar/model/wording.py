@@ -11,8 +11,10 @@ from planar.foundation.errors import join_names as several
 from planar.foundation.units import parse_unit
 from planar.model.mechanism import FileUnits
 
-REST_TOLERANCE = 1e-9
-"""A rate below this part of the greatest of its kind is at rest."""
+REST_TOLERANCE = 1e-12
+"""A rate below this part of the greatest of its kind is at rest: what rounding leaves of none."""
+STEADY_TOLERANCE = 1e-9
+"""A speed that changes by less than this part of what it could is steady."""
 
 
 def amount(value: float, kind: str, units: FileUnits) -> str:
@@ -43,7 +45,7 @@ def direction_sense(vector: Sequence[float] | np.ndarray, scale: float = 0.0) ->
 
 def speed_trend(power: float, scale: float = 0.0) -> str:
     """Whether speed grows, from the product of velocity and acceleration, beside the greatest that it could be."""
-    if abs(power) <= REST_TOLERANCE * scale:
+    if abs(power) <= STEADY_TOLERANCE * scale:
         return "steady"
     return "speeding up" if power > 0.0 else "slowing down"
 

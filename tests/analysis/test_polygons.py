@@ -11,6 +11,7 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
+import planar
 from planar.analysis.polygons.construction import acceleration_polygon, velocity_polygon
 from planar.analysis.polygons.polygon import (
     Meeting,
@@ -25,6 +26,7 @@ from planar.document import files
 from planar.foundation.geometry import direction
 from planar.model.wording import direction_sense
 from planar.solving.position import solve
+from tests.builders import four_bar as bars
 from tests.draws import draws
 from tests.known import some_models
 from tests.known import state_of as solved
@@ -683,3 +685,24 @@ def test_odd_names_of_points_get_letters_of_their_own(names):
         if kind == "acceleration":
             # pole 2, points 2, heads of centripetal parts 3
             assert len(polygon.letters) == 7
+
+
+@pytest.mark.parametrize("draw", [velocity_polygon, acceleration_polygon])
+def test_beside_a_point_very_far_off_all_others_are_in_one_place(draw):
+    """C and T, 0.05 m and 0.1 m from O, are where o is in an image of 1e9 m."""
+    far = planar.load("cardan-gears").with_values({"wheel.N.distance": 1e9})
+    state = planar.solve(far)
+    found = draw(state)
+    by_point = {point: letter for letter, point in found.points.items()}
+    value = state.point("N").velocity if draw is velocity_polygon else state.point("N").acceleration
+    np.testing.assert_allclose(found.letters[by_point["N"]], value, rtol=1e-9)
+    assert np.hypot(*found.letters[by_point["C"]]) < 1e-8 * np.hypot(*value)
+
+
+@pytest.mark.parametrize("by", [1e-11, 1e-6, 1e6])
+def test_polygons_of_a_mechanism_of_any_size_are_alike(by):
+    found, plain = (velocity_polygon(solve(bars(*(each * k for each in (1, 3, 2.5, 3.5)), 0.9))) for k in (by, 1.0))
+    assert (found.points, list(found.letters)) == (plain.points, list(plain.letters))
+    assert [type(each) for each in found.stages] == [type(each) for each in plain.stages]
+    for letter, place in plain.letters.items():
+        np.testing.assert_allclose(found.letters[letter], by * place, rtol=1e-9, atol=1e-12 * by)

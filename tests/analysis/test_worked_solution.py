@@ -423,3 +423,26 @@ def test_published_values_with_their_slips_stand_at_the_end() -> None:
     state = planar.solve(planar.load("000-P2"))
     told = record(worked_solution(state, compare_published(state)))["published"]
     assert any(each["verdict"] == "slip in the book" and each["slip"] for each in told)
+
+
+def test_a_wheel_that_turns_very_slowly_beside_others_turns():
+    """1e-11 of the first: that is its gears' business, not rounding."""
+    text = {"A": [0, 0], "B": [3, 0], "C": [6, 0]}
+    value = {
+        "planar": 1,
+        "frame": "f",
+        "links": {"f": {"points": text}} | {k.lower(): {"points": {k: [0, 0], f"{k}1": [1, 0]}} for k in text},
+        "pairs": [
+            *({"turning": name} for name in text),
+            {"gear": "m", "links": ["a", "b"], "ratio": -1e-6},
+            {"gear": "n", "links": ["b", "c"], "ratio": -1e-5},
+        ],
+        "inputs": [{"pair": "A", "position": 0.3, "velocity": 2}],
+    }
+    state = planar.solve(planar.from_dict(value))
+    assert state.link("c").angular_velocity == pytest.approx(2e-11, rel=1e-12)
+    assert state.link("c").sense == "anticlockwise, steady"
+    assert state.point("C1").sense.startswith("upwards")
+    told = shown(worked_solution(state))
+    assert "By the pair n: ω_c = 0" not in told
+    assert "c does not turn" not in told

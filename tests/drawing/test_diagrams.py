@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import planar
+from planar.drawing.diagrams.axes import fit_axis
 from planar.drawing.diagrams.kinematic_diagrams import diagrams
 from planar.drawing.diagrams.motion_curves import default_subject, find_peak
 from planar.foundation.errors import BadInput
@@ -395,3 +396,11 @@ def test_what_turns_at_a_pin_may_be_drawn():
     figure = diagrams(mechanism, "O:arm,sun")
     assert "Kinematic diagrams of pair O:arm,sun" in texts(figure)
     assert curve(figure, "velocity", "ω")[1] == pytest.approx(mechanism.inputs[0].velocity * 2.0 / 3.0)
+
+
+@pytest.mark.parametrize("most", [5e-324, 1e-310, 1e-290, 1e250])
+def test_an_axis_of_the_least_and_the_greatest_numbers_has_ticks(most):
+    axis = fit_axis(np.array([0.0, most]), 85.0, "T")
+    assert 2 <= len(axis.ticks) < 20
+    assert axis.low <= 0.0 < axis.high
+    assert np.all(np.isfinite(axis.ticks))

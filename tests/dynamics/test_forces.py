@@ -535,3 +535,34 @@ def test_the_equations_are_set_up_once_wherever_inputs_stand_and_however_fast_th
     # and what acts is
     planar.forces(solve(replace(engine, loads=())))
     assert len(made) == 2
+
+
+def two_slots(first: dict[str, Any]) -> dict[str, Any]:
+    """A body on two upright lines, by `first` on the left one and by a pin in a slot on the other, under a couple."""
+    return {
+        "planar": 1,
+        "frame": "f",
+        "links": {"f": {"points": {"P": [0, 0], "Q": [2, 0]}}, "b": {"points": {"F": [0, 0], "G": [2, 0]}}},
+        "pairs": [
+            {"links": ["f", "b"], "line": {"through": "P", "angle": pi / 2}, "point": "F"} | first,
+            {"slot": "q", "links": ["f", "b"], "line": {"through": "Q", "angle": pi / 2}, "point": "G"},
+        ],
+        "inputs": [{"pair": "p", "position": 0.3}],
+        "loads": [{"link": "b", "torque": 5.0}],
+    }
+
+
+def test_a_couple_that_slots_cannot_bear_gets_a_remedy_that_helps():
+    """Both normal forces lie in one line wherever the body stands: moving it helps nothing."""
+    mechanism = planar.from_dict(two_slots({"slot": "p"}))
+    with pytest.raises(NoAnswer, match="wherever the inputs are the pairs hold link 'b' to second order") as refused:
+        planar.forces(solve(mechanism))
+    helps = "have a pair that bears couples too, as a sliding pair, in place of 'p' or 'q'"
+    assert refused.value.reason.endswith(helps)
+    over = planar.forces(planar.cycle(mechanism, 4, start=0.0, stop=1.0)).undetermined["p"]
+    assert "wherever the inputs are" in over
+    assert "dead point" not in over
+    # as is said
+    held = planar.forces(solve(planar.from_dict(two_slots({"sliding": "p", "turn": -pi / 2}))))
+    assert held.reactions["p"].couple == pytest.approx(-5.0, abs=1e-12)
+    assert held.inputs["p"] == pytest.approx(0.0, abs=1e-12)

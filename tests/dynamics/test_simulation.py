@@ -337,12 +337,37 @@ def test_a_link_that_nothing_makes_heavy_is_named():
     with pytest.raises(NoAnswer, match="'lever' can move without anything that has a mass") as refused:
         run(value, 1.0)
     assert refused.value.outcome is Outcome.TOO_FEW_INPUTS
+    assert refused.value.reason.endswith("give it a mass with an inertia, or let an input drive it (--drive O)")
     # its weight alone at the pin is no inertia either
     value["masses"] = [{"link": "lever", "mass": 1.0, "at": "O"}]
     with pytest.raises(NoAnswer, match="can move without"):
         run(value, 1.0)
     driven = run(value, 1.0, driven=["O"], moving=True)
     assert angle(driven)[-1] == pytest.approx(3.0 + 1.0, rel=1e-12)
+
+
+def test_where_nothing_is_let_go_that_is_said_with_the_option_that_drives_it():
+    value = lever_document({"A": [1, 0]}, gravity=[0, -G], masses=[{"link": "lever", "mass": 1.0, "at": "A"}])
+    assert not any("nothing" in each for each in run(value, 0.1).motion.remarks)
+    (told,) = run(value, 0.1, driven=["O"]).motion.remarks
+    assert told.startswith("nothing moves freely: the driven inputs at 'O' determine the whole motion")
+    assert told.endswith("to let it go leave out --drive O")
+    value["inputs"][0]["law"] = [{"motion": "constant speed", "by": 1, "in": 1}]
+    told = run(value, 0.1).motion.remarks[-1]
+    assert told.endswith("to let it go take the law of 'O' out of the file")
+
+
+def test_of_a_truss_it_is_said_that_nothing_can_move():
+    bars = {"AC": {"ends": ["A", "C"], "length": 1.5}, "BC": {"ends": ["B", "C"], "length": 1.5}}
+    value = {
+        "planar": 1,
+        "frame": "f",
+        "links": {"f": {"points": {"A": [0, 0], "B": [2, 0]}}, **bars},
+        "pairs": [{"turning": name} for name in "ABC"],
+        "sketch": {"C": [1, 1]},
+        "masses": [{"link": "AC", "mass": 2, "at": "C"}],
+    }
+    assert "nothing can move: the pairs hold every link" in run(value, 0.1).motion.remarks
 
 
 def test_where_what_can_move_loses_its_mass_on_the_way_the_rows_before_are_kept():
@@ -439,3 +464,30 @@ def test_a_motion_does_not_depend_on_units_or_size():
         np.testing.assert_allclose(angle(other), angle(found), atol=1e-9)
         np.testing.assert_allclose(other.kinetic, found.kinetic * by**2, atol=1e-10 * by**2)
         assert other.balance < 1e-10
+
+
+# a model with a damper
+
+
+def test_a_door_with_a_closer_is_critically_damped():
+    """J = m b^2 / 3, c = 2 sqrt(k J): it shuts by the closed form, and never swings through."""
+    door = planar.load("door-closer")
+    (spring,), (mass,) = door.springs, door.masses
+    inertia = mass.inertia + mass.mass * 0.4**2
+    assert inertia == pytest.approx(mass.mass * 0.8**2 / 3.0, rel=1e-14)
+    assert spring.damping == pytest.approx(2.0 * sqrt(spring.stiffness * inertia), rel=1e-14)
+    found = planar.simulate(door, 5.0, 50)
+    omega, time = sqrt(spring.stiffness / inertia), found.motion.time
+    np.testing.assert_allclose(angle(found, "H"), pi / 2 * (1.0 + omega * time) * np.exp(-omega * time), atol=1e-10)
+    assert np.all(np.diff(angle(found, "H")) < 0.0)
+    # with a quarter of the damping it would: ratio 0.25, by the decrement of what it swings out beyond
+    found = planar.simulate(door.with_values({"springs.0.damping": 4.0}), 12.0, 1200)
+    swings = angle(found, "H")
+    ends = swings[1:-1][np.diff(np.sign(np.diff(swings))) != 0]
+    decrement = np.log(ends[:-1] / -ends[1:])
+    np.testing.assert_allclose(decrement, pi * 0.25 / sqrt(1.0 - 0.25**2), rtol=1e-3)
+
+
+def test_a_door_with_a_closer_stands_in_a_wind_where_its_spring_balances_it():
+    door = planar.load("door-closer").with_values({"H.velocity": 0.0, "H.position": 0.5})
+    assert planar.forces(planar.solve(door)).inputs["H"] == pytest.approx(12.0 * 0.5, rel=1e-12)

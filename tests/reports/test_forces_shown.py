@@ -359,7 +359,7 @@ def test_it_starts_from_rest_unless_it_moves_already(tmp_path):
         (("physical-pendulum",), 2, "command line: missing option '--duration'"),
         (("physical-pendulum", "--duration", "5 mm"), 2, "--duration: "),
         (("physical-pendulum", "--duration", "-1s"), 2, ""),
-        (("physical-pendulum", "--duration", "1s", "--drive", "P"), 2, "driven: there is no input at 'P'"),
+        (("physical-pendulum", "--duration", "1s", "--drive", "P"), 2, "--drive: there is no input at 'P'"),
         (("physical-pendulum", "--duration", "1s", "--steps", "0"), 2, "steps: "),
         (
             ("physical-pendulum", "--duration", "1s", "-o", "p.txt"),

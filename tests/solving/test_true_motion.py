@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import HealthCheck, assume, example, given, settings
 from hypothesis import strategies as st
 
 import planar
@@ -235,6 +235,7 @@ def test_third_rates_are_the_derivatives_at_order_two(seed, links, higher):
     assert gaps[1] < rounding or 3.6 < np.log2(gaps[0] / gaps[1]) < 4.4  # steps of a quarter
 
 
+@example(8205, 7)  # starts beside a dead point
 @few
 @given(seeds, sizes)
 def test_a_circuit_comes_back_to_its_start_or_says_why_not(seed, links):

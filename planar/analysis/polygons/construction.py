@@ -65,7 +65,7 @@ class _PolygonConstruction:
         self.representatives = turning_classes(self.equations.equations)
         self.known_links: dict[str, None] = {self.frame: None}
         self.known_rates = {self._representative(Rate(self.frame))}
-        self.lettering = Lettering(self.equations, self.named_points, self.frame, order)
+        self.lettering = Lettering(self.equations, self.named_points, self.frame, order, self.size)
         self.letters: dict[str, Array] = {}
         self.pole: list[str] = []
         self.stages: list[DrawingStage] = []
@@ -300,7 +300,9 @@ class _PolygonConstruction:
             and float(np.hypot(*self.chains.unit_rate_velocity(leg))) <= COINCIDENT_TOLERANCE * self.size
         ):
             self.lettering.share_letter(leg.head, tail)
-            return [], tail
+            head = self.lettering.letter(leg.head)
+            self.letters.setdefault(head, self.letters[tail])  # one that had a letter before is in its place
+            return [], head
         head = self.lettering.letter(leg.head)
         drawn = head in self.letters
         vectors = []

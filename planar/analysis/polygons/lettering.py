@@ -53,8 +53,9 @@ class Lettering:
     A point of a moving link that a slider B lies on is B′; a fixed one is G, G′, ... as the chapters have it.
     """
 
-    def __init__(self, rates: RateEquations, named: Sequence[NamedPoint], frame: str, order: int):
+    def __init__(self, rates: RateEquations, named: Sequence[NamedPoint], frame: str, order: int, size: float):
         self.equations, self.frame, self.suffix = rates, frame, "" if order == 1 else "_1"
+        self._same_place = COINCIDENT_TOLERANCE * size  # m
         self.members: Mapping[str, tuple[tuple[str, str], ...]] = {each.name: each.members for each in named}
         taken = {name.lower() for name in self.members}
         self.guide_letter = next((letter for letter in GUIDE_LETTERS if letter.lower() not in taken), "G*")
@@ -122,7 +123,7 @@ class Lettering:
 
     def _is_near(self, one: LinkPoint, other: LinkPoint) -> bool:
         apart = one.local - other.local
-        return max(abs(apart.x), abs(apart.y)) <= COINCIDENT_TOLERANCE
+        return max(abs(apart.x), abs(apart.y)) <= self._same_place
 
     def _key(self, place: LinkPoint) -> tuple[str, str]:
         """("", point) of a named point, else the link and the point that it lies under."""

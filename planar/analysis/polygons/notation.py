@@ -35,7 +35,7 @@ from planar.analysis.rich_text import (
 from planar.foundation.units import length_unit_of_rates, unit_of_kind
 from planar.model.mechanism import named_points
 
-NEGLIGIBLE_RATIO = 1e-9
+NEGLIGIBLE_RATIO = 1e-12
 """A vector below this part of the polygon's greatest is zero."""
 UNKNOWN_PHRASE: Phrase = ("—",)
 PART_SUPERSCRIPTS = {

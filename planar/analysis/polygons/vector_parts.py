@@ -14,7 +14,7 @@ from planar.model.wording import direction_sense
 from planar.results.motion import State
 
 Array = np.ndarray
-NEGLIGIBLE_RATIO = 1e-10
+NEGLIGIBLE_RATIO = 1e-12
 """A rate below this part of the greatest of its kind is none."""
 
 

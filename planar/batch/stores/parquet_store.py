@@ -70,6 +70,10 @@ class ParquetStore(BlockStore):
                 about = json.loads(parquet.read_schema(self._block_path(number)).metadata[b"planar"])
                 self.block_notes[number] = about["general"], about["sent"], about["said"]
                 self.finished.add(number)
+            if number not in self.finished and (
+                self._block_path(number).exists() or self._checksum_path(number).exists()
+            ):
+                self.damaged.add(number)
 
     def _verify_block(self, number: int) -> None:
         """Raises BadInput, or one of UNREADABLE, where a block is not whole; looked at once as long as it stays."""

@@ -19,6 +19,7 @@ from planar.codegen.aligned_arrays import allocate_aligned
 from planar.document.files import to_dict
 from planar.foundation.errors import BadInput, Outcome
 from planar.foundation.safe_files import PARTIAL_FILE_NAME, write_error
+from planar.model.wording import count_phrase
 
 Array = np.ndarray
 
@@ -68,6 +69,8 @@ class BlockStore(ABC):
     def __init__(self, plan: SweepPlan):
         self.plan, self.block_size = plan, plan.block_size
         self.finished: set[int] = set()
+        self.damaged: set[int] = set()
+        "blocks of which something was there already, but not whole"
         self.block_notes: dict[int, tuple[int, int, Any]] = {}
         "of every block: positions and designs of the general path, and what is said"
 
@@ -101,6 +104,9 @@ class BlockStore(ABC):
             f"{count} of {many} designs: {outcomes[code].value} (the first: {sentence})"
             for code, (count, sentence) in sorted(ended.items())
         ]
+        if self.damaged:
+            which = f"{len(self.damaged)} of {count_phrase(self.plan.block_count, 'block')} in the store"
+            found.append(f"{which} {'was' if len(self.damaged) == 1 else 'were'} not whole, and solved again")
         return tuple(found)
 
     @property

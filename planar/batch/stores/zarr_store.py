@@ -113,13 +113,14 @@ class ZarrStore(BlockStore):
         return name, self.group.create_array(name, overwrite=True, **wanted)
 
     def _verify_block(self, number: int) -> None:
-        """Take a block as finished that is whole."""
+        """Take a block as finished that is whole, and as damaged of which only something is there."""
         record = self._read_record(number)
-        if record is not None and all(
-            self.is_readable(name, number) for name in self.arrays if _is_written_by_block(name)
-        ):
+        there = [self.is_readable(name, number) for name in self.arrays if _is_written_by_block(name)]
+        if record is not None and all(there):
             self.finished.add(number)
             self.block_notes[number] = record
+        elif record is not None or any(there):
+            self.damaged.add(number)
 
     def _read_record(self, number: int) -> tuple[int, int, Any] | None:
         try:

@@ -20,6 +20,8 @@ NUMBER_GAP = 0.6
 FLAT_TOLERANCE, FLAT_HALF_RATIO = 1e-9, 0.5
 """Values that differ by less than this part of the greatest are one, and stand in the middle of an axis that goes on
 by this part of it, or of one, both ways."""
+LEAST_VALUE = 1e-290
+"""Values below this are drawn as none: their steps would be no numbers any more."""
 
 USUAL_QUANTILE, OUTLIER_RATIO, SHOWN_RATIO = 0.8, 10.0, 3.0
 """So many of all values are usual; one that is so many times the greatest of these is beyond the axis, and so many are
@@ -63,6 +65,8 @@ def fit_axis(
     if not low <= high:
         low, high = 0.0, 0.0
     most = max(abs(low), abs(high))
+    if most < LEAST_VALUE:
+        low, high, most = 0.0, 0.0, 0.0
     if high - low <= FLAT_TOLERANCE * most or most == 0.0:
         low, high = low - FLAT_HALF_RATIO * (most or 1.0), high + FLAT_HALF_RATIO * (most or 1.0)
     step = round_step((high - low) * tick_distance / length, DEGREE_STEPS if degrees else DECIMAL_STEPS)

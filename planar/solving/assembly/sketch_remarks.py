@@ -47,13 +47,17 @@ def sketch_remarks(setup: PreparedMechanism, candidates: BlockAssemblies, found:
     return tuple(told)
 
 
-def _second_order_remark(setup: PreparedMechanism) -> str:
-    """What to say of constraints that hold to second order what they leave free to first order, all along."""
+def links_held_to_second_order(setup: PreparedMechanism) -> list[str]:
+    """The links that constraints hold to second order only, and leave free to first order, all along the motion."""
     rows = setup.equations.rows
     touching = [
         stage for stage in setup.equations.blocks if any(row.kind is MeasureKind.PURE for row in rows[stage.rows])
     ]
-    links = list(dict.fromkeys(link for stage in touching for link in stage.links))
+    return list(dict.fromkeys(link for stage in touching for link in stage.links))
+
+
+def _second_order_remark(setup: PreparedMechanism) -> str:
+    links = links_held_to_second_order(setup)
     return (
         f"all along the motion the pairs hold link{'s' * (len(links) != 1)} {quote_names(links)} "
         f"to second order only; to first order more could move, so that a little play lets it move far"

@@ -125,9 +125,10 @@ def nearest_start(y: Array, start: CurvePoint, is_periodic: Array) -> tuple[Arra
 def closing_piece(curve: SolutionCurve, piece: PathPiece, start: CurvePoint, is_periodic: Array) -> PathPiece | None:
     """The piece up to a start, whole turns on, if that lies on it and the curve goes on from there as it did."""
     arc = piece.arc
-    length = abs(piece.last - piece.first)
+    begin, end = arc.ends
     there, far = nearest_start(arc.after.y, start, is_periodic)
-    if far > 2.0 * length + CLOSED_TOLERANCE:
+    # by the whole arc, to whose end that is: a piece before a dead point may be a small part of it
+    if far > 2.0 * abs(end - begin) + CLOSED_TOLERANCE:
         return None
     x = float(arc.axis @ (there - arc.origin))
     low, high = sorted((piece.first, piece.last))
