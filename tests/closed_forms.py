@@ -1,4 +1,4 @@
-"""Closed forms by which several test files judge: four-bars by the law of cosines, and lengths they hold for."""
+"""Closed forms by which several test files judge: four-bars by the law of cosines, pistons, lengths they are for."""
 
 from math import pi
 
@@ -28,6 +28,14 @@ def rates(a, b, c, theta, beta, phi, omega, alpha):
     beta2 = (known * np.exp(-1j * phi)).real / (b * np.sin(phi - beta))
     phi2 = (known * np.exp(-1j * beta)).real / (c * np.sin(phi - beta))
     return beta1, phi1, beta2, phi2
+
+
+def piston(theta, r, l, e=0.0):  # noqa: E741 - the letters of textbooks
+    """How far the rod's end is along its line, with the first and second derivative by the crank's angle."""
+    s, c = r * np.sin(theta), r * np.cos(theta)
+    g = s - e
+    root = np.sqrt(l**2 - g**2)
+    return c + root, -s - g * c / root, -c - (c * c - g * s) / root - (g * c) ** 2 / root**3
 
 
 PARALLELOGRAM = (1.0, 2.0, 1.0, 2.0)

@@ -12,7 +12,7 @@ import pytest
 import planar
 from planar.dynamics.forces import Forces
 from planar.model.loads import Load
-from tests.builders import slider_crank_document
+from tests.builders import piston_document
 from tests.checks import forces_of
 
 Value = dict[str, Any]
@@ -143,7 +143,7 @@ def test_of_wheels_given_by_ratio_couples_are_told_and_bearings_named(keyword):
 
 def test_a_bearing_beyond_the_wheels_is_told_all_the_same():
     """Behind wheel b a crank drives a piston: what runs in the shafts is open, what runs in the rod is not."""
-    value = slider_crank_document(0.3, 0.9, loads=[{"point": "B", "force": [100, 0]}])
+    value = piston_document(0.3, 0.9, loads=[{"point": "B", "force": [100, 0]}])
     whole = forces_of(value)
     value["links"]["f"]["points"]["Q"] = [-0.5, 0.0]
     value["links"]["motor"] = {"points": {"Q": [0, 0]}}
@@ -193,7 +193,7 @@ def agreeing(ways: list[Forces]) -> set[str]:
 
 
 def test_of_a_piston_in_two_guides_only_the_guides_are_not_told():
-    value = slider_crank_document(0.3, 0.9, loads=[{"point": "B", "force": [-100, 0]}, {"point": "A", "force": [3, 5]}])
+    value = piston_document(0.3, 0.9, loads=[{"point": "B", "force": [-100, 0]}, {"point": "A", "force": [3, 5]}])
     again = {"sliding": "again", "links": ["f", "piston"], "line": {"through": "O"}, "point": "B"}
     broken = [forces_of(value)]
     whole = forces_of(value | {"pairs": [*value["pairs"], again]})
@@ -233,7 +233,7 @@ def test_of_a_rod_on_three_parallel_cranks_what_hangs_on_it_is_told():
 
 
 def test_a_shaft_in_two_bearings_at_one_place_has_no_telling_which_carries():
-    value = slider_crank_document(0.3, 0.9, loads=[{"point": "B", "force": [-100, 0]}])
+    value = piston_document(0.3, 0.9, loads=[{"point": "B", "force": [-100, 0]}])
     value["links"]["f"]["points"]["O2"] = [0, 0]
     value["links"]["crank"]["points"] = {"O2": [0, 0]}
     value["pairs"].append({"turning": "O2", "links": ["f", "crank"]})

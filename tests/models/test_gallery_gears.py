@@ -46,7 +46,7 @@ def turn(angle):
 # gears between cranks
 
 
-def five_bar(a):
+def geared_five_bar_points(a):
     """A, B, C and P of the geared five-bar, the first crank at angle a; the second turns -1.5 times as far."""
     at_a, at_b = 0.04 * turn(a), 0.15 + 0.03 * turn(np.radians(100) - 1.5 * (a - np.radians(60)))
     c = meeting(at_a, 0.13, at_b, 0.11)
@@ -57,7 +57,7 @@ def five_bar(a):
 def test_the_geared_five_bar_goes_where_circles_meet_turn_after_turn(degrees):
     state = state_turned_by("geared-five-bar", "O", degrees)
     for index, name in enumerate("ABCP"):
-        agrees(state, name, lambda a, index=index: five_bar(a)[index])
+        agrees(state, name, lambda a, index=index: geared_five_bar_points(a)[index])
     assert state.link("QB").angle == pytest.approx(np.radians(100 - 1.5 * degrees), abs=1e-12)
 
 
