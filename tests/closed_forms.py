@@ -7,6 +7,18 @@ import numpy as np
 TURN = 2 * np.pi
 
 
+def between(one, two, opposite):
+    """The angle between two sides of a triangle, by the law of cosines."""
+    return np.arccos((one * one + two * two - opposite * opposite) / (2 * one * two))
+
+
+def meeting(p, r, q, s):
+    """Where circles about p and q (complex) with radii r and s meet, to the left of the way from p to q."""
+    far = abs(q - p)
+    along = (r**2 - s**2 + far**2) / (2 * far)
+    return p + (q - p) / far * (along + 1j * np.sqrt(r**2 - along**2))
+
+
 def rocker(a, b, c, d, theta, closed=1):
     """The angle of DC by the law of cosines in the triangle BCD."""
     r = np.hypot(d - a * np.cos(theta), a * np.sin(theta))
@@ -57,9 +69,7 @@ def antiparallelogram(theta):
     return phi, 2.0 * first, 4.0 * second + first
 
 
-TRIPLE_LIMIT = float(
-    np.arccos((TRIPLE[0] ** 2 + TRIPLE[3] ** 2 - (TRIPLE[1] + TRIPLE[2]) ** 2) / (2 * TRIPLE[0] * TRIPLE[3]))
-)
+TRIPLE_LIMIT = float(between(TRIPLE[0], TRIPLE[3], TRIPLE[1] + TRIPLE[2]))
 """The crank of the triple rocker moves between plus and minus this, where coupler and follower stretch."""
 
 

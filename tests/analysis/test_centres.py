@@ -8,7 +8,7 @@ from cmath import phase
 from collections import Counter
 from dataclasses import replace
 from itertools import combinations
-from math import acos, atan2, cos, hypot, pi, sin, sqrt
+from math import atan2, cos, hypot, pi, sin
 
 import numpy as np
 import pytest
@@ -26,6 +26,7 @@ from planar.reports.tables.centres import remarks
 from planar.results.motion import State
 from planar.solving.position import solve
 from tests.builders import four_bar_document, slider_crank_document
+from tests.closed_forms import between, piston
 from tests.command import run
 from tests.draws import draws
 from tests.known import MODELS, some_models, state_of
@@ -354,7 +355,7 @@ def placed_slider_crank(r, rod, offset, angle, turn=0.0, shift=(0.0, 0.0)):
 def test_in_a_slider_crank_the_crank_meets_the_square_to_the_stroke():
     r, rod, e, angle = 0.3, 1.1, 0.1, 0.8
     result = centres(solve(placed_slider_crank(r, rod, e, angle)))
-    x = r * cos(angle) + sqrt(rod * rod - (r * sin(angle) - e) ** 2)
+    x = piston(angle, r, rod, e)[0]
     np.testing.assert_allclose(result["BA", "frame"].position, [x, x * sin(angle) / cos(angle)], rtol=1e-12)
     # I13 is where the rod's line meets the square to the stroke through O: v = w |OI|
     slope = (r * sin(angle) - e) / (r * cos(angle) - x)
@@ -530,7 +531,7 @@ def test_linkages_of_pins_turned_and_moved_have_their_centres_turned_and_moved(s
 def on_a_dead_point(velocity: float = 1.0) -> Mechanism:
     """A rocker that drives, in the position where coupler and other rocker are in line."""
     a, b, c, d = 2.0, 1.5, 1.0, 2.2
-    angle = acos((a * a + d * d - (b + c) ** 2) / (2 * a * d))
+    angle = float(between(a, d, b + c))
     return pivoted_four_bar(a, b, c, (d, 0.0), angle, {"C": [1.5, 0.7]}, velocity)
 
 
@@ -707,7 +708,7 @@ def test_the_chapters_connecting_rod_turns_about_its_centre():
     """004, problem by the method of instantaneous centres: r 160 mm, l 500 mm, 4500 rpm, 40 deg."""
     result = found("004-EX-piston")
     r, rod, angle = 0.16, 0.5, 2 * pi / 9
-    x = r * cos(angle) + sqrt(rod * rod - (r * sin(angle)) ** 2)
+    x = piston(angle, r, rod)[0]
     corner = np.array([x, x * sin(angle) / cos(angle)])
     turning = result["AB", "frame"]
     np.testing.assert_allclose(turning.position, corner, rtol=1e-12)

@@ -19,6 +19,7 @@ from planar.model.mechanism import pair_entries
 from planar.pages.page_data import page_data
 from planar.reports.tables.inspection import inspection_tables, link_orders_text
 from tests.builders import four_bar_document
+from tests.closed_forms import between
 from tests.command import ROOT, run, written
 from tests.known import MODELS, some_models
 
@@ -258,7 +259,7 @@ def test_at_a_dead_point_it_is_a_mechanism_with_a_word_of_warning():
     value = lettered_four_bar()["links"]
     for name, length in zip("abc", (0.5, 0.66, 0.56), strict=True):
         value[name]["length"] = length
-    limit = float(np.arccos((0.25 + 1 - 1.22**2) / (2 * 0.5)))
+    limit = float(between(0.5, 1, 1.22))
     each = inspected(links=value, inputs=[{"pair": "A", "position": limit, "velocity": 1.0}])
     assert each.is_mechanism
     assert "but here: at A" in each.mechanism_reason

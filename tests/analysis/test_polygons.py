@@ -26,6 +26,7 @@ from planar.foundation.geometry import direction
 from planar.model.wording import direction_sense
 from planar.solving.position import solve
 from tests.builders import four_bar_document
+from tests.closed_forms import between
 from tests.draws import draws
 from tests.known import some_models
 from tests.known import state_of as solved
@@ -598,7 +599,7 @@ def test_block_on_a_coupler_has_the_coriolis_part_of_its_loops():
     q, p = 1.9 + 0j, 0.1 - 0.6j
     a = crank * np.exp(1j * np.radians(115.0))
     apart = abs(q - a)
-    angle = np.arccos((coupler**2 + apart**2 - rocker**2) / (2 * coupler * apart))
+    angle = between(coupler, apart, rocker)
     b = a + coupler * (q - a) / apart * np.exp(1j * angle)
     way = (b - a) / coupler
 

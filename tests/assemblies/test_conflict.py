@@ -14,6 +14,7 @@ from planar.document.dimensions import change_dimension, link_lengths
 from planar.foundation.errors import NoAnswer, Outcome
 from tests import command
 from tests.builders import bar_linkage, bare_four_bar, six_bar
+from tests.closed_forms import between
 from tests.draws import part
 
 
@@ -122,7 +123,7 @@ def test_a_four_bar_is_mended_by_the_law_of_cosines(crank, coupler, rocker, grou
 def test_of_a_four_bar_the_nearest_position_of_the_crank_is_told(at):
     mechanism = bare_four_bar(1.0, 1.2, 1.3, 3.0, radians(at))
     (change,) = planar.conflict(mechanism).positions
-    limit = np.arccos((1.0 + 9.0 - 2.5**2) / 6.0)
+    limit = between(1.0, 3.0, 2.5)
     assert change.name == "A"
     off = pi - abs(change.value - pi)
     assert off == pytest.approx(limit, abs=1e-4)
@@ -268,7 +269,7 @@ def test_the_command_says_why_before_it_refuses(tmp_path):
     (tmp_path / "far.json").write_text(planar.dumps(mechanism), encoding="utf-8")
     ended = command.run(tmp_path, "modes", "far.json")
     told = ended.refused(1)
-    limit = float(np.arccos((1.0 + 9.0 - 2.5**2) / 6.0))
+    limit = float(between(1.0, 3.0, 2.5))
     assert f"or at A = {limit:.4f}"[:-1] in told
     assert "in conflict: pairs 'A', 'B', 'C' and 'D' and the input at 'A'" in ended.out
     assert "coupler.length" in ended.out

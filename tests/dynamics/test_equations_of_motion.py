@@ -22,6 +22,7 @@ from tests.builders import (
     piston_document,
 )
 from tests.checks import forces_of
+from tests.closed_forms import piston
 
 STEP = 1e-30
 """Of the complex step: f'(x) = Im f(x + ih) / h, without cancellation."""
@@ -436,7 +437,6 @@ def test_a_dead_point_is_said_and_in_a_motion_not_a_number():
     assert lost.any()
     assert not lost.all()
     turn = found.moving.pair("O")["relative_angle"][~lost]
-    rod = np.sqrt(0.9**2 - (0.3 * np.sin(turn)) ** 2)
-    wanted = 5.0 / (0.3 * np.sin(turn) * (1 + 0.3 * np.cos(turn) / rod))
+    wanted = -5.0 / piston(turn, 0.3, 0.9)[1]
     np.testing.assert_allclose(force[~lost], wanted, rtol=1e-8)
     assert np.isnan(found.reactions["O"].force[lost]).all()

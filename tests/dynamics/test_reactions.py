@@ -12,7 +12,7 @@ import pytest
 import planar
 from planar.dynamics.forces import Forces
 from planar.model.loads import Load
-from tests.builders import piston_document
+from tests.builders import four_bar_document, piston_document
 from tests.checks import forces_of
 
 Value = dict[str, Any]
@@ -296,20 +296,8 @@ def test_teeth_that_mesh_twice_leave_open_how_hard_they_push_their_bearings_apar
 @pytest.mark.parametrize("angle", [0.3, pi])
 def test_a_motion_that_passes_where_links_are_held_twice_names_it_there_only(angle):
     """A parallelogram of two cranks: flat in its line of shafts it is held twice, elsewhere once."""
-    value = {
-        "planar": 1,
-        "frame": "f",
-        "links": {
-            "f": {"points": {"O": [0, 0], "Q": [0.9, 0]}},
-            "a": {"ends": ["O", "A"], "length": 0.3},
-            "b": {"ends": ["Q", "B"], "length": 0.3},
-            "rod": {"ends": ["A", "B"], "length": 0.9},
-        },
-        "pairs": [{"turning": each} for each in "OQAB"],
-        "inputs": [{"pair": "O", "position": 0.3, "velocity": 1.0}],
-        "loads": [{"link": "b", "torque": 2.0}],
-        "sketch": {"B": [1.19, 0.09]},
-    }
+    more = {"loads": [{"link": "b", "torque": 2.0}], "sketch": {"B": [1.19, 0.09]}}
+    value = four_bar_document(0.3, 0.9, 0.3, 0.9, 0.3, pins="OABQ", names=["f", "a", "rod", "b"], **more)
     motion = planar.cycle(planar.from_dict(value), steps=4, start=angle - 0.2, stop=angle + 0.2)
     found = planar.forces(motion)
     lost = np.isnan(found.inputs["O"])

@@ -14,6 +14,7 @@ import planar
 from planar.dynamics.simulation import Simulation
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from tests.builders import bracket_document, dynamic_four_bar_document, lever_document, masses, piston_document
+from tests.closed_forms import between
 
 Value = dict[str, Any]
 G = 9.81
@@ -201,7 +202,7 @@ def test_a_double_rocker_that_is_let_go_passes_the_limits_of_its_crank():
     value["sketch"] = {"B": [0.4, 0.6]}
     found = run(value, 4.0, 400)
     # the limits of the crank are where coupler and rocker lie in line: by the law of cosines
-    ends = [np.arccos((0.7**2 + 0.9**2 - (0.35 + way * 0.6) ** 2) / (2 * 0.7 * 0.9)) for way in (1.0, -1.0)]
+    ends = [between(0.7, 0.9, 0.35 + way * 0.6) for way in (1.0, -1.0)]
     assert found.balance < 1e-10
     swing = angle(found)
     assert (swing.max(), swing.min()) == pytest.approx(ends, abs=1e-3)
@@ -401,7 +402,7 @@ def test_a_driven_input_that_jams_ends_the_motion_with_a_sentence():
     assert found.motion.outcome is not Outcome.SOLVED
     assert "the motion can be told only to 0.22" in found.motion.reason
     assert "a dead point of what is driven at O" in found.motion.reason
-    end = np.arccos((0.7**2 + 0.9**2 - 0.95**2) / (2 * 0.7 * 0.9))
+    end = between(0.7, 0.9, 0.95)
     assert found.motion.inputs["O"].position[-1] == pytest.approx(end, abs=0.03)
     assert found.motion.residual < 1e-12
 

@@ -8,14 +8,8 @@ import pytest
 from numpy.polynomial import Chebyshev
 
 import planar
+from tests.closed_forms import meeting
 from tests.known import state_turned_by
-
-
-def meeting(p, r, q, s):
-    """Where circles about p and q meet, to the left of the way from p to q."""
-    way = q - p
-    along = (abs(way) ** 2 + r**2 - s**2) / (2 * abs(way))
-    return p + way / abs(way) * (along + 1j * np.sqrt(r**2 - along**2))
 
 
 def rates(closed, at, velocity, acceleration=0.0, reach=0.3):

@@ -11,7 +11,7 @@ from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.solving.continuation.predictor_corrector import ArcBudget
 from tests import ranges
 from tests.builders import block_slider_crank, four_bar
-from tests.closed_forms import PARALLELOGRAM, ROCKER, TRIPLE, TURN, rocker
+from tests.closed_forms import PARALLELOGRAM, ROCKER, TRIPLE, TURN, between, rocker
 
 EPS = float(np.finfo(float).eps)
 
@@ -383,7 +383,7 @@ def test_a_cart_with_a_linkage_on_it_runs_along_its_rail_as_far_as_is_asked(monk
 def test_dead_points_and_the_rockers_swing_of_a_triple_rocker(closed):
     a, b, c, d = TRIPLE
     motion = planar.cycle(four_bar(*TRIPLE, 0.6, closed), 12)
-    limit = np.arccos((a * a + d * d - (b + c) ** 2) / (2 * a * d))
+    limit = between(a, d, b + c)
     # the follower turns back where crank and coupler are in line: A to C is a + b, and the crank's angle that of C
     reach = (d * d + (a + b) ** 2 - c * c) / (2 * d * (a + b))
     swing, value = np.arccos(reach), rocker(*TRIPLE, np.arccos(reach), 1)
@@ -398,7 +398,7 @@ def test_dead_points_and_the_rockers_swing_of_a_triple_rocker(closed):
 
 def test_a_run_past_a_dead_point_ends_with_it_as_its_last_limit():
     a, b, c, d = TRIPLE
-    limit = np.arccos((a * a + d * d - (b + c) ** 2) / (2 * a * d))
+    limit = between(a, d, b + c)
     motion = planar.cycle(four_bar(*TRIPLE, 0.6), 12, 0.6, 3.0)
     assert motion.outcome is Outcome.DEAD_POINT
     ((kind, of, at),) = told(motion)
@@ -410,7 +410,7 @@ def test_a_run_past_a_dead_point_ends_with_it_as_its_last_limit():
 @pytest.mark.parametrize("end", [-1, 1])
 def test_a_range_that_starts_on_a_dead_point_counts_it(end):
     a, b, c, d = TRIPLE
-    limit = end * np.arccos((a * a + d * d - (b + c) ** 2) / (2 * a * d))
+    limit = end * between(a, d, b + c)
     mechanism = four_bar(*TRIPLE, limit)
     inwards = planar.cycle(mechanism, 9, limit, 0.9 * limit)
     ((kind, _, at),) = told(inwards)
@@ -439,8 +439,8 @@ def test_the_swing_of_a_rocker(closed):
     # C at b + a, or b - a, from A: the crank points at it, or away from it
     wanted = {}
     for reach, back in ((b + a, 0.0), (b - a, np.pi)):
-        turn = closed * np.arccos((d * d + reach**2 - c * c) / (2 * d * reach))
-        angle = closed * (np.pi - np.arccos((d * d + c * c - reach**2) / (2 * d * c)))
+        turn = closed * between(d, reach, c)
+        angle = closed * (np.pi - between(d, c, reach))
         wanted[0.8 + (turn + back - 0.8) % TURN] = angle
     np.testing.assert_allclose([each.input for each in found], sorted(wanted), atol=1e-12)
     for each, at in zip(found, sorted(wanted), strict=True):

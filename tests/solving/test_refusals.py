@@ -15,6 +15,7 @@ from planar.solving.assembly.nearest_assembly import AssemblySearchFailure, find
 from planar.solving.diagnosis import remedy
 from planar.solving.prepared_mechanism import PreparedMechanism
 from tests.builders import four_bar_document, six_bar_document, slider_crank_document
+from tests.closed_forms import between
 from tests.command import run, written
 from tests.draws import part
 
@@ -79,7 +80,7 @@ BESIDE = {
     "p": {"ends": ["U", "P"], "length": 80},
     "q": {"ends": ["V", "P"], "length": 90},
 }
-BRACED = float(np.degrees(np.arccos((80**2 + 100**2 - 90**2) / (2 * 80 * 100))))
+BRACED = float(np.degrees(between(80, 100, 90)))
 """The angle of p in its triangle."""
 
 
@@ -111,7 +112,7 @@ def wheels(ratio, *inputs):
 
 
 PARALLELOGRAM = mm_four_bar(50, 100, 50, 100, 180, {"C": [50, 0]})
-LIMIT = float(np.degrees(np.arccos((50**2 + 100**2 - 122**2) / (2 * 50 * 100))))
+LIMIT = float(np.degrees(between(50, 100, 122)))
 """Where BC and DC of the first four-bar stretch into one line."""
 
 CASES = {
