@@ -1,105 +1,206 @@
-"""Mechanisms that several test files build: four-bars, slider-cranks, levers and linkages of bars, one builder each."""
+"""Mechanisms that several test files build: linkages of bars, four-bars, slider-cranks, levers; one builder each."""
 
 from __future__ import annotations
 
-from math import acos, atan2, cos, hypot, sin
+from math import cos, pi, radians, sin
 from typing import Any
 
 import numpy as np
 
 import planar
-from planar.document import files
 from planar.document.dimensions import link_lengths
 from planar.model.mechanism import Mechanism
-from tests.closed_forms import rocker
+from tests.closed_forms import rocker as rocker_angle
+
+Value = dict[str, Any]
+Bar = tuple[str, str, float] | tuple[str, str, float, Value] | Value
+Where = tuple[float, float]
 
 
-def four_bar(a, b, c, d, theta, closed=1, omega=2.0, alpha=1.0, unit="m"):
-    """A four-bar with the crank at theta, sketched in one of its two assemblies."""
-    phi = float(rocker(a, b, c, d, theta, closed))
+def bar_document(
+    frame: Value,
+    bars: dict[str, Bar],
+    driven: tuple[str, float] | None = None,
+    *,
+    ground: str = "frame",
+    pairs: tuple[Value, ...] = (),
+    omega: Any = 1.0,
+    alpha: Any = None,
+    **more: Any,
+) -> Value:
+    """A linkage of bars between pins: {name: (end, end, length) or with further points, or a whole link}.
+
+    A pin is wherever two links have a point of one name, the frame (named `ground`) with its points among them; then
+    come the other `pairs`. The first pair of `driven` stands at the second; units, sketch, loads and so on are `more`.
+    """
+    links: Value = {ground: {"points": frame}}
+    for name, bar in bars.items():
+        links[name] = bar
+        if isinstance(bar, tuple):
+            links[name] = {"ends": list(bar[:2]), "length": bar[2]} | ({"points": bar[3]} if bar[3:] else {})
+    named = [[*link.get("ends", ()), *link.get("points", ())] for link in links.values()]
+    own = dict.fromkeys(name for each in named[1:] for name in each)
+    pins = [name for name in own if sum(name in each for each in named) > 1]
     value = {
         "planar": 1,
-        "name": "four-bar",
-        "units": {"length": unit},
-        "frame": "AD",
-        "links": {
-            "AD": {"points": {"A": [0, 0], "D": [d, 0]}},
-            "AB": {"ends": ["A", "B"], "length": a},
-            "BC": {"ends": ["B", "C"], "length": b, "points": {"E": {"along": ["B", "C"], "distance": 0.4 * b}}},
-            "DC": {"ends": ["D", "C"], "length": c},
-        },
-        "pairs": [{"turning": name} for name in "ABCD"],
-        "inputs": [{"pair": "A", "position": theta, "velocity": omega, "acceleration": alpha}],
-        "sketch": {"C": [d + c * np.cos(phi), c * np.sin(phi)]},
+        "frame": ground,
+        "links": links,
+        "pairs": [*({"turning": name} for name in pins), *pairs],
     }
-    return files.from_dict(value)
+    if driven is not None:
+        rates = {"velocity": omega, "acceleration": alpha}
+        given = {name: rate for name, rate in rates.items() if rate is not None}
+        value["inputs"] = [{"pair": driven[0], "position": driven[1]} | given]
+    return value | more
+
+
+def bar_linkage(
+    frame: Value, bars: dict[str, Bar], driven: tuple[str, float], sketch: Value | None = None
+) -> Mechanism:
+    return planar.from_dict(bar_document(frame, bars, driven, name="bars", sketch=sketch or {}))
+
+
+def four_bar_document(
+    a: float,
+    b: float,
+    c: float,
+    d: float,
+    theta: float | None = None,
+    closed: int = 0,
+    *,
+    pins: str | list[str] = "ABCD",
+    names: list[str] | None = None,
+    driven: str | None = None,
+    points: Value | None = None,
+    turn: float = 0.0,
+    shift: Where = (0.0, 0.0),
+    **more: Any,
+) -> Value:
+    """A four-bar with its crank a at theta from the frame d, a coupler b with these points, and a rocker c.
+
+    Sketched in one of its assemblies (`closed` 1 or -1) or as `more` says; `names` are those of the links d, a, b, c.
+    The frame's line is turned and shifted; angles are in the file's unit, `turn` in rad.
+    """
+    first, second, third, fourth = pins
+    ground, crank, coupler, rocker = names or [first + fourth, first + second, second + third, fourth + third]
+    deg = more.get("units", {}).get("angle") == "deg"
+    if closed:
+        at = radians(theta) if deg else theta
+        spot = complex(*shift) + (d + c * np.exp(1j * rocker_angle(a, b, c, d, at, closed))) * np.exp(1j * turn)
+        more = {"sketch": {third: [float(spot.real), float(spot.imag)]}} | more
+    return bar_document(
+        {first: list(shift), fourth: [shift[0] + d * cos(turn), shift[1] + d * sin(turn)]},
+        {
+            crank: (first, second, a),
+            coupler: (second, third, b, *([points] if points else [])),
+            rocker: (fourth, third, c),
+        },
+        None if theta is None else (driven or first, theta + turn),
+        ground=ground,
+        **more,
+    )
+
+
+def four_bar(a, b, c, d, theta, closed=1, omega=2.0, alpha=1.0, **more):
+    """Its coupler carries a point E."""
+    points = {"E": {"along": ["B", "C"], "distance": 0.4 * b}}
+    given = {"name": "four-bar", "points": points, "omega": omega, "alpha": alpha} | more
+    return planar.from_dict(four_bar_document(a, b, c, d, theta, closed, **given))
+
+
+def open_four_bar(a, b, c, d, velocity=3.0, position=1.0):
+    """The open assembly, the coupler a triangle with a point P."""
+    points = {"P": {"along": ["B", "C"], "distance": b, "angle": 0.7}}
+    return four_bar(a, b, c, d, position, 1, velocity, None, points=points, names=["frame", "AB", "BC", "DC"])
+
+
+def bare_four_bar(crank: float, coupler: float, rocker: float, ground: float, at: float) -> Mechanism:
+    """Nothing says which assembly is meant."""
+    names = ["frame", "crank", "coupler", "rocker"]
+    return planar.from_dict(four_bar_document(crank, coupler, rocker, ground, at, names=names))
+
+
+def dynamic_four_bar_document(crank: float, coupler: float, rocker: float, base: float, **more: Any) -> Value:
+    """Links that can be given the `masses`."""
+    given = {"names": ["f", "crank", "coupler", "rocker"], "sketch": {"B": [base, 2.0 * rocker]}} | more
+    return four_bar_document(crank, coupler, rocker, base, 0.6, pins="OABQ", omega=7.0, alpha=-3.0, **given)
+
+
+def six_bar_document(coupler: float, rocker: float, at: float, **more: Any) -> Value:
+    """A four-bar ABCD with a dyad CFG on the pin of its rocker; only the dyad's lengths are given."""
+    bars = {"AB": ("A", "B", 50.0), "BC": ("B", "C", 66.0), "DC": ("D", "C", 56.0)}
+    bars |= {"CF": ("C", "F", coupler), "GF": ("G", "F", rocker)}
+    return bar_document({"A": [0.0, 0.0], "D": [100.0, 0.0], "G": [200.0, 0.0]}, bars, ("A", at), **more)
+
+
+def six_bar(coupler: float, rocker: float, at: float = pi / 3.0) -> Mechanism:
+    return planar.from_dict(six_bar_document(coupler, rocker, at, name="six-bar"))
+
+
+def slider_crank_document(
+    r: float,
+    l: float,  # noqa: E741 - the letters of textbooks
+    theta: float | None = None,
+    e: float = 0.0,
+    closed: int = 1,
+    *,
+    pins: str = "OAB",
+    names: tuple[str, str, str] = ("frame", "crank", "rod"),
+    piston: str | None = None,
+    slide: str = "stroke",
+    driven: str | None = None,
+    turn: float = 0.0,
+    shift: Where = (0.0, 0.0),
+    **more: Any,
+) -> Value:
+    """A crank r at theta from the stroke, a rod l; the stroke's line e to the left of the crank's pin.
+
+    The rod's end is a block, or pinned to a link `piston`; sketched at its farthest ahead or behind (`closed` 1 or -1)
+    or as `more` says. All of it is turned (rad) and shifted.
+    """
+    shaft, pin, wrist = pins
+    ground, crank, rod = names
+    way, left = np.array([cos(turn), sin(turn)]), np.array([-sin(turn), cos(turn)])
+    line: Value = {"through": (np.array(shift) + e * left).tolist()} | ({"angle": turn} if turn else {})
+    bars: Value = {crank: (shaft, pin, r), rod: (pin, wrist, l)}
+    ends: Value = {"on": ground, "block": wrist, "line": line}
+    if piston is not None:
+        bars[piston] = {"points": {wrist: [0, 0]}}
+        ends = {"links": [ground, piston], "line": line, "point": wrist}
+    if closed:
+        spot = np.array(shift) + closed * (r + l) * way + e * left
+        more = {"sketch": {wrist: spot.tolist()}} | more
+    at = None if theta is None else (driven or shaft, theta if driven == slide else theta + turn)
+    return bar_document({shaft: list(shift)}, bars, at, ground=ground, pairs=({"sliding": slide} | ends,), **more)
 
 
 def block_slider_crank(r=0.48, rod=1.6, offset=0.1, theta=1.0):
-    links = {
-        "frame": {"points": {"O": [0, 0]}},
-        "crank": {"ends": ["O", "A"], "length": r},
-        "rod": {"ends": ["A", "B"], "length": rod},
+    """Its slide is s."""
+    return planar.from_dict(slider_crank_document(r, rod, theta, offset, 0, slide="s", omega=3.0, alpha=-1.0))
+
+
+def slider_crank(r, l, e=0.0, heading=0.0, position=1.0, velocity=2.0, acceleration=None, **more):  # noqa: E741
+    """The stroke at an angle; the position of the crank is counted from the x-axis."""
+    given = {
+        "name": "Slider-crank",
+        "names": ("frame", "OA", "AB"),
+        "turn": heading,
+        "omega": velocity,
+        "alpha": acceleration,
     }
-    pairs = [{"turning": "O"}, {"turning": "A"}]
-    pairs.append({"sliding": "s", "on": "frame", "block": "B", "line": {"through": [0, offset]}})
-    inputs = [{"pair": "O", "position": theta, "velocity": 3.0, "acceleration": -1.0}]
-    return files.from_dict({"planar": 1, "frame": "frame", "links": links, "pairs": pairs, "inputs": inputs})
+    return planar.from_dict(slider_crank_document(r, l, position - heading, e, **(given | more)))
 
 
-Value = dict[str, Any]
-
-
-def four_bar_document(crank: float, coupler: float, rocker: float, base: float, **more: Any) -> Value:
-    return {
-        "planar": 1,
-        "frame": "f",
-        "links": {
-            "f": {"points": {"O": [0, 0], "Q": [base, 0]}},
-            "crank": {"ends": ["O", "A"], "length": crank},
-            "coupler": {"ends": ["A", "B"], "length": coupler},
-            "rocker": {"ends": ["Q", "B"], "length": rocker},
-        },
-        "pairs": [{"turning": each} for each in "OABQ"],
-        "inputs": [{"pair": "O", "position": 0.6, "velocity": 7.0, "acceleration": -3.0}],
-        "sketch": {"B": [base, 2.0 * rocker]},
-        **more,
-    }
-
-
-def slider_crank_document(crank: float, rod: float, **more: Any) -> Value:
-    """The line of the slide is the world's x-axis, through the shaft."""
-    return {
-        "planar": 1,
-        "frame": "f",
-        "links": {
-            "f": {"points": {"O": [0, 0]}},
-            "crank": {"ends": ["O", "A"], "length": crank},
-            "rod": {"ends": ["A", "B"], "length": rod},
-            "piston": {"points": {"B": [0, 0]}},
-        },
-        "pairs": [
-            {"turning": "O"},
-            {"turning": "A"},
-            {"turning": "B"},
-            {"sliding": "stroke", "links": ["f", "piston"], "line": {"through": "O"}, "point": "B"},
-        ],
-        "inputs": [{"pair": "O", "position": 0.4, "velocity": 9.0, "acceleration": 5.0}],
-        "sketch": {"B": [crank + rod, 0.0]},
-        **more,
-    }
+def piston_document(crank: float, rod: float, **more: Any) -> Value:
+    """A slider-crank whose piston is a link; links that can be given the `masses`."""
+    given = {"names": ("f", "crank", "rod"), "piston": "piston", "omega": 9.0, "alpha": 5.0} | more
+    return slider_crank_document(crank, rod, 0.4, **given)
 
 
 def lever_document(points: dict[str, list[float]], angle: float = 0.0, **more: Any) -> Value:
     """A link `lever` that turns about O."""
-    return {
-        "planar": 1,
-        "frame": "f",
-        "links": {"f": {"points": {"O": [0, 0]}}, "lever": {"points": {"O": [0, 0], **points}}},
-        "pairs": [{"turning": "O"}],
-        "inputs": [{"pair": "O", "position": angle, "velocity": 3.0, "acceleration": 2.0}],
-        **more,
-    }
+    lever = {"points": {"O": [0, 0], **points}}
+    return bar_document({"O": [0, 0]}, {"lever": lever}, ("O", angle), ground="f", omega=3.0, alpha=2.0, **more)
 
 
 BODIES = {"crank": (1.3, 0.11, -0.04, 0.02), "second": (0.7, 0.17, 0.06, 0.03), "third": (2.1, 0.05, 0.08, 0.05)}
@@ -115,75 +216,8 @@ def masses(*names: str) -> list[Value]:
 
 def bracket_document(**more: Any) -> Value:
     """Two bars from the frame to C."""
-    return {
-        "planar": 1,
-        "frame": "f",
-        "links": {
-            "f": {"points": {"P": [0, 0], "Q": [0, 3]}},
-            "strut": {"ends": ["P", "C"], "length": 4},
-            "tie": {"ends": ["Q", "C"], "length": 5},
-        },
-        "pairs": [{"turning": each} for each in "PQC"],
-        "sketch": {"C": [4, 0]},
-        **more,
-    }
-
-
-def slider_crank(r, l, e=0.0, heading=0.0, **given):  # noqa: E741 - the letters of textbooks
-    """A crank r and a rod l in metres; the stroke at an angle, e to the left of the crank's pin."""
-    way, left = np.array([cos(heading), sin(heading)]), np.array([-sin(heading), cos(heading)])
-    return planar.from_dict(
-        {
-            "planar": 1,
-            "name": "Slider-crank",
-            "frame": "frame",
-            "links": {
-                "frame": {"points": {"O": [0, 0]}},
-                "OA": {"ends": ["O", "A"], "length": r},
-                "AB": {"ends": ["A", "B"], "length": l},
-            },
-            "pairs": [
-                {"turning": "O"},
-                {"turning": "A"},
-                {
-                    "sliding": "stroke",
-                    "on": "frame",
-                    "block": "B",
-                    "line": {"through": list(e * left), "angle": heading},
-                },
-            ],
-            "inputs": [{"pair": "O", "position": 1.0, "velocity": 2.0} | given],
-            "sketch": {"B": list((r + l) * way + e * left)},
-        }
-    )
-
-
-def open_four_bar(a, b, c, d, velocity=3.0, position=1.0):
-    """A crank a, a coupler b with a point P, a rocker c and a frame d along x (m), the open assembly."""
-    pin, size = np.array([a * cos(position), a * sin(position)]), None
-    far = hypot(d - pin[0], -pin[1])
-    size = atan2(-pin[1], d - pin[0]) + acos((b * b + far * far - c * c) / (2.0 * b * far))
-    joint = pin + b * np.array([cos(size), sin(size)])
-    return planar.from_dict(
-        {
-            "planar": 1,
-            "name": "Four-bar",
-            "frame": "frame",
-            "links": {
-                "frame": {"points": {"A": [0, 0], "D": [d, 0]}},
-                "AB": {"ends": ["A", "B"], "length": a},
-                "BC": {
-                    "ends": ["B", "C"],
-                    "length": b,
-                    "points": {"P": {"along": ["B", "C"], "distance": b, "angle": 0.7}},
-                },
-                "DC": {"ends": ["D", "C"], "length": c},
-            },
-            "pairs": [{"turning": "A"}, {"turning": "B"}, {"turning": "C"}, {"turning": "D"}],
-            "inputs": [{"pair": "A", "position": position, "velocity": velocity}],
-            "sketch": {"B": list(map(float, pin)), "C": list(map(float, joint))},
-        }
-    )
+    bars = {"strut": ("P", "C", 4), "tie": ("Q", "C", 5)}
+    return bar_document({"P": [0, 0], "Q": [0, 3]}, bars, ground="f", **({"sketch": {"C": [4, 0]}} | more))
 
 
 def crank_rocker(seed):
@@ -197,21 +231,11 @@ def crank_rocker(seed):
 
 def triangle(base: float) -> Mechanism:
     """Links of 70 and 80 mm on a base (mm), which does not move."""
-    return planar.from_dict(
-        {
-            "planar": 1,
-            "name": "Triangle",
-            "units": {"length": "mm", "angle": "deg"},
-            "frame": "base",
-            "links": {
-                "base": {"ends": ["A", "B"], "length": base},
-                "left": {"ends": ["A", "C"], "length": 70},
-                "right": {"ends": ["B", "C"], "length": 80},
-            },
-            "pairs": [{"turning": "A"}, {"turning": "B"}, {"turning": "C"}],
-            "sketch": {"C": [50, 50]},
-        }
-    )
+    links = {"base": {"ends": ["A", "B"], "length": base}, "left": ("A", "C", 70), "right": ("B", "C", 80)}
+    units = {"length": "mm", "angle": "deg"}
+    value = bar_document({}, links, name="Triangle", units=units, sketch={"C": [50, 50]})
+    del value["links"]["frame"]
+    return planar.from_dict(value | {"frame": "base"})
 
 
 def designs_around(mechanism, spread, many=5, seed=0):
@@ -221,32 +245,6 @@ def designs_around(mechanism, spread, many=5, seed=0):
     own |= {f"{each.pair}.velocity": each.velocity for each in mechanism.inputs}
     own |= {f"{each.pair}.acceleration": each.acceleration for each in mechanism.inputs}
     return {name: value * (1 + spread * rng.uniform(-1, 1, many)) for name, value in own.items() if value}
-
-
-def bar_linkage(frame: dict, links: dict, driven: tuple[str, float], sketch: dict | None = None) -> planar.Mechanism:
-    """A linkage of bars between pins: {name: (end, end, length)}; a pin is wherever two links name it."""
-    value = {
-        "planar": 1,
-        "name": "bars",
-        "units": {"length": "m", "angle": "rad"},
-        "frame": "frame",
-        "links": {"frame": {"points": frame}}
-        | {name: {"ends": [a, b], "length": length} for name, (a, b, length) in links.items()},
-        "pairs": [{"turning": pin} for pin in dict.fromkeys(end for a, b, _ in links.values() for end in (a, b))],
-        "inputs": [{"pair": driven[0], "position": driven[1], "velocity": 1.0}],
-        "sketch": sketch or {},
-    }
-    value["pairs"] = [
-        pair
-        for pair in value["pairs"]
-        if sum(pair["turning"] in each[:2] for each in links.values()) + (pair["turning"] in frame) > 1
-    ]
-    return planar.from_dict(value)
-
-
-def bare_four_bar(crank: float, coupler: float, rocker: float, ground: float, at: float) -> planar.Mechanism:
-    links = {"crank": ("A", "B", crank), "coupler": ("B", "C", coupler), "rocker": ("D", "C", rocker)}
-    return bar_linkage({"A": [0.0, 0.0], "D": [ground, 0.0]}, links, ("A", at))
 
 
 def tower(many: int) -> planar.Mechanism:

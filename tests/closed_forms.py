@@ -1,10 +1,22 @@
-"""Closed forms by which several test files judge: four-bars by the law of cosines, and lengths they hold for."""
+"""Closed forms by which several test files judge: four-bars by the law of cosines, pistons, lengths they are for."""
 
 from math import pi
 
 import numpy as np
 
 TURN = 2 * np.pi
+
+
+def between(one, two, opposite):
+    """The angle between two sides of a triangle, by the law of cosines."""
+    return np.arccos((one * one + two * two - opposite * opposite) / (2 * one * two))
+
+
+def meeting(p, r, q, s):
+    """Where circles about p and q (complex) with radii r and s meet, to the left of the way from p to q."""
+    far = abs(q - p)
+    along = (r**2 - s**2 + far**2) / (2 * far)
+    return p + (q - p) / far * (along + 1j * np.sqrt(r**2 - along**2))
 
 
 def rocker(a, b, c, d, theta, closed=1):
@@ -30,6 +42,14 @@ def rates(a, b, c, theta, beta, phi, omega, alpha):
     return beta1, phi1, beta2, phi2
 
 
+def piston(theta, r, l, e=0.0):  # noqa: E741 - the letters of textbooks
+    """How far the rod's end is along its line, with the first and second derivative by the crank's angle."""
+    s, c = r * np.sin(theta), r * np.cos(theta)
+    g = s - e
+    root = np.sqrt(l**2 - g**2)
+    return c + root, -s - g * c / root, -c - (c * c - g * s) / root - (g * c) ** 2 / root**3
+
+
 PARALLELOGRAM = (1.0, 2.0, 1.0, 2.0)
 ROCKER = (0.3, 0.9, 0.7, 1.0)
 TRIPLE = (0.9, 0.7, 0.85, 1.5)
@@ -49,9 +69,7 @@ def antiparallelogram(theta):
     return phi, 2.0 * first, 4.0 * second + first
 
 
-TRIPLE_LIMIT = float(
-    np.arccos((TRIPLE[0] ** 2 + TRIPLE[3] ** 2 - (TRIPLE[1] + TRIPLE[2]) ** 2) / (2 * TRIPLE[0] * TRIPLE[3]))
-)
+TRIPLE_LIMIT = float(between(TRIPLE[0], TRIPLE[3], TRIPLE[1] + TRIPLE[2]))
 """The crank of the triple rocker moves between plus and minus this, where coupler and follower stretch."""
 
 

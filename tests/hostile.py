@@ -7,6 +7,7 @@ from typing import Any
 
 import planar
 from planar.model.mechanism import Mechanism
+from tests.builders import four_bar_document
 
 HARMFUL = (
     "</script><script>window.hacked=1</script><img src=x onerror='window.hacked=1'>"
@@ -39,21 +40,11 @@ NAMES = ("$x", "a_b^", "\\frac{", "<b>[red]", "点", "🙂", "name of a point th
 def hostile_document() -> dict[str, Any]:
     """A four-bar whose every name means something to somebody."""
     a, b, c, d, e, one, two, three = NAMES
-    return {
-        "planar": 1,
-        "name": "$\\frac{1}{ [bold]x[/bold] <i> _^ 点🙂",
-        "source": "$$ \\alpha_ {",
-        "frame": "frame $",
-        "links": {
-            "frame $": {"points": {a: [0, 0], d: [0.1, 0]}},
-            one: {"ends": [a, b], "length": 0.05},
-            two: {"ends": [b, c], "length": 0.066, "points": {e: {"along": [b, c], "distance": 0.02}}},
-            three: {"ends": [d, c], "length": 0.056},
-        },
-        "pairs": [{"turning": each} for each in (a, b, c, d)],
-        "inputs": [{"pair": a, "position": 1.0, "velocity": 10.5, "acceleration": -26}],
-        "sketch": {c: [0.08, 0.05]},
-    }
+    names = ["frame $", one, two, three]
+    texts = {"name": "$\\frac{1}{ [bold]x[/bold] <i> _^ 点🙂", "source": "$$ \\alpha_ {"}
+    more = {"points": {e: {"along": [b, c], "distance": 0.02}}, "sketch": {c: [0.08, 0.05]}, **texts}
+    given = {"pins": [a, b, c, d], "names": names, "omega": 10.5, "alpha": -26}
+    return four_bar_document(0.05, 0.066, 0.056, 0.1, 1.0, **given, **more)
 
 
 def harmful_mechanism() -> Mechanism:

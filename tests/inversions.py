@@ -38,14 +38,14 @@ def structures(links: int, count: int) -> tuple[Joints, ...]:
         joints = tuple(_joints(rng, ["frame", "L1"], [f"L{k}" for k in range(2, links + 2)]))
         seed += 1
         # three links pinned to each other are one link
-        if triangles(joints) or joints in found:
+        if has_triangle(joints) or joints in found:
             continue
         if one_group(group(joints, rng).setup, links):
             found[joints] = None
     return tuple(found)
 
 
-def triangles(joints: Joints) -> bool:
+def has_triangle(joints: Joints) -> bool:
     """Whether three links are joined to each other."""
     joined = {frozenset(joint) for joint in (*joints, ("frame", "L1"))}
     links = sorted({link for joint in joined for link in joint})

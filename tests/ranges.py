@@ -13,6 +13,7 @@ import numpy as np
 import planar
 from planar.document import files
 from planar.model.mechanism import Mechanism
+from tests.builders import four_bar_document, slider_crank_document
 
 TURN = 2.0 * np.pi
 ALMOST = 1e-3
@@ -56,13 +57,7 @@ def four_bar(rng: np.random.Generator, lengths: tuple[float, ...] | None = None)
         ends = (-last, last)
     else:
         ends = (first, last) if last < np.pi else (first, TURN - first)
-    links = {
-        "AD": {"points": {"A": [0, 0], "D": [d, 0]}},
-        "AB": {"ends": ["A", "B"], "length": a},
-        "BC": {"ends": ["B", "C"], "length": b},
-        "DC": {"ends": ["D", "C"], "length": c},
-    }
-    return _case(links, [{"turning": name} for name in "ABCD"], "AD", "A", theta, ends, rng)
+    return _case(four_bar_document(a, b, c, d, float(theta)), "A", "C", ends, rng)
 
 
 def beside(rng: np.random.Generator) -> tuple[Case, float] | None:
@@ -94,7 +89,7 @@ def slider_crank(rng: np.random.Generator) -> Case | None:
         ends = (-np.pi - high, high)
     else:
         ends = (low, high)
-    return _case(*_slider(r, rod, e), "frame", "O", theta, ends, rng)
+    return _case(slider_crank_document(r, rod, float(theta), e, slide="s"), "O", "B", ends, rng)
 
 
 def driven_slide(rng: np.random.Generator) -> Case | None:
@@ -111,25 +106,12 @@ def driven_slide(rng: np.random.Generator) -> Case | None:
     ends = (first, last)
     if first > 0.0 and rng.random() < 0.5:
         x, ends = -x, (-last, -first)
-    return _case(*_slider(r, rod, e), "frame", "s", x, ends, rng)
+    return _case(slider_crank_document(r, rod, float(x), e, slide="s", driven="s"), "s", "A", ends, rng)
 
 
-def _slider(r: float, rod: float, e: float) -> tuple[dict, list]:
-    links = {
-        "frame": {"points": {"O": [0, 0]}},
-        "crank": {"ends": ["O", "A"], "length": r},
-        "rod": {"ends": ["A", "B"], "length": rod},
-    }
-    pairs = [{"turning": "O"}, {"turning": "A"}]
-    pairs.append({"sliding": "s", "on": "frame", "block": "B", "line": {"through": [0, e]}})
-    return links, pairs
-
-
-def _case(links, pairs, frame, pair, position, ends, rng) -> Case:
-    """The mechanism in either of its assemblies."""
-    sketch = {"C" if frame == "AD" else "B" if pair == "O" else "A": rng.uniform(-2.0, 2.0, 2).tolist()}
-    inputs = [{"pair": pair, "position": float(position), "velocity": 1.0}]
-    value = {"planar": 1, "frame": frame, "links": links, "pairs": pairs, "inputs": inputs, "sketch": sketch}
+def _case(value, pair, pin, ends, rng) -> Case:
+    """The mechanism in either of its assemblies, as this pin is sketched."""
+    value["sketch"] = {pin: rng.uniform(-2.0, 2.0, 2).tolist()}
     return Case(files.from_dict(value), pair, (float(ends[0]), float(ends[1])))
 
 

@@ -14,31 +14,26 @@ from planar.foundation.errors import BadInput, Unknown
 from planar.model.mechanism import Drive, relative_motions, replace_inputs
 from planar.reports.tables.answers import record, tables
 from tests.builders import crank_rocker, open_four_bar, slider_crank
-from tests.closed_forms import turn_apart
+from tests.closed_forms import between, turn_apart
 from tests.draws import part
 
 SEEDS = part(range(8), 2)
-
-
-def by_cosines(one, two, opposite):
-    """The angle between two sides of a triangle."""
-    return acos((one * one + two * two - opposite * opposite) / (2.0 * one * two))
 
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_crank_rocker_swings_and_returns_as_the_law_of_cosines_says(seed):
     a, b, c, d = crank_rocker(seed)
     motion = planar.cycle(open_four_bar(a, b, c, d, velocity=-2.0 if seed % 2 else 3.0), 24)
-    outer, inner = by_cosines(c, d, a + b), by_cosines(c, d, b - a)  # at D, from the frame
+    outer, inner = between(c, d, a + b), between(c, d, b - a)  # at D, from the frame
     for name in ("DC", "D"):
         found = planar.swing(motion, name)
         assert found.least.value == pytest.approx(pi - outer, abs=1e-11)
         assert found.greatest.value == pytest.approx(pi - inner, abs=1e-11)
         assert found.angle == pytest.approx(outer - inner, abs=1e-11)
         # crank and coupler are in line, stretched and folded
-        assert turn_apart(found.least.input, by_cosines(a + b, d, c)) < 1e-9
-        assert turn_apart(found.greatest.input, pi + by_cosines(b - a, d, c)) < 1e-9
-    off = by_cosines(a + b, d, c) - by_cosines(b - a, d, c)
+        assert turn_apart(found.least.input, between(a + b, d, c)) < 1e-9
+        assert turn_apart(found.greatest.input, pi + between(b - a, d, c)) < 1e-9
+    off = between(a + b, d, c) - between(b - a, d, c)
     ratio = planar.time_ratio(motion, "DC")
     assert ratio.ratio == pytest.approx((pi + abs(off)) / (pi - abs(off)), rel=1e-9)
     assert ratio.out.travel + ratio.back.travel == pytest.approx(2.0 * pi, abs=1e-12)
@@ -88,7 +83,7 @@ def test_a_swing_does_not_jump_where_an_angle_passes_half_a_turn():
     mechanism = planar.to_dict(open_four_bar(0.2, 0.6, 0.5, 0.7))
     mechanism["links"]["DC"]["ends"] = ["C", "D"]  # the rocker's own angle now passes -180 degrees or not
     found = planar.swing(planar.cycle(planar.from_dict(mechanism), 24), "DC")
-    assert found.angle == pytest.approx(by_cosines(0.5, 0.7, 0.8) - by_cosines(0.5, 0.7, 0.4), abs=1e-11)
+    assert found.angle == pytest.approx(between(0.5, 0.7, 0.8) - between(0.5, 0.7, 0.4), abs=1e-11)
 
 
 def test_a_slide_has_no_swing_and_no_return_without_a_whole_turn():

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 import re
+from cmath import phase
 from collections import Counter
 from dataclasses import replace
 from itertools import combinations
-from math import acos, atan2, cos, hypot, pi, sin, sqrt
+from math import atan2, cos, hypot, pi, sin
 
 import numpy as np
 import pytest
@@ -24,6 +25,8 @@ from planar.model.mechanism import Drive, Mechanism, replace_inputs
 from planar.reports.tables.centres import remarks
 from planar.results.motion import State
 from planar.solving.position import solve
+from tests.builders import four_bar_document, slider_crank_document
+from tests.closed_forms import between, piston
 from tests.command import run
 from tests.draws import draws
 from tests.known import MODELS, some_models, state_of
@@ -318,30 +321,11 @@ def test_pins_and_slides_show_as_many_as_there_are_two_links_that_they_join(stem
 # closed forms
 
 
-def four_bar(a, b, c, at, angle, sketch=None, velocity=1.0, ground=((0.0, 0.0), None)):
-    """A crank, a coupler, a rocker; the rocker's pivot `at`, the crank's at the first of `ground`."""
-    pivot = ground[0]
-    turn = atan2(at[1] - pivot[1], at[0] - pivot[0])
-    value = {
-        "planar": 1,
-        "name": "four-bar",
-        "frame": "AD",
-        "links": {
-            "AD": {"points": {"A": list(pivot), "D": list(at)}},
-            "AB": {"ends": ["A", "B"], "length": a},
-            "BC": {"ends": ["B", "C"], "length": b},
-            "DC": {"ends": ["D", "C"], "length": c},
-        },
-        "pairs": [
-            {"turning": "A", "links": ["AD", "AB"]},
-            {"turning": "B", "links": ["AB", "BC"]},
-            {"turning": "C", "links": ["BC", "DC"]},
-            {"turning": "D", "links": ["DC", "AD"]},
-        ],
-        "inputs": [{"pair": "A", "position": angle + turn, "velocity": velocity}],
-        "sketch": sketch or {"C": [at[0], at[1] + c]},
-    }
-    return files.from_dict(value)
+def pivoted_four_bar(a, b, c, at, angle, sketch=None, velocity=1.0, ground=(0.0, 0.0)):
+    """The pivot of its rocker is `at`, that of its crank `ground`."""
+    way, sketch = complex(*at) - complex(*ground), sketch or {"C": [at[0], at[1] + c]}
+    more = {"shift": ground, "turn": phase(way), "omega": velocity, "sketch": sketch}
+    return planar.from_dict(four_bar_document(a, b, c, abs(way), angle, **more))
 
 
 def crossing(p, q, r, s) -> np.ndarray:
@@ -353,7 +337,7 @@ def crossing(p, q, r, s) -> np.ndarray:
 
 
 def test_in_a_four_bar_opposite_links_meet_in_the_two_centres_that_are_not_pins():
-    state = solve(four_bar(1.0, 3.0, 2.5, (3.2, 0.4), 1.1))
+    state = solve(pivoted_four_bar(1.0, 3.0, 2.5, (3.2, 0.4), 1.1))
     a, b, c, d = (state.point(name).position for name in "ABCD")
     result = centres(state)
     np.testing.assert_allclose(result["BC", "AD"].position, crossing(a, b, d, c), rtol=1e-12)
@@ -362,37 +346,16 @@ def test_in_a_four_bar_opposite_links_meet_in_the_two_centres_that_are_not_pins(
     assert [each.derivation for each in result][4:] == ["I13 = I12 I23 × I14 I34", "I24 = I12 I14 × I23 I34"]
 
 
-def slider_crank(r, rod, offset, angle, turn=0.0, shift=(0.0, 0.0)):
-    """The stroke's line at `turn`, `offset` to its left."""
-    way = np.array([cos(turn), sin(turn)])
-    through = np.array(shift) + offset * np.array([-way[1], way[0]])
-    side = np.array(shift) + (r + rod) * way + offset * np.array([-way[1], way[0]])
-    value = {
-        "planar": 1,
-        "name": "slider-crank",
-        "frame": "frame",
-        "links": {
-            "frame": {"points": {"O": list(shift), "T": through.tolist()}},
-            "OB": {"ends": ["O", "B"], "length": r},
-            "BA": {"ends": ["B", "A"], "length": rod},
-            "block": {"points": {"A": [0.0, 0.0]}},
-        },
-        "pairs": [
-            {"turning": "O", "links": ["frame", "OB"]},
-            {"turning": "B", "links": ["OB", "BA"]},
-            {"turning": "A", "links": ["BA", "block"]},
-            {"sliding": "stroke", "links": ["frame", "block"], "line": {"through": "T", "angle": turn}, "point": "A"},
-        ],
-        "inputs": [{"pair": "O", "position": angle + turn, "velocity": 2.0}],
-        "sketch": {"A": side.tolist()},
-    }
-    return files.from_dict(value)
+def placed_slider_crank(r, rod, offset, angle, turn=0.0, shift=(0.0, 0.0)):
+    """With a link for its block, turned and shifted as a whole."""
+    names = {"pins": "OBA", "names": ("frame", "OB", "BA"), "piston": "block"}
+    return planar.from_dict(slider_crank_document(r, rod, angle, offset, turn=turn, shift=shift, omega=2.0, **names))
 
 
 def test_in_a_slider_crank_the_crank_meets_the_square_to_the_stroke():
     r, rod, e, angle = 0.3, 1.1, 0.1, 0.8
-    result = centres(solve(slider_crank(r, rod, e, angle)))
-    x = r * cos(angle) + sqrt(rod * rod - (r * sin(angle) - e) ** 2)
+    result = centres(solve(placed_slider_crank(r, rod, e, angle)))
+    x = piston(angle, r, rod, e)[0]
     np.testing.assert_allclose(result["BA", "frame"].position, [x, x * sin(angle) / cos(angle)], rtol=1e-12)
     # I13 is where the rod's line meets the square to the stroke through O: v = w |OI|
     slope = (r * sin(angle) - e) / (r * cos(angle) - x)
@@ -485,7 +448,7 @@ def test_wheels_that_turn_alike_have_their_centre_at_infinity_along_the_arm():
 
 
 def test_the_coupler_of_a_parallelogram_has_its_centre_at_infinity_along_the_cranks():
-    result = centres(solve(four_bar(1.0, 3.0, 1.0, (3.0, 0.0), 0.9, {"C": [3.0 + cos(0.9), sin(0.9)]})))
+    result = centres(solve(pivoted_four_bar(1.0, 3.0, 1.0, (3.0, 0.0), 0.9, {"C": [3.0 + cos(0.9), sin(0.9)]})))
     for two, way in ((("BC", "AD"), [cos(0.9), sin(0.9), 0.0]), (("AB", "DC"), [1.0, 0.0, 0.0])):
         assert same(result[two].homogeneous, way, 1e-12)
         assert result[two].position is None
@@ -533,12 +496,12 @@ def test_turned_moved_or_scaled_mechanisms_have_their_centres_turned_moved_or_sc
     def place(x, y):
         return (motion @ [x, y, 1.0])[:2].tolist()
 
-    here = solve(four_bar(1.0, 3.0, 2.5, (3.2, 0.4), 1.1, {"C": [3.0, 2.5]}))
+    here = solve(pivoted_four_bar(1.0, 3.0, 2.5, (3.2, 0.4), 1.1, {"C": [3.0, 2.5]}))
     lengths = [factor * each for each in (1.0, 3.0, 2.5)]
-    there = four_bar(*lengths, place(3.2, 0.4), 1.1, {"C": place(3.0, 2.5)}, ground=(place(0.0, 0.0), None))
+    there = pivoted_four_bar(*lengths, place(3.2, 0.4), 1.1, {"C": place(3.0, 2.5)}, ground=place(0.0, 0.0))
     alike(centres(here), centres(solve(there)), lambda at: motion @ at, 1e-11)
-    here = solve(slider_crank(0.3, 1.1, 0.1, 0.8))
-    there = solve(slider_crank(0.3 * factor, 1.1 * factor, 0.1 * factor, 0.8, turn, shift))
+    here = solve(placed_slider_crank(0.3, 1.1, 0.1, 0.8))
+    there = solve(placed_slider_crank(0.3 * factor, 1.1 * factor, 0.1 * factor, 0.8, turn, shift))
     alike(centres(here), centres(there), lambda at: motion @ at, 1e-11)
 
 
@@ -568,8 +531,8 @@ def test_linkages_of_pins_turned_and_moved_have_their_centres_turned_and_moved(s
 def on_a_dead_point(velocity: float = 1.0) -> Mechanism:
     """A rocker that drives, in the position where coupler and other rocker are in line."""
     a, b, c, d = 2.0, 1.5, 1.0, 2.2
-    angle = acos((a * a + d * d - (b + c) ** 2) / (2 * a * d))
-    return four_bar(a, b, c, (d, 0.0), angle, {"C": [1.5, 0.7]}, velocity)
+    angle = float(between(a, d, b + c))
+    return pivoted_four_bar(a, b, c, (d, 0.0), angle, {"C": [1.5, 0.7]}, velocity)
 
 
 def test_on_a_dead_point_of_the_input_there_are_all_centres_though_no_velocities():
@@ -591,7 +554,7 @@ def test_on_a_dead_point_of_the_input_there_are_all_centres_though_no_velocities
 
 def test_a_dead_point_of_a_piston_that_drives_has_all_centres():
     r, rod = 0.3, 1.1
-    mechanism = slider_crank(r, rod, 0.0, 0.0)
+    mechanism = placed_slider_crank(r, rod, 0.0, 0.0)
     driven = replace(mechanism, inputs=(planar.Input("stroke", r + rod, 1.0),))
     result = centres(driven)
     lawful(result)
@@ -603,7 +566,7 @@ def test_a_dead_point_of_a_piston_that_drives_has_all_centres():
 
 @pytest.mark.parametrize("velocity", [0.0, 1.0])
 def test_at_a_change_point_what_is_not_determined_is_said_and_nothing_is_invented(velocity):
-    flat = four_bar(1.0, 2.0, 1.0, (2.0, 0.0), 0.0, {"B": [1.0, 0.0], "C": [3.0, 0.0]}, velocity)
+    flat = pivoted_four_bar(1.0, 2.0, 1.0, (2.0, 0.0), 0.0, {"B": [1.0, 0.0], "C": [3.0, 0.0]}, velocity)
     with pytest.raises(NoAnswer) as refused:
         solve(flat)
     assert refused.value.outcome is Outcome.CHANGE_POINT
@@ -624,7 +587,7 @@ def test_at_a_change_point_each_branch_has_its_own_centres():
     """w_3 = w_1 of the parallelogram; else w_3 = -(d + a) / (d - a) w_1 of the antiparallelogram, from the second order
     of the loop: (w_3 - w_1)(w_3 + w_1) a = d ((w_3 - w_1) a / d)^2."""
     a, d = 1.0, 2.0
-    flat = four_bar(a, d, a, (d, 0.0), 0.0, {"B": [a, 0.0], "C": [a + d, 0.0]})
+    flat = pivoted_four_bar(a, d, a, (d, 0.0), 0.0, {"B": [a, 0.0], "C": [a + d, 0.0]})
     result = centres(flat)
     straight, crossed = sorted(result.branches, key=lambda branch: -abs(branch["I13"][0]))
     for name in ("I13", "I24"):
@@ -639,13 +602,13 @@ def test_at_a_change_point_each_branch_has_its_own_centres():
     assert "on branch 2" in told
     # and it is what the position next to it has
     angle = 1e-4
-    near = solve(four_bar(a, d, a, (d, 0.0), angle, {"C": [a + d, a * ratio * angle], "B": [a, a * angle]}))
+    near = solve(pivoted_four_bar(a, d, a, (d, 0.0), angle, {"C": [a + d, a * ratio * angle], "B": [a, a * angle]}))
     assert same(centres(near)["AB", "DC"].homogeneous, crossed["I13"], 1e-3)
     assert found("four-bar").branches == ()
 
 
 def test_a_truss_has_its_pins_and_all_its_links_at_rest():
-    truss = four_bar(1.0, 2.0, 1.5, (2.0, 0.0), 1.0)
+    truss = pivoted_four_bar(1.0, 2.0, 1.5, (2.0, 0.0), 1.0)
     held = replace(truss, pairs=(*truss.pairs,), inputs=())
     value = files.to_dict(held)
     value["links"]["BC"]["points"] = {"E": [1.0, 0.5]}
@@ -745,7 +708,7 @@ def test_the_chapters_connecting_rod_turns_about_its_centre():
     """004, problem by the method of instantaneous centres: r 160 mm, l 500 mm, 4500 rpm, 40 deg."""
     result = found("004-EX-piston")
     r, rod, angle = 0.16, 0.5, 2 * pi / 9
-    x = r * cos(angle) + sqrt(rod * rod - (r * sin(angle)) ** 2)
+    x = piston(angle, r, rod)[0]
     corner = np.array([x, x * sin(angle) / cos(angle)])
     turning = result["AB", "frame"]
     np.testing.assert_allclose(turning.position, corner, rtol=1e-12)
@@ -762,7 +725,7 @@ def test_the_chapters_connecting_rod_turns_about_its_centre():
 
 
 def test_a_sliding_link_moves_by_its_centre_at_infinity():
-    mechanism = slider_crank(0.3, 1.1, 0.1, 0.8)
+    mechanism = placed_slider_crank(0.3, 1.1, 0.1, 0.8)
     (given_input,) = mechanism.inputs
     state = solve(mechanism)
     driven = replace(mechanism, inputs=(planar.Input("stroke", state.pair("stroke")["displacement"], -0.7),))
@@ -950,7 +913,7 @@ def test_the_command_answers_on_dead_points_and_change_points(tmp_path):
     ended = run(tmp_path, "centres", "dead.json")
     assert (ended.status, ended.err) == (0, "")
     assert "AB rests in this position" in ended.out
-    flat = four_bar(1.0, 2.0, 1.0, (2.0, 0.0), 0.0, {"B": [1.0, 0.0], "C": [3.0, 0.0]})
+    flat = pivoted_four_bar(1.0, 2.0, 1.0, (2.0, 0.0), 0.0, {"B": [1.0, 0.0], "C": [3.0, 0.0]})
     (tmp_path / "flat.json").write_text(planar.dumps(flat))
     ended = run(tmp_path, "centres", "flat.json")
     assert ended.status == 0

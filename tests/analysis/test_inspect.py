@@ -18,6 +18,8 @@ from planar.model.link_graph import link_numbers
 from planar.model.mechanism import pair_entries
 from planar.pages.data.page_data import page_data
 from planar.reports.tables.inspection import inspection_tables, link_orders_text
+from tests.builders import four_bar_document
+from tests.closed_forms import between
 from tests.command import ROOT, run, written
 from tests.known import MODELS, some_models
 
@@ -38,26 +40,12 @@ def found():
     return inspected
 
 
-def four_bar(**top):
-    links = {
-        "f": {"points": {"A": [0, 0], "D": [1, 0]}},
-        "a": {"ends": ["A", "B"], "length": 0.3},
-        "b": {"ends": ["B", "C"], "length": 0.9},
-        "c": {"ends": ["D", "C"], "length": 0.7},
-    }
-    value = {
-        "planar": 1,
-        "frame": "f",
-        "links": links,
-        "pairs": [{"turning": name} for name in "ABCD"],
-        "inputs": [{"pair": "A", "position": 0.8, "velocity": 1.0}],
-        "sketch": {"C": [0.9, 0.7]},
-    }
-    return copy.deepcopy(value | top)
+def lettered_four_bar(**top):
+    return four_bar_document(0.3, 0.9, 0.7, 1, 0.8, names=["f", *"abc"], sketch={"C": [0.9, 0.7]}) | top
 
 
 def inspected(**top):
-    return planar.inspect(files.from_dict(four_bar(**top)))
+    return planar.inspect(files.from_dict(copy.deepcopy(lettered_four_bar(**top))))
 
 
 # the textbook's own listing
@@ -163,7 +151,7 @@ def test_how_links_of_known_mechanisms_move(model, link, motion, found):
 
 
 def test_a_link_that_is_held_stands_still():
-    links = four_bar()["links"] | {
+    links = lettered_four_bar()["links"] | {
         "f": {"points": {"A": [0, 0], "D": [1, 0], "U": [0, -1], "V": [1, -1]}},
         "p": {"ends": ["U", "P"], "length": 0.8},
         "q": {"ends": ["V", "P"], "length": 0.9},
@@ -246,7 +234,7 @@ def test_a_structure_is_no_mechanism():
 
 
 def test_what_nothing_joins_to_the_frame_is_named():
-    each = inspected(links=four_bar()["links"] | {"x": {"points": {"P": [0, 0]}}})
+    each = inspected(links=lettered_four_bar()["links"] | {"x": {"points": {"P": [0, 0]}}})
     assert not each.is_mechanism
     assert "nothing joins 'x' to the frame" in each.mechanism_reason
     assert each.names == ()
@@ -254,7 +242,7 @@ def test_what_nothing_joins_to_the_frame_is_named():
 
 
 def test_what_cannot_be_assembled_is_still_counted_and_named():
-    value = four_bar()["links"]
+    value = lettered_four_bar()["links"]
     for name in "abc":
         value[name]["length"] = 0.1
     each = inspected(links=value)
@@ -268,10 +256,10 @@ def test_what_cannot_be_assembled_is_still_counted_and_named():
 
 
 def test_at_a_dead_point_it_is_a_mechanism_with_a_word_of_warning():
-    value = four_bar()["links"]
+    value = lettered_four_bar()["links"]
     for name, length in zip("abc", (0.5, 0.66, 0.56), strict=True):
         value[name]["length"] = length
-    limit = float(np.arccos((0.25 + 1 - 1.22**2) / (2 * 0.5)))
+    limit = float(between(0.5, 1, 1.22))
     each = inspected(links=value, inputs=[{"pair": "A", "position": limit, "velocity": 1.0}])
     assert each.is_mechanism
     assert "but here: at A" in each.mechanism_reason
@@ -279,7 +267,7 @@ def test_at_a_dead_point_it_is_a_mechanism_with_a_word_of_warning():
 
 
 def test_an_input_at_what_is_held_fast_drives_nothing():
-    links = four_bar()["links"] | {
+    links = lettered_four_bar()["links"] | {
         "f": {"points": {"A": [0, 0], "D": [1, 0], "U": [0, -1], "V": [1, -1]}},
         "p": {"ends": ["U", "P"], "length": 0.8},
         "q": {"ends": ["V", "P"], "length": 0.9},
@@ -293,7 +281,7 @@ def test_an_input_at_what_is_held_fast_drives_nothing():
 
 def test_two_inspections_from_other_names_and_orders_agree():
     """Numbers follow how links are joined to what drives, not how the file lists them."""
-    value = four_bar()
+    value = lettered_four_bar()
     turned = value | {
         "links": dict(reversed(value["links"].items())),
         "pairs": value["pairs"][::-1],
@@ -344,7 +332,7 @@ def test_links_that_are_numbers_keep_them_in_text_tables_drawings_and_pages(rena
 
 @pytest.mark.parametrize("name", ["01", "1a", "-1", "½", "２", "99999"])
 def test_only_a_plain_number_is_a_links_number(name):
-    value = json.loads(json.dumps(four_bar()).replace('"c"', json.dumps(name)))
+    value = json.loads(json.dumps(lettered_four_bar()).replace('"c"', json.dumps(name)))
     number = link_numbers(files.from_dict(value))
     assert sorted(number.values()) == ["1", "2", "3", "4"]
 
@@ -353,7 +341,7 @@ def test_only_a_plain_number_is_a_links_number(name):
 
 
 def test_inspect_ends_with_0_whatever_it_has_to_say(tmp_path):
-    value = four_bar(inputs=[])
+    value = lettered_four_bar(inputs=[])
     out = run(tmp_path, "inspect", written(tmp_path, value)).done()
     assert "no: it has 0 driving links, and it moves in 1 way" in out
     told = json.loads(run(tmp_path, "inspect", "m.json", "--json").done())

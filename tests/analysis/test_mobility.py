@@ -14,6 +14,7 @@ from planar.foundation.errors import NoAnswer, Outcome
 from planar.solving.checks.singular_values import rank
 from planar.solving.full_constraints import FullConstraints
 from planar.solving.position import PositionSolver
+from tests.builders import four_bar_document
 from tests.draws import part
 from tests.linkages import conditioning, determinate, random_linkage
 
@@ -30,14 +31,10 @@ def pins(names):
     return [{"turning": name} for name in names]
 
 
-def four_bar(a, b, c, d, theta, sketch):
-    links = {
-        "f": {"points": {"A": [0, 0], "D": [d, 0]}},
-        "AB": {"ends": ["A", "B"], "length": a},
-        "BC": {"ends": ["B", "C"], "length": b},
-        "DC": {"ends": ["D", "C"], "length": c},
-    }
-    return mechanism(links, pins("ABCD"), [{"pair": "A", "position": theta, "velocity": "3 rad/s"}], sketch)
+def four_bar_in_degrees(a, b, c, d, theta, sketch):
+    units, names = {"angle": "deg"}, ["f", "AB", "BC", "DC"]
+    value = four_bar_document(a, b, c, d, theta, names=names, units=units, omega="3 rad/s", sketch=sketch or {})
+    return files.from_dict(value)
 
 
 def three(found):
@@ -93,7 +90,7 @@ def test_a_differential_has_two_freedoms():
 
 @pytest.mark.parametrize(("theta", "sketch"), [(0, {"C": [3, 0]}), (180, {"C": [1, 0]})])
 def test_a_flat_parallelogram_may_go_on_in_two_ways_one_at_a_time(theta, sketch):
-    found = planar.mobility(four_bar(1, 2, 1, 2, theta, sketch))
+    found = planar.mobility(four_bar_in_degrees(1, 2, 1, 2, theta, sketch))
     assert three(found) == (1, 2, 1)
     (why,) = found.why
     assert "1 more way, but to first order only" in why
@@ -132,7 +129,7 @@ def test_a_crank_beside_bars_in_line_is_all_that_moves():
 def test_a_four_bar_that_just_reaches_cannot_move_at_all(lengths, theta, sketch):
     """The longest is the other three together. Three angles, and of two closures the one along the line vanishes to
     first order: 3 - 1 = 2 ways in this position; to second order the stretched bars only become too short."""
-    found = planar.mobility(four_bar(*lengths, theta, sketch))
+    found = planar.mobility(four_bar_in_degrees(*lengths, theta, sketch))
     assert three(found) == (1, 2, 0)
     assert found.surplus == 0
     first, second = found.why
@@ -169,7 +166,7 @@ def test_links_that_nothing_drives_are_counted_too():
 
 def test_what_cannot_be_assembled_has_no_mobility():
     with pytest.raises(NoAnswer) as refused:
-        planar.mobility(four_bar(1, 2, 1, 9, 60, {}))
+        planar.mobility(four_bar_in_degrees(1, 2, 1, 9, 60, {}))
     assert refused.value.outcome is Outcome.CANNOT_BE_ASSEMBLED
 
 
@@ -238,7 +235,7 @@ def test_of_parallel_guides_any_two_hold_the_same(count):
     assert last == pytest.approx({"displacement": 0.3, "velocity": 2.0, "acceleration": 0.0}, abs=1e-14)
 
 
-def scissor(extra, **points):
+def scissor_lift_with(extra, **points):
     value = json.loads((MODELS / "scissor-lift.json").read_text(encoding="utf-8"))
     value["pairs"].append(extra)
     for name, at in points.items():
@@ -263,7 +260,7 @@ MAST = {
 
 @pytest.mark.parametrize(
     ("value", "surplus"),
-    [(scissor(EDGE, W=[700, 0]), 1), (scissor(MAST), 2)],
+    [(scissor_lift_with(EDGE, W=[700, 0]), 1), (scissor_lift_with(MAST), 2)],
     ids=["a pin in a slot", "a sliding guide"],
 )
 def test_a_scissor_lift_whose_platform_is_guided_once_more(value, surplus):

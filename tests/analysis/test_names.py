@@ -14,6 +14,7 @@ import planar
 from planar.analysis.identity.mechanism_names import mechanism_names
 from planar.document.files import model_files
 from planar.model.link_graph import link_numbers, pair_labels_by_type
+from tests.builders import four_bar_document
 
 
 def made(frame, links, pairs, **more):
@@ -36,21 +37,17 @@ def slide(name, first, second, point, through=(0, 0), angle=0, turn=0):
     return {"sliding": name, "links": [first, second], "line": line, "point": point, "turn": turn}
 
 
-def four_bar(frame, crank, coupler, rocker, **more):
-    links = {
-        "OA": bar("O", "A", length=crank),
-        "AB": bar("A", "B", length=coupler),
-        "QB": bar("Q", "B", length=rocker),
-    }
-    return made({"O": [0, 0], "Q": [frame, 0]}, links, pins("O A B Q"), **more)
+def bars_of_four(frame, crank, coupler, rocker, **more):
+    names, units = ["frame", "OA", "AB", "QB"], {"length": "mm", "angle": "deg"}
+    return four_bar_document(crank, coupler, rocker, frame, pins="OABQ", names=names, name="M", units=units, **more)
 
 
 def folded(sketch, position=70, **inputs):
     given = {"inputs": [{"pair": "O", "position": position}]} if position is not None else {}
-    return four_bar(100, 60, 100, 60, sketch=sketch, **given)
+    return bars_of_four(100, 60, 100, 60, sketch=sketch, **given)
 
 
-def slider_crank(crank, rod, off=0.0, wrist=0.0, turn=0.0):
+def crank_and_piston(crank, rod, off=0.0, wrist=0.0, turn=0.0):
     """The line of slide `off` beside the shaft, the piston's pin `wrist` to the left of the piston's own line."""
     links = {"OA": bar("O", "A", length=crank), "AB": bar("A", "B", length=rod)}
     at = complex(0, wrist) * exp(1j * radians(turn)).conjugate()
@@ -108,7 +105,7 @@ def rapson(fixed):
     return made({}, links, pairs) | {"frame": fixed, "links": links}
 
 
-def wedge(angle=30):
+def wedge_and_follower(angle=30):
     links = {"wedge": {"points": {"W": [0, 0]}}, "follower": {"points": {"V": [0, 0]}}}
     pairs = [
         slide("S", "frame", "wedge", "W", "O"),
@@ -137,7 +134,7 @@ STEPHENSON = ("A: p l", "B: l q", "C: p m", "D: m q", "E: p n", "F: n o", "G: o 
 TOGGLE = ("O: g crank", "A: crank rod", "B: upper rod lower", "C: upper g", "D: lower slider")
 
 
-def five_bar(*more, slider=False):
+def five_bar_with(*more, slider=False):
     links = {"a": bar("O", "A", length=30), "b": bar("A", "B", length=60), "c": bar("C", "B", length=65)}
     last = [slide("S", "frame", "d", "C", (50, 0), 90)] if slider else [*pins("Q")]
     links["d"] = {"points": {"C": [0, 0]}} if slider else bar("Q", "C", length=30)
@@ -166,7 +163,7 @@ def rack():
 
 def sun_and_planet():
     """Watt's: a four-bar whose coupler carries the planet, the sun on the crank's shaft."""
-    value = four_bar(100, 30, 90, 60)
+    value = bars_of_four(100, 30, 90, 60)
     value["links"]["sun"] = {"points": {"O": [0, 0]}}
     value["pairs"].append({"gear": "G", "links": ["AB", "sun"], "carrier": "OA", "ratio": -1})
     return value
@@ -192,7 +189,7 @@ def pantograph(side=200):
     return made({"O": [0, 0]}, links, pins("O D A P C"))
 
 
-def cranks(last=60, rod=80, mirrored=1, scale=1):
+def three_cranks(last=60, rod=80, mirrored=1, scale=1):
     frame = {"O": [0, 0], "P": [100, 0], "Q": [50, 80]}
     links = {f"crank {x}": bar(x, x.lower(), length=last if x == "Q" else 60) for x in "OPQ"}
     spots = {"o": (0, 0), "p": (0, -100 * mirrored), "q": (rod, -50 * mirrored)}
@@ -209,7 +206,7 @@ def star(fixed, cylinders):
     return made({}, links, pairs) | {"frame": fixed, "links": links}
 
 
-def scissor(stages, middle=0.5):
+def scissor_of_stages(stages, middle=0.5):
     links, base = {}, "O"
     for k in range(stages):
         a, b = (
@@ -249,36 +246,42 @@ TWO_WAYS = tuple(f"degenerate {name} with a slider" for name in ("Watt II six-ba
 RAM = ("Watt II six-bar with 2 sliders",)
 
 CASES = {
-    "crank-rocker": (four_bar(200, 50, 180, 120), (*FOUR, "crank-rocker")),
-    "crank-rocker from its rocker": (four_bar(200, 120, 180, 50), (*FOUR, "crank-rocker")),
-    "drag link": (four_bar(40, 100, 90, 110), (*FOUR, "double-crank", "drag link")),
-    "double-rocker": (four_bar(120, 100, 40, 90), (*FOUR, "Grashof double-rocker")),
-    "triple-rocker": (four_bar(150, 90, 70, 85), (*FOUR, "triple-rocker")),
-    "change-point crank-rocker": (four_bar(100, 40, 90, 50), (*CHANGE, "change-point crank-rocker")),
-    "change-point double-crank": (four_bar(40, 100, 90, 50), (*CHANGE, "change-point double-crank")),
-    "change-point double-rocker": (four_bar(90, 50, 40, 100), (*CHANGE, "change-point double-rocker")),
-    "hardly Grashof": (four_bar(100, 40, 90, 50.01), (*FOUR, "crank-rocker")),
-    "hardly not Grashof": (four_bar(100, 40, 90, 49.99), (*FOUR, "triple-rocker")),
-    "rhombus": (four_bar(80, 80, 80, 80), (*CHANGE, "rhombus")),
-    "kite": (four_bar(100, 100, 60, 60), (*CHANGE, "kite (deltoid)")),
-    "kite with a short frame": (four_bar(60, 100, 100, 60), (*CHANGE, "kite (deltoid)")),
+    "crank-rocker": (bars_of_four(200, 50, 180, 120), (*FOUR, "crank-rocker")),
+    "crank-rocker from its rocker": (bars_of_four(200, 120, 180, 50), (*FOUR, "crank-rocker")),
+    "drag link": (bars_of_four(40, 100, 90, 110), (*FOUR, "double-crank", "drag link")),
+    "double-rocker": (bars_of_four(120, 100, 40, 90), (*FOUR, "Grashof double-rocker")),
+    "triple-rocker": (bars_of_four(150, 90, 70, 85), (*FOUR, "triple-rocker")),
+    "change-point crank-rocker": (bars_of_four(100, 40, 90, 50), (*CHANGE, "change-point crank-rocker")),
+    "change-point double-crank": (bars_of_four(40, 100, 90, 50), (*CHANGE, "change-point double-crank")),
+    "change-point double-rocker": (bars_of_four(90, 50, 40, 100), (*CHANGE, "change-point double-rocker")),
+    "hardly Grashof": (bars_of_four(100, 40, 90, 50.01), (*FOUR, "crank-rocker")),
+    "hardly not Grashof": (bars_of_four(100, 40, 90, 49.99), (*FOUR, "triple-rocker")),
+    "rhombus": (bars_of_four(80, 80, 80, 80), (*CHANGE, "rhombus")),
+    "kite": (bars_of_four(100, 100, 60, 60), (*CHANGE, "kite (deltoid)")),
+    "kite with a short frame": (bars_of_four(60, 100, 100, 60), (*CHANGE, "kite (deltoid)")),
     "parallelogram": (folded({"A": [20, 56], "B": [120, 56]}), (*CHANGE, "parallelogram")),
     "antiparallelogram": (folded({"A": [20, 56], "B": [70, -50]}), (*CHANGE, "antiparallelogram")),
     "either": (folded({}, position=None), (*CHANGE, "parallelogram or antiparallelogram")),
-    "too long to close": (four_bar(500, 40, 90, 50), FOUR),
-    "in-line slider-crank": (slider_crank(60, 200), (*SLIDER, "slider-crank", "in-line slider-crank")),
-    "offset slider-crank": (slider_crank(60, 200, 40), (*SLIDER, "slider-crank", "offset slider-crank")),
-    "offset of the wrist pin": (slider_crank(60, 200, 0, 7, 30), (*SLIDER, "slider-crank", "offset slider-crank")),
-    "offsets that cancel": (slider_crank(60, 200, 7, -7, 30), (*SLIDER, "slider-crank", "in-line slider-crank")),
+    "too long to close": (bars_of_four(500, 40, 90, 50), FOUR),
+    "in-line slider-crank": (crank_and_piston(60, 200), (*SLIDER, "slider-crank", "in-line slider-crank")),
+    "offset slider-crank": (crank_and_piston(60, 200, 40), (*SLIDER, "slider-crank", "offset slider-crank")),
+    "offset of the wrist pin": (
+        crank_and_piston(60, 200, 0, 7, 30),
+        (*SLIDER, "slider-crank", "offset slider-crank"),
+    ),
+    "offsets that cancel": (
+        crank_and_piston(60, 200, 7, -7, 30),
+        (*SLIDER, "slider-crank", "in-line slider-crank"),
+    ),
     "line on the piston": (slider_crank_line_on_piston(60, 200, 0), (*SLIDER, "slider-crank", "in-line slider-crank")),
     "line on the piston, offset": (
         slider_crank_line_on_piston(60, 200, 9),
         (*SLIDER, "slider-crank", "offset slider-crank"),
     ),
-    "isosceles slider-crank": (slider_crank(90, 90), (*SLIDER, "slider-crank", "isosceles slider-crank")),
-    "rocker-slider": (slider_crank(60, 90, 40), (*SLIDER, "rocker-slider")),
-    "rocker-slider with a long rocker": (slider_crank(90, 60, 40), (*SLIDER, "rocker-slider")),
-    "pendulum pump": (slider_crank(200, 60), PENDULUM),
+    "isosceles slider-crank": (crank_and_piston(90, 90), (*SLIDER, "slider-crank", "isosceles slider-crank")),
+    "rocker-slider": (crank_and_piston(60, 90, 40), (*SLIDER, "rocker-slider")),
+    "rocker-slider with a long rocker": (crank_and_piston(90, 60, 40), (*SLIDER, "rocker-slider")),
+    "pendulum pump": (crank_and_piston(200, 60), PENDULUM),
     "pendulum pump, line on the plunger": (slider_crank_line_on_piston(200, 60, 9), PENDULUM),
     "Whitworth": (turning_block(40, 100), WHITWORTH),
     "Whitworth, offset": (turning_block(40, 100, 50), WHITWORTH),
@@ -299,26 +302,27 @@ CASES = {
     "parallel slides": (double_slider("yoke", 0), DOUBLE),
     "Rapson": (rapson("hull"), RAPSON),
     "Rapson on its tiller": (rapson("tiller"), RAPSON),
-    "wedge": (wedge(), ("wedge mechanism",)),
-    "no wedge": (wedge(0), ()),
-    "five-bar": (five_bar(), ("five-bar chain",)),
-    "five-bar with a slider": (five_bar(slider=True), ("five-bar chain with a slider",)),
-    "geared five-bar": (five_bar({"gear": "G", "links": ["a", "d"], "ratio": -1}), ("geared five-bar",)),
+    "wedge": (wedge_and_follower(), ("wedge mechanism",)),
+    "no wedge": (wedge_and_follower(0), ()),
+    "five-bar": (five_bar_with(), ("five-bar chain",)),
+    "five-bar with a slider": (five_bar_with(slider=True), ("five-bar chain with a slider",)),
+    "geared five-bar": (five_bar_with({"gear": "G", "links": ["a", "d"], "ratio": -1}), ("geared five-bar",)),
     "geared five-bar with a slider": (
-        five_bar({"gear": "G", "links": ["frame", "b"], "carrier": "a", "ratio": -1}, slider=True),
+        five_bar_with({"gear": "G", "links": ["frame", "b"], "carrier": "a", "ratio": -1}, slider=True),
         ("geared five-bar with a slider",),
     ),
     "geared otherwise": (
-        five_bar({"gear": "G", "links": ["frame", "c"], "carrier": "d", "ratio": -1}) | {"frame": "a"},
+        five_bar_with({"gear": "G", "links": ["frame", "c"], "carrier": "d", "ratio": -1}) | {"frame": "a"},
         ("geared five-bar",),
     ),
-    "geared across": (five_bar({"gear": "G", "links": ["a", "c"], "ratio": -1}), ("geared linkage",)),
+    "geared across": (five_bar_with({"gear": "G", "links": ["a", "c"], "ratio": -1}), ("geared linkage",)),
     "train": (wheels(), ("train of wheels",)),
     "epicyclic": (wheels("arm"), ("epicyclic train",)),
     "epicyclic on a fixed sun": (wheels("arm", "frame"), ("epicyclic train",)),
     "sun and planet": (sun_and_planet(), ("geared linkage", "epicyclic train")),
     "geared four-bar": (
-        four_bar(200, 50, 180, 120) | {"pairs": [*pins("O A B Q"), {"gear": "G", "links": ["OA", "QB"], "ratio": -1}]},
+        bars_of_four(200, 50, 180, 120)
+        | {"pairs": [*pins("O A B Q"), {"gear": "G", "links": ["OA", "QB"], "ratio": -1}]},
         ("geared linkage",),
     ),
     "rack and pinion": (rack(), ("rack and pinion",)),
@@ -366,16 +370,16 @@ CASES = {
     "no Peaucellier": (cell(other=110), ()),
     "pantograph": (pantograph(), ("pantograph",)),
     "no pantograph": (pantograph(210), ()),
-    "parallel cranks": (cranks(), ("parallel cranks with a coupling rod",)),
-    "cranks of two lengths": (cranks(last=70), ()),
-    "cranks on another rod": (cranks(rod=90), ()),
-    "cranks on the rod's back": (cranks(mirrored=-1), ()),
-    "cranks on a larger rod": (cranks(scale=1.5), ()),
+    "parallel cranks": (three_cranks(), ("parallel cranks with a coupling rod",)),
+    "cranks of two lengths": (three_cranks(last=70), ()),
+    "cranks on another rod": (three_cranks(rod=90), ()),
+    "cranks on the rod's back": (three_cranks(mirrored=-1), ()),
+    "cranks on a larger rod": (three_cranks(scale=1.5), ()),
     "rotary engine": (star("crank", 5), ("rotary engine",)),
     "radial engine": (star("block", 3), ("radial engine",)),
-    "scissor lift": (scissor(3), ("scissor lift",)),
-    "scissor lift of one stage": (scissor(1), ("Watt I six-bar with 2 sliders", "scissor lift")),
-    "no scissor lift": (scissor(2, 0.4), ()),
+    "scissor lift": (scissor_of_stages(3), ("scissor lift",)),
+    "scissor lift of one stage": (scissor_of_stages(1), ("Watt I six-bar with 2 sliders", "scissor lift")),
+    "no scissor lift": (scissor_of_stages(2, 0.4), ()),
     "serial arm": (arm(3), ("open chain of 3 moving links", "serial arm")),
     "pendulum": (arm(1), ("open chain of 1 moving link",)),
     "branched arm": (arm(3, branch=True), ("open chain of 4 moving links",)),
@@ -613,7 +617,7 @@ def test_numbers_begin_at_what_drives():
         "swinging link": "3",
         "barrel": "4",
     }
-    value = four_bar(200, 50, 180, 120)
+    value = bars_of_four(200, 50, 180, 120)
     assert link_numbers(planar.from_dict(value)) == {"OA": "1", "AB": "2", "QB": "3", "frame": "4"}
     value["inputs"] = [{"pair": "Q", "position": 90}]
     assert link_numbers(planar.from_dict(value)) == {"QB": "1", "AB": "2", "OA": "3", "frame": "4"}

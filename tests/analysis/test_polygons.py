@@ -27,6 +27,8 @@ from planar.foundation.geometry import direction
 from planar.model.wording import direction_sense
 from planar.solving.position import solve
 from tests.builders import four_bar as bars
+from tests.builders import four_bar_document
+from tests.closed_forms import between
 from tests.draws import draws
 from tests.known import some_models
 from tests.known import state_of as solved
@@ -599,7 +601,7 @@ def test_block_on_a_coupler_has_the_coriolis_part_of_its_loops():
     q, p = 1.9 + 0j, 0.1 - 0.6j
     a = crank * np.exp(1j * np.radians(115.0))
     apart = abs(q - a)
-    angle = np.arccos((coupler**2 + apart**2 - rocker**2) / (2 * coupler * apart))
+    angle = between(coupler, apart, rocker)
     b = a + coupler * (q - a) / apart * np.exp(1j * angle)
     way = (b - a) / coupler
 
@@ -653,28 +655,15 @@ def test_what_turns_about_a_fixed_pin_is_drawn_from_the_pole():
     assert "c0" in drawn("coupled-wheels", "velocity").pole
 
 
-def four_bar(names: str) -> dict:
-    """A four-bar whose pins have other names."""
+def four_bar_with_pins(names: str) -> dict:
     a, b, c, d = names.split()
-    return {
-        "planar": 1,
-        "name": "named",
-        "frame": "frame",
-        "links": {
-            "frame": {"points": {a: [0, 0], d: [4, 0]}},
-            "crank": {"ends": [a, b], "length": 1},
-            "coupler": {"ends": [b, c], "length": 3.5},
-            "rocker": {"ends": [d, c], "length": 2.5},
-        },
-        "pairs": [{"turning": name} for name in (a, b, c, d)],
-        "inputs": [{"pair": a, "position": 1.0, "velocity": 2.0, "acceleration": 1.0}],
-        "sketch": {c: [3, 2.5]},
-    }
+    links, rates = ["frame", "crank", "coupler", "rocker"], {"omega": 2.0, "alpha": 1.0}
+    return four_bar_document(1, 3.5, 2.5, 4, 1.0, pins=[a, b, c, d], names=links, sketch={c: [3, 2.5]}, **rates)
 
 
 @pytest.mark.parametrize("names", ["2 1 3 4", "b B a A", "a_1 a 1 a_a", "A′ A B G", "G H K S", "b_1 b b_b b_1_1"])
 def test_odd_names_of_points_get_letters_of_their_own(names):
-    state = solve(files.from_dict(four_bar(names)))
+    state = solve(files.from_dict(four_bar_with_pins(names)))
     for kind, draw in KINDS.items():
         polygon = draw(state)
         moving = {names.split()[1], names.split()[2]}

@@ -4,14 +4,15 @@ from collections import Counter
 from itertools import product
 from math import acos, pi, sin, sqrt
 
-import networkx as nx
 import numpy as np
 import pytest
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 import planar
 from planar.assemblies.circuits.chebyshev_zeros import SignedLog, find_zeros
 from planar.assemblies.polynomial.completeness import Completeness
-from tests.builders import bare_four_bar
+from tests.builders import bare_four_bar, slider_crank_document
 from tests.draws import draws, part
 from tests.linkages import random_linkage
 
@@ -19,26 +20,9 @@ CLAIMED = Completeness.NUMERICALLY
 TURN = 2.0 * pi
 
 
-def slider(crank: float, rod: float, off: float, at: float) -> planar.Mechanism:
+def driven_slide(crank: float, rod: float, off: float, at: float) -> planar.Mechanism:
     """A slider-crank driven by its slide."""
-    value = {
-        "planar": 1,
-        "name": "slider-crank",
-        "units": {"length": "m", "angle": "rad"},
-        "frame": "frame",
-        "links": {
-            "frame": {"points": {"O": [0.0, 0.0], "G": [0.0, off]}},
-            "crank": {"ends": ["O", "A"], "length": crank},
-            "rod": {"ends": ["A", "B"], "length": rod},
-        },
-        "pairs": [
-            {"turning": "O"},
-            {"turning": "A"},
-            {"sliding": "slide", "on": "frame", "block": "B", "line": {"through": "G"}},
-        ],
-        "inputs": [{"pair": "slide", "position": at, "velocity": 1.0}],
-    }
-    return planar.from_dict(value)
+    return planar.from_dict(slider_crank_document(crank, rod, at, off, 0, slide="slide", driven="slide"))
 
 
 class Chain:
@@ -79,44 +63,41 @@ class Chain:
         }
         return planar.from_dict(value)
 
-    def reached(self, angle: float, signs: tuple[int, ...]) -> int:
-        """How many dyads go together one after the other, with these sides."""
-        frames = {"frame": (0.0j, 1.0 + 0.0j), "crank": (0.0j, np.exp(1j * angle))}
+    def reached(self, angles: np.ndarray, signs: tuple[int, ...]) -> np.ndarray:
+        """How many dyads go together one after the other, with these sides, at each angle."""
+        frames = {"frame": (0.0j, 1.0 + 0.0j), "crank": (0.0j, np.exp(1j * angles))}
+        count, whole = np.zeros(len(angles), dtype=int), np.ones(len(angles), dtype=bool)
         for k, ((one, at), (other, there), r, s) in enumerate(self.dyads):
             p, q = frames[one][0] + frames[one][1] * at, frames[other][0] + frames[other][1] * there
-            far = abs(q - p)
-            if not abs(r - s) < far < r + s:
-                return k
+            far = np.abs(q - p)
+            whole = whole & (abs(r - s) < far) & (far < r + s)
+            count += whole
             along = (r * r - s * s + far * far) / (2.0 * far)
-            joint = p + (q - p) / far * complex(along, signs[k] * np.sqrt(r * r - along * along))
+            across = signs[k] * np.sqrt(np.maximum(r * r - along * along, 0.0))
+            joint = p + (q - p) / far * (along + 1j * across)
             frames[f"one {k}"], frames[f"other {k}"] = (p, (joint - p) / r), (q, (joint - q) / s)
-        return len(self.dyads)
+        return count
 
     def sampled(self, samples: int = 4000) -> list[int]:
         """The number of branches of every circuit, as samples of the crank's turn join into components."""
         many = len(self.dyads)
-        every = list(product((1, -1), repeat=many))
         angles = 0.123 + TURN / samples * np.arange(samples)
-        reached = [{signs: self.reached(angle, signs) for signs in every} for angle in angles]
-        graph, dead = nx.Graph(), []
-        for i, here in enumerate(reached):
-            following = reached[(i + 1) % samples]
-            for signs in every:
-                own = (i, signs)
-                if here[signs] == many:
-                    graph.add_node(own)
-                for at, one, other in ((i, here, following), ((i + 1) % samples, following, here)):
-                    if one[signs] < many or other[signs] == many:
-                        continue
-                    # the dyad that comes apart on the way does so where its two sides meet
-                    apart = other[signs]
-                    across = tuple(-side if k == apart else side for k, side in enumerate(signs))
-                    graph.add_edge((at, signs), (at, across))
-                    if signs[apart] == 1:
-                        dead.append((at, signs))
-                if here[signs] == following[signs] == many:
-                    graph.add_edge(own, ((i + 1) % samples, signs))
-        return sorted(max(1, sum(each in part for each in dead)) for part in nx.connected_components(graph))
+        reached = np.array([self.reached(angles, signs) for signs in product((1, -1), repeat=many)])
+        closed, nodes = reached == many, np.arange(reached.size).reshape(reached.shape)
+        on = closed & np.roll(closed, -1, axis=1)
+        joined, dead = [np.array([nodes[on], np.roll(nodes, -1, axis=1)[on]])], []
+        for way in (-1, 1):
+            beside = np.roll(reached, way, axis=1)
+            row, at = np.nonzero(closed & (beside < many))
+            # the dyad that comes apart on the way does so where its two sides meet; rows have a bit for each side
+            side = 1 << (many - 1 - beside[row, at])
+            joined.append(np.array([nodes[row, at], nodes[row ^ side, at]]))
+            dead.append(nodes[row, at][row & side == 0])
+        edges = np.hstack(joined)
+        graph = coo_array((np.ones(edges.shape[1]), edges), (nodes.size, nodes.size))
+        _, parts = connected_components(graph, directed=False)
+        ends = np.bincount(parts[np.concatenate(dead)], minlength=nodes.size)
+        return sorted(max(1, int(ends[part])) for part in np.unique(parts[closed.ravel()]))
 
 
 @pytest.mark.parametrize("seed", part(range(24), 3))
@@ -211,14 +192,14 @@ def test_an_assembly_lies_on_the_branch_of_its_side():
 @pytest.mark.parametrize("off", [0.0, 0.4])
 def test_a_driven_slide_has_its_limits_where_crank_and_rod_are_in_line(off):
     crank, rod = 1.0, 2.5
-    found = planar.circuits(slider(crank, rod, off, 9.0))
+    found = planar.circuits(driven_slide(crank, rod, off, 9.0))
     assert found.complete is CLAIMED
     assert [len(each.branches) for each in found] == [2, 2]
     limits = sorted(side * sqrt((rod + sign * crank) ** 2 - off**2) for side in (1.0, -1.0) for sign in (1.0, -1.0))
     assert found.critical == pytest.approx(limits, abs=1e-9)
     assert [span for each in found.assembles for span in each] == pytest.approx(limits, abs=1e-9)
     assert [each.assemblies for each in found.intervals] == [0, 2, 0, 2, 0]
-    assert len(planar.modes(slider(crank, rod, off, 9.0))) == 0  # the file's own input is no position of it
+    assert len(planar.modes(driven_slide(crank, rod, off, 9.0))) == 0  # the file's own input is no position of it
 
 
 def test_a_linkage_that_never_goes_together_has_no_circuit():

@@ -13,22 +13,9 @@ from planar.assemblies.polynomial.completeness import Completeness
 from planar.document.dimensions import change_dimension, link_lengths
 from planar.foundation.errors import NoAnswer, Outcome
 from tests import command
-from tests.builders import bar_linkage, bare_four_bar
+from tests.builders import bar_linkage, bare_four_bar, six_bar
+from tests.closed_forms import between
 from tests.draws import part
-
-TWO_LOOPS = {"A": [0.0, 0.0], "D": [100.0, 0.0], "G": [200.0, 0.0]}
-
-
-def six_bar(coupler: float, rocker: float, at: float = pi / 3.0) -> planar.Mechanism:
-    """A four-bar ABCD with a dyad CFG on the pin of its rocker."""
-    links = {
-        "AB": ("A", "B", 50.0),
-        "BC": ("B", "C", 66.0),
-        "DC": ("D", "C", 56.0),
-        "CF": ("C", "F", coupler),
-        "GF": ("G", "F", rocker),
-    }
-    return bar_linkage(TWO_LOOPS, links, ("A", at))
 
 
 def nearest(mechanism: planar.Mechanism, pairs: set[str], inputs: set[str], tries: int) -> float:
@@ -36,22 +23,24 @@ def nearest(mechanism: planar.Mechanism, pairs: set[str], inputs: set[str], trie
 
     Of a bar three unknowns: one end, and its direction.
     """
-    frame = {point.name: np.array(point.place) for link in mechanism.links if not link.length for point in link.points}
+    frame = {point.name: complex(*point.place) for link in mechanism.links if not link.length for point in link.points}
     driven = [given for given in mechanism.inputs if given.pair in inputs]
     moving = [link for link in mechanism.links if link.length and not {*pairs, *inputs}.isdisjoint(link.names)]
+    # all points: those of the frame, first ends, second ends; and which of them are to be one
+    named = [*frame, *(link.names[0] for link in moving), *(link.names[1] for link in moving)]
+    meeting = [[k for k, own in enumerate(named) if own == name] for name in pairs]
+    joined = np.array([(own[0], other) for own in meeting for other in own[1:]], dtype=int).reshape(-1, 2)
+    turned = [(k, given.position) for k, link in enumerate(moving) for given in driven if given.pair == link.names[0]]
+    which, position = np.array(turned).reshape(-1, 2).T
+    fixed, far = np.array(list(frame.values())), np.array([link.length for link in moving])
 
     def left(w: np.ndarray) -> np.ndarray:
-        places: dict[str, list[np.ndarray]] = {name: [at] for name, at in frame.items()}
-        open_ = []
-        for link, (x, y, angle) in zip(moving, w.reshape(-1, 3), strict=True):
-            ends = np.array([x, y]), np.array([x + link.length * cos(angle), y + link.length * sin(angle)])
-            for name, at in zip(link.names, ends, strict=True):
-                places.setdefault(name, []).append(at)
-            open_ += [[sin((angle - given.position) / 2.0)] for given in driven if given.pair == link.names[0]]
-        for name in pairs:
-            first, *others = places[name]
-            open_ += [at - first for at in others]
-        return np.concatenate(open_) if open_ else np.zeros(1)
+        x, y, angle = w.reshape(-1, 3).T
+        first = x + 1j * y
+        points = np.concatenate([fixed, first, first + far * np.exp(1j * angle)])
+        gaps = points[joined[:, 0]] - points[joined[:, 1]]
+        open_ = np.concatenate([np.sin((angle[which.astype(int)] - position) / 2.0), gaps.real, gaps.imag])
+        return open_ if open_.size else np.zeros(1)
 
     size, rng = max(link.length for link in moving), np.random.default_rng(1)
     scale, found = np.tile([size, size, 1.0], (len(moving), 1)), np.inf
@@ -134,7 +123,7 @@ def test_a_four_bar_is_mended_by_the_law_of_cosines(crank, coupler, rocker, grou
 def test_of_a_four_bar_the_nearest_position_of_the_crank_is_told(at):
     mechanism = bare_four_bar(1.0, 1.2, 1.3, 3.0, radians(at))
     (change,) = planar.conflict(mechanism).positions
-    limit = np.arccos((1.0 + 9.0 - 2.5**2) / 6.0)
+    limit = between(1.0, 3.0, 2.5)
     assert change.name == "A"
     off = pi - abs(change.value - pi)
     assert off == pytest.approx(limit, abs=1e-4)
@@ -280,7 +269,7 @@ def test_the_command_says_why_before_it_refuses(tmp_path):
     (tmp_path / "far.json").write_text(planar.dumps(mechanism), encoding="utf-8")
     ended = command.run(tmp_path, "modes", "far.json")
     told = ended.refused(1)
-    limit = float(np.arccos((1.0 + 9.0 - 2.5**2) / 6.0))
+    limit = float(between(1.0, 3.0, 2.5))
     assert f"or at A = {limit:.4f}"[:-1] in told
     assert "in conflict: pairs 'A', 'B', 'C' and 'D' and the input at 'A'" in ended.out
     assert "coupler.length" in ended.out

@@ -22,7 +22,7 @@ GROUND, FIRST, SECOND, RODS = 150.0, 40.0, 30.0, (130.0, 110.0)
 MESH = np.radians([60.0, 100.0])
 
 
-def five_bar(wheels: dict, at: float) -> planar.Mechanism:
+def geared_five_bar(wheels: dict, at: float) -> planar.Mechanism:
     """The geared five-bar, driven where its rods meet: the angle between them is given, so the way from A to B."""
     value = json.loads(planar.dumps(planar.load("geared-five-bar")))
     own = next(k for k, pair in enumerate(value["pairs"]) if "gear" in pair)
@@ -53,7 +53,7 @@ def test_a_geared_five_bar_has_as_many_as_the_degree_of_its_closing_says(wheels,
     """With angles q phi and p phi the square of the way from A to B is of degree max(|p|, q, |p - q|) in exp(i phi)."""
     assert gcd(p, q) == 1
     for at in (80.0, 100.0):
-        setup = PreparedMechanism(five_bar(wheels, at))
+        setup = PreparedMechanism(geared_five_bar(wheels, at))
         (stage,) = setup.equations.blocks
         found = block_roots(setup, stage, np.zeros(2))
         assert found.expected == found.found == 2 * max(abs(p), q, abs(p - q))
@@ -64,24 +64,24 @@ def test_a_geared_five_bar_has_as_many_as_the_degree_of_its_closing_says(wheels,
 
 
 def test_a_geared_five_bar_of_equal_wheels_is_complete():
-    assert planar.modes(five_bar({"gear": "w", "teeth": [20, 20]}, 100.0)).complete is Completeness.PROVED
+    assert planar.modes(geared_five_bar({"gear": "w", "teeth": [20, 20]}, 100.0)).complete is Completeness.PROVED
 
 
 def test_a_ratio_that_is_no_float_is_counted_and_not_certified():
-    modes = planar.modes(five_bar({"chain": "w", "teeth": [40, 30]}, 100.0))
+    modes = planar.modes(geared_five_bar({"chain": "w", "teeth": [40, 30]}, 100.0))
     assert [(group.expected, group.complete) for group in modes.groups] == [(8, Completeness.NUMERICALLY)]
     assert not any(mode.certified for mode in modes)
     assert any("no float" in sentence for sentence in modes.said)
 
 
 def test_where_gears_make_the_count_huge_the_bound_is_said():
-    (group,) = planar.modes(five_bar({"gear": "w", "teeth": [31, 20]}, 100.0)).groups
+    (group,) = planar.modes(geared_five_bar({"gear": "w", "teeth": [31, 20]}, 100.0)).groups
     assert group.complete is Completeness.NOT
     assert "up to 48620 complex ones" in group.said
 
 
 def test_ratios_that_are_not_rational_are_searched_by_starts():
-    (group,) = planar.modes(five_bar({"gear": "w", "ratio": -np.sqrt(2.0)}, 100.0)).groups
+    (group,) = planar.modes(geared_five_bar({"gear": "w", "ratio": -np.sqrt(2.0)}, 100.0)).groups
     assert (group.complete, group.expected) == (Completeness.NOT, None)
 
 

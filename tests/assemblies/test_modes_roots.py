@@ -17,6 +17,7 @@ from planar.assemblies.polynomial.path_tracker import solve_generic_instance
 from planar.document import files
 from planar.equations.constraint_equations import slice_length
 from planar.solving.prepared_mechanism import PreparedMechanism
+from tests.builders import four_bar_document
 from tests.draws import draws, part
 from tests.inversions import group, listed, missed, one_group, structures, unknowns_of
 from tests.linkages import random_linkage
@@ -231,21 +232,7 @@ def test_the_assembly_that_built_a_random_linkage_is_listed(seed):
 
 
 def test_a_kite_folded_on_itself_is_a_curve_of_assemblies():
-    links = {
-        "frame": {"points": {"O": [0, 0], "Q": [1, 0]}},
-        "OA": {"ends": ["O", "A"], "length": 1},
-        "AB": {"ends": ["A", "B"], "length": 0.6},
-        "QB": {"ends": ["Q", "B"], "length": 0.6},
-    }
-    value = {
-        "planar": 1,
-        "name": "kite",
-        "frame": "frame",
-        "links": links,
-        "pairs": [{"turning": name} for name in "OABQ"],
-        "inputs": [{"pair": "O", "position": 0.0}],
-        "sketch": {"B": [0.7, 0.4]},
-    }
+    value = four_bar_document(1, 0.6, 0.6, 1, 0.0, pins="OABQ", omega=None, sketch={"B": [0.7, 0.4]})
     _, found = first(value)
     assert found.has_curve
     assert found.complete is not PROVED
@@ -270,20 +257,8 @@ def test_of_two_curves_of_assemblies_one_place_each_is_listed():
 
 
 def test_at_a_dead_point_two_assemblies_are_one_that_counts_double():
-    value = {
-        "planar": 1,
-        "name": "stretched",
-        "frame": "frame",
-        "links": {
-            "frame": {"points": {"O": [0, 0], "Q": [2.5, 0]}},
-            "OA": {"ends": ["O", "A"], "length": 0.5},
-            "AB": {"ends": ["A", "B"], "length": 1.25},
-            "QB": {"ends": ["Q", "B"], "length": 1.75},
-        },
-        "pairs": [{"turning": name} for name in "OABQ"],
-        "inputs": [{"pair": "O", "position": "180 deg"}],
-        "sketch": {"B": [0.75, 0]},
-    }
+    sketch = {"B": [0.75, 0]}
+    value = four_bar_document(0.5, 1.25, 1.75, 2.5, np.pi, pins="OABQ", omega=None, sketch=sketch)
     _, found = first(value)
     assert len(found.real) == 1
     assert found.double.all()

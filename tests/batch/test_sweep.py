@@ -19,7 +19,7 @@ from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.solving.position import PositionSolver
 from tests.builders import block_slider_crank, designs_around, four_bar
 from tests.checks import ORDERS
-from tests.closed_forms import PARALLELOGRAM, ROCKER, TRIPLE, TURN, rates, rocker
+from tests.closed_forms import PARALLELOGRAM, ROCKER, TRIPLE, TURN, coupler, rates, rocker
 from tests.draws import draws, part
 from tests.known import MODELS
 from tests.linkages import random_linkage
@@ -135,10 +135,8 @@ def test_four_bars_at_every_position_against_the_closed_form():
     designs = {"AB.length": a, "BC.length": b, "DC.length": c, "AD.D.x": d, "A.velocity": omega}
     result = planar.sweep(four_bar(*ROCKER, 0.8), designs | {"A.acceleration": alpha}, 60, ["C", "AB.B", "D"])
     a, b, c, d, omega, alpha = (each[:, None] for each in (a, b, c, d, omega, alpha))
-    r = np.hypot(d - a * np.cos(theta), a * np.sin(theta))
-    back = np.arctan2(a * np.sin(theta), a * np.cos(theta) - d)
-    phi = back - np.arccos((c * c + r * r - b * b) / (2 * c * r))
-    beta = np.angle(d + c * np.exp(1j * phi) - a * np.exp(1j * theta))
+    phi = rocker(a, b, c, d, theta)
+    beta = coupler(a, b, c, d, theta, phi)
     _, phi1, _, phi2 = rates(a, b, c, theta, beta, phi, omega, alpha)
     arm = c * np.exp(1j * phi)
     wanted = d + arm, 1j * phi1 * arm, (1j * phi2 - phi1**2) * arm

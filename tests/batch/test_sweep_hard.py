@@ -8,62 +8,36 @@ import planar
 from planar.batch.design_arrays import values_of_design, with_design_values
 from planar.document.dimensions import link_lengths
 from planar.foundation.errors import BadInput, Outcome
+from tests.builders import bar_linkage, four_bar_document
 from tests.draws import part
 from tests.linkages import random_linkage
 
 
-def joint(B, D, b, c, side=1.0):
-    """The pin b from B and c from D."""
-    way = D - B
-    far = np.hypot(*way)
-    along = (far * far + b * b - c * c) / (2.0 * far)
-    across = side * np.sqrt(max(b * b - along * along, 0.0))
-    return B + way / far * along + np.array([-way[1], way[0]]) / far * across
-
-
-def four_bar(a, b, c, d, theta, side=1.0, ratio=None):
+def four_bar_or_by_wheel(a, b, c, d, theta, side=1, ratio=None):
     """A four-bar, its crank driven, or by a wheel so many times slower."""
-    B, D = a * np.array([np.cos(theta), np.sin(theta)]), np.array([d, 0.0])
-    value = {
-        "planar": 1,
-        "name": "Four-bar",
-        "frame": "F",
-        "links": {
-            "F": {"points": {"A": [0, 0], "D": [d, 0], "O": [-1, 0]}},
-            "AB": {"ends": ["A", "B"], "length": a},
-            "BC": {"ends": ["B", "C"], "length": b},
-            "DC": {"ends": ["D", "C"], "length": c},
-        },
-        "pairs": [{"turning": name} for name in "ABCD"],
-        "inputs": [{"pair": "A", "position": theta, "velocity": 1.0}],
-        "sketch": {"C": joint(B, D, b, c, side).tolist()},
-    }
+    value = four_bar_document(a, b, c, d, theta, side)
     if ratio is not None:
+        value["links"]["AD"]["points"]["O"] = [-1, 0]
         value["links"]["W"] = {"ends": ["O", "P"], "length": 0.4}
-        value["pairs"] += [
-            {"turning": "O"},
-            {"gear": "g", "links": ["W", "AB"], "ratio": ratio, "mesh": {"W": 0.0, "AB": theta}},
-        ]
+        mesh = {"gear": "g", "links": ["W", "AB"], "ratio": ratio, "mesh": {"W": 0.0, "AB": theta}}
+        value["pairs"] += [{"turning": "O"}, mesh]
         value["inputs"] = [{"pair": "O", "position": 0.0, "velocity": 1.0}]
         value["sketch"]["P"] = [-0.6, 0.0]
     return planar.from_dict(value)
 
 
-def chain(rng, cells):
+def chain_of_dyads(rng, cells):
     """A crank and dyads from pin to pin, built closed."""
     theta, r = rng.uniform(-3.0, 3.0), rng.uniform(0.2, 1.0)
     pin = r * np.array([np.cos(theta), np.sin(theta)])
-    links = {"F": {"points": {"A": [0, 0]}}, "L0": {"ends": ["A", "P0"], "length": float(r)}}
-    pairs, sketch = [{"turning": "A"}, {"turning": "P0"}], {"P0": pin.tolist()}
+    frame, bars, sketch = {"A": [0, 0]}, {"L0": ("A", "P0", float(r))}, {"P0": pin.tolist()}
     for k in range(1, cells + 1):
         pivot, after = rng.uniform(-1.5, 1.5, 2), rng.uniform(-1.5, 1.5, 2)
-        links["F"]["points"][f"G{k}"] = pivot.tolist()
-        links[f"C{k}"] = {"ends": [f"P{k - 1}", f"P{k}"], "length": float(np.hypot(*(after - pin)))}
-        links[f"R{k}"] = {"ends": [f"G{k}", f"P{k}"], "length": float(np.hypot(*(after - pivot)))}
-        pairs += [{"turning": f"P{k}"}, {"turning": f"G{k}"}]
+        frame[f"G{k}"] = pivot.tolist()
+        bars[f"C{k}"] = (f"P{k - 1}", f"P{k}", float(np.hypot(*(after - pin))))
+        bars[f"R{k}"] = (f"G{k}", f"P{k}", float(np.hypot(*(after - pivot))))
         sketch[f"P{k}"], pin = after.tolist(), after
-    top = {"planar": 1, "name": "Chain", "frame": "F", "links": links, "pairs": pairs, "sketch": sketch}
-    return planar.from_dict(top | {"inputs": [{"pair": "A", "position": float(theta), "velocity": 1.0}]})
+    return bar_linkage(frame, bars, ("A", float(theta)), sketch)
 
 
 def around(mechanism, spread, many, rng):
@@ -98,13 +72,13 @@ def test_a_dead_point_between_the_first_two_positions_is_seen(backend, steps):
     for _ in range(3):
         a, b, d = rng.uniform(0.3, 0.8), rng.uniform(0.5, 1.5), 1.5
         c = b + (d - a) + 10.0 ** rng.uniform(-6.0, -2.5)  # the crank cannot pass the frame's line, by so little
-        mechanism = four_bar(a, b, c, d, -0.9 * turn, -1.0)
+        mechanism = four_bar_or_by_wheel(a, b, c, d, -0.9 * turn, -1)
         agrees(mechanism, {"A.position": rng.uniform(-1.0, 0.0, 6) * turn}, steps, points="C", backend=backend)
 
 
 @pytest.mark.parametrize("ratio", [13, -13, 6.5, 3])
 def test_a_wheel_may_turn_far_in_a_step_of_the_input(ratio):
-    mechanism = four_bar(0.5, 0.6, 0.7, 1.3, 0.9, ratio=ratio)
+    mechanism = four_bar_or_by_wheel(0.5, 0.6, 0.7, 1.3, 0.9, ratio=ratio)
     lengths = 0.5 * (1.0 + 0.02 * np.random.default_rng(0).uniform(-1.0, 1.0, 3))
     for steps in (13, 26):
         agrees(mechanism, {"AB.length": lengths}, steps, points="C")
@@ -117,7 +91,7 @@ def test_a_wheel_may_turn_far_in_a_step_of_the_input(ratio):
 @pytest.mark.parametrize("seed", part(range(6), 2))
 def test_of_dyads_in_a_row_the_assembly_nearest_to_the_sketch_is_taken(seed):
     rng = np.random.default_rng(seed)
-    mechanism = chain(rng, 1 + seed % 4)
+    mechanism = chain_of_dyads(rng, 1 + seed % 4)
     designs = around(mechanism, (0.003, 0.03, 0.1)[seed % 3], 12, rng)
     agrees(mechanism, designs, (14, 25, 50)[seed % 3], points=f"P{1 + seed % 4}")
 
@@ -134,7 +108,7 @@ def test_groups_of_three_unknowns_are_swept():
 
 
 def test_what_is_known_of_one_run_is_not_another_runs():
-    ready = planar.prepared(four_bar(0.3, 0.8, 0.7, 1.0, 0.5), 60, "C")
+    ready = planar.prepared(four_bar_or_by_wheel(0.3, 0.8, 0.7, 1.0, 0.5), 60, "C")
     found = ready()
     with pytest.raises(ValueError, match="read-only"):
         found.status[3] = 7

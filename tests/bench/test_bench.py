@@ -17,6 +17,7 @@ from planar.bench.benchmark import LENGTH_VARIATIONS, SWEEP_STEPS, measure_speed
 from planar.bench.profiling import SWEEP_PARTS, profile_call, profile_cycle, profile_first_call, profile_sweep
 from planar.reports.tables.benchmark import format_time as shown
 from planar.solving.cycle import cycle
+from tests.builders import bar_document
 from tests.command import run
 from tests.known import MODELS
 from tests.watchdog import watched
@@ -114,17 +115,8 @@ def test_a_linkage_that_is_not_closed_within_a_hundredth_is_swept_nearer(monkeyp
 
 
 def test_a_structure_has_neither_cycle_nor_sweeps():
-    value = {
-        "planar": 1,
-        "frame": "f",
-        "links": {
-            "f": {"points": {"A": [0, 0], "B": [1, 0]}},
-            "a": {"ends": ["A", "C"], "length": 1},
-            "b": {"ends": ["B", "C"], "length": 1},
-        },
-        "pairs": [{"turning": name} for name in "ABC"],
-        "sketch": {"C": [0.5, 0.8]},
-    }
+    bars = {"a": ("A", "C", 1), "b": ("B", "C", 1)}
+    value = bar_document({"A": [0, 0], "B": [1, 0]}, bars, sketch={"C": [0.5, 0.8]})
     found = measure_speed(planar.from_dict(value), rounds=1)
     assert (found.cycle, found.sweeps) == (None, ())
     assert found.solve > 0.0

@@ -19,6 +19,7 @@ pytest.importorskip("matplotlib")
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 
+from tests.closed_forms import piston
 from tests.figures import text_boxes
 
 MM = 25.4
@@ -49,12 +50,10 @@ def at_speed(mechanism, velocity, acceleration=None):
     return replace_inputs(mechanism, (Drive(mechanism.inputs[0].pair, None, velocity, acceleration),))
 
 
-def slider_crank(theta, r, l):  # noqa: E741
+def from_top(theta, r, l):  # noqa: E741
     """Displacement from the top dead centre with its first and second derivative by the crank angle."""
-    root = np.sqrt(l**2 - (r * np.sin(theta)) ** 2)
-    first = r**2 * np.sin(theta) * np.cos(theta) / root
-    second = r**2 * np.cos(2 * theta) / root + (r**2 * np.sin(theta) * np.cos(theta)) ** 2 / root**3
-    return r + l - r * np.cos(theta) - root, r * np.sin(theta) + first, r * np.cos(theta) + second
+    x, first, second = piston(theta, r, l)
+    return r + l - x, -first, -second
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +63,7 @@ def twelve():
 
 def test_the_curves_of_a_slider_crank_are_its_closed_form(twelve):
     time, displacement = curve(twelve, "displacement", "S")
-    exact = slider_crank(time, 0.03, 0.1)
+    exact = from_top(time, 0.03, 0.1)
     assert displacement == pytest.approx(1e3 * exact[0], abs=1e-9)
     assert curve(twelve, "velocity", "V")[1] == pytest.approx(exact[1], abs=1e-12)
     assert curve(twelve, "acceleration", "a")[1] == pytest.approx(exact[2], abs=1e-12)
@@ -72,7 +71,7 @@ def test_the_curves_of_a_slider_crank_are_its_closed_form(twelve):
 
 def test_chords_are_rises_over_equal_times_at_the_middles_of_the_intervals(twelve):
     marks = np.linspace(0.0, 2.0 * pi, 13)
-    exact = slider_crank(marks, 0.03, 0.1)
+    exact = from_top(marks, 0.03, 0.1)
     for name, values in (("velocity", exact[0]), ("acceleration", exact[1])):
         times, rates = curve(twelve, name, "chords")
         assert times == pytest.approx((marks[1:] + marks[:-1]) / 2.0)
@@ -185,7 +184,7 @@ def test_a_clockwise_crank_runs_on_in_time():
     figure = diagrams(planar.load("002-E3.4"))
     time, displacement = curve(figure, "displacement", "S")
     assert time[[0, -1]] == pytest.approx([0.0, 60.0 / 210.0])
-    exact = slider_crank(time * 7.0 * pi, 0.2, 0.8)
+    exact = from_top(time * 7.0 * pi, 0.2, 0.8)
     assert displacement == pytest.approx(1e3 * exact[0], abs=1e-6)
     assert curve(figure, "velocity", "V")[1] == pytest.approx(exact[1] * 7.0 * pi, abs=1e-8)
     assert curve(figure, "acceleration", "a")[1] == pytest.approx(exact[2] * (7.0 * pi) ** 2, abs=1e-6)
@@ -208,7 +207,7 @@ def test_without_a_speed_rates_are_per_radian():
     labels = [chart(figure, name).get_ylabel() for name in ("velocity", "acceleration")]
     assert labels == ["V (m/rad)", "a (m/rad²)"]
     gone, rate = curve(figure, "velocity", "V")
-    assert rate == pytest.approx(slider_crank(gone, 0.15, 0.6)[1], abs=1e-10)
+    assert rate == pytest.approx(from_top(gone, 0.15, 0.6)[1], abs=1e-10)
     assert "rates are per radian of the input" in caption(figure)
     assert "mu_{t}" not in caption(figure)
 
@@ -298,7 +297,7 @@ def test_a_range_that_was_asked_for_is_kept():
     mechanism = planar.load("004-SC12")
     figure = diagrams(planar.cycle(mechanism, 30, start=0.5, stop=2.0))
     time, displacement = curve(figure, "displacement", "S")
-    exact = slider_crank(time + 0.5, 0.03, 0.1)[0]
+    exact = from_top(time + 0.5, 0.03, 0.1)[0]
     assert time[[0, -1]] == pytest.approx([0.0, 1.5])
     assert displacement == pytest.approx(-1e3 * (exact - exact[0]), abs=1e-9)
     assert "Displacements are from position 0" in caption(figure)
@@ -383,7 +382,7 @@ def test_two_turns_are_drawn_as_two_turns():
     figure = diagrams(planar.cycle(planar.load("004-SC12"), 60, 1.0, 1.0 + 4.0 * pi))
     gone, displacement = curve(figure, "displacement", "S")
     assert gone[[0, -1]] == pytest.approx([0.0, 4.0 * pi])
-    assert displacement == pytest.approx(1e3 * slider_crank(gone, 0.03, 0.1)[0], abs=1e-9)
+    assert displacement == pytest.approx(1e3 * from_top(gone, 0.03, 0.1)[0], abs=1e-9)
     assert chart(figure, "angle").get_xlim() == pytest.approx((0.0, 720.0))
 
 

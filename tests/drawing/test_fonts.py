@@ -14,6 +14,7 @@ from planar.drawing.output.solution_pages import encode_sheets, solution_pages
 from planar.drawing.paper.pens import MM_PER_POINT
 from planar.drawing.paper.picture import Label, Pen, Picture, Polyline
 from planar.foundation.errors import MissingGlyphs
+from tests.builders import four_bar_document
 from tests.command import run
 from tests.fonts import ADVANCE, EM, HEIGHT, made, own_fonts  # noqa: F401
 
@@ -97,21 +98,9 @@ def test_texts_are_measured_and_drawn_in_the_font_that_has_them(outlines, embedd
 
 
 def named(name: str) -> dict:
-    return {
-        "planar": 1,
-        "name": f"{name}机",
-        "units": {"length": "mm", "angle": "deg"},
-        "frame": "frame",
-        "links": {
-            "frame": {"points": {"O": [0, 0], "D": [100, 0]}},
-            "crank": {"ends": ["O", name], "length": 50},
-            "rod": {"ends": [name, "C"], "length": 66},
-            "rocker": {"ends": ["D", "C"], "length": 56},
-        },
-        "pairs": [{"turning": "O"}, {"turning": name}, {"turning": "C"}, {"turning": "D"}],
-        "inputs": [{"pair": "O", "position": 60, "velocity": "10.5 rad/s"}],
-        "sketch": {"C": [80, 50]},
-    }
+    texts = {"name": f"{name}机", "units": {"length": "mm", "angle": "deg"}, "sketch": {"C": [80, 50]}}
+    names = {"pins": ["O", name, "C", "D"], "names": ["frame", "crank", "rod", "rocker"]}
+    return four_bar_document(50, 66, 56, 100, 60, omega="10.5 rad/s", **names, **texts)
 
 
 @pytest.mark.parametrize(

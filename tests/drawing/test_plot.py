@@ -10,6 +10,7 @@ from PIL import Image
 
 import planar
 from planar import plot
+from tests.builders import four_bar_document
 from tests.command import run
 from tests.contact_sheet import DRAWINGS, MODELS, drawn
 from tests.draws import part
@@ -125,21 +126,8 @@ def test_what_cannot_be_drawn_is_refused_in_a_sentence(words, said, tmp_path):
 
 
 def test_a_dead_point_has_no_polygon_but_says_why(tmp_path):
-    model = {
-        "planar": 1,
-        "name": "stretched",
-        "frame": "f",
-        "links": {
-            "f": {"points": {"A": [0, 0], "D": [3, 0]}},
-            "AB": {"ends": ["A", "B"], "length": 1},
-            "BC": {"ends": ["B", "C"], "length": 1},
-            "DC": {"ends": ["D", "C"], "length": 1},
-        },
-        "pairs": [{"turning": name} for name in "ABCD"],
-        "inputs": [{"pair": "A", "position": "60 deg", "velocity": "1 rad/s"}],
-        "sketch": {"C": [2, 0.1]},
-    }
-    (tmp_path / "m.json").write_text(json.dumps(model | {"inputs": [{"pair": "A", "position": 0, "velocity": 1}]}))
+    model = four_bar_document(1, 1, 1, 3, 0, sketch={"C": [2, 0.1]})
+    (tmp_path / "m.json").write_text(json.dumps(model))
     done = run(tmp_path, "plot", "m.json", "velocity", "-o", "a.png")
     assert done.status == 1
     assert len(done.err.splitlines()) == 1

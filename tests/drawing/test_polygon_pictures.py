@@ -18,6 +18,7 @@ from planar.drawing.paper.scales import DRAWING_HEIGHT, DRAWING_WIDTH, Scale, pa
 from planar.drawing.polygons.polygon import letter_text, polygon_picture
 from planar.model.mechanism import Drive, named_points
 from planar.solving.position import solve
+from tests.builders import four_bar_document
 from tests.known import MODELS, some_models, state_of
 
 KINDS = {"velocity": velocity_polygon, "acceleration": acceleration_polygon}
@@ -292,20 +293,8 @@ def test_letters_of_velocities_are_plain():
 
 @pytest.mark.parametrize("name", ["$b^2$", r"\frac", "b_1", "{b", "crank pin", "b-c", "_", "b_a_1"])
 def test_names_of_any_kind_are_never_taken_for_formulas(name):
-    value = {
-        "planar": 1,
-        "name": "named",
-        "frame": "frame",
-        "links": {
-            "frame": {"points": {"A": [0, 0], "D": [4, 0]}},
-            "crank": {"ends": ["A", name], "length": 1},
-            "coupler": {"ends": [name, "C"], "length": 3.5},
-            "rocker": {"ends": ["D", "C"], "length": 2.5},
-        },
-        "pairs": [{"turning": each} for each in ("A", name, "C", "D")],
-        "inputs": [{"pair": "A", "position": 1.0, "velocity": 2.0, "acceleration": 1.0}],
-        "sketch": {"C": [3, 2.5]},
-    }
+    names = {"pins": ["A", name, "C", "D"], "names": ["frame", "crank", "coupler", "rocker"]}
+    value = four_bar_document(1, 3.5, 2.5, 4, 1.0, omega=2.0, alpha=1.0, sketch={"C": [3, 2.5]}, **names)
     state = solve(files.from_dict(value))
     for kind, draw in KINDS.items():
         polygon = draw(state)

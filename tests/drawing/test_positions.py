@@ -14,6 +14,7 @@ from planar.drawing.paper.picture import Circle, Label, Pen, Polyline, extent
 from planar.drawing.paper.scales import Scale
 from planar.foundation.errors import BadInput
 from planar.model.mechanism import Drive, replace_inputs
+from tests.closed_forms import piston
 from tests.known import MODELS
 
 PER_MM = 1e-3
@@ -36,10 +37,6 @@ def letters(picture):
     return {mark.text: mark for mark in picture.marks if isinstance(mark, Label)}
 
 
-def slider(turn, r=30.0, l=100.0):  # noqa: E741
-    return r * np.cos(turn) + np.sqrt(l**2 - (r * np.sin(turn)) ** 2)
-
-
 @pytest.fixture(scope="module")
 def twelve():
     return positions(planar.load("004-SC12"), scale=FULL)
@@ -48,10 +45,10 @@ def twelve():
 def test_the_joints_stand_where_the_closed_form_has_them(twelve):
     turn = np.arange(13) * pi / 6.0
     crank = 30.0 * np.column_stack([np.cos(turn), np.sin(turn)])
-    piston = np.column_stack([slider(turn), np.zeros(13)])
+    wrist = np.column_stack([piston(turn, 30.0, 100.0)[0], np.zeros(13)])
     assert marked(twelve, "A") == pytest.approx(crank, abs=1e-9)
-    assert marked(twelve, "B") == pytest.approx(piston, abs=1e-9)
-    assert marked(twelve, "D") == pytest.approx(crank + 0.3 * (piston - crank), abs=1e-9)
+    assert marked(twelve, "B") == pytest.approx(wrist, abs=1e-9)
+    assert marked(twelve, "D") == pytest.approx(crank + 0.3 * (wrist - crank), abs=1e-9)
 
 
 def test_joints_are_lettered_by_their_positions_and_those_that_coincide_together(twelve):

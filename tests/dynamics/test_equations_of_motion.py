@@ -16,12 +16,13 @@ from tests.builders import (
     BODIES,
     Value,
     bracket_document,
-    four_bar_document,
+    dynamic_four_bar_document,
     lever_document,
     masses,
-    slider_crank_document,
+    piston_document,
 )
 from tests.checks import forces_of
+from tests.closed_forms import piston
 
 STEP = 1e-30
 """Of the complex step: f'(x) = Im f(x + ih) / h, without cancellation."""
@@ -72,7 +73,7 @@ def test_the_torque_of_a_slider_crank_with_mass_is_lagranges():
         end = carried(pin, way, rate, rod, 0.0)
         return summed([(((0.0, 0.0), (0.0, 0.0)), (c, s), 1.0), (pin, way, rate), (end, (1.0, 0.0), 0.0)])
 
-    found = over(slider_crank_document(r, rod, masses=masses("crank", "rod", "piston"), gravity=list(WEIGHT)), 48)
+    found = over(piston_document(r, rod, masses=masses("crank", "rod", "piston"), gravity=list(WEIGHT)), 48)
     angle = found.moving.inputs["O"].position
     wanted = lagrange(lambda t: all_of(t)[0], lambda t: all_of(t)[1], angle, 9.0, 5.0)
     np.testing.assert_allclose(found.inputs["O"], wanted, atol=1e-12 * np.abs(wanted).max())
@@ -104,7 +105,7 @@ def test_the_torque_of_a_four_bar_with_mass_is_lagranges(sketched):
             ]
         )
 
-    value = four_bar_document(a, b, c, d, masses=masses("crank", "coupler", "rocker"), gravity=list(WEIGHT))
+    value = dynamic_four_bar_document(a, b, c, d, masses=masses("crank", "coupler", "rocker"), gravity=list(WEIGHT))
     value["sketch"] = {"B": [d, sketched]}
     found = over(value, 48)
     wanted = lagrange(lambda t: all_of(t)[0], lambda t: all_of(t)[1], found.moving.inputs["O"].position, 7.0, -3.0)
@@ -424,7 +425,7 @@ def test_loads_of_time_are_refused_of_a_motion_without():
 
 def test_a_dead_point_is_said_and_in_a_motion_not_a_number():
     """A slider-crank driven by its slide towards its dead point: its pull grows as T / (r sin), and there is none."""
-    value = slider_crank_document(0.3, 0.9, loads=[{"link": "crank", "torque": 5.0}])
+    value = piston_document(0.3, 0.9, loads=[{"link": "crank", "torque": 5.0}])
     value["inputs"] = [{"pair": "stroke", "position": 1.2, "velocity": 0.1}]
     value["sketch"]["A"] = [0.3, 0.01]
     with pytest.raises(NoAnswer) as refused:
@@ -436,7 +437,6 @@ def test_a_dead_point_is_said_and_in_a_motion_not_a_number():
     assert lost.any()
     assert not lost.all()
     turn = found.moving.pair("O")["relative_angle"][~lost]
-    rod = np.sqrt(0.9**2 - (0.3 * np.sin(turn)) ** 2)
-    wanted = 5.0 / (0.3 * np.sin(turn) * (1 + 0.3 * np.cos(turn) / rod))
+    wanted = -5.0 / piston(turn, 0.3, 0.9)[1]
     np.testing.assert_allclose(force[~lost], wanted, rtol=1e-8)
     assert np.isnan(found.reactions["O"].force[lost]).all()

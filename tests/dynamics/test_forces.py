@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
-from math import cos, hypot, inf, nan, pi, radians, sin, sqrt, tan
+from math import cos, hypot, inf, nan, pi, radians, sin, tan
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,8 @@ from planar.model.loads import Load
 from planar.model.mechanism import Drive, Input, Mechanism
 from planar.results.motion import State
 from planar.solving.position import solve
+from tests.builders import Value, slider_crank_document
+from tests.closed_forms import piston
 from tests.command import run
 from tests.draws import draws, part
 from tests.known import MODELS, state_of
@@ -31,26 +33,9 @@ EXACT = 1e-10
 near = settings(max_examples=draws(8), deadline=None)
 
 
-def crank(angle: float, loads: list[Any], r: float = 0.3, rod: float = 1.0, turned: float = 0.0) -> dict[str, Any]:
-    """A slider-crank, the line of its slide turned; the crank's angle is counted from that line."""
-    return {
-        "planar": 1,
-        "name": "Slider-crank",
-        "frame": "frame",
-        "links": {
-            "frame": {"points": {"O": [0.4, -0.7]}},
-            "crank": {"ends": ["O", "A"], "length": r},
-            "rod": {"ends": ["A", "B"], "length": rod},
-        },
-        "pairs": [
-            {"turning": "O"},
-            {"turning": "A"},
-            {"sliding": "stroke", "on": "frame", "block": "B", "line": {"through": "O", "angle": turned}},
-        ],
-        "inputs": [{"pair": "O", "position": angle + turned, "velocity": 2.0}],
-        "loads": loads,
-        "sketch": {"B": [0.4 + (r + rod) * cos(turned), -0.7 + (r + rod) * sin(turned)]},
-    }
+def pushed_crank(angle: float, loads: list[Any], r: float = 0.3, rod: float = 1.0, turned: float = 0.0) -> Value:
+    """Somewhere, the line of its slide turned; the crank's angle is counted from that line."""
+    return slider_crank_document(r, rod, angle, turn=turned, shift=(0.4, -0.7), omega=2.0, loads=loads)
 
 
 def solved(value: dict[str, Any]) -> State:
@@ -59,8 +44,7 @@ def solved(value: dict[str, Any]) -> State:
 
 def speed_ratio(angle: float, r: float = 0.3, rod: float = 1.0) -> float:
     """-dx/d(angle) of a piston, by its closed form."""
-    n = rod / r
-    return r * (sin(angle) + sin(2 * angle) / (2 * sqrt(n**2 - sin(angle) ** 2)))
+    return -float(piston(angle, r, rod)[1])
 
 
 def loaded(mechanism: Mechanism, seed: int) -> Mechanism:
@@ -101,7 +85,7 @@ def by_difference(mechanism: Mechanism, name: str, step: float) -> float:
 @given(angle=st.floats(-3.1, 3.1), force=st.floats(-1e4, 1e4), r=st.floats(0.05, 0.9))
 def test_the_torque_of_a_slider_crank_is_its_closed_form(angle, force, r):
     """T = F r (sin a + sin 2a / (2 sqrt(n^2 - sin^2 a))), n = rod / crank."""
-    state = solved(crank(angle, [{"point": "B", "force": [force, 0]}], r))
+    state = solved(pushed_crank(angle, [{"point": "B", "force": [force, 0]}], r))
     found = planar.forces(state)
     assert found.inputs["O"] == pytest.approx(force * speed_ratio(angle, r), rel=1e-11, abs=1e-12 * (1 + abs(force)))
     rounding = 1e-12 * (1 + abs(force))
@@ -111,7 +95,7 @@ def test_the_torque_of_a_slider_crank_is_its_closed_form(angle, force, r):
 
 def test_an_input_that_slides_supplies_a_force():
     """The same press driven by its ram: F = T / (the ram's speed for each rad/s of the crank)."""
-    value = crank(0.8, [{"link": "crank", "torque": 12.0}])
+    value = pushed_crank(0.8, [{"link": "crank", "torque": 12.0}])
     place = planar.solve(planar.from_dict(value)).pair("stroke")["displacement"]
     value["inputs"] = [{"pair": "stroke", "position": place, "velocity": 0.1}]
     value["sketch"]["A"] = [0.4 + 0.3 * cos(0.8), -0.7 + 0.3 * sin(0.8)]
@@ -287,7 +271,7 @@ def test_efforts_do_not_depend_on_the_axes(angle, turned, force, way):
     def effort(by: float) -> float:
         pushed = [force * cos(way + by), force * sin(way + by)]
         mid = {"point": "A", "force": [-3.0 * sin(by), 3.0 * cos(by)]}
-        return planar.forces(solved(crank(angle, [{"point": "B", "force": pushed}, mid], turned=by))).inputs["O"]
+        return planar.forces(solved(pushed_crank(angle, [{"point": "B", "force": pushed}, mid], turned=by))).inputs["O"]
 
     assert effort(turned) == pytest.approx(effort(0.0), rel=1e-9, abs=1e-9)
 
@@ -313,7 +297,7 @@ def test_without_loads_every_effort_is_zero():
 
 
 def test_a_force_on_the_frame_costs_nothing():
-    state = solved(crank(0.7, [{"point": "O", "force": [1e5, 1e5]}, {"link": "frame", "torque": 1e5}]))
+    state = solved(pushed_crank(0.7, [{"point": "O", "force": [1e5, 1e5]}, {"link": "frame", "torque": 1e5}]))
     assert planar.forces(state).inputs["O"] == 0.0
 
 
@@ -382,10 +366,10 @@ def test_with_several_inputs_each_has_its_own_advantage():
 
 
 def test_towards_its_dead_point_a_toggle_grows_without_bound_and_there_it_is_said():
-    grown = [advantage(solved(crank(angle, [])), "B").by_power for angle in (1e-1, 1e-2, 1e-3, 1e-4, 1e-6)]
+    grown = [advantage(solved(pushed_crank(angle, [])), "B").by_power for angle in (1e-1, 1e-2, 1e-3, 1e-4, 1e-6)]
     assert grown == pytest.approx([1 / speed_ratio(angle) for angle in (1e-1, 1e-2, 1e-3, 1e-4, 1e-6)], rel=1e-8)
     assert grown[-1] > 1e6
-    state = solved(crank(0.0, [{"point": "B", "force": [1e3, 0]}]))
+    state = solved(pushed_crank(0.0, [{"point": "B", "force": [1e3, 0]}]))
     for output in ("B", "stroke"):
         there = advantage(state, output)
         assert there.by_power is None
@@ -395,7 +379,7 @@ def test_towards_its_dead_point_a_toggle_grows_without_bound_and_there_it_is_sai
 
 
 def test_on_the_dead_point_of_the_input_itself_there_is_no_effort_to_tell():
-    value = crank(0.0, [{"link": "crank", "torque": 5.0}])
+    value = pushed_crank(0.0, [{"link": "crank", "torque": 5.0}])
     value["inputs"] = [{"pair": "stroke", "position": 1.3, "velocity": 0.1}]
     with pytest.raises(NoAnswer) as refused:
         planar.forces(solved(value))
@@ -424,7 +408,7 @@ def test_more_inputs_than_freedoms_are_refused_with_the_remedy():
     ],
 )
 def test_loads_made_in_python_are_checked(load, sentence):
-    mechanism = replace(planar.from_dict(crank(0.5, [])), loads=(load,))
+    mechanism = replace(planar.from_dict(pushed_crank(0.5, [])), loads=(load,))
     with pytest.raises(BadInput, match=sentence) as refused:
         planar.forces(solve(mechanism))
     assert refused.value.place == "loads[0]"
@@ -513,7 +497,7 @@ def test_the_program_prints_forces_of_slides_and_says_what_is_at_rest(tmp_path):
 
 
 def test_the_program_ends_with_no_answer_on_a_dead_point(tmp_path):
-    value = crank(pi / 2, [{"point": "A", "force": [5.0, 1.0]}], r=0.3, rod=1.0)
+    value = pushed_crank(pi / 2, [{"point": "A", "force": [5.0, 1.0]}], r=0.3, rod=1.0)
     value["inputs"] = [{"pair": "stroke", "position": 1.3}]
     (tmp_path / "dead.json").write_text(json.dumps(value), encoding="utf-8")
     ended = run(tmp_path, "forces", "dead.json", "--json")

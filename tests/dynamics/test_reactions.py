@@ -12,7 +12,7 @@ import pytest
 import planar
 from planar.dynamics.forces import Forces
 from planar.model.loads import Load
-from tests.builders import slider_crank_document
+from tests.builders import four_bar_document, piston_document
 from tests.checks import forces_of
 
 Value = dict[str, Any]
@@ -143,7 +143,7 @@ def test_of_wheels_given_by_ratio_couples_are_told_and_bearings_named(keyword):
 
 def test_a_bearing_beyond_the_wheels_is_told_all_the_same():
     """Behind wheel b a crank drives a piston: what runs in the shafts is open, what runs in the rod is not."""
-    value = slider_crank_document(0.3, 0.9, loads=[{"point": "B", "force": [100, 0]}])
+    value = piston_document(0.3, 0.9, loads=[{"point": "B", "force": [100, 0]}])
     whole = forces_of(value)
     value["links"]["f"]["points"]["Q"] = [-0.5, 0.0]
     value["links"]["motor"] = {"points": {"Q": [0, 0]}}
@@ -193,7 +193,7 @@ def agreeing(ways: list[Forces]) -> set[str]:
 
 
 def test_of_a_piston_in_two_guides_only_the_guides_are_not_told():
-    value = slider_crank_document(0.3, 0.9, loads=[{"point": "B", "force": [-100, 0]}, {"point": "A", "force": [3, 5]}])
+    value = piston_document(0.3, 0.9, loads=[{"point": "B", "force": [-100, 0]}, {"point": "A", "force": [3, 5]}])
     again = {"sliding": "again", "links": ["f", "piston"], "line": {"through": "O"}, "point": "B"}
     broken = [forces_of(value)]
     whole = forces_of(value | {"pairs": [*value["pairs"], again]})
@@ -233,7 +233,7 @@ def test_of_a_rod_on_three_parallel_cranks_what_hangs_on_it_is_told():
 
 
 def test_a_shaft_in_two_bearings_at_one_place_has_no_telling_which_carries():
-    value = slider_crank_document(0.3, 0.9, loads=[{"point": "B", "force": [-100, 0]}])
+    value = piston_document(0.3, 0.9, loads=[{"point": "B", "force": [-100, 0]}])
     value["links"]["f"]["points"]["O2"] = [0, 0]
     value["links"]["crank"]["points"] = {"O2": [0, 0]}
     value["pairs"].append({"turning": "O2", "links": ["f", "crank"]})
@@ -296,20 +296,8 @@ def test_teeth_that_mesh_twice_leave_open_how_hard_they_push_their_bearings_apar
 @pytest.mark.parametrize("angle", [0.3, pi])
 def test_a_motion_that_passes_where_links_are_held_twice_names_it_there_only(angle):
     """A parallelogram of two cranks: flat in its line of shafts it is held twice, elsewhere once."""
-    value = {
-        "planar": 1,
-        "frame": "f",
-        "links": {
-            "f": {"points": {"O": [0, 0], "Q": [0.9, 0]}},
-            "a": {"ends": ["O", "A"], "length": 0.3},
-            "b": {"ends": ["Q", "B"], "length": 0.3},
-            "rod": {"ends": ["A", "B"], "length": 0.9},
-        },
-        "pairs": [{"turning": each} for each in "OQAB"],
-        "inputs": [{"pair": "O", "position": 0.3, "velocity": 1.0}],
-        "loads": [{"link": "b", "torque": 2.0}],
-        "sketch": {"B": [1.19, 0.09]},
-    }
+    more = {"loads": [{"link": "b", "torque": 2.0}], "sketch": {"B": [1.19, 0.09]}}
+    value = four_bar_document(0.3, 0.9, 0.3, 0.9, 0.3, pins="OABQ", names=["f", "a", "rod", "b"], **more)
     motion = planar.cycle(planar.from_dict(value), steps=4, start=angle - 0.2, stop=angle + 0.2)
     found = planar.forces(motion)
     lost = np.isnan(found.inputs["O"])

@@ -13,7 +13,8 @@ from scipy.special import ellipk
 import planar
 from planar.dynamics.simulation import Simulation
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
-from tests.builders import bracket_document, four_bar_document, lever_document, masses, slider_crank_document
+from tests.builders import bracket_document, dynamic_four_bar_document, lever_document, masses, piston_document
+from tests.closed_forms import between
 
 Value = dict[str, Any]
 G = 9.81
@@ -177,8 +178,8 @@ def test_a_double_pendulum_goes_as_its_equations_in_the_books_say():
 @pytest.mark.parametrize(
     "value",
     [
-        four_bar_document(0.3, 0.7, 0.6, 0.9, masses=masses("crank", "coupler", "rocker"), gravity=[0, -G]),
-        slider_crank_document(0.3, 0.9, masses=masses("crank", "rod", "piston"), gravity=[0, -G]),
+        dynamic_four_bar_document(0.3, 0.7, 0.6, 0.9, masses=masses("crank", "coupler", "rocker"), gravity=[0, -G]),
+        piston_document(0.3, 0.9, masses=masses("crank", "rod", "piston"), gravity=[0, -G]),
     ],
     ids=["four-bar", "slider-crank"],
 )
@@ -196,12 +197,12 @@ def test_what_falls_freely_keeps_its_energy_for_ten_seconds(value):
 
 def test_a_double_rocker_that_is_let_go_passes_the_limits_of_its_crank():
     """Its input angle is no coordinate there, for it turns back: energy and closure do not notice."""
-    value = four_bar_document(0.7, 0.35, 0.6, 0.9, masses=masses("crank", "coupler", "rocker"), gravity=[0, -G])
+    value = dynamic_four_bar_document(0.7, 0.35, 0.6, 0.9, masses=masses("crank", "coupler", "rocker"), gravity=[0, -G])
     value["inputs"][0] |= {"position": 1.0, "velocity": 0.0, "acceleration": 0.0}
     value["sketch"] = {"B": [0.4, 0.6]}
     found = run(value, 4.0, 400)
     # the limits of the crank are where coupler and rocker lie in line: by the law of cosines
-    ends = [np.arccos((0.7**2 + 0.9**2 - (0.35 + way * 0.6) ** 2) / (2 * 0.7 * 0.9)) for way in (1.0, -1.0)]
+    ends = [between(0.7, 0.9, 0.35 + way * 0.6) for way in (1.0, -1.0)]
     assert found.balance < 1e-10
     swing = angle(found)
     assert (swing.max(), swing.min()) == pytest.approx(ends, abs=1e-3)
@@ -284,7 +285,7 @@ def test_a_mechanism_held_twice_falls_as_without_the_second_holding():
 
 def test_a_parallelogram_stays_one_where_its_branches_cross():
     """Let go with some speed it passes flat through its change points, twice a turn, and stays a parallelogram."""
-    value = four_bar_document(
+    value = dynamic_four_bar_document(
         0.3, 0.9, 0.3, 0.9, masses=[{"link": "coupler", "mass": 2.0, "at": [0.45, 0], "inertia": 0.1}]
     )
     value["sketch"] = {"B": [1.15, 0.17]}
@@ -296,7 +297,7 @@ def test_a_parallelogram_stays_one_where_its_branches_cross():
 
 def test_a_parallelogram_that_falls_passes_every_change_point_on_its_way():
     """Its rod translates all the time, so that it is a pendulum of its mass on the cranks: energy tells its speed."""
-    value = four_bar_document(
+    value = dynamic_four_bar_document(
         0.3, 0.9, 0.3, 0.9, masses=[{"link": "coupler", "mass": 2.0, "at": [0.45, 0], "inertia": 0.1}]
     )
     value |= {"gravity": [0, -G], "sketch": {"B": [1.15, 0.17]}}
@@ -419,14 +420,14 @@ def test_inputs_to_be_driven_are_known_by_name():
 
 def test_a_driven_input_that_jams_ends_the_motion_with_a_sentence():
     """The double rocker's crank, driven past where it can go."""
-    value = four_bar_document(0.7, 0.35, 0.6, 0.9, masses=masses("crank", "coupler", "rocker"))
+    value = dynamic_four_bar_document(0.7, 0.35, 0.6, 0.9, masses=masses("crank", "coupler", "rocker"))
     value["inputs"][0] |= {"position": 0.8, "velocity": 2.0, "acceleration": 0.0}
     value["sketch"] = {"B": [0.4, 0.6]}
     found = planar.simulate(planar.from_dict(value), 3.0, 300, driven=["O"], moving=True)
     assert found.motion.outcome is not Outcome.SOLVED
     assert "the motion can be told only to 0.22" in found.motion.reason
     assert "a dead point of what is driven at O" in found.motion.reason
-    end = np.arccos((0.7**2 + 0.9**2 - 0.95**2) / (2 * 0.7 * 0.9))
+    end = between(0.7, 0.9, 0.95)
     assert found.motion.inputs["O"].position[-1] == pytest.approx(end, abs=0.03)
     assert found.motion.residual < 1e-12
 

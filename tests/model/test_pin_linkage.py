@@ -14,7 +14,7 @@ BARS = [[0, 2], [2, 3, 4], [1, 3], [3, 5]]
 """A four-bar whose coupler carries a point, and a bar that hangs on its pin."""
 
 
-def six_bar():
+def pinned_watt_six_bar():
     """Watt's, of two dyads; the second hangs on the rocker's far point."""
     places = [[0, 0], [0.8, 0.1], [0.1, 0.25], [0.7, 0.6], [0.9, 0.9], [1.6, 0.1], [1.5, 0.8]]
     return planar.pinned(np.array(places), [[0, 2], [2, 3], [1, 3, 4], [4, 6], [5, 6]], [0, 1, 5], velocity=2.0)
@@ -72,7 +72,7 @@ def test_a_crank_on_a_pin_of_the_frame_that_other_bars_share():
 
 
 def test_it_is_a_mechanism_like_others():
-    mechanism = six_bar()
+    mechanism = pinned_watt_six_bar()
     again = pickle.loads(pickle.dumps(mechanism))
     assert again.layout.bars == mechanism.layout.bars
     assert again == mechanism

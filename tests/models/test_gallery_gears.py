@@ -8,14 +8,8 @@ import pytest
 from numpy.polynomial import Chebyshev
 
 import planar
+from tests.closed_forms import meeting
 from tests.known import state_turned_by
-
-
-def meeting(p, r, q, s):
-    """Where circles about p and q meet, to the left of the way from p to q."""
-    way = q - p
-    along = (abs(way) ** 2 + r**2 - s**2) / (2 * abs(way))
-    return p + way / abs(way) * (along + 1j * np.sqrt(r**2 - along**2))
 
 
 def rates(closed, at, velocity, acceleration=0.0, reach=0.3):
@@ -46,7 +40,7 @@ def turn(angle):
 # gears between cranks
 
 
-def five_bar(a):
+def geared_five_bar_points(a):
     """A, B, C and P of the geared five-bar, the first crank at angle a; the second turns -1.5 times as far."""
     at_a, at_b = 0.04 * turn(a), 0.15 + 0.03 * turn(np.radians(100) - 1.5 * (a - np.radians(60)))
     c = meeting(at_a, 0.13, at_b, 0.11)
@@ -57,7 +51,7 @@ def five_bar(a):
 def test_the_geared_five_bar_goes_where_circles_meet_turn_after_turn(degrees):
     state = state_turned_by("geared-five-bar", "O", degrees)
     for index, name in enumerate("ABCP"):
-        agrees(state, name, lambda a, index=index: five_bar(a)[index])
+        agrees(state, name, lambda a, index=index: geared_five_bar_points(a)[index])
     assert state.link("QB").angle == pytest.approx(np.radians(100 - 1.5 * degrees), abs=1e-12)
 
 

@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 import planar
 from planar.foundation.errors import Outcome
 from planar.model.link_graph import link_pair_graph
+from tests.closed_forms import between, meeting, piston
 from tests.known import loop_sizes, state_turned_by
 
 
@@ -31,18 +32,6 @@ def velocity(state, point: str) -> complex:
 
 def dot(a: complex, b: complex) -> float:
     return (a * b.conjugate()).real
-
-
-def corner(p: complex, a: float, q: complex, b: float) -> complex:
-    """The point a from p and b from q, to the left of the way from p to q."""
-    apart = abs(q - p)
-    along = (a**2 - b**2 + apart**2) / (2 * apart)
-    return p + (q - p) / apart * (along + 1j * np.sqrt(a**2 - along**2))
-
-
-def between(a: float, b: float, opposite: float) -> float:
-    """The angle between two sides of a triangle, by the law of cosines."""
-    return np.arccos((a**2 + b**2 - opposite**2) / (2 * a * b))
 
 
 def same_direction(angle: float, other: float, within: float = 1e-12):
@@ -66,7 +55,7 @@ def test_the_crank_rockers_output_in_closed_form(degrees):
     state = state_turned_by("crank-rocker", "A0", degrees)
     crank = 0.050 * np.exp(1j * np.radians(60 + degrees))
     rocker = state.link("rocker")
-    same_direction(rocker.angle, np.angle(corner(crank, 0.180, 0.200, 0.120) - 0.200))
+    same_direction(rocker.angle, np.angle(meeting(crank, 0.180, 0.200, 0.120) - 0.200))
     coupler = state.link("coupler").angle
     # what both ends of the coupler have along it is alike
     along = 0.050 * np.sin(np.radians(60 + degrees) - coupler) / (0.120 * np.sin(rocker.angle - coupler))
@@ -155,7 +144,7 @@ def test_the_triple_rocker_is_held_fast_where_coupler_and_follower_stretch(sign)
 def test_the_triple_rocker_swings_across_the_line_of_its_fixed_pins(degrees):
     driver = 0.090 * np.exp(1j * np.radians(degrees))
     state = at("triple-rocker", np.radians(degrees))
-    assert place(state, "B") == pytest.approx(corner(driver, 0.070, 0.150, 0.085), abs=1e-14)
+    assert place(state, "B") == pytest.approx(meeting(driver, 0.070, 0.150, 0.085), abs=1e-14)
 
 
 # Parallel cranks and their crossed sister
@@ -276,15 +265,14 @@ def test_the_rotary_engines_pistons_move_as_in_an_engine_at_rest(degrees):
     for k in range(7):
         turn = np.radians(60 + degrees + 360 * k / 7)
         a = turn - np.pi / 2  # from the fixed crank, which points upwards
-        root = np.sqrt(rod**2 - (r * np.sin(a)) ** 2)
+        far, slope, _ = piston(a, r, rod)
         cylinder = state.pair(f"cylinder {k + 1}")
-        assert cylinder["displacement"] == pytest.approx(r * np.cos(a) + root, abs=1e-14)
-        slide = -r * w * np.sin(a) * (1 + r * np.cos(a) / root)
-        assert cylinder["velocity"] == pytest.approx(slide, abs=1e-12 * r * w)
+        assert cylinder["displacement"] == pytest.approx(far, abs=1e-14)
+        assert cylinder["velocity"] == pytest.approx(w * slope, abs=1e-12 * r * w)
         # and round the pin each runs on a circle
-        piston = place(state, f"P{k + 1}")
-        assert piston == pytest.approx((r * np.cos(a) + root) * np.exp(1j * turn), abs=1e-14)
-        assert abs(piston - 0.060j) == pytest.approx(rod, abs=1e-14)
+        pin = place(state, f"P{k + 1}")
+        assert pin == pytest.approx(far * np.exp(1j * turn), abs=1e-14)
+        assert abs(pin - 0.060j) == pytest.approx(rod, abs=1e-14)
 
 
 @pytest.mark.parametrize("degrees", [-60, -20, 0, 15, 50, 90])
@@ -322,7 +310,7 @@ def test_the_toggle_press_follows_its_triangles(degrees):
     state = state_turned_by("toggle-press", "A0", degrees)
     centre, angle, w = 0.260 - 0.160j, np.radians(60 + degrees), 2 * np.pi
     pin = centre + 0.040 * np.exp(1j * angle)
-    knee = corner(pin, 0.216, 0, 0.200)
+    knee = meeting(pin, 0.216, 0, 0.200)
     assert place(state, "B") == pytest.approx(knee, abs=1e-14)
     assert place(state, "D") == pytest.approx(2j * knee.imag, abs=1e-14)
     # the knee's speed along the rod is the crank pin's
@@ -340,7 +328,7 @@ def test_the_toggle_press_follows_its_triangles(degrees):
 def test_the_toggle_press_gains_as_it_straightens():
     """As the crank comes into line with its rod the knee straightens, and its torque counts for more at the ram."""
     centre = 0.260 - 0.160j
-    knee = corner(centre, 0.256, 0, 0.200)
+    knee = meeting(centre, 0.256, 0, 0.200)
     in_line = np.angle(knee - centre)
     before = [at("toggle-press", in_line - np.radians(d)) for d in (60, 40, 20, 10, 5, 2, 1)]
     gains = [2 * np.pi / abs(velocity(state, "D").imag) for state in before]
@@ -376,7 +364,7 @@ def atkinsons_piston(angle: float) -> tuple[float, float]:
     def reached(a: complex) -> tuple[complex, complex]:
         pin, moved = 0.120 * np.exp(1j * a), 0.120j * np.exp(1j * a)
         q = 0.110 + 0.170j
-        b = corner(q, 0.375, pin, 0.430)
+        b = meeting(q, 0.375, pin, 0.430)
         # b turns about q, so that the rod keeps its length
         turn = dot(moved, b - pin) / dot(1j * (b - q), b - pin)
         return pin + (b - pin) * 605 / 430, moved + (1j * turn * (b - q) - moved) * 605 / 430
@@ -484,14 +472,14 @@ def test_watt_1_and_stephenson_1_fall_into_two_dyads(degrees):
     """Each dyad's pin is the corner of a triangle on what was found before."""
     crank = np.exp(1j * np.radians(60 + degrees))
     watt = state_turned_by("watt-1-six-bar", "A0", degrees)
-    b = corner(0.080 * crank, 0.220, 0.230, 0.160)
+    b = meeting(0.080 * crank, 0.220, 0.230, 0.160)
     d = 0.080 * crank + 0.180 * np.exp(1j * (np.angle(b - 0.080 * crank) + np.radians(50)))
     c = 0.110 * crank * np.exp(1j * np.radians(60))
     assert place(watt, "B") == pytest.approx(b, abs=1e-13)
-    assert place(watt, "E") == pytest.approx(corner(c, 0.200, d, 0.170), abs=1e-13)
+    assert place(watt, "E") == pytest.approx(meeting(c, 0.200, d, 0.170), abs=1e-13)
     stephenson = state_turned_by("stephenson-1-six-bar", "A0", degrees)
-    b = corner(0.070 * crank, 0.240, 0.250, 0.150)
+    b = meeting(0.070 * crank, 0.240, 0.250, 0.150)
     d = 0.250 + 0.140 * np.exp(1j * (np.angle(b - 0.250) - np.radians(45)))
     c = 0.090 * crank * np.exp(1j * np.radians(40))
     assert place(stephenson, "B") == pytest.approx(b, abs=1e-13)
-    assert place(stephenson, "E") == pytest.approx(corner(c, 0.240, d, 0.220), abs=1e-13)
+    assert place(stephenson, "E") == pytest.approx(meeting(c, 0.240, d, 0.220), abs=1e-13)

@@ -10,6 +10,7 @@ from planar.analysis.worked.published import compare_published
 from planar.document import files
 from planar.model.mechanism import Drive
 from planar.solving.position import PositionSolver
+from tests.closed_forms import piston
 
 TEXTBOOK = [file for file in files.model_files() if file.parent.name == "textbook"]
 IDS = [
@@ -98,9 +99,7 @@ def test_the_toggle_follows_its_branch_round_a_whole_turn(degrees, x):
 def test_twelve_positions_of_the_slider_crank(degrees):
     r, rod, a = 0.03, 0.1, np.radians(degrees)
     state = planar.solve(planar.load("004-SC12"), [Drive("O", a)])
-    assert state.point("B").position == pytest.approx(
-        [r * np.cos(a) + np.sqrt(rod**2 - (r * np.sin(a)) ** 2), 0], abs=1e-15
-    )
+    assert state.point("B").position == pytest.approx([piston(a, r, rod)[0], 0], abs=1e-15)
     middle = 0.7 * state.point("A").position + 0.3 * state.point("B").position
     assert state.point("D").position == pytest.approx(middle, abs=1e-15)
 

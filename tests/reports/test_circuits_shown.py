@@ -5,7 +5,7 @@ import subprocess
 import sys
 from functools import cache
 from itertools import combinations, pairwise
-from math import acos, degrees, isclose, pi
+from math import degrees, isclose, pi
 from types import SimpleNamespace
 
 import numpy as np
@@ -20,6 +20,7 @@ from planar.drawing.circuits.equal_curves import merge_equal_charts
 from planar.drawing.labels.text_metrics import format_tick
 from planar.model.wording import number_ranges
 from tests import command
+from tests.closed_forms import between
 from tests.draws import part
 from tests.figures import text_boxes
 from tests.fonts import own_fonts  # noqa: F401
@@ -73,7 +74,7 @@ def rocker_limits():
     """Where crank and coupler are in line, by the law of cosines (deg), from the frame's x-axis."""
     ends = []
     for reach in (COUPLER - CRANK, COUPLER + CRANK):
-        inner = degrees(acos((ROCKER**2 + BASE**2 - reach**2) / (2.0 * ROCKER * BASE)))
+        inner = degrees(between(ROCKER, BASE, reach))
         ends += [180.0 - inner, 180.0 + inner]
     return sorted(ends)
 

@@ -17,6 +17,7 @@ from planar.drawing.output.animation import plan_animation
 from planar.dynamics import simulation
 from planar.foundation.errors import Outcome
 from planar.model.loads import Load, Mass, Spring
+from tests.closed_forms import piston
 from tests.command import run
 from tests.known import MODELS
 
@@ -166,7 +167,7 @@ def test_over_a_turn_inertia_supplies_nothing_and_the_mean_torque_is_the_work_of
     text = run(tmp_path, "forces", "two-stroke-engine", "--cycle", "--steps", "3600").done()
     (load,) = MODELS["two-stroke-engine"].loads
     at, r, rod = np.linspace(0, 2 * pi, 200_001), 0.03, 0.11
-    way = -r * np.sin(at) * (1 + r * np.cos(at) / np.sqrt(rod**2 - (r * np.sin(at)) ** 2))
+    way = piston(at, r, rod)[1]
     work = np.trapezoid(-283 * np.interp(at, load.varies.at, load.varies.factors) * way, at)
     assert float(row(text, "Inputs", "O")[1]) == pytest.approx(-work / (2 * pi), rel=1e-4)
 

@@ -62,7 +62,7 @@ COMMANDS: list[tuple[str, ...]] = [
 
 
 @cache
-def press() -> str:
+def press_of_readme() -> str:
     """The mechanism of the README."""
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     return text.split("<!-- file: press.json -->\n```json\n")[1].split("```")[0]
@@ -70,7 +70,7 @@ def press() -> str:
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    (tmp_path / "press.json").write_text(press(), encoding="utf-8")
+    (tmp_path / "press.json").write_text(press_of_readme(), encoding="utf-8")
     stuck = json.loads((ROOT / "models" / "four-bar.json").read_text(encoding="utf-8"))
     stuck["links"]["BC"] = {"ends": ["B", "C"], "length": 20}
     (tmp_path / "stuck.json").write_text(json.dumps(stuck), encoding="utf-8")

@@ -16,47 +16,20 @@ from planar.model.pairs.guide_line import LinkLine
 from planar.solving.continuation import path, predictor_corrector
 from planar.solving.continuation.period import Period
 from planar.solving.position import PositionSolver
+from tests.builders import four_bar_document, slider_crank_document
 from tests.watchdog import watched
 
 SURE = 1e-7
 """What is not told is better than this."""
 
 
-def four_bar(crank, coupler, rocker, frame, angle, sketch, velocity=1.0, acceleration=0.5):
-    return {
-        "planar": 1,
-        "name": "four-bar",
-        "frame": "OQ",
-        "links": {
-            "OQ": {"points": {"O": [0, 0], "Q": [frame, 0]}},
-            "OA": {"ends": ["O", "A"], "length": crank},
-            "AB": {"ends": ["A", "B"], "length": coupler},
-            "QB": {"ends": ["Q", "B"], "length": rocker},
-        },
-        "pairs": [{"turning": name} for name in "OABQ"],
-        "inputs": [{"pair": "O", "position": angle, "velocity": velocity, "acceleration": acceleration}],
-        "sketch": {"B": list(sketch)},
-    }
+def sketched_four_bar(crank, coupler, rocker, frame, angle, sketch, velocity=1.0, acceleration=0.5):
+    more = {"omega": velocity, "alpha": acceleration, "sketch": {"B": list(sketch)}}
+    return four_bar_document(crank, coupler, rocker, frame, angle, pins="OABQ", **more)
 
 
-def slider_crank(crank, rod, offset, angle, sketch):
-    return {
-        "planar": 1,
-        "name": "slider-crank",
-        "frame": "frame",
-        "links": {
-            "frame": {"points": {"O": [0, 0], "P": [0, offset]}},
-            "crank": {"ends": ["O", "A"], "length": crank},
-            "rod": {"ends": ["A", "B"], "length": rod},
-        },
-        "pairs": [
-            {"turning": "O"},
-            {"turning": "A"},
-            {"sliding": "stroke", "on": "frame", "block": "B", "line": {"through": "P"}},
-        ],
-        "inputs": [{"pair": "O", "position": angle, "velocity": 1.0, "acceleration": 0.5}],
-        "sketch": {"B": list(sketch)},
-    }
+def sketched_slider_crank(crank, rod, offset, angle, sketch):
+    return slider_crank_document(crank, rod, angle, offset, alpha=0.5, sketch={"B": list(sketch)})
 
 
 @pytest.fixture(autouse=True)
@@ -146,7 +119,7 @@ def told_error(state):
 
 @pytest.mark.parametrize(
     ("drawn", "value", "exact"),
-    [(short_four_bars, four_bar, of_four_bar), (short_rods, slider_crank, of_slider_crank)],
+    [(short_four_bars, sketched_four_bar, of_four_bar), (short_rods, sketched_slider_crank, of_slider_crank)],
 )
 def test_the_rates_of_short_links_are_as_exact_as_is_told_or_refused(drawn, value, exact):
     refused, solved = [], []
@@ -154,7 +127,7 @@ def test_the_rates_of_short_links_are_as_exact_as_is_told_or_refused(drawn, valu
         both = [exact(*given, side) for side in (1, -1)]
         if both[0] is None:
             continue
-        least = min(each for each in given[:3] if each) if value is four_bar else given[1]
+        least = min(each for each in given[:3] if each) if value is sketched_four_bar else given[1]
         try:
             state = planar.solve(planar.from_dict(value(*given, both[0][0])))
         except NoAnswer as problem:
@@ -181,7 +154,7 @@ def test_a_wrong_velocity_beside_a_very_fast_link_breaks_its_own_constraint():
     """A link of 1e-8 turns 1e8 times as fast as those that it joins: what is wrong of them is no less wrong for it."""
     angle, rocker = 0.2, 0.7
     frame = float(np.cos(angle) + np.sqrt(rocker**2 - np.sin(angle) ** 2)) + 3e-9
-    given = four_bar(1.0, 1e-8, rocker, frame, angle, of_four_bar(1.0, 1e-8, rocker, frame, angle, 1)[0])
+    given = sketched_four_bar(1.0, 1e-8, rocker, frame, angle, of_four_bar(1.0, 1e-8, rocker, frame, angle, 1)[0])
     solver = PositionSolver(planar.from_dict(given))
     state = solver.state(solver.find_assembly().z)
     assert abs(state.link("AB").angular_velocity) > 1e7
@@ -202,7 +175,7 @@ def test_every_way_to_run_a_linkage_holds_what_rounding_leaves(backend):
     angle, coupler, rocker = 0.5, 1e-12, 0.6
     frame = float(np.cos(angle) + np.sqrt(rocker**2 - np.sin(angle) ** 2)) + 0.3 * coupler
     sketch = of_four_bar(1.0, coupler, rocker, frame, angle, 1)[0]
-    mechanism = planar.from_dict(four_bar(1.0, coupler, rocker, frame, angle, sketch))
+    mechanism = planar.from_dict(sketched_four_bar(1.0, coupler, rocker, frame, angle, sketch))
     whole = {"start": angle, "stop": angle + 0.2 * coupler}
     with pytest.raises(NoAnswer, match="too inexact"):
         planar.cycle(mechanism, 4, **whole)
@@ -266,7 +239,7 @@ def off_closed_form(lengths, angle, point_velocity):
 @pytest.mark.parametrize("lengths", [ROCKER, DRAG_LINK])
 def test_a_crank_far_round_is_followed_over_whole_turns_at_once(lengths, monkeypatch):
     """A motion that comes back goes on as before, so that no walk need go through all its turns."""
-    mechanism = planar.from_dict(four_bar(*lengths, 0.0, of_four_bar(*lengths, 0.0, 1)[0]))
+    mechanism = planar.from_dict(sketched_four_bar(*lengths, 0.0, of_four_bar(*lengths, 0.0, 1)[0]))
     asked = []
     real = path.follow_samples
     monkeypatch.setattr(path, "follow_samples", lambda *given: asked.append(len(given[3])) or real(*given))
@@ -281,7 +254,7 @@ def test_a_crank_far_round_is_followed_over_whole_turns_at_once(lengths, monkeyp
     turned = motion.link("QB").angle[-1] - motion.link("QB").angle[0]
     assert abs(turned - (far if lengths is DRAG_LINK else 0.0)) < 2.0 * np.pi
     assert sum(asked) < 5000
-    at_once = planar.solve(planar.from_dict(four_bar(*lengths, 1e6, motion.point("B").position[0])))
+    at_once = planar.solve(planar.from_dict(sketched_four_bar(*lengths, 1e6, motion.point("B").position[0])))
     assert off_closed_form(lengths, 1e6, at_once.point("B").velocity) <= 20.0 * np.finfo(float).eps * 1e6
 
 
@@ -294,7 +267,7 @@ def test_turns_without_change_points_are_not_gone_through_one_by_one():
 def test_a_far_motion_that_ends_or_does_not_come_back_says_so(monkeypatch):
     monkeypatch.setattr(predictor_corrector.ArcBudget.__init__, "__defaults__", (300, None))
     double_rocker = (0.9, 0.8, 0.5, 0.6)
-    value = four_bar(*double_rocker, 0.3, of_four_bar(*double_rocker, 0.3, 1)[0])
+    value = sketched_four_bar(*double_rocker, 0.3, of_four_bar(*double_rocker, 0.3, 1)[0])
     with pytest.raises(NoAnswer, match="cannot go beyond"):
         planar.solve(planar.from_dict(value), {"O": 1e6})
     # wheels of an irrational ratio never come back to where they meshed
@@ -315,7 +288,7 @@ def test_a_parallelogram_printed_to_fifteen_digits_runs_through_all_its_rows(off
     line: there an angle is off by as much over the square of the distance."""
     crank, frame, start, steps = 0.3, 1.0, 0.9, 360
     place = np.array([frame + crank * np.cos(start), crank * np.sin(start)])
-    mechanism = planar.from_dict(four_bar(crank, frame + off, crank, frame, start, place))
+    mechanism = planar.from_dict(sketched_four_bar(crank, frame + off, crank, frame, start, place))
     motion = planar.cycle(mechanism, steps)
     angles = motion.inputs["O"].position
     true = crank * np.stack([-np.sin(angles), np.cos(angles)], axis=1)

@@ -6,7 +6,7 @@ import pytest
 import planar
 from planar.document import files
 from planar.foundation.errors import NoAnswer, Outcome
-from tests.builders import block_slider_crank, four_bar
+from tests.builders import bar_document, block_slider_crank, four_bar
 from tests.checks import passes_residual_check, same_angles
 from tests.closed_forms import PARALLELOGRAM, TURN, antiparallelogram, coupler, rates, rocker
 
@@ -17,22 +17,11 @@ GRIDS = [(0.0, 4), (0.0, 60), (0.3, 1), (0.3, 7), (0.3, 61), (np.pi, 6), (-1.0, 
 def with_third_crank(start, at=0.7):
     """A parallelogram 1, 2 with a third crank as long as the others: its pin on the frame is at * 2 from A."""
     turn = np.array([np.cos(start), np.sin(start)])
-    links = {
-        "AD": {"points": {"A": [0, 0], "D": [2, 0], "E": [2 * at, 0]}},
-        "AB": {"ends": ["A", "B"], "length": 1},
-        "BC": {"ends": ["B", "C"], "length": 2, "points": {"F": {"along": ["B", "C"], "distance": 2 * at}}},
-        "DC": {"ends": ["D", "C"], "length": 1},
-        "EF": {"ends": ["E", "F"], "length": 1},
-    }
-    value = {
-        "planar": 1,
-        "frame": "AD",
-        "links": links,
-        "pairs": [{"turning": name} for name in "ABCDEF"],
-        "inputs": [{"pair": "A", "position": start, "velocity": 2.0, "acceleration": 1.0}],
-        "sketch": {"C": np.add(turn, (2, 0)).tolist(), "F": np.add(turn, (2 * at, 0)).tolist()},
-    }
-    return files.from_dict(value)
+    bars = {"AB": ("A", "B", 1), "BC": ("B", "C", 2, {"F": {"along": ["B", "C"], "distance": 2 * at}})}
+    bars |= {"DC": ("D", "C", 1), "EF": ("E", "F", 1)}
+    sketch = {"C": np.add(turn, (2, 0)).tolist(), "F": np.add(turn, (2 * at, 0)).tolist()}
+    frame = {"A": [0, 0], "D": [2, 0], "E": [2 * at, 0]}
+    return files.from_dict(bar_document(frame, bars, ("A", start), omega=2.0, alpha=1.0, sketch=sketch))
 
 
 def same_rates(motion, link, first, second, rows=slice(None)):
@@ -185,22 +174,10 @@ def test_backwards_the_same_change_points_are_passed(steps):
 
 def test_a_change_point_of_a_part_of_a_linkage_is_passed_with_the_whole():
     """A dyad on the coupler of a parallelogram goes on as it would by itself."""
-    links = {
-        "AD": {"points": {"A": [0, 0], "D": [2, 0], "G": [1.0, 2.5]}},
-        "AB": {"ends": ["A", "B"], "length": 1},
-        "BC": {"ends": ["B", "C"], "length": 2, "points": {"F": [1.0, 0.5]}},
-        "DC": {"ends": ["D", "C"], "length": 1},
-        "FH": {"ends": ["F", "H"], "length": 2.5},
-        "GH": {"ends": ["G", "H"], "length": 2.2},
-    }
-    value = {
-        "planar": 1,
-        "frame": "AD",
-        "links": links,
-        "pairs": [{"turning": name} for name in "ABCDFGH"],
-        "inputs": [{"pair": "A", "position": 0.3, "velocity": 2.0, "acceleration": 1.0}],
-        "sketch": {"C": [2.96, 0.3], "H": [3.5, 2.0]},
-    }
+    bars = {"AB": ("A", "B", 1), "BC": ("B", "C", 2, {"F": [1.0, 0.5]}), "DC": ("D", "C", 1)}
+    bars |= {"FH": ("F", "H", 2.5), "GH": ("G", "H", 2.2)}
+    frame, sketch = {"A": [0, 0], "D": [2, 0], "G": [1.0, 2.5]}, {"C": [2.96, 0.3], "H": [3.5, 2.0]}
+    value = bar_document(frame, bars, ("A", 0.3), omega=2.0, alpha=1.0, sketch=sketch)
     motion = planar.cycle(files.from_dict(value), 8, 0.0, TURN)
     theta = motion.inputs["A"].position
     # F moves as B does, by [1, 0.5]: a four-bar of its own with crank 1 about [1, 0.5], frame 2 upwards

@@ -9,21 +9,9 @@ from planar.solving import position
 from planar.solving.checks.branch_check import BranchCheck, is_move_allowed
 from planar.solving.continuation.path import follow_samples, follow_to
 from planar.solving.position import PositionSolver
+from tests.builders import four_bar_document
 
-CRANK = {
-    "planar": 1,
-    "name": "crank-rocker",
-    "frame": "AD",
-    "links": {
-        "AD": {"points": {"A": [0, 0], "D": [1.0, 0]}},
-        "AB": {"ends": ["A", "B"], "length": 0.3},
-        "BC": {"ends": ["B", "C"], "length": 0.9},
-        "DC": {"ends": ["D", "C"], "length": 0.7},
-    },
-    "pairs": [{"turning": name} for name in "ABCD"],
-    "inputs": [{"pair": "A", "position": 0.8, "velocity": 2.0, "acceleration": 1.0}],
-    "sketch": {"C": [0.9, 0.7]},
-}
+CRANK = four_bar_document(0.3, 0.9, 0.7, 1.0, 0.8, omega=2.0, alpha=1.0, sketch={"C": [0.9, 0.7]})
 
 
 @pytest.fixture

@@ -15,6 +15,7 @@ from tests.closed_forms import (
     TRIPLE_LIMIT,
     TURN,
     antiparallelogram,
+    between,
     coupler,
     rates,
     rocker,
@@ -79,7 +80,7 @@ def test_the_circuit_of_a_triple_rocker_goes_through_both_assemblies(closed, ste
 def test_the_limits_of_a_circuit_come_in_its_order():
     """The follower turns back where crank and coupler are in line, once in each assembly."""
     motion = planar.cycle(four_bar(*TRIPLE, 0.6), 12, circuit=True)
-    swing = np.arccos((D * D + (A + B) ** 2 - C * C) / (2 * D * (A + B)))
+    swing = between(D, A + B, C)
     found = motion.limits
     assert [(each.kind, each.of) for each in found] == 2 * [(DEAD, "A"), ("stroke end", "D")]
     np.testing.assert_allclose([each.input for each in found], [TRIPLE_LIMIT, -swing, -TRIPLE_LIMIT, swing], atol=1e-12)

@@ -14,7 +14,7 @@ from planar.solving.position import PositionSolver
 from planar.solving.runs import samples as motion_rows
 from tests.builders import block_slider_crank, four_bar
 from tests.checks import passes_residual_check, same_angles
-from tests.closed_forms import PARALLELOGRAM, ROCKER, TRIPLE, TURN, coupler, rates, rocker
+from tests.closed_forms import PARALLELOGRAM, ROCKER, TRIPLE, TURN, between, coupler, rates, rocker
 from tests.command import run
 from tests.draws import part
 
@@ -111,7 +111,7 @@ def test_a_rockers_range_ends_where_coupler_and_follower_stretch(closed):
     mechanism = four_bar(*TRIPLE, 0.6, closed)
     motion = planar.cycle(mechanism, 120)
     theta = motion.inputs["A"].position
-    limit = np.arccos((a * a + d * d - (b + c) ** 2) / (2 * a * d))
+    limit = between(a, d, b + c)
     np.testing.assert_allclose(theta[[0, -1]], [-limit, limit], atol=1e-13)
     np.testing.assert_allclose(np.diff(theta), (theta[-1] - theta[0]) / 120, rtol=1e-9)
     assert motion.outcome is Outcome.SOLVED
@@ -268,7 +268,7 @@ def test_a_mechanism_that_has_no_position_has_no_run():
 
 
 def test_a_start_beyond_the_limit_is_refused_with_the_limit():
-    limit = np.arccos((0.9**2 + 1.5**2 - 1.55**2) / (2 * 0.9 * 1.5))
+    limit = between(0.9, 1.5, 1.55)
     with pytest.raises(NoAnswer) as refused:
         planar.cycle(four_bar(*TRIPLE, 0.6), start=2.0)
     assert refused.value.outcome is Outcome.DEAD_POINT
@@ -281,7 +281,7 @@ def test_a_start_beyond_the_limit_is_refused_with_the_limit():
 @pytest.mark.parametrize("steps", [1, 2, 7, 37, 360])
 @pytest.mark.parametrize("stop", [1.4, 2.5, 5.0])
 def test_a_run_past_a_limit_stops_there_and_keeps_its_rows(steps, stop):
-    limit = np.arccos((0.9**2 + 1.5**2 - 1.55**2) / (2 * 0.9 * 1.5))
+    limit = between(0.9, 1.5, 1.55)
     mechanism = four_bar(*TRIPLE, 0.6)
     motion = planar.cycle(mechanism, steps, 0.6, stop)
     wanted = np.linspace(0.6, stop, steps + 1)
@@ -481,7 +481,7 @@ def test_a_run_that_stops_ends_with_1_and_what_was_reached(tmp_path):
     ended = run(tmp_path, "cycle", "triple-rocker", "--to", "100deg", "--steps", "12", "--json")
     sentence = ended.refused(1)
     told = json.loads(ended.out)
-    limit = np.degrees(np.arccos((90**2 + 150**2 - 155**2) / (2 * 90 * 150)))
+    limit = np.degrees(between(90, 150, 155))
     assert told["outcome"] == "dead point"
     assert told["reason"] in sentence
     assert f"A0 = {limit:.6g} deg" in sentence

@@ -13,6 +13,7 @@ from planar.equations.minors import _determinant
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.solving.assembly.block_assemblies import block_dependencies
 from planar.solving.position import solved_mechanism
+from tests.closed_forms import piston
 from tests.command import run
 from tests.page_scripts import in_node, needs_node
 
@@ -40,7 +41,7 @@ def jaw(pins=(0.0, 2.0), at=0.3, velocity=0.1, **more):
     return mechanism({"f": {"points": frame}, "b": {"points": body}}, pairs, inputs, **more)
 
 
-def press(inputs, **more):
+def press_in_two_slots(inputs, **more):
     """A crank of 0.5 m and a rod of 2.5 m that move a body in two parallel slots; its pin B right above the crank's."""
     links = {
         "f": {"points": {"P": [0, 0], "Q": [2, 0], "O": [1, -3]}},
@@ -54,15 +55,12 @@ def press(inputs, **more):
 
 
 def turned(position=0.3, **more):
-    return press([{"pair": "O", "position": position, "velocity": 1.0}], sketch={"B": [1, 0]}, **more)
+    return press_in_two_slots([{"pair": "O", "position": position, "velocity": 1.0}], sketch={"B": [1, 0]}, **more)
 
 
 def height(theta):
     """Of the rod's end above an in-line crank (0.5, 2.5), with its slope and bend by the angle."""
-    root = sqrt(2.5**2 - (0.5 * cos(theta)) ** 2)
-    slope = 0.25 * sin(theta) * cos(theta) / root
-    bend = 0.25 * (cos(theta) ** 2 - sin(theta) ** 2) / root - slope**2 / root
-    return 0.5 * sin(theta) + root, 0.5 * cos(theta) + slope, -0.5 * sin(theta) + bend
+    return piston(theta - pi / 2, 0.5, 2.5)
 
 
 @pytest.mark.parametrize("pins", [(0.0, 2.0), (0.0, 2.0, 5.0), (0.0, 1e-3), (0.0, 2.0, 5.0, 9.0)])
@@ -124,7 +122,7 @@ def test_its_whole_turn_with_third_rates_has_the_stroke_ends_of_the_crank():
 
 def test_driven_at_a_slot_it_goes_from_dead_point_to_dead_point_and_all_round():
     """The crank is in line with the rod at y = 0 and y = -1."""
-    mechanism_ = press([{"pair": "p", "position": -0.4, "velocity": 1.0}], sketch={"A": [1.5, -3]})
+    mechanism_ = press_in_two_slots([{"pair": "p", "position": -0.4, "velocity": 1.0}], sketch={"A": [1.5, -3]})
     motion = planar.cycle(mechanism_, steps=6)
     assert motion.inputs["p"].position[[0, -1]] == pytest.approx([-1.0, 0.0], abs=1e-9)
     round_ = planar.cycle(mechanism_, steps=6, circuit=True)
@@ -135,7 +133,7 @@ def test_driven_at_a_slot_it_goes_from_dead_point_to_dead_point_and_all_round():
 
 @pytest.mark.parametrize(("branch", "sense"), [(1, 1.0), (2, -1.0)])
 def test_a_start_on_its_dead_point_is_told_as_one_and_left_either_way(branch, sense):
-    mechanism_ = press([{"pair": "p", "position": 0.0, "velocity": 1.0}], sketch={"A": [1, -2.5]})
+    mechanism_ = press_in_two_slots([{"pair": "p", "position": 0.0, "velocity": 1.0}], sketch={"A": [1, -2.5]})
     with pytest.raises(NoAnswer) as refused:
         planar.solve(mechanism_)
     assert refused.value.outcome is Outcome.DEAD_POINT

@@ -6,9 +6,10 @@ import pytest
 import planar
 from planar.document import files
 from planar.foundation.errors import NoAnswer, Outcome
+from tests.builders import four_bar_document
 
 
-def cranks(turn, places, omega=3.0, alpha=2.0, frame=0.0, shift=0j, unit="m", radius=1.0, heights=None):
+def cranks_on_one_rod(turn, places, omega=3.0, alpha=2.0, frame=0.0, shift=0j, unit="m", radius=1.0, heights=None):
     """Equal cranks on one rod, their shafts at these places (and heights) along a line turned by `frame`."""
     feet = [(x + 1j * y) * radius for x, y in zip(places, heights or [0.0] * len(places), strict=True)]
     shafts = [shift + foot * np.exp(1j * frame) for foot in feet]
@@ -30,18 +31,9 @@ def cranks(turn, places, omega=3.0, alpha=2.0, frame=0.0, shift=0j, unit="m", ra
     return files.from_dict(value)
 
 
-def four_bar(a, b, c, d, theta, at):
-    links = {
-        "f": {"points": {"A": [0, 0], "D": [d, 0]}},
-        "AB": {"ends": ["A", "B"], "length": a},
-        "BC": {"ends": ["B", "C"], "length": b},
-        "DC": {"ends": ["D", "C"], "length": c},
-    }
-    inputs = [{"pair": "A", "position": theta, "velocity": 3.0, "acceleration": 0.5}]
-    pairs = [{"turning": name} for name in "ABCD"]
-    return files.from_dict(
-        {"planar": 1, "frame": "f", "links": links, "pairs": pairs, "inputs": inputs, "sketch": {"C": at}}
-    )
+def flat_four_bar(a, b, c, d, theta, at):
+    names, sketch = ["f", "AB", "BC", "DC"], {"C": at}
+    return planar.from_dict(four_bar_document(a, b, c, d, theta, names=names, omega=3.0, alpha=0.5, sketch=sketch))
 
 
 def outcome(mechanism):
@@ -67,7 +59,7 @@ def translates(state, turn, omega, alpha):
 )
 @pytest.mark.parametrize(("omega", "alpha"), [(3.0, 2.0), (-40.0, 1000.0), (1.0, 0.0), (0.2, -5.0)])
 def test_cranks_in_line_are_solved_to_round_off_where_they_lie_flat(turn, places, omega, alpha):
-    state = planar.solve(cranks(turn, places, omega, alpha))
+    state = planar.solve(cranks_on_one_rod(turn, places, omega, alpha))
     assert state.mobility == 1
     translates(state, turn, omega, alpha)
     assert any("the only one that goes on" in remark for remark in state.remarks)
@@ -85,7 +77,7 @@ def test_cranks_in_line_are_solved_to_round_off_where_they_lie_flat(turn, places
     [("mm", 50.0, 0j, 0.0), ("km", 0.002, 0j, 0.0), ("m", 1.0, 3 - 4j, 0.7), ("mm", 8.0, 70 + 10j, -2.5)],
 )
 def test_flat_cranks_in_any_unit_place_and_direction(turn, unit, radius, shift, frame):
-    state = planar.solve(cranks(turn, (0, 2, 0.8), unit=unit, radius=radius, shift=shift, frame=frame))
+    state = planar.solve(cranks_on_one_rod(turn, (0, 2, 0.8), unit=unit, radius=radius, shift=shift, frame=frame))
     translates(state, turn + frame, 3.0, 2.0)
 
 
@@ -94,7 +86,7 @@ def test_flat_cranks_in_any_unit_place_and_direction(turn, unit, radius, shift, 
 def test_beside_the_flat_position_no_rate_is_wrong(turn, beside):
     """So near to it that rounding hides which branch it is, it may be refused."""
     try:
-        state = planar.solve(cranks(turn + beside, (0, 2, 0.8)))
+        state = planar.solve(cranks_on_one_rod(turn + beside, (0, 2, 0.8)))
     except NoAnswer:
         assert beside < 1e-5
         return
@@ -107,7 +99,7 @@ def test_beside_the_flat_position_no_rate_is_wrong(turn, beside):
 @pytest.mark.parametrize("omega", [1e-3, 1e-5])
 def test_how_slowly_flat_cranks_turn_does_not_matter(turn, omega):
     """The same motion in other units of time: rates go with the speed."""
-    state = planar.solve(cranks(turn, (0, 2, 0.8), omega, 0.0))
+    state = planar.solve(cranks_on_one_rod(turn, (0, 2, 0.8), omega, 0.0))
     for name in ("c0", "c1", "c2"):
         assert state.link(name).angular_velocity == pytest.approx(omega, rel=1e-9)
         assert state.link(name).angular_acceleration == pytest.approx(0.0, abs=1e-9 * omega**2)
@@ -116,7 +108,7 @@ def test_how_slowly_flat_cranks_turn_does_not_matter(turn, omega):
 @pytest.mark.parametrize("turn", [0.0, np.pi])
 @pytest.mark.parametrize("omega", [3.0, -0.5])
 def test_cranks_out_of_line_need_no_second_order(turn, omega):
-    state = planar.solve(cranks(turn, (0, 2, 0.8), omega, 2.0, heights=(0, 0, 0.7)))
+    state = planar.solve(cranks_on_one_rod(turn, (0, 2, 0.8), omega, 2.0, heights=(0, 0, 0.7)))
     translates(state, turn, omega, 2.0)
     assert not any("first order" in remark for remark in state.remarks)
 
@@ -125,7 +117,7 @@ def test_cranks_out_of_line_need_no_second_order(turn, omega):
 @pytest.mark.parametrize("places", [(0, 2), (0, 2, 2)], ids=["two", "two of them side by side"])
 def test_where_two_motions_go_on_neither_is_chosen(places, turn):
     """Crank 2 beside crank 1 is one bar more, and redundant; but the rod may still cross over."""
-    refused = outcome(cranks(turn, places))
+    refused = outcome(cranks_on_one_rod(turn, places))
     assert refused.outcome is Outcome.CHANGE_POINT
     assert "'rod'" in refused.reason
     assert "'c1'" in refused.reason
@@ -135,7 +127,7 @@ def test_where_two_motions_go_on_neither_is_chosen(places, turn):
 def test_a_kite_that_opens_goes_on_in_one_way_only():
     """AB = AD and BC = DC: C stays on the bisector of the angle at A; folded, the two bars may also turn about B = D,
     but not while the crank moves."""
-    state = planar.solve(four_bar(1, 2, 2, 1, 0.0, [3, 0]))
+    state = planar.solve(flat_four_bar(1, 2, 2, 1, 0.0, [3, 0]))
     # C = rho(theta) e^(i theta / 2) with rho = 3 and rho' = 0 there: phi' = 3/4 omega, beta' = 1/4 omega
     assert state.link("DC").angle == pytest.approx(0.0, abs=1e-12)
     assert state.link("DC").angular_velocity == pytest.approx(0.75 * 3.0, abs=1e-12)
@@ -145,7 +137,7 @@ def test_a_kite_that_opens_goes_on_in_one_way_only():
 
 
 def test_a_folded_kite_off_its_line_is_at_a_dead_point():
-    refused = outcome(four_bar(1, 2, 2, 1, 0.0, [1, 2]))
+    refused = outcome(flat_four_bar(1, 2, 2, 1, 0.0, [1, 2]))
     assert refused.outcome is Outcome.DEAD_POINT
     assert "'BC' and 'DC'" in refused.reason
 
@@ -161,7 +153,7 @@ def test_a_folded_kite_off_its_line_is_at_a_dead_point():
 )
 def test_flat_four_bars_at_which_two_motions_cross_are_refused(lengths, theta, at):
     """A kite driven at its long side, the parallelogram, and shortest + longest equal to the other two."""
-    refused = outcome(four_bar(*lengths, theta, at))
+    refused = outcome(flat_four_bar(*lengths, theta, at))
     assert refused.outcome in (Outcome.CHANGE_POINT, Outcome.DEAD_POINT)
     if lengths[0] + lengths[3] != lengths[1] + lengths[2] or lengths == (1, 2, 1, 2):
         assert refused.outcome is Outcome.CHANGE_POINT

@@ -11,7 +11,7 @@ from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.solving.continuation.predictor_corrector import ArcBudget
 from tests import ranges
 from tests.builders import block_slider_crank, four_bar
-from tests.closed_forms import PARALLELOGRAM, ROCKER, TRIPLE, TURN, rocker
+from tests.closed_forms import PARALLELOGRAM, ROCKER, TRIPLE, TURN, between, rocker
 
 EPS = float(np.finfo(float).eps)
 
@@ -220,7 +220,7 @@ def test_short_of_where_lines_become_parallel_a_position_and_a_run_agree(through
         assert places(motion, DEAD) == []
 
 
-def wedges(face, lift, reach, through):
+def slides_in_a_ring(face, lift, reach, through):
     """Three slides in a ring: a wedge on the floor lifts a rod, without an end."""
     points = {"A": [0, 0]} | ({"end": [reach, 0]} if reach else {})
     links = {"frame": {"points": {"O": [0, 0]}}, "wedge": {"points": points}, "rod": {"points": {"B": [0, 0]}}}
@@ -251,7 +251,7 @@ def wedges(face, lift, reach, through):
 @pytest.mark.parametrize("reach", [0.0, 0.1])
 @pytest.mark.parametrize(("face", "lift", "through"), [(30, 90, (0.0, 0.0)), (30, 60, (1.0, 0.0)), (5, 80, (0.3, 0.2))])
 def test_slides_without_an_end_have_no_limit(face, lift, through, reach):
-    mechanism = wedges(face, lift, reach, through)
+    mechanism = slides_in_a_ring(face, lift, reach, through)
     up = np.exp(1j * np.radians(lift))
     normal = 1j * np.exp(1j * np.radians(face))
 
@@ -269,7 +269,7 @@ def test_slides_without_an_end_have_no_limit(face, lift, through, reach):
 
 
 def test_a_place_too_far_out_to_be_followed_to_is_reached_as_the_refusal_says():
-    mechanism = wedges(30, 90, 0.0, (0.0, 0.0))
+    mechanism = slides_in_a_ring(30, 90, 0.0, (0.0, 0.0))
     with pytest.raises(NoAnswer, match="write the place that is wanted as the input's `position`") as refused:
         planar.solve(mechanism, {"floor": 1e7})
     assert "drive" not in refused.value.reason
@@ -383,7 +383,7 @@ def test_a_cart_with_a_linkage_on_it_runs_along_its_rail_as_far_as_is_asked(monk
 def test_dead_points_and_the_rockers_swing_of_a_triple_rocker(closed):
     a, b, c, d = TRIPLE
     motion = planar.cycle(four_bar(*TRIPLE, 0.6, closed), 12)
-    limit = np.arccos((a * a + d * d - (b + c) ** 2) / (2 * a * d))
+    limit = between(a, d, b + c)
     # the follower turns back where crank and coupler are in line: A to C is a + b, and the crank's angle that of C
     reach = (d * d + (a + b) ** 2 - c * c) / (2 * d * (a + b))
     swing, value = np.arccos(reach), rocker(*TRIPLE, np.arccos(reach), 1)
@@ -398,7 +398,7 @@ def test_dead_points_and_the_rockers_swing_of_a_triple_rocker(closed):
 
 def test_a_run_past_a_dead_point_ends_with_it_as_its_last_limit():
     a, b, c, d = TRIPLE
-    limit = np.arccos((a * a + d * d - (b + c) ** 2) / (2 * a * d))
+    limit = between(a, d, b + c)
     motion = planar.cycle(four_bar(*TRIPLE, 0.6), 12, 0.6, 3.0)
     assert motion.outcome is Outcome.DEAD_POINT
     ((kind, of, at),) = told(motion)
@@ -410,7 +410,7 @@ def test_a_run_past_a_dead_point_ends_with_it_as_its_last_limit():
 @pytest.mark.parametrize("end", [-1, 1])
 def test_a_range_that_starts_on_a_dead_point_counts_it(end):
     a, b, c, d = TRIPLE
-    limit = end * np.arccos((a * a + d * d - (b + c) ** 2) / (2 * a * d))
+    limit = end * between(a, d, b + c)
     mechanism = four_bar(*TRIPLE, limit)
     inwards = planar.cycle(mechanism, 9, limit, 0.9 * limit)
     ((kind, _, at),) = told(inwards)
@@ -439,8 +439,8 @@ def test_the_swing_of_a_rocker(closed):
     # C at b + a, or b - a, from A: the crank points at it, or away from it
     wanted = {}
     for reach, back in ((b + a, 0.0), (b - a, np.pi)):
-        turn = closed * np.arccos((d * d + reach**2 - c * c) / (2 * d * reach))
-        angle = closed * (np.pi - np.arccos((d * d + c * c - reach**2) / (2 * d * c)))
+        turn = closed * between(d, reach, c)
+        angle = closed * (np.pi - between(d, c, reach))
         wanted[0.8 + (turn + back - 0.8) % TURN] = angle
     np.testing.assert_allclose([each.input for each in found], sorted(wanted), atol=1e-12)
     for each, at in zip(found, sorted(wanted), strict=True):
@@ -448,7 +448,7 @@ def test_the_swing_of_a_rocker(closed):
 
 
 @pytest.mark.parametrize("start", [0.0, 1.0, np.pi])
-@pytest.mark.parametrize("steps", [4, 7, 90])
+@pytest.mark.parametrize("steps", [4, 90])
 @pytest.mark.parametrize("offset", [0.0, 0.1, -0.3])
 def test_top_and_bottom_dead_centre_of_a_slider_crank(start, steps, offset):
     """Crank and rod in line: the block is l + r, and l - r, from the crank's pin."""
@@ -575,8 +575,9 @@ def exact(part: int, by: float):
     return tuple(lengths), first, last
 
 
-@pytest.mark.parametrize("by", [1e-9, -1e-9, 1e-6, -1e-6])
-@pytest.mark.parametrize("part", range(4))
+@pytest.mark.parametrize(
+    ("part", "by"), [(part, by) for part in range(4) for by in (1e-9, -1e-9, 1e-6 * (-1) ** (part // 2))]
+)
 def test_a_parallelogram_a_little_off_has_true_limits(part, by):
     """It turns round, or turns back on one side or on both, as its lengths say; and how near it comes is said.
 

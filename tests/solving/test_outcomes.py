@@ -13,22 +13,12 @@ from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.model.mechanism import Drive
 from planar.model.pairs import pair_types
 from planar.solving.position import solve
+from tests.builders import four_bar_document
+from tests.closed_forms import between
 from tests.draws import part
 
-FOUR_BAR = {
-    "planar": 1,
-    "units": {"length": "mm", "angle": "deg"},
-    "frame": "AD",
-    "links": {
-        "AD": {"points": {"A": [0, 0], "D": [100, 0]}},
-        "AB": {"ends": ["A", "B"], "length": 50},
-        "BC": {"ends": ["B", "C"], "length": 66},
-        "DC": {"ends": ["D", "C"], "length": 56},
-    },
-    "pairs": [{"turning": name} for name in "ABCD"],
-    "inputs": [{"pair": "A", "position": 60, "velocity": "10 rad/s"}],
-    "sketch": {"C": [80, 50]},
-}
+MILLIMETRES = {"length": "mm", "angle": "deg"}
+FOUR_BAR = four_bar_document(50, 66, 56, 100, 60, omega="10 rad/s", units=MILLIMETRES, sketch={"C": [80, 50]})
 
 
 def changed(**top):
@@ -56,7 +46,7 @@ def test_what_cannot_be_joined_says_where_and_by_how_much():
     assert "pair '" in problem.reason
 
 
-LIMIT = np.degrees(np.arccos((50**2 + 100**2 - 122**2) / (2 * 50 * 100)))
+LIMIT = np.degrees(between(50, 100, 122))
 """The input at which BC and DC lie in one line (law of cosines)."""
 
 
@@ -464,7 +454,7 @@ def test_a_small_dyad_hung_on_a_large_linkage_does_not_weaken_it(size):
     state = solve(changed(links=links, pairs=[{"turning": name} for name in "ABCDUVR"], sketch=sketch, **given))
     assert state.mobility == 1
     # law of cosines: r of the dyad against its base, and the speed with which U leaves V along q
-    bend = np.pi - np.arccos((1 + 0.7**2 - 0.6**2) / (2 * 0.7))
+    bend = np.pi - between(1.0, 0.7, 0.6)
     assert state.link("r").angle == pytest.approx(bend, abs=1e-14 / size)
     arm = state.point("R").position - state.point("U").position
     rate = state.point("R").velocity - state.point("U").velocity

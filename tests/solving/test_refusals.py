@@ -14,6 +14,8 @@ from planar.solving.assembly.block_assemblies import BlockAssemblies
 from planar.solving.assembly.nearest_assembly import AssemblySearchFailure, find_nearest_assembly
 from planar.solving.diagnosis import remedy
 from planar.solving.prepared_mechanism import PreparedMechanism
+from tests.builders import four_bar_document, six_bar_document, slider_crank_document
+from tests.closed_forms import between
 from tests.command import run, written
 from tests.draws import part
 
@@ -42,37 +44,22 @@ def pins(names):
     return [{"turning": name} for name in names]
 
 
-def four_bar(a=50, b=66, c=56, d=100, theta=60, sketch=None, pair="A"):
-    links = {
-        "f": {"points": {"A": [0, 0], "D": [d, 0]}},
-        "AB": {"ends": ["A", "B"], "length": a},
-        "BC": {"ends": ["B", "C"], "length": b},
-        "DC": {"ends": ["D", "C"], "length": c},
-    }
-    return value(links, pins("ABCD"), [(pair, theta)], sketch or {"C": [80, 50]})
+UNITS = {"units": {"length": "mm", "angle": "deg"}}
 
 
-def slider_crank(r=50, rod=120, offset=0, theta=60, drive="O"):
-    links = {
-        "f": {"points": {"O": [0, 0]}},
-        "crank": {"ends": ["O", "A"], "length": r},
-        "rod": {"ends": ["A", "B"], "length": rod},
-    }
-    slide = {"sliding": "s", "on": "f", "block": "B", "line": {"through": [0, offset]}}
-    return value(links, [*pins("OA"), slide], [(drive, theta)], {"B": [150, offset]})
+def mm_four_bar(a=50, b=66, c=56, d=100, theta=60, sketch=None, pair="A"):
+    more = {"names": ["f", "AB", "BC", "DC"], "omega": "1 rad/s", "sketch": sketch or {"C": [80, 50]}} | UNITS
+    return four_bar_document(a, b, c, d, theta, driven=pair, **more)
 
 
-def six_bar(last=60):
-    """A dyad hung on the rocker's pin of a four-bar."""
-    links = {
-        "f": {"points": {"A": [0, 0], "D": [100, 0], "G": [200, 0]}},
-        "AB": {"ends": ["A", "B"], "length": 50},
-        "BC": {"ends": ["B", "C"], "length": 66},
-        "DC": {"ends": ["D", "C"], "length": 56},
-        "CF": {"ends": ["C", "F"], "length": 30},
-        "GF": {"ends": ["G", "F"], "length": last},
-    }
-    return value(links, pins("ABCDFG"), [("A", 60)], {"C": [80, 50], "F": [130, 50]})
+def mm_slider_crank(r=50, rod=120, offset=0, theta=60, drive="O"):
+    more = {"names": ("f", "crank", "rod"), "slide": "s", "driven": drive, "sketch": {"B": [150, offset]}} | UNITS
+    return slider_crank_document(r, rod, theta, offset, omega="1 m/s" if drive == "s" else "1 rad/s", **more)
+
+
+def mm_six_bar(last=60):
+    sketch = {"C": [80, 50], "F": [130, 50]}
+    return six_bar_document(30, last, 60, ground="f", omega="1 rad/s", sketch=sketch, **UNITS)
 
 
 def refused(given, drives=()):
@@ -93,7 +80,7 @@ BESIDE = {
     "p": {"ends": ["U", "P"], "length": 80},
     "q": {"ends": ["V", "P"], "length": 90},
 }
-BRACED = float(np.degrees(np.arccos((80**2 + 100**2 - 90**2) / (2 * 80 * 100))))
+BRACED = float(np.degrees(between(80, 100, 90)))
 """The angle of p in its triangle."""
 
 
@@ -124,18 +111,21 @@ def wheels(ratio, *inputs):
     )
 
 
-PARALLELOGRAM = four_bar(50, 100, 50, 100, 180, {"C": [50, 0]})
-LIMIT = float(np.degrees(np.arccos((50**2 + 100**2 - 122**2) / (2 * 50 * 100))))
+PARALLELOGRAM = mm_four_bar(50, 100, 50, 100, 180, {"C": [50, 0]})
+LIMIT = float(np.degrees(between(50, 100, 122)))
 """Where BC and DC of the first four-bar stretch into one line."""
 
 CASES = {
-    "cannot be assembled": (four_bar(theta=150), ["A = 150 deg", "'BC' and 'DC'", "pair '", "BC.length"]),
-    "dead point": (four_bar(theta=LIMIT), [f"A = {LIMIT:.6g} deg", "'A'", "'BC' and 'DC'", "drive 'B' or 'C' or 'D'"]),
+    "cannot be assembled": (mm_four_bar(theta=150), ["A = 150 deg", "'BC' and 'DC'", "pair '", "BC.length"]),
+    "dead point": (
+        mm_four_bar(theta=LIMIT),
+        [f"A = {LIMIT:.6g} deg", "'A'", "'BC' and 'DC'", "drive 'B' or 'C' or 'D'"],
+    ),
     "change point": (PARALLELOGRAM, ["A = 180 deg", "2 freedoms for 1 input", "'BC' and 'DC'", "a further input"]),
     "too few inputs": (twins(("A", 50)), ["1 input", "'p', 'r' and 'q'", "1 way", "'U' or 'V' or 'P' or 'R'"]),
     "too many inputs": (beside(("A", 50), ("U", 60)), ["'A' and 'U'", "the input at 'U' cannot move", "leave it out"]),
     "too inexact": (
-        four_bar(a=44, b=1e-11, c=56, theta=0, sketch={"C": [44, 0]}),
+        mm_four_bar(a=44, b=1e-11, c=56, theta=0, sketch={"C": [44, 0]}),
         ["A = 0 deg", "link 'BC' has an arm of 1e-13", "lengthen link 'BC'"],
     ),
     "input jammed": (beside(("U", 60)), ["'U'", "'f' and 'p' fast", "'AB', 'BC' and 'DC'", "drive 'A' or 'B'"]),
@@ -155,14 +145,14 @@ def test_the_command_ends_with_1_and_says_outcome_and_reason(outcome, tmp_path):
 
 
 def test_a_dead_point_on_the_way_by_the_command(tmp_path):
-    name = written(tmp_path, four_bar())
+    name = written(tmp_path, mm_four_bar())
     ended = run(tmp_path, "solve", name, "--json", "--at", "A=140")
     told = json.loads(ended.out)
     assert ended.refused(1) == f"dead point: {told['reason']}"
     assert told["outcome"] == "dead point"
     for word in (f"beyond A = {LIMIT:.6g} deg", "links 'BC' and 'DC'", "drive 'B' or 'C' or 'D'"):
         assert word in told["reason"]
-    assert refused(four_bar(), {"A": 140 * DEG}).reason == told["reason"]
+    assert refused(mm_four_bar(), {"A": 140 * DEG}).reason == told["reason"]
 
 
 def test_a_slide_that_goes_out_without_an_end_is_lost_there():
@@ -219,7 +209,7 @@ STATIONS = [(a, d, theta) for a, d in ((50, 100), (70, 100), (50, 130)) for thet
 
 @pytest.mark.parametrize(("a", "d", "theta"), part([each for each in STATIONS if diagonal(*each) > 123], 3))
 def test_bars_that_are_too_short_are_told_the_gap_and_the_length_that_just_reaches(a, d, theta):
-    given = four_bar(a, 66, 56, d, theta)
+    given = mm_four_bar(a, 66, 56, d, theta)
     problem = refused(given)
     assert problem.outcome is Outcome.CANNOT_BE_ASSEMBLED
     far = diagonal(a, d, theta)
@@ -236,7 +226,7 @@ def test_bars_that_are_too_short_are_told_the_gap_and_the_length_that_just_reach
 
 @pytest.mark.parametrize(("b", "c"), [(200, 56), (66, 230)])
 def test_a_bar_that_is_too_long_is_told_how_short_it_would_have_to_be(b, c):
-    given = four_bar(50, b, c, 100, 60)
+    given = mm_four_bar(50, b, c, 100, 60)
     problem = refused(given)
     far = diagonal(50, 100, 60)
     assert f"stays open by {abs(b - c) - far:.6g} mm" in problem.reason
@@ -262,7 +252,7 @@ def check_offer(given, reason, other=None):
 
 @pytest.mark.parametrize("offset", [100, -90])
 def test_a_rod_that_does_not_reach_its_line_is_told_so(offset):
-    given = slider_crank(50, 60, offset, -60 if offset > 0 else 60)
+    given = mm_slider_crank(50, 60, offset, -60 if offset > 0 else 60)
     problem = refused(given)
     assert problem.outcome is Outcome.CANNOT_BE_ASSEMBLED
     gap = abs(offset) + 50 * np.sin(60 * DEG) - 60
@@ -273,9 +263,9 @@ def test_a_rod_that_does_not_reach_its_line_is_told_so(offset):
 
 @pytest.mark.parametrize("last", [15, 300])
 def test_a_six_bar_whose_second_dyad_does_not_reach(last):
-    given = six_bar(last)
+    given = mm_six_bar(last)
     reason = refused(given).reason
-    at = planar.solve(files.from_dict(four_bar())).point("C").position * 1e3
+    at = planar.solve(files.from_dict(mm_four_bar())).point("C").position * 1e3
     far = float(np.hypot(*(at - [200, 0])))
     gap = far - (30 + last) if last < 100 else last - 30 - far
     assert f"by {gap:.6g} mm" in reason
@@ -299,7 +289,7 @@ def test_where_no_single_length_helps_none_is_offered():
 
 def test_a_remedy_is_looked_for_as_long_as_an_assembly_and_no_longer(monkeypatch):
     """Groups solved are counted: those of the search, and as many again at most."""
-    given = six_bar(15)
+    given = mm_six_bar(15)
     solved = []
     real = BlockAssemblies.near_sketch
     monkeypatch.setattr(BlockAssemblies, "near_sketch", lambda *each, **more: solved.append(1) or real(*each, **more))
@@ -322,27 +312,27 @@ def test_a_remedy_is_looked_for_as_long_as_an_assembly_and_no_longer(monkeypatch
 
 @pytest.mark.parametrize(("theta", "x"), [(0, 170), (180, 70)])
 def test_a_piston_cannot_move_its_crank_out_of_the_dead_centres(theta, x):
-    problem = refused(slider_crank(theta=x, drive="s"))
+    problem = refused(mm_slider_crank(theta=x, drive="s"))
     assert problem.outcome is Outcome.DEAD_POINT
     assert f"s = {x} mm" in problem.reason
     assert "'s'" in problem.reason
     assert "'crank'" in problem.reason
     drive = re.search(r"drive '(\w+)'", problem.reason).group(1)
     assert drive in "OAB"
-    state = solved(slider_crank(theta=theta))
+    state = solved(mm_slider_crank(theta=theta))
     assert state.point("B").position[0] == pytest.approx(x / 1e3)
     assert state.point("B").velocity[0] == pytest.approx(0.0, abs=1e-15)
 
 
 def test_after_driving_what_is_advised_the_dead_point_is_no_more():
-    problem = refused(four_bar(theta=LIMIT))
+    problem = refused(mm_four_bar(theta=LIMIT))
     offered = re.findall(r"'(\w)'", problem.reason.split("drive ")[1])
     assert offered == ["B", "C", "D"]
     # stretched: C on the way from D to B, 56 from D
     b = 50 * np.exp(1j * LIMIT * DEG)
     angle = float(np.degrees(np.angle(b - 100)))
     c = 100 + 56 * np.exp(1j * angle * DEG)
-    given = four_bar(theta=angle, pair="D", sketch={"C": [c.real, c.imag], "B": [b.real, b.imag]})
+    given = mm_four_bar(theta=angle, pair="D", sketch={"C": [c.real, c.imag], "B": [b.real, b.imag]})
     state = solved(given)
     assert state.link("AB").angle == pytest.approx(LIMIT * DEG, abs=1e-7)
     assert state.link("AB").angular_velocity == pytest.approx(0.0, abs=1e-6)
@@ -350,7 +340,7 @@ def test_after_driving_what_is_advised_the_dead_point_is_no_more():
 
 @pytest.mark.parametrize("theta", [0, 180])
 def test_a_further_input_leads_over_a_change_point(theta):
-    given = four_bar(50, 100, 50, 100, theta, {"C": [100 + 50 * np.cos(theta * DEG), 0]})
+    given = mm_four_bar(50, 100, 50, 100, theta, {"C": [100 + 50 * np.cos(theta * DEG), 0]})
     assert refused(given).outcome is Outcome.CHANGE_POINT
     given["inputs"].append({"pair": "D", "position": theta, "velocity": "1 rad/s"})
     state = solved(given)
@@ -477,7 +467,7 @@ def test_a_ring_of_gears_that_closes_is_not_jammed():
 
 @pytest.mark.parametrize("point", "BD")
 def test_a_pin_that_was_forgotten_is_named_with_the_links_that_it_would_join_and_mends_it(point):
-    whole = four_bar()
+    whole = mm_four_bar()
     part = whole | {"pairs": [pair for pair in whole["pairs"] if pair["turning"] != point]}
     with pytest.raises(NoAnswer) as refused:
         planar.solve(planar.from_dict(part))
@@ -489,7 +479,7 @@ def test_a_pin_that_was_forgotten_is_named_with_the_links_that_it_would_join_and
 
 @pytest.mark.parametrize(("point", "place"), [("A", "$.inputs[0].pair"), ("C", "$.sketch.C")])
 def test_a_pin_that_was_forgotten_is_named_where_the_file_counts_on_it(point, place):
-    whole = four_bar()
+    whole = mm_four_bar()
     with pytest.raises(planar.BadInput) as refused:
         planar.from_dict(whole | {"pairs": [pair for pair in whole["pairs"] if pair["turning"] != point]})
     assert refused.value.place == place
@@ -497,14 +487,14 @@ def test_a_pin_that_was_forgotten_is_named_where_the_file_counts_on_it(point, pl
 
 
 def test_a_guide_that_was_forgotten_leaves_a_link_that_hangs_by_one_pair():
-    whole = slider_crank()
+    whole = mm_slider_crank()
     with pytest.raises(NoAnswer) as refused:
         planar.solve(planar.from_dict(whole | {"pairs": whole["pairs"][:2], "sketch": {}}))
     assert "link 'rod' hangs at 'A' alone: add the pair that joins it to the rest" in refused.value.reason
 
 
 def test_names_that_stand_twice_by_chance_are_no_forgotten_pins():
-    whole = four_bar()
+    whole = mm_four_bar()
     for name in ("AB", "BC", "DC"):
         whole["links"][name]["points"] = {"G": [10, 0]}
     whole["pairs"] = [pair for pair in whole["pairs"] if pair["turning"] != "D"]
@@ -553,7 +543,7 @@ def test_whatever_the_reason_is_made_of_it_is_bounded_and_one_line():
 )
 def test_what_is_not_there_is_answered_with_what_there_is(key, wrong, offers):
     with pytest.raises(planar.BadInput) as refused:
-        planar.from_dict(four_bar() | {key: wrong})
+        planar.from_dict(mm_four_bar() | {key: wrong})
     assert offers in refused.value.sentence
 
 
@@ -567,7 +557,7 @@ def test_of_very_many_names_that_there_are_a_few_are_listed():
 def test_what_would_mend_it_is_looked_for_once_and_only_where_somebody_asks(monkeypatch):
     looked, search_for_one = [], remedy.describe_remedy
     monkeypatch.setattr(remedy, "describe_remedy", lambda *given: looked.append(given) or search_for_one(*given))
-    apart = files.from_dict(four_bar(theta=150) | {"name": "looked for once"})  # solved by no other test
+    apart = files.from_dict(mm_four_bar(theta=150) | {"name": "looked for once"})  # solved by no other test
     assert not planar.modes(apart, certify=False)
     assert len(planar.circuits(apart)) == 1
     assert not looked

@@ -19,6 +19,7 @@ from planar.solving.continuation import fast_path, path
 from planar.solving.continuation.fast_path import fast_position, fast_run
 from planar.solving.position import PositionSolver, SolvedMechanism
 from tests.builders import four_bar
+from tests.closed_forms import between
 
 ROCKER = (0.3, 0.8, 0.7, 1.0)
 CLOSED = ("crank-rocker", "crank-and-slotted-lever", "offset-slider-crank", "sewing-machine")
@@ -145,7 +146,7 @@ def test_wrong_rates_of_a_compiled_function_do_not_pass(order, monkeypatch):
 def test_a_position_beside_a_dead_point_is_left_to_the_general_path():
     """B, C and D all but in line: the crank of a triple rocker stands next to its limit."""
     lengths = (1.0, 0.8, 0.7, 0.9)
-    limit = np.arccos((1.0 + 0.9**2 - 1.5**2) / (2.0 * 0.9))
+    limit = between(1.0, 0.9, 1.5)
     near, far = (PositionSolver(four_bar(*lengths, limit - gap)) for gap in (1e-8, 0.3))
     assert fast_position(far, far.find_assembly().z) is not None
     assert fast_position(near, near.find_assembly().z) is None

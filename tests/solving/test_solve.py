@@ -11,6 +11,8 @@ import planar
 from planar.document import files
 from planar.foundation.errors import Unknown
 from planar.model.mechanism import Drive
+from tests.builders import block_slider_crank, four_bar
+from tests.closed_forms import piston, rocker
 
 DEG = np.pi / 180
 
@@ -18,17 +20,6 @@ DEG = np.pi / 180
 def mechanism(links, pairs, inputs, sketch=None, frame="frame"):
     value = {"planar": 1, "units": {"length": "m", "angle": "deg"}, "frame": frame, "links": links, "pairs": pairs}
     return files.from_dict(copy.deepcopy(value | {"inputs": inputs, "sketch": sketch or {}}))
-
-
-def four_bar(a, b, c, d, theta, omega, alpha, sketch):
-    links = {
-        "AD": {"points": {"A": [0, 0], "D": [d, 0]}},
-        "AB": {"ends": ["A", "B"], "length": a},
-        "BC": {"ends": ["B", "C"], "length": b},
-        "DC": {"ends": ["D", "C"], "length": c},
-    }
-    inputs = [{"pair": "A", "position": theta / DEG, "velocity": f"{omega} rad/s", "acceleration": f"{alpha} rad/s^2"}]
-    return mechanism(links, [{"turning": n} for n in "ABCD"], inputs, sketch, "AD")
 
 
 lengths = st.floats(0.2, 2.0)
@@ -39,13 +30,10 @@ def test_four_bar_satisfies_freudenstein_and_its_derivatives(a, b, c, d, theta, 
     """K1 cos(phi) - K2 cos(theta) + K3 = cos(theta - phi) (F. Freudenstein, Trans. ASME 77, 1955), both assemblies."""
     r = np.hypot(d - a * np.cos(theta), a * np.sin(theta))
     assume(abs(b - c) + 0.05 < r < b + c - 0.05)
-    # the closed form: the triangle BCD on the diagonal r from B to D (law of cosines)
-    back = np.arctan2(a * np.sin(theta), a * np.cos(theta) - d)
-    bend = np.arccos((c * c + r * r - b * b) / (2 * c * r))
-    phi = back - bend if up else back + bend
+    side = 1 if up else -1
+    phi = rocker(a, b, c, d, theta, side)
     omega, alpha = 2.0, -3.0
-    sketch = {"C": [d + c * np.cos(phi), c * np.sin(phi)]}
-    state = planar.solve(four_bar(a, b, c, d, theta, omega, alpha, sketch))
+    state = planar.solve(four_bar(a, b, c, d, theta, side, omega, alpha))
     found = state.link("DC")
     assert np.cos(found.angle - phi) == pytest.approx(1, abs=1e-14)
 
@@ -68,21 +56,9 @@ offsets = st.floats(-0.2, 0.2).map(lambda x: x if abs(x) > 1e-90 else 0.0)  # no
 def test_offset_slider_crank(r, ratio, offset, theta):
     """x = r cos + sqrt(l^2 - (r sin - e)^2), differentiated by hand."""
     rod = r * ratio + abs(offset)
-    links = {
-        "frame": {"points": {"O": [0, 0]}},
-        "crank": {"ends": ["O", "A"], "length": r},
-        "rod": {"ends": ["A", "B"], "length": rod},
-    }
-    pairs = [{"turning": "O"}, {"turning": "A"}]
-    pairs.append({"sliding": "s", "on": "frame", "block": "B", "line": {"through": [0, offset]}})
-    inputs = [{"pair": "O", "position": theta / DEG, "velocity": "3 rad/s", "acceleration": "-1 rad/s^2"}]
-    state = planar.solve(mechanism(links, pairs, inputs))  # no sketch: the slide ahead of `through`
-    w, al, s, c = 3.0, -1.0, np.sin(theta), np.cos(theta)
-    g = r * s - offset
-    root = np.sqrt(rod**2 - g**2)
-    x = r * c + root
-    dx = -r * s - g * r * c / root
-    ddx = -r * c - (r * r * c * c - g * r * s) / root - (g * r * c) ** 2 / root**3
+    state = planar.solve(block_slider_crank(r, rod, offset, theta))  # no sketch: the slide ahead of `through`
+    w, al = 3.0, -1.0
+    x, dx, ddx = piston(theta, r, rod, offset)
     scale = r * ratio
     assert state.point("B").position == pytest.approx([x, offset], abs=1e-14 * 10)
     assert state.point("B").velocity == pytest.approx([dx * w, 0], abs=1e-12 * scale * 10)
@@ -137,7 +113,7 @@ def test_slotted_link_with_its_coriolis_part(theta):
 
 
 def test_between_two_points_of_a_link_nothing_slides_and_no_coriolis_part_is_left():
-    state = planar.solve(four_bar(0.5, 1.2, 1.0, 1.4, 1.0, 3.0, 1.0, {"C": [1.5, 1.0]}))
+    state = planar.solve(four_bar(0.5, 1.2, 1.0, 1.4, 1.0, 0, 3.0, 1.0, points=None, sketch={"C": [1.5, 1.0]}))
     parts = state.relative("C", "B")
     link = state.link("BC")
     assert parts.axes == "BC"
@@ -152,7 +128,7 @@ def test_between_two_points_of_a_link_nothing_slides_and_no_coriolis_part_is_lef
 
 
 def test_relative_motion_of_points_on_no_common_link_asks_for_axes():
-    state = planar.solve(four_bar(0.5, 1.2, 1.0, 1.4, 1.0, 3.0, 1.0, {"C": [1.5, 1.0]}))
+    state = planar.solve(four_bar(0.5, 1.2, 1.0, 1.4, 1.0, 0, 3.0, 1.0, points=None, sketch={"C": [1.5, 1.0]}))
     with pytest.raises(Unknown, match="name the link"):
         state.relative("A", "C")
     parts = state.relative("A", "C", axes="BC")
@@ -163,7 +139,7 @@ def test_relative_motion_of_points_on_no_common_link_asks_for_axes():
 
 @pytest.mark.parametrize("name", ["nobody", "BC", "X.Y"])
 def test_unknown_names_are_answered_with_the_known_ones(name):
-    state = planar.solve(four_bar(0.5, 1.2, 1.0, 1.4, 1.0, 3.0, 1.0, {"C": [1.5, 1.0]}))
+    state = planar.solve(four_bar(0.5, 1.2, 1.0, 1.4, 1.0, 0, 3.0, 1.0, points=None, sketch={"C": [1.5, 1.0]}))
     with pytest.raises(Unknown, match="points are A, D, B and C"):
         state.point(name)
     with pytest.raises(Unknown, match="pairs are A, B, C and D"):
@@ -171,7 +147,7 @@ def test_unknown_names_are_answered_with_the_known_ones(name):
 
 
 def test_points_are_found_under_their_link_too():
-    state = planar.solve(four_bar(0.5, 1.2, 1.0, 1.4, 1.0, 3.0, 1.0, {"C": [1.5, 1.0]}))
+    state = planar.solve(four_bar(0.5, 1.2, 1.0, 1.4, 1.0, 0, 3.0, 1.0, points=None, sketch={"C": [1.5, 1.0]}))
     np.testing.assert_array_equal(state.point("BC.C").position, state.point("C").position)
 
 
@@ -290,13 +266,13 @@ def test_a_link_drawn_in_place_has_its_angle_along_its_axis():
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_the_sketch_chooses_the_assembly(side):
-    state = planar.solve(four_bar(0.5, 1.2, 1.0, 1.4, 1.0, 3.0, 1.0, {"C": [1.4, 0.8 * side]}))
+    state = planar.solve(four_bar(0.5, 1.2, 1.0, 1.4, 1.0, 0, 3.0, 1.0, points=None, sketch={"C": [1.4, 0.8 * side]}))
     assert np.sign(state.point("C").position[1]) == side
     assert state.remarks == ()
 
 
 def test_without_a_sketch_the_tie_is_named_and_the_same_assembly_taken_each_time():
-    states = [planar.solve(four_bar(0.5, 1.2, 1.0, 1.4, 1.0, 3.0, 1.0, {})) for _ in range(2)]
+    states = [planar.solve(four_bar(0.5, 1.2, 1.0, 1.4, 1.0, 0, 3.0, 1.0, points=None, sketch={})) for _ in range(2)]
     assert states[0].point("C").position[1] > 0
     np.testing.assert_array_equal(states[0].point("C").position, states[1].point("C").position)
     assert "no sketch" in states[0].remarks[0]
@@ -333,7 +309,7 @@ def test_a_sketched_point_far_down_the_chain_decides_what_lies_before_it():
 
 def test_moving_an_input_keeps_to_the_branch_where_the_sketch_would_mislead():
     """A crank-rocker carried round by half a turn: the sketch, drawn for the start, is nearer to the other assembly."""
-    start = four_bar(0.3, 0.9, 0.7, 1.0, 0.8, 1.0, 0.0, {"C": [0.9, 0.7]})
+    start = four_bar(0.3, 0.9, 0.7, 1.0, 0.8, 0, 1.0, 0.0, points=None, sketch={"C": [0.9, 0.7]})
     for turn in np.linspace(0.5, 6.0, 12):
         state = planar.solve(start, [Drive("A", 0.8 + turn)])
         b, c, d = (state.point(name).position for name in "BCD")
@@ -346,7 +322,7 @@ def test_moving_an_input_keeps_to_the_branch_where_the_sketch_would_mislead():
 
 
 def test_states_and_mechanisms_are_immutable():
-    value = four_bar(0.5, 1.2, 1.0, 1.4, 1.0, 3.0, 1.0, {"C": [1.5, 1.0]})
+    value = four_bar(0.5, 1.2, 1.0, 1.4, 1.0, 0, 3.0, 1.0, points=None, sketch={"C": [1.5, 1.0]})
     state = planar.solve(value)
     for thing, name in ((value, "name"), (state, "residual"), (value.links[0], "length"), (state.link("BC"), "angle")):
         with pytest.raises(AttributeError):

@@ -8,7 +8,7 @@ from planar.document import files
 from planar.foundation.errors import BadInput, Outcome
 from tests.builders import block_slider_crank, four_bar
 from tests.checks import passes_residual_check, same_angles
-from tests.closed_forms import PARALLELOGRAM, ROCKER, TRIPLE, TRIPLE_LIMIT, antiparallelogram, rocker
+from tests.closed_forms import PARALLELOGRAM, ROCKER, TRIPLE, TRIPLE_LIMIT, antiparallelogram, piston, rocker
 
 RISES = ["3-4-5", "4-5-6-7", "cycloidal", "harmonic", "trapezoidal", "modified trapezoidal"]
 
@@ -298,7 +298,7 @@ def test_ends_of_strokes_have_their_times(steps):
     assert {each.of for each in found} == {"s"}
     assert found[0].value == pytest.approx(np.sqrt((rod - r) ** 2 - e**2), abs=1e-13)
     turn = 1.0 + 9 / 2
-    assert found[1].value == pytest.approx(r * np.cos(turn) + np.sqrt(rod**2 - (r * np.sin(turn) - e) ** 2), abs=1e-12)
+    assert found[1].value == pytest.approx(piston(turn, r, rod, e)[0], abs=1e-12)
 
 
 # third rates of ranges

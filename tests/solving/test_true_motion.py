@@ -10,6 +10,7 @@ from planar.document import files
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.model.pairs import MeasureKind
 from planar.solving.position import PositionSolver
+from tests.builders import bar_document
 from tests.checks import passes_residual_check
 from tests.closed_forms import TURN, rocker
 from tests.draws import draws
@@ -40,28 +41,13 @@ def watt(reach, side=1):
     middle, half = 0.5 * (f + g), 0.5 * (g - f)
     high = np.sqrt((0.5 * reach) ** 2 - abs(half) ** 2)
     h = middle + side * 1j * half / abs(half) * high
-    links = {
-        "AD": {"points": {"A": [0, 0], "D": [d, 0], "G": [g.real, g.imag]}},
-        "AB": {"ends": ["A", "B"], "length": a},
-        "BC": {"ends": ["B", "C"], "length": b},
-        "DC": {
-            "ends": ["D", "C"],
-            "length": c,
-            "points": {"F": [0.6 * np.cos(0.9), -0.6 * np.sin(0.9)]},
-        },
-        "FH": {"ends": ["F", "H"], "length": 0.5 * reach},
-        "GH": {"ends": ["G", "H"], "length": 0.5 * reach},
-    }
+    arm = {"F": [0.6 * np.cos(0.9), -0.6 * np.sin(0.9)]}
+    bars = {"AB": ("A", "B", a), "BC": ("B", "C", b), "DC": ("D", "C", c, arm)}
+    bars |= {"FH": ("F", "H", 0.5 * reach), "GH": ("G", "H", 0.5 * reach)}
     c_at = d + c * np.exp(1j * phi)
-    value = {
-        "planar": 1,
-        "frame": "AD",
-        "links": links,
-        "pairs": [{"turning": name} for name in "ABCDFGH"],
-        "inputs": [{"pair": "A", "position": theta, "velocity": 1.0}],
-        "sketch": {"C": [c_at.real, c_at.imag], "H": [h.real, h.imag]},
-    }
-    return files.from_dict(value)
+    sketch = {"C": [c_at.real, c_at.imag], "H": [h.real, h.imag]}
+    frame = {"A": [0, 0], "D": [d, 0], "G": [g.real, g.imag]}
+    return files.from_dict(bar_document(frame, bars, ("A", theta), sketch=sketch))
 
 
 def apart(theta):
