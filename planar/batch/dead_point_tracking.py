@@ -282,7 +282,7 @@ class _DeadPointTracker:
         z = columns.correct(y[:, :-1], u.T)
         fine &= np.max(np.abs(z - y[:, :-1]), axis=1, initial=0.0) < 1e-3
         w = columns.coordinates(z, u.T)
-        branches, closed = DesignBranchCheck(columns, own.p), make_residual_check(own)
+        branches, closed = DesignBranchCheck(columns), make_residual_check(own)
         here = branches.evaluate(z, u.T)
         fine &= (closed.worst_residual(w, u) <= march.tolerance) & branches.is_regular(here)
         out = np.empty((wide, len(step)))

@@ -31,10 +31,10 @@ class DesignPositions(NamedTuple):
 
 
 class DesignBranchCheck(BranchCheck):
-    """The second part of the gate, for designs each with its own p (numbers, designs): see `Branch`."""
+    """The second part of the gate, for designs each with its own p: see `BranchCheck`."""
 
-    def __init__(self, columns: DesignFunctions, p: Array):
-        super().__init__(columns, p)  # type: ignore[arg-type] - it asks for slopes and equations only
+    def __init__(self, functions: DesignFunctions):
+        super().__init__(functions.program, functions.p)
 
     def evaluate(self, z: Array, u: Array) -> DesignPositions:
         """What is judged at a step; z (designs, unknowns), u (designs, inputs)."""
@@ -90,7 +90,7 @@ class DesignResidualCheck:
         self.mechanism, self.program = mechanism, program
         self.residual_check = copy(residual_check)
         self.residual_check.unit = 1.0
-        self.residual_check.numbers = split_pair_numbers(mechanism.pairs, p)
+        self.residual_check.numbers = {**split_pair_numbers(mechanism.pairs, list(p))}
         # a pin of many links has motions between links that no pair of its own joins
         for given in mechanism.inputs:
             self.residual_check.numbers.setdefault(given.pair, tuple(residual_check.numbers[given.pair]))

@@ -102,8 +102,9 @@ def iterate_steps(
     if not task.program.is_square:
         raise UnsupportedStructure("constraints hold each other more than once")
     functions = functions or DesignFunctions(task.program, task.p)
-    closed, branches = make_residual_check(task), DesignBranchCheck(functions, task.p)
-    z, moves = np.ascontiguousarray(task.z0.T), []
+    closed, branches = make_residual_check(task), DesignBranchCheck(functions)
+    z = np.ascontiguousarray(task.z0.T)
+    moves: list[Array] = []
     before, ahead, last_way = None, None, None
     good = np.ones(len(z), dtype=bool)
     for u in inputs:

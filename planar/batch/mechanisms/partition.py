@@ -105,9 +105,13 @@ def _pair_type_number(pair_type: type[Pair]) -> int:
 def quick_link_shape(link: Link) -> LinkShape:
     """The shape of a link."""
     points = link.points
-    if link.axis is not None or any(type(point.place) is not At for point in points):
+    if link.axis is not None:
         return link_shape(link)
-    drawn = {name: Vector(place.x, place.y) for name, place in points}  # type: ignore[union-attr]
+    drawn: dict[str, Vector] = {}
+    for name, place in points:
+        if type(place) is not At:
+            return link_shape(link)
+        drawn[name] = Vector(place.x, place.y)
     if link.ends is not None:
         drawn = {link.ends[0]: ORIGIN, link.ends[1]: Vector(link.length, 0.0)} | drawn
     return LinkShape(drawn, ORIGIN, X_AXIS)
@@ -134,7 +138,10 @@ class _Partitioner:
         many = len(number)
         self.neighbours: list[list[tuple[int, int]]] = [[] for _ in range(many)]
         "for every link the links beside it, each with the pair between"
-        self.pairs, self.prevented_motions, self.ends, self.is_symmetric = list(mechanism.pairs), [], [], []
+        self.pairs = list(mechanism.pairs)
+        self.prevented_motions: list[int] = []
+        self.ends: list[tuple[int, int]] = []
+        self.is_symmetric: list[bool] = []
         for k, pair in enumerate(self.pairs):
             about = _pair_type_facts(type(pair))
             if about is None:
@@ -198,7 +205,8 @@ class _Partitioner:
         others = [pair for pair in type(pairs[0]).relative_motions(pairs) if named in pair.links]
         for k, pair in zip(own, others, strict=True):
             self.pairs[k] = pair
-            first, second = self.ends[k] = tuple(self.number[each] for each in pair.links)
+            one, other = pair.links
+            first, second = self.ends[k] = self.number[one], self.number[other]
             self.neighbours[first].append((second, k))
             self.neighbours[second].append((first, k))
 
@@ -307,8 +315,9 @@ class _Partitioner:
                     turned = self.is_symmetric[k] or self.ends[k][0] == link
                     found.append((_PAIR_TYPE_NUMBERS[type(pairs[k])], here, there, turned, k in driven, k, other))
         found.sort()
-        key, given, inputs, p = [], [], [], []
-        level, turn = 0, []
+        given: list[int] = []
+        p: list[float] = []
+        key, inputs, level, turn = [], [], 0, []
         shapes, names = self.shapes, self.names
         for number, here, inside, turned, is_driven, k, other in found:
             there = inside
