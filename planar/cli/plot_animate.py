@@ -129,10 +129,11 @@ def plot(  # many: options of a command; # long: each has its line
                 raise BadInput(
                     "--link", "centrodes are of two links; name one, or one and the link that it is seen from"
                 )
+            link, other = (*links, None, None)[:2]
             figure = {
                 "positions": lambda: drawn.positions(moving, steps, points or None, scales),
                 "loci": lambda: drawn.loci(moving, points or None, scales),
-                "centrodes": lambda: drawn.centrodes(moving, *links, scale=scales),
+                "centrodes": lambda: drawn.centrodes(moving, link, other, scales),
                 "diagrams": lambda: drawn.diagrams(moving, of, steps if chords else None),
                 "torque": lambda: drawn.torque(moving, of, fluctuation),
                 "bearings": lambda: drawn.bearings(moving, pairs or None),
