@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -213,7 +214,9 @@ class _DeadPointTracker:
         if on.any():
             self.arcs.append(arcs.select(on))
 
-    def _find_falling_zero(self, arcs: _CurveArcs, value) -> tuple[Array, Array]:  # noqa: ANN001
+    def _find_falling_zero(
+        self, arcs: _CurveArcs, value: Callable[[_DesignCurves, Array], Array]
+    ) -> tuple[Array, Array]:
         """Where on each arc a value of its points falls through zero: the points, and which of them surely do."""
         curves, chord = _DesignCurves(self.batch, arcs.design, self.direction), arcs.y1 - arcs.y0
         a, b = np.zeros(len(chord)), np.ones(len(chord))

@@ -213,7 +213,7 @@ def _only_design(order: Mapping[str, Any]) -> dict[str, Array]:
     return {name: np.asarray(array[0]) for name, array in order.items()}
 
 
-def _check_number(name: str, value: Any) -> float:
+def _check_number(name: str, value: float) -> float:
     if np.ndim(value) != 0:
         raise BadInput(str(name), "one number is wanted; many designs at once are a sweep")
     return value

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import copy
 from typing import NamedTuple
 
@@ -13,6 +14,8 @@ from planar.equations.coordinates import coordinate_columns, frames_from_coordin
 from planar.equations.functions import EquationFunctions
 from planar.equations.linear import solve_arrays
 from planar.equations.residuals import split_pair_numbers
+from planar.foundation.geometry import Frame
+from planar.foundation.jets import Scalar
 from planar.model.mechanism import Mechanism
 from planar.solving.checks.branch_check import BranchCheck, is_move_allowed
 from planar.solving.checks.residual_check import EPS, NEGLIGIBLE_ERROR, ResidualCheck
@@ -98,8 +101,10 @@ class DesignResidualCheck:
         self.links = [link.name for link in mechanism.links]
         self.pairs = {pair.name: pair for pair in mechanism.pairs}
 
-    def frames_from_coordinates(self, w):  # noqa: ANN001, ANN201 - arrays or jets alike
-        """Frames of links and own coordinates of pairs from w (coordinates, designs)."""
+    def frames_from_coordinates(
+        self, w: Sequence[Scalar] | Array
+    ) -> tuple[dict[str, Frame], dict[str, tuple[Scalar, ...]]]:
+        """Frames of links and own coordinates of pairs from w (coordinates, designs), arrays or jets."""
         return frames_from_coordinates(w, self.column, self.links, self.pairs)
 
     def is_resolved(self, w: Array) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import NamedTuple
 
 import casadi as ca
@@ -153,7 +154,7 @@ class FormulaBuilder:
             ]
         return polished
 
-    def _inner_frames(self) -> tuple[dict[str, Frame], dict[str, tuple]]:
+    def _inner_frames(self) -> tuple[dict[str, Frame], dict[str, tuple[ca.SX, ...]]]:
         """Frames of the inner links and own coordinates of the pairs, in the unknowns."""
         e, kind = self.equations, self.block_equations
         column = coordinate_columns(e.coordinates)
@@ -226,10 +227,9 @@ class FormulaBuilder:
 
     def sketch_distance(self, poses: list[list[int]], sketch_sums: list[list[int]]) -> int:
         """The squared distance of the links' points to the sketch, from the sums of its points, see `BlockType`."""
-        add = self.instructions.add
+        add, mul = self.instructions.add, partial(self.instructions.add, "mul")
         whole = self.instructions.add_constant(0.0)
         for (x, y, c, s), (many, px, py, tx, ty, along, across, squares) in zip(poses, sketch_sums, strict=True):
-            mul = lambda a, b: add("mul", a, b)  # noqa: E731
             square = add("add", mul(x, x), mul(y, y))
             turned = add("sub", mul(c, px), mul(s, py)), add("add", mul(s, px), mul(c, py))
             mixed = add("add", mul(x, add("sub", turned[0], tx)), mul(y, add("sub", turned[1], ty)))

@@ -136,7 +136,9 @@ def _partition_linkage(
     return PartitionedLinkage(own, inputs, sketch, points, shown), names, mechanism.inputs[running].position
 
 
-def _shown_points(mechanism: Mechanism, partition: Partition, members: Mapping) -> list[tuple[float, ...]]:
+def _shown_points(
+    mechanism: Mechanism, partition: Partition, members: Mapping[str, Sequence[tuple[str, str]]]
+) -> list[tuple[float, ...]]:
     """Points of every link that the sketch shows, or that lie on the frame: see `Lot.shown`."""
     at = {name: (x, y) for name, x, y in mechanism.sketch}
     found: list[tuple[float, ...]] = []

@@ -339,7 +339,7 @@ class _Partitioner:
             p += numbers
         self._refuse_short_arms(inner, [each[-2] for each in found])
         known = (len(inner), len(given), tuple(key))
-        own = _BLOCK_TYPES.get(known) or _make_block_type(known, pairs, found)
+        own = _BLOCK_TYPES.get(known) or _make_block_type(known, [type(pairs[each[5]]) for each in found])
         if not own.is_square:
             raise NotPartitionable("constraints hold each other more than once")
         after = max(
@@ -353,7 +353,7 @@ class _Partitioner:
             self.level[link], self.merged_level[link], self.block_type_of_link[link] = level + 1, after, own
         self.blocks.append(PartitionBlock(own, (*given, *inputs, *own_places), p, inner, level, after))
 
-    def _sort_key(self, link: int) -> tuple:
+    def _sort_key(self, link: int) -> tuple[int, list[tuple[int, bool, bool, bool]]]:
         """What a link of a group is held by, so that equal groups come out alike."""
         own = [
             (
@@ -368,14 +368,13 @@ class _Partitioner:
         return len(own), sorted(own)
 
 
-_BLOCK_TYPES: dict[tuple, BlockType] = {}
+_SignatureKey = tuple[int, int, tuple[tuple[int, tuple[int, int], bool], ...]]
+_BLOCK_TYPES: dict[_SignatureKey, BlockType] = {}
 
 
-def _make_block_type(signature_key: tuple, pairs: Sequence[Pair], found: Sequence[tuple]) -> BlockType:
+def _make_block_type(signature_key: _SignatureKey, pair_types: Sequence[type[Pair]]) -> BlockType:
     inner, given, key = signature_key
-    joints = tuple(
-        BlockPair(type(pairs[each[5]]), bodies, driven) for each, (_, bodies, driven) in zip(found, key, strict=True)
-    )
+    joints = tuple(BlockPair(each, bodies, driven) for each, (_, bodies, driven) in zip(pair_types, key, strict=True))
     if len(_BLOCK_TYPES) >= MAX_BLOCK_TYPES:
         _BLOCK_TYPES.clear()
     made = _BLOCK_TYPES[signature_key] = find_block_type(BlockSignature(inner, given, joints))
