@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,6 +27,8 @@ from planar.cli.options import (
 from planar.foundation.errors import BadInput
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from planar.model.mechanism import Mechanism
     from planar.results.motion import Motion
 
@@ -130,14 +133,15 @@ def plot(  # many: options of a command; # long: each has its line
                     "--link", "centrodes are of two links; name one, or one and the link that it is seen from"
                 )
             link, other = (*links, None, None)[:2]
-            figure = {
+            drawings: dict[str, Callable[[], Figure | list[Figure]]] = {
                 "positions": lambda: drawn.positions(moving, steps, points or None, scales),
                 "loci": lambda: drawn.loci(moving, points or None, scales),
                 "centrodes": lambda: drawn.centrodes(moving, link, other, scales),
                 "diagrams": lambda: drawn.diagrams(moving, of, steps if chords else None),
                 "torque": lambda: drawn.torque(moving, of, fluctuation),
                 "bearings": lambda: drawn.bearings(moving, pairs or None),
-            }[what]()
+            }
+            figure = drawings[what]()
         drawn.save(figure, output)
 
 

@@ -52,7 +52,7 @@ def record(motion: Motion, more: Iterable[ReportedSeries] = (), facts: Mapping[s
     "time" is there where the run has one, so are "jerk" of points and "angular_jerk" of links; "limits" is a list of
     what `planar.results.records.Limit` holds.
     """
-    return _run_record(motion, more, _to_list) | facts
+    return {**_run_record(motion, more, _to_list), **facts}
 
 
 def _run_record(
@@ -85,11 +85,11 @@ def _to_list(values: Array | None) -> Any:
     if values is None:
         return None
     there = np.isfinite(values)
-    return (values if there.all() else np.where(there, values, None)).tolist()
+    return (values if there.all() else np.where(there, values.astype(object), np.array(None))).tolist()
 
 
 def _encode_json(motion: Motion, more: Iterable[ReportedSeries], facts: Mapping[str, Any]) -> bytes:
-    whole = _run_record(motion, more, lambda values: values) | facts
+    whole = {**_run_record(motion, more, lambda values: values), **facts}
     # arrays become lists one by one as they are written: lists of a long run take four times the memory of its arrays
     return (json.dumps(whole, default=_to_list, ensure_ascii=False, allow_nan=False) + "\n").encode()
 
@@ -130,7 +130,7 @@ def _encode_npz(motion: Motion, more: Iterable[ReportedSeries]) -> bytes:
             if values is not None:
                 name = "/".join(filter(None, (thing.group, thing.name, what)))
                 arrays[name], units[name] = values, UNITS_BY_KIND[thing.kinds[what]]
-    texts = {what: np.array(text) for what, text in run_header(motion).items()}
+    texts: dict[str, Any] = {what: np.array(text) for what, text in run_header(motion).items()}
     content = io.BytesIO()
     np.savez(content, **arrays, **texts, units=np.array(list(units.items())))
     return content.getvalue()

@@ -57,9 +57,10 @@ def dataset(motion: Motion) -> xr.Dataset:
     }
     for each in groups["inputs"]:
         for what, values in each.values.items():
-            into = coordinates if what == "position" else variables
-            attributes = _attributes(each.kinds[what], f"input {each.name} {what}")
-            into[f"input_{each.name}_{what}"] = (("row",), values, attributes)
+            if values is None:
+                continue
+            variable = (("row",), values, _attributes(each.kinds[what], f"input {each.name} {what}"))
+            (coordinates if what == "position" else variables)[f"input_{each.name}_{what}"] = variable
     return xr.Dataset(variables, coordinates, run_header(motion))
 
 

@@ -74,11 +74,11 @@ def _route_facts(route: AnalyticalRoute, units: FileUnits, per: _RateUnits) -> I
     """Stroke, greatest speed, mean, and what the slide is, in words."""
     stroke = route.series[0].stroke
     if stroke is not None:
-        told = (
+        ends = (
             f"{word} at {_angle_text(end.input, units)}, displacement {_length_text(end.value, units)}"
             for word, end in (("TDC", stroke.top), ("BDC", stroke.bottom))
         )
-        yield "stroke", f"{_length_text(stroke.length, units)}: {'; '.join(told)}"
+        yield "stroke", f"{_length_text(stroke.length, units)}: {'; '.join(ends)}"
     fastest = (
         f"{_format_number(route.fastest.value * per.length_factor)} {per.velocity} at "
         f"{_angle_text(route.fastest.input, units)}"

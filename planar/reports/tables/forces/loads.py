@@ -28,7 +28,7 @@ class ActionMotion(NamedTuple):
     def max_power(self) -> float:
         """The greatest power that it could have at these speeds, W."""
         pushing = float(np.hypot(*self.acting.force) * np.hypot(*self.velocity))
-        return pushing + abs(self.acting.couple * self.angular_velocity)
+        return pushing + abs(float(self.acting.couple) * self.angular_velocity)
 
 
 def actions_with_motion(forces: Forces, inertia: bool) -> list[ActionMotion]:
@@ -59,7 +59,7 @@ def actions_table(title: str, rows: Iterable[ActionMotion], units: FileUnits, mo
     measure = display_unit("velocity", units)[1]
     for each in rows:
         acting = each.acting
-        turns = abs(acting.couple) > ROUNDING_RATIO * moment
+        turns = abs(float(acting.couple)) > ROUNDING_RATIO * moment
         pushes = acting.force.any() or not turns
         table.add_row(
             acting.name,
