@@ -129,10 +129,7 @@ def plotted_outputs(mechanism: Mechanism, of: str) -> tuple[PlottedOutput, ...]:
     if slide is None and any(
         of in (each.name, *(f"{link}.{own}" for link, own in each.members)) for each in named_points(mechanism)
     ):
-        return tuple(
-            PlottedOutput(f"{axis} of {of}", False, lambda moving, k=k: moving.point(of).position[..., k])
-            for k, axis in enumerate("xy")
-        )
+        return tuple(PlottedOutput(f"{axis} of {of}", False, _coordinate_of(of, k)) for k, axis in enumerate("xy"))
     if slide is None and any(link.name == of for link in mechanism.links):
         return (PlottedOutput(f"angle of {of}", True, lambda moving: moving.link(of).angle),)
     pair = named.get(slide or of)
@@ -141,6 +138,10 @@ def plotted_outputs(mechanism: Mechanism, of: str) -> tuple[PlottedOutput, ...]:
     first = next(iter(pair.result_kinds))
     angle = pair.input_kind is not MeasureKind.LENGTH
     return (PlottedOutput(f"{first} at {slide or of}", angle, lambda moving: moving.pair(slide or of)[first]),)
+
+
+def _coordinate_of(point: str, axis: int) -> Callable[[Any], Any]:
+    return lambda moving: moving.point(point).position[..., axis]
 
 
 def input_window(circuits: Circuits) -> InputWindow:

@@ -137,8 +137,10 @@ def _clearest_point(tried: Array, taken: Array) -> Array:
 
 
 def _draw_number(axes: Axes, sheet: PanelLayout, at: Array, text: str, colour: str, gid: str) -> None:
+    x, y = at / sheet.panel_size
     axes.text(
-        *(at / sheet.panel_size),
+        x,
+        y,
         text,
         transform=axes.transAxes,
         fontsize=SMALL_TEXT,

@@ -129,7 +129,8 @@ class DrawnRun(NamedTuple):
         for pair in self.motion.mechanism.pairs:
             if pair.point_on_line() is not None:
                 went = self.motion.pair(pair.name)[next(iter(pair.result_kinds))]
-                found[pair.name] = (float(np.min(went)), float(np.max(went)))
+                if went is not None:
+                    found[pair.name] = (float(np.min(went)), float(np.max(went)))
         return found
 
     @property

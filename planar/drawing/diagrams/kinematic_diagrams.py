@@ -158,9 +158,9 @@ def _draw_diagram(axes: Axes, sheet: DiagramSheet, ordinate: Ordinate, index: in
         fontsize=NORMAL_TEXT,
         labelpad=3.0,
     )
-    every = ceil(4.5 * sheet.count / sheet.width)
-    marks = np.linspace(0.0, sheet.span, sheet.count + 1)
-    numbers = ["" if k % every else f"{k}" for k in range(sheet.count + 1)]
+    every = ceil(4.5 * sheet.interval_count / sheet.width)
+    marks = np.linspace(0.0, sheet.span, sheet.interval_count + 1)
+    numbers = ["" if k % every else f"{k}" for k in range(sheet.interval_count + 1)]
     axes.set_xticks(marks, numbers, family=DRAWING_FAMILY, fontsize=SMALL_TEXT)
     axes.tick_params(length=2.0, width=0.5, pad=1.5)
     for side in axes.spines.values():

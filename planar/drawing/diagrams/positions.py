@@ -192,7 +192,8 @@ def _division_rows(run: DrawnRun, count: int) -> Sequence[int]:
 def _motion_scale(run: DrawnRun, room: tuple[float, float] = (DRAWING_WIDTH, DRAWING_HEIGHT)) -> Scale:
     """The round scale at which the whole motion fits the paper."""
     low, high = run.bounds
-    return round_scale("length", run.motion.mechanism.units.length, *(float(part) for part in high - low), room)
+    width, height = map(float, high - low)
+    return round_scale("length", run.motion.mechanism.units.length, width, height, room)
 
 
 def _path_stroke(run: DrawnRun, name: str, scale: Scale) -> Polyline:

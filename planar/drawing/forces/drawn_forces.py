@@ -32,6 +32,7 @@ class ForceRun(NamedTuple):
     """
 
     forces: Forces
+    motion: Motion
     abscissa: Array
     axis_name: str
     "of what it is, with its unit"
@@ -41,7 +42,7 @@ class ForceRun(NamedTuple):
     "of a whole cycle, in the unit; else 0"
     notes: tuple[str, ...]
 
-    def in_order(self, values: Array) -> Array:
+    def in_order(self, values: Array | float) -> Array:
         """What the motion has at its rows (n, ...), in this order."""
         found = np.asarray(values)[self.order]
         if not self.period:
@@ -105,4 +106,4 @@ def forces_over_cycle(source: Forces | Motion | Mechanism) -> ForceRun:
     over = over[order]
     if period:
         over = np.concatenate([[0.0], over, [period]])
-    return ForceRun(found, over, label, written, order, period, tuple(notes))
+    return ForceRun(found, motion, over, label, written, order, period, tuple(notes))

@@ -17,7 +17,7 @@ from planar.drawing.diagrams.drawn_run import DrawnRun, closed_run, smooth_path,
 from planar.drawing.diagrams.positions import coupler_points, resolve_points
 from planar.drawing.labels.fonts import font_families, printable_text
 from planar.drawing.paper.pens import FILL_COLOURS, PEN_STYLES, require_matplotlib
-from planar.drawing.paper.picture import Circle, Fill, Mark, PaperPoint, Pen, Polyline, extent
+from planar.drawing.paper.picture import Fill, Outline, PaperPoint, Pen, Polyline, extent
 from planar.drawing.paper.scales import Scale
 from planar.drawing.scheme.ground import ground_marks
 from planar.drawing.scheme.link_bodies import link_bodies
@@ -69,8 +69,8 @@ class AnimationScript(NamedTuple):
     low: PaperPoint
     high: PaperPoint
     "corners of the drawing (mm)"
-    ground: tuple[Mark, ...]
-    bodies: tuple[tuple[Mark, ...], ...]
+    ground: tuple[Outline, ...]
+    bodies: tuple[tuple[Outline, ...], ...]
 
     @property
     def size(self) -> tuple[int, int]:
@@ -215,7 +215,7 @@ class _FrameCanvas:
         self.axes.draw_artist(self.text)
         return np.asarray(self.canvas.buffer_rgba())[:, :, :3].copy()
 
-    def _artists_for(self, marks: Sequence[Mark]) -> list[Artist]:
+    def _artists_for(self, marks: Sequence[Outline]) -> list[Artist]:
         """The artists for such marks; other ones only where a position has other strokes."""
         key = tuple((type(mark), mark.pen, getattr(mark, "closed", True), mark.fill) for mark in marks)
         if key not in self.artists_by_kind:
@@ -239,7 +239,7 @@ def _rounded_amount(value: float, kind: str, units: Any) -> str:
     return f"{float(number):.1f} {name}"
 
 
-def _outline_points(mark: Polyline | Circle) -> Array:
+def _outline_points(mark: Outline) -> Array:
     """The places that a stroke goes through (n, 2)."""
     if isinstance(mark, Polyline):
         return np.array(mark.points)
@@ -248,7 +248,7 @@ def _outline_points(mark: Polyline | Circle) -> Array:
     return np.array([(x + r * cos(turn), y + r * sin(turn)) for turn in turns])
 
 
-def _add_artist(axes: Axes, mark: Mark) -> Any:
+def _add_artist(axes: Axes, mark: Outline) -> Any:
     """The stroke of a mark, as wide as on paper."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Polygon
@@ -266,7 +266,7 @@ def _add_artist(axes: Axes, mark: Mark) -> Any:
     return axes.add_line(line)
 
 
-def _move_artist(artist: Any, mark: Mark) -> None:
+def _move_artist(artist: Any, mark: Outline) -> None:
     corners = _outline_points(mark)
     if hasattr(artist, "set_xy"):
         artist.set_xy(corners)

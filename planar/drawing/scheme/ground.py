@@ -10,7 +10,7 @@ from typing import Self
 
 import numpy as np
 
-from planar.drawing.paper.picture import Arrow, Circle, Mark, Pen, Polyline, paper_point
+from planar.drawing.paper.picture import Arrow, Circle, Mark, Outline, Pen, Polyline, paper_point
 from planar.drawing.paper.scales import Scale
 from planar.drawing.scheme import symbol_table, symbols
 from planar.drawing.scheme.link_bodies import LinkBody, distance_between, unit_vector
@@ -41,7 +41,7 @@ def ground_marks(
     scale: Scale,
     travel: TravelRanges | None = None,
     obstacles: Iterable[Mark] = (),
-) -> tuple[Mark, ...]:
+) -> tuple[Outline, ...]:
     """What stands still: supports, fixed guides and wheels, turned so that they are clear of the links' position.
 
     `beside` are further strokes to be clear of, such as the links in other positions.
@@ -49,10 +49,10 @@ def ground_marks(
     return fixed_marks(Scene(mechanism, bodies, frames, shapes, scale, travel or {}), obstacles)
 
 
-def fixed_marks(scene: Scene, obstacles: Iterable[Mark] = ()) -> tuple[Mark, ...]:
+def fixed_marks(scene: Scene, obstacles: Iterable[Mark] = ()) -> tuple[Outline, ...]:
     """Supports, guides, racks and wheels of the frame, clear of the links and of further strokes where that can be."""
     frame = scene.mechanism.frame
-    made: list[Mark] = []
+    made: list[Outline] = []
     taken = [
         pin
         for mark in scene.marks
@@ -83,8 +83,7 @@ def fixed_marks(scene: Scene, obstacles: Iterable[Mark] = ()) -> tuple[Mark, ...
             made += symbols.rail(at + way * low, at + way * high, back, f"guide {mark.name}")
     clear = clear.with_marks(made)
     for mark in scene.marks:
-        on_frame = isinstance(mark, GuideMark | SlotMark) and mark.link == frame
-        if on_frame or (isinstance(mark, SliderMark) and mark.link == frame):
+        if isinstance(mark, GuideMark | SlotMark | SliderMark) and mark.link == frame:
             strokes = tuple(_fixed_guide_strokes(scene, mark, clear, middle))
             made += strokes
             clear = clear.with_marks(strokes)
@@ -103,9 +102,9 @@ def fixed_marks(scene: Scene, obstacles: Iterable[Mark] = ()) -> tuple[Mark, ...
     return tuple(made)
 
 
-def _spring_anchors(scene: Scene, pins: Sequence[Circle]) -> Iterator[tuple[str, Vector]]:
+def _spring_anchors(scene: Scene, pins: Sequence[Outline]) -> Iterator[tuple[str, Vector]]:
     """Where springs hang on the frame, but at its pins; once where several do."""
-    met = [Vector(*pin.centre) for pin in pins]
+    met = [Vector(*pin.centre) for pin in pins if isinstance(pin, Circle)]
     for mark in scene.marks:
         if isinstance(mark, Coil):
             for link, place in zip(mark.links, mark.at, strict=True):
@@ -130,7 +129,7 @@ def _guide_extent(scene: Scene, name: str, through: Vector, way: Vector, half: f
 
 def _fixed_guide_strokes(
     scene: Scene, mark: GuideMark | SlotMark | SliderMark, clear: Clearance, middle: Vector
-) -> Iterator[Mark]:
+) -> Iterator[Outline]:
     """A hatched line beneath a block; round a pin a slot; a fixed block, through which a link slides."""
     about = f"guide {mark.name}"
     half = symbol_table.BLOCK_SIZE[1] / 2.0

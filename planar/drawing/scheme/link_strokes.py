@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from math import hypot
 from typing import Any
 
-from planar.drawing.paper.picture import Circle, Fill, Mark, Pen, Polyline
+from planar.drawing.paper.picture import Fill, Outline, Pen, Polyline
 from planar.drawing.paper.scales import Scale
 from planar.drawing.scheme import symbol_table, symbols
 from planar.drawing.scheme.link_bodies import LinkBody, distance_from_line
@@ -27,13 +27,13 @@ def body_marks(
     pen: Pen = Pen.LINK,
     with_symbols: bool = True,
     travel: TravelRanges | None = None,
-) -> tuple[Mark, ...]:
+) -> tuple[Outline, ...]:
     """What moves, in one position (frames of plain numbers), with all pins; lines alone where no symbols are wanted."""
     scene = Scene(mechanism, bodies, frames, shapes, scale, travel or {})
     return moving_marks(scene, pen) if with_symbols else (*bar_strokes(scene, pen), *_cylinder_centre_lines(scene, pen))
 
 
-def moving_marks(scene: Scene, pen: Pen = Pen.LINK) -> tuple[Mark, ...]:
+def moving_marks(scene: Scene, pen: Pen = Pen.LINK) -> tuple[Outline, ...]:
     """Plates, wheels, bars, springs, slots, blocks, centres of mass and pins of a scene."""
     plates = [
         symbols.filled_area(f"link {body.link}", pen, Fill.LINK, *(scene.to_paper(body.link, p) for p in body.plate))
@@ -98,7 +98,7 @@ def _guide_strokes(scene: Scene, link: str, body: LinkBody, pen: Pen) -> Iterato
         )
 
 
-def _wheel_marks(scene: Scene) -> Iterator[Mark]:
+def _wheel_marks(scene: Scene) -> Iterator[Outline]:
     """Wheels that move, and bands."""
     frame = scene.mechanism.frame
     seen: set[tuple[Any, ...]] = set()
@@ -117,7 +117,7 @@ def _wheel_marks(scene: Scene) -> Iterator[Mark]:
             yield from symbols.band(centres, radii, mark.crossed, f"band {mark.name}")
 
 
-def rack_strokes(scene: Scene) -> Iterator[Polyline]:
+def rack_strokes(scene: Scene) -> Iterator[Outline]:
     """Racks that move, from the link's body to beneath the wheel."""
     for mark in scene.marks:
         if isinstance(mark, PitchLineMark) and mark.link != scene.mechanism.frame:
@@ -152,7 +152,7 @@ def _cylinder_centre_lines(scene: Scene, pen: Pen) -> Iterator[Polyline]:
             yield symbols.stroke(f"link {link}", pen, *ends)
 
 
-def cylinder_strokes(scene: Scene, pen: Pen) -> Iterator[Polyline]:
+def cylinder_strokes(scene: Scene, pen: Pen) -> Iterator[Outline]:
     """Cylinders with their pistons and rods."""
     for name, tube in scene.cylinders.items():
         here = scene.displacement_along(name, tube.guide, tube.foot, tube.direction)
@@ -166,7 +166,7 @@ def cylinder_strokes(scene: Scene, pen: Pen) -> Iterator[Polyline]:
         yield from symbols.symbol_marks("piston", f"link {tube.rod}", spots[2], way, spots[3], pen=pen)
 
 
-def _slider_marks(scene: Scene, pen: Pen) -> Iterator[Mark]:
+def _slider_marks(scene: Scene, pen: Pen) -> Iterator[Outline]:
     """Slots, blocks, pins and points, in the order in which they hide one another."""
     frame = scene.mechanism.frame
     for mark in scene.marks:
@@ -190,7 +190,7 @@ def _slider_marks(scene: Scene, pen: Pen) -> Iterator[Mark]:
                 )
 
 
-def pin_strokes(scene: Scene) -> Iterator[Circle]:
+def pin_strokes(scene: Scene) -> Iterator[Outline]:
     """Every pin, once however many links it joins."""
     drawn: set[str] = set()
     for mark in scene.marks:

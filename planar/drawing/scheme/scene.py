@@ -34,7 +34,10 @@ def plain_frames(frames: Mapping[str, Frame], index: int | None = None) -> dict[
         value = value.parts[0] if isinstance(value, Jet) else value
         return float(value if index is None or np.ndim(value) == 0 else value[index])
 
-    return {link: Frame(*(number(value) for value in frame[:5]), frame.fixed) for link, frame in frames.items()}
+    return {
+        link: Frame(number(at.x), number(at.y), number(at.cos), number(at.sin), number(at.angle), at.fixed)
+        for link, at in frames.items()
+    }
 
 
 class Cylinder(NamedTuple):
@@ -117,7 +120,8 @@ class Scene:
         if name not in self.travel:
             return here, here
         start = float((through - foot).dot(way))
-        return tuple(sorted(start + value for value in self.travel[name]))
+        low, high = sorted(start + value for value in self.travel[name])
+        return low, high
 
     def _find_cylinders(self) -> Iterator[tuple[str, Cylinder]]:
         """Slides that look like cylinders: driven ones between moving links, and those whose block has a rod."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from math import atan2, pi, remainder
 
-from planar.drawing.paper.picture import Label, Mark, Polyline, paper_point
+from planar.drawing.paper.picture import Label, Outline, paper_point
 from planar.drawing.scheme import symbol_table, symbols
 from planar.drawing.scheme.link_bodies import unit_vector
 from planar.drawing.scheme.scene import Scene
@@ -15,7 +15,7 @@ MIN_SPRING_LENGTH = 1e-6
 """mm: ends of a spring nearer than this have no direction."""
 
 
-def spring_strokes(scene: Scene) -> Iterator[Polyline]:
+def spring_strokes(scene: Scene) -> Iterator[Outline]:
     """Springs and dampers, each as long as it is in this position."""
     for mark in scene.marks:
         if isinstance(mark, Coil):
@@ -33,7 +33,7 @@ def spring_strokes(scene: Scene) -> Iterator[Polyline]:
             )
 
 
-def mass_centre_marks(scene: Scene) -> Iterator[Mark]:
+def mass_centre_marks(scene: Scene) -> Iterator[Outline]:
     """Centres of mass."""
     for mark in scene.marks:
         if isinstance(mark, MassCentreMark):

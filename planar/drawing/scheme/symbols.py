@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from math import acos, atan2, ceil, degrees, pi, remainder, sqrt
 
-from planar.drawing.paper.picture import Circle, Fill, Mark, Pen, Polyline, paper_point
+from planar.drawing.paper.picture import Circle, Fill, Outline, Pen, Polyline, paper_point
 from planar.drawing.scheme.symbol_table import (
     HATCH_LENGTH,
     RIM_WIDTH,
@@ -45,7 +45,7 @@ def symbol_marks(
     left: Vector | None = None,
     radius: float = 0.0,
     pen: Pen = Pen.LINK,
-) -> Iterator[Polyline | Circle]:
+) -> Iterator[Outline]:
     """A symbol of the table at a place on paper, along a unit vector, and as far as a second place where it has two.
 
     `left` is the unit vector to its left where it may be mirrored, `radius` that of a wheel (mm); `pen` draws links.
@@ -61,7 +61,7 @@ def symbol_marks(
             yield Polyline(tuple(paper_point(spot) for spot in spots), own, about, each.closed, each.fill)
 
 
-def hatching(start: Vector, stop: Vector, side: Vector, about: str) -> Iterator[Polyline | Circle]:
+def hatching(start: Vector, stop: Vector, side: Vector, about: str) -> Iterator[Outline]:
     """Strokes at 45 degrees from a line to the side to which the unit vector `side` points."""
     whole = stop - start
     length = sqrt(whole.dot(whole))
@@ -71,12 +71,12 @@ def hatching(start: Vector, stop: Vector, side: Vector, about: str) -> Iterator[
             yield from symbol_marks("hatch", about, start + way * foot, way, left=side)
 
 
-def rail(start: Vector, stop: Vector, side: Vector, about: str) -> tuple[Polyline | Circle, ...]:
+def rail(start: Vector, stop: Vector, side: Vector, about: str) -> tuple[Outline, ...]:
     """A line of what does not move, hatched on one side."""
     return stroke(about, Pen.GROUND, start, stop), *hatching(start, stop, side, about)
 
 
-def slot(at: Vector, way: Vector, about: str, pen: Pen) -> Iterator[Polyline | Circle]:
+def slot(at: Vector, way: Vector, about: str, pen: Pen) -> Iterator[Outline]:
     """A slot of the usual length along a unit vector."""
     half = way * ((SLOT_SIZE[0] - SLOT_SIZE[1]) / 2.0)
     return symbol_marks("slot opening", about, at - half, way, at + half, pen=pen)
@@ -96,18 +96,18 @@ def torsion_spring(
             yield stroke(about, each.pen, *spots)
 
 
-def wheel(at: Vector, radius: float, about: str, rim: str = "rim") -> Iterator[Polyline | Circle]:
+def wheel(at: Vector, radius: float, about: str, rim: str = "rim") -> Iterator[Outline]:
     """A pitch circle; of an internal wheel (radius below zero) also its rim."""
     for name in ("wheel", rim) if radius < 0.0 else ("wheel",):
         yield from symbol_marks(name, about, at, radius=abs(radius))
 
 
-def fixed_wheel(at: Vector, radius: float, about: str) -> tuple[Mark, ...]:
+def fixed_wheel(at: Vector, radius: float, about: str) -> tuple[Outline, ...]:
     """A wheel that does not move: a hatched one."""
     return *wheel(at, radius, about, "fixed rim"), *rim_hatching(at, radius, about)
 
 
-def rim_hatching(at: Vector, radius: float, about: str) -> Iterator[Polyline | Circle]:
+def rim_hatching(at: Vector, radius: float, about: str) -> Iterator[Outline]:
     """Hatching in three places inside the circle of a wheel, of an internal wheel outside its rim."""
     inside = radius > 0.0
     rim = abs(radius) if inside else abs(radius) + RIM_WIDTH
@@ -122,7 +122,7 @@ def rim_hatching(at: Vector, radius: float, about: str) -> Iterator[Polyline | C
             yield from symbol_marks("hatch", about, at + out * rim, quarter_turn(out) * -1.0, left=inward)
 
 
-def band(centres: Sequence[Vector], radii: Sequence[float], crossed: bool, about: str) -> tuple[Mark, ...]:
+def band(centres: Sequence[Vector], radii: Sequence[float], crossed: bool, about: str) -> tuple[Outline, ...]:
     """A loop round two wheels: both circles and their outer, if crossed their inner, common tangents."""
     (p, q), (r, s) = centres, radii
     circles = tuple(Circle(paper_point(at), each, Pen.BAND, about) for at, each in ((p, r), (q, s)))
