@@ -9,7 +9,10 @@ from __future__ import annotations
 import re
 from functools import cache
 from math import isfinite, log10, pi
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, overload
+
+if TYPE_CHECKING:
+    import numpy as np
 
 SI_UNITS = {
     "length": "m",
@@ -118,10 +121,22 @@ class Unit(NamedTuple):
     numerator: float
     denominator: float
 
-    def to_si(self, value: float) -> float:
+    @overload
+    def to_si(self, value: float) -> float: ...
+
+    @overload
+    def to_si(self, value: np.ndarray) -> np.ndarray: ...
+
+    def to_si(self, value: float | np.ndarray) -> float | np.ndarray:
         return value * self.numerator / self.denominator
 
-    def from_si(self, value: float) -> float:
+    @overload
+    def from_si(self, value: float) -> float: ...
+
+    @overload
+    def from_si(self, value: np.ndarray) -> np.ndarray: ...
+
+    def from_si(self, value: float | np.ndarray) -> float | np.ndarray:
         return value * self.denominator / self.numerator
 
 
