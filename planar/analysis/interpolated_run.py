@@ -8,6 +8,7 @@ from math import pi
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer
 from planar.foundation.geometry import Frame, frame_at
 from planar.foundation.jets import Jet
@@ -17,8 +18,6 @@ from planar.results.kinematic_result import KinematicResult
 from planar.results.motion import Motion, State
 from planar.solving.continuation.path import follow_straight
 from planar.solving.position import PositionSolver
-
-Array = np.ndarray
 
 CLOSED_TOLERANCE = 1e-9
 """rad, or part of the size: a motion that comes so near to where it started is closed."""

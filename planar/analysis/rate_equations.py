@@ -8,13 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.foundation.geometry import Frame, Vector
 from planar.foundation.jets import Jet
 from planar.model.mechanism import Mechanism, pair_entries, relative_motions
 from planar.model.pairs import Pair
 from planar.results.motion import State
 
-Array = np.ndarray
 LEAST_COEFFICIENT = 1e-12
 """A slope below this is none: the residuals' slopes are of order one, or of the links' lengths."""
 

@@ -10,9 +10,9 @@ import numpy as np
 from planar.analysis.polygons.loop_equations import loop_equations
 from planar.analysis.rate_equations import PinJoint, Rate, RateEquations, moving_links, turning_classes
 from planar.analysis.vector_chains import KnownRates, VectorChains
+from planar.foundation.arrays import Array
 from planar.solving.checks.singular_values import SINGULAR_TOLERANCE
 
-Array = np.ndarray
 ROUNDING = 1e-15
 """What equations and slopes are exact to, in the mechanism's size."""
 LEAST_ERROR = 1e-13

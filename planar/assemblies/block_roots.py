@@ -33,6 +33,7 @@ from planar.assemblies.polynomial.path_tracker import (
 from planar.assemblies.solution_curves import SINGULAR_RATIO, STEP_LENGTH, is_on_curve, one_per_curve
 from planar.equations.constraint_equations import Block, ConstraintEquations, slice_length
 from planar.equations.functions import EquationFunctions
+from planar.foundation.arrays import Array
 from planar.model.pairs import MeasureKind
 from planar.solving.assembly.block_assemblies import SAME_ASSEMBLY_TOLERANCE, BlockAssemblies, block_residual_function
 from planar.solving.newton import (
@@ -43,8 +44,6 @@ from planar.solving.newton import (
     refine_multiple_root,
 )
 from planar.solving.prepared_mechanism import PreparedMechanism
-
-Array = np.ndarray
 
 MAX_PATHS = 1000
 """Bezout's number up to which paths are followed."""

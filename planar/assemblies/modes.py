@@ -17,6 +17,7 @@ from planar.assemblies.search_tree import BEST_TO_WORST, AssemblyPath, AssemblyT
 from planar.document.first_argument import takes_mechanism
 from planar.equations.constraint_equations import slice_length
 from planar.equations.coordinates import frames_from_coordinates
+from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.geometry import Frame
 from planar.foundation.notebook_display import Displayable
@@ -27,8 +28,6 @@ from planar.model.wording import count_phrase, join_all_names
 from planar.results.motion import State
 from planar.solving.diagnosis import refusals
 from planar.solving.position import PositionSolver, solve, solved_mechanism
-
-Array = np.ndarray
 
 MAX_SOLVED_FOR_COUNT = 4096
 """Dyads, or larger groups by what they take, that are solved for the sake of a number alone."""

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.solving.newton import CLOSED_TOLERANCE, ResidualFunction, correct, damped_newton, one_system, shortest_step
-
-Array = np.ndarray
 
 SINGULAR_RATIO = 1e-5
 """Least singular value, of the greatest, below which a direction may be open."""

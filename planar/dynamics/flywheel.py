@@ -9,10 +9,9 @@ import numpy as np
 
 from planar.document.first_argument import takes_result
 from planar.dynamics.forces import Forces
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.results.motion import Motion
-
-Array = np.ndarray
 
 DEFAULT_FLUCTUATION = 0.02
 """The coefficient of fluctuation of speed where none is given."""

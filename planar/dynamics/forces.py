@@ -25,13 +25,12 @@ from planar.dynamics.multipliers import ReactionSolver
 from planar.dynamics.reactions import ZERO_COUPLE_TOLERANCE, Reaction, input_efforts, pair_reaction
 from planar.dynamics.virtual_velocities import has_length_motion, refuse_surplus_inputs, unit_rate_state
 from planar.dynamics.virtual_work import BalanceFunction, balance_function
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.foundation.notebook_display import Displayable
 from planar.model.mechanism import Mechanism
 from planar.model.wording import quote_names
 from planar.results.motion import Motion, State
-
-Array = np.ndarray
 
 
 class ForceProof(NamedTuple):

@@ -20,13 +20,12 @@ from planar.dynamics.load_attachment import Attachment, attachments
 from planar.equations.coordinates import FRAME_PARTS, frames_from_coordinates
 from planar.equations.mechanism_numbers import mechanism_size, shapes_of_links
 from planar.equations.residuals import input_positions, pair_residuals, scalars
+from planar.foundation.arrays import Array
 from planar.foundation.geometry import Vector
 from planar.foundation.jets import value_and_rates
 from planar.model.loads import COINCIDENCE_TOLERANCE, Load, Mass, Spring
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.results.kinematic_result import KinematicResult
-
-Array = np.ndarray
 
 
 class LagrangianFunctions:

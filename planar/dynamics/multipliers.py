@@ -15,12 +15,11 @@ import numpy as np
 from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.virtual_work import BalanceFunction, VirtualWorkBalance
 from planar.equations.mechanism_numbers import mechanism_size
+from planar.foundation.arrays import Array
 from planar.foundation.geometry import Vector
 from planar.foundation.short_repr import short_repr
 from planar.model.pairs import Pair
 from planar.model.pairs.base import ToothContact
-
-Array = np.ndarray
 
 RANK_TOLERANCE = 1e-9
 """A singular value below this part of the greatest is none: what it would hold is held by others, or by nothing."""
@@ -36,7 +35,8 @@ class Wrench(NamedTuple):
     force: Array
     moment: Array
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return short_repr(self)
 
     def moment_about(self, at: Array) -> Array:
         """The moment about places (..., 2)."""
@@ -59,7 +59,8 @@ class ForceSolution(NamedTuple):
     causes: tuple[str, ...]
     is_balanced: Array
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return short_repr(self)
 
 
 class ReactionSolver:

@@ -15,6 +15,7 @@ from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.lagrangian import lagrangian_functions
 from planar.dynamics.load_validation import check_loads
 from planar.equations.mechanism_numbers import mechanism_size
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.foundation.geometry import Frame, frame_at
 from planar.foundation.jets import Jet
@@ -25,8 +26,6 @@ from planar.model.wording import join_all_names
 from planar.results.motion import Motion, State
 from planar.results.records import InputMotion
 from planar.solving.position import PositionSolver, solve
-
-Array = np.ndarray
 
 RELATIVE_TOLERANCE = 1e-12
 """What a step may be off, of sizes and turns and of the rates that are reached."""

@@ -27,12 +27,11 @@ from planar.equations.functions import (
 from planar.equations.mechanism_numbers import equation_structure
 from planar.equations.rates import UnknownRates, first_and_second_rates, time_derivatives
 from planar.equations.residuals import closing_error, residuals, scalars, split_pair_numbers
+from planar.foundation.arrays import Array
 from planar.foundation.geometry import Frame, frame_at, frame_term_sizes
 from planar.foundation.jets import Jet, TermSizes, term_sizes
 from planar.model.mechanism import Mechanism
 from planar.model.pairs import MeasureKind
-
-Array = np.ndarray
 
 CARRIED_ROUNDING = 1e-3
 """The rates of a constraint are judged by its own terms, and by this part of the greatest speed anywhere: some rounding

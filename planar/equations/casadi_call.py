@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-Array = np.ndarray
+from planar.foundation.arrays import Array
 
 CHUNK_SIZES = (256, 32, 8)
 """Positions that are worked on by one call."""

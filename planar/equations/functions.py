@@ -16,9 +16,9 @@ from planar.equations.elimination import stack_expressions
 from planar.equations.linear import solve_linear
 from planar.equations.mechanism_numbers import equation_structure
 from planar.equations.rates import rate_symbols, time_derivatives
+from planar.foundation.arrays import Array
 from planar.model.mechanism import Mechanism
 
-Array = np.ndarray
 MAX_CACHED_STRUCTURES = 256
 """Mechanisms of which what was derived is kept: more than come along, so that none is derived twice in a round."""
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.foundation.errors import Unknown, join_names
 from planar.foundation.geometry import Frame, Vector
 from planar.foundation.jets import Jet, value_and_rates
@@ -24,8 +25,6 @@ from planar.results.records import (
     vector_and_rates,
     wrap_angle,
 )
-
-Array = np.ndarray
 
 
 class KinematicResult(Displayable):

@@ -14,6 +14,7 @@ from planar.equations.constraint_equations import slice_length
 from planar.equations.coordinates import frames_from_coordinates
 from planar.equations.functions import MAX_CACHED_STRUCTURES, EquationRates, equation_functions
 from planar.equations.linear import solve_vectors
+from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer, Outcome, TrackingEnd
 from planar.foundation.geometry import Frame
 from planar.foundation.jets import Jet
@@ -40,8 +41,6 @@ from planar.solving.rates.regularity import (
 
 if TYPE_CHECKING:
     from planar.solving.continuation.singular_rates import SingularRates
-
-Array = np.ndarray
 
 
 @takes_mechanism

@@ -32,6 +32,7 @@ from planar.analysis.rate_equations import rate_equations as rates_of
 from planar.analysis.rate_ratios import LEAST_ERROR, LinkPoles, solve_link_poles
 from planar.analysis.vector_chains import VectorChains
 from planar.document.first_argument import takes_result
+from planar.foundation.arrays import Array
 from planar.foundation.errors import Unknown
 from planar.foundation.notebook_display import Displayable
 from planar.foundation.short_repr import short_repr
@@ -40,7 +41,6 @@ from planar.model.mechanism import Mechanism, named_points
 from planar.results.motion import State
 from planar.solving.rest_position import rest_position
 
-Array = np.ndarray
 MAX_ERROR_AT_CROSSING = 1e-9
 """Where motions cross positions are exact to the root of rounding only: lines that close to one another are one."""
 INFINITY_RATIO_AT_CROSSING = 1e-6

@@ -11,6 +11,7 @@ import numpy as np
 from planar.analysis.interpolated_run import InterpolatedRun
 from planar.analysis.relative_motion import RelativeMotion, relative_motion
 from planar.document.first_argument import takes_result
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.foundation.geometry import Frame, Vector, frame_at
 from planar.foundation.jets import Jet
@@ -19,8 +20,6 @@ from planar.model.link_graph import link_numbers
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import MeasureKind
 from planar.results.motion import Motion
-
-Array = np.ndarray
 
 INFINITY_RATIO = 1e-9
 """A pole whose w is this small beside x and y, in the mechanism's size, cannot be told from one at infinity."""
@@ -47,7 +46,8 @@ class Centrode(NamedTuple):
     homogeneous: Array
     rate: Array
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return short_repr(self)
 
     @property
     def position(self) -> Array:

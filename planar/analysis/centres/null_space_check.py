@@ -11,13 +11,13 @@ import numpy as np
 from planar.analysis.centres.kennedy import LinkPair
 from planar.analysis.rate_equations import derivative
 from planar.analysis.rate_ratios import choose_motion
+from planar.foundation.arrays import Array
 from planar.results.motion import State
 from planar.solving.checks.singular_values import null_space
 from planar.solving.full_constraints import FullConstraints
 from planar.solving.position import PositionSolver
 from planar.solving.prepared_mechanism import PreparedMechanism
 
-Array = np.ndarray
 AS_ONE_RATIO = 1e-7
 """Links that move this little against each other, beside the greatest motion, move as one.
 

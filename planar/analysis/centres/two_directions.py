@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.foundation.short_repr import short_repr
 
-Array = np.ndarray
 QUARTER_TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
 """A quarter anticlockwise."""
 PARALLEL_TOLERANCE = 1e-9
@@ -30,7 +30,8 @@ class TwoDirections(NamedTuple):
     angular_velocity: float
     velocity_b: Array
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return short_repr(self)
 
     @property
     def position(self) -> Array | None:

@@ -11,11 +11,11 @@ from planar.analysis.motion.extremes import find_greatest, quantity_and_rates
 from planar.analysis.motion.harmonics import Harmonics, full_turn, harmonics
 from planar.analysis.motion.output import Extreme
 from planar.analysis.motion.piston import Deviation, Piston, RodPointMotion, find_piston
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import Mechanism, named_points, relative_motions
 from planar.model.pairs import MeasureKind
-from planar.results.motion import Array
 
 
 class TwoTermComparison(NamedTuple):

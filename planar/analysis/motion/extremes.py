@@ -12,6 +12,7 @@ from planar.analysis.interpolated_run import CLOSED_TOLERANCE, InterpolatedRun
 from planar.analysis.motion.output import Axis, Extreme, Output
 from planar.analysis.motion.zeros import SERIES_TOLERANCE, bracket_maxima, bracket_zeros, find_maximum
 from planar.document.first_argument import takes_result
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer
 from planar.foundation.root_finding import find_root
 from planar.model.mechanism import relative_motions
@@ -19,7 +20,6 @@ from planar.model.pairs import MeasureKind
 from planar.results.kinematic_result import KinematicResult
 from planar.results.motion import Motion, State
 
-Array = np.ndarray
 StateMeasure = Callable[[State], float | Array]
 
 RIVAL_RATIO = 0.5

@@ -11,6 +11,7 @@ import numpy as np
 
 from planar.analysis.interpolated_run import CLOSED_TOLERANCE, InterpolatedRun
 from planar.analysis.motion.zeros import bracket_near_zeros, bracket_zeros
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer, Unknown
 from planar.foundation.jets import value_and_rates
 from planar.foundation.root_finding import find_root
@@ -19,7 +20,6 @@ from planar.model.pairs import MeasureKind
 from planar.results.kinematic_result import KinematicResult, ValueAndRates
 from planar.results.records import principal_turns
 
-Array = np.ndarray
 Axis = str | float
 """`x` or `y` of the frame, or a direction (rad) against its x-axis."""
 STANDSTILL_RATIO = 1e-9

@@ -16,6 +16,7 @@ from planar.analysis.identity.kinematic_scheme import (
     kinematic_scheme,
     pin_distance,
 )
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.foundation.geometry import Vector
 from planar.foundation.jets import Jet
@@ -23,7 +24,7 @@ from planar.foundation.root_finding import find_root
 from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import MeasureKind
-from planar.results.motion import Array, State
+from planar.results.motion import State
 from planar.solving.position import solve
 
 COMPARISON_ANGLES = 3600
@@ -44,7 +45,8 @@ class RodPointMotion(NamedTuple):
     velocity: Array
     acceleration: Array
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return short_repr(self)
 
 
 class PistonFormulas(Protocol):

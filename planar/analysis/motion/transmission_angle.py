@@ -10,6 +10,7 @@ from planar.analysis.interpolated_run import InterpolatedRun
 from planar.analysis.motion.output import Extreme
 from planar.analysis.motion.zeros import SERIES_TOLERANCE, bracket_maxima, find_maximum
 from planar.document.first_argument import takes_result
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer, Unknown
 from planar.foundation.jets import Jet
 from planar.foundation.short_repr import short_repr
@@ -22,7 +23,6 @@ from planar.solving.checks.singular_values import SINGULAR_TOLERANCE
 from planar.solving.full_constraints import COMPLEX_STEP, FullConstraints
 from planar.solving.prepared_mechanism import PreparedMechanism
 
-Array = np.ndarray
 BALANCE_TOLERANCE = 1e-7
 """Of a unit load: what is left of it by all multipliers, where the position is a limit and nothing balances it."""
 NEGLIGIBLE_FORCE = 1e-7
@@ -47,7 +47,8 @@ class Transmission(NamedTuple):
     angle: float | Array
     least: Extreme | None = None
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return short_repr(self)
 
 
 @takes_result("State", "Motion")

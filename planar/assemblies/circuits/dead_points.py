@@ -22,12 +22,11 @@ from planar.assemblies.polynomial.completeness import Completeness
 from planar.assemblies.polynomial.isotropic_form import isotropic_form
 from planar.assemblies.search_tree import is_linear
 from planar.equations.constraint_equations import Block, slice_length
+from planar.foundation.arrays import Array
 from planar.model.pairs import MeasureKind
 from planar.solving.assembly.block_assemblies import block_dependencies
 from planar.solving.newton import CLOSED_TOLERANCE
 from planar.solving.prepared_mechanism import PreparedMechanism
-
-Array = np.ndarray
 
 DyadChoices = tuple[int, ...]
 """Of every block on the way which of its two closed forms is taken, 0 where there is no choice to make."""

@@ -19,8 +19,7 @@ from planar.assemblies.polynomial.path_tracker import (
     track_paths,
 )
 from planar.equations.constraint_equations import ConstraintEquations
-
-Array = np.ndarray
+from planar.foundation.arrays import Array
 
 COMPLEX_MIDPOINT = 0.5 + 0.3j
 """Of the way from one position to another: the complex place between."""

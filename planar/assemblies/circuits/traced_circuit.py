@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer
 from planar.solving.continuation.path_pieces import PathPiece
 from planar.solving.continuation.period import MAX_PIECES
@@ -15,8 +16,6 @@ from planar.solving.continuation.predictor_corrector import CurveTracker
 from planar.solving.continuation.solution_curve import SolutionCurve
 from planar.solving.position import PositionSolver
 from planar.solving.runs.closed_circuit import follow_circuit, is_endless, moving_pieces, split_at_dead_points
-
-Array = np.ndarray
 
 TURN = 2.0 * pi
 

@@ -17,8 +17,7 @@ import numpy as np
 
 from planar.assemblies.polynomial.isotropic_form import IsotropicForm
 from planar.codegen.generic_evaluation import evaluate_function
-
-Array = np.ndarray
+from planar.foundation.arrays import Array
 
 BALL_PRECISION_BITS = 128
 BOX_HALF_WIDTHS = (1e-7, 1e-9, 1e-11, 1e-13)

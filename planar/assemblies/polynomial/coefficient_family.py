@@ -8,8 +8,7 @@ import numpy as np
 
 from planar.assemblies.polynomial.isotropic_form import ZERO_TOLERANCE, BlockPolynomials, IsotropicForm
 from planar.equations.constraint_equations import ConstraintEquations
-
-Array = np.ndarray
+from planar.foundation.arrays import Array
 
 
 class CoefficientFamily(NamedTuple):

@@ -5,9 +5,7 @@ from __future__ import annotations
 from enum import Enum
 from typing import NamedTuple
 
-import numpy as np
-
-Array = np.ndarray
+from planar.foundation.arrays import Array
 
 
 class Completeness(Enum):

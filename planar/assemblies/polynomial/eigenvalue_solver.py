@@ -17,8 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.assemblies.polynomial.isotropic_form import BlockPolynomials, IsotropicForm
-
-Array = np.ndarray
+from planar.foundation.arrays import Array
 
 MAX_DIMENSION = 3
 """Dimensions up to which eigenvalues are sought; beyond, paths are followed: their number grows less than the size's

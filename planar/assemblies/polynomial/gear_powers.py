@@ -21,9 +21,9 @@ import numpy as np
 
 from planar.codegen.generic_evaluation import OPERATIONS, evaluate_function
 from planar.equations.constraint_equations import Block, ConstraintEquations
+from planar.foundation.arrays import Array
 from planar.model.pairs import MeasureKind
 
-Array = np.ndarray
 IntegerVector = tuple[int, ...]
 
 MAX_DENOMINATOR = 1000

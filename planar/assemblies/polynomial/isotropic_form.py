@@ -30,9 +30,8 @@ import numpy as np
 from planar.assemblies.polynomial.gear_powers import AngleArguments, GearPowers, angle_arguments, gear_powers
 from planar.equations.casadi_call import BufferedFunction
 from planar.equations.constraint_equations import Block, ConstraintEquations
+from planar.foundation.arrays import Array
 from planar.model.pairs import MeasureKind
-
-Array = np.ndarray
 
 ZERO_TOLERANCE = 1e-10
 """Of numbers about one: what is rounding."""

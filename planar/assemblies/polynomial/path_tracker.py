@@ -15,8 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.assemblies.polynomial.isotropic_form import BlockPolynomials, IsotropicForm
-
-Array = np.ndarray
+from planar.foundation.arrays import Array
 
 FIRST_STEP = 0.05
 MIN_STEP = 1e-11

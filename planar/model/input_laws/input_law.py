@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.model.input_laws.segment import MAX_LAW_ITEMS, Array, LawSegment
+from planar.foundation.arrays import Array
+from planar.model.input_laws.segment import MAX_LAW_ITEMS, LawSegment
 from planar.model.input_laws.spline_table import TableSegment
 
 

@@ -8,9 +8,7 @@ from math import isfinite
 from numbers import Real
 from typing import Any, ClassVar, NamedTuple
 
-import numpy as np
-
-Array = np.ndarray
+from planar.foundation.arrays import Array
 
 SHORTEST_DURATION, LONGEST_DURATION = 1e-9, 1e9
 """s: what a piece takes at least and at most, so that no rate of it overflows."""

@@ -11,13 +11,12 @@ from planar.equations.constraint_equations import Block, slice_length
 from planar.equations.coordinates import frames_from_coordinates
 from planar.equations.functions import EquationFunctions
 from planar.equations.minors import constraint_dependencies
+from planar.foundation.arrays import Array
 from planar.foundation.geometry import Vector
 from planar.model.pairs import MeasureKind
 from planar.solving.assembly.sketch_start import turn_between
 from planar.solving.newton import CLOSED_TOLERANCE, NewtonResult, ResidualFunction, damped_newton, polish_root
 from planar.solving.prepared_mechanism import PreparedMechanism
-
-Array = np.ndarray
 
 SAME_ASSEMBLY_TOLERANCE = 1e-6
 """Unknowns closer than this are one assembly: within it two would be a dead point to working precision."""

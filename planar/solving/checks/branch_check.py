@@ -6,6 +6,7 @@ import numpy as np
 
 from planar.equations.functions import EquationFunctions
 from planar.equations.linear import solve_arrays
+from planar.foundation.arrays import Array
 from planar.solving.checks.singular_values import (
     DIFFERENCE_STEP,
     SINGULAR_DISTANCE_RATIO,
@@ -13,9 +14,6 @@ from planar.solving.checks.singular_values import (
     least_singular_values,
     singular_distance,
 )
-
-Array = np.ndarray
-
 
 ZERO_SINGULAR_VALUE = 1e-6
 """A least singular value that is zero: on the singular position itself it is what rounding left."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-Array = np.ndarray
+from planar.foundation.arrays import Array
 
 SINGULAR_TOLERANCE = 1e-6
 """A singular value below this part of the greatest is zero: where constraints touch, rounding leaves about 1e-8."""

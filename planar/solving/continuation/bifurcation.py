@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.solving.checks.singular_values import SINGULAR_TOLERANCE, null_space
 from planar.solving.continuation.second_order import (
     CONVERGED_STEP,
@@ -24,8 +25,6 @@ from planar.solving.continuation.second_order import (
 )
 from planar.solving.continuation.solution_curve import Arc, CurvePoint, SolutionCurve, fit_polynomial
 from planar.solving.newton import settle
-
-Array = np.ndarray
 
 SMALL_SINGULAR_VALUE = 0.1
 """A singular value below this part of the greatest may be one that vanishes near by."""

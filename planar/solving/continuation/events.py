@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.equations.coordinates import frames_from_coordinates
+from planar.foundation.arrays import Array
 from planar.foundation.errors import TrackingEnd
 from planar.foundation.jets import Jet, value_and_rates
 from planar.foundation.root_finding import find_root
@@ -27,8 +28,6 @@ from planar.solving.continuation.predictor_corrector import CurveTracker
 from planar.solving.continuation.solution_curve import CurvePoint, SolutionCurve
 from planar.solving.continuation.turning_points import is_dead_point, lowest_on_cubic
 from planar.solving.prepared_mechanism import PreparedMechanism
-
-Array = np.ndarray
 
 STANDING_RATE = 1e-9
 """An output that moves less than this (rad or sizes) for one of the curve's length stands still but for rounding."""

@@ -8,12 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.equations.acceptance import AcceptanceResult, StepCheck
+from planar.foundation.arrays import Array
 from planar.solving.checks.branch_check import is_move_allowed
 from planar.solving.checks.residual_check import CONTACT_TOLERANCE, EPS, NEGLIGIBLE_ERROR
 from planar.solving.checks.singular_values import SINGULAR_DISTANCE_RATIO
 from planar.solving.prepared_mechanism import PreparedMechanism
-
-Array = np.ndarray
 
 MIN_FAST_REGULARITY = 1e-3
 """Strength of a group from which on its rates are taken as they come; what is weaker is looked at in doubles' whole

@@ -11,6 +11,7 @@ import numpy as np
 
 from planar.equations.functions import EquationFunctions
 from planar.equations.linear import solve_vectors
+from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer, TrackingEnd
 from planar.solving.checks.branch_check import BranchCheck
 from planar.solving.continuation.fast_path import STRAIGHT_TOLERANCE, FastSamples, fast_run
@@ -24,8 +25,6 @@ from planar.solving.continuation.path_pieces import (
 from planar.solving.continuation.period import Period, PeriodSearch
 from planar.solving.continuation.predictor_corrector import ArcBudget, CurveTracker, NearbyBifurcation
 from planar.solving.continuation.solution_curve import CurvePoint, CurveSolver
-
-Array = np.ndarray
 
 MIN_WINDOW = 8
 """Samples that are tried at once where none has passed before."""

@@ -7,13 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.foundation.root_finding import find_root
 from planar.solving.continuation.fast_path import STRAIGHT_TOLERANCE
 from planar.solving.continuation.predictor_corrector import CurveTracker, PassedBifurcation
 from planar.solving.continuation.solution_curve import Arc, CurvePoint, SolutionCurve
 from planar.solving.continuation.turning_points import find_turning_point, is_dead_point
-
-Array = np.ndarray
 
 MAX_CORRECTION_RATIO = 0.1
 """A correction longer than this part of an arc has gone astray."""

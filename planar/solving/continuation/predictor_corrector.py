@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.foundation.errors import TrackingEnd
 from planar.foundation.root_finding import find_root
 from planar.model.pairs import MeasureKind
@@ -22,8 +23,6 @@ from planar.solving.continuation.bifurcation import (
 )
 from planar.solving.continuation.solution_curve import Arc, CurvePoint, CurveSolver, SolutionCurve, arc_between
 from planar.solving.continuation.turning_points import start_point
-
-Array = np.ndarray
 
 FIRST_STEP, LONGEST_STEP, SHORTEST_STEP = 0.05, 0.25, 1e-9
 """Steps of arc length (rad, lengths of the size): the first, the longest, and one at which the curve ends."""

@@ -13,6 +13,7 @@ import numpy as np
 from planar.document.dimensions import change_dimension, link_lengths
 from planar.equations.constraint_equations import Block
 from planar.equations.mechanism_numbers import pair_numbers, shapes_of_links
+from planar.foundation.arrays import Array
 from planar.foundation.units import parse_unit
 from planar.model.link_shapes import PointPlacementError
 from planar.model.mechanism import Drive, Mechanism, replace_inputs
@@ -21,8 +22,6 @@ from planar.solving.assembly.block_assemblies import BlockAssemblies, BlockAssem
 from planar.solving.assembly.nearest_assembly import Assembly, AssemblySearchFailure, find_nearest_assembly
 from planar.solving.newton import correct_blocks, damped_newton
 from planar.solving.prepared_mechanism import PreparedMechanism
-
-Array = np.ndarray
 
 MAX_DIMENSIONS = 40
 """Dimensions that are looked at."""

@@ -8,14 +8,13 @@ import numpy as np
 
 from planar.equations.linear import inverse_arrays
 from planar.equations.rounding_errors import rounding_terms
+from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.model.pairs import MeasureKind
 from planar.model.wording import count_phrase
 from planar.solving.checks.residual_check import EPS, MAX_RATE_ERROR, NEGLIGIBLE_ERROR
 from planar.solving.prepared_mechanism import PreparedMechanism
 from planar.solving.rates.regularity import regularity
-
-Array = np.ndarray
 
 SMALLEST_NORMAL = float(np.finfo(float).tiny)
 MAX_ACCELERATION_ERROR = 0.1

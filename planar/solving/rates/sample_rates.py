@@ -8,14 +8,13 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.equations.linear import solve_vectors
+from planar.foundation.arrays import Array
 from planar.solving.checks.singular_values import MIN_REGULARITY
 from planar.solving.continuation.path_pieces import BranchRates
 from planar.solving.newton import truncated_step
 from planar.solving.prepared_mechanism import PreparedMechanism
 from planar.solving.rates.accuracy import AccuracyDoubts, find_accuracy_doubts
 from planar.solving.rates.regularity import regularity
-
-Array = np.ndarray
 
 MIN_REGULARITY_FOR_RATES = 1e-3
 """Strength of a group from which on its rates are taken from its slope, however near a change point is."""

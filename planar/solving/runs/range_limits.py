@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
+from planar.foundation.arrays import Array
 from planar.results.motion import Motion
 from planar.results.records import Limit
 from planar.solving.continuation import events
@@ -12,8 +11,6 @@ from planar.solving.continuation.predictor_corrector import CurveTracker
 from planar.solving.runs.closed_circuit import ClosedCircuit
 from planar.solving.runs.running_input import RunningInput
 from planar.solving.runs.samples import RunSamples
-
-Array = np.ndarray
 
 STEP_ROUNDING = 1e-9
 """Parts of a step: what rounding leaves of one."""

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer, Outcome, TrackingEnd
 from planar.model.wording import join_all_names
 from planar.results.motion import Motion
@@ -33,8 +34,6 @@ from planar.solving.runs.samples import (
     run_samples,
     splice_runs,
 )
-
-Array = np.ndarray
 
 MIN_RANGE = 1e-5
 """rad or sizes: a range shorter than this is none."""

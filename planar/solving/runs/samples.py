@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.jets import Jet
 from planar.model.mechanism import Drive, replace_inputs
@@ -26,8 +27,6 @@ from planar.solving.lazy_frames import lazy_frames
 from planar.solving.position import PositionSolver
 from planar.solving.rates.accuracy import AccuracyDoubts
 from planar.solving.rates.sample_rates import InputRates, sample_rates
-
-Array = np.ndarray
 
 
 class RunSamples(NamedTuple):

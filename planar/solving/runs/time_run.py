@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from planar.equations.coordinates import frames_from_coordinates
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, Outcome
 from planar.foundation.jets import Jet
 from planar.foundation.root_finding import find_root
@@ -21,8 +22,6 @@ from planar.solving.continuation.path_pieces import END_TOLERANCE, PathBifurcati
 from planar.solving.position import solved_mechanism, stopped_at_start
 from planar.solving.rates.sample_rates import InputRates, sample_rates
 from planar.solving.runs.samples import RunSamples, build_motion, run_samples
-
-Array = np.ndarray
 
 
 class TimeRun:
