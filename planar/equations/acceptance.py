@@ -179,7 +179,8 @@ class AcceptanceFunctions:
         whole = self._term_sizes((w, w1, w2), (u, u1, u2), p)
         x, x1, x2 = ca.vertcat(w, u), ca.vertcat(w1, u1), ca.vertcat(w2, u2)
 
-        gaps = [ca.fabs(closing_error(left, kind)) for kind, left in zip(kinds, scalars(closures), strict=True)]
+        errors: list[ca.SX] = [closing_error(left, kind) for kind, left in zip(kinds, scalars(closures), strict=True)]
+        gaps = [ca.fabs(each) for each in errors]
         broken = []
         lengths = [k for k, kind in enumerate(kinds) if kind is MeasureKind.LENGTH]
         fastest = ca.SX(0.0)
@@ -191,7 +192,9 @@ class AcceptanceFunctions:
             broken.append(greatest_entry(ca.fabs(left) / ca.if_else(scale == 0.0, 1.0, scale)))
         greatest = self._greatest_rates(w1, w2)
         moving = (contacts, *time_derivatives(contacts, x, x1, x2))
-        open_ = [greatest_entry(ca.fabs(each) / size) for each, size in zip(moving, (1.0, *greatest), strict=True)]
+        open_ = [
+            greatest_entry(ca.fabs(each) / size) for each, size in zip(moving, (ca.SX(1.0), *greatest), strict=True)
+        ]
         many = ca.fmax(greatest_entry(ca.fabs(counted)) / (2.0 * np.pi), 1.0)
         total = sum(gaps, ca.SX(0.0)) + ca.sum1(ca.vertcat(w, w1, w2))
         verdict = [

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from math import isfinite
 from numbers import Real
-from typing import Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from planar.foundation.arrays import Array
 
@@ -37,7 +37,12 @@ class LawSegment(ABC):
 
     motion: ClassVar[str]
     keys: ClassVar[Mapping[str, SegmentKey]]
-    duration: float
+
+    if TYPE_CHECKING:  # a field, or made of the fields
+
+        @property
+        def duration(self) -> float:
+            """How long it takes (s)."""
 
     @abstractmethod
     def evaluate(self, t: Array, velocity: float) -> Array:
