@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property, lru_cache
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import casadi as ca
 import numpy as np
@@ -27,7 +27,6 @@ from planar.equations.functions import (
 from planar.equations.mechanism_numbers import equation_structure
 from planar.equations.rates import UnknownRates, first_and_second_rates, time_derivatives
 from planar.equations.residuals import closing_error, residuals, scalars, split_pair_numbers
-from planar.foundation.arrays import Array
 from planar.foundation.geometry import Frame, frame_at, frame_term_sizes
 from planar.foundation.jets import Jet, TermSizes, term_sizes
 from planar.model.mechanism import Mechanism
@@ -40,24 +39,28 @@ MAX_BLOCK_SIZE = 12
 """Unknowns of a block: the expressions of a larger one would be too long."""
 
 
-class AcceptanceResult(NamedTuple):
+Judged = TypeVar("Judged")
+"""A float of one position, an array of many."""
+
+
+class AcceptanceResult(NamedTuple, Generic[Judged]):
     """What is judged at a position; of many positions arrays. Lengths in sizes of the mechanism, angles in rad."""
 
-    residual: Array
+    residual: Judged
     "what the worst constraint leaves open"
-    finite_sum: Array
+    finite_sum: Judged
     "the sum of all that is left open: a number only if everything is"
-    velocity_error: Array
+    velocity_error: Judged
     "how far velocities break the worst constraint, as a part of the greatest"
-    acceleration_error: Array
+    acceleration_error: Judged
     "the same of accelerations"
-    contact_gap: Array
+    contact_gap: Judged
     "the greatest gap, or rate of one as a part of the greatest, of contacts that guides have to keep closed"
-    regularity: Array
+    regularity: Judged
     "no more than the least regularity of any block, see `solving.rates.regularity`"
-    least_singular_value: Array
+    least_singular_value: Judged
     "no more than the least singular value of any block, columns of one size"
-    rounding_amplification: Array
+    rounding_amplification: Judged
     "by how much, at most, round-off is greater in the rates, see `solving.rates.accuracy`"
 
 

@@ -119,7 +119,7 @@ def solve_arrays(
         return _divide(adjugate_times, (a * d - b * c)[..., None, :], least_determinant)
     if not least_determinant:
         try:
-            return np.linalg.solve(matrices, right_sides)  # type: ignore[return-value]  # numpy: of some floats
+            return np.linalg.solve(matrices, right_sides)
         except np.linalg.LinAlgError:
             pass
     known = np.all(np.isfinite(matrices), axis=(-2, -1))
@@ -156,7 +156,7 @@ def _pseudo_inverses(matrices: Array) -> Array:
     """What gives least squares (..., unknowns, rows); not numbers where a matrix is not all numbers."""
     known = np.all(np.isfinite(matrices), axis=(-2, -1))
     if np.all(known):
-        return np.linalg.pinv(matrices, rcond=RANK_TOLERANCE)  # type: ignore[return-value]  # numpy: of some floats
+        return np.linalg.pinv(matrices, rcond=RANK_TOLERANCE)
     found = np.full((*matrices.shape[:-2], *matrices.shape[:-3:-1]), np.nan)
     found[known] = np.linalg.pinv(matrices[known], rcond=RANK_TOLERANCE)
     return found

@@ -269,7 +269,9 @@ class SolvedMechanism:
     def _refusal(self) -> NoAnswer:
         """Why there is no assembly: looked for only where somebody asks."""
         found = self._start[1]
-        return found if isinstance(found, NoAnswer) else self._plain_solver.unassembled(found)
+        if isinstance(found, NoAnswer):
+            return found
+        return self._plain_solver.unassembled(found)  # type: ignore[arg-type]  # an assembly is not refused
 
     @cached_property
     def _start(self) -> tuple[PositionSolver, Assembly | AssemblySearchFailure | NoAnswer]:

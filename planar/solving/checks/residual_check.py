@@ -127,7 +127,7 @@ class ResidualCheck:
         given = [term_sizes(each) for each in u]
         both = zip(self._residuals(frames, own, u), self._residuals(sizes, own_sizes, given), strict=True)
         closures = [(row.kind, left, whole) for (row, left), (_, whole) in both if isinstance(left, Jet)]
-        found = []
+        found: list[tuple[Array, str]] = []
         for order in (1, 2):
             # a velocity counts as one in an arc of the size: what turning leaves there but for rounding is none
             speeds = [

@@ -65,16 +65,16 @@ class PathPiece(NamedTuple):
             return y[:-1], BranchRates(derivatives_by_input(arc, x), curve.input_direction, arc.rank_loss)
         ahead = np.zeros_like(rough)
         ahead[-1] = 1.0
-        y = curve.correct(rough, ahead)
+        near = curve.correct(rough, ahead)
         if (
-            y is None
-            or np.linalg.norm(y - rough) > MAX_CORRECTION_RATIO * abs(self.last - self.first)
-            or not curve.is_closed(y)
+            near is None
+            or np.linalg.norm(near - rough) > MAX_CORRECTION_RATIO * abs(self.last - self.first)
+            or not curve.is_closed(near)
         ):
-            y = arc.curve_coordinates(
+            near = arc.curve_coordinates(
                 curve, find_root(lambda x: float(arc.curve_coordinates(curve, x)[-1]) - position, self.first, self.last)
             )
-        return y[:-1], None
+        return near[:-1], None
 
 
 def path_pieces(tracker: CurveTracker) -> Iterator[PathPiece]:

@@ -178,11 +178,11 @@ class CurveTracker:
             self._approaching = after.regular_distance < here.regular_distance
             arc = arc_between(here, after)
             if self.far_point is None and self._slide_extent(after.y) > shown:
-                first, last = arc.ends
-                x = find_root(
-                    lambda x, arc=arc: self._slide_extent(arc.curve_coordinates(self.curve, x)) - shown, first, last
-                )
-                self.far_point = arc.point_at(self.curve, x)
+
+                def beyond(x: float, arc: Arc = arc) -> float:
+                    return self._slide_extent(arc.curve_coordinates(self.curve, x)) - shown
+
+                self.far_point = arc.point_at(self.curve, find_root(beyond, *arc.ends))
             self.point = after
             yield arc
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 from math import ceil, floor, log10
 from typing import NamedTuple
@@ -153,7 +154,7 @@ def mending_dimensions(
                 each.value,
                 setup.unit,
                 0.0 if each.name == f"{each.link}.length" else -np.inf,
-                lambda value, each=each: change_dimension(mechanism, each, value),
+                partial(change_dimension, mechanism, each),
             )
             for each in islice(link_lengths(mechanism, links), MAX_DIMENSIONS)
         ],
@@ -181,7 +182,7 @@ def mending_inputs(
                 given.position,
                 setup.unit if setup.is_sliding(given.pair) else 1.0,
                 -np.inf,
-                lambda value, given=given: replace_inputs(mechanism, (Drive(given.pair, value),)),
+                partial(_with_input_at, mechanism, given.pair),
             )
             for given in mechanism.inputs
             if inputs is None or given.pair in inputs
@@ -189,6 +190,10 @@ def mending_inputs(
         thorough,
         budget or BlockBudget(np.inf),
     )
+
+
+def _with_input_at(mechanism: Mechanism, pair: str, position: float) -> Mechanism:
+    return replace_inputs(mechanism, (Drive(pair, position),))
 
 
 def _smallest_changes_first(

@@ -57,11 +57,10 @@ def sample_rates(
     strong = strength >= MIN_REGULARITY
     # near by, the rates along a branch are those of a linkage that has the change point exactly
     known = {
-        index: _rates_in_time(each, inputs, index)
+        index: in_time
         for index, each in branch_rates.items()
-        if strength[index] < MIN_REGULARITY_FOR_RATES
+        if strength[index] < MIN_REGULARITY_FOR_RATES and (in_time := _rates_in_time(each, inputs, index)) is not None
     }
-    known = {index: each for index, each in known.items() if each is not None}
     weak = ~strong
     weak[list(known)] = False
     strong[list(known)] = False

@@ -44,9 +44,9 @@ class RangeLimits:
         up = self._limits_until(here, last, sense)
         low, high = sorted((first * ranged.scale, last * ranged.scale))
         room = STEP_ROUNDING * ranged.scale
-        told = [each for each in (*down[::-1], *up) if low - room <= each.limit.input <= high + room]
+        between = [each for each in (*down[::-1], *up) if low - room <= each.limit.input <= high + room]
         curve = ranged.curve_tracker(ranged.assembly.z, here).curve
-        return events.distinct_limits(ranged.solver, ranged.pair, curve, told)
+        return events.distinct_limits(ranged.solver, ranged.pair, curve, between)
 
     def _is_there_and_back(self, u: Array) -> bool:
         return len(u) > 2 and u[0] == u[-1] and u[1] == u[-2]

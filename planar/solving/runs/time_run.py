@@ -152,7 +152,11 @@ class _TimeCourse:
                 if any(first <= at <= last for at in switched):
                     continue  # it is the branch that turns, not the output
                 base = after if before in self.found.branch_rates else before
-                at = find_root(lambda t, row=base, pair=pair: self._output_at(row, t, pair.name)[1], first, last)
+
+                def output_velocity(t: float, row: int = base, name: str = pair.name) -> float:
+                    return self._output_at(row, t, name)[1]
+
+                at = find_root(output_velocity, first, last)
                 value = self._output_at(base, at, pair.name)[0]
                 yield Limit("stroke end", pair.name, at, value)
 
