@@ -55,7 +55,8 @@ class KinematicArrays:
 
     def frame(self, link: str) -> Frame:
         """A link's axes at every position, rates left out."""
-        return Frame(*self._frame_rates(link)[0], self.moving.frames[link].fixed)
+        x, y, cosine, sine, angle = self._frame_rates(link)[0]
+        return Frame(x, y, cosine, sine, angle, self.moving.frames[link].fixed)
 
     @property
     def frames(self) -> dict[str, Frame]:

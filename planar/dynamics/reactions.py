@@ -9,7 +9,7 @@ import numpy as np
 
 from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.multipliers import ForceSolution, ReactionSolver
-from planar.foundation.arrays import Array
+from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.short_repr import short_repr
 from planar.model.pairs import Pair
 from planar.model.wording import join_all_names
@@ -85,7 +85,7 @@ def bearing_point(pair: Pair) -> tuple[str, str] | None:
     return next(iter(pair.coincident_points()[1:] or ((rides[0],) if rides else ())), None)
 
 
-def _is_determined(changes: Array) -> Array:
+def _is_determined(changes: Array) -> BoolArray:
     """Where no way to hold the links otherwise changes something (n,), of its changes (n, ways)."""
     return np.abs(changes).max(axis=1, initial=0.0) <= DETERMINED_TOLERANCE
 

@@ -178,7 +178,8 @@ class _SimulationRun:
     def _add_rows(self, rows: list[Array], tick: ProgressCallback | None) -> str:
         """Add the rows after the first, as far as they can be told; why not all of them."""
         last = float(self.time[-1])
-        solver, good, tiny = self._integrator(0.0, self.initial_state), [], 0
+        solver, tiny = self._integrator(0.0, self.initial_state), 0
+        good: list[tuple[float, Array]] = []
         while solver.status == "running":
             failed = False
             try:
