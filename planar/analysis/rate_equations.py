@@ -231,7 +231,8 @@ def _input_coefficients(state: State, pair: Pair) -> dict[Rate, float]:
 
 def without_rates(frame: Frame) -> Frame:
     """A frame without its rates."""
-    return Frame(*(derivative(value, 0) for value in frame[:5]), frame.fixed)
+    x, y, cosine, sine, angle = (derivative(value, 0) for value in frame[:5])
+    return Frame(x, y, cosine, sine, angle, frame.fixed)
 
 
 def _at_unit_rate(frame: Frame, which: str = "") -> Frame:

@@ -152,7 +152,9 @@ class Modes(Displayable, Sequence["Mode"]):
     @property
     def bound(self) -> int | None:
         """How many complex solutions there may be: the product over the groups; None where one is not known."""
-        return None if None in self._expected else prod(self._expected)
+        every = self._expected
+        known = [each for each in every if each is not None]
+        return prod(known) if len(known) == len(every) else None
 
     @property
     def _expected(self) -> list[int | None]:
@@ -384,6 +386,6 @@ class Mode:
         return replace(self._solver.mechanism, sketch=sketch)
 
 
-def _restore_mode(of: tuple[Any, ...], mechanism: Mechanism) -> Mode:
+def _restore_mode(of: tuple[int | None, tuple[int, ...], bool, bool, Array], mechanism: Mechanism) -> Mode:
     """A mode where it has been sent to."""
     return Mode(*of, solved_mechanism(mechanism).solver)

@@ -18,6 +18,7 @@ import casadi as ca
 import numpy as np
 
 from planar.equations.constraint_equations import Block, ConstraintEquations
+from planar.foundation.arrays import Array
 from planar.model.pairs import MeasureKind
 
 ZERO_TOLERANCE = 1e-10
@@ -196,7 +197,7 @@ def _which_vanish(e: ConstraintEquations, parts: list[ca.SX]) -> list[bool]:
     return [bool(np.all(np.abs(each) < ZERO_TOLERANCE)) for each in _evaluate_at_random(e, parts)]
 
 
-def _evaluate_at_random(e: ConstraintEquations, parts: list[ca.SX]) -> list[np.ndarray]:
+def _evaluate_at_random(e: ConstraintEquations, parts: list[ca.SX]) -> list[Array]:
     """Expressions (2,) in numbers (2, places): at random places an identity holds by accident nowhere."""
     function = ca.Function("parts", [e.z, e.u, e.p], [ca.densify(part) for part in parts])
     rng = np.random.default_rng(0)

@@ -128,7 +128,7 @@ class Curvature:
         speed = hypot(*v)
         if speed <= self.least:
             # in the pole: a cusp, unless the pole stays there as well
-            stays = self.pole is None or hypot(*self.pole_velocity) <= self.least
+            stays = self.pole is None or self.pole_velocity is None or hypot(*self.pole_velocity) <= self.least
             return (nan if stays else 0.0), None
         bend = float(v[0] * a[1] - v[1] * a[0])
         if speed**3 >= STRAIGHT_RATIO * self.size * abs(bend):

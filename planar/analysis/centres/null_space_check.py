@@ -46,7 +46,7 @@ class AllowedMotions(NamedTuple):
     """
 
     poles: Mapping[str, Array]
-    count: int
+    mobility: int
 
 
 class FullPosition(NamedTuple):
@@ -124,11 +124,11 @@ def prove_centres(found: Mapping[LinkPair, Array], links: Sequence[str], motions
         for three in combinations(links, 3)
         if len({stands.get(link, link) for link in three}) > 1
     ]
-    a, b, c = np.array(threes, dtype=int).reshape(-1, 3).T
-    triples = np.stack([at[a, b], at[b, c], at[a, c]], axis=1)
+    first, second, third = np.array(threes, dtype=int).reshape(-1, 3).T
+    triples = np.stack([at[first, second], at[second, third], at[first, third]], axis=1)
     known = ~np.isnan(triples).any(axis=(1, 2))
     collinear = float(np.abs(np.linalg.det(triples[known])).max(initial=0.0))
-    if not motions.count or not found:
+    if not motions.mobility or not found:
         return CentresProof(None, collinear, None)
     centres = np.array(list(found.values()))[:, None]
     relative = np.array([motions.poles[b] - motions.poles[a] for a, b in map(tuple, found)])

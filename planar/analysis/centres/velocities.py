@@ -179,11 +179,11 @@ class _ScaledCentres:
             link, sign = (second, 1.0) if first == frame else (first, -1.0)
             return {link: LinkByCentres(sign * motion, ())}
         # between moving links: m_second - m_first is known, and where both poles lie
-        poles = [self.centre_point(link, frame) for link in (first, second)]
+        poles = self.centre_point(first, frame), self.centre_point(second, frame)
         for held, moves, sign in ((first, second, 1.0), (second, first, -1.0)):
             if self._is_one_with(held, frame):  # at rest here
                 return {held: LinkByCentres(np.zeros(3), ()), moves: LinkByCentres(sign * motion, ())}
-        if any(pole is None for pole in poles):
+        if poles[0] is None or poles[1] is None:
             raise _undetermined_answer(self.centres, [first, second], name)
         matrix = np.stack([-poles[0], poles[1]], axis=1)
         if np.linalg.svd(matrix, compute_uv=False)[-1] <= COINCIDENT_TOLERANCE:

@@ -85,6 +85,7 @@ def analytical_routes(
         told += f", such as {such[0].name!r}" if such else ""
         raise BadInput(mechanism.name, told)
     pistons = [one for pair in frame_slides(mechanism) if (one := find_piston(mechanism, pair)) is not None]
+    found: list[tuple[tuple[Harmonics, ...], str]]
     found = [((harmonics(mechanism, pair, None, running),), pair) for pair in pairs]
     found += [
         (tuple(harmonics(mechanism, point, axis, running) for axis in "xy"), f"{link}.{name}")

@@ -17,8 +17,7 @@ from planar.foundation.errors import NoAnswer
 from planar.foundation.root_finding import find_root
 from planar.foundation.short_repr import short_repr
 from planar.model.wording import REST_TOLERANCE
-from planar.results.kinematic_result import KinematicResult
-from planar.results.motion import Motion
+from planar.results.motion import Motion, State
 
 
 class AdvantageOver(NamedTuple):
@@ -86,7 +85,7 @@ def _is_length(steady: InterpolatedRun, output: str | Output) -> bool:
 def _find_standstills(steady: InterpolatedRun, output: str | Output, still: float) -> list[float]:
     """Where the output stands still: where its speed is least, and none beside the greatest."""
 
-    def power(moving: KinematicResult) -> Array:
+    def power(moving: State | Motion) -> Array:
         _, velocity, acceleration = quantity_and_rates(moving, output)
         return np.sum(velocity * acceleration, axis=-1) / steady.rate
 

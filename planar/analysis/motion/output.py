@@ -17,7 +17,8 @@ from planar.foundation.jets import value_and_rates
 from planar.foundation.root_finding import find_root
 from planar.model.mechanism import relative_motions
 from planar.model.pairs import MeasureKind
-from planar.results.kinematic_result import KinematicResult, ValueAndRates
+from planar.results.kinematic_result import ValueAndRates
+from planar.results.motion import Motion, State
 from planar.results.records import principal_turns
 
 Axis = str | float
@@ -64,7 +65,7 @@ class Output:
             self._offset = principal_turns(self._values)
         self._values = self._values + self._offset
 
-    def value_and_rates(self, moving: KinematicResult) -> ValueAndRates:
+    def value_and_rates(self, moving: State | Motion) -> ValueAndRates:
         """Its value and rates in a state, or over a motion (n,)."""
         if self._direction is not None:
             position, velocity, acceleration = (part @ self._direction for part in moving.point(self.name)[:3])
@@ -80,8 +81,9 @@ class Output:
         place = self.run.wrap_position(position)
         if place is None or not self.run.closed:
             return self._evaluate_in_range(position)
-        value, *rates = self._evaluate_in_range(place)
-        return value + self.gain_per_period * round((position - place) / self.run.period), *rates
+        value, velocity, acceleration = self._evaluate_in_range(place)
+        value += self.gain_per_period * round((position - place) / self.run.period)
+        return value, velocity, acceleration
 
     def _evaluate_in_range(self, position: float) -> tuple[float, float, float]:
         try:

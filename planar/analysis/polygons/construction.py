@@ -177,7 +177,7 @@ class _PolygonConstruction:
     def _draw_meeting(
         self, links: tuple[str, ...], sides: Sequence[tuple[LinkPoint, tuple[ChainVector, ...]]], meeting: LinkPoint
     ) -> None:
-        drawn = []
+        drawn: list[MeetingSide] = []
         for start, legs in sides:
             if not legs:
                 self._draw_point(start)

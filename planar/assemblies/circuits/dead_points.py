@@ -100,8 +100,8 @@ class _DeadPointSearch:
         if any(crossings) or any(high - low < SAME_POSITION_DISTANCE for low, high in pairwise(every)):
             doubts.append(BRANCHES_CROSS)
         if self.slides and not self._is_bounded():
-            low, high = (self.setup.describe_input(self.pair, at) for at in self.span)
-            doubts.append(f"other slides may let it run on without end; it was looked over from {low} to {high}")
+            first, last = (self.setup.describe_input(self.pair, at) for at in self.span)
+            doubts.append(f"other slides may let it run on without end; it was looked over from {first} to {last}")
         return CriticalPositions(self._to_si(found), self._to_si(crossings), self._si_range(), tuple(doubts))
 
     def _to_si(self, found: Sequence[Sequence[float]]) -> tuple[float, ...]:
@@ -159,14 +159,14 @@ class _DeadPointSearch:
 
     def _earlier_assemblies(self, level: int, at: float) -> list[tuple[DyadChoices, Array]]:
         """Every assembly of the blocks on which one hangs."""
-        found = [((), np.zeros(len(self.setup.equations.unknowns)))]
+        found: list[tuple[DyadChoices, Array]] = [((), np.zeros(len(self.setup.equations.unknowns)))]
         u = self._inputs_at(at)
         earlier = tuple(sorted(self.dependencies[level]))
         for k, group in enumerate(earlier):
             key = at, earlier[: k + 1]
             if key not in self._reached:
                 own = self.stages[group].unknowns
-                following = []
+                following: list[tuple[DyadChoices, Array]] = []
                 for choices, z in found:
                     for choice, values in self._assemblies(group, z, u):
                         there = z.copy()

@@ -200,7 +200,7 @@ class _BallPolynomials:
         for half in BOX_HALF_WIDTHS:
             box = self._box(w, half)
             wide = one - near * self.mat(self._residuals_and_jacobian(box, True)[1])
-            about = self.mat([[each] for each in self._box(np.zeros(len(w)), half)])
+            about = self.mat([[each] for each in self._box(np.zeros(len(w), dtype=complex), half)])
             moved = (wide * about - step).entries()
             if all(_is_within(each, half) for each in moved):
                 return half, [at + each for at, each in zip(middle, moved, strict=True)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import Enum
 from typing import NamedTuple
 
-from planar.foundation.arrays import Array
+from planar.foundation.arrays import Array, BoolArray
 
 
 class Completeness(Enum):
@@ -27,8 +27,8 @@ class BlockRoots(NamedTuple):
     """
 
     real: Array
-    double: Array
-    certified: Array
+    double: BoolArray
+    certified: BoolArray
     expected: int | None
     found: int
     complete: Completeness

@@ -114,8 +114,8 @@ class IsotropicForm(NamedTuple):
     def polynomials(self, z: Array, u: Array, p: Array) -> BlockPolynomials:
         """The block where all before it stands at z, for inputs u and numbers p."""
         real, imaginary = (each.T for each in self.factors_call(z, u, p))
-        alpha = real + 1j * imaginary
-        loops = self.combined @ alpha
+        alpha: ComplexArray = real + 1j * imaginary
+        loops: ComplexArray = self.combined @ alpha
         # of what is real one half stands with X, one with Y: in a loop both are put together
         loops[:, self.real_entries] *= 2.0
         return BlockPolynomials(loops, loops.conj(), self.single @ alpha, self.single @ alpha.conj())

@@ -213,7 +213,7 @@ def _solve_batch(slope: ComplexArray, right: ComplexArray) -> ComplexArray:
     try:
         return np.linalg.solve(slope, right[..., None])[..., 0]
     except np.linalg.LinAlgError:
-        bad = ~np.isfinite(slope).all(axis=(1, 2))
+        bad = np.logical_not(np.isfinite(slope).all(axis=(1, 2)))
         slope = np.where(bad[:, None, None], np.eye(slope.shape[1]), slope)
         return _matrix_times_vector(np.linalg.pinv(slope), np.where(bad[:, None], np.nan, right))
 
