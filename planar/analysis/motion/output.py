@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from math import cos, isfinite, sin
 from numbers import Real
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -68,12 +69,13 @@ class Output:
     def value_and_rates(self, moving: State | Motion) -> ValueAndRates:
         """Its value and rates in a state, or over a motion (n,)."""
         if self._direction is not None:
-            position, velocity, acceleration = (part @ self._direction for part in moving.point(self.name)[:3])
+            rates: Sequence[Any] = [part @ self._direction for part in moving.point(self.name)[:3]]
         elif self._is_pair:
             pair, parts = moving._find_relative_motion(self.name)
-            position, velocity, acceleration = list(pair.results(*parts).values())[:3]
+            rates = list(pair.results(*parts).values())[:3]
         else:
-            position, velocity, acceleration = value_and_rates(moving.frames[self.name].angle)
+            rates = value_and_rates(moving.frames[self.name].angle)
+        position, velocity, acceleration = rates
         return position + self._offset, velocity, acceleration
 
     def evaluate(self, position: float) -> tuple[float, float, float]:
