@@ -8,13 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.foundation.geometry import Frame, Vector
 from planar.foundation.jets import Jet
 from planar.model.mechanism import Mechanism, pair_entries, relative_motions
 from planar.model.pairs import Pair
 from planar.results.motion import State
 
-Array = np.ndarray
 LEAST_COEFFICIENT = 1e-12
 """A slope below this is none: the residuals' slopes are of order one, or of the links' lengths."""
 
@@ -231,7 +231,8 @@ def _input_coefficients(state: State, pair: Pair) -> dict[Rate, float]:
 
 def without_rates(frame: Frame) -> Frame:
     """A frame without its rates."""
-    return Frame(*(derivative(value, 0) for value in frame[:5]), frame.fixed)
+    x, y, cosine, sine, angle = (derivative(value, 0) for value in frame[:5])
+    return Frame(x, y, cosine, sine, angle, frame.fixed)
 
 
 def _at_unit_rate(frame: Frame, which: str = "") -> Frame:

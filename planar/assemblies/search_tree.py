@@ -10,12 +10,11 @@ import numpy as np
 from planar.assemblies.polynomial.completeness import BlockRoots, Completeness
 from planar.equations.constraint_equations import Block, slice_length
 from planar.equations.functions import POLISHING_STEPS
+from planar.foundation.arrays import Array
 from planar.model.pairs import MeasureKind
 from planar.solving.assembly.block_assemblies import MEETING_COSINE_SQUARED, block_dependencies
 from planar.solving.newton import CLOSED_TOLERANCE
 from planar.solving.prepared_mechanism import PreparedMechanism
-
-Array = np.ndarray
 
 BEST_TO_WORST = (Completeness.PROVED, Completeness.NUMERICALLY, Completeness.NOT)
 """From the best to the worst."""

@@ -164,11 +164,12 @@ class Cursor:
         return found
 
     def choice(self, key: str, words: tuple[str, ...]) -> str | None:
-        if not self.has(key):
-            return None
-        word = self[key].as_text()
+        return self[key].as_choice(words) if self.has(key) else None
+
+    def as_choice(self, words: tuple[str, ...]) -> str:
+        word = self.as_text()
         if word not in words:
-            raise self.error_at(key, f"{word!r} is none of {', '.join(words)}{suggest_spelling(word, words)}")
+            raise self.error_at(None, f"{word!r} is none of {', '.join(words)}{suggest_spelling(word, words)}")
         return word
 
     # quantities

@@ -119,8 +119,8 @@ def _expand_short_forms(top: Cursor) -> Cursor:
             links[name] = _read_link(name, Cursor(link, cursor.path, top.context))
         entries[index] = whole.entry
         _add_links_to_entry(whole.joining_entry, tuple(whole.links), entries)
-    whole = replace(top.context, links=links)
-    return replace(top, value=dict(top.fields()) | {"pairs": entries}, context=whole)
+    context = replace(top.context, links=links)
+    return replace(top, value=dict(top.fields()) | {"pairs": entries}, context=context)
 
 
 def _add_links_to_entry(by: dict[str, Any], links: tuple[str, ...], entries: list[dict[str, Any]]) -> None:

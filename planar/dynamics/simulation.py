@@ -15,6 +15,7 @@ from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.lagrangian import lagrangian_functions
 from planar.dynamics.load_validation import check_loads
 from planar.equations.mechanism_numbers import mechanism_size
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.foundation.geometry import Frame, frame_at
 from planar.foundation.jets import Jet
@@ -25,8 +26,6 @@ from planar.model.wording import join_all_names
 from planar.results.motion import Motion, State
 from planar.results.records import InputMotion
 from planar.solving.position import PositionSolver, solve
-
-Array = np.ndarray
 
 RELATIVE_TOLERANCE = 1e-12
 """What a step may be off, of sizes and turns and of the rates that are reached."""
@@ -179,7 +178,8 @@ class _SimulationRun:
     def _add_rows(self, rows: list[Array], tick: ProgressCallback | None) -> str:
         """Add the rows after the first, as far as they can be told; why not all of them."""
         last = float(self.time[-1])
-        solver, good, tiny = self._integrator(0.0, self.initial_state), [], 0
+        solver, tiny = self._integrator(0.0, self.initial_state), 0
+        good: list[tuple[float, Array]] = []
         while solver.status == "running":
             failed = False
             try:

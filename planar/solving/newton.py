@@ -13,8 +13,8 @@ import numpy as np
 
 from planar.equations.constraint_equations import slice_length
 from planar.equations.functions import EquationFunctions
+from planar.foundation.arrays import Array
 
-Array = np.ndarray
 ResidualFunction = Callable[[Array], tuple[Array, Array]]
 """Unknowns (starts, n) -> what is left open (starts, m), and its slope (starts, m, n)."""
 SystemFunction = Callable[[Array], tuple[Array, Array]]

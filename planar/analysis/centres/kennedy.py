@@ -16,7 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-Array = np.ndarray
+from planar.foundation.arrays import Array
+
 ROUNDING = 1e-15
 """How exact a centre is that a pair shows."""
 MAX_MEETING_ERROR = 1e-7

@@ -11,11 +11,11 @@ import numpy as np
 from planar.analysis.centres.centres import Centre, Centres, extent
 from planar.analysis.rate_equations import RateEquation, RateEquations, SlideJoint, rate_equations
 from planar.document.first_argument import takes_result
+from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import Drive, replace_inputs
 
-Array = np.ndarray
 COINCIDENT_TOLERANCE = 1e-7
 """Homogeneous centres, of length one with lengths in sizes, that are no farther apart than this are one.
 
@@ -30,7 +30,8 @@ class LinkByCentres(NamedTuple):
     by: tuple[str, ...]
     "the names of the three centres of which it follows from another link's, none for what an input gives"
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return short_repr(self)
 
     @property
     def angular_velocity(self) -> float:
@@ -51,7 +52,8 @@ class PointByCentre(NamedTuple):
     radius: float | None
     by: tuple[str, ...]
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return short_repr(self)
 
 
 @takes_result("Centres")
@@ -177,11 +179,11 @@ class _ScaledCentres:
             link, sign = (second, 1.0) if first == frame else (first, -1.0)
             return {link: LinkByCentres(sign * motion, ())}
         # between moving links: m_second - m_first is known, and where both poles lie
-        poles = [self.centre_point(link, frame) for link in (first, second)]
+        poles = self.centre_point(first, frame), self.centre_point(second, frame)
         for held, moves, sign in ((first, second, 1.0), (second, first, -1.0)):
             if self._is_one_with(held, frame):  # at rest here
                 return {held: LinkByCentres(np.zeros(3), ()), moves: LinkByCentres(sign * motion, ())}
-        if any(pole is None for pole in poles):
+        if poles[0] is None or poles[1] is None:
             raise _undetermined_answer(self.centres, [first, second], name)
         matrix = np.stack([-poles[0], poles[1]], axis=1)
         if np.linalg.svd(matrix, compute_uv=False)[-1] <= COINCIDENT_TOLERANCE:

@@ -8,11 +8,11 @@ import numpy as np
 
 from planar.analysis.interpolated_run import CLOSED_TOLERANCE, InterpolatedRun
 from planar.document.first_argument import takes_result
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
 
-Array = np.ndarray
 SUM_TOLERANCE = 1e-10
 """The estimated error, beside the area, at which the sum has come to its end."""
 ROUND_OFF_RATIO = 1e-14

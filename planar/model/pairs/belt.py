@@ -64,7 +64,8 @@ class BeltPair(WheelPair):
         wheels = [mark for mark in super().drawing_marks(shapes, all_pairs) if isinstance(mark, WheelMark)]
         if len(wheels) != 2:
             return tuple(wheels)
-        return (*wheels, BeltMark(self.name, *wheels, self.ratio() < 0.0))
+        first, second = wheels
+        return (first, second, BeltMark(self.name, first, second, self.ratio() < 0.0))
 
     def _pitch_radii(self, centre_distance: Scalar) -> tuple[Scalar, ...]:
         ratio = abs(self.ratio())

@@ -12,13 +12,13 @@ import numpy as np
 
 from planar.equations.acceptance import CARRIED_ROUNDING
 from planar.equations.residuals import closing_error, input_residuals, pair_residuals
+from planar.foundation.arrays import Array
 from planar.foundation.geometry import Frame, frame_term_sizes
 from planar.foundation.jets import Jet, term_sizes
 from planar.model.link_shapes import LinkShape
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import MeasureKind, Pair
 
-Array = np.ndarray
 CONTACT_TOLERANCE = 1e-6
 """Sizes: dimensions in files are rounded, so a contact that guides keep closed may be open by as much."""
 EPS = float(np.finfo(float).eps)
@@ -127,7 +127,7 @@ class ResidualCheck:
         given = [term_sizes(each) for each in u]
         both = zip(self._residuals(frames, own, u), self._residuals(sizes, own_sizes, given), strict=True)
         closures = [(row.kind, left, whole) for (row, left), (_, whole) in both if isinstance(left, Jet)]
-        found = []
+        found: list[tuple[Array, str]] = []
         for order in (1, 2):
             # a velocity counts as one in an arc of the size: what turning leaves there but for rounding is none
             speeds = [
