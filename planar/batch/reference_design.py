@@ -165,7 +165,7 @@ class ReferenceDesign:
 
     def _search_block_assemblies(self) -> Iterator[tuple[Array, int]]:
         candidates = self.candidates
-        nodes = [(0.0, np.zeros(len(self.solver.equations.unknowns)))]
+        nodes: list[tuple[float, Array]] = [(0.0, np.zeros(len(self.solver.equations.unknowns)))]
         for stage in self.solver.equations.blocks:
             ways = []
             for cost, z in nodes:

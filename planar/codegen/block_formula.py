@@ -9,8 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planar.codegen.instructions import InstructionList, required_values
-
-Array = np.ndarray
+from planar.foundation.arrays import Array
 
 NUMPY_OPERATIONS: Mapping[str, Callable[..., Any]] = {
     "add": operator.add,

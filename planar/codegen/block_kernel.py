@@ -10,8 +10,7 @@ import numpy as np
 from planar.codegen.block_formula import BlockFormula, KernelLayout
 from planar.codegen.llvm_compile import compile_function
 from planar.codegen.llvm_ir import IRWriter
-
-Array = np.ndarray
+from planar.foundation.arrays import Array
 
 LANES = 8
 """Numbers that are worked on at once; rows of memory are multiples of so many."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from functools import cached_property
 from itertools import combinations
-from math import isfinite
+from math import copysign, inf, isfinite
 from typing import NamedTuple
 
 import numpy as np
@@ -40,11 +40,11 @@ from planar.drawing.paper.scales import Scale, round_scale
 from planar.drawing.scheme.scene import plain_frames
 from planar.drawing.scheme.scheme import scheme, space_scale
 from planar.drawing.scheme.symbol_table import PIN_RADIUS
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.foundation.units import parse_unit
 from planar.model.mechanism import relative_motions
 
-Array = np.ndarray
 DEFAULT_REACH = 2.0
 """Of the mechanism's greater extent: how wide and high the window is in which centres are drawn."""
 DRAWING_SIZE = 211.0, 125.0
@@ -290,7 +290,7 @@ class _CentresDrawing:
                 continue
             finite = [at for name in ray.centre_names if (at := self._paper_point(name)) is not None]
             parts = [ray.coordinate_of(at) for at in (*finite, *ray.points)]
-            parts += [np.copysign(np.inf, ray.direction @ ways[name]) for name in ray.centre_names if name in ways]
+            parts += [copysign(inf, ray.direction @ ways[name]) for name in ray.centre_names if name in ways]
             low, high = max(ends[0], min(parts) - LINE_OVERHANG), min(ends[1], max(parts) + LINE_OVERHANG)
             if low < high:
                 yield Polyline(

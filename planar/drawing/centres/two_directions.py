@@ -25,13 +25,13 @@ from planar.drawing.paper.picture import (
 from planar.drawing.paper.scales import Scale
 from planar.drawing.scheme.scene import plain_frames
 from planar.drawing.scheme.scheme import scheme, space_scale
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.foundation.units import length_unit_of_rates, unit_of_kind
 from planar.model.mechanism import named_points
 from planar.results.motion import State
 from planar.results.records import PointState
 
-Array = np.ndarray
 WINDOW_RATIO = 2.5
 """Of the mechanism's greater extent: how far from its middle C is still drawn in its place."""
 MAX_ARROW_LENGTH = 30.0

@@ -13,14 +13,13 @@ from planar.assemblies.circuits.circuit_of_assembly import LocatedAssembly
 from planar.assemblies.circuits.circuits import Circuit, Circuits
 from planar.drawing.diagrams.drawn_run import MAX_TURNS
 from planar.drawing.diagrams.motion_curves import available_names, default_subject, find_slide
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.model.link_graph import link_numbers
 from planar.model.mechanism import Mechanism, named_points, relative_motions
 from planar.model.pairs import MeasureKind
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
-
-Array = np.ndarray
 
 FULL_TURN = 2.0 * pi
 RANGE_MARGIN = 0.08

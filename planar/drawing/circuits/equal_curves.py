@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from planar.drawing.circuits.curves import BranchCurve, CircuitChart, InputWindow
-
-Array = np.ndarray
+from planar.foundation.arrays import Array
 
 INDISTINGUISHABLE_RATIO = 4e-3
 """Of a panel's width or height: curves nearer than that cannot be told apart on paper."""

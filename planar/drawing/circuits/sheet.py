@@ -9,8 +9,8 @@ import numpy as np
 from planar.assemblies.circuits.circuits import Circuits
 from planar.drawing.circuits.curves import InputWindow, PlottedOutput
 from planar.drawing.labels.fonts import font_families
+from planar.foundation.arrays import Array
 
-Array = np.ndarray
 PanelPoint = tuple[float, float]
 
 SMALL_TEXT, NORMAL_TEXT, LARGE_TEXT = 7.0, 8.0, 10.0

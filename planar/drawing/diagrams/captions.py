@@ -11,11 +11,10 @@ from planar.drawing.diagrams.drawn_run import DrawnRun
 from planar.drawing.diagrams.motion_curves import ChordRates, DiagramSubject, MotionCurve, Peak, chord_rates, find_peak
 from planar.drawing.labels.text_metrics import text_size, wrap_text
 from planar.drawing.paper.scales import Scale
+from planar.foundation.arrays import Array
 from planar.foundation.units import coherent_unit, display_unit, length_unit_of_rates, parse_unit
 from planar.model.mechanism import FileUnits
 from planar.model.wording import amount
-
-Array = np.ndarray
 
 END_MARGIN = 0.1
 """Part of the run beside an end where rates grow without bound that no ordinate is made for."""

@@ -22,6 +22,7 @@ from planar.drawing.labels.fonts import DRAWING_FAMILY, font_families
 from planar.drawing.labels.text_metrics import clip_text, format_tick, text_size
 from planar.drawing.paper.pens import MM_PER_POINT, require_matplotlib
 from planar.drawing.paper.scales import DECIMAL_STEPS, DEGREE_STEPS, round_scale, round_step
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.foundation.units import SI_UNITS, coherent_unit, length_unit_of_rates, parse_unit, unit_of_kind
 from planar.model.mechanism import Mechanism, relative_motions
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Array = np.ndarray
 
 INCHES_PER_MM = 1.0 / 25.4
 """inches"""

@@ -17,14 +17,13 @@ from planar.drawing.scheme.ground import ground_marks
 from planar.drawing.scheme.link_bodies import link_bodies
 from planar.drawing.scheme.link_strokes import body_marks
 from planar.drawing.scheme.scheme import scheme
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.model.mechanism import Drive, Mechanism, NamedPoint, named_points, relative_motions, replace_inputs
 from planar.model.pairs import MeasureKind
 from planar.model.wording import amount
 from planar.results.motion import Motion
 from planar.solving.position import solve
-
-Array = np.ndarray
 
 MIN_PATH_STEPS = 360
 """Steps, at least, of a path that is drawn as a curve."""

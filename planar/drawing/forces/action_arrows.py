@@ -12,9 +12,8 @@ from planar.drawing.paper.picture import Pen
 from planar.drawing.scheme.scheme import SUBSCRIPTS
 from planar.dynamics.external_actions import ExternalAction
 from planar.dynamics.forces import Forces
+from planar.foundation.arrays import Array
 from planar.model.link_graph import link_numbers
-
-Array = np.ndarray
 
 ROUND_OFF_RATIO = 1e-9
 """A force, or a couple at an arm of the mechanism's size, below this part of the greatest force is round-off."""

@@ -24,6 +24,7 @@ from planar.drawing.paper.scales import (
 from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.forces import Forces
 from planar.dynamics.reactions import Reaction
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.model.link_graph import link_numbers
 from planar.model.mechanism import Mechanism
@@ -31,8 +32,6 @@ from planar.model.pairs import MeasureKind, Pair
 from planar.model.pairs.symbols import GuideMark
 from planar.model.wording import join_all_names
 from planar.results.motion import Motion
-
-Array = np.ndarray
 
 POLAR_SIZE, DIAGRAM_WIDTH, DIAGRAM_HEIGHT = (58.0, 58.0), 75.0, 42.0
 """mm: room of a polar diagram; between the axes of the others."""

@@ -13,12 +13,11 @@ from planar.dynamics.flywheel import whole_turns
 from planar.dynamics.forces import Forces, forces
 from planar.dynamics.load_validation import require_loads
 from planar.equations.mechanism_numbers import mechanism_size
+from planar.foundation.arrays import Array, IntArray
 from planar.foundation.errors import BadInput
 from planar.foundation.units import parse_unit
 from planar.model.mechanism import Mechanism
 from planar.results.motion import Motion
-
-Array = np.ndarray
 
 ROUND_OFF_RATIO = 1e-9
 """A force below this part of the greatest in any pair at that position is round-off."""
@@ -37,7 +36,7 @@ class ForceRun(NamedTuple):
     axis_name: str
     "of what it is, with its unit"
     unit: str
-    order: Array
+    order: IntArray
     period: float
     "of a whole cycle, in the unit; else 0"
     notes: tuple[str, ...]

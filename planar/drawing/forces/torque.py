@@ -12,12 +12,11 @@ from planar.drawing.paper.picture import Circle, Fill, Label, Mark, Pen, Picture
 from planar.drawing.paper.scales import format_force
 from planar.dynamics.flywheel import DEFAULT_FLUCTUATION, Flywheel, explain_no_cycle, flywheel
 from planar.dynamics.forces import Forces
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.foundation.units import parse_unit
 from planar.model.mechanism import Mechanism
 from planar.results.motion import Motion
-
-Array = np.ndarray
 
 DIAGRAM_WIDTH, DIAGRAM_HEIGHT = 170.0, 85.0
 """mm between the axes."""

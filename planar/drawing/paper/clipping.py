@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-Array = np.ndarray
+from planar.foundation.arrays import Array
 
 POINT_SPACING = 0.15
 """mm between the points of a stroke."""

@@ -10,13 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.foundation.errors import unknown_format_error
 from planar.reports.columns import UNITS_BY_KIND, ReportedSeries, reported_series, run_columns, run_header
 from planar.reports.files import parquet
 from planar.results.motion import Motion
 from planar.results.records import Limit
-
-Array = np.ndarray
 
 _NO_FACTS: Mapping[str, Any] = MappingProxyType({})
 FORMULA_STARTS = ("=", "+", "-", "@", "'")

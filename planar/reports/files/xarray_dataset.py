@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from planar.document.first_argument import takes_result
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.foundation.units import SI_UNITS
 from planar.reports.columns import ReportedSeries, reported_series, run_header
@@ -16,7 +17,6 @@ from planar.results.motion import Motion
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = np.ndarray
 Variable = tuple[tuple[str, ...], Array, dict[str, str]]
 """Dimensions, values and attributes, as xarray takes them."""
 

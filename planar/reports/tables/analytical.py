@@ -12,12 +12,12 @@ from rich.text import Text
 
 from planar.analysis.motion.analytical_route import AnalyticalRoute, RodPointComparison, TwoTermComparison
 from planar.analysis.motion.harmonics import Harmonics
+from planar.foundation.arrays import Array
 from planar.foundation.units import length_unit_of_rates, parse_unit
 from planar.model.mechanism import FileUnits, Mechanism
 from planar.model.wording import amount, count_phrase
 from planar.reports.fitted_table import plain_table
 from planar.reports.number_format import paragraphs
-from planar.results.motion import Array
 
 NEGLIGIBLE_RATIO, DIGITS = 1e-5, 6
 """Of the greatest harmonic: those after the last that is more are not printed. Digits of the greatest."""

@@ -12,6 +12,7 @@ from rich.text import Text
 from planar.dynamics.forces import Forces
 from planar.dynamics.load_attachment import attachment_remarks
 from planar.dynamics.reactions import Reaction
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.model.wording import count_phrase, join_all_names
 from planar.reports.columns import ReportedSeries
@@ -21,8 +22,6 @@ from planar.reports.tables.forces import loads
 from planar.reports.tables.forces import position_forces as at_one
 from planar.reports.tables.motion import motion_heading, position_cell, position_heading, running_pair
 from planar.results.motion import Motion
-
-Array = np.ndarray
 
 
 def tables(forces: Forces) -> RenderableType:

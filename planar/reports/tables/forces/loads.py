@@ -9,12 +9,11 @@ import numpy as np
 
 from planar.dynamics.external_actions import ExternalAction, KinematicArrays
 from planar.dynamics.forces import Forces
+from planar.foundation.arrays import Array
 from planar.foundation.units import display_unit, parse_unit
 from planar.model.mechanism import FileUnits
 from planar.reports.fitted_table import FittedTable, plain_table
 from planar.reports.number_format import ROUNDING_RATIO, column_heading, format_or_zero, vector_direction
-
-Array = np.ndarray
 
 
 class ActionMotion(NamedTuple):
