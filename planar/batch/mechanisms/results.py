@@ -25,9 +25,10 @@ class PointMapping(Mapping[str, Array]):
     def __getitem__(self, name: str) -> Array:
         """The array of a point."""
         try:
-            return self._values[self._names.index(name)]
+            found: Array = self._values[self._names.index(name)]
         except ValueError:
             raise KeyError(name) from None
+        return found
 
     def __iter__(self) -> Iterator[str]:
         """The names."""
