@@ -67,11 +67,11 @@ class ReferenceDesign:
         frame = self.mechanism.frame
         return {name: each for name, each in self.points.items() if frame not in dict(each.members)}
 
-    def select_points(self, points: object) -> tuple[str, ...]:
+    def select_points(self, points: Sequence[str] | str | None) -> tuple[str, ...]:
         """The result names of points, given by those or as `link.point`; all that move where none are. BadInput."""
         if points is None:
             return tuple(self.moving_points)
-        given = [points] if isinstance(points, str) else list(points)  # type: ignore[call-overload]
+        given = [points] if isinstance(points, str) else list(points)
         members = {f"{link}.{point}": name for name, each in self.points.items() for link, point in each.members}
         known = members | {name: name for name in self.points}
         for each in given:
