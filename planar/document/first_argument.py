@@ -21,7 +21,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 def takes_mechanism(function: Callable[Concatenate[Mechanism, P], R]) -> Callable[Concatenate[MechanismSource, P], R]:
     """The function with a path or a model's name in place of its mechanism, too; anything else is BadInput."""
-    return _with_first(function, as_mechanism)
+    found: Callable[Concatenate[MechanismSource, P], R] = _with_first(function, as_mechanism)
+    return found
 
 
 def takes_result(*classes: str) -> Callable[[F], F]:

@@ -9,8 +9,10 @@ from __future__ import annotations
 import re
 from functools import cache
 from math import isfinite, log10, pi
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+if TYPE_CHECKING:
+    from pint import UnitRegistry  # slow to load
 SI_UNITS = {
     "length": "m",
     "angle": "rad",
@@ -298,7 +300,7 @@ def _check_unit_size(spelled: str, kind: str, factor: float) -> Unit:
 
 
 @cache
-def _pint_registry():  # noqa: ANN202 - pint's own type, which would load pint
+def _pint_registry() -> UnitRegistry[Any]:
     import pint
 
     return pint.UnitRegistry(cache_folder=None)
