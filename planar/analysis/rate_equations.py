@@ -10,7 +10,7 @@ import numpy as np
 
 from planar.foundation.arrays import Array
 from planar.foundation.geometry import Frame, Vector
-from planar.foundation.jets import Jet
+from planar.foundation.jets import Jet, Scalar
 from planar.model.mechanism import Mechanism, pair_entries, relative_motions
 from planar.model.pairs import Pair
 from planar.results.motion import State
@@ -150,11 +150,11 @@ def turning_classes(equations: Iterable[RateEquation]) -> dict[Rate, Rate]:
     return {rate: of(rate) for rate in stands}
 
 
-def derivative(value: object, order: int) -> float:
+def derivative(value: Scalar, order: int) -> float:
     """A derivative of a jet; a plain number is at rest."""
     if isinstance(value, Jet):
         return float(value.parts[order])
-    return float(value) if order == 0 else 0.0  # type: ignore[arg-type]
+    return float(value) if order == 0 else 0.0
 
 
 def _is_equality(slopes: Mapping[Rate, float]) -> bool:

@@ -167,7 +167,7 @@ class VectorChains:
 
     def _is_crossing(self, first: ChainVector, second: ChainVector) -> bool:
         a, b = (self.unit_rate_velocity(leg) for leg in (first, second))
-        return abs(a[0] * b[1] - a[1] * b[0]) > 1e-7 * float(np.hypot(*a) * np.hypot(*b))
+        return bool(abs(a[0] * b[1] - a[1] * b[0]) > 1e-7 * float(np.hypot(*a) * np.hypot(*b)))
 
     def unit_rate_velocity(self, leg: ChainVector) -> Array:
         """The velocity that a leg has by its rate of one, (2,)."""

@@ -27,9 +27,8 @@ from planar.cli.options import (
 from planar.foundation.errors import BadInput
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from planar.model.mechanism import Mechanism
+    from planar.plot import Drawing
     from planar.results.motion import Motion
 
 POSITION_DRAWINGS = ("scheme", "velocity", "acceleration", "centres", "forces")
@@ -133,7 +132,7 @@ def plot(  # many: options of a command; # long: each has its line
                     "--link", "centrodes are of two links; name one, or one and the link that it is seen from"
                 )
             link, other = (*links, None, None)[:2]
-            drawings: dict[str, Callable[[], Figure | list[Figure]]] = {
+            drawings: dict[str, Callable[[], Drawing]] = {
                 "positions": lambda: drawn.positions(moving, steps, points or None, scales),
                 "loci": lambda: drawn.loci(moving, points or None, scales),
                 "centrodes": lambda: drawn.centrodes(moving, link, other, scales),

@@ -242,9 +242,10 @@ class Cursor:
     def flag(self, key: str) -> bool:
         if not self.has(key):
             return False
-        if not isinstance(self[key].value, bool):
-            raise self.error_at(key, f"true or false is wanted here, not {describe_value(self[key].value)}")
-        return self[key].value
+        value = self[key].value
+        if not isinstance(value, bool):
+            raise self.error_at(key, f"true or false is wanted here, not {describe_value(value)}")
+        return value
 
     def counted_angle(self, key: str) -> float:
         found = self.quantity(key, "angle")

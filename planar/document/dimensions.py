@@ -122,7 +122,8 @@ def change_dimension(mechanism: Mechanism, dimension: Dimension, value: Any) -> 
     """The mechanism with this number at another value (SI), or at an array or a symbol, unchecked."""
     where, index, *rest = dimension.address
     if where != "pairs" or not isinstance(index, int):
-        return _with_value(mechanism, dimension.address, value)
+        alone: Mechanism = _with_value(mechanism, dimension.address, value)
+        return alone
     entry = mechanism.pairs[index].entry_name()  # a pin of several links is several pairs of one entry
     changed = (
         _with_value(pair, tuple(rest), value) if pair.entry_name() == entry else pair for pair in mechanism.pairs

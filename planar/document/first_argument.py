@@ -33,7 +33,8 @@ class _TakesSource(Protocol):
 
 def takes_mechanism(function: Callable[Concatenate[Mechanism, P], R]) -> Callable[Concatenate[MechanismSource, P], R]:
     """The function with a path or a model's name in place of its mechanism, too; anything else is BadInput."""
-    return _with_first(function, as_mechanism)
+    found: Callable[Concatenate[MechanismSource, P], R] = _with_first(function, as_mechanism)
+    return found
 
 
 @overload

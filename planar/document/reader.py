@@ -362,7 +362,7 @@ def _read_published(cursor: Cursor, mechanism: Mechanism, points: Mapping[str, s
 
 def _read_tolerance(cursor: Cursor) -> float:
     if not cursor.has("tolerance"):
-        return PublishedValue._field_defaults["tolerance"]
+        return float(PublishedValue._field_defaults["tolerance"])
     found = cursor["tolerance"].as_number()
     if not 0.0 <= found < 1e100:
         raise cursor.error_at("tolerance", f"a number from zero on is wanted here, not {found!r}")

@@ -229,7 +229,7 @@ class AcceptanceFunctions:
 
     def _frames_from_coordinates(
         self, w: Sequence[Any], frame: Callable[..., Frame]
-    ) -> tuple[dict[str, Frame], dict[str, tuple]]:
+    ) -> tuple[dict[str, Frame], dict[str, tuple[Any, ...]]]:
         pairs = {pair.name: pair for pair in self.structure.pairs}
         columns = coordinate_columns(self.equations.coordinates)
         return frames_from_coordinates(w, columns, [link.name for link in self.structure.links], pairs, frame)

@@ -9,10 +9,11 @@ from __future__ import annotations
 import re
 from functools import cache
 from math import isfinite, log10, pi
-from typing import TYPE_CHECKING, NamedTuple, overload
+from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
 if TYPE_CHECKING:
     import numpy as np
+    from pint import UnitRegistry  # slow to load
 
 SI_UNITS = {
     "length": "m",
@@ -313,7 +314,7 @@ def _check_unit_size(spelled: str, kind: str, factor: float) -> Unit:
 
 
 @cache
-def _pint_registry():  # noqa: ANN202 - pint's own type, which would load pint
+def _pint_registry() -> UnitRegistry[Any]:
     import pint
 
     return pint.UnitRegistry(cache_folder=None)

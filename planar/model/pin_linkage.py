@@ -104,14 +104,14 @@ class PinnedMechanism(Mechanism):
         return Mechanism, tuple([getattr(self, each.name) for each in fields(Mechanism)])
 
     @cached_property
-    def links(self) -> tuple[Link, ...]:  # type: ignore[override]
+    def links(self) -> tuple[Link, ...]:
         """The frame, then the bars."""
         laid = self._checked_layout
         frame = Link(FRAME_NAME, tuple([Point(f"P{pin}", At(*laid.position_lists[pin])) for pin in laid.frame_pins]))
         return (frame, *[_bar_link(f"bar{k}", bar, laid.position_lists) for k, bar in enumerate(laid.bars)])
 
     @cached_property
-    def pairs(self) -> tuple[Pair, ...]:  # type: ignore[override]
+    def pairs(self) -> tuple[Pair, ...]:
         """The pins, one after the other."""
         make: Callable[..., Pair] = turning_pair_type()
         found = []
@@ -123,7 +123,7 @@ class PinnedMechanism(Mechanism):
         return tuple(found)
 
     @cached_property
-    def inputs(self) -> tuple[Input, ...]:  # type: ignore[override]
+    def inputs(self) -> tuple[Input, ...]:
         """The crank's."""
         laid = self._checked_layout
         (pin,) = (pin for pin in laid.bars[laid.crank] if pin in laid.frame_pins)
@@ -131,7 +131,7 @@ class PinnedMechanism(Mechanism):
         return (Input(name, laid.crank_angle, laid.velocity, laid.acceleration),)
 
     @cached_property
-    def sketch(self) -> tuple[tuple[str, float, float], ...]:  # type: ignore[override]
+    def sketch(self) -> tuple[tuple[str, float, float], ...]:
         """Where the pins are that move."""
         laid = self._checked_layout
         fixed = set(laid.frame_pins)

@@ -32,7 +32,7 @@ from planar.analysis.rate_equations import rate_equations as rates_of
 from planar.analysis.rate_ratios import LEAST_ERROR, LinkPoles, solve_link_poles
 from planar.analysis.vector_chains import VectorChains
 from planar.document.first_argument import takes_result
-from planar.foundation.arrays import Array
+from planar.foundation.arrays import Array, IntArray
 from planar.foundation.errors import Unknown
 from planar.foundation.notebook_display import Displayable
 from planar.foundation.short_repr import short_repr
@@ -75,7 +75,8 @@ class Centre:
         """(2,), m; None at infinity, and where it is not determined."""
         if self.homogeneous is None or self.homogeneous[2] == 0.0:
             return None
-        return self.homogeneous[:2] / self.homogeneous[2]
+        found: Array = self.homogeneous[:2] / self.homogeneous[2]
+        return found
 
     @property
     def direction(self) -> Array | None:
@@ -206,7 +207,7 @@ class _CentreSearch:
         every = map(frozenset, combinations(self.links, 2))
         return [two for two in every if two not in self.found and two not in self.as_one]
 
-    def _count_opened(self) -> Array:
+    def _count_opened(self) -> IntArray:
         """How many open centres would have two lines if that of two links were known, (links, links)."""
         place = {link: index for index, link in enumerate(self.links)}
         known = np.zeros((len(self.links), len(self.links)), dtype=int)
@@ -215,7 +216,7 @@ class _CentreSearch:
             known[a, b] = known[b, a] = 1
         one_line = (known == 0) & (known @ known > 0)
         np.fill_diagonal(one_line, False)
-        opened = one_line.astype(int) @ known
+        opened: IntArray = one_line.astype(int) @ known
         return opened + opened.T
 
     def result(self) -> Centres:

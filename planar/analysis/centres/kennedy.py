@@ -217,4 +217,5 @@ def _cross(a: Array, b: Array) -> Array:
 
 def _lengths(vectors: Array) -> Array:
     """Lengths (...,) of vectors (..., 3)."""
-    return np.sqrt((vectors * vectors).sum(axis=-1))
+    found: Array = np.sqrt((vectors * vectors).sum(axis=-1))
+    return found

@@ -38,7 +38,8 @@ class TwoDirections(NamedTuple):
         """(2,), m; None at infinity, and where the link rests."""
         if self.homogeneous is None or self.homogeneous[2] == 0.0:
             return None
-        return self.homogeneous[:2] / self.homogeneous[2]
+        found: Array = self.homogeneous[:2] / self.homogeneous[2]
+        return found
 
 
 def centre_of(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -119,12 +120,15 @@ class _ScaledCentres:
 
     centres: Centres
 
-    def __post_init__(self) -> None:
-        middle, size = extent(self.centres.state)
-        at = {frozenset(each.links): self._scale_centre(each, middle, size) for each in self.centres}
-        object.__setattr__(self, "_at", at)
-        object.__setattr__(self, "_size", size)
-        object.__setattr__(self, "_middle", middle)
+    @cached_property
+    def _extent(self) -> tuple[Array, float]:
+        """The mechanism's middle and size."""
+        return extent(self.centres.state)
+
+    @cached_property
+    def _at(self) -> dict[frozenset[str], Array | None]:
+        middle, size = self._extent
+        return {frozenset(each.links): self._scale_centre(each, middle, size) for each in self.centres}
 
     @staticmethod
     def _scale_centre(centre: Centre, middle: Array, size: float) -> Array | None:
@@ -132,16 +136,17 @@ class _ScaledCentres:
             return None
         x, y, w = centre.homogeneous
         at = np.array([(x - w * middle[0]) / size, (y - w * middle[1]) / size, w])
-        return at / np.linalg.norm(at)
+        found: Array = at / np.linalg.norm(at)
+        return found
 
     def centre_point(self, one: str, other: str) -> Array | None:
         """(3,), of length one; None where they move as one, or it is not determined."""
-        return self._at[frozenset((one, other))]  # type: ignore[attr-defined]
+        return self._at[frozenset((one, other))]
 
     def in_metres(self, motion: Array) -> Array:
         """A motion of poles in sizes about the middle as one of poles in metres."""
         x, y, w = motion
-        size, middle = self._size, self._middle  # type: ignore[attr-defined]
+        middle, size = self._extent
         return np.array([size * x + w * middle[0], size * y + w * middle[1], w])
 
     def separation(self, link: str, known: str) -> float:
@@ -204,9 +209,10 @@ class _ScaledCentres:
             return first, second, at * (rate / turns[second] / at[2])
         (own,) = tie.coefficients
         slide: SlideJoint = next(each for each in found.slides if own in each.rates)
-        way = slide.directions[slide.rates.index(own)] * rate / tie.coefficients[own] / self._size  # type: ignore[attr-defined]
+        middle, size = self._extent
+        way = slide.directions[slide.rates.index(own)] * rate / tie.coefficients[own] / size
         at = self.centre_point(slide.guide, slide.rider)
-        x, y = (found.point_position(slide.rider, slide.point) - self._middle) / self._size  # type: ignore[attr-defined]
+        x, y = (found.point_position(slide.rider, slide.point) - middle) / size
         if at is None:
             raise _undetermined_answer(self.centres, [slide.guide, slide.rider], tie.pair)
         carried = np.array([at[1] - at[2] * y, at[2] * x - at[0]])

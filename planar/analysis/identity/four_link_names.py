@@ -132,4 +132,4 @@ def _double_slider_names(loop: KinematicLoop, word: str) -> tuple[str, ...]:
 def _offset_from_line(pin: Vector, side: LoopLink) -> float:
     """How far to the left of the way of its slide a pin of a link lies (m)."""
     slide = side.after if side.before.direction is None else side.before
-    return slide.line_direction.cross(pin - slide.point)
+    return float(slide.line_direction.cross(pin - slide.point))

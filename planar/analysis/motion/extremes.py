@@ -253,4 +253,4 @@ def _is_unbounded(positions: Array, squares: Array, limit: float) -> bool:
     """Whether a quantity grows beyond all bounds towards a limit, by the two states that are nearest to it."""
     near, nearer = np.argsort(np.abs(positions - limit))[1::-1]
     times = abs((positions[near] - limit) / (positions[nearer] - limit))
-    return times > NEARER_RATIO and squares[nearer] > times**GROWTH_EXPONENT * squares[near]
+    return bool(times > NEARER_RATIO and squares[nearer] > times**GROWTH_EXPONENT * squares[near])

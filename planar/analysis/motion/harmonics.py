@@ -106,9 +106,10 @@ class Harmonics:
         theta = np.asarray(theta, dtype=float)
         n = np.arange(1, len(self.cosines) + 1)[:terms]
         turned = theta[..., None] * n + order * 0.5 * pi  # d/dx cos x = cos(x + pi/2), and of sin alike
-        return (
+        found: Array = (
             np.cos(turned) * (n**order * self.cosines[:terms]) + np.sin(turned) * (n**order * self.sines[:terms])
         ).sum(axis=-1)
+        return found
 
 
 @takes_mechanism

@@ -177,8 +177,9 @@ class _AdvantagesOverInput:
         if at is None:
             return None
         x, y, w = at
-        found = np.array([(x - w * self.middle[0]) / self.size, (y - w * self.middle[1]) / self.size, w])
-        return found / np.linalg.norm(found)
+        at = np.array([(x - w * self.middle[0]) / self.size, (y - w * self.middle[1]) / self.size, w])
+        found: Array = at / np.linalg.norm(at)
+        return found
 
 
 def _choose_input(state: State, name: str | None) -> str:

@@ -87,7 +87,8 @@ def _find_standstills(steady: InterpolatedRun, output: str | Output, still: floa
 
     def power(moving: State | Motion) -> Array:
         _, velocity, acceleration = quantity_and_rates(moving, output)
-        return np.sum(velocity * acceleration, axis=-1) / steady.rate
+        found: Array = np.sum(velocity * acceleration, axis=-1) / steady.rate
+        return found
 
     if not still:
         return []

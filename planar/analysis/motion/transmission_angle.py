@@ -256,7 +256,8 @@ class _DrivenOutput:
         slope = self._jacobians(self._coordinates(moving)[:, :1])[0]
         own = self.prepared.column[self.pair.name, self.pair.coordinate_kinds[0][0]]
         way = slope[self.rows_of_pair[self.pair.name][:2], own]
-        return way / np.hypot(*way)
+        found: Array = way / np.hypot(*way)
+        return found
 
     def _coordinates(self, moving: KinematicResult) -> Array:
         """w (coordinates, n), lengths in sizes."""

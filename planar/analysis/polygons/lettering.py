@@ -122,7 +122,7 @@ class Lettering:
 
     def _is_near(self, one: LinkPoint, other: LinkPoint) -> bool:
         apart = one.local - other.local
-        return max(abs(apart.x), abs(apart.y)) <= COINCIDENT_TOLERANCE
+        return bool(max(abs(apart.x), abs(apart.y)) <= COINCIDENT_TOLERANCE)
 
     def _key(self, place: LinkPoint) -> tuple[str, str]:
         """("", point) of a named point, else the link and the point that it lies under."""

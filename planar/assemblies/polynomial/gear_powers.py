@@ -10,11 +10,11 @@ are entries of X and Y of their own (see `isotropic_form`), each the product or 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from itertools import permutations, product
 from math import lcm
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -97,7 +97,11 @@ def angle_arguments(e: ConstraintEquations, stage: Block, angles: Sequence[int],
         new = ca.SX.sym(f"argument {len(found)}"), rates[0], still
         return found.setdefault((*rates[0], *at.ravel().round(12)), new)[0]
 
-    done = {**OPERATIONS, ca.OP_COS: lambda of: ca.cos(symbol(of)), ca.OP_SIN: lambda of: ca.sin(symbol(of))}
+    done: dict[int, Callable[..., Any]] = {
+        **OPERATIONS,
+        ca.OP_COS: lambda of: ca.cos(symbol(of)),
+        ca.OP_SIN: lambda of: ca.sin(symbol(of)),
+    }
     loops = [row.kind is MeasureKind.LENGTH for row in e.rows[stage.rows]]
     closed, between = (e.F[stage.rows][np.flatnonzero(np.equal(loops, which)).tolist()] for which in (True, False))
     rows = ca.Function("rows", [e.z, e.u, e.p], [ca.densify(closed)])
