@@ -327,7 +327,8 @@ __all__ = [
 
 def _present(result: Any) -> str | None:
     """The page of a result, for notebooks; loaded only where something is shown."""
-    return import_module("planar.pages.view").notebook_html(result)
+    page: str | None = import_module("planar.pages.view").notebook_html(result)
+    return page
 
 
 def _revise(mechanism: Any, values: Any) -> Any:

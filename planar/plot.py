@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from planar.model.mechanism import Mechanism
     from planar.results.motion import Motion, State
 
+    Drawing = Figure | list[Figure]
+    """One figure, or several sheets."""
+
 __all__ = [
     "acceleration",
     "animate",

@@ -8,17 +8,15 @@ from math import pi
 
 import numpy as np
 
+from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.errors import BadInput, NoAnswer
 from planar.foundation.geometry import Frame, frame_at
 from planar.foundation.jets import Jet
 from planar.model.mechanism import Drive, replace_inputs
 from planar.model.pairs import MeasureKind
-from planar.results.kinematic_result import KinematicResult
 from planar.results.motion import Motion, State
 from planar.solving.continuation.path import follow_straight
 from planar.solving.position import PositionSolver
-
-Array = np.ndarray
 
 CLOSED_TOLERANCE = 1e-9
 """rad, or part of the size: a motion that comes so near to where it started is closed."""
@@ -82,7 +80,7 @@ class InterpolatedRun:
             self._states[position] = there.state(z) if local is None else there.state_on_branch(z, local)
         return self._states[position]
 
-    def _is_on_branch(self, position: float) -> Array:
+    def _is_on_branch(self, position: float) -> BoolArray:
         """Which samples lead to a position on this motion's branch (samples,).
 
         Not those on change points, from which several ways lead on, nor those beyond one where another way was taken.
@@ -92,7 +90,7 @@ class InterpolatedRun:
             sound &= (self.positions - fork) * (position - fork) >= 0.0
         return sound
 
-    def tabulate(self, measure: Callable[[KinematicResult], Array]) -> tuple[Array, Array]:
+    def tabulate(self, measure: Callable[[State | Motion], Array]) -> tuple[Array, Array]:
         """Positions in order, and what is measured there (positions, ...), of states that have rates.
 
         Besides the samples there are some just beyond open ends of the range, or nearer and nearer to its limits; what
@@ -140,12 +138,14 @@ class InterpolatedRun:
     def _solver_at(self, position: float) -> PositionSolver:
         return PositionSolver(replace_inputs(self.mechanism, (Drive(self.pair, position),)))
 
-    def _find_rates(self) -> Array:
+    def _find_rates(self) -> BoolArray:
         """Which samples have rates (samples,)."""
         jets = [each for f in self.samples.frames.values() if not f.fixed for each in (f.x, f.y, f.angle)]
         jets += [jet for own in self.samples.own.values() for jet in own]
         parts = [np.broadcast_to(part, len(self.positions)) for jet in jets for part in jet.parts]
-        return np.isfinite(parts).all(axis=0) if parts else np.ones(len(self.positions), dtype=bool)
+        if not parts:
+            return np.ones(len(self.positions), dtype=bool)
+        return np.asarray(np.isfinite(parts).all(axis=0))
 
     def _unknowns(self, motion: Motion) -> Array:
         """The unknowns at every sample (samples, unknowns), from the frames."""
@@ -182,7 +182,7 @@ class InterpolatedRun:
 
     def _samples_at_unit_rate(self, motion: Motion) -> Motion:
         """The samples of a motion whose input stands still in the file, with rates."""
-        states = []
+        states: list[State | None] = []
         for position, z in zip(self.positions.tolist(), self.z, strict=True):
             try:
                 here = PositionSolver(replace_inputs(self.mechanism, (Drive(self.pair, position),)))
@@ -200,14 +200,14 @@ class InterpolatedRun:
             parts = ("x", "y", "angle")
             return frame_at(
                 *(
-                    stacked([s and getattr(s.frames[link], part) for s in states], getattr(before, part))
+                    stacked([getattr(s.frames[link], part) if s else None for s in states], getattr(before, part))
                     for part in parts
                 )
             )
 
         frames = {link: frame(link, before) for link, before in motion.frames.items()}
         own = {
-            name: tuple(stacked([s and s.own[name][k] for s in states], jet) for k, jet in enumerate(jets))
+            name: tuple(stacked([s.own[name][k] if s else None for s in states], jet) for k, jet in enumerate(jets))
             for name, jets in motion.own.items()
         }
         return replace(motion, mechanism=self.mechanism, frames=frames, own=own)

@@ -8,13 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.foundation.geometry import Frame, Vector
-from planar.foundation.jets import Jet
+from planar.foundation.jets import Jet, Scalar
 from planar.model.mechanism import Mechanism, pair_entries, relative_motions
 from planar.model.pairs import Pair
 from planar.results.motion import State
 
-Array = np.ndarray
 LEAST_COEFFICIENT = 1e-12
 """A slope below this is none: the residuals' slopes are of order one, or of the links' lengths."""
 
@@ -150,11 +150,11 @@ def turning_classes(equations: Iterable[RateEquation]) -> dict[Rate, Rate]:
     return {rate: of(rate) for rate in stands}
 
 
-def derivative(value: object, order: int) -> float:
+def derivative(value: Scalar, order: int) -> float:
     """A derivative of a jet; a plain number is at rest."""
     if isinstance(value, Jet):
         return float(value.parts[order])
-    return float(value) if order == 0 else 0.0  # type: ignore[arg-type]
+    return float(value) if order == 0 else 0.0
 
 
 def _is_equality(slopes: Mapping[Rate, float]) -> bool:
@@ -231,7 +231,8 @@ def _input_coefficients(state: State, pair: Pair) -> dict[Rate, float]:
 
 def without_rates(frame: Frame) -> Frame:
     """A frame without its rates."""
-    return Frame(*(derivative(value, 0) for value in frame[:5]), frame.fixed)
+    x, y, cosine, sine, angle = (derivative(value, 0) for value in frame[:5])
+    return Frame(x, y, cosine, sine, angle, frame.fixed)
 
 
 def _at_unit_rate(frame: Frame, which: str = "") -> Frame:

@@ -10,9 +10,9 @@ import numpy as np
 from planar.analysis.polygons.loop_equations import loop_equations
 from planar.analysis.rate_equations import PinJoint, Rate, RateEquations, moving_links, turning_classes
 from planar.analysis.vector_chains import KnownRates, VectorChains
+from planar.foundation.arrays import Array
 from planar.solving.checks.singular_values import SINGULAR_TOLERANCE
 
-Array = np.ndarray
 ROUNDING = 1e-15
 """What equations and slopes are exact to, in the mechanism's size."""
 LEAST_ERROR = 1e-13
@@ -108,7 +108,7 @@ def _input_rows(
         right[row] = by * velocities[tie.pair]
         for rate, slope in tie.coefficients.items():
             stands = known.unknown_rate(rate)
-            if stands in column:
+            if stands is not None and stands in column:
                 matrix[row, column[stands]] += by * slope * columns[column[stands]]
     return matrix, right
 
@@ -128,7 +128,8 @@ def _carry_poles(
         return 0.0 if stands is None else values.get(stands, 0.0)
 
     frame = equations.state.mechanism.frame
-    poles, waiting = {frame: np.zeros(3)}, [frame]
+    poles: dict[str, Array] = {frame: np.zeros(3)}
+    waiting = [frame]
     while waiting:
         link = waiting.pop(0)
         for joint in chains.joints(link):

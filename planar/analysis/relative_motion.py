@@ -7,12 +7,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.foundation.errors import Unknown
 from planar.foundation.geometry import Frame, Vector
 from planar.foundation.jets import value_and_rates
 from planar.foundation.short_repr import short_repr
-
-Array = np.ndarray
 
 
 class RelativeMotion(NamedTuple):
@@ -30,7 +29,8 @@ class RelativeMotion(NamedTuple):
     angular_acceleration: Array
     "angular acceleration"
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return short_repr(self)
 
     @property
     def fixed_pole(self) -> tuple[Array, Array]:

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
 from planar.analysis.rate_equations import PinJoint, Rate, RateEquations, SlideJoint
+from planar.foundation.arrays import Array
 from planar.foundation.geometry import Vector
 
 MAX_UNKNOWNS = 2
@@ -81,16 +83,18 @@ class VectorChains:
     "result name of (link, point)"
     size: float
 
-    def __post_init__(self) -> None:
+    @cached_property
+    def _joints(self) -> dict[str, list[JointOfRates]]:
         joints: dict[str, list[JointOfRates]] = {}
-        for joint in (*self.equations.pins, *self.equations.slides):
+        every: tuple[JointOfRates, ...] = (*self.equations.pins, *self.equations.slides)
+        for joint in every:
             for link in joint.members:
                 joints.setdefault(link, []).append(joint)
-        object.__setattr__(self, "_joints", joints)
+        return joints
 
     def joints(self, link: str) -> list[JointOfRates]:
         """The pins and slides of a link."""
-        return self._joints.get(link, [])  # type: ignore[attr-defined]
+        return self._joints.get(link, [])
 
     def shortest_chain(self, known: KnownRates) -> VectorChain | None:
         """The way over the fewest links, of several the one found first."""
@@ -142,9 +146,7 @@ class VectorChains:
         runs = self._split_into_sliding_groups(links, joints)
         for orders in product(*(self._slide_orders(run) for run in runs)):
             legs, start, stop = self._make_vectors(runs, orders)
-            open_ones = [
-                (k, self._unknown_rate(leg, known)) for k, leg in enumerate(legs) if self._unknown_rate(leg, known)
-            ]
+            open_ones = [(k, rate) for k, leg in enumerate(legs) if (rate := self._unknown_rate(leg, known))]
             unknown = frozenset(rate for _, rate in open_ones)
             if len(open_ones) > MAX_UNKNOWNS or len(unknown) < len(open_ones):
                 return None
@@ -165,16 +167,16 @@ class VectorChains:
 
     def _is_crossing(self, first: ChainVector, second: ChainVector) -> bool:
         a, b = (self.unit_rate_velocity(leg) for leg in (first, second))
-        return abs(a[0] * b[1] - a[1] * b[0]) > 1e-7 * float(np.hypot(*a) * np.hypot(*b))
+        return bool(abs(a[0] * b[1] - a[1] * b[0]) > 1e-7 * float(np.hypot(*a) * np.hypot(*b)))
 
-    def unit_rate_velocity(self, leg: ChainVector) -> np.ndarray:
+    def unit_rate_velocity(self, leg: ChainVector) -> Array:
         """The velocity that a leg has by its rate of one, (2,)."""
         if leg.slide is not None:
             return leg.sign * leg.slide.directions[leg.slide.rates.index(leg.rate)]
         x, y = self.point_position(leg.head) - self.point_position(leg.tail)
         return np.array([-y, x])
 
-    def point_position(self, place: LinkPoint) -> np.ndarray:
+    def point_position(self, place: LinkPoint) -> Array:
         """Where a place is (m), (2,)."""
         return self.equations.point_motion(place.link, place.local)
 
@@ -205,7 +207,7 @@ class VectorChains:
             return LinkPoint(link, self.equations.local_point(link, joint.point), name)
         return self.point_under(link, self.equations.point_position(joint.rider, joint.point), name)
 
-    def point_under(self, link: str, spot: np.ndarray, name: str) -> LinkPoint:
+    def point_under(self, link: str, spot: Array, name: str) -> LinkPoint:
         """The point of a link that lies where a named point is."""
         return LinkPoint(link, self.equations.local_point_at(link, spot), name)
 
@@ -225,23 +227,23 @@ class VectorChains:
             inside = self._sliding_group_vectors(run, slides_first)
             legs += inside.vectors
             ends += [inside.start, inside.stop]
-            if run.exit_slot is not None:
+            slot = run.exit_slot
+            onwards = None if slot is None else runs[index + 1].entry
+            if slot is not None and slot.line is not None and onwards is not None:
                 # a pin in a slot: from its place on the guide to itself, or back
-                forth = run.exit_slot.rider == runs[index + 1].links[0]
-                way = run.exit_slot.line
-                legs.append(
-                    ChainVector(inside.stop, runs[index + 1].entry, way[1], run.exit_slot, 1.0 if forth else -1.0)
-                )
+                forth = slot.rider == runs[index + 1].links[0]
+                legs.append(ChainVector(inside.stop, onwards, slot.line[1], slot, 1.0 if forth else -1.0))
         return legs, ends[0], ends[-1]
 
     def _sliding_group_vectors(self, run: _SlidingGroup, slides_first: bool) -> _GroupVectors:
         """The legs of a run, all its slides at one point: where it is left, or where it is entered."""
         entry, leave = run.entry, run.exit
-        if entry is None and leave is None:
-            entry = leave = self.joint_point(run.slides[0], run.slides[0].rider)
+        if entry is not None and (leave is None or slides_first):
             anchor = entry
+        elif leave is not None:
+            anchor = leave
         else:
-            anchor = entry if leave is None or (slides_first and entry is not None) else leave
+            anchor = entry = leave = self.joint_point(run.slides[0], run.slides[0].rider)
         here = [
             anchor if link == anchor.link else self.point_under(link, self.point_position(anchor), anchor.over)
             for link in run.links

@@ -33,6 +33,7 @@ from planar.assemblies.polynomial.path_tracker import (
 from planar.assemblies.solution_curves import SINGULAR_RATIO, STEP_LENGTH, is_on_curve, one_per_curve
 from planar.equations.constraint_equations import Block, ConstraintEquations, slice_length
 from planar.equations.functions import EquationFunctions
+from planar.foundation.arrays import Array, BoolArray, ComplexArray
 from planar.model.pairs import MeasureKind
 from planar.solving.assembly.block_assemblies import SAME_ASSEMBLY_TOLERANCE, BlockAssemblies, block_residual_function
 from planar.solving.newton import (
@@ -43,8 +44,6 @@ from planar.solving.newton import (
     refine_multiple_root,
 )
 from planar.solving.prepared_mechanism import PreparedMechanism
-
-Array = np.ndarray
 
 MAX_PATHS = 1000
 """Bezout's number up to which paths are followed."""
@@ -85,16 +84,15 @@ def block_roots(setup: PreparedMechanism, stage: Block, z: Array, certify: bool 
     known = _block_structure(setup, stage)
     unknowns = slice_length(stage.unknowns)
     if not unknowns:
-        return BlockRoots(
-            np.zeros((1, 0)), *np.zeros((2, 1), dtype=bool), 1, 1, Completeness.PROVED, False, "nothing is open"
-        )
+        none = np.zeros(1, dtype=bool)
+        return BlockRoots(np.zeros((1, 0)), none, none, 1, 1, Completeness.PROVED, False, "nothing is open")
     if known.linear_jacobian is not None:
         return _linear_root(setup, stage, z, known.linear_jacobian, certify)
     if known.form is None:
         return _search_from_starts(setup, stage, z, "its equations are no polynomials of this kind")
     if known.form.bezout_number > (MAX_GEARED_PATHS if known.form.gears else MAX_PATHS):
         return _search_from_starts(setup, stage, z, f"there may be up to {known.form.bezout_number} complex ones")
-    found = _BlockRootSolver(setup, stage, z, known).roots(certify)
+    found = _BlockRootSolver(setup, stage, z, known.form, known.instances).roots(certify)
     return found or _search_from_starts(setup, stage, z, "linkages of this structure have no single solutions")
 
 
@@ -110,7 +108,7 @@ def _block_structure(setup: PreparedMechanism, stage: Block) -> _BlockStructure:
     return kept[key]
 
 
-def solve_by_eigenvalues(form: IsotropicForm, polynomials: BlockPolynomials) -> Array | None:
+def solve_by_eigenvalues(form: IsotropicForm, polynomials: BlockPolynomials) -> ComplexArray | None:
     """All complex solutions that Bezout's theorem allows (solutions, 2 many), as eigenvalues.
 
     None where they are too many for that, or do not all count once.
@@ -122,7 +120,7 @@ def solve_by_eigenvalues(form: IsotropicForm, polynomials: BlockPolynomials) -> 
     return ends.V if ends.is_single.all() and not is_duplicate(ends.V).any() else None
 
 
-def absent_coefficients(polynomials: BlockPolynomials) -> Array:
+def absent_coefficients(polynomials: BlockPolynomials) -> BoolArray:
     """Which coefficients a linkage's polynomials do not have."""
     coefficients = np.abs(polynomials.flat_coefficients[0])
     return coefficients < ZERO_COEFFICIENT * max(float(coefficients.max(initial=0.0)), 1.0)
@@ -141,8 +139,8 @@ class _ComplexSolutions(NamedTuple):
     """All complex solutions that were found: those that count once, those where several meet or that go on, whether
     every path came to an end, how many there are at finite places, and how they were found."""
 
-    single: Array
-    multiple: Array
+    single: ComplexArray
+    multiple: ComplexArray
     all_paths_ended: bool
     expected: int
     method: str
@@ -151,9 +149,15 @@ class _ComplexSolutions(NamedTuple):
 class _BlockRootSolver:
     """One block with its numbers."""
 
-    def __init__(self, setup: PreparedMechanism, stage: Block, z: Array, known: _BlockStructure):
-        self.setup, self.stage, self.z, self.structure = setup, stage, z, known
-        self.form = known.form
+    def __init__(
+        self,
+        setup: PreparedMechanism,
+        stage: Block,
+        z: Array,
+        form: IsotropicForm,
+        instances: dict[bytes, GenericInstance],
+    ):
+        self.setup, self.stage, self.z, self.form, self.instances = setup, stage, z, form, instances
         self.given = (z, setup.inputs.u, setup.inputs.p)
         self.polynomials: BlockPolynomials = self.form.polynomials(*self.given)
         self.residual_function: ResidualFunction = block_residual_function(setup.functions, stage, z, *self.given[1:])
@@ -219,11 +223,11 @@ class _BlockRootSolver:
 
     def _instance(self) -> GenericInstance:
         key = absent_coefficients(self.polynomials).tobytes()
-        if key not in self.structure.instances:
-            self.structure.instances[key] = generic_instance(self.setup.equations, self.form, self.polynomials)
-        return self.structure.instances[key]
+        if key not in self.instances:
+            self.instances[key] = generic_instance(self.setup.equations, self.form, self.polynomials)
+        return self.instances[key]
 
-    def _real_roots(self, found: _ComplexSolutions, single: Array) -> tuple[Array, bool]:
+    def _real_roots(self, found: _ComplexSolutions, single: ComplexArray) -> tuple[Array, bool]:
         """The assemblies among the solutions (roots, unknowns), sorted, and whether there is a curve of them."""
         X, Y = single[:, : self.form.entry_count], single[:, self.form.entry_count :]
         X, Y = X / X[:, :1], Y / Y[:, :1]
@@ -237,7 +241,8 @@ class _BlockRootSolver:
                 several[:, : self.form.entry_count], several[:, self.form.entry_count :], self.given
             )
         )
-        kept, curves = list(met), []
+        kept: list[Array] = list(met)
+        curves: list[Array] = []
         if len(found.multiple):
             kept, curves = _isolated_and_curves(self.setup, self.stage, self.z, self.residual_function, met)
         every = [self.form.wrap_angles(each) for each in (*sure, *tried, *kept, *curves)]
@@ -250,11 +255,11 @@ class _BlockRootSolver:
                 continue
             open_ = bool(_least_singular_ratio(self.residual_function, each[None])[0] < SINGULAR_RATIO)
             # where several meet each is found to a root of round-off only
-            near = [SAME_SINGULAR_ROOT_DISTANCE if open_ and other else SAME_ASSEMBLY_TOLERANCE for other in weak]
-            if not any(self._is_same_root(each, other, within) for other, within in zip(distinct, near, strict=True)):
+            room = [SAME_SINGULAR_ROOT_DISTANCE if open_ and other else SAME_ASSEMBLY_TOLERANCE for other in weak]
+            if not any(self._is_same_root(each, other, within) for other, within in zip(distinct, room, strict=True)):
                 distinct.append(each)
                 weak.append(open_ and number >= len(sure))  # of single solutions each stands for itself
-        distinct.sort(key=lambda each: tuple(np.round(each, 7)))
+        distinct.sort(key=_rounded)
         return np.array(distinct).reshape(-1, slice_length(self.stage.unknowns)), bool(curves)
 
     def _converged_roots(self, near: Array) -> list[Array]:
@@ -277,7 +282,7 @@ class _BlockRootSolver:
         apart[angles] = np.abs(np.exp(1j * one[angles]) - np.exp(1j * other[angles]))
         return bool(np.all(apart < within))
 
-    def _certify_roots(self, found: _ComplexSolutions, real: Array) -> tuple[Array, bool]:
+    def _certify_roots(self, found: _ComplexSolutions, real: Array) -> tuple[BoolArray, bool]:
         """Which assemblies are proved, and whether it is proved that there are no others."""
         proof = certify_solutions(self.form, self.given, found.single)
         many = self.form.entry_count
@@ -289,11 +294,17 @@ class _BlockRootSolver:
         return proofs, whole and int(proof.real.sum()) == len(real)
 
 
-def _is_shared_end(ends: PathEnds) -> Array:
+def _is_shared_end(ends: PathEnds) -> BoolArray:
     """Which single solutions several paths came to: one of them took another's."""
     met = np.zeros(len(ends.V), dtype=bool)
     met[ends.is_single] = is_duplicate(ends.V[ends.is_single])
     return met
+
+
+def _rounded(root: Array) -> list[float]:
+    """What roots are sorted by."""
+    found: list[float] = np.round(root, 7).tolist()
+    return found
 
 
 def _search_from_starts(setup: PreparedMechanism, stage: Block, z: Array, why: str) -> BlockRoots:
@@ -303,7 +314,7 @@ def _search_from_starts(setup: PreparedMechanism, stage: Block, z: Array, why: s
     real = np.array([*isolated, *curves]).reshape(-1, slice_length(stage.unknowns))
     if not setup.structure.counts:
         real = np.where(_is_angle(setup, stage), np.arctan2(np.sin(real), np.cos(real)), real)
-    real = np.array(sorted(real, key=lambda each: tuple(np.round(each, 7)))).reshape(real.shape)
+    real = np.array(sorted(real, key=_rounded)).reshape(real.shape)
     none = np.zeros(len(real), dtype=bool)
     said = f"searched by starts only: {why}"
     return BlockRoots(real, _is_double_root(closing, real), none, None, len(real), Completeness.NOT, bool(curves), said)
@@ -320,7 +331,7 @@ def _isolated_and_curves(
     return isolated, one_per_curve(closing, on_curves, _is_angle(setup, stage))
 
 
-def _is_angle(setup: PreparedMechanism, stage: Block) -> Array:
+def _is_angle(setup: PreparedMechanism, stage: Block) -> BoolArray:
     """Which unknowns of a block are angles (unknowns,)."""
     own = (setup.equations.coordinates[column] for column in setup.equations.unknowns[stage.unknowns])
     return np.array([each.kind is not MeasureKind.LENGTH for each in own], dtype=bool)
@@ -354,7 +365,7 @@ def _least_singular_ratio(closing: ResidualFunction, real: Array) -> Array:
     return values[:, -1] / np.maximum(values[:, 0], 1e-300)
 
 
-def _is_double_root(closing: ResidualFunction, real: Array) -> Array:
+def _is_double_root(closing: ResidualFunction, real: Array) -> BoolArray:
     """Where two assemblies or more meet (roots,): a direction is open there, and a way off along it is not.
 
     Beside a curve of assemblies it is open, or all but open, all along; there they lie apart.

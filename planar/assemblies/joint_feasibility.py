@@ -7,14 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.model.mechanism import pair_entries
 from planar.model.pairs import MeasureKind, Pair
 from planar.solving.assembly.sketch_start import sketch_coordinates
 from planar.solving.full_constraints import COMPLEX_STEP, FullConstraints
 from planar.solving.newton import damped_newton
 from planar.solving.prepared_mechanism import PreparedMechanism
-
-Array = np.ndarray
 
 START_BATCHES = (1, 3, 28)
 """Starts, one batch after the other; what can be met is mostly met from the first."""

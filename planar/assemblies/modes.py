@@ -17,6 +17,7 @@ from planar.assemblies.search_tree import BEST_TO_WORST, AssemblyPath, AssemblyT
 from planar.document.first_argument import takes_mechanism
 from planar.equations.constraint_equations import slice_length
 from planar.equations.coordinates import frames_from_coordinates
+from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.geometry import Frame
 from planar.foundation.notebook_display import Displayable
@@ -27,8 +28,6 @@ from planar.model.wording import count_phrase, join_all_names
 from planar.results.motion import State
 from planar.solving.diagnosis import refusals
 from planar.solving.position import PositionSolver, solve, solved_mechanism
-
-Array = np.ndarray
 
 MAX_SOLVED_FOR_COUNT = 4096
 """Dyads, or larger groups by what they take, that are solved for the sake of a number alone."""
@@ -153,7 +152,9 @@ class Modes(Displayable, Sequence["Mode"]):
     @property
     def bound(self) -> int | None:
         """How many complex solutions there may be: the product over the groups; None where one is not known."""
-        return None if None in self._expected else prod(self._expected)
+        every = self._expected
+        known = [each for each in every if each is not None]
+        return prod(known) if len(known) == len(every) else None
 
     @property
     def _expected(self) -> list[int | None]:
@@ -385,6 +386,6 @@ class Mode:
         return replace(self._solver.mechanism, sketch=sketch)
 
 
-def _restore_mode(of: tuple[Any, ...], mechanism: Mechanism) -> Mode:
+def _restore_mode(of: tuple[int | None, tuple[int, ...], bool, bool, Array], mechanism: Mechanism) -> Mode:
     """A mode where it has been sent to."""
     return Mode(*of, solved_mechanism(mechanism).solver)

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from planar.assemblies.polynomial.completeness import BlockRoots, Completeness
 from planar.equations.constraint_equations import Block, slice_length
 from planar.equations.functions import POLISHING_STEPS
+from planar.foundation.arrays import Array
 from planar.model.pairs import MeasureKind
 from planar.solving.assembly.block_assemblies import MEETING_COSINE_SQUARED, block_dependencies
 from planar.solving.newton import CLOSED_TOLERANCE
 from planar.solving.prepared_mechanism import PreparedMechanism
-
-Array = np.ndarray
 
 BEST_TO_WORST = (Completeness.PROVED, Completeness.NUMERICALLY, Completeness.NOT)
 """From the best to the worst."""
@@ -114,7 +113,7 @@ class AssemblyTree:
             yield AssemblyPath((), z, True, False)
             return
         # of every block on the way: its roots, the one that is next, and whether an earlier one led to an end
-        way: list[list] = [[self.roots(0, z), 0, False]]
+        way: list[list[Any]] = [[self.roots(0, z), 0, False]]
         while way:
             found, rank, led = way[-1]
             depth = len(way) - 1
@@ -133,7 +132,7 @@ class AssemblyTree:
             elif self._choice_key(depth + 1, z) not in self._dead_ends[depth + 1]:
                 way.append([self.roots(depth + 1, z), 0, False])
 
-    def _path(self, way: list[list], z: Array) -> AssemblyPath:
+    def _path(self, way: list[list[Any]], z: Array) -> AssemblyPath:
         ranks = [(found, rank - 1) for found, rank, _ in way]
         return AssemblyPath(
             tuple(rank for _, rank in ranks),
@@ -145,7 +144,7 @@ class AssemblyTree:
     def path_to(self, target: Array) -> AssemblyPath | None:
         """The assembly with given unknowns (unknowns,); None where it is none of these."""
         z = np.zeros_like(target)
-        way: list[list] = []
+        way: list[list[Any]] = []
         for index, stage in enumerate(self.stages):
             found = self.roots(index, z)
             if not len(found.real):

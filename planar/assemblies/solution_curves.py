@@ -6,9 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from planar.foundation.arrays import Array, BoolArray
 from planar.solving.newton import CLOSED_TOLERANCE, ResidualFunction, correct, damped_newton, one_system, shortest_step
-
-Array = np.ndarray
 
 SINGULAR_RATIO = 1e-5
 """Least singular value, of the greatest, below which a direction may be open."""
@@ -35,7 +34,7 @@ def is_on_curve(residual_function: ResidualFunction, root: Array) -> bool:
     return False
 
 
-def one_per_curve(closing: ResidualFunction, roots: Sequence[Array], angles: Array) -> list[Array]:
+def one_per_curve(closing: ResidualFunction, roots: Sequence[Array], angles: BoolArray) -> list[Array]:
     """Of places on curves one for each curve, as far as following tells; `angles` (unknowns,) says which those are.
 
     Where two ways are open there is no one way to follow, and one place stands for all.
@@ -51,7 +50,7 @@ def one_per_curve(closing: ResidualFunction, roots: Sequence[Array], angles: Arr
     return kept
 
 
-def _follow_curve(closing: ResidualFunction, start: Array, angles: Array) -> list[Array]:
+def _follow_curve(closing: ResidualFunction, start: Array, angles: BoolArray) -> list[Array]:
     """Places along a curve a step of ALONG from each other, right round or so far both ways."""
     way = np.linalg.svd(closing(start[None])[1][0])[2][-1]
     found = [start]
@@ -74,7 +73,7 @@ def _correct(closing: ResidualFunction, tried: Array) -> Array | None:
     return found if gap <= CLOSED_TOLERANCE else None
 
 
-def _distances(curve: Array, place: Array, angles: Array) -> Array:
+def _distances(curve: Array, place: Array, angles: BoolArray) -> Array:
     """How far the places of a curve (places, unknowns) are from another one."""
     gaps = np.where(angles, np.abs(np.exp(1j * curve) - np.exp(1j * place)), np.abs(curve - place))
     return np.linalg.norm(gaps, axis=1)

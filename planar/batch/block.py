@@ -18,6 +18,7 @@ from planar.batch.march.numpy_backend import iterate_steps
 from planar.batch.reference_design import ReferenceDesign, reference_design, stack_rows
 from planar.codegen.aligned_arrays import allocate_aligned
 from planar.foundation.errors import Outcome
+from planar.model.link_shapes import LinkShape
 from planar.model.mechanism import LARGEST_INPUT_POSITION, Mechanism
 
 Array = np.ndarray
@@ -131,7 +132,7 @@ class _DesignBlockSolver:
                 said[int(told.status[-1])] = many + 1, sentence
         return SolvedDesigns(out, status, inputs, general, sent, tuple((code, *each) for code, each in said.items()))
 
-    def _solve_one_design(self, index: int, grid: Array | None):  # noqa: ANN202
+    def _solve_one_design(self, index: int, grid: Array | None) -> SolvedDesign:
         block = self.block
         mechanism = with_design_values(self.reference.mechanism, values_of_design(block.designs, index))
         ends = (block.start, block.stop) if grid is None else (float(grid[0]), float(grid[-1]))
@@ -224,7 +225,9 @@ class _DesignBlockSolver:
             (last,) = deque(iterate_steps(march, (self.u + place * gone for place in places)), maxlen=1)
         return march._replace(z0=last.z.T), fit & last.passed
 
-    def _with_frame_points(self, out: Array, told: Mapping[str, tuple[str, str]], shapes) -> Array:  # noqa: ANN001
+    def _with_frame_points(
+        self, out: Array, told: Mapping[str, tuple[str, str]], shapes: Mapping[str, LinkShape]
+    ) -> Array:
         """The rows of all points, those on the frame filled in."""
         frame = self.reference.mechanism.frame
         if all(link != frame for link, _ in told.values()):

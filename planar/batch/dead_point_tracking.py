@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -213,7 +214,9 @@ class _DeadPointTracker:
         if on.any():
             self.arcs.append(arcs.select(on))
 
-    def _find_falling_zero(self, arcs: _CurveArcs, value) -> tuple[Array, Array]:  # noqa: ANN001
+    def _find_falling_zero(
+        self, arcs: _CurveArcs, value: Callable[[_DesignCurves, Array], Array]
+    ) -> tuple[Array, Array]:
         """Where on each arc a value of its points falls through zero: the points, and which of them surely do."""
         curves, chord = _DesignCurves(self.batch, arcs.design, self.direction), arcs.y1 - arcs.y0
         a, b = np.zeros(len(chord)), np.ones(len(chord))
@@ -282,7 +285,7 @@ class _DeadPointTracker:
         z = columns.correct(y[:, :-1], u.T)
         fine &= np.max(np.abs(z - y[:, :-1]), axis=1, initial=0.0) < 1e-3
         w = columns.coordinates(z, u.T)
-        branches, closed = DesignBranchCheck(columns, own.p), make_residual_check(own)
+        branches, closed = DesignBranchCheck(columns), make_residual_check(own)
         here = branches.evaluate(z, u.T)
         fine &= (closed.worst_residual(w, u) <= march.tolerance) & branches.is_regular(here)
         out = np.empty((wide, len(step)))

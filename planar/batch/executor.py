@@ -9,7 +9,8 @@ from typing import TypeVar
 
 from planar.foundation.errors import BadInput
 
-Task, Result = TypeVar("Task"), TypeVar("Result")
+Task = TypeVar("Task")
+Result = TypeVar("Result")
 
 MAX_EXECUTOR_TRIES = 2
 """How often a task is given to an executor before it is done here."""

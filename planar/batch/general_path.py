@@ -31,7 +31,13 @@ class SolvedDesign(NamedTuple):
 
 
 def solve_design(
-    mechanism: Mechanism, pair: str, grid: Array | None, steps: int, range_: tuple, points: tuple[str, ...], rates: bool
+    mechanism: Mechanism,
+    pair: str,
+    grid: Array | None,
+    steps: int,
+    range_: tuple[float | None, float | None],
+    points: tuple[str, ...],
+    rates: bool,
 ) -> SolvedDesign:
     """A design over a grid of positions (rows,) of its running input, or, without one, over a range of its own.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
@@ -306,7 +307,7 @@ class _AssemblySearch:
         if tied.size:
             keys = [each[tied] for each in here.tie_keys]
             # behind counts over all groups, the rest group after group
-            keys = [sum(keys[::3])] + [key for k, key in enumerate(keys) if k % 3] if keys else []
+            keys = [reduce(np.add, keys[::3]), *(key for k, key in enumerate(keys) if k % 3)] if keys else []
             left = alike[tied]
             for key in keys:
                 value = np.where(left, key, np.inf)

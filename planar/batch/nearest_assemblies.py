@@ -113,10 +113,10 @@ class _NearestAssemblySearch:
         clear, total, before = found.converged.copy(), costs.sum(axis=0), np.zeros(self.design_count)
         for stage in self.blocks:
             own = np.array(self.point_blocks) == stage.block_index
-            cost, other = costs[own].sum(axis=0), others[own].sum(axis=0)
+            cost, other, own_count = costs[own].sum(axis=0), others[own].sum(axis=0), int(own.sum())
             if np.all(np.isinf(other)):
-                clear &= is_at_sketch(cost, np.count_nonzero(own), NEAR_SKETCH) & is_clearly_regular(found.regularity)
-                near = is_at_sketch(cost, np.count_nonzero(own))
+                clear &= is_at_sketch(cost, own_count, NEAR_SKETCH) & is_clearly_regular(found.regularity)
+                near = is_at_sketch(cost, own_count)
                 clear &= (
                     near if near.all() else near | is_surely_farther(before + self._next_cost(stage, found, own), total)
                 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from threading import Lock
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict
 
 import numpy as np
 
@@ -18,6 +18,9 @@ from planar.document.first_argument import takes_mechanism
 from planar.foundation.errors import BadInput
 from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import Mechanism
+
+if TYPE_CHECKING:
+    from planar.batch.march.llvm_positions import PositionsKernel
 
 Array = np.ndarray
 
@@ -33,7 +36,16 @@ class PreparedRun(NamedTuple):
     status: Array
     said: tuple[str, ...] = ()
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return short_repr(self)
+
+
+class RangeArguments(TypedDict):
+    """Where the running input starts and stops (rad or m; None: by itself), and its pair."""
+
+    start: float | None
+    stop: float | None
+    pair: str | None
 
 
 @takes_mechanism
@@ -77,7 +89,7 @@ class PreparedSweep:
         self.mechanism = check_range(mechanism, steps, start, stop, pair)
         self.reference = reference_design(self.mechanism, pair)
         self.steps, self.rates = steps, rates
-        self.range = {"start": start, "stop": stop, "pair": pair}
+        self.range: RangeArguments = {"start": start, "stop": stop, "pair": pair}
         self.points = self.reference.select_points(points)
         self.members = {name: self.reference.point_member(name) for name in self.points}
         own = float(self.reference.mechanism.inputs[self.reference.running_index].position)
@@ -105,7 +117,7 @@ class PreparedSweep:
     def __repr__(self) -> str:
         return f"<PreparedSweep of {self.mechanism.name!r}: {self.steps + 1} positions of {', '.join(self.points)}>"
 
-    def _compile_kernel(self) -> Any:
+    def _compile_kernel(self) -> PositionsKernel | None:
         """The compiled function; None where there is none for this structure."""
         base_, frame = self.reference, self.reference.mechanism.frame
         if any(link == frame for link, _ in self.members.values()) or not base_.can_run_backend:
@@ -136,7 +148,7 @@ class PreparedSweep:
         found = None
         if self.kernel is not None:
             with self.lock:  # what is known of a design is kept from call to call
-                if values == self.current_design or self._set_design(values):
+                if values == self.current_design or self._set_design(self.kernel, values):
                     found = self.kernel(self.kernel_numbers, self.tolerance, self.reference.unit)
         if found is None or not found[1]:
             return self._run_as_sweep(values)
@@ -146,9 +158,10 @@ class PreparedSweep:
             {name: turned[:, 2 * (k * many + n) : 2 * (k * many + n) + 2] for n, name in enumerate(self.points)}
             for k in range(3 if self.rates else 1)
         ]
-        return PreparedRun(orders[0], *(orders[1:] if self.rates else (None, None)), self.solved_status)
+        velocity, acceleration = orders[1:] if self.rates else (None, None)
+        return PreparedRun(orders[0], velocity, acceleration, self.solved_status)
 
-    def _set_design(self, values: dict[str, float]) -> bool:
+    def _set_design(self, kernel: PositionsKernel, values: dict[str, float]) -> bool:
         """Take over a design's numbers; whether its assembly is surely the one nearest to the sketch."""
         base_ = self.reference
         arrays = read_designs(self.mechanism, values) if values else {}
@@ -177,7 +190,7 @@ class PreparedSweep:
         ]
         sign = self.kernel_equations.assembly_signs(start.z[:, 0], u[:, 0], p[:, 0])
         rates = {"u1": u1[:, 0], "u2": u2[:, 0]}
-        self.kernel_numbers = self.kernel.pack_numbers(p=p[:, 0], q=np.array(q), sign=sign, **rates)
+        self.kernel_numbers = kernel.pack_numbers(p=p[:, 0], q=np.array(q), sign=sign, **rates)
         self.current_design = values
         return True
 
@@ -187,14 +200,20 @@ class PreparedSweep:
             f"{self.reference.pair}.position": self.reference.mechanism.inputs[self.reference.running_index].position
         }
         found = sweep(self.mechanism, given, self.steps, self.points, rates=self.rates, **self.range)
-        orders = [
-            order and {name: np.asarray(array[0]) for name, array in order.items()}
-            for order in (found.position, found.velocity, found.acceleration)
-        ]
-        return PreparedRun(*orders, np.asarray(found.status)[0], found.said)
+        return PreparedRun(
+            _only_design(found.position),
+            found.velocity and _only_design(found.velocity),
+            found.acceleration and _only_design(found.acceleration),
+            np.asarray(found.status)[0],
+            found.said,
+        )
 
 
-def _check_number(name: str, value: Any) -> float:
+def _only_design(order: Mapping[str, Any]) -> dict[str, Array]:
+    return {name: np.asarray(array[0]) for name, array in order.items()}
+
+
+def _check_number(name: str, value: float) -> float:
     if np.ndim(value) != 0:
         raise BadInput(str(name), "one number is wanted; many designs at once are a sweep")
     return value

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property, lru_cache
 from itertools import combinations
 
@@ -12,6 +12,7 @@ from planar.batch.design_arrays import design_variables
 from planar.document.cursor import suggest_spelling
 from planar.equations.mechanism_numbers import scaled_pair_numbers
 from planar.foundation.errors import BadInput
+from planar.foundation.geometry import Vector
 from planar.foundation.jets import Scalar
 from planar.model.link_shapes import LinkShape, link_shape
 from planar.model.mechanism import (
@@ -66,11 +67,11 @@ class ReferenceDesign:
         frame = self.mechanism.frame
         return {name: each for name, each in self.points.items() if frame not in dict(each.members)}
 
-    def select_points(self, points: object) -> tuple[str, ...]:
+    def select_points(self, points: Sequence[str] | str | None) -> tuple[str, ...]:
         """The result names of points, given by those or as `link.point`; all that move where none are. BadInput."""
         if points is None:
             return tuple(self.moving_points)
-        given = [points] if isinstance(points, str) else list(points)  # type: ignore[call-overload]
+        given = [points] if isinstance(points, str) else list(points)
         members = {f"{link}.{point}": name for name, each in self.points.items() for link, point in each.members}
         known = members | {name: name for name in self.points}
         for each in given:
@@ -162,9 +163,9 @@ class ReferenceDesign:
 
     _block_assemblies: tuple[tuple[Array, int], ...] | None = None
 
-    def _search_block_assemblies(self):  # noqa: ANN202
+    def _search_block_assemblies(self) -> Iterator[tuple[Array, int]]:
         candidates = self.candidates
-        nodes = [(0.0, np.zeros(len(self.solver.equations.unknowns)))]
+        nodes: list[tuple[float, Array]] = [(0.0, np.zeros(len(self.solver.equations.unknowns)))]
         for stage in self.solver.equations.blocks:
             ways = []
             for cost, z in nodes:
@@ -185,7 +186,7 @@ def reference_design(mechanism: Mechanism, pair: str | None) -> ReferenceDesign:
     return ReferenceDesign(mechanism, pair)
 
 
-def stack_rows(rows, design_count: int) -> Array:  # noqa: ANN001 - numbers and arrays mixed
+def stack_rows(rows: Sequence[Array | float], design_count: int) -> Array:
     """Rows of numbers, or of arrays of one for each design, as one array (rows, designs)."""
     found = np.empty((len(rows), design_count))
     for k, row in enumerate(rows):
@@ -204,7 +205,7 @@ def shape_of_designs(whole: LinkShape, which: Array) -> LinkShape:
 
 
 def _map_shape(whole: LinkShape, of: Callable[[Array], Scalar]) -> LinkShape:
-    def own(value):  # noqa: ANN001, ANN202
-        return type(value)(*(of(part) if isinstance(part, np.ndarray) else part for part in value))
+    def own(value: Vector) -> Vector:
+        return Vector(*(of(part) if isinstance(part, np.ndarray) else part for part in value))
 
     return LinkShape({name: own(at) for name, at in whole.points.items()}, own(whole.origin), own(whole.axis))

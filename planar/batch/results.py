@@ -46,4 +46,5 @@ class Sweep:
     @property
     def whole(self) -> Array:
         """The designs (designs,) that were solved at every step."""
-        return np.all(np.asarray(self.status[:]) == 0, axis=1)
+        found: Array = np.all(np.asarray(self.status[:]) == 0, axis=1)
+        return found

@@ -17,6 +17,7 @@ import numpy as np
 
 from planar.batch.design_arrays import design_variables
 from planar.batch.reference_design import reference_design
+from planar.batch.results import Sweep
 from planar.batch.sweep import sweep
 from planar.bench.profiling import profile_cycle, profile_first_call, profile_sweep
 from planar.equations.constraint_equations import Block, ConstraintEquations, build_equations
@@ -100,7 +101,9 @@ def measure_speed(mechanism: Mechanism, rounds: int = 5, seconds: float = SWEEP_
     solver = PositionSolver(mechanism)
     assembly = _best_time(solver.find_assembly, rounds)
     solved = _best_time(_make_solve_task(mechanism), 2 * rounds)
-    cycled, swept, told = None, (), _describe_blocks(solver.equations)
+    cycled: float | None = None
+    swept: tuple[SweepTiming, ...] = ()
+    told = _describe_blocks(solver.equations)
     if mechanism.inputs:
         between, along, rows, cycled = _find_ranges(mechanism)
         if cycled < MAX_PROFILED_SECONDS:
@@ -192,9 +195,11 @@ def _time_sweeps(mechanism: Mechanism, input_range: InputRange, seconds: float) 
     todo = [(name, rates) for name, needs in BACKEND_LIBRARIES.items() if find_spec(needs) for rates in (True, False)]
     end, within = perf_counter() + seconds, LENGTH_VARIATIONS[0]
 
-    def run(backend: str, rates: bool, designs: int) -> Any:
-        given = {"rates": rates, "start": start, "stop": stop, "pair": pair, "backend": backend}
-        return sweep(mechanism, _draw_designs(mechanism, designs, within), SWEEP_STEPS, points, **given)
+    def run(backend: str, rates: bool, designs: int) -> Sweep:
+        drawn = _draw_designs(mechanism, designs, within)
+        return sweep(
+            mechanism, drawn, SWEEP_STEPS, points, rates=rates, start=start, stop=stop, pair=pair, backend=backend
+        )
 
     for k, (backend, rates) in enumerate(todo):
         task = partial(run, backend, rates)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Callable
 from cProfile import Profile
 from time import perf_counter
@@ -77,13 +77,13 @@ def profile_call(task: Callable[[], Any]) -> CallProfile:
     profile = Profile()
     start = perf_counter()
     profile.runcall(task)
-    found = CallProfile(perf_counter() - start, Counter(), Counter(), {})
+    found = CallProfile(perf_counter() - start, defaultdict(float), defaultdict(float), {})
     for each in profile.getstats():
         place = _function_key(each.code)
         found.total_seconds[place] += each.totaltime
         found.own_seconds[place] += each.inlinetime
         for callee in each.calls or ():
-            callers = found.callers.setdefault(_function_key(callee.code), Counter())
+            callers = found.callers.setdefault(_function_key(callee.code), defaultdict(float))
             callers[place] += callee.totaltime
     return found
 

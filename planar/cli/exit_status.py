@@ -9,7 +9,7 @@ import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from types import MappingProxyType
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TextIO
 
 import click
 
@@ -128,11 +128,18 @@ def _report_missing_glyphs() -> Iterator[None]:
     found: set[str] = set()
     before = warnings.showwarning
 
-    def collect(message: Warning | str, *rest: Any) -> None:
+    def collect(  # many: the signature of `showwarning`
+        message: Warning | str,
+        category: type[Warning],
+        filename: str,
+        lineno: int,
+        file: TextIO | None = None,
+        line: str | None = None,
+    ) -> None:
         if isinstance(message, MissingGlyphs):
             found.update(message.characters)
         else:
-            before(message, *rest)
+            before(message, category, filename, lineno, file, line)
 
     with warnings.catch_warnings():
         warnings.simplefilter("always", MissingGlyphs)

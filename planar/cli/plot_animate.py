@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,6 +28,7 @@ from planar.foundation.errors import BadInput
 
 if TYPE_CHECKING:
     from planar.model.mechanism import Mechanism
+    from planar.plot import Drawing
     from planar.results.motion import Motion
 
 POSITION_DRAWINGS = ("scheme", "velocity", "acceleration", "centres", "forces")
@@ -129,14 +131,16 @@ def plot(  # many: options of a command; # long: each has its line
                 raise BadInput(
                     "--link", "centrodes are of two links; name one, or one and the link that it is seen from"
                 )
-            figure = {
+            link, other = (*links, None, None)[:2]
+            drawings: dict[str, Callable[[], Drawing]] = {
                 "positions": lambda: drawn.positions(moving, steps, points or None, scales),
                 "loci": lambda: drawn.loci(moving, points or None, scales),
-                "centrodes": lambda: drawn.centrodes(moving, *links, scale=scales),
+                "centrodes": lambda: drawn.centrodes(moving, link, other, scales),
                 "diagrams": lambda: drawn.diagrams(moving, of, steps if chords else None),
                 "torque": lambda: drawn.torque(moving, of, fluctuation),
                 "bearings": lambda: drawn.bearings(moving, pairs or None),
-            }[what]()
+            }
+            figure = drawings[what]()
         drawn.save(figure, output)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-Array = np.ndarray
+from planar.foundation.arrays import Array
 
 WIDEST_VECTOR = 8
 """Numbers of the widest vectors of a machine."""

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import operator
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from planar.codegen.instructions import InstructionList, required_values
+from planar.foundation.arrays import Array
 
-Array = np.ndarray
-
-NUMPY_OPERATIONS = {
+NUMPY_OPERATIONS: Mapping[str, Callable[..., Any]] = {
     "add": operator.add,
     "sub": operator.sub,
     "mul": operator.mul,
@@ -30,27 +30,30 @@ class FormulaInput(NamedTuple):
     """What a formula takes: ("row", slot, which of its rows), ("p", number), or ("z", unknown, 0 or 1)."""
 
     source: str
-    index: int
+    place: int
     part: int = 0
 
 
 class BlockFormula:
     """Values by number; `leaves` are the numbers of those that are taken from outside."""
 
-    def __init__(self, listing: InstructionList, wanted: tuple[int, ...], leaves: dict[int, FormulaInput]):
+    def __init__(
+        self, listing: InstructionList[FormulaInput], wanted: tuple[int, ...], leaves: dict[int, FormulaInput]
+    ):
         self.instructions, self.outputs, self.inputs = listing, wanted, leaves
         self.order = required_values(listing, wanted)
 
     def evaluate_numpy(self, taken: dict[FormulaInput, Any]) -> list[Any]:
         """The wanted values where the leaves are arrays, or numbers."""
-        values, listing = {}, self.instructions.instructions
+        values: dict[int, Any] = {}
+        listing = self.instructions.instructions
         with np.errstate(all="ignore"):  # what cannot be assembled is no number, and judged as such
             for number in self.order:
                 value = listing[number]
                 if value.operation == "input":
                     values[number] = taken[self.inputs[number]]
                 elif value.operation == "const":
-                    values[number] = value.data
+                    values[number] = value.number
                 else:
                     values[number] = NUMPY_OPERATIONS[value.operation](*(values[k] for k in value.operands))
         return [values[number] for number in self.outputs]
@@ -82,9 +85,9 @@ def run_formula(formula: BlockFormula, layout: KernelLayout, state: Array, index
     taken: dict[FormulaInput, Any] = {}
     for leaf in formula.inputs.values():
         if leaf.source == "p":
-            taken[leaf] = p[:, leaf.index, None]
+            taken[leaf] = p[:, leaf.place, None]
         else:
-            taken[leaf] = state[index[:, leaf.index], leaf.part]
+            taken[leaf] = state[index[:, leaf.place], leaf.part]
     found = formula.evaluate_numpy(taken)
     for k, value in enumerate(found):
         if k < len(layout.output_rows):

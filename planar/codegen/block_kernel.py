@@ -10,8 +10,7 @@ import numpy as np
 from planar.codegen.block_formula import BlockFormula, KernelLayout
 from planar.codegen.llvm_compile import compile_function
 from planar.codegen.llvm_ir import IRWriter
-
-Array = np.ndarray
+from planar.foundation.arrays import Array
 
 LANES = 8
 """Numbers that are worked on at once; rows of memory are multiples of so many."""
@@ -37,7 +36,7 @@ def write_kernel_ir(formula: BlockFormula, layout: KernelLayout) -> str:
     first = t.add_instruction(f"mul i64 %i, {layout.number_count}")
     for number, leaf in formula.inputs.items():
         if leaf.source == "p":
-            pointer = t.double_pointer("%p", t.add_instruction(f"add i64 {first}, {leaf.index}"))
+            pointer = t.double_pointer("%p", t.add_instruction(f"add i64 {first}, {leaf.place}"))
             names[number] = t.broadcast(t.add_instruction(f"load double, ptr {pointer}"))
     begin = t.add_instruction(f"mul i64 %i, {layout.slot_count}")
     bases = []
@@ -48,7 +47,7 @@ def write_kernel_ir(formula: BlockFormula, layout: KernelLayout) -> str:
     def based(slot: int, row: int) -> str:
         return t.add_instruction(f"add i64 {bases[slot]}, {t.add_instruction(f'mul i64 %stride, {row}')}")
 
-    taken = {number: based(leaf.index, leaf.part) for number, leaf in formula.inputs.items() if leaf.source == "row"}
+    taken = {number: based(leaf.place, leaf.part) for number, leaf in formula.inputs.items() if leaf.source == "row"}
     given = [based(slot, row) for slot, row in layout.output_rows]
     out = t.add_instruction(f"mul i64 {t.add_instruction('mul i64 %i, %stride')}, {layout.extra_row_count}")
     if not layout.extremes_only:

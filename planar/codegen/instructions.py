@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from math import cos, sin
-from typing import NamedTuple
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import casadi as ca
 
@@ -57,29 +57,34 @@ def check_length(instructions: int) -> None:
         raise UnsupportedOperation(f"more than {MAX_INSTRUCTIONS} instructions take too long to compile")
 
 
-class Instruction(NamedTuple):
-    """One value: what makes it ("const", "input", "add", ...), of which values, and a constant or the input's place."""
+Key = TypeVar("Key", bound=Hashable)
+"""What tells the inputs of a list from each other, as whoever writes the code knows them."""
+
+
+class Instruction(NamedTuple, Generic[Key]):
+    """One value: what makes it ("const", "input", "add", ...), of which values, a constant's number, an input's key."""
 
     operation: str
     operands: tuple[int, ...] = ()
-    data: float | tuple[int, int] | str = 0.0
+    number: float = 0.0
+    key: Key | None = None
 
 
-class InstructionList:
+class InstructionList(Generic[Key]):
     """Values by number, each of which is made once, however often it is asked for."""
 
     def __init__(self) -> None:
-        self.instructions: list[Instruction] = []
-        self._known: dict[Instruction, int] = {}
+        self.instructions: list[Instruction[Key]] = []
+        self._known: dict[Instruction[Key], int] = {}
 
-    def add(self, what: str, *of: int, data: float | tuple[int, int] | str = 0.0) -> int:
+    def add(self, what: str, *of: int, number: float = 0.0, key: Key | None = None) -> int:
         """The number of a value; sums and products with nothing and one are not made."""
         short = self._simplify(what, of)
         if short is not None:
             return short
         if what in ("add", "mul") and of[0] > of[1]:
             of = (of[1], of[0])
-        value = Instruction(what, of, data)
+        value = Instruction(what, of, number, key)
         if value not in self._known:
             self._known[value] = len(self.instructions)
             self.instructions.append(value)
@@ -87,11 +92,19 @@ class InstructionList:
 
     def add_constant(self, number: float) -> int:
         """A constant."""
-        return self.add("const", data=float(number))
+        return self.add("const", number=float(number))
+
+    def add_input(self, key: Key) -> int:
+        """A value from outside."""
+        return self.add("input", key=key)
+
+    def add_again(self, value: Instruction[Key], operands: Iterable[int]) -> int:
+        """An instruction of another list, of values of this one."""
+        return self.add(value.operation, *operands, number=value.number, key=value.key)
 
     def constant_value(self, value: int) -> float | None:
         """What a constant is; None for another value."""
-        return float(self.instructions[value].data) if self.instructions[value].operation == "const" else None
+        return self.instructions[value].number if self.instructions[value].operation == "const" else None
 
     def _simplify(self, what: str, of: tuple[int, ...]) -> int | None:
         """A value that is known already: a constant, or one of those that it would be made of."""
@@ -136,7 +149,7 @@ class InstructionList:
         raise UnsupportedOperation(f"operation {code}")
 
 
-def required_values(listing: InstructionList, wanted: Iterable[int]) -> list[int]:
+def required_values(listing: InstructionList[Any], wanted: Iterable[int]) -> list[int]:
     """The values on which the wanted ones depend, and these, in their order."""
     found: set[int] = set()
     stack = list(wanted)
@@ -156,8 +169,8 @@ class CosSin(NamedTuple):
 
 
 def expand_angle_sums(
-    listing: InstructionList, wanted: list[int], angles: Mapping[int, CosSin]
-) -> tuple[InstructionList, list[int]]:
+    listing: InstructionList[Key], wanted: list[int], angles: Mapping[int, CosSin]
+) -> tuple[InstructionList[Key], list[int]]:
     """The same values with no cos and sin of known angles in them: these are put together from the angles' own.
 
     cos(a + b) = cos a cos b - sin a sin b. Angles of which other multiples stand in a sum, or that stand elsewhere,
@@ -175,11 +188,12 @@ class _AngleSum(NamedTuple):
     rest: int | None
 
 
-class _AngleSumExpander:
+class _AngleSumExpander(Generic[Key]):
     """Makes a listing again, with the angles' own cos and sin."""
 
-    def __init__(self, listing: InstructionList, angles: Mapping[int, CosSin]):
-        self.source, self.angles, self.result = listing, angles, InstructionList()
+    def __init__(self, listing: InstructionList[Key], angles: Mapping[int, CosSin]):
+        self.source, self.angles = listing, angles
+        self.result: InstructionList[Key] = InstructionList()
         self.new_numbers: dict[int, int] = {}
         self.sums: dict[int, _AngleSum | None] = {}
 
@@ -194,9 +208,7 @@ class _AngleSumExpander:
             if value.operation in ("cos", "sin") and inside is not None and inside.factors:
                 self.new_numbers[each] = getattr(self._cos_sin_of_sum(inside), value.operation)
             else:
-                self.new_numbers[each] = self.result.add(
-                    value.operation, *(self.new_numbers[k] for k in value.operands), data=value.data
-                )
+                self.new_numbers[each] = self.result.add_again(value, (self.new_numbers[k] for k in value.operands))
         return [self.new_numbers[each] for each in wanted]
 
     def _cos_sin_of_sum(self, inside: _AngleSum) -> CosSin:
@@ -214,16 +226,14 @@ class _AngleSumExpander:
                 )
         return CosSin(c, s)
 
-    def _angle_sum(self, each: int, value: Instruction) -> _AngleSum | None:
+    def _angle_sum(self, each: int, value: Instruction[Key]) -> _AngleSum | None:
         if each in self.angles:
             return _AngleSum({each: 1}, None)
-        of = [self.sums[k] for k in value.operands]
-        if any(part is None for part in of):
+        of = [part for k in value.operands if (part := self.sums[k]) is not None]
+        if len(of) < len(value.operands):
             return None
         if not any(part.factors for part in of):
-            return _AngleSum(
-                {}, self.result.add(value.operation, *(self.new_numbers[k] for k in value.operands), data=value.data)
-            )
+            return _AngleSum({}, self.result.add_again(value, (self.new_numbers[k] for k in value.operands)))
         if value.operation in ("add", "sub"):
             return self._add_sums(of[0], of[1] if value.operation == "add" else self._scale_sum(of[1], -1))
         if value.operation == "neg":

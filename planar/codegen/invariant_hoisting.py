@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Generic, NamedTuple
 
-from planar.codegen.instructions import Instruction, InstructionList, required_values
+from planar.codegen.instructions import Instruction, InstructionList, Key, required_values
 
 MAX_REUSED_TERMS = 6
 """Terms of a sum that is wanted more than once: a longer one is computed once, and not put into other sums."""
@@ -19,16 +19,17 @@ class _LinearForm(NamedTuple):
     rest: int | None
 
 
-class InvariantHoister:
-    """Makes listings again, all into one. `is_still`: which inputs do not vary; `still`: all values that do not."""
+class InvariantHoister(Generic[Key]):
+    """Makes listings again, all into one. `is_still`: which inputs do not vary; `invariants`: what values do not."""
 
-    def __init__(self, is_still: Callable[[Instruction], bool]):
-        self.is_invariant, self.result = is_still, InstructionList()
+    def __init__(self, is_still: Callable[[Key], bool]):
+        self.is_invariant = is_still
+        self.result: InstructionList[Key] = InstructionList()
         self.invariants: set[int] = set()
         self.linear_forms: dict[int, _LinearForm] = {}
         self.value_numbers: dict[int, int] = {}
 
-    def rebuild(self, listing: InstructionList, wanted: Sequence[int]) -> list[int]:
+    def rebuild(self, listing: InstructionList[Key], wanted: Sequence[int]) -> list[int]:
         """The numbers of the wanted values in the listing that is made."""
         self.linear_forms, self.value_numbers = {}, {}
         order = required_values(listing, wanted)
@@ -40,12 +41,12 @@ class InvariantHoister:
             self.linear_forms[k] = found
         return [self._value_number(k) for k in wanted]
 
-    def _linear_form(self, value: Instruction) -> _LinearForm:
+    def _linear_form(self, value: Instruction[Key]) -> _LinearForm:
         of = [self.linear_forms[k] for k in value.operands]
-        if not any(part.factors for part in of) and (value.operation not in ("input",) or self.is_invariant(value)):
-            return _LinearForm(
-                {}, self._add_invariant(value.operation, *(self._rest_or_zero(part) for part in of), data=value.data)
-            )
+        if not any(part.factors for part in of) and (value.key is None or self.is_invariant(value.key)):
+            number = self.result.add_again(value, [self._rest_or_zero(part) for part in of])
+            self.invariants.add(number)
+            return _LinearForm({}, number)
         if value.operation in ("add", "sub", "neg"):
             first, second = of if len(of) == 2 else (_LinearForm({}, None), of[0])
             return self._add_forms(first, second, "add" if value.operation == "add" else "sub")
@@ -54,11 +55,9 @@ class InvariantHoister:
             return self._scale_form(part, self._rest_or_zero(by))
         if value.operation == "div":
             return self._divide(value, *of)
-        return self._single_term(
-            self.result.add(value.operation, *(self._value_number(k) for k in value.operands), data=value.data)
-        )
+        return self._single_term(self.result.add_again(value, [self._value_number(k) for k in value.operands]))
 
-    def _divide(self, value: Instruction, above: _LinearForm, below: _LinearForm) -> _LinearForm:
+    def _divide(self, value: Instruction[Key], above: _LinearForm, below: _LinearForm) -> _LinearForm:
         """One division for all that is divided by the same."""
         if not below.factors:
             return self._scale_form(above, self._add_invariant("div", self._constant(1.0), self._rest_or_zero(below)))
@@ -78,8 +77,8 @@ class InvariantHoister:
             else _LinearForm({}, number)
         )
 
-    def _add_invariant(self, what: str, *of: int, data: float | tuple[int, int] | str = 0.0) -> int:
-        number = self.result.add(what, *of, data=data)
+    def _add_invariant(self, what: str, *of: int) -> int:
+        number = self.result.add(what, *of)
         self.invariants.add(number)
         return number
 

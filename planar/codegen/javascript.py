@@ -23,7 +23,7 @@ JS_FUNCTIONS = {
 }
 
 
-class CaseInstructionList(InstructionList):
+class CaseInstructionList(InstructionList[tuple[int, int]]):
     """A listing that knows cases as well."""
 
     def _add_operation(self, code: int, of: list[int]) -> int:
@@ -36,19 +36,17 @@ def write_javascript(name: str, function: ca.Function) -> str:
     Raises UnsupportedOperation where it holds an operation that is not known.
     """
     listing = CaseInstructionList()
-    inputs = [
-        [listing.add("input", data=(k, at)) for at in range(function.numel_in(k))] for k in range(function.n_in())
-    ]
+    inputs = [[listing.add_input((k, at)) for at in range(function.numel_in(k))] for k in range(function.n_in())]
     wanted = [value for result in listing.inline_function(function, inputs) for value in result]
     arguments = [f"a{k}" for k in range(function.n_in())]
     told: dict[int, str] = {}
     lines = []
     for number in required_values(listing, wanted):
-        what, of, data = listing.instructions[number]
+        what, of, constant, key = listing.instructions[number]
         if what == "const":
-            told[number] = _js_number(float(data))
-        elif what == "input":
-            argument, at = data
+            told[number] = _js_number(constant)
+        elif key is not None:
+            argument, at = key
             told[number] = f"a{argument}[{at}]"
         else:
             told[number] = f"v{number}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Mapping
 from functools import cache, lru_cache
 from hashlib import sha256
 from typing import Any
@@ -17,14 +18,18 @@ PASS_LEVEL, CODEGEN_LEVEL, FAST_CODEGEN_LEVEL = 1, 2, 0
 LONG_TEXT_LINES = 6_000
 """Lines of a text whose code is made in the brief way: up to there the other takes less than a second, but its time
 grows faster than the text, and what is gained is at most the half of a run."""
-C_TYPES = {"int": ctypes.c_int64, "float": ctypes.c_double, "array": ctypes.c_void_p}
+C_TYPES: Mapping[str, type[ctypes.c_int64 | ctypes.c_double | ctypes.c_void_p]] = {
+    "int": ctypes.c_int64,
+    "float": ctypes.c_double,
+    "array": ctypes.c_void_p,
+}
 
 
 @lru_cache(maxsize=64)
 def compile_function(text: str, name: str, *kinds: str) -> Any:
     """The function of that name in a text, which takes arguments of these kinds ("int", "float", "array")."""
     engine = _load_or_compile(text)
-    function = ctypes.CFUNCTYPE(None, *(C_TYPES[kind] for kind in kinds))(engine.get_function_address(name))
+    function: Any = ctypes.CFUNCTYPE(None, *(C_TYPES[kind] for kind in kinds))(engine.get_function_address(name))
     function.engine = engine  # what was compiled lives as long as the function
     return function
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from typing import Any
 
 from planar.codegen.instructions import InstructionList, UnsupportedOperation
 
@@ -18,8 +19,9 @@ class IRWriter:
 
     def __init__(self, lanes: int):
         self.lanes, self.count = lanes, 0
-        self.lines: list[str | list[str]] = []
-        self._ahead: list[str | list[str]] = []
+        self.lines: list[str] = []
+        self._ahead: list[str] = []
+        self._sections = [self.lines]
         self.vector = f"<{lanes} x double>"
 
     def write_line(self, text: str) -> None:
@@ -28,8 +30,8 @@ class IRWriter:
 
     def mark_hoist_point(self) -> None:
         """Here, later, stands what is written `ahead`."""
-        self._ahead = []
-        self.lines.append(self._ahead)
+        self._ahead, self.lines = [], []
+        self._sections += [self._ahead, self.lines]
 
     @contextmanager
     def hoisted(self) -> Iterator[None]:
@@ -146,7 +148,7 @@ class IRWriter:
             f"declare double @{name}({', '.join(['double'] * many)}) memory(none)"
             for name, many in LIBRARY_ARGUMENT_COUNTS.items()
         ]
-        lines = [each for line in self.lines for each in ([line] if isinstance(line, str) else line)]
+        lines = [line for section in self._sections for line in section]
         return "\n".join([*lines, *calls, "!0 = !{i32 1}"])
 
     def double_pointer(self, base: str, index: str) -> str:
@@ -161,7 +163,7 @@ class IRWriter:
         )
 
     def write_values(
-        self, listing: InstructionList, order: Sequence[int], names: dict[int, str], inputs: Mapping[int, str]
+        self, listing: InstructionList[Any], order: Sequence[int], names: dict[int, str], inputs: Mapping[int, str]
     ) -> None:
         """Write values in an order; `names` grows by theirs, those of inputs are known."""
         for each in order:
@@ -170,7 +172,7 @@ class IRWriter:
             if value.operation == "input":
                 names[each] = inputs[each]
             elif value.operation == "const":
-                names[each] = self.constant(value.data)
+                names[each] = self.constant(value.number)
             elif value.operation == "neg":
                 names[each] = self.add_instruction(f"fneg {self.vector} {of[0]}")
             elif value.operation in LLVM_OPERATIONS:

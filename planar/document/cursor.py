@@ -164,11 +164,12 @@ class Cursor:
         return found
 
     def choice(self, key: str, words: tuple[str, ...]) -> str | None:
-        if not self.has(key):
-            return None
-        word = self[key].as_text()
+        return self[key].as_choice(words) if self.has(key) else None
+
+    def as_choice(self, words: tuple[str, ...]) -> str:
+        word = self.as_text()
         if word not in words:
-            raise self.error_at(key, f"{word!r} is none of {', '.join(words)}{suggest_spelling(word, words)}")
+            raise self.error_at(None, f"{word!r} is none of {', '.join(words)}{suggest_spelling(word, words)}")
         return word
 
     # quantities
@@ -241,9 +242,10 @@ class Cursor:
     def flag(self, key: str) -> bool:
         if not self.has(key):
             return False
-        if not isinstance(self[key].value, bool):
-            raise self.error_at(key, f"true or false is wanted here, not {describe_value(self[key].value)}")
-        return self[key].value
+        value = self[key].value
+        if not isinstance(value, bool):
+            raise self.error_at(key, f"true or false is wanted here, not {describe_value(value)}")
+        return value
 
     def counted_angle(self, key: str) -> float:
         found = self.quantity(key, "angle")

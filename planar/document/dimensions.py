@@ -41,8 +41,11 @@ Address = tuple[str | int, ...]
 NAMED_LISTS = ("links", "pairs", "inputs")
 """Lists of a file whose entries have names of their own."""
 OTHER_LISTS = ("loads", "springs", "masses", "gravity", "sketch")
-SPELLINGS = {("links", 2, "points"): "", ("links", 4, "distances"): "", ("pairs", 3, "through"): ""} | {
-    ("springs", 2, key): "free" for key in ("free_length", "free_angle")
+SPELLINGS: dict[tuple[str | int, int, str], str] = {
+    ("links", 2, "points"): "",
+    ("links", 4, "distances"): "",
+    ("pairs", 3, "through"): "",
+    **{("springs", 2, key): "free" for key in ("free_length", "free_angle")},
 }
 """Keys that a name spells otherwise than the file, by their list and depth there."""
 LAW_LISTS = frozenset(name for kind in SEGMENT_TYPES.values() for name, key in kind.keys.items() if key.is_list)
@@ -119,7 +122,8 @@ def change_dimension(mechanism: Mechanism, dimension: Dimension, value: Any) -> 
     """The mechanism with this number at another value (SI), or at an array or a symbol, unchecked."""
     where, index, *rest = dimension.address
     if where != "pairs" or not isinstance(index, int):
-        return _with_value(mechanism, dimension.address, value)
+        alone: Mechanism = _with_value(mechanism, dimension.address, value)
+        return alone
     entry = mechanism.pairs[index].entry_name()  # a pin of several links is several pairs of one entry
     changed = (
         _with_value(pair, tuple(rest), value) if pair.entry_name() == entry else pair for pair in mechanism.pairs
@@ -340,4 +344,4 @@ def _with_value(data: Any, address: Address, value: Any) -> Any:
     if isinstance(step, int):
         return (*data[:step], _with_value(data[step], rest, value), *data[step + 1 :])
     part = _with_value(getattr(data, step), rest, value)
-    return data._replace(**{step: part}) if isinstance(data, tuple) else replace(data, **{step: part})
+    return data._replace(**{step: part}) if hasattr(data, "_replace") else replace(data, **{step: part})

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import wraps
 from os import PathLike
-from typing import Any, Concatenate, ParamSpec, TypeVar
+from typing import Any, Concatenate, Literal, ParamSpec, Protocol, TypeVar, overload
 
 from planar.document.files import as_mechanism
 from planar.foundation.errors import BadInput, join_names
@@ -17,14 +17,35 @@ MechanismSource = Mechanism | str | PathLike[str]
 P = ParamSpec("P")
 R = TypeVar("R")
 F = TypeVar("F", bound=Callable[..., Any])
+T = TypeVar("T")
+
+ResultName = Literal["Centres", "Circuits", "Forces", "Modes", "Motion", "State"]
+SourceName = Literal["Mechanism"]
+
+
+class _TakesSource(Protocol):
+    """Makes of a function one that takes a path or a model's name, too."""
+
+    def __call__(
+        self, function: Callable[Concatenate[T, P], R], /
+    ) -> Callable[Concatenate[T | str | PathLike[str], P], R]: ...
 
 
 def takes_mechanism(function: Callable[Concatenate[Mechanism, P], R]) -> Callable[Concatenate[MechanismSource, P], R]:
     """The function with a path or a model's name in place of its mechanism, too; anything else is BadInput."""
-    return _with_first(function, as_mechanism)
+    found: Callable[Concatenate[MechanismSource, P], R] = _with_first(function, as_mechanism)
+    return found
 
 
-def takes_result(*classes: str) -> Callable[[F], F]:
+@overload
+def takes_result(result: ResultName, source: SourceName, /) -> _TakesSource: ...
+@overload
+def takes_result(result: ResultName, other: ResultName, source: SourceName, /) -> _TakesSource: ...
+@overload
+def takes_result(source: SourceName, result: ResultName, other: ResultName, /) -> _TakesSource: ...
+@overload
+def takes_result(*results: ResultName) -> Callable[[F], F]: ...
+def takes_result(*classes: str) -> Any:
     """The function, which takes results of these classes, by name; with "Mechanism" among them a path or a name, too.
 
     Anything else is BadInput.

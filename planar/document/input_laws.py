@@ -24,8 +24,8 @@ def read_law(cursor: Cursor, given: Input, kinds: InputKinds) -> InputLaw:
     joints = law.joints(given.position, given.velocity)
     for place, piece, before, after in zip(places, law.segments, joints, joints[1:], strict=False):
         if isinstance(piece, TableSegment) and not piece.starts_at(before.position):
-            told = [_format_value(cursor, each, kinds[0]) for each in (piece.positions[0], before.position)]
-            raise place.error_at("positions[0]", f"the table starts at {told[0]}, but the piece starts at {told[1]}")
+            own, wanted = (_format_value(cursor, each, kinds[0]) for each in (piece.positions[0], before.position))
+            raise place.error_at("positions[0]", f"the table starts at {own}, but the piece starts at {wanted}")
         if not abs(after.position) <= LARGEST_INPUT_POSITION:
             told = f"this leads to {after.position:.6g} {SI_UNITS[kinds[0]]}"
             raise place.error_at(None, f"{told}; an input moves to {LARGEST_INPUT_POSITION:g} rad or m at most")
@@ -63,8 +63,7 @@ def speed_jump_remarks(inputs: Iterable[Input], known: Mapping[str, Pair]) -> It
 
 
 def _read_segment(cursor: Cursor, kinds: InputKinds) -> LawSegment:
-    cursor["motion"].as_text()
-    motion = cursor.choice("motion", tuple(SEGMENT_TYPES))
+    motion = cursor["motion"].as_choice(tuple(SEGMENT_TYPES))
     kind = SEGMENT_TYPES[motion]
     for key in cursor.fields():
         if key not in ("motion", *kind.keys):

@@ -84,7 +84,7 @@ def _read_variation(cursor: Cursor, mechanism: Mechanism, named: Mapping[str, Pa
             raise cursor.error_at(f"at[{index + 1}]", "the places rise; one that stands twice is a step")
     if not at[0] < at[-1]:
         raise cursor.error_at("at", "the places do not differ, so nothing varies over them")
-    return Course(pair and pair.name, at, factors)
+    return Course(pair.name if pair else None, at, factors)
 
 
 def _read_spring(cursor: Cursor, points: Mapping[str, str]) -> Spring:
@@ -127,7 +127,7 @@ def _read_nonnegative(cursor: Cursor, key: str, kind: str, default: float | None
 def write_loads(mechanism: Mechanism, quantity: QuantityWriter) -> dict[str, list[Any]]:
     """The same as entries of a file; nothing for what there is none of."""
     named = relative_motions(mechanism)
-    found = {
+    found: dict[str, list[Any]] = {
         "loads": [write_load(load, named, quantity) for load in mechanism.loads],
         "springs": [write_spring(spring, quantity) for spring in mechanism.springs],
         "masses": [write_mass(mass, quantity) for mass in mechanism.masses],

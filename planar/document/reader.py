@@ -119,8 +119,8 @@ def _expand_short_forms(top: Cursor) -> Cursor:
             links[name] = _read_link(name, Cursor(link, cursor.path, top.context))
         entries[index] = whole.entry
         _add_links_to_entry(whole.joining_entry, tuple(whole.links), entries)
-    whole = replace(top.context, links=links)
-    return replace(top, value=dict(top.fields()) | {"pairs": entries}, context=whole)
+    context = replace(top.context, links=links)
+    return replace(top, value=dict(top.fields()) | {"pairs": entries}, context=context)
 
 
 def _add_links_to_entry(by: dict[str, Any], links: tuple[str, ...], entries: list[dict[str, Any]]) -> None:
@@ -362,7 +362,7 @@ def _read_published(cursor: Cursor, mechanism: Mechanism, points: Mapping[str, s
 
 def _read_tolerance(cursor: Cursor) -> float:
     if not cursor.has("tolerance"):
-        return PublishedValue._field_defaults["tolerance"]
+        return float(PublishedValue._field_defaults["tolerance"])
     found = cursor["tolerance"].as_number()
     if not 0.0 <= found < 1e100:
         raise cursor.error_at("tolerance", f"a number from zero on is wanted here, not {found!r}")

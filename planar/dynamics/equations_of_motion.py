@@ -18,11 +18,10 @@ import numpy as np
 from planar.dynamics.lagrangian import LagrangianFunctions
 from planar.dynamics.load_variation import load_factors
 from planar.equations.casadi_call import BufferedFunction
+from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.model.wording import quote_names
 from planar.solving.runs.time_run import input_law_rates
-
-Array = np.ndarray
 
 RANK_TOLERANCE = 1e-9
 """A singular value below this part of the greatest is none."""

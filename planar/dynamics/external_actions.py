@@ -15,6 +15,7 @@ import numpy as np
 from planar.dynamics.load_attachment import Attachment, attachments
 from planar.dynamics.load_variation import load_factors
 from planar.equations.mechanism_numbers import mechanism_size
+from planar.foundation.arrays import Array
 from planar.foundation.geometry import Frame, Vector
 from planar.foundation.jets import value_and_rates
 from planar.foundation.short_repr import short_repr
@@ -22,8 +23,6 @@ from planar.model.link_shapes import LinkShape
 from planar.model.loads import COINCIDENCE_TOLERANCE, Load, Spring
 from planar.model.mechanism import relative_motions
 from planar.results.kinematic_result import KinematicResult
-
-Array = np.ndarray
 
 
 class ExternalAction(NamedTuple):
@@ -40,7 +39,8 @@ class ExternalAction(NamedTuple):
     couple: Array | float
     power: Array | float = 0.0
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return short_repr(self)
 
 
 class KinematicArrays:
@@ -55,7 +55,8 @@ class KinematicArrays:
 
     def frame(self, link: str) -> Frame:
         """A link's axes at every position, rates left out."""
-        return Frame(*self._frame_rates(link)[0], self.moving.frames[link].fixed)
+        x, y, cosine, sine, angle = self._frame_rates(link)[0]
+        return Frame(x, y, cosine, sine, angle, self.moving.frames[link].fixed)
 
     @property
     def frames(self) -> dict[str, Frame]:

@@ -9,10 +9,9 @@ import numpy as np
 
 from planar.document.first_argument import takes_result
 from planar.dynamics.forces import Forces
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
-from planar.results.motion import Motion
-
-Array = np.ndarray
+from planar.results.motion import Motion, State
 
 DEFAULT_FLUCTUATION = 0.02
 """The coefficient of fluctuation of speed where none is given."""
@@ -86,6 +85,8 @@ def whole_turns(motion: Motion, name: str) -> int:
 def explain_no_cycle(forces: Forces, name: str) -> str:
     """Why forces over a motion are not those of a whole cycle of an input; nothing where they are."""
     motion, torque = forces.moving, np.asarray(forces.inputs[name])
+    if isinstance(motion, State):
+        return "one position is no cycle; give the forces over a motion"
     if motion.has_length_motion(name):
         return "a flywheel turns; this input is a length"
     if not whole_turns(motion, name):

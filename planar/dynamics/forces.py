@@ -26,12 +26,11 @@ from planar.dynamics.multipliers import ReactionSolver
 from planar.dynamics.reactions import ZERO_COUPLE_TOLERANCE, Reaction, input_efforts, pair_reaction
 from planar.dynamics.virtual_velocities import has_length_motion, refuse_surplus_inputs, unit_rate_state
 from planar.dynamics.virtual_work import BalanceFunction, balance_function
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.foundation.notebook_display import Displayable
 from planar.model.mechanism import Mechanism
 from planar.results.motion import Motion, State
-
-Array = np.ndarray
 
 
 class ForceProof(NamedTuple):
@@ -120,10 +119,11 @@ def forces(moving: State | Motion, inertia: bool = True) -> Forces:
     """
     mechanism = moving.mechanism
     check_loads(mechanism)
-    one = isinstance(moving, State)
-    if one:
-        refuse_surplus_inputs(moving)
-    time = np.zeros(1) if one else moving.time
+    state = moving if isinstance(moving, State) else None
+    one = state is not None
+    if state is not None:
+        refuse_surplus_inputs(state)
+    time = np.zeros(1) if isinstance(moving, State) else moving.time
     if time is None and any(load.varies is not None and load.varies.input is None for load in mechanism.loads):
         raise BadInput("loads", "a load varies with time, which this motion has not; give it a duration")
     equations = balance_function(mechanism)
@@ -144,17 +144,17 @@ def forces(moving: State | Motion, inertia: bool = True) -> Forces:
     moved = action_velocities(field, all_of)
     powers = action_powers(field, all_of, moved)
     all_of = [each._replace(power=row) for each, row in zip(all_of, powers, strict=True)]
-    told = {pair.name: pair_reaction(pair, field, reactions, solved) for pair in mechanism.pairs}
-    equilibrium, bodies = free_body_imbalance(field, all_of, told, reactions.arm)
+    by_pair = {pair.name: pair_reaction(pair, field, reactions, solved) for pair in mechanism.pairs}
+    equilibrium, bodies = free_body_imbalance(field, all_of, by_pair, reactions.arm)
     names = [given.pair for given in mechanism.inputs]
     undetermined = {name: why for name, why in zip(names, whys, strict=True) if why}
-    undetermined |= {name: each.why for name, each in told.items() if each.why}
-    routes = _second_route_error(moving, field, all_of, supplied[0]) if one else None
+    undetermined |= {name: each.why for name, each in by_pair.items() if each.why}
+    routes = None if state is None else _second_route_error(state, field, all_of, supplied[0])
     found = Forces(
         moving,
         dict(zip(names, supplied.T, strict=True)),
         {name: sum(each.power for each in all_of if each[:2] == ("input", name)) for name in names},
-        told,
+        by_pair,
         tuple(all_of),
         undetermined,
         ForceProof(_power_imbalance(powers, all_of, moved), routes, equilibrium),
@@ -218,20 +218,21 @@ def _second_route_error(
 def _single_position(found: Forces) -> Forces:
     """The same for the one position that there is, without an axis for it."""
 
+    def only(values: Array | float) -> float:
+        return float(np.ravel(values)[0])
+
     def one(each: Reaction) -> Reaction:
         at = None if each.at is None else each.at[0]
-        couples = {link: float(couple[0]) for link, couple in each.couples.items()}
-        return each._replace(at=at, force=each.force[0], couple=float(each.couple[0]), couples=couples)
+        couples = {link: only(couple) for link, couple in each.couples.items()}
+        return each._replace(at=at, force=each.force[0], couple=only(each.couple), couples=couples)
 
     def act(each: ExternalAction) -> ExternalAction:
-        return each._replace(
-            at=each.at[0], force=each.force[0], couple=float(each.couple[0]), power=float(each.power[0])
-        )
+        return each._replace(at=each.at[0], force=each.force[0], couple=only(each.couple), power=only(each.power))
 
     return Forces(
         found.moving,
-        {name: float(each[0]) for name, each in found.inputs.items()},
-        {name: float(each[0]) for name, each in found.powers.items()},
+        {name: only(each) for name, each in found.inputs.items()},
+        {name: only(each) for name, each in found.powers.items()},
         {name: one(each) for name, each in found.reactions.items()},
         tuple(act(each) for each in found.acting),
         found.undetermined,

@@ -12,8 +12,7 @@ import numpy as np
 
 from planar.dynamics.external_actions import ExternalAction, KinematicArrays
 from planar.dynamics.reactions import Reaction
-
-Array = np.ndarray
+from planar.foundation.arrays import Array
 
 
 def free_body_imbalance(

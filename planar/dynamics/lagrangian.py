@@ -18,15 +18,15 @@ import numpy as np
 
 from planar.dynamics.load_attachment import Attachment, attachments
 from planar.equations.coordinates import FRAME_PARTS, frames_from_coordinates
+from planar.equations.elimination import stack_expressions
 from planar.equations.mechanism_numbers import mechanism_size, shapes_of_links
 from planar.equations.residuals import input_positions, pair_residuals, scalars
+from planar.foundation.arrays import Array
 from planar.foundation.geometry import Vector
 from planar.foundation.jets import value_and_rates
 from planar.model.loads import COINCIDENCE_TOLERANCE, Load, Mass, Spring
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.results.kinematic_result import KinematicResult
-
-Array = np.ndarray
 
 
 class LagrangianFunctions:
@@ -89,7 +89,8 @@ class LagrangianFunctions:
         parts = [value_and_rates(value)[:3] for value in values]
         many = max((np.size(part) for each in parts for part in each), default=1)
         found = np.array([[np.broadcast_to(part, (many,)) for part in each] for each in parts], dtype=float)
-        return tuple(found.reshape(-1, 3, many).transpose(1, 2, 0))  # type: ignore[return-value]
+        places, first, second = found.reshape(-1, 3, many).transpose(1, 2, 0)
+        return places, first, second
 
     @cached_property
     def residuals(self) -> ca.SX:
@@ -140,7 +141,7 @@ class LagrangianFunctions:
             at = self.mass_centre(mass)
             potential += self._weight_potential(mass)
             if mass.link in self.link_columns:
-                v = self._time_derivative(ca.vertcat(at.x, at.y))
+                v = self._time_derivative(stack_expressions(at))
                 turning = self.q1[self.link_columns[mass.link] + 2]
                 kinetic += 0.5 * mass.mass * ca.dot(v, v) + 0.5 * mass.inertia * turning**2
         for number, spring in enumerate(self.mechanism.springs):
@@ -197,7 +198,7 @@ class LagrangianFunctions:
             way = self.frames[second].angle - self.frames[first].angle - spring.free - self.spring_turns[number]
             return 0.5 * spring.stiffness * way**2, 0.5 * spring.damping * self._time_derivative(way) ** 2
         ends = self.attachments
-        apart = ca.vertcat(*(self.attachment_position(ends[second]) - self.attachment_position(ends[first])))
+        apart = stack_expressions(self.attachment_position(ends[second]) - self.attachment_position(ends[first]))
         square = ca.dot(apart, apart)
         away = ca.sqrt(square)
         met = square <= (COINCIDENCE_TOLERANCE * self.size) ** 2

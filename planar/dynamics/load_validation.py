@@ -17,10 +17,14 @@ Problems = Iterator[str]
 def check_loads(mechanism: Mechanism) -> None:
     """Refuse loads, springs and masses that are none of this mechanism's. Raises BadInput."""
     known = _LoadChecker(mechanism)
-    of = (("loads", mechanism.loads, known.load_problems), ("springs", mechanism.springs, known.spring_problems))
-    for name, each, problems in (*of, ("masses", mechanism.masses, known.mass_problems)):
-        for index, item in enumerate(each):
-            for sentence in problems(item):
+    of = (
+        ("loads", map(known.load_problems, mechanism.loads)),
+        ("springs", map(known.spring_problems, mechanism.springs)),
+        ("masses", map(known.mass_problems, mechanism.masses)),
+    )
+    for name, each in of:
+        for index, problems in enumerate(each):
+            for sentence in problems:
                 raise BadInput(f"{name}[{index}]", sentence)
     if not all(map(isfinite, mechanism.gravity)):
         raise BadInput("gravity", "gravity is two finite numbers")

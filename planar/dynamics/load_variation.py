@@ -6,10 +6,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.model.loads import Course
 from planar.model.mechanism import Mechanism, relative_motions
-
-Array = np.ndarray
 
 
 def load_factors(mechanism: Mechanism, inputs: Mapping[str, Array], time: Array | None, many: int) -> Array:

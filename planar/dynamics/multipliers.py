@@ -15,12 +15,11 @@ import numpy as np
 from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.virtual_work import BalanceFunction, VirtualWorkBalance
 from planar.equations.mechanism_numbers import mechanism_size
+from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.geometry import Vector
 from planar.foundation.short_repr import short_repr
 from planar.model.pairs import Pair
 from planar.model.pairs.base import ToothContact
-
-Array = np.ndarray
 
 RANK_TOLERANCE = 1e-9
 """A singular value below this part of the greatest is none: what it would hold is held by others, or by nothing."""
@@ -36,7 +35,8 @@ class Wrench(NamedTuple):
     force: Array
     moment: Array
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return short_repr(self)
 
     def moment_about(self, at: Array) -> Array:
         """The moment about places (..., 2)."""
@@ -57,10 +57,11 @@ class ForceSolution(NamedTuple):
     wrenches: dict[str, dict[str, Wrench]]
     wrench_changes: dict[str, dict[str, Wrench]]
     causes: tuple[str, ...]
-    is_balanced: Array
+    is_balanced: BoolArray
     imbalance: str = ""
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return short_repr(self)
 
 
 class ReactionSolver:
@@ -156,7 +157,7 @@ class ReactionSolver:
             ways[weak] = spare
         return inverse, ways
 
-    def _solve_balance(self, asked: Array) -> tuple[Array, Array, Array]:
+    def _solve_balance(self, asked: Array) -> tuple[Array, Array, BoolArray]:
         """The forces (n, forces, 1) that do what is asked (n, links, 1), how else they may be, and whether they can."""
         inverse, ways = self._inverse_and_null_space
         found = inverse @ asked
@@ -227,7 +228,10 @@ class ReactionSolver:
         """Forces on the coordinates of a pair's bodies (n, links, ways); the frame has what adds up to nothing."""
         bodies = dict.fromkeys(pair.bodies)
         found = {link: self._wrench_on_link(link, own) for link in bodies if link in self.work.link_columns}
-        rest = Wrench(-sum(each.force for each in found.values()), -sum(each.moment for each in found.values()))
+        none = np.zeros(())
+        rest = Wrench(
+            -sum((each.force for each in found.values()), none), -sum((each.moment for each in found.values()), none)
+        )
         return {link: found.get(link, rest) for link in bodies}
 
     def _wrench_on_link(self, link: str, own: Array) -> Wrench:

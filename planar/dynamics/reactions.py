@@ -9,11 +9,10 @@ import numpy as np
 
 from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.multipliers import ForceSolution, ReactionSolver
+from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.short_repr import short_repr
 from planar.model.pairs import Pair
 from planar.model.wording import join_all_names
-
-Array = np.ndarray
 
 DETERMINED_TOLERANCE = 1e-7
 """What a force of one held otherwise changes by more than this is not determined."""
@@ -36,7 +35,8 @@ class Reaction(NamedTuple):
     couples: Mapping[str, Array | float]
     why: str
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return short_repr(self)
 
 
 def input_efforts(solved: ForceSolution) -> tuple[Array, list[str]]:
@@ -85,7 +85,7 @@ def bearing_point(pair: Pair) -> tuple[str, str] | None:
     return next(iter(pair.coincident_points()[1:] or ((rides[0],) if rides else ())), None)
 
 
-def _is_determined(changes: Array) -> Array:
+def _is_determined(changes: Array) -> BoolArray:
     """Where no way to hold the links otherwise changes something (n,), of its changes (n, ways)."""
     return np.abs(changes).max(axis=1, initial=0.0) <= DETERMINED_TOLERANCE
 

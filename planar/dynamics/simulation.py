@@ -16,6 +16,7 @@ from planar.dynamics.imbalance import explain_loose_links
 from planar.dynamics.lagrangian import lagrangian_functions
 from planar.dynamics.load_validation import check_loads
 from planar.equations.mechanism_numbers import mechanism_size
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.foundation.geometry import Frame, frame_at
 from planar.foundation.jets import Jet
@@ -26,8 +27,6 @@ from planar.model.wording import join_all_names, quote_names
 from planar.results.motion import Motion, State
 from planar.results.records import InputMotion
 from planar.solving.position import PositionSolver, solve
-
-Array = np.ndarray
 
 RELATIVE_TOLERANCE = 1e-12
 """What a step may be off, of sizes and turns and of the rates that are reached."""
@@ -196,7 +195,8 @@ class _SimulationRun:
     def _add_rows(self, rows: list[Array], tick: ProgressCallback | None) -> str:
         """Add the rows after the first, as far as they can be told; why not all of them."""
         last = float(self.time[-1])
-        solver, good, tiny = self._integrator(0.0, self.initial_state), [], 0
+        solver, tiny = self._integrator(0.0, self.initial_state), 0
+        good: list[tuple[float, Array]] = []
         while solver.status == "running":
             failed = False
             try:

@@ -10,9 +10,8 @@ import numpy as np
 
 from planar.dynamics.lagrangian import LagrangianFunctions
 from planar.equations.casadi_call import BufferedFunction
+from planar.foundation.arrays import Array
 from planar.model.mechanism import Input, Mechanism
-
-Array = np.ndarray
 
 
 class VirtualWorkBalance(NamedTuple):

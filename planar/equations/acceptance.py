@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property, lru_cache
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import casadi as ca
 import numpy as np
@@ -32,8 +32,6 @@ from planar.foundation.jets import Jet, TermSizes, term_sizes
 from planar.model.mechanism import Mechanism
 from planar.model.pairs import MeasureKind
 
-Array = np.ndarray
-
 CARRIED_ROUNDING = 1e-3
 """The rates of a constraint are judged by its own terms, and by this part of the greatest speed anywhere: some rounding
 of that is carried round a loop into terms that are small, as where a link comes to rest."""
@@ -41,24 +39,28 @@ MAX_BLOCK_SIZE = 12
 """Unknowns of a block: the expressions of a larger one would be too long."""
 
 
-class AcceptanceResult(NamedTuple):
+Judged = TypeVar("Judged")
+"""A float of one position, an array of many."""
+
+
+class AcceptanceResult(NamedTuple, Generic[Judged]):
     """What is judged at a position; of many positions arrays. Lengths in sizes of the mechanism, angles in rad."""
 
-    residual: Array
+    residual: Judged
     "what the worst constraint leaves open"
-    finite_sum: Array
+    finite_sum: Judged
     "the sum of all that is left open: a number only if everything is"
-    velocity_error: Array
+    velocity_error: Judged
     "how far velocities break the worst constraint, as a part of the greatest"
-    acceleration_error: Array
+    acceleration_error: Judged
     "the same of accelerations"
-    contact_gap: Array
+    contact_gap: Judged
     "the greatest gap, or rate of one as a part of the greatest, of contacts that guides have to keep closed"
-    regularity: Array
+    regularity: Judged
     "no more than the least regularity of any block, see `solving.rates.regularity`"
-    least_singular_value: Array
+    least_singular_value: Judged
     "no more than the least singular value of any block, columns of one size"
-    rounding_amplification: Array
+    rounding_amplification: Judged
     "by how much, at most, round-off is greater in the rates, see `solving.rates.accuracy`"
 
 
@@ -180,7 +182,8 @@ class AcceptanceFunctions:
         whole = self._term_sizes((w, w1, w2), (u, u1, u2), p)
         x, x1, x2 = ca.vertcat(w, u), ca.vertcat(w1, u1), ca.vertcat(w2, u2)
 
-        gaps = [ca.fabs(closing_error(left, kind)) for kind, left in zip(kinds, scalars(closures), strict=True)]
+        errors: list[ca.SX] = [closing_error(left, kind) for kind, left in zip(kinds, scalars(closures), strict=True)]
+        gaps = [ca.fabs(each) for each in errors]
         broken = []
         lengths = [k for k, kind in enumerate(kinds) if kind is MeasureKind.LENGTH]
         fastest = ca.SX(0.0)
@@ -192,7 +195,9 @@ class AcceptanceFunctions:
             broken.append(greatest_entry(ca.fabs(left) / ca.if_else(scale == 0.0, 1.0, scale)))
         greatest = self._greatest_rates(w1, w2)
         moving = (contacts, *time_derivatives(contacts, x, x1, x2))
-        open_ = [greatest_entry(ca.fabs(each) / size) for each, size in zip(moving, (1.0, *greatest), strict=True)]
+        open_ = [
+            greatest_entry(ca.fabs(each) / size) for each, size in zip(moving, (ca.SX(1.0), *greatest), strict=True)
+        ]
         many = ca.fmax(greatest_entry(ca.fabs(counted)) / (2.0 * np.pi), 1.0)
         total = sum(gaps, ca.SX(0.0)) + ca.sum1(ca.vertcat(w, w1, w2))
         verdict = [
@@ -224,7 +229,7 @@ class AcceptanceFunctions:
 
     def _frames_from_coordinates(
         self, w: Sequence[Any], frame: Callable[..., Frame]
-    ) -> tuple[dict[str, Frame], dict[str, tuple]]:
+    ) -> tuple[dict[str, Frame], dict[str, tuple[Any, ...]]]:
         pairs = {pair.name: pair for pair in self.structure.pairs}
         columns = coordinate_columns(self.equations.coordinates)
         return frames_from_coordinates(w, columns, [link.name for link in self.structure.links], pairs, frame)

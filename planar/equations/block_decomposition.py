@@ -56,7 +56,8 @@ def _overdetermined_parts(
     """
     parts: list[tuple[set[int], set[int]]] = []
     for row in surplus:
-        held, reached, waiting = {row}, set(), [row]
+        held, waiting = {row}, [row]
+        reached: set[int] = set()
         while waiting:
             for column in rows[waiting.pop()] - reached:
                 reached.add(column)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-Array = np.ndarray
+from planar.foundation.arrays import Array
 
 CHUNK_SIZES = (256, 32, 8)
 """Positions that are worked on by one call."""
@@ -32,7 +32,7 @@ class BufferedFunction:
         for set_, arrays in ((buffer.set_arg, self.input_buffers), (buffer.set_res, self.output_buffers)):
             for k, each in enumerate(arrays):
                 if each.size:
-                    set_(k, memoryview(each.reshape(-1)))
+                    set_(k, each.reshape(-1).data)
         self._buffer = buffer  # has to live as long as what runs it
         return run
 
@@ -54,16 +54,16 @@ class BufferedFunction:
             array[: len(array) if alike else count] = each
             array[len(array) if alike else count :] = 0.0
             given.append((array, alike))
-        views = [(k, memoryview(array.reshape(-1)), array[:1].size, alike) for k, (array, alike) in enumerate(given)]
-        told = [(k, memoryview(each.reshape(-1)), each[:1].size, False) for k, each in enumerate(found)]
+        views = [(k, array.reshape(-1).data, array[:1].size, alike) for k, (array, alike) in enumerate(given)]
+        told = [(k, each.reshape(-1).data, each[:1].size, False) for k, each in enumerate(found)]
         done = 0
         with self.lock:
             for size in CHUNK_SIZES:
                 first = True
                 while room - done >= size:
                     buffer, run = self._mapped_call(size)
-                    for set_, each in ((buffer.set_arg, views), (buffer.set_res, told)):
-                        for k, view, entries, alike in each:
+                    for set_, of_all in ((buffer.set_arg, views), (buffer.set_res, told)):
+                        for k, view, entries, alike in of_all:
                             if entries and (first or not alike):
                                 start = 0 if alike else done
                                 set_(k, view[start * entries : (start + size) * entries])
@@ -112,7 +112,7 @@ class RunFunction:
             buffer, run = function.buffer()
             for k, each in enumerate(arrays[:3]):
                 if each.size:
-                    buffer.set_arg(k, memoryview(each.reshape(-1)))
-            buffer.set_res(0, memoryview(arrays[3].reshape(-1)))
+                    buffer.set_arg(k, each.reshape(-1).data)
+            buffer.set_res(0, arrays[3].reshape(-1).data)
             self._made[size] = run, arrays, buffer
         return self._made[size][:2]

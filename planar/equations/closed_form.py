@@ -18,6 +18,7 @@ import casadi as ca
 import numpy as np
 
 from planar.equations.constraint_equations import Block, ConstraintEquations
+from planar.foundation.arrays import Array
 from planar.model.pairs import MeasureKind
 
 ZERO_TOLERANCE = 1e-10
@@ -93,14 +94,14 @@ def find_closed_form(e: ConstraintEquations, stage: Block) -> ClosedForm | None:
 def _solve_two_angles(e: ConstraintEquations, stage: Block, unknowns: list[ca.SX]) -> ClosedForm | None:
     one, two = unknowns
     rows = e.F[stage.rows]
-    a, turning_a = _cos_sin_coefficients(ca.substitute(rows, two, 0.0), one)
-    b, turning_b = _cos_sin_coefficients(ca.substitute(rows, one, 0.0), two)
-    g = ca.substitute(rows, ca.vertcat(one, two), ca.SX.zeros(2)) - a - b
-    model = g + _combine_cos_sin(a, turning_a, one) + _combine_cos_sin(b, turning_b, two)
-    signs = _rotation_senses(e, rows - model, [(a, turning_a), (b, turning_b)])
+    by_one = _cos_sin_coefficients(ca.substitute(rows, two, 0.0), one)
+    by_two = _cos_sin_coefficients(ca.substitute(rows, one, 0.0), two)
+    rest = ca.substitute(rows, ca.vertcat(one, two), ca.SX.zeros(2)) - by_one[0] - by_two[0]
+    model = rest + _combine_cos_sin(*by_one, one) + _combine_cos_sin(*by_two, two)
+    signs = _rotation_senses(e, rows - model, [by_one, by_two])
     if signs is None or 0 in signs:
         return None
-    a, b, g = (_rows_as_complex(part, signs) for part in (a, b, g))
+    a, b, g = (_rows_as_complex(part, signs) for part in (by_one[0], by_two[0], rest))
     d = -g
     sign = ca.SX.sym("sign")
     spanned, gap = a.squared_length * b.squared_length, 0.5 * (a.squared_length + b.squared_length - d.squared_length)
@@ -122,15 +123,19 @@ def _solve_angle_and_length(e: ConstraintEquations, stage: Block, unknowns: list
     rows = e.F[stage.rows]
     still = ca.substitute(rows, slide, 0.0)
     moved = ca.substitute(ca.jacobian(rows, slide), slide, 0.0)
-    a, turning_a = _cos_sin_coefficients(still, turn)
-    d, turning_d = _cos_sin_coefficients(moved, turn)
-    g, fixed = (ca.substitute(part, turn, 0.0) - turned for part, turned in ((still, a), (moved, d)))
-    model = g + _combine_cos_sin(a, turning_a, turn) + slide * (fixed + _combine_cos_sin(d, turning_d, turn))
-    signs = _rotation_senses(e, rows - model, [(a, turning_a), (d, turning_d)])
+    turned = _cos_sin_coefficients(still, turn)
+    turned_slide = _cos_sin_coefficients(moved, turn)
+    fixed_rows, fixed_slide = (
+        ca.substitute(part, turn, 0.0) - by_turn[0] for part, by_turn in ((still, turned), (moved, turned_slide))
+    )
+    model = fixed_rows + _combine_cos_sin(*turned, turn)
+    model = model + slide * (fixed_slide + _combine_cos_sin(*turned_slide, turn))
+    signs = _rotation_senses(e, rows - model, [turned, turned_slide])
     if signs is None:
         return None
-    rest = _which_vanish(e, [fixed, d, a])
-    fixed, d, a, g = (_rows_as_complex(part, signs) for part in (fixed, d, a, g))
+    parts = fixed_slide, turned_slide[0], turned[0]
+    rest = _which_vanish(e, list(parts))
+    fixed, d, a, g = (_rows_as_complex(part, signs) for part in (*parts, fixed_rows))
     sign = ca.SX.sym("sign")
     if rest[1] and not rest[0] and not rest[2]:
         # the length goes along a direction that is known
@@ -192,7 +197,7 @@ def _which_vanish(e: ConstraintEquations, parts: list[ca.SX]) -> list[bool]:
     return [bool(np.all(np.abs(each) < ZERO_TOLERANCE)) for each in _evaluate_at_random(e, parts)]
 
 
-def _evaluate_at_random(e: ConstraintEquations, parts: list[ca.SX]) -> list[np.ndarray]:
+def _evaluate_at_random(e: ConstraintEquations, parts: list[ca.SX]) -> list[Array]:
     """Expressions (2,) in numbers (2, places): at random places an identity holds by accident nowhere."""
     function = ca.Function("parts", [e.z, e.u, e.p], [ca.densify(part) for part in parts])
     rng = np.random.default_rng(0)

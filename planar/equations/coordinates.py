@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
-import numpy as np
-
+from planar.foundation.arrays import Array
 from planar.foundation.geometry import GROUND, Frame, frame_at
 from planar.foundation.jets import Scalar
 from planar.model.pairs import MeasureKind, Pair
-
-Array = np.ndarray
 
 FRAME_PARTS = ("x", "y", "angle")
 """The coordinates of a link."""

@@ -65,7 +65,8 @@ def split_constant_factors(closures: Sequence[ca.SX], symbols: CoordinateSymbols
     bent: list[set[int]] = [set() for _ in closures]
     crooked: set[int] = set()
     rows, columns = slopes.sparsity().get_triplet()
-    for row, column, slope in zip(rows, columns, slopes.nonzeros(), strict=True):
+    entries: list[ca.SX] = slopes.nonzeros()  # type: ignore[assignment]  # casadi says SXElem, which it hands to nobody
+    for row, column, slope in zip(rows, columns, entries, strict=True):
         if column < count and slope.is_constant():
             factors[row][column] = float(slope)
         else:

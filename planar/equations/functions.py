@@ -16,9 +16,9 @@ from planar.equations.elimination import stack_expressions
 from planar.equations.linear import solve_linear
 from planar.equations.mechanism_numbers import equation_structure
 from planar.equations.rates import rate_symbols, time_derivatives
+from planar.foundation.arrays import Array
 from planar.model.mechanism import Mechanism
 
-Array = np.ndarray
 MAX_CACHED_STRUCTURES = 256
 """Mechanisms of which what was derived is kept: more than come along, so that none is derived twice in a round."""
 
@@ -222,10 +222,11 @@ class EquationFunctions:
         rows, unknowns = self.equations.F.numel(), self.equations.z.numel()
         if y.ndim == 1:
             parts, slopes = self._kinematics_calls[0](y, y1, y2, p)
-            return EquationRates(*parts[:, :rows], *parts[:, rows:], slopes[:unknowns].T, slopes[unknowns:].T)
+            return EquationRates._make((*parts[:, :rows], *parts[:, rows:], slopes[:unknowns].T, slopes[unknowns:].T))
         parts, slopes = self._kinematics_calls[0].evaluate_batch(len(y), y, y1, y2, p)
         parts, slopes = parts.transpose(1, 0, 2), slopes.transpose(0, 2, 1)
-        return EquationRates(*parts[..., :rows], *parts[..., rows:], slopes[..., :unknowns], slopes[..., unknowns:])
+        parted = *parts[..., :rows], *parts[..., rows:], slopes[..., :unknowns], slopes[..., unknowns:]
+        return EquationRates._make(parted)
 
     @cached_property
     def newton_function(self) -> ca.Function:

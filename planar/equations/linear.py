@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import casadi as ca
 import numpy as np
 
-Array = np.ndarray
+from planar.foundation.arrays import Array
 
 MAX_CRAMER_UNKNOWNS = 4
 """More unknowns are not solved by determinants."""

@@ -7,11 +7,10 @@ from math import hypot
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.model.link_shapes import Link, LinkShape, link_shape
 from planar.model.mechanism import Input, Mechanism, relative_motions
 from planar.model.pairs import MeasureKind, Pair
-
-Array = np.ndarray
 
 
 def equation_structure(mechanism: Mechanism) -> Mechanism:

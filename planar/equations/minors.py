@@ -13,9 +13,8 @@ import numpy as np
 from planar.equations.elimination import stack_expressions
 from planar.equations.functions import MAX_CACHED_STRUCTURES, EquationFunctions
 from planar.equations.residuals import ConstraintRow
+from planar.foundation.arrays import Array
 from planar.model.pairs import MeasureKind
-
-Array = np.ndarray
 
 
 class LowRankBlock(NamedTuple):

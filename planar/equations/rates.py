@@ -21,7 +21,7 @@ def time_derivatives(value: ca.SX, y: ca.SX, *rates: ca.SX) -> list[ca.SX]:
     Those but the last have to be symbols. The chain rule: what an order is made of is y, y', ..., and the next one
     is the sum of its derivatives by each, times the rate of that.
     """
-    found = []
+    found: list[ca.SX] = []
     for order, last in enumerate(rates):
         # the last rate stands in it as y' stands in the first
         rate = ca.jtimes(value, y, last)

@@ -6,14 +6,12 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import casadi as ca
-import numpy as np
 
 from planar.equations.casadi_call import BufferedFunction
 from planar.equations.constraint_equations import ConstraintEquations
 from planar.equations.functions import function_with_cse
 from planar.equations.rates import rate_symbols, time_derivatives
-
-Array = np.ndarray
+from planar.foundation.arrays import Array
 
 
 class RoundingTerms(NamedTuple):

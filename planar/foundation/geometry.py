@@ -19,7 +19,7 @@ class Vector(NamedTuple):
     def __sub__(self, other: Vector) -> Vector:
         return Vector(self.x - other.x, self.y - other.y)
 
-    def __mul__(self, factor: Scalar) -> Vector:  # type: ignore[override]
+    def __mul__(self, factor: Scalar) -> Vector:
         return Vector(self.x * factor, self.y * factor)
 
     def dot(self, other: Vector) -> Scalar:

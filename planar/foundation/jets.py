@@ -86,7 +86,8 @@ class Jet:
         return Jet(*(a - b for a, b in zip(self.parts, self._derivatives_of(other), strict=True)))
 
     def __rsub__(self, other: Scalar) -> Jet:
-        return -self + other
+        found: Jet = -self + other
+        return found
 
     def __mul__(self, other: Scalar) -> Jet:
         if not isinstance(other, Jet):

@@ -26,4 +26,5 @@ class Revisable:
         revise = Revisable.reviser
         if revise is None:
             raise NotImplementedError("import planar, which knows how files are written")
-        return revise(self, values)
+        revised: Self = revise(self, values)
+        return revised

@@ -9,7 +9,11 @@ from __future__ import annotations
 import re
 from functools import cache
 from math import isfinite, log10, pi
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, overload
+
+if TYPE_CHECKING:
+    import numpy as np
+    from pint import UnitRegistry  # slow to load
 
 SI_UNITS = {
     "length": "m",
@@ -118,10 +122,22 @@ class Unit(NamedTuple):
     numerator: float
     denominator: float
 
-    def to_si(self, value: float) -> float:
+    @overload
+    def to_si(self, value: float) -> float: ...
+
+    @overload
+    def to_si(self, value: np.ndarray) -> np.ndarray: ...
+
+    def to_si(self, value: float | np.ndarray) -> float | np.ndarray:
         return value * self.numerator / self.denominator
 
-    def from_si(self, value: float) -> float:
+    @overload
+    def from_si(self, value: float) -> float: ...
+
+    @overload
+    def from_si(self, value: np.ndarray) -> np.ndarray: ...
+
+    def from_si(self, value: float | np.ndarray) -> float | np.ndarray:
         return value * self.denominator / self.numerator
 
 
@@ -298,7 +314,7 @@ def _check_unit_size(spelled: str, kind: str, factor: float) -> Unit:
 
 
 @cache
-def _pint_registry():  # noqa: ANN202 - pint's own type, which would load pint
+def _pint_registry() -> UnitRegistry[Any]:
     import pint
 
     return pint.UnitRegistry(cache_folder=None)

@@ -107,7 +107,7 @@ def independent_loop_count(figure: JointDiagram) -> int:
     import networkx as nx
 
     graph = _labelled_graph(figure)
-    return graph.number_of_edges() - graph.number_of_nodes() + nx.number_connected_components(graph)
+    return int(graph.number_of_edges() - graph.number_of_nodes() + nx.number_connected_components(graph))
 
 
 def pin_pair_trees(links: Sequence[str]) -> tuple[tuple[tuple[str, str], ...], ...]:

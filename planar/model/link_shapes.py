@@ -175,7 +175,8 @@ def _point_position(name: str, place: PointDefinition, drawn: Mapping[str, Vecto
         raise PointPlacementError(name, f"points {base!r} and {other!r} coincide, so they give no direction")
     unit = Vector(way.x / length, way.y / length)
     if isinstance(place, Along):
-        return p + unit.rotate(direction(place.angle)) * place.distance
+        away: Vector = unit.rotate(direction(place.angle)) * place.distance
+        return p + away
     return p + _triangle_apex(name, place, length).rotate(unit)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import fields
 from functools import cached_property, lru_cache
 from math import atan2, hypot, isfinite
@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.model.link_shapes import At, Link, Point
 from planar.model.mechanism import LARGEST_INPUT_POSITION, FileUnits, Input, Mechanism
@@ -70,7 +71,7 @@ def pinned(
 class PinLayout(NamedTuple):
     """A pinned linkage as numbers: places (pins, 2), also as lists; the pins of every bar; those on the frame."""
 
-    pin_positions: np.ndarray
+    pin_positions: Array
     position_lists: list[list[float]]
     bars: list[list[int]]
     frame_pins: tuple[int, ...]
@@ -103,25 +104,26 @@ class PinnedMechanism(Mechanism):
         return Mechanism, tuple([getattr(self, each.name) for each in fields(Mechanism)])
 
     @cached_property
-    def links(self) -> tuple[Link, ...]:  # type: ignore[override]
+    def links(self) -> tuple[Link, ...]:
         """The frame, then the bars."""
         laid = self._checked_layout
         frame = Link(FRAME_NAME, tuple([Point(f"P{pin}", At(*laid.position_lists[pin])) for pin in laid.frame_pins]))
         return (frame, *[_bar_link(f"bar{k}", bar, laid.position_lists) for k, bar in enumerate(laid.bars)])
 
     @cached_property
-    def pairs(self) -> tuple[Pair, ...]:  # type: ignore[override]
+    def pairs(self) -> tuple[Pair, ...]:
         """The pins, one after the other."""
-        of, found = turning_pair_type(), []
+        make: Callable[..., Pair] = turning_pair_type()
+        found = []
         for pin, held in enumerate(self._links_on_pins):
             point, first = f"P{pin}", held[0]
             for other in held[1:]:
                 name = point if len(held) == 2 else f"{point}:{first},{other}"
-                found.append(of(name, (first, other), (point, point), point))
+                found.append(make(name, (first, other), (point, point), point))
         return tuple(found)
 
     @cached_property
-    def inputs(self) -> tuple[Input, ...]:  # type: ignore[override]
+    def inputs(self) -> tuple[Input, ...]:
         """The crank's."""
         laid = self._checked_layout
         (pin,) = (pin for pin in laid.bars[laid.crank] if pin in laid.frame_pins)
@@ -129,11 +131,11 @@ class PinnedMechanism(Mechanism):
         return (Input(name, laid.crank_angle, laid.velocity, laid.acceleration),)
 
     @cached_property
-    def sketch(self) -> tuple[tuple[str, float, float], ...]:  # type: ignore[override]
+    def sketch(self) -> tuple[tuple[str, float, float], ...]:
         """Where the pins are that move."""
         laid = self._checked_layout
         fixed = set(laid.frame_pins)
-        return tuple([(f"P{pin}", *at) for pin, at in enumerate(laid.position_lists) if pin not in fixed])
+        return tuple([(f"P{pin}", x, y) for pin, (x, y) in enumerate(laid.position_lists) if pin not in fixed])
 
     @cached_property
     def _links_on_pins(self) -> list[list[str]]:
@@ -156,7 +158,7 @@ class PinnedMechanism(Mechanism):
 _UNITS = FileUnits()
 
 
-def _read_positions(places: Any) -> np.ndarray:
+def _read_positions(places: Any) -> Array:
     """The places as an array of its own."""
     try:
         at = np.array(places, dtype=float)
@@ -180,7 +182,7 @@ def _read_bars(bars: Any) -> list[list[int]]:
 
 
 def _check_pin(pin: Any, place: str, many: int) -> int:
-    if isinstance(pin, bool) or not isinstance(pin, Integral) or not 0 <= pin < many:
+    if isinstance(pin, bool) or not isinstance(pin, Integral) or pin < 0 or not pin < many:
         raise BadInput(place, f"the number of a pin is wanted, of which there are {many}, not {pin!r:.40}")
     return int(pin)
 

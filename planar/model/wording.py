@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from math import atan2, hypot, pi
 
-import numpy as np
-
+from planar.foundation.arrays import Array
 from planar.foundation.errors import join_names as several
 from planar.foundation.units import parse_unit
 from planar.model.mechanism import FileUnits
@@ -30,7 +29,7 @@ def turning_sense(rate: float, scale: float = 0.0) -> str:
     return "anticlockwise" if rate > 0.0 else "clockwise"
 
 
-def direction_sense(vector: Sequence[float] | np.ndarray, scale: float = 0.0) -> str:
+def direction_sense(vector: Sequence[float] | Array, scale: float = 0.0) -> str:
     """The sense of a vector, beside the greatest of its kind: one of four ways along an axis, else two together."""
     x, y = float(vector[0]), float(vector[1])
     if hypot(x, y) <= REST_TOLERANCE * scale:

@@ -5,12 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
-import numpy as np
-
+from planar.foundation.arrays import Array
 from planar.foundation.units import SI_UNITS, unit_of_kind
 from planar.results.motion import Motion
-
-Array = np.ndarray
 
 POINT_KINDS = {"position": "length", "velocity": "velocity", "acceleration": "acceleration", "jerk": "jerk"}
 """What is reported of a point, and the kind of quantity that each is; a jerk where the run has one."""

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from textwrap import wrap
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from rich.box import SIMPLE_HEAD
 from rich.cells import cell_len
@@ -100,7 +100,7 @@ class FittedTable:
         table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
         for k, width in widths.items():
             column = self.columns[k]
-            justify = "left" if column.has_words else "right"
+            justify: Literal["left", "right"] = "left" if column.has_words else "right"
             table.add_column("\n".join(column.lines), justify=justify, overflow="fold", width=width)
         for row in self.rows:
             table.add_row(*(row[k] for k in widths))
@@ -191,7 +191,7 @@ def _spread_widths(widths: Sequence[ColumnWidths], least: Sequence[int], room: i
         most -= 1
 
 
-def _total_width(widths: Sequence[int] | Iterator[int]) -> int:
+def _total_width(widths: Iterable[int]) -> int:
     """The characters that columns of these widths take side by side."""
     told = list(widths)
     return sum(told) + COLUMN_GAP * (len(told) - 1) + EDGE_WIDTH

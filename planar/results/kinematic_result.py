@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.foundation.errors import Unknown, join_names
 from planar.foundation.geometry import Frame, Vector
 from planar.foundation.jets import Jet, value_and_rates
@@ -17,6 +18,8 @@ from planar.model.mechanism import Mechanism, NamedPoint, links_counting_turns, 
 from planar.model.pairs import MeasureKind, Pair
 from planar.model.wording import amount
 from planar.results.records import (
+    InputMotion,
+    InputState,
     RelativeState,
     principal_turns,
     rotate_quarter_turn,
@@ -24,8 +27,6 @@ from planar.results.records import (
     vector_and_rates,
     wrap_angle,
 )
-
-Array = np.ndarray
 
 
 class KinematicResult(Displayable):
@@ -35,6 +36,12 @@ class KinematicResult(Displayable):
     frames: Mapping[str, Frame]
     own: Mapping[str, tuple[Jet, ...]]
     shapes: Mapping[str, LinkShape]
+
+    if TYPE_CHECKING:  # a field, or made of the mechanism
+
+        @property
+        def inputs(self) -> Mapping[str, InputState | InputMotion]:
+            """Every input by its pair."""
 
     def _format_input_position(self, pair: str, position: float) -> str:
         """A position of an input in the file's units: A = 60 deg."""

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, Outcome
 from planar.foundation.geometry import Frame, frame_at
 from planar.foundation.jets import Jet, value_and_rates
@@ -32,8 +33,6 @@ from planar.results.records import (
     vector_and_rates,
     wrap_angle,
 )
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True)

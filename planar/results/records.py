@@ -7,11 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.foundation.geometry import Frame, Vector
 from planar.foundation.jets import Jet, value_and_rates
 from planar.foundation.short_repr import short_repr
-
-Array = np.ndarray
 
 
 class PointState(NamedTuple):
@@ -25,7 +24,8 @@ class PointState(NamedTuple):
     acceleration: Array
     sense: str
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return short_repr(self)
 
 
 class LinkState(NamedTuple):
@@ -39,7 +39,8 @@ class LinkState(NamedTuple):
     angular_acceleration: float
     sense: str
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return short_repr(self)
 
 
 class InputState(NamedTuple):
@@ -49,7 +50,8 @@ class InputState(NamedTuple):
     velocity: float
     acceleration: float
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return short_repr(self)
 
 
 class PointMotion(NamedTuple):
@@ -59,7 +61,8 @@ class PointMotion(NamedTuple):
     velocity: Array
     acceleration: Array
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return short_repr(self)
 
 
 class LinkMotion(NamedTuple):
@@ -69,7 +72,8 @@ class LinkMotion(NamedTuple):
     angular_velocity: Array
     angular_acceleration: Array
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return short_repr(self)
 
 
 class InputMotion(NamedTuple):
@@ -79,7 +83,8 @@ class InputMotion(NamedTuple):
     velocity: Array
     acceleration: Array
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return short_repr(self)
 
 
 class Limit(NamedTuple):
@@ -100,7 +105,8 @@ class Limit(NamedTuple):
     end: str | None = None
     told: str = ""
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return short_repr(self)
 
 
 class RelativeState(NamedTuple):
@@ -123,7 +129,8 @@ class RelativeState(NamedTuple):
     coriolis: Array
     sliding_acceleration: Array
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return short_repr(self)
 
 
 class ThirdRates(NamedTuple):
@@ -132,7 +139,8 @@ class ThirdRates(NamedTuple):
     frames: Mapping[str, Frame]
     own: Mapping[str, tuple[Jet, ...]]
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return short_repr(self)
 
 
 HALF_TURN_TOLERANCE = 1e-9

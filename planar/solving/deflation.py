@@ -17,11 +17,10 @@ import numpy as np
 from planar.equations.constraint_equations import Block
 from planar.equations.functions import EquationFunctions
 from planar.equations.minors import LowRankBlock, add_minors, constraint_dependencies
+from planar.foundation.arrays import Array
 from planar.solving.checks.singular_values import MIN_REGULARITY, column_norms, null_space, rank
 from planar.solving.newton import correct, shortest_step
 from planar.solving.prepared_mechanism import PreparedMechanism
-
-Array = np.ndarray
 
 MAX_MINOR_RANK = 12
 """Rank from which on minors would be expressions too long."""

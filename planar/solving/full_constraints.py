@@ -13,6 +13,7 @@ import numpy as np
 from planar.equations.coordinates import frames_from_coordinates
 from planar.equations.mechanism_numbers import scaled_pair_numbers
 from planar.equations.residuals import ConstraintRow, input_positions, pair_residuals, wrapped_residual
+from planar.foundation.arrays import Array
 from planar.foundation.geometry import Frame
 from planar.foundation.jets import Scalar
 from planar.model.pairs import Pair
@@ -20,8 +21,6 @@ from planar.solving.assembly.sketch_start import sketch_coordinates
 from planar.solving.checks.singular_values import null_space, rank
 from planar.solving.newton import damped_newton
 from planar.solving.prepared_mechanism import PreparedMechanism
-
-Array = np.ndarray
 
 COMPLEX_STEP = 1e-30
 CLOSED_TOLERANCE = 1e-10

@@ -6,13 +6,10 @@ from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Any
 
-import numpy as np
-
 from planar.equations.coordinates import frames_from_coordinates
+from planar.foundation.arrays import Array
 from planar.foundation.jets import Jet
 from planar.solving.prepared_mechanism import PreparedMechanism
-
-Array = np.ndarray
 
 
 class LazyFrames:

@@ -11,10 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.equations.casadi_call import BufferedFunction
 from planar.equations.constraint_equations import slice_length
 from planar.equations.functions import EquationFunctions
+from planar.foundation.arrays import Array
 
-Array = np.ndarray
 ResidualFunction = Callable[[Array], tuple[Array, Array]]
 """Unknowns (starts, n) -> what is left open (starts, m), and its slope (starts, m, n)."""
 SystemFunction = Callable[[Array], tuple[Array, Array]]
@@ -153,7 +154,7 @@ def correct_blocks(
             continue
         own, evaluate = block.unknowns, functions.block_call(block)
 
-        def here(x: Array, own: slice = own, evaluate: Callable = evaluate) -> tuple[Array, Array]:
+        def here(x: Array, own: slice = own, evaluate: BufferedFunction = evaluate) -> tuple[Array, Array]:
             z[own] = x
             left, slope = evaluate(z, u, p)
             return left[0], slope.T.reshape(len(left[0]), len(x))

@@ -14,6 +14,7 @@ from planar.equations.constraint_equations import slice_length
 from planar.equations.coordinates import frames_from_coordinates
 from planar.equations.functions import MAX_CACHED_STRUCTURES, EquationRates, equation_functions
 from planar.equations.linear import solve_vectors
+from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer, Outcome, TrackingEnd
 from planar.foundation.geometry import Frame
 from planar.foundation.jets import Jet
@@ -40,8 +41,6 @@ from planar.solving.rates.regularity import (
 
 if TYPE_CHECKING:
     from planar.solving.continuation.singular_rates import SingularRates
-
-Array = np.ndarray
 
 
 @takes_mechanism
@@ -270,7 +269,9 @@ class SolvedMechanism:
     def _refusal(self) -> NoAnswer:
         """Why there is no assembly: looked for only where somebody asks."""
         found = self._start[1]
-        return found if isinstance(found, NoAnswer) else self._plain_solver.unassembled(found)
+        if isinstance(found, NoAnswer):
+            return found
+        return self._plain_solver.unassembled(found)  # type: ignore[arg-type]  # an assembly is not refused
 
     @cached_property
     def _start(self) -> tuple[PositionSolver, Assembly | AssemblySearchFailure | NoAnswer]:

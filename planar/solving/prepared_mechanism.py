@@ -12,6 +12,7 @@ from planar.equations.acceptance import AcceptanceFunctions
 from planar.equations.coordinates import frames_from_coordinates
 from planar.equations.functions import EquationFunctions
 from planar.equations.mechanism_numbers import pair_numbers_from, shape_extent, shapes_of_links, size_from_extents
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.foundation.errors import join_names as several
 from planar.foundation.geometry import Frame
@@ -21,8 +22,6 @@ from planar.model.pairs import MeasureKind
 from planar.model.wording import amount
 from planar.solving.checks.residual_check import ResidualCheck
 from planar.solving.structure import mechanism_structure
-
-Array = np.ndarray
 
 ZERO_POSITION = 1e-14
 """rad or sizes: a position of an input that was solved for and is nearer to zero is there."""

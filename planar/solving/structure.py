@@ -23,8 +23,6 @@ from planar.model.mechanism import (
 )
 from planar.model.pairs import MeasureKind, Pair
 
-Array = np.ndarray
-
 
 class PointLocations(NamedTuple):
     """Where named points are found: each by the first of its links to be placed, (stage, link, point), and the points

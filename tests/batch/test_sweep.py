@@ -184,7 +184,7 @@ def test_a_flipped_linkage_is_closed_and_does_not_pass():
     solver, flipped = PositionSolver(mechanism), PositionSolver(four_bar(*ROCKER, 0.8, -1))
     z, other = (each.find_assembly().z for each in (solver, flipped))
     p = np.repeat(solver.inputs.p[:, None], 2, axis=1)
-    branches = DesignBranchCheck(DesignFunctions(solver.functions, p), p)
+    branches = DesignBranchCheck(DesignFunctions(solver.functions, p))
     u = solver.inputs.u
     near = planar.solving.continuation.path.follow_to(solver, solver.inputs.p, z, u, u + 0.02)
     before = branches.evaluate(np.stack([z, z]), np.stack([u, u]))

@@ -94,8 +94,8 @@ def test_a_run_of_a_model_is_the_one_that_casadi_gives(stem):
 
 def test_cos_and_sin_of_sums_are_put_together_from_the_angles_own():
     made_of = InstructionList()
-    a, b, c = (made_of.add("input", data=("z", k)) for k in range(3))
-    turned = [CosSin(*(made_of.add("input", data=(part, k)) for part in ("zc", "zs"))) for k in range(2)]
+    a, b, c = (made_of.add_input(("z", k)) for k in range(3))
+    turned = [CosSin(*(made_of.add_input((part, k)) for part in ("zc", "zs"))) for k in range(2)]
     inside = made_of.add("sub", made_of.add("add", a, made_of.add("mul", made_of.add_constant(2.0), b)), c)
     wanted = [made_of.add("cos", inside), made_of.add("sin", inside)]
     made, numbers = expand_angle_sums(made_of, wanted, {a: turned[0], b: turned[1]})
@@ -117,9 +117,9 @@ def test_cos_and_sin_of_sums_are_put_together_from_the_angles_own():
     found = []
     for value in made.instructions:
         if value.operation == "input":
-            found.append(values.get(value.data, np.nan))  # the angles' own values stand nowhere
+            found.append(values.get(value.key, np.nan))  # the angles' own values stand nowhere
         elif value.operation == "const":
-            found.append(value.data)
+            found.append(value.number)
         else:
             found.append(with_angles[value.operation](*(found[k] for k in value.operands)))
     angle = 0.3 + 2 * 1.1 - 0.7
@@ -184,7 +184,7 @@ def test_what_is_wanted_before_it_is_known_is_not_printed(monkeypatch):
 
 def test_what_cancels_is_nothing():
     made = InstructionList()
-    value = made.add("mul", *(made.add("input", data=("p", k)) for k in range(2)))
+    value = made.add("mul", *(made.add_input(("p", k)) for k in range(2)))
     less = made.add("neg", value)
     assert [made.constant_value(made.add("add", *both)) for both in ((value, less), (less, value))] == [0.0, 0.0]
 

@@ -8,12 +8,11 @@ import numpy as np
 
 from planar.analysis.centres.null_space_check import FullPosition, full_position, poles_of_motions
 from planar.analysis.rate_equations import derivative
+from planar.foundation.arrays import Array
 from planar.foundation.jets import Jet
 from planar.results.motion import State
 from planar.solving.checks.singular_values import SINGULAR_TOLERANCE, null_space
 from planar.solving.continuation.second_order import branch_directions
-
-Array = np.ndarray
 
 
 def branch_poles(state: State, middle: Array, size: float) -> tuple[Mapping[str, Array], ...]:

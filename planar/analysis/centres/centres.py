@@ -32,6 +32,7 @@ from planar.analysis.rate_equations import rate_equations as rates_of
 from planar.analysis.rate_ratios import LEAST_ERROR, LinkPoles, solve_link_poles
 from planar.analysis.vector_chains import VectorChains
 from planar.document.first_argument import takes_result
+from planar.foundation.arrays import Array, IntArray
 from planar.foundation.errors import Unknown
 from planar.foundation.notebook_display import Displayable
 from planar.foundation.short_repr import short_repr
@@ -40,7 +41,6 @@ from planar.model.mechanism import Mechanism, named_points
 from planar.results.motion import State
 from planar.solving.rest_position import rest_position
 
-Array = np.ndarray
 MAX_ERROR_AT_CROSSING = 1e-9
 """Where motions cross positions are exact to the root of rounding only: lines that close to one another are one."""
 INFINITY_RATIO_AT_CROSSING = 1e-6
@@ -75,7 +75,8 @@ class Centre:
         """(2,), m; None at infinity, and where it is not determined."""
         if self.homogeneous is None or self.homogeneous[2] == 0.0:
             return None
-        return self.homogeneous[:2] / self.homogeneous[2]
+        found: Array = self.homogeneous[:2] / self.homogeneous[2]
+        return found
 
     @property
     def direction(self) -> Array | None:
@@ -164,7 +165,7 @@ class _CentreSearch:
         named = {member: each.name for each in named_points(state.mechanism) for member in each.members}
         self.chains = VectorChains(rates, named, self.size)
         self.motions = allowed_motions(state, self.middle, self.size)
-        worst = MAX_MEETING_ERROR if self.motions.count <= 1 else MAX_ERROR_AT_CROSSING
+        worst = MAX_MEETING_ERROR if self.motions.mobility <= 1 else MAX_ERROR_AT_CROSSING
         self.construction = KennedyConstruction(self.links, primary_centres(rates, self.middle, self.size), worst)
         self.by_equations: dict[LinkPair, str] = {}
         self.as_one: set[LinkPair] = set()
@@ -181,7 +182,7 @@ class _CentreSearch:
         moved: LinkPoles | None = None
         while left := self._remaining_pairs():
             moved = moved or solve_link_poles(self.chains.equations, self.chains, self.middle, self.size)
-            further = moved.links is None and self.motions.count == 1
+            further = moved.links is None and self.motions.mobility == 1
             if further:
                 moved = LinkPoles({link: each[0] for link, each in self.motions.poles.items()}, "", LEAST_ERROR)
             if moved.links is None:
@@ -206,7 +207,7 @@ class _CentreSearch:
         every = map(frozenset, combinations(self.links, 2))
         return [two for two in every if two not in self.found and two not in self.as_one]
 
-    def _count_opened(self) -> Array:
+    def _count_opened(self) -> IntArray:
         """How many open centres would have two lines if that of two links were known, (links, links)."""
         place = {link: index for index, link in enumerate(self.links)}
         known = np.zeros((len(self.links), len(self.links)), dtype=int)
@@ -215,7 +216,7 @@ class _CentreSearch:
             known[a, b] = known[b, a] = 1
         one_line = (known == 0) & (known @ known > 0)
         np.fill_diagonal(one_line, False)
-        opened = one_line.astype(int) @ known
+        opened: IntArray = one_line.astype(int) @ known
         return opened + opened.T
 
     def result(self) -> Centres:
@@ -230,7 +231,7 @@ class _CentreSearch:
     def _branch_centres(self, listed: Sequence[Centre]) -> tuple[dict[str, Array], ...]:
         """Where the open centres lie on each branch of a change point; links that move as one on it have none."""
         left = [each for each in listed if each.how == "open"]
-        if not left or self.motions.count <= len(self.state.mechanism.inputs):
+        if not left or self.motions.mobility <= len(self.state.mechanism.inputs):
             return ()
         found = []
         for motions in branch_poles(self.state, self.middle, self.size):
@@ -252,9 +253,8 @@ class _CentreSearch:
         return normalise(np.array([self.size * x + w * self.middle[0], self.size * y + w * self.middle[1], w]))
 
     def _named(self, two: LinkPair) -> tuple[tuple[str, str], str]:
-        links = tuple(sorted(two, key=lambda link: int(self.numbers[link])))
-        first, second = (self.numbers[link] for link in links)
-        return links, f"I{first}{number_separator(self.numbers)}{second}"
+        first, second = sorted(two, key=lambda link: int(self.numbers[link]))
+        return (first, second), f"I{self.numbers[first]}{number_separator(self.numbers)}{self.numbers[second]}"
 
     def _name(self, a: str, b: str) -> str:
         return self._named(frozenset((a, b)))[1]

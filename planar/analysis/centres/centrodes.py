@@ -11,6 +11,7 @@ import numpy as np
 from planar.analysis.interpolated_run import InterpolatedRun
 from planar.analysis.relative_motion import RelativeMotion, relative_motion
 from planar.document.first_argument import takes_result
+from planar.foundation.arrays import Array, IntArray
 from planar.foundation.errors import BadInput
 from planar.foundation.geometry import Frame, Vector, frame_at
 from planar.foundation.jets import Jet
@@ -19,8 +20,6 @@ from planar.model.link_graph import link_numbers
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import MeasureKind
 from planar.results.motion import Motion
-
-Array = np.ndarray
 
 INFINITY_RATIO = 1e-9
 """A pole whose w is this small beside x and y, in the mechanism's size, cannot be told from one at infinity."""
@@ -47,7 +46,8 @@ class Centrode(NamedTuple):
     homogeneous: Array
     rate: Array
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return short_repr(self)
 
     @property
     def position(self) -> Array:
@@ -64,7 +64,7 @@ class Centrode(NamedTuple):
         w = self.homogeneous[:, 2:]
         return np.where(w == 0.0, np.nan, w)
 
-    def curve(self, rows: Array, parts: int = 1) -> Array:
+    def curve(self, rows: IntArray, parts: int = 1) -> Array:
         """The path through some rows (k,), each step in so many parts: ((k - 1) parts + 1, 3), homogeneous.
 
         Between two rows it is the cubic that has their rates, through infinity as well: wrong by the fourth power of
@@ -76,7 +76,7 @@ class Centrode(NamedTuple):
         inner = self._between(rows[:-1], rows[1:], s)
         return np.concatenate([inner.reshape(-1, 3), self.homogeneous[rows[-1:]]])
 
-    def _between(self, first: Array, last: Array, s: Array) -> Array:
+    def _between(self, first: IntArray, last: IntArray, s: Array) -> Array:
         """Steps from first rows to last ones (k,) at parts s of each: (k, parts, 3)."""
         step = (self.inputs[last] - self.inputs[first])[:, None, None]
         a, b = self.homogeneous[first][:, None], self.homogeneous[last][:, None]
@@ -112,7 +112,7 @@ class Centrodes:
     "of the input that runs"
     fixed: Centrode
     moving: Centrode
-    arcs: tuple[Array, ...]
+    arcs: tuple[IntArray, ...]
     motion: RelativeMotion
     "of the link in the axes of the other, at every position"
     reason: str
@@ -129,7 +129,7 @@ class Centrodes:
         return here.points_in_other(points)
 
     @property
-    def known(self) -> Array:
+    def known(self) -> IntArray:
         """The rows at which the pole is determined, be it at infinity."""
         return np.flatnonzero(np.isfinite(self.fixed.homogeneous[:, 2]))
 
@@ -243,7 +243,7 @@ def _continuous_signs(poles: Array) -> Array:
     return signs[:, None]
 
 
-def _split_at_infinity(fixed: Centrode) -> tuple[Array, ...]:
+def _split_at_infinity(fixed: Centrode) -> tuple[IntArray, ...]:
     """The rows of the pieces of a curve, cut where w vanishes at a row or between two."""
     known = np.flatnonzero(np.isfinite(fixed.homogeneous[:, 2]))
     w = fixed.curve(known, PARTS_PER_STEP)[:, 2]
@@ -274,7 +274,7 @@ def _frames_with_limit_rates(steady: InterpolatedRun) -> Mapping[str, Frame]:
     running = [given.pair for given in solver.mechanism.inputs].index(steady.pair)
     by = solver.unit if solver.relative_motions[steady.pair].input_kind is MeasureKind.LENGTH else 1.0
     rates = {}
-    for row in np.flatnonzero(~steady.has_rates):
+    for row in np.flatnonzero(~steady.has_rates).tolist():
         z, u = steady.z[row], solver.inputs.u.copy()
         u[running] = steady.positions[row] / by
         slopes, drives = program.jacobians(z[None], u[None], solver.inputs.p)

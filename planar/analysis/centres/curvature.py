@@ -16,13 +16,13 @@ import numpy as np
 
 from planar.analysis.relative_motion import RelativeMotion, quarter_turn, relative_motion
 from planar.document.first_argument import takes_result
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, Unknown
 from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import Drive, named_points, replace_inputs
 from planar.results.motion import State
 from planar.solving.position import PositionSolver
 
-Array = np.ndarray
 NEGLIGIBLE_RATIO = 1e-9
 """A rate below this part of the greatest is none: rates are good to some 1e-13 of it."""
 STRAIGHT_RATIO = 1e9
@@ -35,7 +35,8 @@ class MotionCircle(NamedTuple):
     centre: Array
     diameter: float
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return short_repr(self)
 
 
 class PathCurvature(NamedTuple):
@@ -52,7 +53,8 @@ class PathCurvature(NamedTuple):
     direct: float
     centre: Array | None
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return short_repr(self)
 
 
 @dataclass(frozen=True)
@@ -126,7 +128,7 @@ class Curvature:
         speed = hypot(*v)
         if speed <= self.least:
             # in the pole: a cusp, unless the pole stays there as well
-            stays = self.pole is None or hypot(*self.pole_velocity) <= self.least
+            stays = self.pole is None or self.pole_velocity is None or hypot(*self.pole_velocity) <= self.least
             return (nan if stays else 0.0), None
         bend = float(v[0] * a[1] - v[1] * a[0])
         if speed**3 >= STRAIGHT_RATIO * self.size * abs(bend):

@@ -16,7 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-Array = np.ndarray
+from planar.foundation.arrays import Array
+
 ROUNDING = 1e-15
 """How exact a centre is that a pair shows."""
 MAX_MEETING_ERROR = 1e-7
@@ -216,4 +217,5 @@ def _cross(a: Array, b: Array) -> Array:
 
 def _lengths(vectors: Array) -> Array:
     """Lengths (...,) of vectors (..., 3)."""
-    return np.sqrt((vectors * vectors).sum(axis=-1))
+    found: Array = np.sqrt((vectors * vectors).sum(axis=-1))
+    return found

@@ -11,13 +11,13 @@ import numpy as np
 from planar.analysis.centres.kennedy import LinkPair
 from planar.analysis.rate_equations import derivative
 from planar.analysis.rate_ratios import choose_motion
+from planar.foundation.arrays import Array
 from planar.results.motion import State
 from planar.solving.checks.singular_values import null_space
 from planar.solving.full_constraints import FullConstraints
 from planar.solving.position import PositionSolver
 from planar.solving.prepared_mechanism import PreparedMechanism
 
-Array = np.ndarray
 AS_ONE_RATIO = 1e-7
 """Links that move this little against each other, beside the greatest motion, move as one.
 
@@ -46,7 +46,7 @@ class AllowedMotions(NamedTuple):
     """
 
     poles: Mapping[str, Array]
-    count: int
+    mobility: int
 
 
 class FullPosition(NamedTuple):
@@ -124,11 +124,11 @@ def prove_centres(found: Mapping[LinkPair, Array], links: Sequence[str], motions
         for three in combinations(links, 3)
         if len({stands.get(link, link) for link in three}) > 1
     ]
-    a, b, c = np.array(threes, dtype=int).reshape(-1, 3).T
-    triples = np.stack([at[a, b], at[b, c], at[a, c]], axis=1)
+    first, second, third = np.array(threes, dtype=int).reshape(-1, 3).T
+    triples = np.stack([at[first, second], at[second, third], at[first, third]], axis=1)
     known = ~np.isnan(triples).any(axis=(1, 2))
     collinear = float(np.abs(np.linalg.det(triples[known])).max(initial=0.0))
-    if not motions.count or not found:
+    if not motions.mobility or not found:
         return CentresProof(None, collinear, None)
     centres = np.array(list(found.values()))[:, None]
     relative = np.array([motions.poles[b] - motions.poles[a] for a, b in map(tuple, found)])

@@ -6,13 +6,13 @@ import numpy as np
 
 from planar.analysis.centres.kennedy import ROUNDING, FoundCentre, LinkPair, PrimaryCentres, normalise
 from planar.analysis.rate_equations import Rate, RateEquations, derivative, pair_gradients
+from planar.foundation.arrays import Array
 from planar.foundation.geometry import Frame
 from planar.model.mechanism import relative_motions
 from planar.model.pairs import Pair
 from planar.results.motion import State
 from planar.solving.checks.singular_values import null_space
 
-Array = np.ndarray
 RANK_TOLERANCE = 1e-10
 """A singular value below this part of the greatest is none: slopes are exact to rounding."""
 

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.foundation.short_repr import short_repr
 
-Array = np.ndarray
 QUARTER_TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
 """A quarter anticlockwise."""
 PARALLEL_TOLERANCE = 1e-9
@@ -30,14 +30,16 @@ class TwoDirections(NamedTuple):
     angular_velocity: float
     velocity_b: Array
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return short_repr(self)
 
     @property
     def position(self) -> Array | None:
         """(2,), m; None at infinity, and where the link rests."""
         if self.homogeneous is None or self.homogeneous[2] == 0.0:
             return None
-        return self.homogeneous[:2] / self.homogeneous[2]
+        found: Array = self.homogeneous[:2] / self.homogeneous[2]
+        return found
 
 
 def centre_of(
@@ -49,13 +51,13 @@ def centre_of(
     through the arrows' heads meets AB in it; equal velocities put it at infinity. Raises BadInput where A and B are
     one point, or no rigid link can have such velocities, or a direction is not enough.
     """
-    a, b, va = (np.array(each, dtype=float) for each in (a, b, velocity_a))
-    if not all(each.shape == (2,) and np.isfinite(each).all() for each in (a, b, va)):
+    at_a, at_b, va = (np.array(each, dtype=float) for each in (a, b, velocity_a))
+    if not all(each.shape == (2,) and np.isfinite(each).all() for each in (at_a, at_b, va)):
         raise BadInput("centre_of", "points and velocities are pairs of finite numbers")
-    reach = float(np.hypot(*(b - a)))
-    if reach <= PARALLEL_TOLERANCE * max(1e-300, np.abs(a).max(), np.abs(b).max()):
+    reach = float(np.hypot(*(at_b - at_a)))
+    if reach <= PARALLEL_TOLERANCE * max(1e-300, np.abs(at_a).max(), np.abs(at_b).max()):
         raise BadInput("centre_of", "A and B are one point, so that their velocities show no centre")
-    along = (b - a) / reach
+    along = (at_b - at_a) / reach
     vb = _velocity_b(va, along, velocity_b)
     fastest = max(float(np.hypot(*va)), float(np.hypot(*vb)))
     if fastest == 0.0:
@@ -70,10 +72,10 @@ def centre_of(
         way = np.array([at[0], at[1], 0.0]) / np.hypot(at[0], at[1])
         sign = 1.0 if (way[1], way[0]) > (0.0, 0.0) else -1.0
         return TwoDirections(sign * way + 0.0, None, None, 0.0, vb)
-    position = a + reach * at[:2] / at[2]
+    position = at_a + reach * at[:2] / at[2]
     homogeneous = np.append(position, 1.0)
-    radii = (float(np.hypot(*(position - each))) for each in (a, b))
-    return TwoDirections(homogeneous / np.linalg.norm(homogeneous), *radii, angular_velocity, vb)
+    radius_a, radius_b = (float(np.hypot(*(position - each))) for each in (at_a, at_b))
+    return TwoDirections(homogeneous / np.linalg.norm(homogeneous), radius_a, radius_b, angular_velocity, vb)
 
 
 def _velocity_b(va: Array, along: Array, given: Sequence[float] | float) -> Array:

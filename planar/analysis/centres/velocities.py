@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -11,11 +12,11 @@ import numpy as np
 from planar.analysis.centres.centres import Centre, Centres, extent
 from planar.analysis.rate_equations import RateEquation, RateEquations, SlideJoint, rate_equations
 from planar.document.first_argument import takes_result
+from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import Drive, replace_inputs
 
-Array = np.ndarray
 COINCIDENT_TOLERANCE = 1e-7
 """Homogeneous centres, of length one with lengths in sizes, that are no farther apart than this are one.
 
@@ -30,7 +31,8 @@ class LinkByCentres(NamedTuple):
     by: tuple[str, ...]
     "the names of the three centres of which it follows from another link's, none for what an input gives"
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return short_repr(self)
 
     @property
     def angular_velocity(self) -> float:
@@ -51,7 +53,8 @@ class PointByCentre(NamedTuple):
     radius: float | None
     by: tuple[str, ...]
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return short_repr(self)
 
 
 @takes_result("Centres")
@@ -117,12 +120,15 @@ class _ScaledCentres:
 
     centres: Centres
 
-    def __post_init__(self) -> None:
-        middle, size = extent(self.centres.state)
-        at = {frozenset(each.links): self._scale_centre(each, middle, size) for each in self.centres}
-        object.__setattr__(self, "_at", at)
-        object.__setattr__(self, "_size", size)
-        object.__setattr__(self, "_middle", middle)
+    @cached_property
+    def _extent(self) -> tuple[Array, float]:
+        """The mechanism's middle and size."""
+        return extent(self.centres.state)
+
+    @cached_property
+    def _at(self) -> dict[frozenset[str], Array | None]:
+        middle, size = self._extent
+        return {frozenset(each.links): self._scale_centre(each, middle, size) for each in self.centres}
 
     @staticmethod
     def _scale_centre(centre: Centre, middle: Array, size: float) -> Array | None:
@@ -130,16 +136,17 @@ class _ScaledCentres:
             return None
         x, y, w = centre.homogeneous
         at = np.array([(x - w * middle[0]) / size, (y - w * middle[1]) / size, w])
-        return at / np.linalg.norm(at)
+        found: Array = at / np.linalg.norm(at)
+        return found
 
     def centre_point(self, one: str, other: str) -> Array | None:
         """(3,), of length one; None where they move as one, or it is not determined."""
-        return self._at[frozenset((one, other))]  # type: ignore[attr-defined]
+        return self._at[frozenset((one, other))]
 
     def in_metres(self, motion: Array) -> Array:
         """A motion of poles in sizes about the middle as one of poles in metres."""
         x, y, w = motion
-        size, middle = self._size, self._middle  # type: ignore[attr-defined]
+        middle, size = self._extent
         return np.array([size * x + w * middle[0], size * y + w * middle[1], w])
 
     def separation(self, link: str, known: str) -> float:
@@ -177,11 +184,11 @@ class _ScaledCentres:
             link, sign = (second, 1.0) if first == frame else (first, -1.0)
             return {link: LinkByCentres(sign * motion, ())}
         # between moving links: m_second - m_first is known, and where both poles lie
-        poles = [self.centre_point(link, frame) for link in (first, second)]
+        poles = self.centre_point(first, frame), self.centre_point(second, frame)
         for held, moves, sign in ((first, second, 1.0), (second, first, -1.0)):
             if self._is_one_with(held, frame):  # at rest here
                 return {held: LinkByCentres(np.zeros(3), ()), moves: LinkByCentres(sign * motion, ())}
-        if any(pole is None for pole in poles):
+        if poles[0] is None or poles[1] is None:
             raise _undetermined_answer(self.centres, [first, second], name)
         matrix = np.stack([-poles[0], poles[1]], axis=1)
         if np.linalg.svd(matrix, compute_uv=False)[-1] <= COINCIDENT_TOLERANCE:
@@ -202,9 +209,10 @@ class _ScaledCentres:
             return first, second, at * (rate / turns[second] / at[2])
         (own,) = tie.coefficients
         slide: SlideJoint = next(each for each in found.slides if own in each.rates)
-        way = slide.directions[slide.rates.index(own)] * rate / tie.coefficients[own] / self._size  # type: ignore[attr-defined]
+        middle, size = self._extent
+        way = slide.directions[slide.rates.index(own)] * rate / tie.coefficients[own] / size
         at = self.centre_point(slide.guide, slide.rider)
-        x, y = (found.point_position(slide.rider, slide.point) - self._middle) / self._size  # type: ignore[attr-defined]
+        x, y = (found.point_position(slide.rider, slide.point) - middle) / size
         if at is None:
             raise _undetermined_answer(self.centres, [slide.guide, slide.rider], tie.pair)
         carried = np.array([at[1] - at[2] * y, at[2] * x - at[0]])

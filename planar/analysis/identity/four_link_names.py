@@ -58,7 +58,7 @@ def _four_bar_names(loop: KinematicLoop) -> tuple[str, ...]:
     one line: all equal a rhombus, opposite ones equal a parallelogram or, crossed, an antiparallelogram, adjacent
     ones equal a kite; any other is called as Grashof's with the same shortest link.
     """
-    chain = ("four-bar chain",)
+    chain: tuple[str, ...] = ("four-bar chain",)
     lengths = [side.length for side in loop.links]
     s, p, q, l = sorted(lengths)  # noqa: E741 - the letters of Grashof's rule
     size = s + p + q + l
@@ -124,7 +124,7 @@ def _double_slider_names(loop: KinematicLoop, word: str) -> tuple[str, ...]:
     """
     chain = ("double slider-crank chain",)
     cross = next(side for side in loop.links if side.before.direction is not None and side.after.direction is not None)
-    if abs(cross.before.direction.cross(cross.after.direction)) <= LENGTH_TOLERANCE:
+    if abs(cross.before.line_direction.cross(cross.after.line_direction)) <= LENGTH_TOLERANCE:
         return chain
     return (*chain, *_DOUBLE_SLIDER["".join(sorted(word[0] + word[-1]))])
 
@@ -132,4 +132,4 @@ def _double_slider_names(loop: KinematicLoop, word: str) -> tuple[str, ...]:
 def _offset_from_line(pin: Vector, side: LoopLink) -> float:
     """How far to the left of the way of its slide a pin of a link lies (m)."""
     slide = side.after if side.before.direction is None else side.before
-    return slide.direction.cross(pin - slide.point)
+    return float(slide.line_direction.cross(pin - slide.point))

@@ -14,6 +14,7 @@ from planar.document.dimensions import Dimension, file_dimensions
 from planar.document.first_argument import takes_mechanism
 from planar.dynamics.load_attachment import attachment_remarks
 from planar.equations.mechanism_numbers import mechanism_size, shapes_of_links
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer, Outcome, PlanarError
 from planar.foundation.short_repr import short_repr
 from planar.foundation.units import SI_UNITS, display_unit
@@ -206,7 +207,7 @@ def _describe_motion(mechanism: Mechanism, link: str, runs: list[Motion]) -> str
     return "rocks" if all(run.outcome is Outcome.SOLVED for run in runs) else "turns or rocks"
 
 
-def _origin_coordinate(run: Motion, link: str, axis: str) -> np.ndarray:
+def _origin_coordinate(run: Motion, link: str, axis: str) -> Array:
     jet = getattr(run.frames[link], axis)
     return np.broadcast_to(jet.parts[0], (len(run),))
 

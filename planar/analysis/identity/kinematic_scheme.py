@@ -23,6 +23,13 @@ class JointLocation(NamedTuple):
     point: Vector
     direction: Vector | None = None
 
+    @property
+    def line_direction(self) -> Vector:
+        """The way of its slide's line. Raises ValueError at a pin, which has none."""
+        if self.direction is None:
+            raise ValueError("a pin has no line")
+        return self.direction
+
 
 class SchemeJoint(NamedTuple):
     """Links that meet in a pin (angle) or a slide (length), and where on each of them."""
@@ -107,8 +114,12 @@ def kinematic_scheme(mechanism: Mechanism) -> KinematicScheme:
             )
         elif pair.is_lower_pair and pair.input_kind is MeasureKind.LENGTH:
             joints.append(_slide_joint(pair, shapes))
-        elif pair.input_kind is MeasureKind.LENGTH and not pair.counts_turns:
-            joints += _slot_joints(pair, shapes)
+        elif (
+            pair.input_kind is MeasureKind.LENGTH
+            and not pair.counts_turns
+            and (rides := pair.point_on_line()) is not None
+        ):
+            joints += _slot_joints(pair, rides, shapes)
         else:
             higher += group
     links = dict.fromkeys(
@@ -135,9 +146,11 @@ def _slide_joint(pair: Pair, shapes: Mapping[str, LinkShape]) -> SchemeJoint:
     return SchemeJoint(pair.name, MeasureKind.LENGTH, places)
 
 
-def _slot_joints(pair: Pair, shapes: Mapping[str, LinkShape]) -> tuple[SchemeJoint, SchemeJoint]:
-    """A pin that runs along a line as a block on that line with the pin in it."""
-    (link, point), guide = pair.point_on_line()
+def _slot_joints(
+    pair: Pair, rides: tuple[tuple[str, str], str], shapes: Mapping[str, LinkShape]
+) -> tuple[SchemeJoint, SchemeJoint]:
+    """A pin, the (link, point) that rides along a line of another link, as a block on that line with the pin in it."""
+    (link, point), guide = rides
     numbers = pair.measure([shapes[body] for body in pair.bodies])
     start, on = (Vector(*pair.residual((GROUND, GROUND), numbers, (slide,))[:2]) for slide in (0.0, 1.0))
     pin, block, origin = shapes[link].position(point), f"{pair.name}:block", Vector(0.0, 0.0)

@@ -35,6 +35,7 @@ def describe_actions(mechanism: Mechanism) -> tuple[ActionDescription, ...]:
 
 
 def _describe_load(mechanism: Mechanism, load: Load) -> ActionDescription:
+    links: tuple[str, ...]
     if load.point is not None and load.force is not None:
         link = attachments(mechanism)[load.point].link
         turns = "" if load.axes is None else f" in the axes of {load.axes}"

@@ -254,7 +254,9 @@ def _loop_names(chain: KinematicScheme, mechanism: Mechanism) -> Iterator[str]:
         return
     sliders = sum(joint.slides for joint in found.joints)
     if len(found.links) == 3 and sliders == 3:
-        if all(abs(side.before.direction.cross(side.after.direction)) > LENGTH_TOLERANCE for side in found.links):
+        if all(
+            abs(side.before.line_direction.cross(side.after.line_direction)) > LENGTH_TOLERANCE for side in found.links
+        ):
             yield "wedge mechanism"
     elif len(found.links) == 4:
         for name in four_link_names(found):

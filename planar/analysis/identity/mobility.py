@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from planar.document.first_argument import takes_mechanism
+from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer
 from planar.model.link_graph import pairs_farthest_first
 from planar.model.mechanism import Mechanism
@@ -16,8 +15,6 @@ from planar.solving.checks.singular_values import null_space, rank
 from planar.solving.diagnosis.redundancy import smallest_dependent_sets
 from planar.solving.full_constraints import FullConstraints, find_closed_position, motion_dimension
 from planar.solving.position import PositionSolver
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True)
@@ -84,7 +81,8 @@ def closed_position(solver: PositionSolver, constraints: FullConstraints) -> Arr
     except NoAnswer as problem:
         nearest = problem
     if isinstance(nearest, Assembly):
-        return solver.functions.coordinate_function(nearest.z, solver.inputs.u, solver.inputs.p).full().ravel()
+        there: Array = solver.functions.coordinate_function(nearest.z, solver.inputs.u, solver.inputs.p).full()
+        return there.ravel()
     found = find_closed_position(constraints)
     if found is None:
         raise solver.unassembled(nearest) if isinstance(nearest, AssemblySearchFailure) else nearest

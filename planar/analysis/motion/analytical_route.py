@@ -11,11 +11,11 @@ from planar.analysis.motion.extremes import find_greatest, quantity_and_rates
 from planar.analysis.motion.harmonics import Harmonics, full_turn, harmonics
 from planar.analysis.motion.output import Extreme
 from planar.analysis.motion.piston import Deviation, Piston, RodPointMotion, find_piston
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import Mechanism, named_points, relative_motions
 from planar.model.pairs import MeasureKind
-from planar.results.motion import Array
 
 
 class TwoTermComparison(NamedTuple):
@@ -85,6 +85,7 @@ def analytical_routes(
         told += f", such as {such[0].name!r}" if such else ""
         raise BadInput(mechanism.name, told)
     pistons = [one for pair in frame_slides(mechanism) if (one := find_piston(mechanism, pair)) is not None]
+    found: list[tuple[tuple[Harmonics, ...], str]]
     found = [((harmonics(mechanism, pair, None, running),), pair) for pair in pairs]
     found += [
         (tuple(harmonics(mechanism, point, axis, running) for axis in "xy"), f"{link}.{name}")

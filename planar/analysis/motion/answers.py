@@ -109,7 +109,7 @@ def _point_answers(motion: Motion, steady: InterpolatedRun, name: str) -> Answer
         rate=steady.rate,
         per_unit=_is_per_unit(motion, steady),
         length=True,
-        extremes=tuple(find_extremes(each) for each in outputs),
+        extremes=tuple(find_extremes(output, axis) for output, axis in zip(outputs, POINT_AXES, strict=True)),
         velocity=find_greatest(steady, name) if moves else None,
         acceleration=find_greatest(steady, name, "acceleration") if moves else None,
         dwells=tuple((each.axis, dwell) for each in outputs for dwell in find_dwells(each)),

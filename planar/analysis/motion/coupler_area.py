@@ -8,11 +8,11 @@ import numpy as np
 
 from planar.analysis.interpolated_run import CLOSED_TOLERANCE, InterpolatedRun
 from planar.document.first_argument import takes_result
+from planar.foundation.arrays import Array, ComplexArray
 from planar.foundation.errors import BadInput, NoAnswer
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
 
-Array = np.ndarray
 SUM_TOLERANCE = 1e-10
 """The estimated error, beside the area, at which the sum has come to its end."""
 ROUND_OFF_RATIO = 1e-14
@@ -81,17 +81,18 @@ def _refuse_open(steady: InterpolatedRun, motion: Motion, point: str) -> None:
     raise BadInput(point, f"{told}; run the input through as many whole turns as it takes")
 
 
-def _sample_curve(steady: InterpolatedRun, point: str, many: int) -> Array:
+def _sample_curve(steady: InterpolatedRun, point: str, many: int) -> ComplexArray:
     """x + iy at equally spaced positions, without the end."""
     places = np.linspace(steady.lowest, steady.highest, many + 1)
     order = np.argsort(steady.positions, kind="stable")
     if np.abs(steady.positions[order] - places).max() > 1e-13 * max(steady.period, abs(steady.highest)):
         return _points_at(steady, point, places[:-1])
     x, y = steady.samples.point(point).position[order[:-1]].T
-    return x + 1j * y
+    found: ComplexArray = x + 1j * y
+    return found
 
 
-def _refine_curve(steady: InterpolatedRun, point: str, curve: Array) -> Array:
+def _refine_curve(steady: InterpolatedRun, point: str, curve: ComplexArray) -> ComplexArray:
     """The same curve at twice as many positions: of a finer run where that is the same motion, else one by one."""
     many = len(curve)
     try:
@@ -100,17 +101,18 @@ def _refine_curve(steady: InterpolatedRun, point: str, curve: Array) -> Array:
         finer = None
     if finer is not None and len(finer) == 2 * many + 1:
         x, y = finer.point(point).position[:-1].T
-        if np.abs(x[::2] + 1j * y[::2] - curve).max() <= CLOSED_TOLERANCE * steady.solver.unit:
-            return x + 1j * y
+        found: ComplexArray = x + 1j * y
+        if np.abs(found[::2] - curve).max() <= CLOSED_TOLERANCE * steady.solver.unit:
+            return found
     between = _points_at(steady, point, steady.lowest + steady.period * (np.arange(many) + 0.5) / many)
     return np.stack([curve, between], axis=1).ravel()
 
 
-def _points_at(steady: InterpolatedRun, point: str, places: Array) -> Array:
+def _points_at(steady: InterpolatedRun, point: str, places: Array) -> ComplexArray:
     return np.array([complex(*steady.state_at(float(place)).point(point).position) for place in places])
 
 
-def _area_within(curve: Array) -> float:
+def _area_within(curve: ComplexArray) -> float:
     many = len(curve)
     terms = np.fft.fft(curve) / many
     n = np.fft.fftfreq(many, 1.0 / many)

@@ -12,14 +12,13 @@ from planar.analysis.interpolated_run import CLOSED_TOLERANCE, InterpolatedRun
 from planar.analysis.motion.output import Axis, Extreme, Output
 from planar.analysis.motion.zeros import SERIES_TOLERANCE, bracket_maxima, bracket_zeros, find_maximum
 from planar.document.first_argument import takes_result
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer
 from planar.foundation.root_finding import find_root
 from planar.model.mechanism import relative_motions
 from planar.model.pairs import MeasureKind
-from planar.results.kinematic_result import KinematicResult
 from planar.results.motion import Motion, State
 
-Array = np.ndarray
 StateMeasure = Callable[[State], float | Array]
 
 RIVAL_RATIO = 0.5
@@ -108,11 +107,11 @@ def extremes(motion: Motion, point: str, axis: Axis = "x") -> Extremes:
     Over a range that is not closed they may be at its ends. Of places that are alike the first in the range is told.
     Raises Unknown for another name, BadInput for another axis.
     """
-    return find_extremes(Output(InterpolatedRun(motion), point, axis))
+    return find_extremes(Output(InterpolatedRun(motion), point, axis), axis)
 
 
-def find_extremes(output: Output) -> Extremes:
-    """See `extremes`; of an output that is made already."""
+def find_extremes(output: Output, axis: Axis) -> Extremes:
+    """See `extremes`; of the output along this axis, made already."""
     turns = output.turning_points
     candidates = [(each, True) for each in turns] + [(each, False) for each in output.range_ends]
     least, greatest = (
@@ -120,7 +119,7 @@ def find_extremes(output: Output) -> Extremes:
         for end in output.range
     )
     length = greatest[0].value - least[0].value
-    return Extremes(output.name, output.axis, least[0], greatest[0], length, (least[1], greatest[1]))
+    return Extremes(output.name, axis, least[0], greatest[0], length, (least[1], greatest[1]))
 
 
 @takes_result("Motion")
@@ -148,7 +147,7 @@ def find_greatest(steady: InterpolatedRun, of: str | Output | StateMeasure, what
     if what not in ("velocity", "acceleration"):
         raise BadInput("what", f"the greatest 'velocity' or 'acceleration' is found, not {what!r:.40}")
 
-    def measured(moving: KinematicResult) -> Array:
+    def measured(moving: State | Motion) -> Array:
         """The square of the quantity, and of a velocity what its square grows by (..., 2)."""
         if not isinstance(of, str | Output):
             if isinstance(moving, Motion):
@@ -210,7 +209,7 @@ def _measure_or_zero(measured: Callable[[State], Array], steady: InterpolatedRun
         return np.zeros(2)
 
 
-def quantity_and_rates(moving: KinematicResult, name: str | Output) -> tuple[Array, Array, Array]:
+def quantity_and_rates(moving: State | Motion, name: str | Output) -> tuple[Array, Array, Array]:
     """Position, velocity and acceleration (..., axes) of a slide, else of a point, another pair or a link."""
     if isinstance(name, Output):
         position, velocity, acceleration = (
@@ -226,9 +225,9 @@ def quantity_and_rates(moving: KinematicResult, name: str | Output) -> tuple[Arr
     return moving.point(name)[:3]
 
 
-def _pair_motion(moving: KinematicResult, pair: str) -> tuple[Array, Array, Array]:
+def _pair_motion(moving: State | Motion, pair: str) -> tuple[Array, Array, Array]:
     """Position, velocity and acceleration of the relative motion at a pair: what every pair reports first."""
-    position, velocity, acceleration = list(moving.pair(pair).values())[:3]
+    position, velocity, acceleration = (np.asarray(each, dtype=float) for each in list(moving.pair(pair).values())[:3])
     return position, velocity, acceleration
 
 
@@ -254,4 +253,4 @@ def _is_unbounded(positions: Array, squares: Array, limit: float) -> bool:
     """Whether a quantity grows beyond all bounds towards a limit, by the two states that are nearest to it."""
     near, nearer = np.argsort(np.abs(positions - limit))[1::-1]
     times = abs((positions[near] - limit) / (positions[nearer] - limit))
-    return times > NEARER_RATIO and squares[nearer] > times**GROWTH_EXPONENT * squares[near]
+    return bool(times > NEARER_RATIO and squares[nearer] > times**GROWTH_EXPONENT * squares[near])

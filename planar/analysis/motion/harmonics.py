@@ -12,11 +12,12 @@ from planar.analysis.motion.extremes import Stroke, find_stroke
 from planar.analysis.motion.output import Extreme
 from planar.document.first_argument import takes_mechanism
 from planar.equations.mechanism_numbers import mechanism_size, shapes_of_links
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer, Outcome, Unknown
 from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import Drive, Mechanism, relative_motions, replace_inputs
 from planar.model.pairs import MeasureKind
-from planar.results.motion import Array, Motion
+from planar.results.motion import Motion
 from planar.solving.cycle import cycle
 
 MIN_SAMPLES, MAX_SAMPLES = 64, 4096
@@ -105,9 +106,10 @@ class Harmonics:
         theta = np.asarray(theta, dtype=float)
         n = np.arange(1, len(self.cosines) + 1)[:terms]
         turned = theta[..., None] * n + order * 0.5 * pi  # d/dx cos x = cos(x + pi/2), and of sin alike
-        return (
+        found: Array = (
             np.cos(turned) * (n**order * self.cosines[:terms]) + np.sin(turned) * (n**order * self.sines[:terms])
         ).sum(axis=-1)
+        return found
 
 
 @takes_mechanism

@@ -14,12 +14,12 @@ from planar.analysis.centres.velocities import LinkByCentres, links_by_centres
 from planar.analysis.rate_equations import Rate, RateEquations, rate_equations
 from planar.document.first_argument import takes_result
 from planar.dynamics.virtual_velocities import has_length_motion, unit_rate_state
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer, Unknown
 from planar.model.mechanism import Input, relative_motions
 from planar.model.wording import REST_TOLERANCE, join_all_names
 from planar.results.motion import State
 
-Array = np.ndarray
 LEAST_SEPARATION = 1e-3
 """Centres that lie closer together than this, homogeneous and of length one, tell the line through them badly."""
 PoleOfLink = Callable[[str], Array]
@@ -177,8 +177,9 @@ class _AdvantagesOverInput:
         if at is None:
             return None
         x, y, w = at
-        found = np.array([(x - w * self.middle[0]) / self.size, (y - w * self.middle[1]) / self.size, w])
-        return found / np.linalg.norm(found)
+        at = np.array([(x - w * self.middle[0]) / self.size, (y - w * self.middle[1]) / self.size, w])
+        found: Array = at / np.linalg.norm(at)
+        return found
 
 
 def _choose_input(state: State, name: str | None) -> str:

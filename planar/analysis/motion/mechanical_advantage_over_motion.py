@@ -12,14 +12,12 @@ from planar.analysis.motion.extremes import find_greatest, quantity_and_rates
 from planar.analysis.motion.output import Extreme, Output
 from planar.analysis.motion.zeros import bracket_zeros
 from planar.document.first_argument import takes_result
+from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer
 from planar.foundation.root_finding import find_root
 from planar.foundation.short_repr import short_repr
 from planar.model.wording import REST_TOLERANCE
-from planar.results.kinematic_result import KinematicResult
-from planar.results.motion import Motion
-
-Array = np.ndarray
+from planar.results.motion import Motion, State
 
 
 class AdvantageOver(NamedTuple):
@@ -39,7 +37,8 @@ class AdvantageOver(NamedTuple):
     least: Extreme
     infinite: tuple[float, ...]
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return short_repr(self)
 
 
 @takes_result("Motion")
@@ -86,9 +85,10 @@ def _is_length(steady: InterpolatedRun, output: str | Output) -> bool:
 def _find_standstills(steady: InterpolatedRun, output: str | Output, still: float) -> list[float]:
     """Where the output stands still: where its speed is least, and none beside the greatest."""
 
-    def power(moving: KinematicResult) -> Array:
+    def power(moving: State | Motion) -> Array:
         _, velocity, acceleration = quantity_and_rates(moving, output)
-        return np.sum(velocity * acceleration, axis=-1) / steady.rate
+        found: Array = np.sum(velocity * acceleration, axis=-1) / steady.rate
+        return found
 
     if not still:
         return []

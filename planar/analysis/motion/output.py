@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from math import cos, isfinite, sin
 from numbers import Real
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from planar.analysis.interpolated_run import CLOSED_TOLERANCE, InterpolatedRun
 from planar.analysis.motion.zeros import bracket_near_zeros, bracket_zeros
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer, Unknown
 from planar.foundation.jets import value_and_rates
 from planar.foundation.root_finding import find_root
 from planar.model.mechanism import relative_motions
 from planar.model.pairs import MeasureKind
-from planar.results.kinematic_result import KinematicResult, ValueAndRates
+from planar.results.kinematic_result import ValueAndRates
+from planar.results.motion import Motion, State
 from planar.results.records import principal_turns
 
-Array = np.ndarray
 Axis = str | float
 """`x` or `y` of the frame, or a direction (rad) against its x-axis."""
 STANDSTILL_RATIO = 1e-9
@@ -64,15 +66,16 @@ class Output:
             self._offset = principal_turns(self._values)
         self._values = self._values + self._offset
 
-    def value_and_rates(self, moving: KinematicResult) -> ValueAndRates:
+    def value_and_rates(self, moving: State | Motion) -> ValueAndRates:
         """Its value and rates in a state, or over a motion (n,)."""
         if self._direction is not None:
-            position, velocity, acceleration = (part @ self._direction for part in moving.point(self.name)[:3])
+            rates: Sequence[Any] = [part @ self._direction for part in moving.point(self.name)[:3]]
         elif self._is_pair:
             pair, parts = moving._find_relative_motion(self.name)
-            position, velocity, acceleration = list(pair.results(*parts).values())[:3]
+            rates = list(pair.results(*parts).values())[:3]
         else:
-            position, velocity, acceleration = value_and_rates(moving.frames[self.name].angle)
+            rates = value_and_rates(moving.frames[self.name].angle)
+        position, velocity, acceleration = rates
         return position + self._offset, velocity, acceleration
 
     def evaluate(self, position: float) -> tuple[float, float, float]:
@@ -80,8 +83,9 @@ class Output:
         place = self.run.wrap_position(position)
         if place is None or not self.run.closed:
             return self._evaluate_in_range(position)
-        value, *rates = self._evaluate_in_range(place)
-        return value + self.gain_per_period * round((position - place) / self.run.period), *rates
+        value, velocity, acceleration = self._evaluate_in_range(place)
+        value += self.gain_per_period * round((position - place) / self.run.period)
+        return value, velocity, acceleration
 
     def _evaluate_in_range(self, position: float) -> tuple[float, float, float]:
         try:

@@ -16,6 +16,7 @@ from planar.analysis.identity.kinematic_scheme import (
     kinematic_scheme,
     pin_distance,
 )
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.foundation.geometry import Vector
 from planar.foundation.jets import Jet
@@ -23,7 +24,7 @@ from planar.foundation.root_finding import find_root
 from planar.foundation.short_repr import short_repr
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import MeasureKind
-from planar.results.motion import Array, State
+from planar.results.motion import State
 from planar.solving.position import solve
 
 COMPARISON_ANGLES = 3600
@@ -44,7 +45,8 @@ class RodPointMotion(NamedTuple):
     velocity: Array
     acceleration: Array
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return short_repr(self)
 
 
 class PistonFormulas(Protocol):
@@ -55,11 +57,11 @@ class PistonFormulas(Protocol):
     TDC and positive away from it, towards the crank; `rate` is d theta/dt (rad/s), which is steady.
     """
 
-    def displacement(self, theta: Array) -> Array: ...
+    def displacement(self, theta: Array | float) -> Array: ...
 
-    def velocity(self, theta: Array, rate: float) -> Array: ...
+    def velocity(self, theta: Array | float, rate: float) -> Array: ...
 
-    def acceleration(self, theta: Array, rate: float) -> Array: ...
+    def acceleration(self, theta: Array | float, rate: float) -> Array: ...
 
     def rod_point(self, theta: float, rate: float, b: float) -> RodPointMotion: ...
 
@@ -76,15 +78,15 @@ class TwoTermFormulas:
     r: float
     l: float  # noqa: E741 - the letter of the textbooks
 
-    def displacement(self, theta: Array) -> Array:
+    def displacement(self, theta: Array | float) -> Array:
         """S = r [(1 - cos theta) + (r/4l)(1 - cos 2 theta)]."""
         return self.r * ((1.0 - np.cos(theta)) + self.r / (4.0 * self.l) * (1.0 - np.cos(2.0 * theta)))
 
-    def velocity(self, theta: Array, rate: float) -> Array:
+    def velocity(self, theta: Array | float, rate: float) -> Array:
         """dS/dt = r w [sin theta + sin 2 theta / 2n], n = l/r."""
         return self.r * rate * (np.sin(theta) + self.r / (2.0 * self.l) * np.sin(2.0 * theta))
 
-    def acceleration(self, theta: Array, rate: float) -> Array:
+    def acceleration(self, theta: Array | float, rate: float) -> Array:
         """d2S/dt2 = r w^2 [cos theta + cos 2 theta / n], n = l/r, at a steady rate."""
         return self.r * rate**2 * (np.cos(theta) + self.r / self.l * np.cos(2.0 * theta))
 
@@ -118,13 +120,13 @@ class ExactFormulas:
     l: float  # noqa: E741
     e: float = 0.0
 
-    def displacement(self, theta: Array) -> Array:
+    def displacement(self, theta: Array | float) -> Array:
         return sqrt((self.l + self.r) ** 2 - self.e**2) - self._pin_position(theta)[0]
 
-    def velocity(self, theta: Array, rate: float) -> Array:
+    def velocity(self, theta: Array | float, rate: float) -> Array:
         return -rate * self._pin_position(theta)[1]
 
-    def acceleration(self, theta: Array, rate: float) -> Array:
+    def acceleration(self, theta: Array | float, rate: float) -> Array:
         return -(rate**2) * self._pin_position(theta)[2]
 
     def rod_point(self, theta: float, rate: float, b: float) -> RodPointMotion:
@@ -149,7 +151,7 @@ class ExactFormulas:
             at for at, speed in zip(found, speeds, strict=True) if speed >= max(speeds) * (1.0 - LENGTH_TOLERANCE**2)
         )
 
-    def _pin_position(self, theta: Array) -> tuple[Array, Array, Array]:
+    def _pin_position(self, theta: Array | float) -> tuple[Array, Array, Array]:
         """x of the piston's pin from the crank's axis with its first and second derivative with respect to theta."""
         y, y1 = self.r * np.sin(theta) - self.e, self.r * np.cos(theta)
         q = np.sqrt(self.l**2 - y**2)
@@ -295,7 +297,7 @@ def _measure_piston(
     frame = scheme.frame
     r, l = pin_distance(b.locations[crank], c.locations[crank]), pin_distance(a.locations[rod], b.locations[rod])  # noqa: E741
     axis, pin = c.locations[frame].point, _world_point(state, rod, a.locations[rod].point)
-    way = slide.locations[frame].direction
+    way = slide.locations[frame].line_direction
     forwards = 1.0 if way.dot(pin - axis) >= 0.0 else -1.0
     way = way * forwards
     e = float(way.cross(pin - axis))

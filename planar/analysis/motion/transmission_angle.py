@@ -10,6 +10,7 @@ from planar.analysis.interpolated_run import InterpolatedRun
 from planar.analysis.motion.output import Extreme
 from planar.analysis.motion.zeros import SERIES_TOLERANCE, bracket_maxima, find_maximum
 from planar.document.first_argument import takes_result
+from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.errors import BadInput, NoAnswer, Unknown
 from planar.foundation.jets import Jet
 from planar.foundation.short_repr import short_repr
@@ -22,7 +23,6 @@ from planar.solving.checks.singular_values import SINGULAR_TOLERANCE
 from planar.solving.full_constraints import COMPLEX_STEP, FullConstraints
 from planar.solving.prepared_mechanism import PreparedMechanism
 
-Array = np.ndarray
 BALANCE_TOLERANCE = 1e-7
 """Of a unit load: what is left of it by all multipliers, where the position is a limit and nothing balances it."""
 NEGLIGIBLE_FORCE = 1e-7
@@ -47,7 +47,8 @@ class Transmission(NamedTuple):
     angle: float | Array
     least: Extreme | None = None
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return short_repr(self)
 
 
 @takes_result("State", "Motion")
@@ -173,13 +174,14 @@ class _DrivenOutput:
         with np.errstate(invalid="ignore", divide="ignore"):
             return dict(zip(self.driving_pairs, every / greatest, strict=True)), stuck
 
-    def _multipliers(self, jacobians: Array, load: Array) -> tuple[Array, Array]:
+    def _multipliers(self, jacobians: Array, load: Array) -> tuple[Array, BoolArray]:
         """Multipliers (n, rows) that balance a load (coordinates,) on slopes (n, rows, coordinates); which do not.
 
         NaN where nothing does, and where the position is a limit and they are not the only ones.
         """
         many, rows, columns = jacobians.shape
-        found, stuck, sound = np.zeros((many, rows)), np.zeros(many, dtype=bool), np.zeros(many, dtype=bool)
+        found: Array = np.zeros((many, rows))
+        stuck, sound = np.zeros(many, dtype=bool), np.zeros(many, dtype=bool)
         if rows == columns:
             try:
                 loads = np.broadcast_to(-load[:, None], (many, columns, 1))
@@ -191,7 +193,7 @@ class _DrivenOutput:
             found[~sound], stuck[~sound] = self._minimum_norm_multipliers(jacobians[~sound], load)
         return found, stuck
 
-    def _minimum_norm_multipliers(self, slopes: Array, load: Array) -> tuple[Array, Array]:
+    def _minimum_norm_multipliers(self, slopes: Array, load: Array) -> tuple[Array, BoolArray]:
         """See `_multipliers`; where constraints may hold twice, or a position is a limit."""
         sides, columns = slopes.transpose(0, 2, 1), slopes.shape[2]
         u, s, vt = np.linalg.svd(sides, full_matrices=False)
@@ -254,7 +256,8 @@ class _DrivenOutput:
         slope = self._jacobians(self._coordinates(moving)[:, :1])[0]
         own = self.prepared.column[self.pair.name, self.pair.coordinate_kinds[0][0]]
         way = slope[self.rows_of_pair[self.pair.name][:2], own]
-        return way / np.hypot(*way)
+        found: Array = way / np.hypot(*way)
+        return found
 
     def _coordinates(self, moving: KinematicResult) -> Array:
         """w (coordinates, n), lengths in sizes."""

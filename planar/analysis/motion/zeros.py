@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.polynomial import Chebyshev
 
-Array = np.ndarray
+from planar.foundation.arrays import Array
 
 SERIES_NODES, MAX_HALVINGS = 12, 4
 """Exact positions through which a quantity is laid to be differentiated; how often their stretch is halved for it."""

@@ -32,11 +32,10 @@ from planar.analysis.vector_chains import (
     VectorChains,
 )
 from planar.equations.functions import equation_functions
+from planar.foundation.arrays import Array
 from planar.model.mechanism import named_points
 from planar.model.wording import REST_TOLERANCE, turning_sense
 from planar.results.motion import State
-
-Array = np.ndarray
 
 
 def velocity_polygon(state: State) -> Polygon:
@@ -178,7 +177,7 @@ class _PolygonConstruction:
     def _draw_meeting(
         self, links: tuple[str, ...], sides: Sequence[tuple[LinkPoint, tuple[ChainVector, ...]]], meeting: LinkPoint
     ) -> None:
-        drawn = []
+        drawn: list[MeetingSide] = []
         for start, legs in sides:
             if not legs:
                 self._draw_point(start)

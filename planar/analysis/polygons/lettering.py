@@ -123,7 +123,7 @@ class Lettering:
 
     def _is_near(self, one: LinkPoint, other: LinkPoint) -> bool:
         apart = one.local - other.local
-        return max(abs(apart.x), abs(apart.y)) <= self._same_place
+        return bool(max(abs(apart.x), abs(apart.y)) <= self._same_place)
 
     def _key(self, place: LinkPoint) -> tuple[str, str]:
         """("", point) of a named point, else the link and the point that it lies under."""

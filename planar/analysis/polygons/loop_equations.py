@@ -11,8 +11,8 @@ import numpy as np
 from planar.analysis.polygons.polygon import LoopEquation
 from planar.analysis.rate_equations import PinJoint, Rate, RateEquation, RateEquations
 from planar.analysis.vector_chains import JointOfRates, KnownRates, VectorChains
+from planar.foundation.arrays import Array
 
-Array = np.ndarray
 LEAST_COEFFICIENT = 1e-12
 """m or pure: a coefficient that is none."""
 DEPENDENCE_TOLERANCE = 1e-9

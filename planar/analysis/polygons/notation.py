@@ -32,6 +32,7 @@ from planar.analysis.rich_text import (
     length_without_primes,
     with_double_primes,
 )
+from planar.foundation.arrays import Array
 from planar.foundation.units import length_unit_of_rates, unit_of_kind
 from planar.model.mechanism import named_points
 
@@ -108,7 +109,7 @@ class Notation:
         """The greatest vector of the polygon (m/s or m/s^2)."""
         return max((float(np.hypot(*value)) for value in self.polygon.letters.values()), default=0.0)
 
-    def vector_length(self, value: Sequence[float] | np.ndarray) -> float:
+    def vector_length(self, value: Sequence[float] | Array) -> float:
         """The magnitude of a vector, zero where it is round-off beside the greatest."""
         found = float(np.hypot(*value))
         return found if found > NEGLIGIBLE_RATIO * self.greatest else 0.0

@@ -7,12 +7,9 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple
 
-import numpy as np
-
+from planar.foundation.arrays import Array
 from planar.foundation.short_repr import short_repr
 from planar.results.motion import State
-
-Array = np.ndarray
 
 
 class VectorPart(Enum):
@@ -52,7 +49,8 @@ class PolygonVector(NamedTuple):
     towards: str = ""
     "the sense where it is known: the point (A) or the letter (a) that it points to, else words"
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return short_repr(self)
 
 
 class Factor(NamedTuple):

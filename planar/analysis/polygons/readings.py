@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-import numpy as np
-
 from planar.analysis.polygons.notation import NEGLIGIBLE_RATIO, Notation
 from planar.analysis.polygons.polygon import Meeting, PolygonVector, SimultaneousSolution, TurningRate, VectorPart
 from planar.analysis.rich_text import Fraction, MeasuredValue, Name, Phrase, Symbol
+from planar.foundation.arrays import Array
 from planar.model.mechanism import relative_motions
 from planar.model.wording import direction_sense
 
@@ -90,7 +89,7 @@ class Readings:
             return
         yield (*told, f", {direction_sense(value)}", *(self._change_of_speed(point, value) if slider else ()))
 
-    def _change_of_speed(self, point: str, value: np.ndarray) -> Phrase:
+    def _change_of_speed(self, point: str, value: Array) -> Phrase:
         """Whether a slider's acceleration is in the direction of its velocity."""
         if self.notation.order == 1:
             return ()

@@ -10,10 +10,10 @@ from planar.analysis.polygons.lettering import Lettering, line_name
 from planar.analysis.polygons.polygon import Factor, PolygonVector, VectorPart
 from planar.analysis.rate_equations import Rate, RateEquations, SlideJoint, moving_links
 from planar.analysis.vector_chains import ChainVector, VectorChains
+from planar.foundation.arrays import Array
 from planar.model.wording import direction_sense
 from planar.results.motion import State
 
-Array = np.ndarray
 NEGLIGIBLE_RATIO = 1e-12
 """A rate below this part of the greatest of its kind is none."""
 

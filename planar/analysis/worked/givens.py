@@ -26,9 +26,9 @@ def given_data(state: State) -> Iterator[Phrase]:
     pairs: dict[str, list[Pair]] = {}
     for group in pair_entries(mechanism):
         pairs.setdefault(type(group[0]).keyword, []).append(group[0])
-    for kind, group in pairs.items():
-        many = "s" * (len(group) > 1)
-        yield (f"{kind.capitalize()} pair{many}: ", *_pair_phrases(group, state), ".")
+    for kind, alike in pairs.items():
+        many = "s" * (len(alike) > 1)
+        yield (f"{kind.capitalize()} pair{many}: ", *_pair_phrases(alike, state), ".")
     named = relative_motions(mechanism)
     for pair, driven in state.inputs.items():
         yield _input_phrase(mechanism, named[pair], driven)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.model.mechanism import Drive, PublishedValue
 from planar.model.wording import direction_sense, join_all_names, turning_sense
 from planar.results.motion import State
@@ -83,14 +84,14 @@ def _turning_sense(item: PublishedValue, value: float) -> str:
     return turning_sense(value) if item.quantity.startswith("angular") else ""
 
 
-def _size_and_sense(item: PublishedValue, value: np.ndarray) -> tuple[float, str]:
+def _size_and_sense(item: PublishedValue, value: Array) -> tuple[float, str]:
     """The magnitude of a vector, or its component where one is asked for, with its sense."""
     if item.component is not None:
         return float(value["xy".index(item.component)]), direction_sense(value)
     return float(np.hypot(*value)), direction_sense(value)
 
 
-def _solved_value(item: PublishedValue, state: State, start: State) -> float | np.ndarray:
+def _solved_value(item: PublishedValue, state: State, start: State) -> float | Array:
     if item.quantity in ("angular velocity", "angular acceleration"):
         return _angular_value(item, state)
     of_pair = {

@@ -87,15 +87,16 @@ class WorkedSolution:
 
 def worked_solution(state: State, comparisons: Sequence[Comparison] = ()) -> WorkedSolution:
     """The worked solution of a solved position; `comparisons` lay its published values beside the solved ones."""
-    halves = [
+    velocity, acceleration = (
         WorkedPolygon(each.kind, each, sections(each))
         for each in (velocity_polygon(state), acceleration_polygon(state))
-    ]
+    )
     return WorkedSolution(
         state,
         tuple(given_data(state)),
         tuple(_asked_for(state.mechanism.published)),
-        *halves,
+        velocity,
+        acceleration,
         tuple(_link_results(state)),
         tuple(_point_results(state)),
         tuple(_slide_results(state)),
@@ -137,7 +138,8 @@ def _point_results(state: State) -> Iterator[PointResult]:
     greatest = state.scales_of_points
     for name, point in state.points.items():
         both = [
-            (float(np.hypot(*point[order])), direction_sense(point[order], greatest[order - 1])) for order in (1, 2)
+            (float(np.hypot(*rate)), direction_sense(rate, most))
+            for rate, most in zip((point.velocity, point.acceleration), greatest, strict=True)
         ]
         (v, vs), (a, as_) = [
             (size if size > REST_TOLERANCE * most else 0.0, sense)

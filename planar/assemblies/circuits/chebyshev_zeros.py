@@ -15,9 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import chebyshev
 
+from planar.foundation.arrays import Array
 from planar.foundation.root_finding import find_root
-
-Array = np.ndarray
 
 NODE_COUNT, TAIL_TERMS = 32, 8
 """Places on a part, and how many of the last terms must have fallen away there."""

@@ -18,13 +18,12 @@ from planar.assemblies.circuits.dead_points import (
 from planar.assemblies.circuits.traced_circuit import TracedCircuit, trace_circuit
 from planar.assemblies.modes import Mode, Modes
 from planar.assemblies.polynomial.completeness import Completeness
+from planar.foundation.arrays import Array
 from planar.model.mechanism import Drive, Mechanism, replace_inputs
 from planar.model.pairs import MeasureKind
 from planar.model.wording import count_phrase
 from planar.solving.diagnosis import refusals
 from planar.solving.position import PositionSolver, solved_mechanism
-
-Array = np.ndarray
 
 TURN = 2.0 * pi
 MAX_ASSEMBLIES = 256

@@ -14,13 +14,12 @@ from planar.assemblies.circuits.circuit_search import CircuitSearch, InputInterv
 from planar.assemblies.circuits.traced_circuit import Branch, TracedCircuit
 from planar.assemblies.modes import Mode
 from planar.document.first_argument import takes_mechanism
+from planar.foundation.arrays import Array
 from planar.foundation.notebook_display import Displayable
 from planar.model.mechanism import Drive, Mechanism, replace_inputs, running_input_index
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
 from planar.solving.position import solved_mechanism
-
-Array = np.ndarray
 
 TURN = 2.0 * pi
 END_MARGIN = 1e-6

@@ -22,12 +22,11 @@ from planar.assemblies.polynomial.completeness import Completeness
 from planar.assemblies.polynomial.isotropic_form import isotropic_form
 from planar.assemblies.search_tree import is_linear
 from planar.equations.constraint_equations import Block, slice_length
+from planar.foundation.arrays import Array
 from planar.model.pairs import MeasureKind
 from planar.solving.assembly.block_assemblies import block_dependencies
 from planar.solving.newton import CLOSED_TOLERANCE
 from planar.solving.prepared_mechanism import PreparedMechanism
-
-Array = np.ndarray
 
 DyadChoices = tuple[int, ...]
 """Of every block on the way which of its two closed forms is taken, 0 where there is no choice to make."""
@@ -101,8 +100,8 @@ class _DeadPointSearch:
         if any(crossings) or any(high - low < SAME_POSITION_DISTANCE for low, high in pairwise(every)):
             doubts.append(BRANCHES_CROSS)
         if self.slides and not self._is_bounded():
-            low, high = (self.setup.describe_input(self.pair, at) for at in self.span)
-            doubts.append(f"other slides may let it run on without end; it was looked over from {low} to {high}")
+            first, last = (self.setup.describe_input(self.pair, at) for at in self.span)
+            doubts.append(f"other slides may let it run on without end; it was looked over from {first} to {last}")
         return CriticalPositions(self._to_si(found), self._to_si(crossings), self._si_range(), tuple(doubts))
 
     def _to_si(self, found: Sequence[Sequence[float]]) -> tuple[float, ...]:
@@ -160,14 +159,14 @@ class _DeadPointSearch:
 
     def _earlier_assemblies(self, level: int, at: float) -> list[tuple[DyadChoices, Array]]:
         """Every assembly of the blocks on which one hangs."""
-        found = [((), np.zeros(len(self.setup.equations.unknowns)))]
+        found: list[tuple[DyadChoices, Array]] = [((), np.zeros(len(self.setup.equations.unknowns)))]
         u = self._inputs_at(at)
         earlier = tuple(sorted(self.dependencies[level]))
         for k, group in enumerate(earlier):
             key = at, earlier[: k + 1]
             if key not in self._reached:
                 own = self.stages[group].unknowns
-                following = []
+                following: list[tuple[DyadChoices, Array]] = []
                 for choices, z in found:
                     for choice, values in self._assemblies(group, z, u):
                         there = z.copy()

@@ -19,8 +19,7 @@ from planar.assemblies.polynomial.path_tracker import (
     track_paths,
 )
 from planar.equations.constraint_equations import ConstraintEquations
-
-Array = np.ndarray
+from planar.foundation.arrays import Array, ComplexArray
 
 COMPLEX_MIDPOINT = 0.5 + 0.3j
 """Of the way from one position to another: the complex place between."""
@@ -38,7 +37,7 @@ class MovingSolutions:
     def __init__(self, equations: ConstraintEquations, form: IsotropicForm):
         self.equations, self.form = equations, form
         self._by_eigenvalues = True
-        self._last_solutions: tuple[BlockPolynomials, Array] | None = None
+        self._last_solutions: tuple[BlockPolynomials, ComplexArray] | None = None
         self._many: int | None = None
 
     def discriminant(self, z: Array, u: Array, p: Array) -> SignedLog:
@@ -67,7 +66,7 @@ class MovingSolutions:
         part = whole.real if abs(whole.real) > abs(whole.imag) else whole.imag
         return SignedLog(float(np.sign(part)), float(np.sum(sizes)))
 
-    def _track_solutions(self, numbers: BlockPolynomials) -> Array | None:
+    def _track_solutions(self, numbers: BlockPolynomials) -> ComplexArray | None:
         """All that count once at the position before; None where they do not here."""
         if self._last_solutions is None:
             begin = generic_instance(self.equations, self.form, numbers)
@@ -89,7 +88,7 @@ class MovingSolutions:
         return found
 
 
-def _single_ends(ends: PathEnds) -> Array | None:
+def _single_ends(ends: PathEnds) -> ComplexArray | None:
     """The ends of all paths that are single solutions; None where some others are not at infinity."""
     lost = ~ends.is_single & is_finite_solution(ends.V, INFINITY_TOLERANCE)
     found = ends.V[ends.is_single]

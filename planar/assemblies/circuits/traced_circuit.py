@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer
 from planar.solving.continuation.path_pieces import PathPiece
 from planar.solving.continuation.period import MAX_PIECES
@@ -15,8 +16,6 @@ from planar.solving.continuation.predictor_corrector import CurveTracker
 from planar.solving.continuation.solution_curve import SolutionCurve
 from planar.solving.position import PositionSolver
 from planar.solving.runs.closed_circuit import follow_circuit, is_endless, moving_pieces, split_at_dead_points
-
-Array = np.ndarray
 
 TURN = 2.0 * pi
 
@@ -131,7 +130,7 @@ def trace_circuit(solver: PositionSolver, index: int, z: Array) -> TracedCircuit
     legs = [BranchLeg(walk.curve, stretch.pieces, first, 1.0) for stretch in whole.branches]
     rests = tuple(leg.ends[1] for leg in (legs if whole.starts_at_dead_point else legs[:-1]))
     if len(legs) == 1 or whole.starts_at_dead_point:
-        branches = [(leg,) for leg in legs]
+        branches: list[tuple[BranchLeg, ...]] = [(leg,) for leg in legs]
     else:  # the last comes back to where the first has started
         branches = [(legs[-1], legs[0]), *((leg,) for leg in legs[1:-1])]
     return TracedCircuit(solver, tuple(branches), 0, rests, bool(walk.passed), True, "", turns)

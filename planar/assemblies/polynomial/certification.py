@@ -17,8 +17,7 @@ import numpy as np
 
 from planar.assemblies.polynomial.isotropic_form import IsotropicForm
 from planar.codegen.generic_evaluation import evaluate_function
-
-Array = np.ndarray
+from planar.foundation.arrays import Array, BoolArray, ComplexArray
 
 BALL_PRECISION_BITS = 128
 BOX_HALF_WIDTHS = (1e-7, 1e-9, 1e-11, 1e-13)
@@ -31,12 +30,12 @@ class Certificate(NamedTuple):
     `decided`: whether it is proved that it is so, or that it is not.
     """
 
-    proved: Array
-    real: Array
-    decided: Array
+    proved: BoolArray
+    real: BoolArray
+    decided: BoolArray
 
 
-def certify_solutions(form: IsotropicForm, given: Sequence[Array], V: Array) -> Certificate:
+def certify_solutions(form: IsotropicForm, given: Sequence[Array], V: ComplexArray) -> Certificate:
     """What is proved of solutions V (solutions, 2 many) of a block at (z, u, p)."""
     from flint import ctx
 
@@ -50,7 +49,7 @@ def certify_solutions(form: IsotropicForm, given: Sequence[Array], V: Array) -> 
         ctx.prec = before
 
 
-def _certify_balls(balls: _BallPolynomials, V: Array) -> Certificate:
+def _certify_balls(balls: _BallPolynomials, V: ComplexArray) -> Certificate:
     count, m = len(V), V.shape[1] // 2
     proved, real, decided = (np.zeros(count, dtype=bool) for _ in range(3))
     x, y = balls.reduce_solutions(V[:, :m], V[:, m:])
@@ -65,12 +64,12 @@ def _certify_balls(balls: _BallPolynomials, V: Array) -> Certificate:
     apart = np.abs(w[:, None] - w[None]).max(axis=2, initial=0.0)
     np.fill_diagonal(apart, np.inf)
     safe = np.where(np.isfinite(half), half, 0.0)
-    for k in np.flatnonzero(proved):
+    for k in np.flatnonzero(proved).tolist():
         others = proved & (apart[k] <= 4.0 * (safe[k] + safe))
         if others.any():
             proved[k] = False
     n = w.shape[1] // 2
-    for k in np.flatnonzero(proved):
+    for k in np.flatnonzero(proved).tolist():
         image = np.concatenate([w[k, n:], w[k, :n]]).conj()
         gap = float(np.abs(image - w[k]).max())
         if gap > 4.0 * half[k]:
@@ -144,7 +143,7 @@ class _BallPolynomials:
             found.append(whole)
         return found
 
-    def reduce_solutions(self, X: Array, Y: Array) -> tuple[Array, Array]:
+    def reduce_solutions(self, X: ComplexArray, Y: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
         """x and y of solutions, measured."""
         x, y = X[:, self.free], Y[:, self.free]
         return x / (x @ self.c)[:, None], y / (y @ self.c.conj())[:, None]
@@ -184,7 +183,7 @@ class _BallPolynomials:
             slope += [c + none, none + [each.conjugate() for each in c]]
         return left, slope
 
-    def prove_box(self, w: Array) -> tuple[float, list[Any]] | None:
+    def prove_box(self, w: ComplexArray) -> tuple[float, list[Any]] | None:
         """The half width of a box about w that holds one solution and no other, and a narrow box of it within."""
         middle = [self.acb(each.real, each.imag) for each in w]
         left, slope = self._residuals_and_jacobian(middle, True)
@@ -201,18 +200,18 @@ class _BallPolynomials:
         for half in BOX_HALF_WIDTHS:
             box = self._box(w, half)
             wide = one - near * self.mat(self._residuals_and_jacobian(box, True)[1])
-            about = self.mat([[each] for each in self._box(np.zeros(len(w)), half)])
+            about = self.mat([[each] for each in self._box(np.zeros(len(w), dtype=complex), half)])
             moved = (wide * about - step).entries()
             if all(_is_within(each, half) for each in moved):
                 return half, [at + each for at, each in zip(middle, moved, strict=True)]
         return None
 
-    def _box(self, w: Array, half: float) -> list[Any]:
+    def _box(self, w: ComplexArray, half: float) -> list[Any]:
         from flint import arb
 
         return [self.acb(arb(each.real, half), arb(each.imag, half)) for each in w.astype(complex)]
 
-    def is_own_image(self, w: Array, half: float, inside: Sequence[Any]) -> bool:
+    def is_own_image(self, w: ComplexArray, half: float, inside: Sequence[Any]) -> bool:
         """Whether the mirror image of the solution lies in the box of which it is the only one."""
         n = len(self.free)
         image = [each.conjugate() for each in (*inside[n:], *inside[:n])]
@@ -230,9 +229,10 @@ def _is_within(ball: Any, half: float) -> bool:
     return bool(ball.real.abs_upper() < half) and bool(ball.imag.abs_upper() < half)
 
 
-def _pivots(rows: Array) -> list[int]:
+def _pivots(rows: ComplexArray) -> list[int]:
     """Columns, one for each row, that are as independent as can be had: the longest of what is left each time."""
-    left, found = rows.copy(), []
+    left = rows.copy()
+    found: list[int] = []
     for _ in range(len(rows)):
         sizes = np.linalg.norm(left, axis=0)
         sizes[found] = -1.0

@@ -8,8 +8,7 @@ import numpy as np
 
 from planar.assemblies.polynomial.isotropic_form import ZERO_TOLERANCE, BlockPolynomials, IsotropicForm
 from planar.equations.constraint_equations import ConstraintEquations
-
-Array = np.ndarray
+from planar.foundation.arrays import BoolArray, ComplexArray
 
 
 class CoefficientFamily(NamedTuple):
@@ -17,7 +16,7 @@ class CoefficientFamily(NamedTuple):
     conjugate."""
 
     form: IsotropicForm
-    span: Array
+    span: ComplexArray
 
     def draw_member(self, rng: np.random.Generator) -> BlockPolynomials:
         """A random member, complex: its Y is not the conjugate of its X."""
@@ -25,14 +24,14 @@ class CoefficientFamily(NamedTuple):
         x, y = (rng.normal(size=many) + 1j * rng.normal(size=many) for _ in range(2))
         return self._split_coefficients(self.span @ x, self.span.conj() @ y)
 
-    def _split_coefficients(self, x: Array, y: Array) -> BlockPolynomials:
+    def _split_coefficients(self, x: ComplexArray, y: ComplexArray) -> BlockPolynomials:
         loops, singles, many = len(self.form.combined), len(self.form.single), self.form.entry_count
         A, a = x[: loops * many].reshape(loops, many), x[loops * many :].reshape(singles, many)
         B, b = y[: loops * many].reshape(loops, many), y[loops * many :].reshape(singles, many)
         return BlockPolynomials(A, B, a, b)
 
 
-def coefficient_family(e: ConstraintEquations, form: IsotropicForm, absent: Array) -> CoefficientFamily:
+def coefficient_family(e: ConstraintEquations, form: IsotropicForm, absent: BoolArray) -> CoefficientFamily:
     """The least linear family that holds every linkage of a structure in which some coefficients are `absent`."""
     rng = np.random.default_rng(3)
     wanted = form.entry_count * (len(form.combined) + len(form.single)) + 8
@@ -48,7 +47,7 @@ def coefficient_family(e: ConstraintEquations, form: IsotropicForm, absent: Arra
     return CoefficientFamily(form, span)
 
 
-def _span(columns: Array) -> Array:
+def _span(columns: ComplexArray) -> ComplexArray:
     """An orthonormal basis of what columns span."""
     directions, sizes, _ = np.linalg.svd(columns, full_matrices=False)
     return directions[:, sizes > 1e-9 * max(sizes[0], 1e-300)] if len(sizes) else columns

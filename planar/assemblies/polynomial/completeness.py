@@ -5,9 +5,7 @@ from __future__ import annotations
 from enum import Enum
 from typing import NamedTuple
 
-import numpy as np
-
-Array = np.ndarray
+from planar.foundation.arrays import Array, BoolArray
 
 
 class Completeness(Enum):
@@ -29,8 +27,8 @@ class BlockRoots(NamedTuple):
     """
 
     real: Array
-    double: Array
-    certified: Array
+    double: BoolArray
+    certified: BoolArray
     expected: int | None
     found: int
     complete: Completeness

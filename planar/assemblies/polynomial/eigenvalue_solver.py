@@ -17,8 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.assemblies.polynomial.isotropic_form import BlockPolynomials, IsotropicForm
-
-Array = np.ndarray
+from planar.foundation.arrays import ComplexArray, IntArray
 
 MAX_DIMENSION = 3
 """Dimensions up to which eigenvalues are sought; beyond, paths are followed: their number grows less than the size's
@@ -28,14 +27,14 @@ cube."""
 class _MonomialTables(NamedTuple):
     """What depends on the dimension alone: places, the inverse of the monomials there, which minors, products."""
 
-    points: Array
-    inverse: Array
-    minors: Array
-    product_index: Array
+    points: ComplexArray
+    inverse: ComplexArray
+    minors: IntArray
+    product_index: IntArray
     "(d + 1, monomials of degree d): which monomial of degree d + 1 the product with an entry of x is"
 
 
-def eigenvalue_solutions(form: IsotropicForm, polynomials: BlockPolynomials) -> Array | None:
+def eigenvalue_solutions(form: IsotropicForm, polynomials: BlockPolynomials) -> ComplexArray | None:
     """As many solutions X, Y (C(2d, d), 2 many) as Bezout's number; None where these are not single solutions."""
     d = form.dimension
     room = _monomial_tables(d)
@@ -78,6 +77,6 @@ def _monomial_tables(d: int) -> _MonomialTables:
     return _MonomialTables(places, np.linalg.inv(values), np.array(list(combinations(range(2 * d), d + 1))), times)
 
 
-def _kernel(rows: Array) -> Array:
+def _kernel(rows: ComplexArray) -> ComplexArray:
     """An orthonormal basis of what rows send to nothing (many, d + 1)."""
     return np.linalg.svd(rows)[2][len(rows) :].conj().T if len(rows) else np.eye(rows.shape[1], dtype=complex)

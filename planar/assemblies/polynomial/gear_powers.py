@@ -10,20 +10,20 @@ are entries of X and Y of their own (see `isotropic_form`), each the product or 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from itertools import permutations, product
 from math import lcm
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 
 from planar.codegen.generic_evaluation import OPERATIONS, evaluate_function
 from planar.equations.constraint_equations import Block, ConstraintEquations
+from planar.foundation.arrays import Array
 from planar.model.pairs import MeasureKind
 
-Array = np.ndarray
 IntegerVector = tuple[int, ...]
 
 MAX_DENOMINATOR = 1000
@@ -97,7 +97,11 @@ def angle_arguments(e: ConstraintEquations, stage: Block, angles: Sequence[int],
         new = ca.SX.sym(f"argument {len(found)}"), rates[0], still
         return found.setdefault((*rates[0], *at.ravel().round(12)), new)[0]
 
-    done = OPERATIONS | {ca.OP_COS: lambda of: ca.cos(symbol(of)), ca.OP_SIN: lambda of: ca.sin(symbol(of))}
+    done: dict[int, Callable[..., Any]] = {
+        **OPERATIONS,
+        ca.OP_COS: lambda of: ca.cos(symbol(of)),
+        ca.OP_SIN: lambda of: ca.sin(symbol(of)),
+    }
     loops = [row.kind is MeasureKind.LENGTH for row in e.rows[stage.rows]]
     closed, between = (e.F[stage.rows][np.flatnonzero(np.equal(loops, which)).tolist()] for which in (True, False))
     rows = ca.Function("rows", [e.z, e.u, e.p], [ca.densify(closed)])
@@ -109,10 +113,10 @@ def angle_arguments(e: ConstraintEquations, stage: Block, angles: Sequence[int],
     except (_NonlinearArgument, KeyError):
         return None
     start = -ca.mtimes(ca.SX(np.linalg.pinv(relations)), left) if len(relations) else ca.SX.zeros(len(angles))
-    symbols, rates, still = zip(*found.values(), strict=True) if found else ((), (), ())
-    rates = np.array(rates).reshape(len(found), len(angles))
-    still = tuple(each + ca.dot(ca.SX(of), start) for each, of in zip(still, rates, strict=True))
-    return AngleArguments(ca.vertcat(*written), symbols, rates, still, relations, start)
+    symbols = tuple(each for each, _, _ in found.values())
+    rates = np.array([of for _, of, _ in found.values()]).reshape(len(found), len(angles))
+    offsets = tuple(each + ca.dot(ca.SX(of), start) for (_, _, each), of in zip(found.values(), rates, strict=True))
+    return AngleArguments(ca.vertcat(*written), symbols, rates, offsets, relations, start)
 
 
 def gear_powers(rates: Array, relations: Array) -> GearPowers | None:

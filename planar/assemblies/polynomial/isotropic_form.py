@@ -30,9 +30,8 @@ import numpy as np
 from planar.assemblies.polynomial.gear_powers import AngleArguments, GearPowers, angle_arguments, gear_powers
 from planar.equations.casadi_call import BufferedFunction
 from planar.equations.constraint_equations import Block, ConstraintEquations
+from planar.foundation.arrays import Array, ComplexArray, IntArray
 from planar.model.pairs import MeasureKind
-
-Array = np.ndarray
 
 ZERO_TOLERANCE = 1e-10
 """Of numbers about one: what is rounding."""
@@ -43,13 +42,13 @@ RANDOM_POINTS = 4
 class BlockPolynomials(NamedTuple):
     """One block with numbers filled in; see the module for the letters."""
 
-    A: Array
-    B: Array
-    a: Array
-    b: Array
+    A: ComplexArray
+    B: ComplexArray
+    a: ComplexArray
+    b: ComplexArray
 
     @property
-    def flat_coefficients(self) -> tuple[Array, Array]:
+    def flat_coefficients(self) -> tuple[ComplexArray, ComplexArray]:
         """All coefficients of X, and all of Y, each in one row."""
         return (
             np.concatenate([self.A.ravel(), self.a.ravel()]),
@@ -106,7 +105,7 @@ class IsotropicForm(NamedTuple):
         return comb(2 * self.dimension, self.dimension)
 
     @property
-    def products(self) -> Array:
+    def products(self) -> IntArray:
         """(equations, 4): X[i] Y[j] - X[k] Y[l] = 0."""
         turned = self.gears.products if self.gears else [(j, j, 0, 0) for j in range(1, self.first_length)]
         slid = [(self.first_length + m, j, j, self.first_length + m) for m, j in enumerate(self.direction_index)]
@@ -115,13 +114,13 @@ class IsotropicForm(NamedTuple):
     def polynomials(self, z: Array, u: Array, p: Array) -> BlockPolynomials:
         """The block where all before it stands at z, for inputs u and numbers p."""
         real, imaginary = (each.T for each in self.factors_call(z, u, p))
-        alpha = real + 1j * imaginary
-        loops = self.combined @ alpha
+        alpha: ComplexArray = real + 1j * imaginary
+        loops: ComplexArray = self.combined @ alpha
         # of what is real one half stands with X, one with Y: in a loop both are put together
         loops[:, self.real_entries] *= 2.0
         return BlockPolynomials(loops, loops.conj(), self.single @ alpha, self.single @ alpha.conj())
 
-    def nearest_real_unknowns(self, X: Array, Y: Array, given: Sequence[Array]) -> Array:
+    def nearest_real_unknowns(self, X: ComplexArray, Y: ComplexArray, given: Sequence[Array]) -> Array:
         """The real unknowns of the block (solutions, unknowns) that lie nearest to solutions at finite places, at
         (z, u, p)."""
         found = np.zeros((len(X), len(self.angles) + len(self.lengths)))

@@ -15,8 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.assemblies.polynomial.isotropic_form import BlockPolynomials, IsotropicForm
-
-Array = np.ndarray
+from planar.foundation.arrays import Array, BoolArray, ComplexArray, IntArray
 
 FIRST_STEP = 0.05
 MIN_STEP = 1e-11
@@ -42,19 +41,19 @@ class PathEnds(NamedTuple):
     `near`: whether the path came so near to the end that what it comes to is to be seen.
     """
 
-    V: Array
+    V: ComplexArray
     regularity: Array
-    has_converged: Array
-    is_near_end: Array
+    has_converged: BoolArray
+    is_near_end: BoolArray
 
     @property
-    def is_single(self) -> Array:
+    def is_single(self) -> BoolArray:
         """Which are isolated solutions that count once."""
         return self.has_converged & (self.regularity > SINGULAR_TOLERANCE)
 
 
-HomotopyValues = tuple[Array, Array, Array]
-Homotopy = Callable[[Array, Array], HomotopyValues]
+HomotopyValues = tuple[ComplexArray, ComplexArray, ComplexArray]
+Homotopy = Callable[[ComplexArray, Array], HomotopyValues]
 """Solutions (paths, 2 many), how far on the way (paths,) -> equations (paths, rows), slope, derivative along it."""
 
 
@@ -68,7 +67,7 @@ class CoefficientHomotopy:
         m = form.entry_count
         self.rows = 2 * m - 2
 
-    def __call__(self, V: Array, way: Array) -> HomotopyValues:
+    def __call__(self, V: ComplexArray, way: Array) -> HomotopyValues:
         """The equations, their slope, and their derivative along the way."""
         m, products = self.many, self.products
         X, Y = V[:, :m], V[:, m:]
@@ -108,7 +107,7 @@ class ProductHomotopy:
         self.l, self.r = (_random_complex(rng, equations, many) for _ in range(2))
         self.turned = np.exp(1j * rng.uniform(0.0, 2.0 * np.pi))
 
-    def __call__(self, V: Array, way: Array) -> HomotopyValues:
+    def __call__(self, V: ComplexArray, way: Array) -> HomotopyValues:
         """The equations, their slope, and their derivative along the way."""
         m, fixed = self.form.entry_count, 2 * len(self.end.A)
         left, slope, _ = self.whole(V, np.zeros(len(V)))
@@ -123,7 +122,7 @@ class ProductHomotopy:
         slope[:, fixed:, m:] += (self.turned * away * one)[..., None] * self.r
         return left, slope, along
 
-    def starts(self) -> Array:
+    def starts(self) -> ComplexArray:
         """The solutions of the products: in half of them the form in X vanishes, in the others that in Y."""
         equations = 2 * self.form.dimension
         chosen = [np.isin(np.arange(equations), own) for own in combinations(range(equations), self.form.dimension)]
@@ -132,7 +131,7 @@ class ProductHomotopy:
         return np.concatenate([np.array(X), np.array(Y)], axis=1)
 
 
-def track_paths(homotopy: Homotopy, V: Array, near: float = PREDICTION_TOLERANCE) -> PathEnds:
+def track_paths(homotopy: Homotopy, V: ComplexArray, near: float = PREDICTION_TOLERANCE) -> PathEnds:
     """The solutions at the end of the way from those at its beginning."""
     V = normalize(V)
     way, step = np.zeros(len(V)), np.full(len(V), FIRST_STEP)
@@ -154,7 +153,7 @@ def track_paths(homotopy: Homotopy, V: Array, near: float = PREDICTION_TOLERANCE
     return refine_ends(homotopy, V, way >= 1.0)._replace(is_near_end=way > 1.0 - END_VISIBLE_DISTANCE)
 
 
-def refine_ends(homotopy: Homotopy, V: Array, arrived: Array) -> PathEnds:
+def refine_ends(homotopy: Homotopy, V: ComplexArray, arrived: BoolArray) -> PathEnds:
     """Solutions carried to round-off at the end of the way."""
     arrived = arrived.copy()
     one = np.ones(len(V))
@@ -172,7 +171,9 @@ def refine_ends(homotopy: Homotopy, V: Array, arrived: Array) -> PathEnds:
     return PathEnds(V, regular, arrived, arrived.copy())
 
 
-def _runge_kutta_step(at: Homotopy, V: Array, way: Array, h: Array, ahead: Array) -> tuple[Array, Array, Array]:
+def _runge_kutta_step(
+    at: Homotopy, V: ComplexArray, way: Array, h: Array, ahead: Array
+) -> tuple[ComplexArray, Array, Array]:
     """Solutions a step on, and how far Newton's two corrections moved them."""
     wide = h[:, None]
     k1 = _tangent(at, V, V, way)
@@ -189,7 +190,7 @@ def _runge_kutta_step(at: Homotopy, V: Array, way: Array, h: Array, ahead: Array
     return normalize(np.where(np.isfinite(sizes[1])[:, None], tried, V)), sizes[0], sizes[1]
 
 
-def _with_patch_rows(slope: Array, patch: Array) -> Array:
+def _with_patch_rows(slope: ComplexArray, patch: ComplexArray) -> ComplexArray:
     """The slope with the two rows that keep X and Y from growing."""
     half = patch.shape[1] // 2
     rows = np.zeros((len(patch), 2, 2 * half), dtype=complex)
@@ -197,27 +198,27 @@ def _with_patch_rows(slope: Array, patch: Array) -> Array:
     return np.concatenate([slope, rows], axis=1)
 
 
-def _tangent(at: Homotopy, patch: Array, V: Array, way: Array) -> Array:
+def _tangent(at: Homotopy, patch: ComplexArray, V: ComplexArray, way: Array) -> ComplexArray:
     _, slope, along = at(V, way)
     return _solve_batch(_with_patch_rows(slope, patch), np.pad(-along, ((0, 0), (0, 2))))
 
 
-def _newton_step(at: Homotopy, patch: Array, V: Array, way: Array) -> tuple[Array, Array]:
+def _newton_step(at: Homotopy, patch: ComplexArray, V: ComplexArray, way: Array) -> tuple[ComplexArray, ComplexArray]:
     left, slope, _ = at(V, way)
     slope = _with_patch_rows(slope, patch)
     return _solve_batch(slope, np.pad(-left, ((0, 0), (0, 2)))), slope
 
 
-def _solve_batch(slope: Array, right: Array) -> Array:
+def _solve_batch(slope: ComplexArray, right: ComplexArray) -> ComplexArray:
     try:
         return np.linalg.solve(slope, right[..., None])[..., 0]
     except np.linalg.LinAlgError:
-        bad = ~np.isfinite(slope).all(axis=(1, 2))
+        bad = np.logical_not(np.isfinite(slope).all(axis=(1, 2)))
         slope = np.where(bad[:, None, None], np.eye(slope.shape[1]), slope)
         return _matrix_times_vector(np.linalg.pinv(slope), np.where(bad[:, None], np.nan, right))
 
 
-def normalize(V: Array) -> Array:
+def normalize(V: ComplexArray) -> ComplexArray:
     """X and Y of length one each."""
     half = V.shape[1] // 2
     parts = (V[:, :half], V[:, half:])
@@ -225,7 +226,7 @@ def normalize(V: Array) -> Array:
         return np.concatenate([each / np.linalg.norm(each, axis=1, keepdims=True) for each in parts], axis=1)
 
 
-def is_duplicate(V: Array) -> Array:
+def is_duplicate(V: ComplexArray) -> BoolArray:
     """Which solutions lie on another one (solutions,)."""
     half = V.shape[1] // 2
     X, Y = V[:, :half], V[:, half:]
@@ -235,15 +236,15 @@ def is_duplicate(V: Array) -> Array:
     return apart.min(axis=1, initial=1.0) < SAME_SOLUTION_DISTANCE
 
 
-def _matrix_times_vector(matrices: Array, vectors: Array) -> Array:
+def _matrix_times_vector(matrices: ComplexArray, vectors: ComplexArray) -> ComplexArray:
     return (matrices @ vectors[..., None])[..., 0]
 
 
-def _random_complex(rng: np.random.Generator, *shape: int) -> Array:
+def _random_complex(rng: np.random.Generator, *shape: int) -> ComplexArray:
     return rng.normal(size=shape) + 1j * rng.normal(size=shape)
 
 
-def _null_vector(matrix: Array) -> Array:
+def _null_vector(matrix: ComplexArray) -> ComplexArray:
     return np.linalg.svd(matrix)[2][-1].conj()
 
 
@@ -254,7 +255,7 @@ class GenericInstance(NamedTuple):
     """
 
     begin: BlockPolynomials
-    V: Array
+    V: ComplexArray
     bound: int
     finite: int
 
@@ -278,7 +279,7 @@ def solve_generic_instance(
     return GenericInstance(begin, V, form.bezout_number, int(np.sum(is_finite_solution(V))))
 
 
-def _distinct_rows(V: Array) -> Array:
+def _distinct_rows(V: ComplexArray) -> IntArray:
     kept: list[int] = []
     for k in range(len(V)):
         if not kept or not is_duplicate(V[[*kept, k]])[-1]:
@@ -286,7 +287,7 @@ def _distinct_rows(V: Array) -> Array:
     return np.array(kept, dtype=int)
 
 
-def is_finite_solution(V: Array, least: float = 1e-7) -> Array:
+def is_finite_solution(V: ComplexArray, least: float = 1e-7) -> BoolArray:
     """Which solutions are at finite places, X0 and Y0 not vanishing."""
     half = V.shape[1] // 2
     return (np.abs(V[:, 0]) > least) & (np.abs(V[:, half]) > least)

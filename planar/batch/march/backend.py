@@ -114,7 +114,8 @@ class RunnerLadder:
                 if left.size == len(good):
                     good = runner.run(batch, out)
                 else:
-                    own = allocate_aligned(*out.shape[:2], left.size)
+                    steps, rows, _ = out.shape
+                    own = allocate_aligned(steps, rows, left.size)
                     good[left] = runner.run(batch.select(left), own)
                     out[:, :, left] = own
             except UnsupportedStructure:

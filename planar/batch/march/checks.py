@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import copy
 from typing import NamedTuple
 
@@ -13,6 +14,8 @@ from planar.equations.coordinates import coordinate_columns, frames_from_coordin
 from planar.equations.functions import EquationFunctions
 from planar.equations.linear import solve_arrays
 from planar.equations.residuals import split_pair_numbers
+from planar.foundation.geometry import Frame
+from planar.foundation.jets import Scalar
 from planar.model.mechanism import Mechanism
 from planar.solving.checks.branch_check import BranchCheck, is_move_allowed
 from planar.solving.checks.residual_check import EPS, NEGLIGIBLE_ERROR, ResidualCheck
@@ -31,10 +34,10 @@ class DesignPositions(NamedTuple):
 
 
 class DesignBranchCheck(BranchCheck):
-    """The second part of the gate, for designs each with its own p (numbers, designs): see `Branch`."""
+    """The second part of the gate, for designs each with its own p: see `BranchCheck`."""
 
-    def __init__(self, columns: DesignFunctions, p: Array):
-        super().__init__(columns, p)  # type: ignore[arg-type] - it asks for slopes and equations only
+    def __init__(self, functions: DesignFunctions):
+        super().__init__(functions.program, functions.p)
 
     def evaluate(self, z: Array, u: Array) -> DesignPositions:
         """What is judged at a step; z (designs, unknowns), u (designs, inputs)."""
@@ -90,7 +93,7 @@ class DesignResidualCheck:
         self.mechanism, self.program = mechanism, program
         self.residual_check = copy(residual_check)
         self.residual_check.unit = 1.0
-        self.residual_check.numbers = split_pair_numbers(mechanism.pairs, p)
+        self.residual_check.numbers = {**split_pair_numbers(mechanism.pairs, list(p))}
         # a pin of many links has motions between links that no pair of its own joins
         for given in mechanism.inputs:
             self.residual_check.numbers.setdefault(given.pair, tuple(residual_check.numbers[given.pair]))
@@ -98,8 +101,10 @@ class DesignResidualCheck:
         self.links = [link.name for link in mechanism.links]
         self.pairs = {pair.name: pair for pair in mechanism.pairs}
 
-    def frames_from_coordinates(self, w):  # noqa: ANN001, ANN201 - arrays or jets alike
-        """Frames of links and own coordinates of pairs from w (coordinates, designs)."""
+    def frames_from_coordinates(
+        self, w: Sequence[Scalar] | Array
+    ) -> tuple[dict[str, Frame], dict[str, tuple[Scalar, ...]]]:
+        """Frames of links and own coordinates of pairs from w (coordinates, designs), arrays or jets."""
         return frames_from_coordinates(w, self.column, self.links, self.pairs)
 
     def is_resolved(self, w: Array) -> Array:

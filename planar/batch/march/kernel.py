@@ -144,7 +144,7 @@ class KernelWriter:
             "u2": ca.SX.sym("u2", e.u.numel()),
             "sign": ca.vertcat(ca.SX(0, 1), *(form.sign for form in equations.closed_forms)),
         }
-        self.hoister = InvariantHoister(lambda value: value.data[0] in invariant)
+        self.hoister = InvariantHoister[Operand](lambda operand: operand[0] in invariant)
         self.hoisted_names: dict[int, str] = {}
         "of what does not vary"
         self.sign_index = {
@@ -159,16 +159,16 @@ class KernelWriter:
         """The values of expressions where numbers stand under these names. Raises BareAngle, UnsupportedOperation."""
         function = ca.Function("part", list(self.symbols.values()), [ca.densify(ca.vertcat(*outputs))], {"cse": True})
         check_length(self.ir.count + function.n_instructions())
-        listing = InstructionList()
+        listing: InstructionList[Operand] = InstructionList()
         angles: dict[int, CosSin] = {}
         arguments = []
         for name, symbol in self.symbols.items():
-            numbers = [listing.add("input", data=(name, k)) for k in range(symbol.numel())]
+            numbers = [listing.add_input((name, k)) for k in range(symbol.numel())]
             arguments.append(numbers)
             turned = self.equations.is_angle if name == "z" else self.equations.input_is_angle if name == "u" else ()
             for k, is_angle in enumerate(turned):
                 if is_angle:
-                    angles[numbers[k]] = CosSin(*(listing.add("input", data=(name + part, k)) for part in "cs"))
+                    angles[numbers[k]] = CosSin(*(listing.add_input((name + part, k)) for part in "cs"))
         wanted = [each for output in listing.inline_function(function, arguments) for each in output]
         turned_out, wanted = expand_angle_sums(listing, wanted, angles)
         numbers = self.hoister.rebuild(turned_out, wanted)
@@ -186,11 +186,11 @@ class KernelWriter:
         order = required_values(made, wanted)
         names = {}
         for k in order:
-            value = made.instructions[k]
-            if value.operation == "input":
-                if value.data not in have:
-                    raise BareAngle(value.data)
-                names[k] = have[value.data]
+            operand = made.instructions[k].key
+            if operand is not None:
+                if operand not in have:
+                    raise BareAngle(operand)
+                names[k] = have[operand]
         ahead = [k for k in order if k in still and k not in self.hoisted_names]
         with self.ir.hoisted():
             self.ir.write_values(made, ahead, self.hoisted_names, names)

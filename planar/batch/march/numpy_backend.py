@@ -15,7 +15,7 @@ from planar.equations.functions import EquationRates
 from planar.equations.linear import solve_vectors
 from planar.equations.mechanism_numbers import mechanism_size, shapes_of_links
 from planar.foundation.geometry import Vector
-from planar.foundation.jets import Jet
+from planar.foundation.jets import Jet, Scalar
 from planar.solving.checks.residual_check import ResidualCheck
 
 Array = np.ndarray
@@ -102,8 +102,9 @@ def iterate_steps(
     if not task.program.is_square:
         raise UnsupportedStructure("constraints hold each other more than once")
     functions = functions or DesignFunctions(task.program, task.p)
-    closed, branches = make_residual_check(task), DesignBranchCheck(functions, task.p)
-    z, moves = np.ascontiguousarray(task.z0.T), []
+    closed, branches = make_residual_check(task), DesignBranchCheck(functions)
+    z = np.ascontiguousarray(task.z0.T)
+    moves: list[Array] = []
     before, ahead, last_way = None, None, None
     good = np.ones(len(z), dtype=bool)
     for u in inputs:
@@ -168,7 +169,7 @@ class PointWriter:
         found = at(z1, z2)
         return found.w, found.w1, found.w2
 
-    def _write_points(self, out: Array, w) -> None:  # noqa: ANN001 - arrays or jets alike
+    def _write_points(self, out: Array, w: Sequence[Scalar] | Array) -> None:
         frames, _ = self.residual_check.frames_from_coordinates(w)
         many = 2 * len(self.task.links)
         for k, link in enumerate(self.task.links):

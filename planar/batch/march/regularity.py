@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+from typing import TypeVar
+
+import numpy as np
+
+Number = TypeVar("Number", float, np.ndarray)
+
 LEAST_NUMPY_REGULARITY = 1e-4
 """Below it a march by numpy does not go on."""
 LEAST_KERNEL_REGULARITY = 1e-2
@@ -10,6 +16,6 @@ CLEAR_REGULARITY = 0.2
 """From it on no other assembly is near."""
 
 
-def least_regularity(base, unknowns: int):  # noqa: ANN001, ANN201 - numbers and arrays alike
+def least_regularity(base: Number, unknowns: int) -> Number:
     """The least volume of a block of so many unknowns; `base` is that of one or two, or of each design's."""
     return base if unknowns <= 2 else base**1.5

@@ -115,8 +115,9 @@ def bar_linkage_arrays(layouts: Sequence[PinLayout], wanted: Sequence[int] | Non
     sketch = PointArrays(owner[shown], place[whole.link[firsts[shown]]], both)
     told, own = _wanted_pins(layouts, which, wanted, shown, whole.first_pin)
     points = PointArrays(owner[told], place[whole.link[firsts[told]]], local[told])
-    start = np.array([layouts[k].crank_angle for k in which])
-    rates = np.array([(layouts[k].velocity, layouts[k].acceleration) for k in which]).reshape(-1, 2)
+    kept = [layouts[k] for k in which.tolist()]
+    start = np.array([each.crank_angle for each in kept])
+    rates = np.array([(each.velocity, each.acceleration) for each in kept]).reshape(-1, 2)
     every, yes = np.arange(len(which)), np.ones(len(which), dtype=bool)
     inputs = InputArrays(every, np.ones_like(every), start, yes, yes, *rates.T)
     many = np.diff(whole.first_link)[which]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from functools import partial
+from typing import NamedTuple
 
 import casadi as ca
 
@@ -43,28 +44,32 @@ class FormulaBuilder:
 
     def __init__(self, block_equations: BlockEquations):
         self.block_equations, self.equations = block_equations, block_equations.equations
-        self.instructions = InstructionList()
+        self.instructions: InstructionList[FormulaInput] = InstructionList()
         e, given, measures = self.equations, len(block_equations.given_links), block_equations.measures
         self.symbols = [e.u, e.p, ca.SX.sym("u1", e.u.numel()), ca.SX.sym("u2", e.u.numel())]
-        self.u, self.cos_sin = [], {}
+        self.u: list[int] = []
+        self.cos_sin: dict[int, CosSin] = {}
         for k in range(e.u.numel()):
             slot, part = (k // 3, k % 3) if k < 3 * given else (given + k - 3 * given, 0)
-            self.u.append(self.add_input("angle", (slot,)) if part == 2 else self.add_input("row", (slot, part)))
+            self.u.append(self.add_input("angle", slot) if part == 2 else self.add_input("row", slot, part))
             if part == 2 or e.input_kinds[k] is not Measure.LENGTH:
-                self.cos_sin[self.u[-1]] = CosSin(
-                    self.add_input("row", (slot, COS)), self.add_input("row", (slot, SIN))
-                )
+                self.cos_sin[self.u[-1]] = CosSin(self.add_input("row", slot, COS), self.add_input("row", slot, SIN))
         self.p = [self.add_input("p", k) for k in range(len(measures))]
         for place, k in enumerate(block_equations.angle_measures):
             both = (self.add_input("p", len(measures) + 2 * place + part) for part in (0, 1))
             self.cos_sin[self.p[k]] = CosSin(*both)
         rows = [(k // 3, X1 + k % 3, X2 + k % 3) if k < 3 * given else (given + k - 3 * given, X1, X2)
                 for k in range(e.u.numel())]  # fmt: skip
-        self.u1 = [self.add_input("row", (slot, first)) for slot, first, _ in rows]
-        self.u2 = [self.add_input("row", (slot, second)) for slot, _, second in rows]
+        self.u1 = [self.add_input("row", slot, first) for slot, first, _ in rows]
+        self.u2 = [self.add_input("row", slot, second) for slot, _, second in rows]
 
-    def add_input(self, what: str, data: Any) -> int:
-        return self.instructions.add("input", data=(what, data))
+    def add_input(self, source: str, place: int, part: int = 0) -> int:
+        """A value from outside; those of "angle" and "unknown" are stood for by their cos and sin."""
+        return self.instructions.add_input(FormulaInput(source, place, part))
+
+    def add_unknown(self) -> int:
+        """A value that no other is, stood for by its cos and sin, or by what it is put together from."""
+        return self.add_input("unknown", len(self.instructions.instructions))
 
     def _inline(
         self, of: Sequence[ca.SX], outputs: list[ca.SX], z: list[int], more: Sequence[list[int]] = ()
@@ -78,7 +83,7 @@ class FormulaBuilder:
     def closed_form_assembly(self, signs: Sequence[int], polished: bool = False) -> SymbolicAssembly:
         """The unknowns, group after group, by their closed forms; polished by a step of Newton's method."""
         e, way = self.equations, len(self.instructions.instructions)
-        z = [self.add_input("unknown", (way, k)) for k in range(e.z.numel())]
+        z = [self.add_input("unknown", way, k) for k in range(e.z.numel())]
         turned, bends, left = {}, [], iter(signs)
         for stage, form in zip(self.block_equations.blocks, self.block_equations.closed_forms, strict=True):
             assert form is not None
@@ -104,9 +109,9 @@ class FormulaBuilder:
         e, kind = self.equations, self.block_equations
         z, turned = [], {}
         for k, is_angle in enumerate(kind.unknown_is_angle):
-            z.append(self.add_input("unknown", ("of", k)) if is_angle else self.add_input("z", (k, 0)))
+            z.append(self.add_unknown() if is_angle else self.add_input("z", k, 0))
             if is_angle:
-                turned[k] = self.cos_sin[z[k]] = CosSin(self.add_input("z", (k, 0)), self.add_input("z", (k, 1)))
+                turned[k] = self.cos_sin[z[k]] = CosSin(self.add_input("z", k, 0), self.add_input("z", k, 1))
         if rates is None:
             step, square, *lengths = solve_with_volume(ca.densify(ca.jacobian(e.F, e.z)), e.F)
             strength = square / lengths[0] if lengths else square
@@ -127,29 +132,29 @@ class FormulaBuilder:
                 c, s = found
                 size = add("sqrt", add("add", add("mul", c, c), add("mul", s, s)))
                 parts[k] = [add("div", c, size), add("div", s, size)]
-                near[k] = self.add_input("unknown", ("near", len(self.instructions.instructions)))
+                near[k] = self.add_unknown()
                 self.cos_sin[near[k]] = CosSin(*parts[k])
             else:
                 near[k] = found[0]
         slope = block_jacobian(e, stage.rows, stage.unknowns)
         step = self._inline((), [solve_by_determinants(slope, e.F[stage.rows])], near)
-        found = {}
+        polished = {}
         for (k, own), back in zip(parts.items(), step, strict=True):
             if len(own) == 1:
-                found[k] = [add("sub", own[0], back)]
+                polished[k] = [add("sub", own[0], back)]
                 continue
             c, s = own
             half = add("mul", self.instructions.add_constant(-0.5), back)
             square = add("mul", half, half)
             scale = add("div", one, add("add", one, square))
             cos, sin = add("mul", add("sub", one, square), scale), add("mul", add("add", half, half), scale)
-            found[k] = [
+            polished[k] = [
                 add("sub", add("mul", c, cos), add("mul", s, sin)),
                 add("add", add("mul", s, cos), add("mul", c, sin)),
             ]
-        return found
+        return polished
 
-    def _inner_frames(self) -> tuple[dict[str, Frame], dict[str, tuple]]:
+    def _inner_frames(self) -> tuple[dict[str, Frame], dict[str, tuple[ca.SX, ...]]]:
         """Frames of the inner links and own coordinates of the pairs, in the unknowns."""
         e, kind = self.equations, self.block_equations
         column = coordinate_columns(e.coordinates)
@@ -172,8 +177,8 @@ class FormulaBuilder:
         e, kind = self.equations, self.block_equations
         places = ca.SX.sym("places", 3 * len(kind.inner_links))
         poses_given: list[int] = []
-        for k, (x, y, c, s) in enumerate(poses):
-            poses_given += [x, y, self.add_input("unknown", (len(self.instructions.instructions), k))]
+        for x, y, c, s in poses:
+            poses_given += [x, y, self.add_unknown()]
             self.cos_sin[poses_given[-1]] = CosSin(c, s)
         names = (*kind.given_links, *kind.inner_links)
         split = [*ca.vertsplit(e.u)[: 3 * len(kind.given_links)], *ca.vertsplit(places)]
@@ -222,10 +227,9 @@ class FormulaBuilder:
 
     def sketch_distance(self, poses: list[list[int]], sketch_sums: list[list[int]]) -> int:
         """The squared distance of the links' points to the sketch, from the sums of its points, see `BlockType`."""
-        add = self.instructions.add
+        add, mul = self.instructions.add, partial(self.instructions.add, "mul")
         whole = self.instructions.add_constant(0.0)
         for (x, y, c, s), (many, px, py, tx, ty, along, across, squares) in zip(poses, sketch_sums, strict=True):
-            mul = lambda a, b: add("mul", a, b)  # noqa: E731
             square = add("add", mul(x, x), mul(y, y))
             turned = add("sub", mul(c, px), mul(s, py)), add("add", mul(s, px), mul(c, py))
             mixed = add("add", mul(x, add("sub", turned[0], tx)), mul(y, add("sub", turned[1], ty)))
@@ -242,10 +246,9 @@ class FormulaBuilder:
         order = required_values(made, numbers)
         check_length(len(order))
         for number in order:
-            value = made.instructions[number]
-            if value.operation == "input":
-                what, data = value.data  # type: ignore[misc]
-                if what in ("angle", "unknown"):
+            key = made.instructions[number].key
+            if key is not None:
+                if key.source in ("angle", "unknown"):
                     raise UnsupportedOperation("an angle stands outside cos and sin")
-                leaves[number] = FormulaInput(what, *(data if isinstance(data, tuple) else (data,)))
+                leaves[number] = key
         return BlockFormula(made, tuple(numbers), leaves)

@@ -81,7 +81,7 @@ class BlockEquations:
         inputs = tuple(Input(p.name, 0.0) for p, joint in zip(pairs, signature.pairs, strict=True) if joint.driven)
         names = ("frame", *inner, *self.given_links)
         links = tuple(Link(name) for name in names)
-        self.mechanism = Mechanism("", "frame", links, pairs, inputs)  # type: ignore[arg-type]
+        self.mechanism = Mechanism("", "frame", links, pairs, inputs)  # type: ignore[arg-type]  # pairs as equations ask for them
         self.equations: ConstraintEquations = build_equations(self.mechanism, self.given_links)
         e = self.equations
         self.input_count = len(inputs)

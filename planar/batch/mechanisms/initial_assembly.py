@@ -141,8 +141,8 @@ def _unknowns_from_frames(
     `rows` gives a row of a slot (groups,), p (groups, numbers). Lengths of slides are read off the frames, in which
     they are linear.
     """
-    given = [
-        Frame(*(rows(slot, row) for row in range(POSE_ROWS)), np.zeros(len(p)))  # angles are asked of no pair here
+    given = [  # angles are asked of no pair here
+        Frame(rows(slot, X), rows(slot, Y), rows(slot, COS), rows(slot, SIN), np.zeros(len(p)))
         for slot in range(len(block_type.given_links))
     ]
     of = dict(zip((*block_type.given_links, *block_type.inner_links), (*given, *frames), strict=True)) | {

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from planar.batch.mechanisms.partition import Partition
 from planar.batch.mechanisms.solved_block_type import BlockType
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 Array = np.ndarray
 
@@ -136,11 +139,15 @@ class PartitionedLinkage(NamedTuple):
     shown_points: list[tuple[float, ...]]
 
 
+_BlockRow = tuple[int, Sequence[int], Sequence[float], int]
+"""A block: its owner, where its links are, the numbers of its pairs (m, rad), its number."""
+
+
 def make_linkage_arrays(linkages: Sequence[PartitionedLinkage]) -> LinkageArrays:
     """Parted linkages as arrays."""
     unit = np.array([one.partition.unit for one in linkages])
-    levels: dict[tuple[int, int], list] = {}
-    turns: dict[tuple[int, int], list] = {}
+    levels: dict[tuple[int, int], list[_BlockRow]] = {}
+    turns: dict[tuple[int, int], list[_BlockRow]] = {}
     kinds: dict[int, BlockType] = {}
     number = 0
     for owner, one in enumerate(linkages):
@@ -151,8 +158,12 @@ def make_linkage_arrays(linkages: Sequence[PartitionedLinkage]) -> LinkageArrays
             turns.setdefault((group.merged_level, id(group.block_type)), []).append(row)
             number += 1
 
-    def batches(of: dict[tuple[int, int], list]) -> list[BlockBatch]:
-        return [make_batch(kinds[key[1]], *map(list, zip(*of[key], strict=True)), unit) for key in sorted(of)]
+    def batches(of: dict[tuple[int, int], list[_BlockRow]]) -> list[BlockBatch]:
+        made = []
+        for key in sorted(of):
+            owners, places, p, block_numbers = zip(*of[key], strict=True)
+            made.append(make_batch(kinds[key[1]], owners, places, p, block_numbers, unit))
+        return made
 
     inputs = [(owner, 1 + k, *each) for owner, one in enumerate(linkages) for k, each in enumerate(one.inputs)]
     parts = zip(*inputs, strict=True)
@@ -172,10 +183,10 @@ def make_linkage_arrays(linkages: Sequence[PartitionedLinkage]) -> LinkageArrays
 
 def make_batch(
     block_type: BlockType,
-    owner: Sequence[int],
-    link_indices: Sequence,
-    p: Sequence,
-    block_numbers: Sequence[int],
+    owner: ArrayLike,
+    link_indices: ArrayLike,
+    p: ArrayLike,
+    block_numbers: ArrayLike,
     unit: Array,
 ) -> BlockBatch:
     """Groups of a kind with the numbers of their pairs p (groups, measures), in m, as the kind's formulas take them."""

@@ -51,14 +51,18 @@ def linkage_groups(mechanisms: Sequence[Mechanism], request: SweepRequest) -> It
     }
     laid = {k: each for k, each in laid.items() if len(each.bars) <= MAX_BARS}
     if laid and pins != ():
-        numbers = np.array(list(laid))
         own = bar_linkage_arrays(list(laid.values()), pins)
         if own is not None:
-            taken = set(numbers[own.which].tolist())
+            which = np.array(list(laid))[own.which]
+            taken = set(which.tolist())
             called = [f"P{k}" for k in range(max(len(each.pin_positions) for each in laid.values()))]
-            names = [[called[pin] for pin in each] for each in own.pins]
-            yield LinkageGroup(numbers[own.which], own.arrays, names, own.start, own.links_of_block)
-    ones, numbers, names, starts = [], [], [], []
+            yield LinkageGroup(
+                which, own.arrays, [[called[pin] for pin in each] for each in own.pins], own.start, own.links_of_block
+            )
+    ones: list[PartitionedLinkage] = []
+    numbers: list[int] = []
+    names: list[list[str]] = []
+    starts: list[float] = []
     for k, mechanism in enumerate(mechanisms):
         made = None if k in taken else _partition_linkage(mechanism, request)
         if made is not None:
@@ -123,7 +127,8 @@ def _partition_linkage(
         if place:
             at = own.shapes[link].points[point]
             sketch.append((place, at.x / unit, at.y / unit, x / unit, y / unit))
-    names, points = [], []
+    names: list[str] = []
+    points: list[tuple[float, ...]] = []
     for name in wanted_points(mechanism, members, request.points):
         place, link, point = min((own.link_index[link], link, point) for link, point in members[name])
         names.append(name)
@@ -131,7 +136,9 @@ def _partition_linkage(
     return PartitionedLinkage(own, inputs, sketch, points, shown), names, mechanism.inputs[running].position
 
 
-def _shown_points(mechanism: Mechanism, partition: Partition, members: Mapping) -> list[tuple[float, ...]]:
+def _shown_points(
+    mechanism: Mechanism, partition: Partition, members: Mapping[str, Sequence[tuple[str, str]]]
+) -> list[tuple[float, ...]]:
     """Points of every link that the sketch shows, or that lie on the frame: see `Lot.shown`."""
     at = {name: (x, y) for name, x, y in mechanism.sketch}
     found: list[tuple[float, ...]] = []

@@ -86,7 +86,7 @@ class _NewtonKernelWriter:
         t.write_line("%k = phi i64 [0, %instance], [%knext, %solved]")
         for leaf in self.operands:
             if leaf.source == "row":
-                have[leaf] = t.load(self._state_pointer(bases[leaf.index], leaf.part))
+                have[leaf] = t.load(self._state_pointer(bases[leaf.place], leaf.part))
         aheads = self._write_prediction()
         t.write_line(f"%count = load i64, ptr {t.add_instruction('getelementptr i64, ptr %counts, i64 %k')}")
         t.write_line("br label %newton")
@@ -111,13 +111,14 @@ class _NewtonKernelWriter:
 
     def _write_block_start(self) -> tuple[dict[FormulaInput, str], list[str]]:
         """A group begins: its numbers, and where its places are."""
-        t, kind, have = self.ir, self.block_type, {}
+        t, kind = self.ir, self.block_type
+        have: dict[FormulaInput, str] = {}
         t.write_label("instance")
         t.write_line("%i = phi i64 [0, %entry], [%inext, %instanceend]")
         begin = t.add_instruction(f"mul i64 %i, {len(kind.measures) + 2 * len(kind.angle_measures)}")
         for leaf in self.operands:
             if leaf.source == "p":
-                have[leaf] = self._write_load("%p", t.add_instruction(f"add i64 {begin}, {leaf.index}"))
+                have[leaf] = self._write_load("%p", t.add_instruction(f"add i64 {begin}, {leaf.place}"))
         begin = t.add_instruction(f"mul i64 %i, {kind.slot_count}")
         bases = []
         for slot in range(kind.slot_count):
@@ -127,10 +128,10 @@ class _NewtonKernelWriter:
             bases.append(t.add_instruction(f"load i64, ptr {place}"))
         begin = t.add_instruction(f"mul i64 %i, {2 * self.unknown_count}")
         for k, both in enumerate(self.unknown_slots):
-            for part, slot in enumerate(both):
-                t.store(self._write_load("%start", t.add_instruction(f"add i64 {begin}, {2 * k + part}")), slot)
-        for slot in (each for own in self.history_slots for each in own):
-            t.store("zeroinitializer", slot)
+            for part, pointer in enumerate(both):
+                t.store(self._write_load("%start", t.add_instruction(f"add i64 {begin}, {2 * k + part}")), pointer)
+        for pointer in (each for own in self.history_slots for each in own):
+            t.store("zeroinitializer", pointer)
         self.check_offset = t.add_instruction(f"mul i64 {t.add_instruction('mul i64 %i, %stride')}, {CHECK_ROWS}")
         return have, bases
 
@@ -207,7 +208,7 @@ class _NewtonKernelWriter:
         t = self.ir
         given = {}
         for number, leaf in formula.inputs.items():
-            given[number] = t.load(self.unknown_slots[leaf.index][leaf.part]) if leaf.source == "z" else have[leaf]
+            given[number] = t.load(self.unknown_slots[leaf.place][leaf.part]) if leaf.source == "z" else have[leaf]
         known: dict[int, str] = {}
         t.write_values(formula.instructions, formula.order, known, given)
         return [known[number] for number in formula.outputs]

@@ -57,11 +57,11 @@ def formula_inputs(
     found = {}
     for leaf in formula.inputs.values():
         if leaf.source == "p":
-            found[leaf] = p[:, leaf.index]
+            found[leaf] = p[:, leaf.place]
         elif leaf.source == "z":
-            found[leaf] = parts[leaf.part][:, leaf.index]
+            found[leaf] = parts[leaf.part][:, leaf.place]
         else:
-            found[leaf] = rows(leaf.index, leaf.part)
+            found[leaf] = rows(leaf.place, leaf.part)
     return found
 
 

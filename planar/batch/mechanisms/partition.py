@@ -105,9 +105,13 @@ def _pair_type_number(pair_type: type[Pair]) -> int:
 def quick_link_shape(link: Link) -> LinkShape:
     """The shape of a link."""
     points = link.points
-    if link.axis is not None or any(type(point.place) is not At for point in points):
+    if link.axis is not None:
         return link_shape(link)
-    drawn = {name: Vector(place.x, place.y) for name, place in points}  # type: ignore[union-attr]
+    drawn: dict[str, Vector] = {}
+    for name, place in points:
+        if type(place) is not At:
+            return link_shape(link)
+        drawn[name] = Vector(place.x, place.y)
     if link.ends is not None:
         drawn = {link.ends[0]: ORIGIN, link.ends[1]: Vector(link.length, 0.0)} | drawn
     return LinkShape(drawn, ORIGIN, X_AXIS)
@@ -134,7 +138,10 @@ class _Partitioner:
         many = len(number)
         self.neighbours: list[list[tuple[int, int]]] = [[] for _ in range(many)]
         "for every link the links beside it, each with the pair between"
-        self.pairs, self.prevented_motions, self.ends, self.is_symmetric = list(mechanism.pairs), [], [], []
+        self.pairs = list(mechanism.pairs)
+        self.prevented_motions: list[int] = []
+        self.ends: list[tuple[int, int]] = []
+        self.is_symmetric: list[bool] = []
         for k, pair in enumerate(self.pairs):
             about = _pair_type_facts(type(pair))
             if about is None:
@@ -198,7 +205,8 @@ class _Partitioner:
         others = [pair for pair in type(pairs[0]).relative_motions(pairs) if named in pair.links]
         for k, pair in zip(own, others, strict=True):
             self.pairs[k] = pair
-            first, second = self.ends[k] = tuple(self.number[each] for each in pair.links)
+            one, other = pair.links
+            first, second = self.ends[k] = self.number[one], self.number[other]
             self.neighbours[first].append((second, k))
             self.neighbours[second].append((first, k))
 
@@ -307,8 +315,9 @@ class _Partitioner:
                     turned = self.is_symmetric[k] or self.ends[k][0] == link
                     found.append((_PAIR_TYPE_NUMBERS[type(pairs[k])], here, there, turned, k in driven, k, other))
         found.sort()
-        key, given, inputs, p = [], [], [], []
-        level, turn = 0, []
+        given: list[int] = []
+        p: list[float] = []
+        key, inputs, level, turn = [], [], 0, []
         shapes, names = self.shapes, self.names
         for number, here, inside, turned, is_driven, k, other in found:
             there = inside
@@ -330,7 +339,7 @@ class _Partitioner:
             p += numbers
         self._refuse_short_arms(inner, [each[-2] for each in found])
         known = (len(inner), len(given), tuple(key))
-        own = _BLOCK_TYPES.get(known) or _make_block_type(known, pairs, found)
+        own = _BLOCK_TYPES.get(known) or _make_block_type(known, [type(pairs[each[5]]) for each in found])
         if not own.is_square:
             raise NotPartitionable("constraints hold each other more than once")
         after = max(
@@ -344,7 +353,7 @@ class _Partitioner:
             self.level[link], self.merged_level[link], self.block_type_of_link[link] = level + 1, after, own
         self.blocks.append(PartitionBlock(own, (*given, *inputs, *own_places), p, inner, level, after))
 
-    def _sort_key(self, link: int) -> tuple:
+    def _sort_key(self, link: int) -> tuple[int, list[tuple[int, bool, bool, bool]]]:
         """What a link of a group is held by, so that equal groups come out alike."""
         own = [
             (
@@ -359,14 +368,13 @@ class _Partitioner:
         return len(own), sorted(own)
 
 
-_BLOCK_TYPES: dict[tuple, BlockType] = {}
+_SignatureKey = tuple[int, int, tuple[tuple[int, tuple[int, int], bool], ...]]
+_BLOCK_TYPES: dict[_SignatureKey, BlockType] = {}
 
 
-def _make_block_type(signature_key: tuple, pairs: Sequence[Pair], found: Sequence[tuple]) -> BlockType:
+def _make_block_type(signature_key: _SignatureKey, pair_types: Sequence[type[Pair]]) -> BlockType:
     inner, given, key = signature_key
-    joints = tuple(
-        BlockPair(type(pairs[each[5]]), bodies, driven) for each, (_, bodies, driven) in zip(found, key, strict=True)
-    )
+    joints = tuple(BlockPair(each, bodies, driven) for each, (_, bodies, driven) in zip(pair_types, key, strict=True))
     if len(_BLOCK_TYPES) >= MAX_BLOCK_TYPES:
         _BLOCK_TYPES.clear()
     made = _BLOCK_TYPES[signature_key] = find_block_type(BlockSignature(inner, given, joints))

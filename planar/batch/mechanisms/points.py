@@ -15,11 +15,13 @@ def point_formula(rates: bool) -> tuple[BlockFormula, KernelLayout]:
 
     Numbers: the point in its link (m), then what the link's own lengths are multiplied by.
     """
-    listing, leaves = InstructionList(), {}
+    listing: InstructionList[FormulaInput] = InstructionList()
+    leaves: dict[int, FormulaInput] = {}
 
     def leaf(what: str, first: int, second: int = 0) -> int:
-        number = listing.add("input", data=(what, (first, second)))
-        leaves[number] = FormulaInput(what, first, second)
+        key = FormulaInput(what, first, second)
+        number = listing.add_input(key)
+        leaves[number] = key
         return number
 
     def times(a: int, b: int) -> int:

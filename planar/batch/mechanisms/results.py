@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, overload
 
 import numpy as np
 
@@ -25,9 +25,10 @@ class PointMapping(Mapping[str, Array]):
     def __getitem__(self, name: str) -> Array:
         """The array of a point."""
         try:
-            return self._values[self._names.index(name)]
+            found: Array = self._values[self._names.index(name)]
         except ValueError:
             raise KeyError(name) from None
+        return found
 
     def __iter__(self) -> Iterator[str]:
         """The names."""
@@ -55,7 +56,8 @@ class Swept(NamedTuple):
     reason: str
     general: bool
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        return short_repr(self)
 
     @property
     def whole(self) -> bool:
@@ -83,8 +85,14 @@ class Each(Sequence[Swept]):
         """How many mechanisms there are."""
         return len(self.found)
 
-    def __getitem__(self, index):  # noqa: ANN001 - one, or a slice of them
-        """One of them."""
+    @overload
+    def __getitem__(self, index: int) -> Swept: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Swept, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> Swept | tuple[Swept, ...]:
+        """One of them, or a slice of them."""
         return self.found[index]
 
     def __iter__(self) -> Iterator[Swept]:

@@ -76,7 +76,7 @@ class ZarrStore(BlockStore):
         """All arrays by name, those made that are not there or not as they have to be."""
         plan, rows, steps = self.plan, self.block_size, self.plan.all_designs.steps + 1
         row = {"shape": (plan.design_count, steps), "chunks": (rows, steps), "dimension_names": ("design", "step")}
-        point = {"shape": (plan.design_count, steps, 2), "chunks": (rows, steps, 2)}
+        point: dict[str, Any] = {"shape": (plan.design_count, steps, 2), "chunks": (rows, steps, 2)}
         point["dimension_names"] = ("design", "step", "axis")
         for order in plan.quantities:
             for name in plan.all_designs.points:
@@ -125,7 +125,9 @@ class ZarrStore(BlockStore):
     def _read_record(self, number: int) -> tuple[int, int, Any] | None:
         try:
             text = bytes(self.arrays["blocks"][number]).rstrip(b"\0")
-            general, sent, said = json.loads(text) if text else (None, None, None)
+            if not text:
+                return None
+            general, sent, said = json.loads(text)
         except READ_ERRORS:
             return None
         return None if general is None else (int(general), int(sent), [tuple(each) for each in said])

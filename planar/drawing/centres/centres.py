@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from functools import cached_property
 from itertools import combinations
-from math import isfinite
+from math import copysign, inf, isfinite
 from typing import NamedTuple
 
 import numpy as np
@@ -40,11 +40,11 @@ from planar.drawing.paper.scales import Scale, round_scale
 from planar.drawing.scheme.scene import plain_frames
 from planar.drawing.scheme.scheme import scheme, space_scale
 from planar.drawing.scheme.symbol_table import PIN_RADIUS
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.foundation.units import parse_unit
 from planar.model.mechanism import relative_motions
 
-Array = np.ndarray
 DEFAULT_REACH = 2.0
 """Of the mechanism's greater extent: how wide and high the window is in which centres are drawn."""
 DRAWING_SIZE = 211.0, 125.0
@@ -150,9 +150,9 @@ class _CentresDrawing:
         marks += self._arrow_labels(arrows)
         return Picture(tuple(marks), "Instantaneous centres", (str(self.scale), *self._notes(arrows, groups)))
 
-    def _normalized_point(self, name: str) -> Array:
+    def _normalized_point(self, homogeneous: Array) -> Array:
         """A centre as (x, y, w) of length one, x and y in SIZE from the window's middle."""
-        x, y, w = self.centres_by_name[name].homogeneous
+        x, y, w = homogeneous
         x, y = np.array([x, y]) / self.scale.per_mm - w * self.middle
         point = np.array([x / PAPER_SIZE, y / PAPER_SIZE, w])
         return point / np.linalg.norm(point)
@@ -185,7 +185,9 @@ class _CentresDrawing:
     def _centre_line(self, centre: Centre, line: Known) -> PaperLine | None:
         """A line of centres on paper; None where it is at infinity, or one of its centres is not shown."""
         names = (*line.centres, centre.name)
-        if any(name not in self.centres_by_name or self.centres_by_name[name].homogeneous is None for name in names):
+        known = [self.centres_by_name[name] for name in names if name in self.centres_by_name]
+        places = [each.homogeneous for each in known if each.homogeneous is not None]
+        if len(places) < len(names):
             return None
         spots: tuple[Array, ...] = ()
         if line.pair:
@@ -194,7 +196,7 @@ class _CentresDrawing:
         else:
             through = [
                 np.cross(self._normalized_point(one), self._normalized_point(other))
-                for one, other in combinations(names, 2)
+                for one, other in combinations(places, 2)
             ]
         # of its three centres the two that lie farthest apart
         a, b, c = max(through, key=lambda each: float(np.linalg.norm(each)), default=np.zeros(3))
@@ -230,14 +232,12 @@ class _CentresDrawing:
             if centre.homogeneous is None or centre.name in self.paper_points:
                 continue
             at, way = self._paper_point(centre.name), centre.direction
-            alike = (far for far in done if at is None and sine_between(far.direction, way) < PARALLEL_TOLERANCE)
-            known = next((far for far in alike if far.centre.direction is not None), None)
-            if known is not None:
-                done.append(known._replace(centre=centre))
-            elif at is None:
-                done.append(self._towards_infinity(centre, np.array(way)))
-            else:
+            if at is not None:
                 done.append(self._towards_point(centre, at))
+            elif way is not None:
+                alike = (far for far in done if sine_between(far.direction, way) < PARALLEL_TOLERANCE)
+                known = next((far for far in alike if far.centre.direction is not None), None)
+                done.append(self._towards_infinity(centre, way) if known is None else known._replace(centre=centre))
         yield from done
 
     def _towards_infinity(self, centre: Centre, way: Array) -> _CentreArrow:
@@ -251,8 +251,8 @@ class _CentresDrawing:
         lines = [ray.through for ray in self.centre_lines if any(each.name in ray.centre_names for each in alike)]
         for anchor in (*shown, *lines, self.middle):
             ray = PaperLine(anchor, way, "", frozenset())
-            ends = ray.clip_to(self.window)
-            if ends is not None and ends[1] - ends[0] > 2.0 * ARROW_LENGTH:
+            ends = ray.clip_to(self.window) or (0.0, 0.0)
+            if ends[1] - ends[0] > 2.0 * ARROW_LENGTH:
                 break
         parts = [
             0.0,
@@ -290,19 +290,20 @@ class _CentresDrawing:
                 continue
             finite = [at for name in ray.centre_names if (at := self._paper_point(name)) is not None]
             parts = [ray.coordinate_of(at) for at in (*finite, *ray.points)]
-            parts += [np.copysign(np.inf, ray.direction @ ways[name]) for name in ray.centre_names if name in ways]
+            parts += [copysign(inf, ray.direction @ ways[name]) for name in ray.centre_names if name in ways]
             low, high = max(ends[0], min(parts) - LINE_OVERHANG), min(ends[1], max(parts) + LINE_OVERHANG)
             if low < high:
                 yield Polyline(
                     (paper_point(ray.point_at(low)), paper_point(ray.point_at(high))), Pen.CENTRE_LINE, ray.about
                 )
         for far in arrows:
-            alone = far.foot is not None and not any(
+            if far.foot is None or far.centre.how != "pair":
+                continue
+            if not any(
                 ray.distance_to(far.foot) < COINCIDENCE_TOLERANCE
                 and sine_between(ray.direction, far.direction) < PARALLEL_TOLERANCE
                 for ray in self.centre_lines
-            )
-            if alone and far.centre.how == "pair":
+            ):
                 yield Polyline(
                     (paper_point(far.foot), paper_point(far.tip)), Pen.CENTRE_LINE, f"towards {far.centre.name}"
                 )

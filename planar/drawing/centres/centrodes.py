@@ -16,6 +16,7 @@ from planar.drawing.paper.picture import Circle, Fill, Label, Pen, Picture, Poly
 from planar.drawing.paper.scales import Scale, round_scale
 from planar.drawing.scheme.scene import plain_frames
 from planar.drawing.scheme.scheme import scheme, space_scale
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer, Unknown
 from planar.foundation.geometry import Vector
 from planar.model.link_graph import link_numbers, number_separator
@@ -24,8 +25,6 @@ from planar.model.wording import amount
 from planar.results.motion import Motion, State
 from planar.solving.cycle import cycle
 from planar.solving.position import solve
-
-Array = np.ndarray
 
 MIN_WINDOW_RATIO, MAX_WINDOW_RATIO = 2.0, 3.0
 """Of the mechanism's greater extent: how wide and high the window at least is in which the curves are drawn, and how

@@ -10,6 +10,7 @@ import numpy as np
 from planar.analysis.centres.centres import Centre, Centres
 from planar.drawing.labels.text_metrics import text_size
 from planar.drawing.paper.picture import Circle, Label, Mark, PaperPoint, Pen, Picture, Polyline, paper_point
+from planar.foundation.arrays import Array
 from planar.foundation.geometry import direction
 from planar.model.link_graph import link_label
 
@@ -30,7 +31,6 @@ ENOUGH_ROOM, NUMBER_GAP = 4.0, 0.9
 """mm to other chords and numbers, beyond which a number stands no better; mm between its box and its chord."""
 MIDDLE_BONUS = 3.0
 """mm of room that a place in the middle of a chord is worth, beside one at its end."""
-Array = np.ndarray
 
 
 def circle_picture(found: Centres, shown: Sequence[Centre]) -> Picture:

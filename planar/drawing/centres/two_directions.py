@@ -25,13 +25,13 @@ from planar.drawing.paper.picture import (
 from planar.drawing.paper.scales import Scale
 from planar.drawing.scheme.scene import plain_frames
 from planar.drawing.scheme.scheme import scheme, space_scale
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.foundation.units import length_unit_of_rates, unit_of_kind
 from planar.model.mechanism import named_points
 from planar.results.motion import State
 from planar.results.records import PointState
 
-Array = np.ndarray
 WINDOW_RATIO = 2.5
 """Of the mechanism's greater extent: how far from its middle C is still drawn in its place."""
 MAX_ARROW_LENGTH = 30.0
@@ -151,9 +151,12 @@ class _TwoDirectionsDrawing:
         whole = space_scale(state.mechanism, plain_frames(state.frames), state.shapes)
         low, high = (np.array(each) * whole.per_mm for each in extent(scheme(state, whole, False, False).marks))
         size, middle = float((high - low).max()), (low + high) / 2.0
-        near = found.position is not None and np.abs(found.position - middle).max() <= WINDOW_RATIO * size / 2.0
-        both = np.array([low, high, *([found.position] if near else [])])
-        self.scale = scale or scales.round_scale("length", whole.unit, *map(float, np.ptp(both, axis=0)), DRAWING_SIZE)
+        position = found.position
+        if position is not None and not np.abs(position - middle).max() <= WINDOW_RATIO * size / 2.0:
+            position = None
+        both = np.array([low, high] if position is None else [low, high, position])
+        width, height = map(float, np.ptp(both, axis=0))
+        self.scale = scale or scales.round_scale("length", whole.unit, width, height, DRAWING_SIZE)
         self.speeds = speeds or scales.round_scale(
             "velocity",
             unit_of_kind("velocity", state.mechanism.units)[0],
@@ -164,8 +167,9 @@ class _TwoDirectionsDrawing:
         self.scheme_picture = scheme(state, self.scale, numbers=False)
         self.paper_points = [point.position / self.scale.per_mm for point in points]
         self.heads = [at + v.velocity / self.speeds.per_mm for at, v in zip(self.paper_points, points, strict=True)]
-        self.centre = found.position / self.scale.per_mm if near else None
-        corners = np.array([*extent(self.scheme_picture.marks), *self.heads, *([self.centre] if near else [])])
+        self.centre = None if position is None else position / self.scale.per_mm
+        shown = self.heads if self.centre is None else [*self.heads, self.centre]
+        corners = np.array([*extent(self.scheme_picture.marks), *shown])
         self.window = Box(*map(float, (*(corners.min(axis=0) - SHEET_MARGIN), *(corners.max(axis=0) + SHEET_MARGIN))))
 
     def picture(self) -> Picture:
@@ -207,7 +211,7 @@ class _TwoDirectionsDrawing:
                 yield Label(
                     text, paper_point((at + self.centre) / 2.0), f"radius {name}", 9.0, 0.8, math=_is_simple(name)
                 )
-        if self.found.by_heads:
+        if self.found.by_heads and end is not None:
             yield from self._line_to_centre("heads", self.heads[0], end - self.heads[0], end, self.heads[1])
 
     def _line_to_centre(

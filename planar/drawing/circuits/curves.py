@@ -13,14 +13,13 @@ from planar.assemblies.circuits.circuit_of_assembly import LocatedAssembly
 from planar.assemblies.circuits.circuits import Circuit, Circuits
 from planar.drawing.diagrams.drawn_run import MAX_TURNS
 from planar.drawing.diagrams.motion_curves import available_names, default_subject, find_slide
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.model.link_graph import link_numbers
 from planar.model.mechanism import Mechanism, named_points, relative_motions
 from planar.model.pairs import MeasureKind
 from planar.results.motion import Motion
 from planar.solving.cycle import cycle
-
-Array = np.ndarray
 
 FULL_TURN = 2.0 * pi
 RANGE_MARGIN = 0.08
@@ -140,10 +139,7 @@ def plotted_outputs(mechanism: Mechanism, of: str) -> tuple[PlottedOutput, ...]:
     if slide is None and any(
         of in (each.name, *(f"{link}.{own}" for link, own in each.members)) for each in named_points(mechanism)
     ):
-        return tuple(
-            PlottedOutput(f"{axis} of {of}", False, lambda moving, k=k: moving.point(of).position[..., k])
-            for k, axis in enumerate("xy")
-        )
+        return tuple(PlottedOutput(f"{axis} of {of}", False, _coordinate_of(of, k)) for k, axis in enumerate("xy"))
     if slide is None and any(link.name == of for link in mechanism.links):
         return (PlottedOutput(f"angle of {of}", True, lambda moving: moving.link(of).angle),)
     pair = named.get(slide or of)
@@ -152,6 +148,10 @@ def plotted_outputs(mechanism: Mechanism, of: str) -> tuple[PlottedOutput, ...]:
     first = next(iter(pair.result_kinds))
     angle = pair.input_kind is not MeasureKind.LENGTH
     return (PlottedOutput(f"{first} at {slide or of}", angle, lambda moving: moving.pair(slide or of)[first]),)
+
+
+def _coordinate_of(point: str, axis: int) -> Callable[[Any], Any]:
+    return lambda moving: moving.point(point).position[..., axis]
 
 
 def input_window(circuits: Circuits) -> InputWindow:

@@ -32,6 +32,7 @@ from planar.drawing.circuits.sheet import (
     NORMAL_TEXT,
     OTHER_GREY,
     SMALL_TEXT,
+    ArtistStyle,
     PanelLayout,
     PanelPoint,
     text_settings,
@@ -80,8 +81,9 @@ def circuit_figures(circuits: Circuits, assemblies: Sequence[LocatedAssembly], o
     for reading in outputs:
         drawn = merge_equal_charts(circuit_charts(circuits, motions, reading, shown, assemblies), shown)
         sheets = [drawn[first : first + MAX_PANELS_PER_SHEET] for first in range(0, len(drawn), MAX_PANELS_PER_SHEET)]
-        columns, *size = next(rest for most, *rest in PANEL_GRIDS if min(len(drawn), MAX_PANELS_PER_SHEET) <= most)
-        figures += [_sheet_figure(circuits, reading, shown, sheet, columns, (size[0], size[1])) for sheet in sheets]
+        most = min(len(drawn), MAX_PANELS_PER_SHEET)
+        columns, size = next((across, (wide, tall)) for up_to, across, wide, tall in PANEL_GRIDS if most <= up_to)
+        figures += [_sheet_figure(circuits, reading, shown, sheet, columns, size) for sheet in sheets]
     return figures
 
 
@@ -278,7 +280,7 @@ def _draw_gaps(axes: Axes, sheet: PanelLayout) -> None:
         )
 
 
-KeyEntry = tuple[str, dict[str, object]]
+KeyEntry = tuple[str, ArtistStyle]
 
 
 def _key_rows(sheet: PanelLayout, drawn: Sequence[CircuitChart], room: float) -> list[list[KeyEntry]]:

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from planar.drawing.circuits.curves import BranchCurve, CircuitChart, InputWindow
-
-Array = np.ndarray
+from planar.foundation.arrays import Array
 
 INDISTINGUISHABLE_RATIO = 4e-3
 """Of a panel's width or height: curves nearer than that cannot be told apart on paper."""
@@ -43,7 +42,7 @@ def _are_alike(one: CircuitChart, other: CircuitChart, size: Array) -> bool:
     ways = [
         sorted(each.branch_curves, key=lambda strand: (strand.branch, *_end_points(strand)[0])) for each in (one, other)
     ]
-    return all(_coincide(*both, size) for both in zip(*ways, strict=True))
+    return all(_coincide(mine, its, size) for mine, its in zip(*ways, strict=True))
 
 
 def _title_facts(chart: CircuitChart) -> tuple[object, ...]:

@@ -19,13 +19,13 @@ from planar.drawing.circuits.sheet import (
     text_settings,
 )
 from planar.drawing.labels.text_metrics import format_tick, text_size
+from planar.foundation.arrays import Array
 from planar.foundation.units import parse_unit
 from planar.model.wording import number_ranges
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = np.ndarray
 
 NUMBER_DISTANCE, PANEL_MARGIN, SAME_MARK_DISTANCE = 3.2, 2.0, 0.3
 """mm from an assembly to its number, from there to the panel's edge at the least, and between marks that are one."""
@@ -137,8 +137,10 @@ def _clearest_point(tried: Array, taken: Array) -> Array:
 
 
 def _draw_number(axes: Axes, sheet: PanelLayout, at: Array, text: str, colour: str, gid: str) -> None:
+    x, y = at / sheet.panel_size
     axes.text(
-        *(at / sheet.panel_size),
+        x,
+        y,
         text,
         transform=axes.transAxes,
         fontsize=SMALL_TEXT,

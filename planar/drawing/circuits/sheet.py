@@ -9,8 +9,8 @@ import numpy as np
 from planar.assemblies.circuits.circuits import Circuits
 from planar.drawing.circuits.curves import InputWindow, PlottedOutput
 from planar.drawing.labels.fonts import font_families
+from planar.foundation.arrays import Array
 
-Array = np.ndarray
 PanelPoint = tuple[float, float]
 
 SMALL_TEXT, NORMAL_TEXT, LARGE_TEXT = 7.0, 8.0, 10.0
@@ -24,9 +24,11 @@ BRANCH_LINES = (
     ("#a84a00", (0, (3.0, 2.4))),
 )
 """Of branches, one after the other; a dash says what a colour says, for those who print in grey."""
-DEAD_POINT_MARK = {"ls": "", "marker": "o", "ms": 4.0, "color": "black"}
-INPUT_LINE = {"lw": 0.6, "ls": (0, (6.0, 2.0, 1.0, 2.0)), "color": "0.45"}
-ASSEMBLY_MARK = {"ls": "", "marker": "s", "ms": 4.5, "mew": 0.9, "mec": "black"}
+ArtistStyle = dict[str, Any]
+"""Properties of artists as matplotlib takes them by name."""
+DEAD_POINT_MARK: ArtistStyle = {"ls": "", "marker": "o", "ms": 4.0, "color": "black"}
+INPUT_LINE: ArtistStyle = {"lw": 0.6, "ls": (0, (6.0, 2.0, 1.0, 2.0)), "color": "0.45"}
+ASSEMBLY_MARK: ArtistStyle = {"ls": "", "marker": "s", "ms": 4.5, "mew": 0.9, "mec": "black"}
 """Marks of dead points, of assemblies, and the line where the file has the input."""
 OTHER_GREY, GAP_GREY, LEADER_GREY = "0.8", "0.62", "0.45"
 """Greys: of the other circuits, of the hatching, of leaders."""

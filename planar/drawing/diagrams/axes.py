@@ -10,8 +10,7 @@ import numpy as np
 
 from planar.drawing.paper.picture import Label, Mark, PaperPoint, Pen, Polyline, paper_point
 from planar.drawing.paper.scales import DECIMAL_STEPS, DEGREE_STEPS, choose_prefix, round_step
-
-Array = np.ndarray
+from planar.foundation.arrays import Array
 
 TICK_LENGTH, NUMBER_SIZE, NAME_SIZE = 1.2, 7.0, 8.0
 """mm that a tick is long; points of the numbers and of an axis's name."""

@@ -11,11 +11,10 @@ from planar.drawing.diagrams.drawn_run import DrawnRun
 from planar.drawing.diagrams.motion_curves import ChordRates, DiagramSubject, MotionCurve, Peak, chord_rates, find_peak
 from planar.drawing.labels.text_metrics import text_size, wrap_text
 from planar.drawing.paper.scales import Scale
+from planar.foundation.arrays import Array
 from planar.foundation.units import coherent_unit, display_unit, length_unit_of_rates, parse_unit
 from planar.model.mechanism import FileUnits
 from planar.model.wording import amount
-
-Array = np.ndarray
 
 END_MARGIN = 0.1
 """Part of the run beside an end where rates grow without bound that no ordinate is made for."""
@@ -42,7 +41,7 @@ class DiagramSheet(NamedTuple):
     subject: DiagramSubject
     units: FileUnits
     width: float
-    count: int
+    interval_count: int
     chords: int | None
 
     @property
@@ -78,8 +77,8 @@ def caption_lines(sheet: DiagramSheet, ordinates: list[Ordinate], points: float,
     lines = [(line, False) for line in wrap_text(_start_sentence(sheet), points, room)]
     lines += [(line, True) for line in _fill_lines(_scale_phrases(sheet, ordinates), points, room)]
     if has_unbounded_end(sheet):
-        told = "At an end of the range, a dead or change point, no rates exist; what grows without bound is cut off."
-        lines += [(line, False) for line in wrap_text(told, points, room)]
+        ends = "At an end of the range, a dead or change point, no rates exist; what grows without bound is cut off."
+        lines += [(line, False) for line in wrap_text(ends, points, room)]
     told = [line for index in (1, 2) for line in _peak_sentences(sheet, ordinates[index], index)]
     if sheet.chords is not None:
         told.append(_chord_scale_sentence(sheet, ordinates))
@@ -228,10 +227,10 @@ def _shortfall_text(found: ChordRates, exact: Peak) -> str:
 
 def _chord_scale_sentence(sheet: DiagramSheet, ordinates: list[Ordinate]) -> str:
     """The scale that a velocity would have if the rises were drawn as they are in the displacements."""
-    step = sheet.span / sheet.count
+    step = sheet.span / sheet.interval_count
     symbols = _scale_subscripts(sheet)
     per_mm = ordinates[0].scale.per_mm / step
-    base = f"$\\mu_{symbols[0]}/(\\mu_t\\cdot$OK$/{sheet.count})$"
+    base = f"$\\mu_{symbols[0]}/(\\mu_t\\cdot$OK$/{sheet.interval_count})$"
     said = _calculating_scale(symbols[1], per_mm * ordinates[1].si_factor, ordinates[1].si_unit).replace(
         " = ", f" = {base} = ", 1
     )

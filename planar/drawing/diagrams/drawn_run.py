@@ -10,6 +10,7 @@ import numpy as np
 
 from planar.analysis.motion.extremes import Stroke, stroke
 from planar.drawing.scheme.scene import plain_frames
+from planar.foundation.arrays import Array, IntArray
 from planar.foundation.errors import BadInput, Outcome, PlanarError, Unknown
 from planar.foundation.geometry import Frame
 from planar.model.mechanism import Drive, Input, Mechanism, replace_inputs, running_input_index
@@ -17,8 +18,6 @@ from planar.model.pairs import Pair
 from planar.results.motion import Motion
 from planar.results.records import PointMotion
 from planar.solving.cycle import cycle
-
-Array = np.ndarray
 
 COARSE_STEPS = 36
 """Steps of a turn, at least, that tell where slides turn back, and whether the mechanism is back after it."""
@@ -129,7 +128,8 @@ class DrawnRun(NamedTuple):
         for pair in self.motion.mechanism.pairs:
             if pair.point_on_line() is not None:
                 went = self.motion.pair(pair.name)[next(iter(pair.result_kinds))]
-                found[pair.name] = (float(np.min(went)), float(np.max(went)))
+                if went is not None:
+                    found[pair.name] = (float(np.min(went)), float(np.max(went)))
         return found
 
     @property
@@ -143,7 +143,7 @@ class DrawnRun(NamedTuple):
         """Whether everything is at the end where it was at the start."""
         return _is_closed(self.motion, 0, -1)
 
-    def equal_divisions(self, count: int) -> Array | None:
+    def equal_divisions(self, count: int) -> IntArray | None:
         """The rows (count + 1,) that divide the run into equal parts, None where no rows do so."""
         step, rest = divmod(len(self.motion) - 1, count)
         return None if rest or step == 0 or not _is_even(self.time) else np.arange(count + 1) * step

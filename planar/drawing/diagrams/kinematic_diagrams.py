@@ -22,6 +22,7 @@ from planar.drawing.labels.fonts import DRAWING_FAMILY, font_families
 from planar.drawing.labels.text_metrics import clip_text, format_tick, text_size
 from planar.drawing.paper.pens import MM_PER_POINT, require_matplotlib
 from planar.drawing.paper.scales import DECIMAL_STEPS, DEGREE_STEPS, round_scale, round_step
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.foundation.units import SI_UNITS, coherent_unit, length_unit_of_rates, parse_unit, unit_of_kind
 from planar.model.mechanism import Mechanism, relative_motions
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Array = np.ndarray
 
 INCHES_PER_MM = 1.0 / 25.4
 """inches"""
@@ -158,9 +158,9 @@ def _draw_diagram(axes: Axes, sheet: DiagramSheet, ordinate: Ordinate, index: in
         fontsize=NORMAL_TEXT,
         labelpad=3.0,
     )
-    every = ceil(4.5 * sheet.count / sheet.width)
-    marks = np.linspace(0.0, sheet.span, sheet.count + 1)
-    numbers = ["" if k % every else f"{k}" for k in range(sheet.count + 1)]
+    every = ceil(4.5 * sheet.interval_count / sheet.width)
+    marks = np.linspace(0.0, sheet.span, sheet.interval_count + 1)
+    numbers = ["" if k % every else f"{k}" for k in range(sheet.interval_count + 1)]
     axes.set_xticks(marks, numbers, family=DRAWING_FAMILY, fontsize=SMALL_TEXT)
     axes.tick_params(length=2.0, width=0.5, pad=1.5)
     for side in axes.spines.values():

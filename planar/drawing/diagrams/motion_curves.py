@@ -9,12 +9,11 @@ import numpy as np
 
 from planar.drawing.diagrams.drawn_run import DrawnRun, frame_slides
 from planar.drawing.scheme.link_bodies import largest_span as size_of
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.model.link_graph import link_numbers
 from planar.model.mechanism import Mechanism, named_points, relative_motions
 from planar.model.pairs import MeasureKind
-
-Array = np.ndarray
 
 ZERO_TOLERANCE = 1e-12
 """A displacement below this part of the mechanism's size, or a rate of it, is round-off."""

@@ -17,14 +17,13 @@ from planar.drawing.scheme.ground import ground_marks
 from planar.drawing.scheme.link_bodies import link_bodies
 from planar.drawing.scheme.link_strokes import body_marks
 from planar.drawing.scheme.scheme import scheme
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.model.mechanism import Drive, Mechanism, NamedPoint, named_points, relative_motions, replace_inputs
 from planar.model.pairs import MeasureKind
 from planar.model.wording import amount
 from planar.results.motion import Motion
 from planar.solving.position import solve
-
-Array = np.ndarray
 
 MIN_PATH_STEPS = 360
 """Steps, at least, of a path that is drawn as a curve."""
@@ -192,7 +191,8 @@ def _division_rows(run: DrawnRun, count: int) -> Sequence[int]:
 def _motion_scale(run: DrawnRun, room: tuple[float, float] = (DRAWING_WIDTH, DRAWING_HEIGHT)) -> Scale:
     """The round scale at which the whole motion fits the paper."""
     low, high = run.bounds
-    return round_scale("length", run.motion.mechanism.units.length, *(float(part) for part in high - low), room)
+    width, height = map(float, high - low)
+    return round_scale("length", run.motion.mechanism.units.length, width, height, room)
 
 
 def _path_stroke(run: DrawnRun, name: str, scale: Scale) -> Polyline:

@@ -12,9 +12,8 @@ from planar.drawing.paper.picture import Pen
 from planar.drawing.scheme.springs_masses import SUBSCRIPTS
 from planar.dynamics.external_actions import ExternalAction
 from planar.dynamics.forces import Forces
+from planar.foundation.arrays import Array
 from planar.model.link_graph import link_numbers
-
-Array = np.ndarray
 
 ROUND_OFF_RATIO = 1e-9
 """A force, or a couple at an arm of the mechanism's size, below this part of the greatest force is round-off."""
@@ -32,26 +31,26 @@ class ActionSymbol(NamedTuple):
     """A letter with its index, `primes` where a link feels several that are called the same."""
 
     base: str
-    index: str
+    subscript: str
     primes: int = 0
 
     @property
     def label(self) -> tuple[str, bool]:
         """How it is written, and whether that is mathtext."""
         letters = self.base.removeprefix("-")
-        if not SIMPLE_INDEX.fullmatch(self.index):
-            return f"{self.base}{'′' * self.primes} ({self.index})", False
-        index = self.index.replace(" ", r"\ ").replace(",", "{,}").replace(":", "{:}")
+        if not SIMPLE_INDEX.fullmatch(self.subscript):
+            return f"{self.base}{'′' * self.primes} ({self.subscript})", False
+        index = self.subscript.replace(" ", r"\ ").replace(",", "{,}").replace(":", "{:}")
         each = (f"{letter}{chr(39) * self.primes}_{{{index}}}".replace("α", r"\alpha ") for letter in letters)
         return f"${'-' if self.base != letters else ''}{''.join(each)}$", True
 
     @property
     def plain_text(self) -> str:
         """How it is written in a sentence: F₃₂."""
-        return f"{self.base}{'′' * self.primes}{self.index.translate(SUBSCRIPTS)}"
+        return f"{self.base}{'′' * self.primes}{self.subscript.translate(SUBSCRIPTS)}"
 
     def __str__(self) -> str:
-        return f"{self.base}{'′' * self.primes}_{self.index}"
+        return f"{self.base}{'′' * self.primes}_{self.subscript}"
 
 
 class ActionArrow(NamedTuple):
@@ -69,9 +68,14 @@ class ActionArrow(NamedTuple):
     "whether its place is a centre of mass"
 
     @property
+    def vector(self) -> Array:
+        """The force (2,); nothing of a couple."""
+        return np.zeros(2) if self.force is None else self.force
+
+    @property
     def is_determined(self) -> bool:
         """Whether equilibrium tells it."""
-        return bool(np.isfinite(self.force if self.force is not None else self.couple).all())
+        return bool(np.isfinite(self.couple or 0.0 if self.force is None else self.force).all())
 
 
 def action_arrows(forces: Forces, arm: float) -> dict[str, tuple[ActionArrow, ...]]:

@@ -24,6 +24,7 @@ from planar.drawing.paper.scales import (
 from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.forces import Forces
 from planar.dynamics.reactions import Reaction
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.model.link_graph import link_numbers
 from planar.model.mechanism import Mechanism
@@ -31,8 +32,6 @@ from planar.model.pairs import MeasureKind, Pair
 from planar.model.pairs.symbols import GuideMark
 from planar.model.wording import join_all_names
 from planar.results.motion import Motion
-
-Array = np.ndarray
 
 POLAR_SIZE, DIAGRAM_WIDTH, DIAGRAM_HEIGHT = (58.0, 58.0), 75.0, 42.0
 """mm: room of a polar diagram; between the axes of the others."""
@@ -138,12 +137,13 @@ def _polar_picture(drawn: ForceRun, force: Array, load: _BearingLoad) -> Picture
     corners = np.concatenate([seen[np.isfinite(seen).all(axis=1)], np.zeros((1, 2))])
     low, high = corners.min(axis=0), corners.max(axis=0)
     prefix, per = choose_prefix(float(np.abs(corners).max()))
-    scale = round_scale("force", f"{prefix}N", *map(float, high - low), POLAR_SIZE)
+    width, height = map(float, high - low)
+    scale = round_scale("force", f"{prefix}N", width, height, POLAR_SIZE)
     across, up = (_axis_at_scale(low[k], high[k], scale, f"{'xy'[k]} ({prefix}N)", per) for k in (0, 1))
     strokes: list[Mark] = [*axes.axes_frame(across, up)]
     middle = float(across.on_paper(0.0))
     strokes.append(Polyline(((middle, 0.0), (middle, up.length)), Pen.AXIS, "zero"))
-    strokes += axes.curve_strokes(*seen.T, across, up, Pen.CURVE, "load")
+    strokes += axes.curve_strokes(seen[:, 0], seen[:, 1], across, up, Pen.CURVE, "load")
     strokes += _input_marks(drawn, seen, across, up)
     notes = [str(scale), *_load_notes(drawn, long, load)]
     row = int(np.nanargmax(long))
@@ -151,7 +151,7 @@ def _polar_picture(drawn: ForceRun, force: Array, load: _BearingLoad) -> Picture
     if np.nanmin(long) < (1.0 - CONSTANT_TOLERANCE) * long[row]:
         text = f"{text} {drawn.place_text(row)}"
     if np.isfinite(seen[row]).all():
-        tip = axes.point_on_paper(*seen[row], across, up)
+        tip = axes.point_on_paper(seen[row, 0], seen[row, 1], across, up)
         strokes.append(Arrow(axes.point_on_paper(0.0, 0.0, across, up), tip, Pen.REACTION, "greatest"))
         strokes.append(Label(text, tip, "greatest", 8.0, 1.0))
     else:
@@ -223,12 +223,12 @@ def _load_notes(drawn: ForceRun, values: Array, load: _BearingLoad) -> Iterator[
     if len(gaps) > MAX_NAMED_GAPS:
         yield f"told at {len(values) - len(gaps)} of {len(values)} positions only: {load.gap_reason}"
     elif len(gaps):
-        yield f"not told {join_all_names([drawn.place_text(row) for row in gaps])}"
+        yield f"not told {join_all_names([drawn.place_text(row) for row in gaps.tolist()])}"
 
 
 def _lateral_force(drawn: ForceRun, pair: Pair, force: Array) -> Array:
     """The force (n,) on the left of the pair's line."""
-    motion = drawn.forces.moving
+    motion = drawn.motion
     marks = pair.drawing_marks(motion.shapes, motion.mechanism.pairs)
     guide = next(mark for mark in marks if isinstance(mark, GuideMark))
     way = KinematicArrays(motion, motion.shapes).frame(guide.link).rotate_to_world(guide.direction)

@@ -13,12 +13,11 @@ from planar.dynamics.flywheel import whole_turns
 from planar.dynamics.forces import Forces, forces
 from planar.dynamics.load_validation import require_loads
 from planar.equations.mechanism_numbers import mechanism_size
+from planar.foundation.arrays import Array, IntArray
 from planar.foundation.errors import BadInput
 from planar.foundation.units import parse_unit
 from planar.model.mechanism import Mechanism
 from planar.results.motion import Motion
-
-Array = np.ndarray
 
 ROUND_OFF_RATIO = 1e-9
 """A force below this part of the greatest in any pair at that position is round-off."""
@@ -32,16 +31,17 @@ class ForceRun(NamedTuple):
     """
 
     forces: Forces
+    motion: Motion
     abscissa: Array
     axis_name: str
     "of what it is, with its unit"
     unit: str
-    order: Array
+    order: IntArray
     period: float
     "of a whole cycle, in the unit; else 0"
     notes: tuple[str, ...]
 
-    def in_order(self, values: Array) -> Array:
+    def in_order(self, values: Array | float) -> Array:
         """What the motion has at its rows (n, ...), in this order."""
         found = np.asarray(values)[self.order]
         if not self.period:
@@ -105,4 +105,4 @@ def forces_over_cycle(source: Forces | Motion | Mechanism) -> ForceRun:
     over = over[order]
     if period:
         over = np.concatenate([[0.0], over, [period]])
-    return ForceRun(found, over, label, written, order, period, tuple(notes))
+    return ForceRun(found, motion, over, label, written, order, period, tuple(notes))

@@ -74,7 +74,7 @@ def free_bodies(forces: Forces, scale: str | Sequence[str] | None = None) -> tup
     felt = action_arrows(forces, mechanism_size(mechanism, state.shapes))
     frames, shown = plain_frames(state.frames), link_bodies(mechanism, state.shapes)
     scene = Scene(mechanism, shown, frames, state.shapes, given.get("length") or _length_scale(forces))
-    force = given.get("force") or _force_scale(felt.values())
+    force = given.get("force") or _force_scale(list(felt.values()))
     drawn = scheme(state, scene.scale)
     note = "F₃₂ is the force on link 3 by link 2, M₃₂ the couple"
     pictures = [drawn._replace(title="Space diagram", notes=(note, *attachment_remarks(mechanism)))]
@@ -123,9 +123,9 @@ class _FreeBody:
         """Whether just two forces act on it, at two places, and no couple."""
         if len(self.arrows) != 2 or self.couples or self.undetermined:
             return False
-        return hypot(*(self.arrows[1].at - self.arrows[0].at)) > SAME_POINT_RATIO * mechanism_size(
-            self.scene.mechanism, self.scene.shapes
-        )
+        places = [each.at for each in self.arrows if each.at is not None]
+        least = SAME_POINT_RATIO * mechanism_size(self.scene.mechanism, self.scene.shapes)
+        return len(places) == 2 and hypot(*(places[1] - places[0])) > least
 
     @property
     def is_too_small_for_polygon(self) -> bool:
@@ -160,7 +160,7 @@ class _FreeBody:
     def _force_arrow(self, push: ActionArrow, clear: Clearance) -> Arrow:
         """The arrow of a force, from its place or to it, whichever crosses less."""
         at = Vector(*self._action_point(push))
-        along = Vector(*map(float, push.force / self.scale.per_mm))
+        along = Vector(*paper_point(push.vector / self.scale.per_mm))
         way, long = unit_vector(along), hypot(*along)
         price = [
             clear.count_in_box(at, way, Vector(low, -1.0), Vector(high, 1.0))
@@ -199,8 +199,8 @@ class _FreeBody:
             or self.is_too_small_for_polygon
         ):
             return
-        ordered = sorted(self.arrows, key=lambda each: atan2(each.force[1], each.force[0]))
-        sides = np.array([each.force for each in ordered]) / self.scale.per_mm
+        ordered = sorted(self.arrows, key=lambda each: atan2(each.vector[1], each.vector[0]))
+        sides = np.array([each.vector for each in ordered]) / self.scale.per_mm
         corners = np.concatenate([np.zeros((1, 2)), np.cumsum(sides, axis=0)])
         (_, low), (right, high) = about
         shift = np.array([right + POLYGON_GAP, (low + high) / 2.0])
@@ -250,11 +250,10 @@ def _length_scale(forces: Forces) -> Scale:
     frames = plain_frames(state.frames)
     whole = space_scale(mechanism, frames, state.shapes)
     scene = Scene(mechanism, link_bodies(mechanism, state.shapes), frames, state.shapes, whole)
-    spans = []
-    for marks, room in [
-        (list(moving_marks(scene)), MECHANISM_SIZE),
-        *((list(_body_marks(scene, link)), BODY_SIZE) for link in scene.bodies),
-    ]:
+    spans: list[float] = []
+    drawn: list[tuple[Sequence[Mark], tuple[float, float]]] = [(moving_marks(scene), MECHANISM_SIZE)]
+    drawn += [(list(_body_marks(scene, link)), BODY_SIZE) for link in scene.bodies]
+    for marks, room in drawn:
         low, high = extent(marks)
         spans += [(high[k] - low[k]) * whole.per_mm / room[k] for k in (0, 1)]
     most = max(spans)

@@ -12,12 +12,11 @@ from planar.drawing.paper.picture import Circle, Fill, Label, Mark, Pen, Picture
 from planar.drawing.paper.scales import format_force
 from planar.dynamics.flywheel import DEFAULT_FLUCTUATION, Flywheel, explain_no_cycle, flywheel
 from planar.dynamics.forces import Forces
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.foundation.units import parse_unit
 from planar.model.mechanism import Mechanism
 from planar.results.motion import Motion
-
-Array = np.ndarray
 
 DIAGRAM_WIDTH, DIAGRAM_HEIGHT = 170.0, 85.0
 """mm between the axes."""
@@ -38,7 +37,7 @@ def torque_picture(
     """
     drawn = forces_over_cycle(source)
     found = drawn.forces
-    name = found.moving.running_input if of is None else of
+    name = drawn.motion.running_input if of is None else of
     if name not in found.inputs:
         raise BadInput(name, f"there is no input of this name; inputs are at {', '.join(found.inputs)}")
     effort = drawn.in_order(found.inputs[name])
@@ -113,7 +112,7 @@ def _effort_parts(drawn: ForceRun, name: str) -> dict[str, Array]:
 
     By power: at every position that of a part and that of its share are opposite.
     """
-    motion = drawn.forces.moving
+    motion = drawn.motion
     rates = {other: given.velocity for other, given in motion.inputs.items()}
     if any(np.any(rate) for other, rate in rates.items() if other != name) or not np.all(rates[name]):
         return {}

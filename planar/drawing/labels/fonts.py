@@ -6,9 +6,9 @@ import re
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from functools import lru_cache
+from functools import lru_cache, partial
 from logging import ERROR, getLogger
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 from unicodedata import category
 
 from planar.drawing.paper.pens import require_matplotlib
@@ -81,9 +81,9 @@ def font_properties(
 def _cached_font_properties(points: float, slanted: bool, heavy: bool, families: tuple[str, ...]) -> FontProperties:
     from matplotlib.font_manager import FontProperties
 
-    style = "italic" if families[0] == BOOK_FAMILY else "oblique"
+    slope: Literal["italic", "oblique"] = "italic" if families[0] == BOOK_FAMILY else "oblique"
     return FontProperties(
-        family=list(families), style=style if slanted else "normal", weight="bold" if heavy else "normal", size=points
+        family=list(families), style=slope if slanted else "normal", weight="bold" if heavy else "normal", size=points
     )
 
 
@@ -260,7 +260,7 @@ def _candidate_fonts(
         if name in named
     )
     for name in likely:
-        yield name, lambda each, name=name: _has_character(name, slanted, heavy, each)
+        yield name, partial(_has_character, name, slanted, heavy)
     files = {each.fname: each.name for each in fontManager.ttflist if not getattr(each, "index", 0)}
     for file, name in sorted(files.items(), key=lambda each: (each[1], each[0])):
         if name in likely or name.startswith(LAST_RESORT):
@@ -269,7 +269,7 @@ def _candidate_fonts(
             made = get_font(file)
         except (OSError, RuntimeError):
             continue
-        yield name, lambda each, made=made: _can_draw(made, each)
+        yield name, partial(_can_draw, made)
 
 
 def _add_new_fonts() -> bool:

@@ -54,7 +54,7 @@ class TextLineArtist(Text):
         alone = self if len(self.line.pieces) == 1 and not self.line.bars else None
         for each in self.line.pieces:
             right, up = x + pixels * each.x, y + pixels * each.y
-            looks = font_properties(self.get_fontsize() * each.size, each.slanted, each.heavy, each.families)
+            looks = font_properties(float(self.get_fontsize()) * each.size, each.slanted, each.heavy, each.families)
             renderer.draw_text(pen, right, up if top is None else top - up, each.text, looks, 0.0, False, alone)
         for left, low, right, high in self.line.bars:
             corners = Path([(left, low), (right, low), (right, high), (left, high), (left, low)], closed=True)
@@ -68,7 +68,7 @@ class TextLineArtist(Text):
         figure = self.get_figure()
         whole = figure.dpi if figure is not None else 72.0
         shift = 1.0 if dpi is None else dpi / whole
-        pixels = self.get_fontsize() * whole / 72.0
+        pixels = float(self.get_fontsize()) * whole / 72.0
         x, y = self._start_point(pixels)
         box = (x, y - pixels * self.line.descent, x + pixels * self.line.width, y + pixels * self.line.ascent)
         return Bbox.from_extents(*(shift * each for each in box))
@@ -99,7 +99,7 @@ def draw_text(
         made.set_transform(transform or on.transFigure)
         made.set_figure(on)
         on.texts.append(made)
-        made._remove_method = on.texts.remove
+        made._remove_method = on.texts.remove  # type: ignore[attr-defined]  # as `Figure.text` does, untold
     else:
         made.set_transform(transform or on.transData)
         on.add_artist(made)

@@ -122,8 +122,8 @@ class _LineWriter:
 
     def add_line(self, line: TextLine, x: float, y: float = 0.0, size: float = 1.0) -> None:
         """Another line with its left end there, in a size of this line's."""
-        for text, left, up, part, *looks in line.pieces:
-            self.pieces.append(TextPiece(text, x + size * left, y + size * up, size * part, *looks))
+        for text, left, up, part, slanted, heavy, families in line.pieces:
+            self.pieces.append(TextPiece(text, x + size * left, y + size * up, size * part, slanted, heavy, families))
         self.bars += [(x + size * a, y + size * b, x + size * c, y + size * d) for a, b, c, d in line.bars]
         if line.pieces or line.bars:
             self.extents.append((y + size * line.ascent, size * line.descent - y))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_left
+from collections.abc import Callable
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -60,6 +61,12 @@ def text_size(text: str, points: float, slanted: bool = False, math: bool = Fals
     return TextSize(size * line.width, size * (line.ascent + line.descent), size * line.descent)
 
 
+def _fitting_length(word: str, most: int, fits: Callable[[str], bool]) -> int:
+    """The greatest number of a word's characters that fit, one at least, not all and at most so many."""
+    tried = range(1, min(len(word) - 1, most) + 1)
+    return max(1, bisect_left(tried, True, key=lambda count: not fits(word[:count])))
+
+
 def wrap_text(text: str, points: float, width: float, heavy: bool = False) -> list[str]:
     """A plain text as lines of at most so many mm, broken at spaces and within a word that is too long by itself."""
 
@@ -77,9 +84,7 @@ def wrap_text(text: str, points: float, width: float, heavy: bool = False) -> li
             lines.append(line)
         rest = word
         while len(rest) > 1 and (len(rest) > most or not fits(rest)):
-            # the greatest number of its characters that fit, one at least
-            tried = range(1, min(len(rest) - 1, most) + 1)
-            cut = max(1, bisect_left(tried, True, key=lambda n, rest=rest: not fits(rest[:n])))
+            cut = _fitting_length(rest, most, fits)
             lines.append(rest[:cut])
             rest = rest[cut:]
         line = rest

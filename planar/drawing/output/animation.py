@@ -12,16 +12,18 @@ from threading import Thread
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from planar.drawing.diagrams.drawn_run import DrawnRun, closed_run, smooth_path, steady_run
 from planar.drawing.diagrams.positions import coupler_points, resolve_points
 from planar.drawing.labels.fonts import font_families, printable_text
 from planar.drawing.paper.pens import FILL_COLOURS, PEN_STYLES, require_matplotlib
-from planar.drawing.paper.picture import Circle, Fill, Mark, PaperPoint, Pen, Polyline, extent
+from planar.drawing.paper.picture import Fill, Outline, PaperPoint, Pen, Polyline, extent
 from planar.drawing.paper.scales import Scale
 from planar.drawing.scheme.ground import ground_marks
 from planar.drawing.scheme.link_bodies import link_bodies
 from planar.drawing.scheme.link_strokes import body_marks
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, unknown_format_error
 from planar.model.mechanism import Mechanism
 from planar.model.wording import amount
@@ -32,7 +34,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Array = np.ndarray
+Pixels = npt.NDArray[np.uint8]
+"""Bytes of a picture, or of colours."""
+
 Progress = Callable[[int, int], None]
 """Told how many frames are done, and of how many."""
 
@@ -69,8 +73,8 @@ class AnimationScript(NamedTuple):
     low: PaperPoint
     high: PaperPoint
     "corners of the drawing (mm)"
-    ground: tuple[Mark, ...]
-    bodies: tuple[tuple[Mark, ...], ...]
+    ground: tuple[Outline, ...]
+    bodies: tuple[tuple[Outline, ...], ...]
 
     @property
     def size(self) -> tuple[int, int]:
@@ -199,7 +203,7 @@ class _FrameCanvas:
             script.low[0] + MARGIN, script.low[1] + 2.0, "", family=family, fontsize=9.0, va="bottom", parse_math=False
         )
 
-    def draw_frame(self, index: int) -> Array:
+    def draw_frame(self, index: int) -> Pixels:
         """One frame (height, width, 3) of bytes."""
         script = self.script
         self.canvas.restore_region(self.background)
@@ -215,7 +219,7 @@ class _FrameCanvas:
         self.axes.draw_artist(self.text)
         return np.asarray(self.canvas.buffer_rgba())[:, :, :3].copy()
 
-    def _artists_for(self, marks: Sequence[Mark]) -> list[Artist]:
+    def _artists_for(self, marks: Sequence[Outline]) -> list[Artist]:
         """The artists for such marks; other ones only where a position has other strokes."""
         key = tuple((type(mark), mark.pen, getattr(mark, "closed", True), mark.fill) for mark in marks)
         if key not in self.artists_by_kind:
@@ -239,7 +243,7 @@ def _rounded_amount(value: float, kind: str, units: Any) -> str:
     return f"{float(number):.1f} {name}"
 
 
-def _outline_points(mark: Polyline | Circle) -> Array:
+def _outline_points(mark: Outline) -> Array:
     """The places that a stroke goes through (n, 2)."""
     if isinstance(mark, Polyline):
         return np.array(mark.points)
@@ -248,7 +252,7 @@ def _outline_points(mark: Polyline | Circle) -> Array:
     return np.array([(x + r * cos(turn), y + r * sin(turn)) for turn in turns])
 
 
-def _add_artist(axes: Axes, mark: Mark) -> Any:
+def _add_artist(axes: Axes, mark: Outline) -> Any:
     """The stroke of a mark, as wide as on paper."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Polygon
@@ -266,7 +270,7 @@ def _add_artist(axes: Axes, mark: Mark) -> Any:
     return axes.add_line(line)
 
 
-def _move_artist(artist: Any, mark: Mark) -> None:
+def _move_artist(artist: Any, mark: Outline) -> None:
     corners = _outline_points(mark)
     if hasattr(artist, "set_xy"):
         artist.set_xy(corners)
@@ -275,7 +279,7 @@ def _move_artist(artist: Any, mark: Mark) -> None:
         artist.set_data(*(np.vstack([corners, corners[:1]]) if closed else corners).T)
 
 
-def _rendered_frames(script: AnimationScript, progress: Progress) -> Iterator[Array]:
+def _rendered_frames(script: AnimationScript, progress: Progress) -> Iterator[Pixels]:
     stage, total = _FrameCanvas(script), len(script.rows)
     for index in range(total):
         yield stage.draw_frame(index)
@@ -289,7 +293,7 @@ def _encode_gif(script: AnimationScript, fps: float, progress: Progress) -> byte
     colours = _palette(_FrameCanvas(script).draw_frame(int(np.argmax(script.traced))))
     nearest = _nearest_colours(colours)
 
-    def image(shot: Array) -> Image.Image:
+    def image(shot: Pixels) -> Image.Image:
         cells = (shot >> 3).astype(np.uint16)
         made = Image.fromarray(nearest[cells[..., 0] << 10 | cells[..., 1] << 5 | cells[..., 2]])
         made.putpalette(colours.tobytes())
@@ -310,13 +314,13 @@ def _encode_gif(script: AnimationScript, fps: float, progress: Progress) -> byte
     return content.getvalue()
 
 
-def _palette(shot: Array) -> Array:
+def _palette(shot: Pixels) -> Pixels:
     """The most frequent colours of a frame (n, 3), as bytes."""
     colours, counts = np.unique(shot.reshape(-1, 3), axis=0, return_counts=True)
     return colours[np.argsort(-counts, kind="stable")[:PALETTE_SIZE]]
 
 
-def _nearest_colours(colours: Array) -> Array:
+def _nearest_colours(colours: Pixels) -> Pixels:
     """For every colour of five bits to a channel the nearest of a palette; black and white are themselves."""
     steps = np.arange(32) * 255.0 / 31.0
     cells = np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3)

@@ -18,6 +18,7 @@ from planar.foundation.errors import BadInput, unknown_format_error
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from matplotlib.typing import RcKeyType
 
 MM_PER_INCH = 25.4
 PAGE_WIDTH, PAGE_HEIGHT = 277.0, 190.0
@@ -35,7 +36,7 @@ MAX_SHEET_SIZE = 5000.0
 RESOLUTION = 200
 """Dots to an inch in PNG files."""
 MAX_PIXELS = 1e8
-MATPLOTLIB_SETTINGS = {
+MATPLOTLIB_SETTINGS: dict[RcKeyType, Any] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "planar",
     "pdf.fonttype": 42,
@@ -207,7 +208,7 @@ def _encode_pdf(figures: Sequence[Figure]) -> bytes:
     out = BytesIO()
     used = {family for each in figures for family in used_families(each)}
     # where a font cannot be embedded as it is, all are embedded as drawings of their letters
-    fonts = {} if have_truetype_outlines(used) else {"pdf.fonttype": 3, "ps.fonttype": 3}
+    fonts: dict[RcKeyType, Any] = {} if have_truetype_outlines(used) else {"pdf.fonttype": 3, "ps.fonttype": 3}
     with rc_context(fonts), outlines_only(), PdfPages(out, metadata=METADATA["pdf"]) as book:
         for each in figures:
             book.savefig(each)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import hypot
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
 
 from planar.drawing.labels.fonts import printable_text
 from planar.drawing.labels.placement import PlacedLabel
@@ -16,6 +18,7 @@ from planar.drawing.paper.stroke_shapes import ArrowHead, arc_arrow_head, arrow_
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
+    from matplotlib.patches import Patch
 
 
 def draw_labels(axes: Axes, labels: Sequence[PlacedLabel], order: int) -> None:
@@ -28,8 +31,8 @@ def draw_labels(axes: Axes, labels: Sequence[PlacedLabel], order: int) -> None:
         below = text_size(letter.text, letter.size, letter.slanted, letter.math).descent
         # centred, as the same font is a little wider or narrower in other programs
         at = (box.left + box.right) / 2.0, box.bottom + below
-        looks = {"math": letter.math, "slanted": letter.slanted, "ha": "center"}
-        _tag_artist(draw_text(axes, letter.text, at, letter.size, **looks), letter.about, order + 1)
+        drawn = draw_text(axes, letter.text, at, letter.size, math=letter.math, slanted=letter.slanted, ha="center")
+        _tag_artist(drawn, letter.about, order + 1)
 
 
 def _tag_artist(artist: Artist, about: str, order: float) -> None:
@@ -53,7 +56,7 @@ def _add_line(
     about: str,
     order: float,
     width: float | None = None,
-    cap: str = "butt",
+    cap: Literal["butt", "round"] = "butt",
 ) -> None:
     from matplotlib.lines import Line2D
 
@@ -97,8 +100,8 @@ def _draw_line(axes: Axes, mark: Polyline, order: int) -> None:
         axes.add_artist(area)
         _tag_artist(area, mark.about, order)
     elif len(mark.points) > 1:
-        cap = "butt" if mark.pen in {Pen.HATCH, Pen.GROUND} else "round"
-        _add_line(axes, mark.points, ink, mark.about, order, cap=cap)
+        flat = mark.pen in {Pen.HATCH, Pen.GROUND}
+        _add_line(axes, mark.points, ink, mark.about, order, cap="butt" if flat else "round")
 
 
 def _draw_circle(axes: Axes, mark: Circle, order: int) -> None:
@@ -111,11 +114,11 @@ def _draw_circle(axes: Axes, mark: Circle, order: int) -> None:
     looks = {"facecolor": fill, "edgecolor": ink.colour}
     tip = arc_arrow_head(mark)
     if turn == 360.0 and tip is None:
-        drawn = Whole(mark.centre, abs(mark.radius), **looks, **_line_style(ink))
+        drawn: Patch = Whole(mark.centre, abs(mark.radius), **looks, **_line_style(ink))
     elif turn > 0.0:
         start, stop = (mark.start, mark.start + turn) if tip is None else tip[1:]
         arc = Path.arc(start, stop)
-        corners = arc.vertices * mark.radius + mark.centre
+        corners = np.asarray(arc.vertices) * mark.radius + mark.centre
         drawn = PathPatch(Path(corners, arc.codes), capstyle="butt", **looks, **_line_style(ink))
     else:
         return

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from io import BytesIO
 from math import isclose
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from planar.drawing.labels.typesetting import TextStyle, TypesetPage
 from planar.drawing.output.matplotlib_figure import (
     MATPLOTLIB_SETTINGS,
     MM_PER_INCH,
+    PictureCell,
     draw_cell,
     encode_pages,
     lay_out_picture,
@@ -109,7 +110,8 @@ def encode_sheets(figures: Sequence[Figure], suffix: str) -> bytes:
         tall = max(page.shape[0] for page in row)
         row += [np.zeros((0, 0, 3), dtype=np.uint8)] * (columns - len(row))
         rows.append(np.hstack([_pad_page(page, tall, wide) for page in row]))
-    imsave(out, np.vstack(rows), format="png", dpi=dots, metadata={"Software": None})
+    nameless: dict[str, Any] = {"Software": None}  # what matplotlib would write there is left out
+    imsave(out, np.vstack(rows), format="png", dpi=dots, metadata=nameless)
     return out.getvalue()
 
 
@@ -145,9 +147,9 @@ def _space_diagram_scale(state: State) -> Scale:
     scale, length = space_scale(state.mechanism, plain_frames(state.frames), state.shapes), state.mechanism.units.length
     for _ in range(3):
         low, high = extent([mark for mark in scheme(state, scale).marks if not isinstance(mark, Label)])
-        size = [(b - a) * scale.per_mm for a, b in zip(low, high, strict=True)]
+        width, height = ((b - a) * scale.per_mm for a, b in zip(low, high, strict=True))
         room = DRAWING_SIZES["length"][0] + SYMBOL_MARGIN, DRAWING_SIZES["length"][1] + SYMBOL_MARGIN
-        scale, before = round_scale("length", length, *size, room), scale
+        scale, before = round_scale("length", length, width, height, room), scale
         if scale == before:
             break
     return scale
@@ -201,7 +203,7 @@ def _picture_strips(pictures: Sequence[Picture]) -> Iterator[Strip]:
             raise BadInput(
                 "--scale", f"the {each.picture.title.lower()} takes {size}, more than a page: choose a smaller"
             )
-    rows: list[list] = []
+    rows: list[list[PictureCell]] = []
     for each in made:
         if rows and sum(other.width for other in (*rows[-1], each)) + 6.0 * len(rows[-1]) <= TEXT_WIDTH:
             rows[-1].append(each)
@@ -211,7 +213,7 @@ def _picture_strips(pictures: Sequence[Picture]) -> Iterator[Strip]:
         yield _picture_row_strip(row)
 
 
-def _picture_row_strip(row: Sequence) -> Strip:
+def _picture_row_strip(row: Sequence[PictureCell]) -> Strip:
     inside = max(each.axes_size[1] for each in row)
     tall = inside + max(each.text_height for each in row)
     gap = (TEXT_WIDTH - sum(each.width for each in row)) / (len(row) + 1)

@@ -24,6 +24,7 @@ from planar.drawing.paper.picture import (
     Pen,
     Picture,
     Polyline,
+    Stroke,
     extent,
 )
 from planar.drawing.paper.stroke_shapes import (
@@ -70,7 +71,7 @@ def svg(picture: Picture, title: str = "") -> str:
     )
 
 
-def _mark_elements(mark: Mark) -> Iterable[str]:
+def _mark_elements(mark: Stroke) -> Iterable[str]:
     ink, stroke = PEN_STYLES[mark.pen], _stroke_attributes(mark.pen)
     if isinstance(mark, Polyline):
         kind = "polygon" if mark.closed else "polyline"

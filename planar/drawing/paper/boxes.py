@@ -42,7 +42,7 @@ def lengths_inside_boxes(boxes: np.ndarray, segments: np.ndarray, padding: np.nd
 
     A piece is cut by the two strips of a box (Liang and Barsky, 1984).
     """
-    enter, leave, square = 0.0, 1.0, 0.0
+    enter, leave, square = np.array(0.0), np.array(1.0), np.array(0.0)
     for axis in (0, 1):
         start, way = segments[..., axis], segments[..., axis + 2] - segments[..., axis]
         steep = 1.0 / np.where(np.abs(way) < 1e-9, 1e-9, way)

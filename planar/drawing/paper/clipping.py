@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-Array = np.ndarray
+from planar.foundation.arrays import Array
 
 POINT_SPACING = 0.15
 """mm between the points of a stroke."""
@@ -56,7 +56,8 @@ def remove_repeated_strokes(pieces: Sequence[Array]) -> tuple[Array, ...]:
     A closed curve is often run through several times, and dashes drawn twice are no dashes.
     """
     seen: dict[tuple[int, int, int], float] = {}
-    gone, found = 0.0, []
+    gone = 0.0
+    found: list[Array] = []
     for piece in pieces:
         spots = _thin_points(piece)
         ways = np.diff(spots, axis=0)

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.drawing.paper.boxes import Box
+from planar.foundation.arrays import Array
 
-Array = np.ndarray
 PAPER_SIZE = 100.0
 """mm: lengths beside which homogeneous points are well conditioned on paper."""
 PARALLEL_TOLERANCE = 1e-9

@@ -145,7 +145,9 @@ class Label(NamedTuple):
     "the only side on which it may stand, such as (0, -1) for below, as the numbers of an axis do"
 
 
-Mark = Polyline | Arrow | Circle | Label
+Outline = Polyline | Circle
+Stroke = Outline | Arrow
+Mark = Stroke | Label
 
 
 class Picture(NamedTuple):

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planar.drawing.paper.pens import ARROW_HEAD_LENGTH, ARROW_HEAD_WIDTH, PEN_STYLES
-from planar.drawing.paper.picture import Arrow, Circle, Label, Mark, PaperPoint, Pen, Polyline
+from planar.drawing.paper.picture import Arrow, Circle, Label, Mark, PaperPoint, Pen, Polyline, Stroke
 from planar.foundation.errors import BadInput
 
 MAX_CHORD_SAG = 0.04
@@ -118,7 +118,7 @@ def arc_points(circle: Circle) -> np.ndarray:
     return np.array(circle.centre) + circle.radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
 
 
-def _polylines(mark: Mark) -> list[np.ndarray]:
+def _polylines(mark: Stroke) -> list[np.ndarray]:
     """The strokes of a mark as chains of points (n, 2)."""
     if isinstance(mark, Polyline):
         points = np.array(mark.points, dtype=float).reshape(-1, 2)
@@ -126,16 +126,16 @@ def _polylines(mark: Mark) -> list[np.ndarray]:
     if isinstance(mark, Arrow):
         made = arrow_head(mark.tail, mark.head, hypot(mark.head[0] - mark.tail[0], mark.head[1] - mark.tail[1]))
         return [] if made is None else [np.array([mark.tail, mark.head]), np.array([*made.corners, made.corners[0]])]
-    if isinstance(mark, Circle):
-        tip = arc_arrow_head(mark)
-        return [arc_points(mark), *([] if tip is None else [np.array([*tip[0].corners, tip[0].corners[0]])])]
-    return []
+    tip = arc_arrow_head(mark)
+    return [arc_points(mark), *([] if tip is None else [np.array([*tip[0].corners, tip[0].corners[0]])])]
 
 
 def stroke_segments(marks: Iterable[Mark]) -> StrokeSegments:
     """The straight pieces of everything but letters."""
     ends, half, weight = [np.empty((0, 4))], [np.empty(0)], [np.empty(0)]
     for mark in marks:
+        if isinstance(mark, Label):
+            continue
         for chain in _polylines(mark):
             if len(chain) < 2:
                 continue

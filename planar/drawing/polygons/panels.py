@@ -32,9 +32,9 @@ def polygon_panels(state: State, scales: ScaleTexts, count: int) -> list[Picture
         space = paper.round_scale("length", whole.unit, width * whole.per_mm, height * whole.per_mm, PANEL_SIZE)
     pictures = [scheme_picture(state, space)._replace(title="Space diagram", notes=_scale_notes(space))]
     for polygon in (velocity_polygon(state), acceleration_polygon(state))[: count - 1]:
-        spread = np.ptp([(0.0, 0.0), *polygon.letters.values()], axis=0)
+        width, height = map(float, np.ptp(np.array([(0.0, 0.0), *polygon.letters.values()]), axis=0))
         unit = unit_of_kind(polygon.kind, state.mechanism.units)[0]
-        fits = given.get(polygon.kind) or paper.round_scale(polygon.kind, unit, *map(float, spread), PANEL_SIZE)
+        fits = given.get(polygon.kind) or paper.round_scale(polygon.kind, unit, width, height, PANEL_SIZE)
         drawn = polygon_picture(polygon, fits)
         rest = tuple(note for note in drawn.notes[1:] if note not in _scale_notes(fits))
         title = f"{polygon.kind} polygon".capitalize()

@@ -167,7 +167,9 @@ class _PolygonDrawing:
         """Of a link that was found together with others what turns about a fixed pin of it."""
         letters = self._letters_of_link(link, stage)
         pin = next((letter for letter in letters if letter in self.pole_letters), None)
-        for letter in letters if pin else ():
+        if not pin:
+            return
+        for letter in letters:
             of, against = (self.polygon.points[each] for each in (letter, pin))
             yield from self._total_stroke((pin, letter), of, against, True)
 

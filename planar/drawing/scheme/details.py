@@ -44,7 +44,7 @@ def scheme_with_details(state: State, scale: Scale | None = None) -> list[Pictur
         (max(each) - min(each) for each in zip(*(at for at, _ in points.values()), strict=True)), default=0.0
     )
     frames: list[Mark] = []
-    pictures = []
+    pictures: list[Picture] = []
     for names, places, nearest in _clusters(points, chosen):
         apart = min(APART, LARGEST * usual.on_paper(nearest))
         larger = round_scale("length", state.mechanism.units.length, nearest, nearest, (apart, apart))
@@ -67,7 +67,7 @@ def _symbols(state: State) -> dict[str, tuple[Vector, float]]:
     marks = all_marks(state.mechanism, state.shapes)
     pins = {mark.name for mark in marks if isinstance(mark, PinMark)}
     blocks = {mark.name for mark in marks if isinstance(mark, SliderMark)}
-    riders = {pair.point_on_line()[0] for pair in state.mechanism.pairs if pair.name in blocks and pair.point_on_line()}
+    riders = {on[0] for pair in state.mechanism.pairs if pair.name in blocks and (on := pair.point_on_line())}
     for each in named_points(state.mechanism):
         block = not riders.isdisjoint(each.members)
         if block or each.name in pins:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from itertools import chain
 from math import ceil, pi
 
-from planar.drawing.paper.picture import Mark, Pen
+from planar.drawing.paper.picture import Mark, Outline, Pen
 from planar.drawing.paper.scales import Scale
 from planar.drawing.scheme import symbol_table, symbols
 from planar.drawing.scheme.clearance import Clearance
@@ -45,7 +45,7 @@ def ground_marks(
     scale: Scale,
     travel: TravelRanges | None = None,
     obstacles: Iterable[Mark] = (),
-) -> tuple[Mark, ...]:
+) -> tuple[Outline, ...]:
     """What stands still: supports, fixed guides and wheels, turned so that they are clear of the links' position.
 
     `obstacles` are further strokes to be clear of, such as the links in other positions.
@@ -53,7 +53,7 @@ def ground_marks(
     return fixed_marks(Scene(mechanism, bodies, frames, shapes, scale, travel or {}), obstacles)
 
 
-def fixed_marks(scene: Scene, obstacles: Iterable[Mark] = ()) -> tuple[Mark, ...]:
+def fixed_marks(scene: Scene, obstacles: Iterable[Mark] = ()) -> tuple[Outline, ...]:
     """Supports, guides, racks and wheels of the frame, clear of the links and of further strokes where that can be."""
     on_paper = scene.frames, scene.scale.per_mm
     moving = stroke_marks(obstructing_strokes(scene), *on_paper)

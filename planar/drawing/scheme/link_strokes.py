@@ -7,7 +7,7 @@ from itertools import chain
 from math import hypot
 from typing import Any
 
-from planar.drawing.paper.picture import Fill, Mark, Pen
+from planar.drawing.paper.picture import Fill, Mark, Outline, Pen
 from planar.drawing.paper.scales import Scale
 from planar.drawing.scheme import symbol_table, symbols
 from planar.drawing.scheme.link_bodies import LinkBody, distance_from_line
@@ -39,7 +39,7 @@ def body_marks(
     pen: Pen = Pen.LINK,
     with_symbols: bool = True,
     travel: TravelRanges | None = None,
-) -> tuple[Mark, ...]:
+) -> tuple[Outline, ...]:
     """What moves, in one position (frames of plain numbers), with all pins; lines alone where no symbols are wanted."""
     scene = Scene(mechanism, bodies, frames, shapes, scale, travel or {})
     if with_symbols:

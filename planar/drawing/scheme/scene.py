@@ -36,7 +36,10 @@ def plain_frames(frames: Mapping[str, Frame], index: int | None = None) -> dict[
         value = value.parts[0] if isinstance(value, Jet) else value
         return float(value if index is None or np.ndim(value) == 0 else value[index])
 
-    return {link: Frame(*(number(value) for value in frame[:5]), frame.fixed) for link, frame in frames.items()}
+    return {
+        link: Frame(number(at.x), number(at.y), number(at.cos), number(at.sin), number(at.angle), at.fixed)
+        for link, at in frames.items()
+    }
 
 
 def least(first: Scalar, second: Scalar) -> Scalar:

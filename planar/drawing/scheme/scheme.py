@@ -214,8 +214,8 @@ def _number_position(scene: Scene, body: LinkBody, clear: Clearance) -> tuple[Ve
             if link == each.guide
             else (max(each.mouth, here + each.piston), here + each.rod_end)
         )
-        low, high = (scene.to_paper(each.guide, each.foot + each.direction * s) for s in (low, high))
-        return (low + high) * 0.5, symbol_table.CYLINDER_WIDTH / 2.0 + 0.8 if link == each.guide else 1.0
+        first, last = (scene.to_paper(each.guide, each.foot + each.direction * s) for s in (low, high))
+        return (first + last) * 0.5, symbol_table.CYLINDER_WIDTH / 2.0 + 0.8 if link == each.guide else 1.0
     lines = list(body.sides)
     for name, foot, way in body.guides:
         lines.append((foot, foot + way * scene.displacement_along(name, link, foot, way)))

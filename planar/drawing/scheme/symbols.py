@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from math import degrees, pi, remainder, sqrt
 
-from planar.drawing.paper.picture import Circle, Fill, Pen, Polyline, paper_point
+from planar.drawing.paper.picture import Circle, Fill, Outline, Pen, Polyline, paper_point
 from planar.drawing.scheme.symbol_table import SYMBOLS, Hatching, SymbolCircle, TurnedStroke, hatching_feet
 from planar.foundation.geometry import Vector, direction
 
@@ -27,7 +27,7 @@ def symbol_marks(
     side: float = 1.0,
     radius: float = 0.0,
     pen: Pen = Pen.LINK,
-) -> Iterator[Polyline | Circle]:
+) -> Iterator[Outline]:
     """A symbol of the table at a place on paper, along a unit vector, and as far as a second place where it has two.
 
     `side` -1 mirrors it, `radius` is that of a wheel (mm); `pen` draws links.

@@ -15,7 +15,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from planar.model.input_laws.segment import Array, LawSegment, SegmentKey
+from planar.foundation.arrays import Array, BoolArray
+from planar.model.input_laws.segment import LawSegment, SegmentKey
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,7 @@ class CamRise(LawSegment):
     }
 
     @abstractmethod
-    def first_half(self, x: Array, is_mirrored: Array) -> Array:
+    def first_half(self, x: Array, is_mirrored: BoolArray) -> Array:
         """(4, n): s and its derivatives by x, for x (n,) between 0 and 1/2.
 
         Where a derivative jumps, it is what follows; what went before where `back` says so.
@@ -59,7 +60,7 @@ class PolynomialRise(CamRise):
 
     coefficients: ClassVar[tuple[int, ...]]
 
-    def first_half(self, x: Array, is_mirrored: Array) -> Array:
+    def first_half(self, x: Array, is_mirrored: BoolArray) -> Array:
         s = Polynomial(self.coefficients)
         return np.stack([s.deriv(k)(x) for k in range(4)])
 
@@ -83,7 +84,7 @@ class CycloidalRise(CamRise):
 
     motion = "cycloidal"
 
-    def first_half(self, x: Array, is_mirrored: Array) -> Array:
+    def first_half(self, x: Array, is_mirrored: BoolArray) -> Array:
         turn = 2.0 * pi
         c, s = np.cos(turn * x), np.sin(turn * x)
         return np.stack([x - s / turn, 2.0 * np.sin(pi * x) ** 2, turn * s, turn**2 * c])
@@ -94,7 +95,7 @@ class HarmonicRise(CamRise):
 
     motion = "harmonic"
 
-    def first_half(self, x: Array, is_mirrored: Array) -> Array:
+    def first_half(self, x: Array, is_mirrored: BoolArray) -> Array:
         c, s = np.cos(pi * x), np.sin(pi * x)
         return np.stack([np.sin(0.5 * pi * x) ** 2, 0.5 * pi * s, 0.5 * pi**2 * c, -0.5 * pi**3 * s])
 
@@ -108,7 +109,7 @@ class RampedRise(CamRise):
     """
 
     ramp: float = 0.125
-    keys: ClassVar[Mapping[str, SegmentKey]] = CamRise.keys | {"ramp": SegmentKey("ramp", "number", is_required=False)}
+    keys: ClassVar[Mapping[str, SegmentKey]] = {**CamRise.keys, "ramp": SegmentKey("ramp", "number", is_required=False)}
     ramp_mean: ClassVar[float]
     "the mean of acceleration over a ramp, of its greatest"
 
@@ -116,7 +117,7 @@ class RampedRise(CamRise):
     def ramp_integrals(self, x: Array) -> Array:
         """(4, n): what acceleration sums to within a ramp, of height and length one: s, v, a, j over x (n,)."""
 
-    def first_half(self, x: Array, is_mirrored: Array) -> Array:
+    def first_half(self, x: Array, is_mirrored: BoolArray) -> Array:
         b = self.ramp
         # v(1/2) = a (1/2 - 2 b + 2 b filling), and s(1/2) = v(1/2) / 4 = 1/2
         a = 2.0 / (0.5 - 2.0 * b + 2.0 * b * self.ramp_mean)

@@ -8,7 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from planar.model.input_laws.segment import Array, LawSegment, SegmentKey
+from planar.foundation.arrays import Array
+from planar.model.input_laws.segment import LawSegment, SegmentKey
 
 
 @dataclass(frozen=True)

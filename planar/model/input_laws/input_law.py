@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.model.input_laws.segment import MAX_LAW_ITEMS, Array, LawSegment
+from planar.foundation.arrays import Array
+from planar.model.input_laws.segment import MAX_LAW_ITEMS, LawSegment
 from planar.model.input_laws.spline_table import TableSegment
 
 
@@ -71,18 +72,20 @@ class InputLaw:
             own = np.where(t[rows] >= self.joint_times[i + 1], piece.duration, t[rows] - self.joint_times[i])
             found[:, rows] = piece.evaluate(np.clip(own, 0.0, piece.duration), joints[i].velocity_before)
             found[0, rows] += joints[i].position
-        for rows, joint in ((t < 0.0, joints[0]), (t > self.duration, joints[-1])):
-            found[:, rows] = 0.0
-            found[0, rows] = joint.position + joint.velocity_before * (t[rows] - joint.time)
-            found[1, rows] = joint.velocity_before
+        for outside, joint in ((t < 0.0, joints[0]), (t > self.duration, joints[-1])):
+            found[:, outside] = 0.0
+            found[0, outside] = joint.position + joint.velocity_before * (t[outside] - joint.time)
+            found[1, outside] = joint.velocity_before
         return found
 
     def start_at(self, position: float, velocity: float) -> InputLaw:
         """The law for an input that starts here: tables, whose positions are absolute, move to where they start."""
-        pieces = []
+        pieces: list[LawSegment] = []
         for joint, piece in zip(self.joints(position, velocity), self.segments, strict=False):
-            lies = not isinstance(piece, TableSegment) or piece.starts_at(joint.position)
-            pieces.append(piece if lies else piece.shift_to(joint.position))
+            if isinstance(piece, TableSegment) and not piece.starts_at(joint.position):
+                pieces.append(piece.shift_to(joint.position))
+            else:
+                pieces.append(piece)
         return InputLaw(tuple(pieces))
 
     def find_problem(self) -> tuple[str, str] | None:

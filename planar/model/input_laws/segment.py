@@ -6,11 +6,9 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from math import isfinite
 from numbers import Real
-from typing import Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
-import numpy as np
-
-Array = np.ndarray
+from planar.foundation.arrays import Array
 
 SHORTEST_DURATION, LONGEST_DURATION = 1e-9, 1e9
 """s: what a piece takes at least and at most, so that no rate of it overflows."""
@@ -39,7 +37,12 @@ class LawSegment(ABC):
 
     motion: ClassVar[str]
     keys: ClassVar[Mapping[str, SegmentKey]]
-    duration: float
+
+    if TYPE_CHECKING:  # a field, or made of the fields
+
+        @property
+        def duration(self) -> float:
+            """How long it takes (s)."""
 
     @abstractmethod
     def evaluate(self, t: Array, velocity: float) -> Array:

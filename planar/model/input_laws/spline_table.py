@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.model.input_laws.segment import (
     LONGEST_DURATION,
     MAX_LAW_ITEMS,
     SHORTEST_DURATION,
-    Array,
     LawSegment,
     SegmentKey,
 )

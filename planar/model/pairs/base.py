@@ -233,7 +233,7 @@ def sample_shape(**points: Vector) -> LinkShape:
     return LinkShape(points, Vector(0.0, 0.0), Vector(1.0, 0.0))
 
 
-Schema = Mapping[str, Any]
+Schema = dict[str, Any]
 """What JSON Schema says of a value."""
 
 

@@ -65,8 +65,8 @@ class GearPair(WheelPair):
 
         A ratio alone leaves open what stands between the wheels.
         """
-        pins = [self._centre_pin(wheel, all_pairs) for wheel in self.links]
-        if self.size_kind == "ratio" or None in pins:
+        pins = self._centre_pins(all_pairs)
+        if self.size_kind == "ratio" or pins is None:
             return None
         first, second = (shapes[self.carrier].position(pin[self.carrier]) for pin in pins)
         apart = sqrt((second - first).dot(second - first))

@@ -88,12 +88,12 @@ class LinkLine(NamedTuple):
 def point_along_line(frame: Frame, numbers: Sequence[Scalar], displacement: Scalar, offset: Scalar = 0.0) -> Vector:
     """The place at a distance along a measured line of a link, and at a distance to the left of it."""
     way = Vector(*numbers[2:4])
-    at = frame.to_world(Vector(*numbers[0:2])) + frame.rotate_to_world(way) * displacement
-    return (
-        at
-        if isinstance(offset, float) and offset == 0.0
-        else at + frame.rotate_to_world(Vector(-way.y, way.x)) * offset
-    )
+    along: Vector = frame.rotate_to_world(way) * displacement
+    at = frame.to_world(Vector(*numbers[0:2])) + along
+    if isinstance(offset, float) and offset == 0.0:
+        return at
+    beside: Vector = frame.rotate_to_world(Vector(-way.y, way.x)) * offset
+    return at + beside
 
 
 @dataclass(frozen=True)

@@ -122,8 +122,8 @@ class RackPair(GuidedPair):
     @classmethod
     def write(cls, group: Sequence[Self], quantity: QuantityWriter) -> dict[str, Any]:
         (pair,) = group
-        entry = {"rack": pair.name, "links": list(pair.links), "line": pair.line.write(quantity), "point": pair.point}
-        entry["radius"] = quantity(pair.radius, "length")
+        entry: dict[str, Any] = {"rack": pair.name, "links": list(pair.links), "line": pair.line.write(quantity)}
+        entry |= {"point": pair.point, "radius": quantity(pair.radius, "length")}
         if pair.mesh_reference != (0.0, 0.0):
             s0, a0 = pair.mesh_reference
             entry["mesh"] = {"displacement": quantity(s0, "length"), "angle": quantity(a0, "angle")}

@@ -108,7 +108,7 @@ class SlidingPair(GuidedPair):
     @classmethod
     def write(cls, group: Sequence[Self], quantity: QuantityWriter) -> dict[str, Any]:
         (pair,) = group
-        entry = {"sliding": pair.name, "links": list(pair.links), "line": pair.line.write(quantity)}
+        entry: dict[str, Any] = {"sliding": pair.name, "links": list(pair.links), "line": pair.line.write(quantity)}
         entry["point"] = pair.point
         if pair.block_angle != 0.0:
             entry["turn"] = quantity(pair.block_angle, "angle")

@@ -109,8 +109,8 @@ class WheelPair(Pair):
 
     def drawing_marks(self, shapes: Mapping[str, LinkShape], all_pairs: Sequence[Pair]) -> tuple[DrawingMark, ...]:
         """Both pitch circles, where both wheels are pinned to the carrier."""
-        pins = [self._centre_pin(wheel, all_pairs) for wheel in self.links]
-        if None in pins:
+        pins = self._centre_pins(all_pairs)
+        if pins is None:
             return ()
         first, second = self._carrier_centres(shapes, all_pairs)
         apart = second - first
@@ -136,6 +136,11 @@ class WheelPair(Pair):
         for pair in beside:  # a pin of n links is several pairs
             pins.setdefault(pair.entry_name(), {}).update(pair.coincident_points())
         return next((pin for pin in pins.values() if wheel in pin and self.carrier in pin), None)
+
+    def _centre_pins(self, beside: Sequence[Pair]) -> list[Mapping[str, str]] | None:
+        """Those of both wheels; None where one of them is not pinned to the carrier."""
+        pins = [pin for wheel in self.links if (pin := self._centre_pin(wheel, beside)) is not None]
+        return pins if len(pins) == len(self.links) else None
 
     def describe_sizes(self, format_length: LengthFormatter) -> str:
         first, second = self.links
@@ -227,12 +232,10 @@ class WheelPair(Pair):
         """The pair with its carrier and first wheel at these angles; wheels with radii pinned so far apart."""
         second = self.ratio() * (first - carrier - self.mesh_reference[0]) + carrier + self.mesh_reference[1]
         frames = frame_at(0.2, 0.5, first), frame_at(-0.7, 0.1, second), frame_at(0.3, -0.4, carrier)
-        shapes, beside = (
-            (sample_shape(A=Vector(0.0, 0.0)), sample_shape(B=Vector(0.0, 0.0)), sample_shape(C=Vector(0.0, 0.0))),
-            (),
-        )
+        shapes = sample_shape(A=Vector(0.0, 0.0)), sample_shape(B=Vector(0.0, 0.0)), sample_shape(C=Vector(0.0, 0.0))
+        beside: tuple[dict[str, Any], ...] = ()
         if apart is not None:
-            shapes = (*shapes[:2], sample_shape(A=Vector(0.0, 0.0), B=Vector(apart, 0.0)))
+            shapes = shapes[0], shapes[1], sample_shape(A=Vector(0.0, 0.0), B=Vector(apart, 0.0))
             beside = {"turning": "A", "links": ["c", "a"]}, {"turning": "B", "links": ["c", "b"]}
         entry = {self.keyword: self.name, "links": ["a", "b"], "carrier": "c", **more}
         return PairSample(self, shapes, frames, (), entry, beside)

@@ -43,7 +43,7 @@ class DimensionNumber:
         return DimensionNumber(-self.value, lambda: -self.expression)
 
     def __eq__(self, other: object) -> bool:
-        return self.value == float(other)  # type: ignore[arg-type]
+        return self.value == float(other)  # type: ignore[arg-type]  # of nothing but numbers
 
     def __lt__(self, other: Any) -> bool:
         return self.value < float(other)

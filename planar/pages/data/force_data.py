@@ -47,7 +47,7 @@ class BalanceRows:
 
     def add_place(self, at: Vector) -> int:
         """The number of a place."""
-        self.places.append(ca.vertcat(at.x, at.y))
+        self.places.append(ca.vertcat(ca.SX(at.x), ca.SX(at.y)))
         return len(self.places) - 1
 
     def add_origin(self, link: str) -> int:
@@ -103,7 +103,7 @@ def force_data(mechanism: Mechanism, d: ca.SX, state: State, unit: float) -> tup
     data["inertia"] = rows.add(work.inertia.T)[0]
     table = ca.vertcat(*rows.rows)
     data["row"], data["column"] = (list(each) for each in table.sparsity().get_triplet())
-    told = ca.vertcat(*table.nonzeros(), *rows.places)
+    told = ca.vertcat(table.nz[:], *rows.places)
     given = [work.q, work.q1, work.q2, work.factors, work.spring_turns, d]
     data |= {"rows": rows.count, "told": told.numel()}
     return data, write_javascript("balance", ca.Function("balance", given, [told]))

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from planar.analysis.centres.centrodes import usual_links
-from planar.assemblies.circuits.circuits import circuits
-from planar.assemblies.modes import modes
+from planar.assemblies.circuits.circuits import Circuits, circuits
+from planar.assemblies.modes import Mode, modes
 from planar.codegen.javascript import write_javascript
 from planar.document.dimensions import Dimension, change_dimension
 from planar.equations.constraint_equations import slice_length
@@ -173,18 +173,19 @@ def _assembly_data(mechanism: Mechanism, solver: PositionSolver) -> dict[str, An
         len(stages) <= 1 and all(slice_length(stage.unknowns) <= 2 for stage in stages) and len(mechanism.inputs) == 1
     )
     every = circuits(mechanism) if small else None
-    lying = [every.of(mode) if every else None for mode in listed[:MAX_ASSEMBLIES]]
     return {
         "more": len(listed) > MAX_ASSEMBLIES,
-        "list": [
-            {
-                "z": mode.z.tolist(),
-                "circuit": on and [on[0].number, len(every)],
-                "branch": on and [on[1].number, len(on[0].branches)],
-            }
-            for mode, on in zip(listed, lying, strict=False)
-        ],
+        "list": [{"z": mode.z.tolist(), **_location_data(mode, every)} for mode in listed[:MAX_ASSEMBLIES]],
     }
+
+
+def _location_data(mode: Mode, every: Circuits | None) -> dict[str, Any]:
+    """The circuit and the branch of an assembly, each with how many there are; null where that is not known."""
+    on = every.of(mode) if every else None
+    if not every or on is None:
+        return {"circuit": None, "branch": None}
+    circuit, branch = on
+    return {"circuit": [circuit.number, len(every)], "branch": [branch.number, len(circuit.branches)]}
 
 
 def _dimension_data(mechanism: Mechanism, each: Dimension, size: float) -> dict[str, Any]:

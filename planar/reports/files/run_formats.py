@@ -9,13 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.foundation.errors import unknown_format_error
 from planar.reports.columns import ReportedSeries, reported_series, run_header
 from planar.reports.files import csv, npz, parquet
 from planar.results.motion import Motion
 from planar.results.records import Limit
-
-Array = np.ndarray
 
 _NO_FACTS: Mapping[str, Any] = MappingProxyType({})
 
@@ -47,7 +46,7 @@ def record(motion: Motion, more: Iterable[ReportedSeries] = (), facts: Mapping[s
     "time" is there where the run has one, so are "jerk" of points and "angular_jerk" of links; "limits" is a list of
     what `planar.results.records.Limit` holds.
     """
-    return _run_record(motion, more, _to_list) | facts
+    return {**_run_record(motion, more, _to_list), **facts}
 
 
 def _run_record(
@@ -80,11 +79,11 @@ def _to_list(values: Array | None) -> Any:
     if values is None:
         return None
     there = np.isfinite(values)
-    return (values if there.all() else np.where(there, values, None)).tolist()
+    return (values if there.all() else np.where(there, values.astype(object), np.array(None))).tolist()
 
 
 def _encode_json(motion: Motion, more: Iterable[ReportedSeries], facts: Mapping[str, Any]) -> bytes:
-    whole = _run_record(motion, more, lambda values: values) | facts
+    whole = {**_run_record(motion, more, lambda values: values), **facts}
     # arrays become lists one by one as they are written: lists of a long run take four times the memory of its arrays
     return (json.dumps(whole, default=_to_list, ensure_ascii=False, allow_nan=False) + "\n").encode()
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+from collections.abc import Callable
 
 from rich.cells import cell_len
 from rich.console import Console, RenderableType
@@ -22,7 +23,7 @@ def encode_tables(renderable: RenderableType, suffix: str) -> str:
     longest = max(map(cell_len, console.export_text(clear=False).splitlines()), default=0)
     if longest > DEFAULT_WIDTH:  # a picture would be cut where its width ends
         console = _print_to_console(renderable, longest)
-    formats = {
+    formats: dict[str, Callable[[], str]] = {
         ".txt": console.export_text,
         ".html": lambda: console.export_html(theme=DEFAULT_TERMINAL_THEME),
         ".svg": lambda: _without_fonts(console.export_svg(title="planar", theme=DEFAULT_TERMINAL_THEME)),

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from planar.document.first_argument import takes_result
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput
 from planar.foundation.units import SI_UNITS
 from planar.reports.columns import ReportedSeries, reported_series, run_header
@@ -16,7 +17,6 @@ from planar.results.motion import Motion
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = np.ndarray
 Variable = tuple[tuple[str, ...], Array, dict[str, str]]
 """Dimensions, values and attributes, as xarray takes them."""
 
@@ -57,9 +57,10 @@ def dataset(motion: Motion) -> xr.Dataset:
     }
     for each in groups["inputs"]:
         for what, values in each.values.items():
-            into = coordinates if what == "position" else variables
-            attributes = _attributes(each.kinds[what], f"input {each.name} {what}")
-            into[f"input_{each.name}_{what}"] = (("row",), values, attributes)
+            if values is None:
+                continue
+            variable = (("row",), values, _attributes(each.kinds[what], f"input {each.name} {what}"))
+            (coordinates if what == "position" else variables)[f"input_{each.name}_{what}"] = variable
     return xr.Dataset(variables, coordinates, run_header(motion))
 
 

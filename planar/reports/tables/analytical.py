@@ -12,12 +12,12 @@ from rich.text import Text
 
 from planar.analysis.motion.analytical_route import AnalyticalRoute, RodPointComparison, TwoTermComparison
 from planar.analysis.motion.harmonics import Harmonics
+from planar.foundation.arrays import Array
 from planar.foundation.units import length_unit_of_rates, parse_unit
 from planar.model.mechanism import FileUnits, Mechanism
 from planar.model.wording import amount, count_phrase
 from planar.reports.fitted_table import plain_table
 from planar.reports.number_format import paragraphs
-from planar.results.motion import Array
 
 NEGLIGIBLE_RATIO, DIGITS = 1e-5, 6
 """Of the greatest harmonic: those after the last that is more are not printed. Digits of the greatest."""
@@ -74,11 +74,11 @@ def _route_facts(route: AnalyticalRoute, units: FileUnits, per: _RateUnits) -> I
     """Stroke, greatest speed, mean, and what the slide is, in words."""
     stroke = route.series[0].stroke
     if stroke is not None:
-        told = (
+        ends = (
             f"{word} at {_angle_text(end.input, units)}, displacement {_length_text(end.value, units)}"
             for word, end in (("TDC", stroke.top), ("BDC", stroke.bottom))
         )
-        yield "stroke", f"{_length_text(stroke.length, units)}: {'; '.join(told)}"
+        yield "stroke", f"{_length_text(stroke.length, units)}: {'; '.join(ends)}"
     fastest = (
         f"{_format_number(route.fastest.value * per.length_factor)} {per.velocity} at "
         f"{_angle_text(route.fastest.input, units)}"

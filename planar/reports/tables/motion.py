@@ -29,7 +29,7 @@ TURN_TOLERANCE = 1e-9
 
 def motion_tables(motion: Motion) -> RenderableType:
     """A run: its range, its limits, and for every point where it went and how fast it was, at most, among the rows."""
-    tables = [Text(), _limits_table(motion)] if motion.limits else []
+    tables: list[RenderableType] = [Text(), _limits_table(motion)] if motion.limits else []
     notes = [paragraphs(("-", remark) for remark in motion.remarks)] if motion.remarks else []
     return Group(*motion_heading(motion), *tables, Text(), _points_table(motion), *notes)
 
@@ -59,10 +59,10 @@ def _range_text(motion: Motion, name: str) -> str:
         return f"{name} = {ends[0]}" + (", held" if len(motion) > 1 else "")
     gone = abs(float(position[-1] - position[0])) / (2.0 * np.pi)
     if not turns and kind == "angle" and round(gone) >= 1 and abs(gone - round(gone)) < TURN_TOLERANCE:
-        told = "a full turn" if round(gone) == 1 else count_phrase(round(gone), "full turn")
-        return f"{name} from {ends[0]} to {ends[1]}, {told}"
-    told = ends[1:] if len(ends) <= MAX_LISTED_ENDS else [*ends[1:MAX_LISTED_ENDS], f"and so on to {ends[-1]}"]
-    return f"{name} from {ends[0]} to {', to '.join(told)}"
+        turned = "a full turn" if round(gone) == 1 else count_phrase(round(gone), "full turn")
+        return f"{name} from {ends[0]} to {ends[1]}, {turned}"
+    places = ends[1:] if len(ends) <= MAX_LISTED_ENDS else [*ends[1:MAX_LISTED_ENDS], f"and so on to {ends[-1]}"]
+    return f"{name} from {ends[0]} to {', to '.join(places)}"
 
 
 def _limits_table(motion: Motion) -> FittedTable:

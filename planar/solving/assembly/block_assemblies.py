@@ -11,13 +11,12 @@ from planar.equations.constraint_equations import Block, slice_length
 from planar.equations.coordinates import frames_from_coordinates
 from planar.equations.functions import EquationFunctions
 from planar.equations.minors import constraint_dependencies
+from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.geometry import Vector
 from planar.model.pairs import MeasureKind
 from planar.solving.assembly.sketch_start import turn_between
 from planar.solving.newton import CLOSED_TOLERANCE, NewtonResult, ResidualFunction, damped_newton, polish_root
 from planar.solving.prepared_mechanism import PreparedMechanism
-
-Array = np.ndarray
 
 SAME_ASSEMBLY_TOLERANCE = 1e-6
 """Unknowns closer than this are one assembly: within it two would be a dead point to working precision."""
@@ -67,7 +66,7 @@ class BlockAssemblies:
         self.equations, self.pairs, self.column = setup.equations, setup.pairs, setup.column
         self.numbers, first = {}, 0
         for pair in mechanism.pairs:
-            self.numbers[pair.name] = self.p[first : first + len(pair.number_kinds)]
+            self.numbers[pair.name] = self.p[first : first + len(pair.number_kinds)].tolist()
             first += len(pair.number_kinds)
         self.local = {
             name: {point: Vector(at.x / unit, at.y / unit) for point, at in shape.points.items()}
@@ -202,7 +201,7 @@ class BlockAssemblies:
         ended = damped_newton(closing, self._with_lengths(stage, closing, starts))
         return self._from_converged(stage, z, closing, ended.unknowns[ended.converged])
 
-    def _is_angle(self, stage: Block) -> Array:
+    def _is_angle(self, stage: Block) -> BoolArray:
         columns = self.equations.unknowns[stage.unknowns]
         return np.array([self.equations.coordinates[c].kind is not MeasureKind.LENGTH for c in columns], dtype=bool)
 
@@ -287,7 +286,7 @@ def block_residual_function(
     return closing
 
 
-def _distances(is_angle: Array, a: Array, b: Array) -> Array:
+def _distances(is_angle: BoolArray, a: Array, b: Array) -> Array:
     """How far numbers are apart, those that are angles modulo a turn."""
     return np.where(is_angle, np.abs(np.exp(1j * a) - np.exp(1j * b)), np.abs(a - b))
 

@@ -10,9 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.equations.constraint_equations import Block
+from planar.foundation.arrays import Array
 from planar.solving.assembly.block_assemblies import BlockAssemblies, BlockAssembly, block_dependencies
-
-Array = np.ndarray
 
 EQUAL_DISTANCE_TOLERANCE = 1e-9
 """Assemblies whose sums of squared distances to the sketch (sizes squared) agree to this fit alike."""

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from planar.equations.constraint_equations import Block
 from planar.equations.coordinates import frames_from_coordinates
+from planar.foundation.arrays import Array
 from planar.foundation.units import parse_unit
 from planar.model.pairs import MeasureKind
 from planar.model.wording import count_phrase, join_all_names, quote_names
@@ -13,8 +12,6 @@ from planar.solving.assembly import nearest_assembly
 from planar.solving.assembly.block_assemblies import BlockAssemblies
 from planar.solving.assembly.nearest_assembly import Assembly
 from planar.solving.prepared_mechanism import PreparedMechanism
-
-Array = np.ndarray
 
 MAX_NAMED_BLOCKS = 4
 """Groups of links that are named one by one."""

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.foundation.geometry import Vector
 from planar.model.mechanism import named_points
 from planar.solving.prepared_mechanism import PreparedMechanism
-
-Array = np.ndarray
 
 START_SPREAD = 0.5
 """Sizes, rad: how far tries after the first are spread about what the sketch shows."""

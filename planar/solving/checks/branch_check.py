@@ -6,6 +6,7 @@ import numpy as np
 
 from planar.equations.functions import EquationFunctions
 from planar.equations.linear import solve_arrays
+from planar.foundation.arrays import Array, BoolArray
 from planar.solving.checks.singular_values import (
     DIFFERENCE_STEP,
     SINGULAR_DISTANCE_RATIO,
@@ -13,9 +14,6 @@ from planar.solving.checks.singular_values import (
     least_singular_values,
     singular_distance,
 )
-
-Array = np.ndarray
-
 
 ZERO_SINGULAR_VALUE = 1e-6
 """A least singular value that is zero: on the singular position itself it is what rounding left."""
@@ -78,7 +76,7 @@ class BranchCheck:
         return np.nan_to_num(distances, nan=0.0, posinf=np.inf)
 
 
-def is_move_allowed(move: Array, before: Array, after: Array) -> Array:
+def is_move_allowed(move: Array, before: Array, after: Array) -> BoolArray:
     """Whether a move is one that the rates at its two ends allow, each as a move over the whole step.
 
     A smooth move differs from the mean of the two by no more than they differ from one another, with room for the

@@ -6,19 +6,26 @@ since the residual of a flipped linkage is zero too, is `branch`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
 from planar.equations.acceptance import CARRIED_ROUNDING
-from planar.equations.residuals import closing_error, input_residuals, pair_residuals
+from planar.equations.residuals import (
+    ConstraintRow,
+    Frames,
+    PairValues,
+    closing_error,
+    input_residuals,
+    pair_residuals,
+)
+from planar.foundation.arrays import Array
 from planar.foundation.geometry import Frame, frame_term_sizes
-from planar.foundation.jets import Jet, term_sizes
+from planar.foundation.jets import Jet, Scalar, term_sizes
 from planar.model.link_shapes import LinkShape
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import MeasureKind, Pair
 
-Array = np.ndarray
 CONTACT_TOLERANCE = 1e-6
 """Sizes: dimensions in files are rounded, so a contact that guides keep closed may be open by as much."""
 EPS = float(np.finfo(float).eps)
@@ -127,7 +134,7 @@ class ResidualCheck:
         given = [term_sizes(each) for each in u]
         both = zip(self._residuals(frames, own, u), self._residuals(sizes, own_sizes, given), strict=True)
         closures = [(row.kind, left, whole) for (row, left), (_, whole) in both if isinstance(left, Jet)]
-        found = []
+        found: list[tuple[Array, str]] = []
         for order in (1, 2):
             # a velocity counts as one in an arc of the size: what turning leaves there but for rounding is none
             speeds = [
@@ -166,8 +173,10 @@ class ResidualCheck:
     def _unit_of(self, kind: MeasureKind) -> float:
         return self.unit if kind is MeasureKind.LENGTH else 1.0
 
-    def _residuals(self, frames, own, u=None):  # noqa: ANN001, ANN202 - floats, arrays or jets alike
-        """The residuals of all pairs, then of all inputs, with their rows."""
+    def _residuals(
+        self, frames: Frames, own: PairValues, u: Iterable[Scalar] | None = None
+    ) -> Iterator[tuple[ConstraintRow, Scalar]]:
+        """The residuals of all pairs, then of all inputs, with their rows: floats, arrays or jets alike."""
         inputs = self.mechanism.inputs
         yield from pair_residuals(self.mechanism.pairs, frames, self.numbers, own)
         motions = [self.relative_motions[given.pair] for given in inputs]

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-Array = np.ndarray
+from planar.foundation.arrays import Array
 
 SINGULAR_TOLERANCE = 1e-6
 """A singular value below this part of the greatest is zero: where constraints touch, rounding leaves about 1e-8."""
@@ -39,7 +41,7 @@ def _count_nonzero(values: Array, tolerance: float, unit: float) -> int:
     return int(np.sum(values > tolerance * max(values[0], unit)))
 
 
-def column_norms(jacobians: Array, least: float) -> Array:
+def column_norms(jacobians: Array, least: float | Array) -> Array:
     """The sizes of columns (..., columns), by which they are judged so that a small link counts as much as a large."""
     return np.maximum(np.linalg.norm(jacobians, axis=-2), least)
 
@@ -57,7 +59,7 @@ def least_singular_values(jacobians: Array) -> Array:
     return np.linalg.svd(jacobians, compute_uv=False)[:, -1]
 
 
-def singular_distance(least: Array, change: Array) -> Array:
+def singular_distance(least: Array | float, change: Array | np.floating[Any]) -> Array:
     """How far a matrix keeps its rank: until it has changed by its least singular value (Weyl's inequality).
 
     `change` is the norm of its change by what the distance is counted in.

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.solving.checks.singular_values import SINGULAR_TOLERANCE, null_space
 from planar.solving.continuation.second_order import (
     CONVERGED_STEP,
@@ -24,8 +25,6 @@ from planar.solving.continuation.second_order import (
 )
 from planar.solving.continuation.solution_curve import Arc, CurvePoint, SolutionCurve, fit_polynomial
 from planar.solving.newton import settle
-
-Array = np.ndarray
 
 SMALL_SINGULAR_VALUE = 0.1
 """A singular value below this part of the greatest may be one that vanishes near by."""
@@ -233,10 +232,12 @@ def branch_crossing(curve: SolutionCurve, branch: CurvePoint, rank_loss: int) ->
         ends = []
         for x in (-half, half):
             y = curve.correct(branch.y + x * branch.tangent + 0.5 * x**2 * branch.curvature, branch.tangent)
-            ends.append(None if y is None else curve.point_at(y, branch.tangent))
-        if all(end is not None and end.tangent @ branch.tangent > 0.9 for end in ends):
-            shape = fit_polynomial((ends[0], branch, ends[1]), branch.tangent, (-1.0, 0.0, 1.0), half)
-            found = BranchCrossing(ends[0], branch, ends[1], half, shape, rank_loss)
+            if y is not None:
+                ends.append(curve.point_at(y, branch.tangent))
+        if len(ends) == 2 and all(end.tangent @ branch.tangent > 0.9 for end in ends):
+            before, after = ends
+            shape = fit_polynomial((before, branch, after), branch.tangent, (-1.0, 0.0, 1.0), half)
+            found = BranchCrossing(before, branch, after, half, shape, rank_loss)
             if _fits_curve(curve, found):
                 return found
         half *= 0.5

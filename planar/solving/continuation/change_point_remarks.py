@@ -22,11 +22,11 @@ def change_point_remarks(
     told: dict[str, None] = {}
     for each in passed:
         told[change_point_remark(setup, each)] = None
-    for each in missed:
-        if each.distance < REMARKED_DISTANCE:
+    for near in missed:
+        if near.distance < REMARKED_DISTANCE:
             told[
-                f"the motion comes within {each.distance:.1g} (rad, or lengths of the mechanism's size) of a change "
-                f"point of a linkage that differs from this one by {each.residual * setup.unit:.1g} m"
+                f"the motion comes within {near.distance:.1g} (rad, or lengths of the mechanism's size) of a change "
+                f"point of a linkage that differs from this one by {near.residual * setup.unit:.1g} m"
             ] = None
     if len(told) > MAX_REMARKS:
         return (

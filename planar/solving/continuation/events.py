@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.equations.coordinates import frames_from_coordinates
+from planar.foundation.arrays import Array
 from planar.foundation.errors import TrackingEnd
 from planar.foundation.jets import Jet, value_and_rates
 from planar.foundation.root_finding import find_root
@@ -24,11 +25,9 @@ from planar.solving.continuation.path_pieces import (
 )
 from planar.solving.continuation.period import PeriodSearch
 from planar.solving.continuation.predictor_corrector import CurveTracker
-from planar.solving.continuation.solution_curve import CurvePoint, SolutionCurve
+from planar.solving.continuation.solution_curve import Arc, CurvePoint, SolutionCurve
 from planar.solving.continuation.turning_points import is_dead_point, lowest_on_cubic
 from planar.solving.prepared_mechanism import PreparedMechanism
-
-Array = np.ndarray
 
 STANDING_RATE = 1e-9
 """An output that moves less than this (rad or sizes) for one of the curve's length stands still but for rounding."""
@@ -74,12 +73,14 @@ class WatchedOutputs(NamedTuple):
         """An end of a piece, with how the outputs move there."""
         return _PieceEnd(point, self.rates_at(curve, point))
 
-    def pin_distance(self, curve: SolutionCurve, point: CurvePoint, pair: Pair, pin: tuple[str, str]) -> float:
-        """How far the point that slides is from a pin of the frame (m)."""
+    def pin_distance(
+        self, curve: SolutionCurve, point: CurvePoint, sliding: tuple[str, str], pin: tuple[str, str]
+    ) -> float:
+        """How far a (link, point) that slides is from a pin of the frame (m)."""
         setup = self.setup
         w = setup.functions.coordinates(point.y[:-1], curve.inputs(point.y), curve.p) * setup.scale
         frames, _ = frames_from_coordinates(w.tolist(), setup.column, setup.shapes, setup.pairs)
-        (link, name), _ = pair.point_on_line()
+        link, name = sliding
         gap = frames[link].to_world(setup.shapes[link].position(name)) - frames[pin[0]].to_world(
             setup.shapes[pin[0]].position(pin[1])
         )
@@ -111,7 +112,11 @@ def pieces_until(parts: Iterable[PathPiece], last: float) -> Iterator[PathPiece]
                 return
             continue
         if piece.start < last:
-            x = find_root(lambda x, arc=piece.arc: float(arc.polynomial(x)[-1]) - last, piece.first, piece.last)
+
+            def beyond(x: float, arc: Arc = piece.arc) -> float:
+                return float(arc.polynomial(x)[-1]) - last
+
+            x = find_root(beyond, piece.first, piece.last)
             yield piece._replace(last=x, stop=last, dead_point=None)
         return
 
@@ -323,8 +328,9 @@ def _name_stroke_ends(
         if high - low <= SAME_VALUE_TOLERANCE * setup.unit:
             continue
         far = True
-        if pins and output.point_on_line() is not None:
-            distances = [watched.pin_distance(curve, point, output, pins[0]) for point in (at_low, at_high)]
+        rides = output.point_on_line()
+        if pins and rides is not None:
+            distances = [watched.pin_distance(curve, point, rides[0], pins[0]) for point in (at_low, at_high)]
             far = distances[1] >= distances[0] - SAME_VALUE_TOLERANCE * setup.unit
         ends[output.name] = (low, high, far)
     for limit, _, _ in found:

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from math import isfinite
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from planar.equations.acceptance import AcceptanceResult, StepCheck
+from planar.equations.acceptance import AcceptanceFunctions, AcceptanceResult, StepCheck
+from planar.equations.functions import EquationFunctions
+from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.solving.checks.branch_check import is_move_allowed
 from planar.solving.checks.residual_check import CONTACT_TOLERANCE, EPS, NEGLIGIBLE_ERROR
 from planar.solving.checks.singular_values import SINGULAR_DISTANCE_RATIO
-from planar.solving.prepared_mechanism import PreparedMechanism
-
-Array = np.ndarray
+from planar.solving.prepared_mechanism import PositionInputs, PreparedMechanism
 
 MIN_FAST_REGULARITY = 1e-3
 """Strength of a group from which on its rates are taken as they come; what is weaker is looked at in doubles' whole
@@ -48,7 +48,7 @@ def fast_position(setup: PreparedMechanism, z: Array) -> FastPosition | None:
         return None
     s = setup.inputs
     parts, verdict, _, _ = judged.position(z, s.u1, s.u, s.u1, s.u2, s.p, setup.row_scale, setup.min_column_scale)
-    told = AcceptanceResult(*verdict[0].tolist())
+    told: AcceptanceResult[float] = AcceptanceResult(*verdict[0].tolist())
     passed = _is_accepted(setup, told) and told.regularity >= MIN_FAST_REGULARITY
     return FastPosition(parts.T, told.residual) if passed else None
 
@@ -67,7 +67,7 @@ class FastSamples(NamedTuple):
     and what the worst constraint leaves open at those. Of the other rows nothing is told."""
 
     coordinate_rates: Array
-    is_sure: Array
+    is_sure: BoolArray
     residual: float
 
     def cut(self, rows: slice) -> FastSamples:
@@ -94,6 +94,29 @@ def concatenate_samples(first: FastSamples | None, second: FastSamples | None) -
     return FastSamples(parts, np.concatenate([first.is_sure, second.is_sure]), max(first.residual, second.residual))
 
 
+class FastSolver(Protocol):
+    """What a run in compiled functions needs of a solver."""
+
+    functions: EquationFunctions
+    inputs: PositionInputs
+
+    @property
+    def acceptance(self) -> AcceptanceFunctions | None:
+        """What judges positions in compiled functions."""
+
+    @property
+    def tolerance(self) -> float:
+        """What the residual check lets pass."""
+
+    @property
+    def row_scale(self) -> Array:
+        """What every row of a Jacobian is divided by (rows,)."""
+
+    @property
+    def min_column_scale(self) -> Array:
+        """What the column of every unknown could be at best (unknowns,)."""
+
+
 class FastRun(NamedTuple):
     """The first rows of a run, all of them surely sound: unknowns (rows, unknowns), coordinates with their rates (rows,
     3, coordinates), and what the worst constraint leaves open."""
@@ -103,7 +126,7 @@ class FastRun(NamedTuple):
     residual: float
 
 
-def fast_run(setup: PreparedMechanism, z: Array, u: Array, u1: Array, u2: Array) -> FastRun | None:
+def fast_run(setup: FastSolver, z: Array, u: Array, u1: Array, u2: Array) -> FastRun | None:
     """A run along a straight way of inputs (rows, inputs) with rates u1, u2 from the unknowns of its first row, as far
     as it is surely sound: both parts of the gate, rates, contacts. None for what is no such run."""
     judged, p = setup.acceptance, setup.inputs.p
@@ -121,7 +144,8 @@ def fast_run(setup: PreparedMechanism, z: Array, u: Array, u1: Array, u2: Array)
     settled, parts, verdict, ways, distances = judged.corrected_position.evaluate_batch(
         len(u), found, axis, u, u1, u2, p, setup.row_scale, setup.min_column_scale
     )
-    settled, told = settled[:, 0], AcceptanceResult(*verdict[:, 0].T)
+    settled = settled[:, 0]
+    told: AcceptanceResult[Array] = AcceptanceResult(*verdict[:, 0].T)
     # what is not a number is not below anything
     fine = told.residual <= setup.tolerance
     fine &= np.isfinite(told.finite_sum)
@@ -136,7 +160,7 @@ def fast_run(setup: PreparedMechanism, z: Array, u: Array, u1: Array, u2: Array)
     return FastRun(settled[:many], parts[:many], float(told.residual[:many].max(initial=0.0)))
 
 
-def _is_accepted(setup: PreparedMechanism, verdict: AcceptanceResult) -> bool:
+def _is_accepted(setup: PreparedMechanism, verdict: AcceptanceResult[float]) -> bool:
     tolerance = setup.tolerance
     return (
         verdict.residual <= tolerance
@@ -148,7 +172,7 @@ def _is_accepted(setup: PreparedMechanism, verdict: AcceptanceResult) -> bool:
     )
 
 
-def _keeps_branch(starts: Array, z: Array, gone: Array, rates: Array, distances: Array, square: float) -> Array:
+def _keeps_branch(starts: IntArray, z: Array, gone: Array, rates: Array, distances: Array, square: float) -> BoolArray:
     """For each step of a run whether it keeps to its branch; see `branch`.
 
     Steps have `gone` (steps,) along the axis of the inputs; rates `ways` (rows, unknowns) and distances (rows, stages)

@@ -11,9 +11,10 @@ import numpy as np
 
 from planar.equations.functions import EquationFunctions
 from planar.equations.linear import solve_vectors
+from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer, TrackingEnd
 from planar.solving.checks.branch_check import BranchCheck
-from planar.solving.continuation.fast_path import STRAIGHT_TOLERANCE, FastSamples, fast_run
+from planar.solving.continuation.fast_path import STRAIGHT_TOLERANCE, FastSamples, FastSolver, fast_run
 from planar.solving.continuation.path_pieces import (
     BranchRates,
     PathBifurcation,
@@ -25,15 +26,13 @@ from planar.solving.continuation.period import Period, PeriodSearch
 from planar.solving.continuation.predictor_corrector import ArcBudget, CurveTracker, NearbyBifurcation
 from planar.solving.continuation.solution_curve import CurvePoint, CurveSolver
 
-Array = np.ndarray
-
 MIN_WINDOW = 8
 """Samples that are tried at once where none has passed before."""
 MAX_SAMPLES_AHEAD = 1000
 """Samples that one trip is to come to at most."""
 
 
-class PathSolver(CurveSolver, Protocol):
+class PathSolver(CurveSolver, FastSolver, Protocol):
     """What following needs of a solver beyond that."""
 
     def end_refusal(self, u: Array, tangent: Array, ending: TrackingEnd) -> NoAnswer:
@@ -227,7 +226,7 @@ class _SamplesFollower:
                 done, stopped = self._follow_general(done)
         last_position = None if stopped is None or self.follower is None else self.follower.last_position
         nearby = (*self.nearby, *(self.follower.tracker.nearby if self.follower is not None else ()))
-        known = self.fast_samples and self.fast_samples.first_samples(done)
+        known = self.fast_samples.first_samples(done) if self.fast_samples is not None else None
         z, passed = self.z[:done], tuple(self.passed)
         return FollowedSamples(z, self.general_count, stopped, last_position, self.branch_rates, passed, nearby, known)
 

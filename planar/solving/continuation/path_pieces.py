@@ -7,13 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.foundation.root_finding import find_root
 from planar.solving.continuation.fast_path import STRAIGHT_TOLERANCE
 from planar.solving.continuation.predictor_corrector import CurveTracker, PassedBifurcation
 from planar.solving.continuation.solution_curve import Arc, CurvePoint, SolutionCurve
 from planar.solving.continuation.turning_points import find_turning_point, is_dead_point
-
-Array = np.ndarray
 
 MAX_CORRECTION_RATIO = 0.1
 """A correction longer than this part of an arc has gone astray."""
@@ -66,16 +65,16 @@ class PathPiece(NamedTuple):
             return y[:-1], BranchRates(derivatives_by_input(arc, x), curve.input_direction, arc.rank_loss)
         ahead = np.zeros_like(rough)
         ahead[-1] = 1.0
-        y = curve.correct(rough, ahead)
+        near = curve.correct(rough, ahead)
         if (
-            y is None
-            or np.linalg.norm(y - rough) > MAX_CORRECTION_RATIO * abs(self.last - self.first)
-            or not curve.is_closed(y)
+            near is None
+            or np.linalg.norm(near - rough) > MAX_CORRECTION_RATIO * abs(self.last - self.first)
+            or not curve.is_closed(near)
         ):
-            y = arc.curve_coordinates(
+            near = arc.curve_coordinates(
                 curve, find_root(lambda x: float(arc.curve_coordinates(curve, x)[-1]) - position, self.first, self.last)
             )
-        return y[:-1], None
+        return near[:-1], None
 
 
 def path_pieces(tracker: CurveTracker) -> Iterator[PathPiece]:

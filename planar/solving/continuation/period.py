@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.solving.continuation.path_pieces import (
     END_TOLERANCE,
     BranchRates,
@@ -17,8 +18,6 @@ from planar.solving.continuation.path_pieces import (
 )
 from planar.solving.continuation.predictor_corrector import CurveTracker
 from planar.solving.continuation.solution_curve import CurvePoint, SolutionCurve
-
-Array = np.ndarray
 
 MAX_PIECES = 1500
 """A curve that is longer, as with wheels of many teeth, is not waited for."""

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.foundation.errors import TrackingEnd
 from planar.foundation.root_finding import find_root
 from planar.model.pairs import MeasureKind
@@ -22,8 +23,6 @@ from planar.solving.continuation.bifurcation import (
 )
 from planar.solving.continuation.solution_curve import Arc, CurvePoint, CurveSolver, SolutionCurve, arc_between
 from planar.solving.continuation.turning_points import start_point
-
-Array = np.ndarray
 
 FIRST_STEP, LONGEST_STEP, SHORTEST_STEP = 0.05, 0.25, 1e-9
 """Steps of arc length (rad, lengths of the size): the first, the longest, and one at which the curve ends."""
@@ -179,11 +178,11 @@ class CurveTracker:
             self._approaching = after.regular_distance < here.regular_distance
             arc = arc_between(here, after)
             if self.far_point is None and self._slide_extent(after.y) > shown:
-                first, last = arc.ends
-                x = find_root(
-                    lambda x, arc=arc: self._slide_extent(arc.curve_coordinates(self.curve, x)) - shown, first, last
-                )
-                self.far_point = arc.point_at(self.curve, x)
+
+                def beyond(x: float, arc: Arc = arc) -> float:
+                    return self._slide_extent(arc.curve_coordinates(self.curve, x)) - shown
+
+                self.far_point = arc.point_at(self.curve, find_root(beyond, *arc.ends))
             self.point = after
             yield arc
 

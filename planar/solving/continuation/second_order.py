@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.solving.checks.singular_values import SINGULAR_TOLERANCE
 from planar.solving.newton import settle, shortest_step
-
-Array = np.ndarray
 
 EXACT_SINGULAR_TOLERANCE = 1e-10
 """At the position to round-off a singular value below this part of the greatest is zero."""

@@ -14,12 +14,11 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.equations.functions import EquationRates
+from planar.foundation.arrays import Array
 from planar.solving.checks.singular_values import SINGULAR_TOLERANCE
 from planar.solving.continuation.bifurcation import ZERO_INPUT_RATE
 from planar.solving.continuation.second_order import EXACT_SINGULAR_TOLERANCE, branch_directions
 from planar.solving.prepared_mechanism import PreparedMechanism
-
-Array = np.ndarray
 
 CONDITION_TOLERANCE, FORM_TOLERANCE = 1e-6, 1e-5
 """Parts of the greatest: of a condition that is met to the position's own error, and of one that is squared in it."""

@@ -8,10 +8,9 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from planar.equations.functions import EquationFunctions
+from planar.foundation.arrays import Array
 from planar.solving.checks.singular_values import DIFFERENCE_STEP, column_norms, singular_distance
 from planar.solving.newton import correct, correct_at_rank
-
-Array = np.ndarray
 
 MAX_CORRECTIONS = 10
 CLOSED_TOLERANCE = 1e-10

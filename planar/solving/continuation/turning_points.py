@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.foundation.root_finding import find_root
 from planar.solving.continuation.bifurcation import AT_BIFURCATION_DISTANCE
 from planar.solving.continuation.solution_curve import Arc, CurvePoint, SolutionCurve
-
-Array = np.ndarray
 
 DEAD_POINT_TOLERANCE = 1e-7
 """The square root of twice what the inputs may have left (rad or sizes) of their way to where they turn back at a dead

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.solving.checks.singular_values import null_space
 from planar.solving.full_constraints import (
     PROBE_DISTANCE,
@@ -15,8 +16,6 @@ from planar.solving.full_constraints import (
     random_step,
 )
 from planar.solving.prepared_mechanism import PreparedMechanism
-
-Array = np.ndarray
 
 ZERO_COMPONENT = 1e-7
 """A part of a unit vector that is zero but for rounding."""

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from planar.equations.constraint_equations import slice_length
+from planar.foundation.arrays import Array
 from planar.foundation.errors import MAX_NAMES_LISTED, NoAnswer, Outcome, TrackingEnd
 from planar.foundation.errors import join_names as several
 from planar.model.mechanism import unjoined_points
@@ -18,8 +19,6 @@ from planar.model.wording import amount, count_phrase, join_all_names, quote_nam
 from planar.solving.assembly.nearest_assembly import AssemblySearchFailure
 from planar.solving.checks.residual_check import CONTACT_TOLERANCE
 from planar.solving.prepared_mechanism import PreparedMechanism
-
-Array = np.ndarray
 
 MAX_BRANCHES_TOLD = 4
 """Ways that are told one by one."""

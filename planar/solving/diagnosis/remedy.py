@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 from math import ceil, floor, log10
 from typing import NamedTuple
@@ -13,6 +14,7 @@ import numpy as np
 from planar.document.dimensions import change_dimension, link_lengths
 from planar.equations.constraint_equations import Block
 from planar.equations.mechanism_numbers import pair_numbers, shapes_of_links
+from planar.foundation.arrays import Array
 from planar.foundation.units import parse_unit
 from planar.model.link_shapes import PointPlacementError
 from planar.model.mechanism import Drive, Mechanism, replace_inputs
@@ -21,8 +23,6 @@ from planar.solving.assembly.block_assemblies import BlockAssemblies, BlockAssem
 from planar.solving.assembly.nearest_assembly import Assembly, AssemblySearchFailure, find_nearest_assembly
 from planar.solving.newton import correct_blocks, damped_newton
 from planar.solving.prepared_mechanism import PreparedMechanism
-
-Array = np.ndarray
 
 MAX_DIMENSIONS = 40
 """Dimensions that are looked at."""
@@ -154,7 +154,7 @@ def mending_dimensions(
                 each.value,
                 setup.unit,
                 0.0 if each.name == f"{each.link}.length" else -np.inf,
-                lambda value, each=each: change_dimension(mechanism, each, value),
+                partial(change_dimension, mechanism, each),
             )
             for each in islice(link_lengths(mechanism, links), MAX_DIMENSIONS)
         ],
@@ -182,7 +182,7 @@ def mending_inputs(
                 given.position,
                 setup.unit if setup.is_sliding(given.pair) else 1.0,
                 -np.inf,
-                lambda value, given=given: replace_inputs(mechanism, (Drive(given.pair, value),)),
+                partial(_with_input_at, mechanism, given.pair),
             )
             for given in mechanism.inputs
             if inputs is None or given.pair in inputs
@@ -190,6 +190,10 @@ def mending_inputs(
         thorough,
         budget or BlockBudget(np.inf),
     )
+
+
+def _with_input_at(mechanism: Mechanism, pair: str, position: float) -> Mechanism:
+    return replace_inputs(mechanism, (Drive(pair, position),))
 
 
 def _smallest_changes_first(

@@ -8,14 +8,13 @@ import numpy as np
 
 from planar.equations.linear import inverse_arrays
 from planar.equations.rounding_errors import rounding_terms
+from planar.foundation.arrays import Array, BoolArray, IntArray
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.model.pairs import MeasureKind
 from planar.model.wording import count_phrase
 from planar.solving.checks.residual_check import EPS, MAX_RATE_ERROR, NEGLIGIBLE_ERROR
 from planar.solving.prepared_mechanism import PreparedMechanism
 from planar.solving.rates.regularity import regularity
-
-Array = np.ndarray
 
 SMALLEST_NORMAL = float(np.finfo(float).tiny)
 MAX_ACCELERATION_ERROR = 0.1
@@ -36,7 +35,7 @@ class RateErrors(NamedTuple):
     acceleration: Array
 
     @property
-    def is_too_inexact(self) -> Array:
+    def is_too_inexact(self) -> BoolArray:
         """Which samples have too few digits left (samples,): next to a change point of places and velocities that are
         known well the accelerations may be known to one."""
         return ~(
@@ -53,7 +52,7 @@ class AccuracyDoubts(NamedTuple):
     """Samples whose accuracy is not sure: which (doubted,), by how much they are wrong at most, and a cause of each in
     words, with what mends it."""
 
-    rows: Array
+    rows: IntArray
     errors: RateErrors
     causes: list[tuple[str, str]]
 
@@ -98,7 +97,7 @@ def find_accuracy_doubts(
     return AccuracyDoubts(rows, found, causes)
 
 
-def _error_amplification(setup: PreparedMechanism, slope: Array) -> tuple[Array, Array, Array]:
+def _error_amplification(setup: PreparedMechanism, slope: Array) -> tuple[Array, IntArray, Array]:
     """By how much round-off is greater in the rates at most, and in which group (samples,); the arm of every unknown.
 
     A place that is rounded by EPS turns a link whose arm is short by EPS / arm, the more where the group is nearly

@@ -9,13 +9,12 @@ import numpy as np
 from planar.equations.constraint_equations import Block, slice_length
 from planar.equations.functions import EquationRates
 from planar.equations.linear import solve_vectors
+from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer
 from planar.solving.checks.singular_values import MIN_REGULARITY, ZERO_REGULARITY, null_space, rank
 from planar.solving.diagnosis import refusals
 from planar.solving.newton import correct_blocks
 from planar.solving.prepared_mechanism import PreparedMechanism
-
-Array = np.ndarray
 
 NEIGHBOUR_DISTANCE = 1e-2
 """How far (rad, or lengths of the size) a position is moved to see whether what holds there holds elsewhere."""

@@ -8,14 +8,13 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.equations.linear import solve_vectors
+from planar.foundation.arrays import Array
 from planar.solving.checks.singular_values import MIN_REGULARITY
 from planar.solving.continuation.path_pieces import BranchRates
 from planar.solving.newton import truncated_step
 from planar.solving.prepared_mechanism import PreparedMechanism
 from planar.solving.rates.accuracy import AccuracyDoubts, find_accuracy_doubts
 from planar.solving.rates.regularity import regularity
-
-Array = np.ndarray
 
 MIN_REGULARITY_FOR_RATES = 1e-3
 """Strength of a group from which on its rates are taken from its slope, however near a change point is."""
@@ -58,11 +57,10 @@ def sample_rates(
     strong = strength >= MIN_REGULARITY
     # near by, the rates along a branch are those of a linkage that has the change point exactly
     known = {
-        index: _rates_in_time(each, inputs, index)
+        index: in_time
         for index, each in branch_rates.items()
-        if strength[index] < MIN_REGULARITY_FOR_RATES
+        if strength[index] < MIN_REGULARITY_FOR_RATES and (in_time := _rates_in_time(each, inputs, index)) is not None
     }
-    known = {index: each for index, each in known.items() if each is not None}
     weak = ~strong
     weak[list(known)] = False
     strong[list(known)] = False

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
-import numpy as np
-
+from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.solving.continuation.path_pieces import BranchRates, PathPiece, path_pieces
 from planar.solving.continuation.period import CLOSED_TOLERANCE, MAX_PIECES, closing_piece, nearest_start
@@ -14,8 +13,6 @@ from planar.solving.continuation.predictor_corrector import SHOWN_SLIDE_EXTENT, 
 from planar.solving.continuation.solution_curve import SolutionCurve
 from planar.solving.continuation.turning_points import is_dead_point
 from planar.solving.position import PositionSolver
-
-Array = np.ndarray
 
 
 class CircuitBranch(NamedTuple):

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
+from planar.foundation.arrays import Array
 from planar.results.motion import Motion
 from planar.results.records import Limit
 from planar.solving.continuation import events
@@ -12,8 +11,6 @@ from planar.solving.continuation.predictor_corrector import CurveTracker
 from planar.solving.runs.closed_circuit import ClosedCircuit
 from planar.solving.runs.running_input import RunningInput
 from planar.solving.runs.samples import RunSamples
-
-Array = np.ndarray
 
 STEP_ROUNDING = 1e-9
 """Parts of a step: what rounding leaves of one."""
@@ -47,9 +44,9 @@ class RangeLimits:
         up = self._limits_until(here, last, sense)
         low, high = sorted((first * ranged.scale, last * ranged.scale))
         room = STEP_ROUNDING * ranged.scale
-        told = [each for each in (*down[::-1], *up) if low - room <= each.limit.input <= high + room]
+        between = [each for each in (*down[::-1], *up) if low - room <= each.limit.input <= high + room]
         curve = ranged.curve_tracker(ranged.assembly.z, here).curve
-        return events.distinct_limits(ranged.solver, ranged.pair, curve, told)
+        return events.distinct_limits(ranged.solver, ranged.pair, curve, between)
 
     def _is_there_and_back(self, u: Array) -> bool:
         return len(u) > 2 and u[0] == u[-1] and u[1] == u[-2]

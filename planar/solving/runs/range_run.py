@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer, Outcome, TrackingEnd
 from planar.model.wording import join_all_names
 from planar.results.motion import Motion
@@ -33,8 +34,6 @@ from planar.solving.runs.samples import (
     run_samples,
     splice_runs,
 )
-
-Array = np.ndarray
 
 MIN_RANGE = 1e-5
 """rad or sizes: a range shorter than this is none."""
@@ -91,7 +90,10 @@ class RangeRun(RunningInput):
         whole = follow_circuit(self.solver, walk)
         turn = np.inf if self.is_sliding else 2.0 * pi
         spacing = min(max(abs(each.ends[1] - each.ends[0]) for each in whole.branches), turn) / steps
-        z, places, senses, dead = [], [], [], []
+        z: list[Array] = []
+        places: list[float] = []
+        senses: list[float] = []
+        dead: list[int] = []
         local: dict[int, BranchRates] = {}
         for stretch in whole.branches:
             begin, last = stretch.ends
@@ -153,10 +155,10 @@ class RangeRun(RunningInput):
         """One turn on where the input makes it, else all between its limits."""
         key = self.index, self.branches
         if key not in self.known.range_ends:
-            found = None if self.is_sliding else self._one_turn(steps, here)
-            if isinstance(found, RunSamples):
-                return found
-            high = found or self._find_range_end(self.assembly.z, here, 1.0)
+            turn = None if self.is_sliding else self._one_turn(steps, here)
+            if isinstance(turn, RunSamples):
+                return turn
+            high = turn or self._find_range_end(self.assembly.z, here, 1.0)
             self.known.range_ends[key] = self._find_range_end(self.assembly.z, here, -1.0), high
         low, high = self.known.range_ends[key]
         if high.position - low.position < MIN_RANGE:
@@ -176,8 +178,8 @@ class RangeRun(RunningInput):
                 return self._with_stop_row(drop_first(part), self.input_rates(inner[: len(part.z)]))
         found = splice_runs(down, up)
         local = {row + 1: each for row, each in found.branch_rates.items()}
-        told = found.fast_samples and found.fast_samples.padded(1, 1)
-        whole = found._replace(z=np.vstack([low.z, found.z, high.z]), branch_rates=local, fast_samples=told)
+        known = found.fast_samples and found.fast_samples.padded(1, 1)
+        whole = found._replace(z=np.vstack([low.z, found.z, high.z]), branch_rates=local, fast_samples=known)
         dead = tuple(index for index, end in ((0, low), (steps, high)) if end.ending is TrackingEnd.DEAD_POINT)
         return self._with_range_ends(run_samples(whole, self.input_rates(grid), dead), (low, high))
 

@@ -7,12 +7,11 @@ from math import pi
 
 import numpy as np
 
+from planar.foundation.arrays import Array
 from planar.model.mechanism import LARGEST_INPUT_POSITION, Drive, Mechanism, replace_inputs, running_input_index
 from planar.solving.continuation.predictor_corrector import MAX_ARCS, ArcBudget, CurveTracker
 from planar.solving.position import solved_mechanism
 from planar.solving.rates.sample_rates import InputRates
-
-Array = np.ndarray
 
 ARCS_PER_TURN = 100
 """Arcs by which what may be spent grows with each turn that is asked for, as far as a motion is followed at most."""

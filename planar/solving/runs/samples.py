@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.foundation.arrays import Array, IntArray
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.jets import Jet
 from planar.model.mechanism import Drive, replace_inputs
@@ -27,8 +28,6 @@ from planar.solving.position import PositionSolver
 from planar.solving.rates.accuracy import AccuracyDoubts
 from planar.solving.rates.sample_rates import InputRates, sample_rates
 
-Array = np.ndarray
-
 
 class RunSamples(NamedTuple):
     """Unknowns at the rows of a run (rows, unknowns), inputs with their rates, the rows that are dead points, rates
@@ -44,7 +43,7 @@ class RunSamples(NamedTuple):
     reason: str = ""
     fast_samples: FastSamples | None = None
 
-    def select(self, some: Array) -> RunSamples:
+    def select(self, some: IntArray) -> RunSamples:
         """Some of the rows, in their order, of which nothing is told."""
         where = {int(row): k for k, row in enumerate(some)}
         return self._replace(
@@ -137,7 +136,8 @@ def build_motion(
     time: Array | None = None,
 ) -> Motion:
     """The motion; raises NoAnswer where the gate does not let it pass."""
-    told, remarks = run.fast_samples if not with_jerk else None, ()
+    told = run.fast_samples if not with_jerk else None
+    remarks: tuple[str, ...] = ()
     if told is not None and told.is_sure.all():
         parts, residual = list(told.coordinate_rates.transpose(1, 0, 2)), told.residual
     elif told is not None:
@@ -181,9 +181,9 @@ def _checked_rates(solver: PositionSolver, run: RunSamples, with_jerk: bool) -> 
     gaps = solver.residuals(z, given.u)
     residual = float(gaps.max(initial=0.0))
     if not residual <= solver.tolerance:
-        pair, row = np.unravel_index(int(np.argmax(gaps)), gaps.shape)
+        open_row, worst = np.unravel_index(int(np.argmax(gaps)), gaps.shape)
         raise refusals.not_closed(
-            solver, solver.residual_check.row_pairs[pair], residual, f"at {solver.describe_inputs(given.u[row])}"
+            solver, solver.residual_check.row_pairs[open_row], residual, f"at {solver.describe_inputs(given.u[worst])}"
         )
     parts, doubt = sample_rates(solver, z, given, run.branch_rates, with_jerk)
     remarks = _undetermined_remark(solver, run, parts[1])

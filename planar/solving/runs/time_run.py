@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from planar.equations.coordinates import frames_from_coordinates
+from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, Outcome
 from planar.foundation.jets import Jet
 from planar.foundation.root_finding import find_root
@@ -21,8 +22,6 @@ from planar.solving.continuation.path_pieces import END_TOLERANCE, PathBifurcati
 from planar.solving.position import solved_mechanism, stopped_at_start
 from planar.solving.rates.sample_rates import InputRates, sample_rates
 from planar.solving.runs.samples import RunSamples, build_motion, run_samples
-
-Array = np.ndarray
 
 
 class TimeRun:
@@ -153,7 +152,11 @@ class _TimeCourse:
                 if any(first <= at <= last for at in switched):
                     continue  # it is the branch that turns, not the output
                 base = after if before in self.found.branch_rates else before
-                at = find_root(lambda t, row=base, pair=pair: self._output_at(row, t, pair.name)[1], first, last)
+
+                def output_velocity(t: float, row: int = base, name: str = pair.name) -> float:
+                    return self._output_at(row, t, name)[1]
+
+                at = find_root(output_velocity, first, last)
                 value = self._output_at(base, at, pair.name)[0]
                 yield Limit("stroke end", pair.name, at, value)
 

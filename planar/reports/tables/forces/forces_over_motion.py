@@ -12,6 +12,8 @@ from rich.text import Text
 from planar.dynamics.forces import Forces
 from planar.dynamics.load_attachment import attachment_remarks
 from planar.dynamics.reactions import Reaction
+from planar.foundation.arrays import Array
+from planar.foundation.errors import BadInput
 from planar.model.wording import count_phrase, join_all_names
 from planar.reports.columns import ReportedSeries
 from planar.reports.fitted_table import FittedTable, plain_table
@@ -19,64 +21,70 @@ from planar.reports.number_format import format_or_zero, paragraphs
 from planar.reports.tables.forces import loads
 from planar.reports.tables.forces import position_forces as at_one
 from planar.reports.tables.motion import motion_heading, position_cell, position_heading, running_pair
-
-Array = np.ndarray
+from planar.results.motion import Motion
 
 
 def tables(forces: Forces) -> RenderableType:
     """Mean, least and greatest effort of every input, the greatest force and couple in every pair, each with where."""
-    motion = forces.moving
+    motion = _motion_of(forces)
     parts: list[RenderableType] = [
         *motion_heading(motion),
         Text(at_one.equilibrium_text(forces)),
         Text(),
-        _efforts_table(forces),
+        _efforts_table(forces, motion),
     ]
-    parts += [_reactions_table(forces), paragraphs([*_shaking_facts(forces), *at_one.proof_facts(forces)])]
-    notes = (*_undetermined_sentences(forces), *attachment_remarks(forces.mechanism), *motion.remarks)
+    facts = [*_shaking_facts(forces, motion), *at_one.proof_facts(forces)]
+    parts += [_reactions_table(forces, motion), paragraphs(facts)]
+    notes = (*_undetermined_sentences(forces, len(motion)), *attachment_remarks(forces.mechanism), *motion.remarks)
     if notes:
         parts += [Text(), paragraphs(("-", sentence) for sentence in notes)]
     return Group(*parts)
 
 
-def _efforts_table(forces: Forces) -> FittedTable:
-    at, most = position_heading(forces.moving), at_one.greatest_moment_and_force(forces)
+def _motion_of(forces: Forces) -> Motion:
+    if not isinstance(forces.moving, Motion):
+        raise BadInput("forces", "this is told over a motion; give the forces over one")
+    return forces.moving
+
+
+def _efforts_table(forces: Forces, motion: Motion) -> FittedTable:
+    at, most = position_heading(motion), at_one.greatest_moment_and_force(forces)
     table = plain_table(
         "Inputs, among these positions", "input", ("mean effort", "unit"), ("least", at), ("greatest", at), left=(0, 2)
     )
     for name, effort in forces.inputs.items():
         _, unit = at_one.effort_name_and_unit(forces, name)
-        least, greatest = (_greatest_with_place(forces, sense * effort) for sense in (-1.0, 1.0))
+        values = np.asarray(effort)
+        least, greatest = (_greatest_with_place(motion, sense * values) for sense in (-1.0, 1.0))
         mean, low, high = (
-            format_or_zero(each, most[unit == "N"]) for each in (_mean(forces, effort), -least[0], greatest[0])
+            format_or_zero(each, most[unit == "N"]) for each in (_mean(motion, values), -least[0], greatest[0])
         )
         table.add_row(name, mean, unit, low, least[1], high, greatest[1])
     return table
 
 
-def _mean(forces: Forces, values: Array) -> float:
+def _mean(motion: Motion, values: Array) -> float:
     """Over the time, or over the way of the input that runs, there and back: work by way where it does not turn."""
-    motion = forces.moving
     driver = running_pair(motion)
     ways = motion.time if driver is None else motion.inputs[driver].position
-    steps = np.abs(np.diff(ways))
+    steps = np.zeros(0) if ways is None else np.abs(np.diff(ways))
     if not steps.any():
         return float(values[0])
     return float(np.sum(0.5 * (values[1:] + values[:-1]) * steps) / np.sum(steps))
 
 
-def _greatest_with_place(forces: Forces, values: Array) -> tuple[float, str]:
+def _greatest_with_place(motion: Motion, values: Array) -> tuple[float, str]:
     """The greatest of the values that are determined, and where it is."""
     if not np.isfinite(values).any():
         return np.nan, ""
     row = int(np.nanargmax(values))
-    return float(values[row]), position_cell(forces.moving, row)
+    return float(values[row]), position_cell(motion, row)
 
 
-def _reactions_table(forces: Forces) -> FittedTable:
+def _reactions_table(forces: Forces, motion: Motion) -> FittedTable:
     degree, at, (moment, greatest) = (
         forces.mechanism.units.angle,
-        position_heading(forces.moving),
+        position_heading(motion),
         at_one.greatest_moment_and_force(forces),
     )
     force = ("greatest force, N", f"its direction, {degree}", at)
@@ -85,37 +93,36 @@ def _reactions_table(forces: Forces) -> FittedTable:
     for name, each in forces.reactions.items():
         first, second = each.links
         if each.at is not None:
-            force = np.hypot(*each.force.T)
-            most, where = _greatest_with_place(forces, force)
-            way = loads.polar_cells(each.force[int(np.nanargmax(force))], degree, greatest)[1] if where else ""
+            sizes = np.hypot(*each.force.T)
+            most, where = _greatest_with_place(motion, sizes)
+            way = loads.polar_cells(each.force[int(np.nanargmax(sizes))], degree, greatest)[1] if where else ""
             told = format_or_zero(most, greatest), way, where if way else ""
-            table.add_row(name, second, first, *told, *_greatest_couple(forces, each.couple, moment))
+            table.add_row(name, second, first, *told, *_greatest_couple(motion, each.couple, moment))
         for link, couple in each.couples.items():
-            table.add_row(name, link, "", "-", "", "", *_greatest_couple(forces, couple, moment))
+            table.add_row(name, link, "", "-", "", "", *_greatest_couple(motion, couple, moment))
     return table
 
 
-def _greatest_couple(forces: Forces, couple: Array, beside: float) -> tuple[str, str]:
+def _greatest_couple(motion: Motion, couple: Array | float, beside: float) -> tuple[str, str]:
     """The greatest couple, whatever its sense, and where; nowhere if there is none."""
-    most, where = _greatest_with_place(forces, np.abs(couple))
+    most, where = _greatest_with_place(motion, np.abs(np.asarray(couple)))
     told = format_or_zero(most, beside)
     return told, "" if told == "0" else where
 
 
-def _shaking_facts(forces: Forces) -> Iterator[tuple[str, str]]:
+def _shaking_facts(forces: Forces, motion: Motion) -> Iterator[tuple[str, str]]:
     if not at_one.has_inertia(forces):
         return
     force, moment = forces.shaking
-    (name, measure), told = position_heading(forces.moving).split(", "), []
-    for values, unit, beside in zip(
-        (np.hypot(*force.T), np.abs(moment)), ("N", "N·m"), at_one.greatest_moment_and_force(forces)[::-1], strict=True
-    ):
-        most, where = _greatest_with_place(forces, values)
+    (name, measure), told = position_heading(motion).split(", "), []
+    sizes, most_of_all = (np.hypot(*force.T), np.abs(np.asarray(moment))), at_one.greatest_moment_and_force(forces)
+    for values, unit, beside in zip(sizes, ("N", "N·m"), most_of_all[::-1], strict=True):
+        most, where = _greatest_with_place(motion, values)
         told.append(f"up to {format_or_zero(most, beside)} {unit} ({name} = {where} {measure})")
     yield "shaking", f"{told[0]}, and {told[1]} about the frame's origin"
 
 
-def _undetermined_sentences(forces: Forces) -> Iterator[str]:
+def _undetermined_sentences(forces: Forces, position_count: int) -> Iterator[str]:
     """What is not told, at how many positions, and why; what has the same reason together."""
     efforts = {name: np.isnan(values) for name, values in forces.inputs.items()}
     by: dict[tuple[str, int], list[str]] = {}
@@ -125,14 +132,14 @@ def _undetermined_sentences(forces: Forces) -> Iterator[str]:
     for (why, count), names in by.items():
         yield (
             f"not determined at {join_all_names(names)}, at {count} of "
-            f"{count_phrase(len(forces.moving), 'position')}: {why}"
+            f"{count_phrase(position_count, 'position')}: {why}"
         )
 
 
 def _undetermined_rows(each: Reaction) -> Array:
     """Where something of a reaction is not told (n,)."""
     parts = [np.asarray(couple) for couple in each.couples.values()] or [*each.force.T, np.asarray(each.couple)]
-    return np.isnan(parts).any(axis=0)
+    return np.isnan(np.stack(parts)).any(axis=0)
 
 
 def force_series(forces: Forces) -> Iterable[ReportedSeries]:
@@ -140,14 +147,18 @@ def force_series(forces: Forces) -> Iterable[ReportedSeries]:
     for name, effort in forces.inputs.items():
         what, _ = at_one.effort_name_and_unit(forces, name)
         yield ReportedSeries(
-            "inputs", name, {what: what, "power": "power"}, {what: effort, "power": forces.powers[name]}
+            "inputs",
+            name,
+            {what: what, "power": "power"},
+            {what: np.asarray(effort), "power": np.asarray(forces.powers[name])},
         )
     for name, each in forces.reactions.items():
         values = _reaction_values(each)
         yield ReportedSeries("reactions", name, {what: _REACTION_KINDS.get(what, "torque") for what in values}, values)
     if at_one.has_inertia(forces):
         force, moment = forces.shaking
-        yield ReportedSeries("shaking", "", {"force": "force", "moment": "torque"}, {"force": force, "moment": moment})
+        kinds = {"force": "force", "moment": "torque"}
+        yield ReportedSeries("shaking", "", kinds, {"force": force, "moment": np.asarray(moment)})
 
 
 _REACTION_KINDS = {"position": "length", "force": "force"}

@@ -9,12 +9,11 @@ import numpy as np
 
 from planar.dynamics.external_actions import ExternalAction, KinematicArrays
 from planar.dynamics.forces import Forces
+from planar.foundation.arrays import Array
 from planar.foundation.units import display_unit, parse_unit
 from planar.model.mechanism import FileUnits
 from planar.reports.fitted_table import FittedTable, plain_table
 from planar.reports.number_format import ROUNDING_RATIO, column_heading, format_or_zero, vector_direction
-
-Array = np.ndarray
 
 
 class ActionMotion(NamedTuple):
@@ -28,7 +27,7 @@ class ActionMotion(NamedTuple):
     def max_power(self) -> float:
         """The greatest power that it could have at these speeds, W."""
         pushing = float(np.hypot(*self.acting.force) * np.hypot(*self.velocity))
-        return pushing + abs(self.acting.couple * self.angular_velocity)
+        return pushing + abs(float(self.acting.couple) * self.angular_velocity)
 
 
 def actions_with_motion(forces: Forces, inertia: bool) -> list[ActionMotion]:
@@ -59,7 +58,7 @@ def actions_table(title: str, rows: Iterable[ActionMotion], units: FileUnits, mo
     measure = display_unit("velocity", units)[1]
     for each in rows:
         acting = each.acting
-        turns = abs(acting.couple) > ROUNDING_RATIO * moment
+        turns = abs(float(acting.couple)) > ROUNDING_RATIO * moment
         pushes = acting.force.any() or not turns
         table.add_row(
             acting.name,

@@ -82,9 +82,14 @@ def effort_name_and_unit(forces: Forces, name: str) -> tuple[str, str]:
 
 def greatest_moment_and_force(forces: Forces) -> tuple[float, float]:
     """The greatest moment (N m) and the greatest force (N) of all that acts and all pairs: what rounding is beside."""
-    exerted = [(each.force, each.couple) for each in (*forces.acting, *forces.reactions.values())]
-    exerted += [(np.zeros(2), couple) for each in forces.reactions.values() for couple in each.couples.values()]
-    force, couple = (max((_largest(each[part]) for each in exerted), default=0.0) for part in (0, 1))
+    reactions = forces.reactions.values()
+    exerted = [(each.force, each.couple) for each in forces.acting] + [(each.force, each.couple) for each in reactions]
+    couples = [
+        *(couple for _, couple in exerted),
+        *(each for reaction in reactions for each in reaction.couples.values()),
+    ]
+    force = max((_largest(force) for force, _ in exerted), default=0.0)
+    couple = max(map(_largest, couples), default=0.0)
     return max(couple, force * mechanism_size(forces.mechanism, forces.moving.shapes)), force
 
 
@@ -99,13 +104,14 @@ def _inputs_table(forces: Forces) -> FittedTable:
     for name, effort in forces.inputs.items():
         kind, rate_kind, _ = named[name].input_quantity_kinds()
         rate, of = display_unit(rate_kind, mechanism.units)
+        position, velocity = float(given[name].position), float(given[name].velocity)
         table.add_row(
             name,
-            format_or_zero(effort, most[forces.is_force_input(name)]),
+            format_or_zero(float(effort), most[forces.is_force_input(name)]),
             effort_name_and_unit(forces, name)[1],
-            amount(given[name].position, kind, mechanism.units),
-            f"{format_or_zero(of.from_si(given[name].velocity))} {rate}",
-            format_or_zero(forces.powers[name], most[forces.is_force_input(name)] * given[name].velocity),
+            amount(position, kind, mechanism.units),
+            f"{format_or_zero(of.from_si(velocity))} {rate}",
+            format_or_zero(float(forces.powers[name]), most[forces.is_force_input(name)] * velocity),
         )
     return table
 
@@ -138,8 +144,8 @@ def _power_and_shaking(forces: Forces, most: float) -> Iterator[tuple[str, str]]
 
 
 def _power_text(forces: Forces, most: float) -> str:
-    supplied, taken = forces.power_in, forces.power_out
-    stored = sum(each.power for each in forces.acting if each.kind == "inertia")
+    supplied, taken = float(forces.power_in), float(forces.power_out)
+    stored = sum(float(each.power) for each in forces.acting if each.kind == "inertia")
     if not np.isfinite(supplied):
         return "not determined, as what the inputs supply is not"
     if forces.proof.power is None:
@@ -202,16 +208,16 @@ def record(forces: Forces, advantages: ratios.Advantages, comparisons: Sequence[
         "outcome": Outcome.SOLVED.value,
         "links": dict(link_numbers(forces.mechanism)),
         "inputs": {
-            name: {effort_name_and_unit(forces, name)[0]: _finite_or_none(effort)}
+            name: {effort_name_and_unit(forces, name)[0]: _finite_or_none(float(effort))}
             | {"position": given[name].position, "velocity": given[name].velocity}
-            | {"power": _finite_or_none(forces.powers[name])}
+            | {"power": _finite_or_none(float(forces.powers[name]))}
             for name, effort in forces.inputs.items()
         },
         "loads": loads.record(loads.actions_with_motion(forces, inertia=False)),
         "inertia": loads.record(loads.actions_with_motion(forces, inertia=True)),
         "reactions": {name: _reaction_record(each) for name, each in forces.reactions.items()},
         **({"shaking": {"force": force.tolist(), "moment": float(moment)}} if has_inertia(forces) else {}),
-        "power": {"in": _finite_or_none(forces.power_in), "out": forces.power_out},
+        "power": {"in": _finite_or_none(float(forces.power_in)), "out": forces.power_out},
         "advantage": ratios.record(advantages),
         **proof_record(forces),
         "remarks": [*attachment_remarks(forces.mechanism), *forces.moving.remarks],
