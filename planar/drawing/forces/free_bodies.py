@@ -155,7 +155,7 @@ class _FreeBody:
     def _line_of_action(self) -> Polyline:
         ends = [Vector(*self._action_point(each)) for each in self.arrows]
         way = unit_vector(ends[1] - ends[0]) * LINE_OF_ACTION_OVERHANG
-        return symbols.stroke("line of action", Pen.CONSTRUCTION, ends[0] - way, ends[1] + way)
+        return Polyline((paper_point(ends[0] - way), paper_point(ends[1] + way)), Pen.CONSTRUCTION, "line of action")
 
     def _force_arrow(self, push: ActionArrow, clear: Clearance) -> Arrow:
         """The arrow of a force, from its place or to it, whichever crosses less."""
@@ -219,7 +219,7 @@ def _body_marks(scene: Scene, link: str) -> Iterator[Mark]:
     wheels += [wheel for mark in scene.marks if isinstance(mark, BeltMark) for wheel in (mark.first, mark.second)]
     for wheel in {(each.centre, each.radius): each for each in wheels if each.link == link}.values():
         yield from stroke_marks(wheel_symbols(wheel, f"gear {wheel.name}"), scene.frames, scene.scale.per_mm)
-    pins = {}
+    pins: dict[str, Vector] = {}
     for mark in scene.marks:
         if isinstance(mark, SliderMark) and mark.link == link and mark.name not in scene.cylinders:
             yield from symbols.symbol_marks(

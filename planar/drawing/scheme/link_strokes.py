@@ -107,7 +107,7 @@ def _guide_strokes(scene: Scene, link: str, body: LinkBody, pen: Pen) -> Iterato
         yield PlacedLine(f"link {link}", link, pen, (foot + way * start, foot + way * stop))
 
 
-def _wheel_strokes(scene: Scene) -> Iterator[PlacedSymbol]:
+def _wheel_strokes(scene: Scene) -> Iterator[PlacedStroke]:
     """Wheels that move, and bands. In a moving picture a mark shows that a wheel turns."""
     frame = scene.mechanism.frame
     seen: set[tuple[Any, ...]] = set()

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from math import atan2, pi, remainder
 from typing import NamedTuple
 
-from planar.drawing.paper.picture import Fill, Mark, Pen, Polyline, paper_point
+from planar.drawing.paper.picture import Fill, Outline, Pen, Polyline, paper_point
 from planar.drawing.scheme import symbols
 from planar.drawing.scheme.link_bodies import unit_vector
 from planar.foundation.geometry import Frame, Vector
@@ -73,7 +73,7 @@ class PlacedTorsionSpring(NamedTuple):
 PlacedStroke = PlacedLine | PlacedSymbol | PlacedSpring | PlacedTorsionSpring
 
 
-def stroke_marks(strokes: Iterable[PlacedStroke], frames: Mapping[str, Frame], per_mm: float) -> Iterator[Mark]:
+def stroke_marks(strokes: Iterable[PlacedStroke], frames: Mapping[str, Frame], per_mm: float) -> Iterator[Outline]:
     """Strokes on paper (mm) where the links have these frames, with so many metres to a millimetre."""
 
     def to_paper(link: str, at: Vector) -> Vector:

@@ -64,8 +64,9 @@ class BeltPair(WheelPair):
         wheels = [mark for mark in super().drawing_marks(shapes, all_pairs) if isinstance(mark, WheelMark)]
         if len(wheels) != 2:
             return tuple(wheels)
-        first, second = self._carrier_centres(shapes, all_pairs)
-        return (*wheels, BeltMark(self.name, *wheels, self.carrier, (first, second), self.ratio() < 0.0))
+        first, second = wheels
+        here, there = self._carrier_centres(shapes, all_pairs)
+        return (first, second, BeltMark(self.name, first, second, self.carrier, (here, there), self.ratio() < 0.0))
 
     def _pitch_radii(self, centre_distance: Scalar) -> tuple[Scalar, ...]:
         ratio = abs(self.ratio())

@@ -125,7 +125,7 @@ def _symbol_data(mechanism: Mechanism, data: Mapping[str, Any]) -> dict[str, Any
 
 
 def _plain_symbols(symbols: Iterable[ActionSymbol]) -> list[tuple[str, str]]:
-    return [(each.base, each.index) for each in symbols]
+    return [(each.base, each.subscript) for each in symbols]
 
 
 def _pair_data(pair: Pair, rows: BalanceRows, held: list[int]) -> dict[str, Any]:

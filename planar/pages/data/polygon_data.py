@@ -87,7 +87,7 @@ def _vector(vertices: Sequence[Mapping[str, Any]], tail: int, head: int, link: s
     """The stroke of a vector, from what is at rest if either is; of two points of a `link` with its parts."""
     if vertices[head]["fixed"]:
         tail, head = head, tail
-    stroke = {"kind": "absolute" if vertices[tail]["fixed"] else "relative", "from": tail, "to": head}
+    stroke: dict[str, Any] = {"kind": "absolute" if vertices[tail]["fixed"] else "relative", "from": tail, "to": head}
     if link is not None:
         stroke |= {"link": link, "end": [vertices[head]["letter"], vertices[tail]["letter"]]}
     return stroke

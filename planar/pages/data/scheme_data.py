@@ -26,6 +26,7 @@ from planar.drawing.scheme.scheme import extent_corners, extent_places, mass_cen
 from planar.drawing.scheme.springs_masses import SpringMassMark
 from planar.equations.coordinates import frames_from_coordinates
 from planar.equations.mechanism_numbers import shapes_of_links
+from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer
 from planar.foundation.geometry import Frame, Vector
 from planar.model.mechanism import Mechanism, relative_motions
@@ -118,12 +119,12 @@ class MovingScene(Scene):
         return self.shown_range(name, link, foot, way)
 
 
-def motion_positions(mechanism: Mechanism, z: np.ndarray) -> Positions:
+def motion_positions(mechanism: Mechanism, z: Array) -> Positions:
     """Where the links are at the unknowns z, and over the motion of every input from there."""
     solver = solved_mechanism(mechanism).solver
     u, p = solver.inputs.u, solver.inputs.p
 
-    def frames(z: np.ndarray, u: np.ndarray) -> Mapping[str, Frame]:
+    def frames(z: Array, u: Array) -> Mapping[str, Frame]:
         w = solver.functions.coordinate_function(z, u, p).full().ravel()
         found, _ = frames_from_coordinates((w * solver.scale).tolist(), solver.column, solver.shapes, solver.pairs)
         return plain_frames(found)
@@ -142,15 +143,13 @@ def motion_positions(mechanism: Mechanism, z: np.ndarray) -> Positions:
     return positions
 
 
-def _followed_samples(
-    solver: PositionSolver, z: np.ndarray, samples: np.ndarray, through: bool
-) -> tuple[np.ndarray, np.ndarray]:
+def _followed_samples(solver: PositionSolver, z: Array, samples: Array, through: bool) -> tuple[Array, Array]:
     """The inputs at every step after the first of the samples, as far as they are reached, and the unknowns there.
 
     Quickly as far as that goes; from there on by the general path, `through` change points, where that is wanted.
     """
     p, places, reached = solver.inputs.p, samples[STEP_PARTS::STEP_PARTS], 0
-    found = np.empty((0, z.size))
+    found: Array = np.empty((0, z.size))
     if solver.functions.is_square:
         every = solver.functions.run_samples(z, samples[1:], p)
         closed = solver.max_residuals(every, samples[1:]) <= solver.tolerance

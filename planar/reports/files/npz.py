@@ -26,7 +26,7 @@ def encode_npz(motion: Motion, more: Iterable[ReportedSeries]) -> bytes:
             if values is not None:
                 name = "/".join(filter(None, (thing.group, thing.name, what)))
                 arrays[name], units[name] = values, UNITS_BY_KIND[thing.kinds[what]]
-    texts = {what: np.array(text) for what, text in run_header(motion).items()}
+    texts: dict[str, Any] = {what: np.array(text) for what, text in run_header(motion).items()}
     content = io.BytesIO()
     np.savez(content, **arrays, **texts, units=np.array(list(units.items())))
     return content.getvalue()
