@@ -64,6 +64,11 @@ class ConstraintEquations:
     """What every entry of u is."""
 
     @cached_property
+    def unknown_is_angle(self) -> np.ndarray:
+        """Which unknowns are angles (unknowns,)."""
+        return np.array([self.coordinates[column].kind is not MeasureKind.LENGTH for column in self.unknowns], bool)
+
+    @cached_property
     def y(self) -> ca.SX:
         """(z, u): what changes in time."""
         return ca.vertcat(self.z, self.u)

@@ -18,11 +18,11 @@ from planar.model.pairs import MeasureKind, Pair
 from planar.model.wording import amount
 from planar.results.records import (
     RelativeState,
+    principal_angle,
     principal_turns,
     rotate_quarter_turn,
     stack_vectors,
     vector_and_rates,
-    wrap_angle,
 )
 
 Array = np.ndarray
@@ -66,7 +66,7 @@ class KinematicResult(Displayable):
         if name in self.inputs:
             started = float(np.ravel(self.inputs[name].position)[0])
             return 2.0 * np.pi * round((started - position) / (2.0 * np.pi))
-        return wrap_angle(position) - position
+        return principal_angle(position) - position
 
     def _turns_of_limit(self, name: str, positions: Array) -> float:
         """The whole turns (rad) by which the angle at a pair is told off these of its unknown; of a length 0."""

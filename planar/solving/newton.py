@@ -192,6 +192,13 @@ def correct_at_rank(residual_function: SystemFunction, y: Array, rank: int, free
     return y
 
 
+def repeat_step(residual_function: SystemFunction, inverse: Array, y: Array, steps: int) -> Array:
+    """Where so many steps from y (n,) lead by one inverse (n, m) of the Jacobian, or of a part of it."""
+    for _ in range(steps):
+        y = y - inverse @ residual_function(y)[0]
+    return y
+
+
 def truncated_step(jacobian: Array, residuals: Array, rank: int) -> Array:
     """The shortest step that closes what is open, by so many of the directions in which the slope is steepest."""
     u, s, vt = np.linalg.svd(jacobian, full_matrices=False)

@@ -30,6 +30,7 @@ import numpy as np
 from planar.assemblies.polynomial.gear_powers import AngleArguments, GearPowers, angle_arguments, gear_powers
 from planar.equations.casadi_call import BufferedFunction
 from planar.equations.constraint_equations import Block, ConstraintEquations
+from planar.foundation.angles import wrap_angle
 from planar.model.pairs import MeasureKind
 
 Array = np.ndarray
@@ -140,7 +141,7 @@ class IsotropicForm(NamedTuple):
         """The same assembly (unknowns,) with angles between -pi and pi, or the least that count turns."""
         angles, root = list(self.angles), root.copy()
         own = root[angles]
-        root[angles] = self.gears.least_angles(own) if self.gears else np.arctan2(np.sin(own), np.cos(own))
+        root[angles] = self.gears.least_angles(own) if self.gears else wrap_angle(own)
         return root
 
 

@@ -11,6 +11,7 @@ from planar.equations.constraint_equations import Block, slice_length
 from planar.equations.coordinates import frames_from_coordinates
 from planar.equations.functions import EquationFunctions
 from planar.equations.minors import constraint_dependencies
+from planar.foundation.angles import distances, wrap_angle
 from planar.foundation.geometry import Vector
 from planar.model.pairs import MeasureKind
 from planar.solving.assembly.sketch_start import turn_between
@@ -139,7 +140,7 @@ class BlockAssemblies:
     ) -> list[BlockAssembly]:
         if self.counts_turns:
             # angles take the turn nearest to none, wherever Newton's method wandered, if that is closed too
-            least = np.where(self._is_angle(stage), np.arctan2(np.sin(converged), np.cos(converged)), converged)
+            least = np.where(self.equations.unknown_is_angle[stage.unknowns], wrap_angle(converged), converged)
             still = (
                 np.abs(closing(least)[0]).max(axis=1, initial=0.0) < CLOSED_TOLERANCE if len(converged) else converged
             )
@@ -202,13 +203,9 @@ class BlockAssemblies:
         ended = damped_newton(closing, self._with_lengths(stage, closing, starts))
         return self._from_converged(stage, z, closing, ended.unknowns[ended.converged])
 
-    def _is_angle(self, stage: Block) -> Array:
-        columns = self.equations.unknowns[stage.unknowns]
-        return np.array([self.equations.coordinates[c].kind is not MeasureKind.LENGTH for c in columns], dtype=bool)
-
     def _is_same(self, stage: Block, z: Array, a: Array, b: Array) -> bool:
         """Whether two roots of a group are one assembly; where turns count, they are if all that hangs on them is."""
-        if not np.all(_distances(self._is_angle(stage), a, b) < SAME_ASSEMBLY_TOLERANCE):
+        if not np.all(distances(self.equations.unknown_is_angle[stage.unknowns], a, b) < SAME_ASSEMBLY_TOLERANCE):
             return False
         if not self.counts_turns:
             return True
@@ -217,7 +214,7 @@ class BlockAssemblies:
         angles = np.array([c.kind is not MeasureKind.LENGTH for c in self.equations.coordinates])
         return bool(
             np.all(
-                _distances(angles, *self.functions.coordinates(both, np.tile(self.u, (2, 1)), self.p))
+                distances(angles, *self.functions.coordinates(both, np.tile(self.u, (2, 1)), self.p))
                 < SAME_ASSEMBLY_TOLERANCE
             )
         )
@@ -246,7 +243,7 @@ class BlockAssemblies:
 
     def _with_lengths(self, stage: Block, closing: ResidualFunction, starts: Array) -> Array:
         """Starts whose lengths follow from their angles: lengths enter linearly, so by least squares."""
-        lengths = ~self._is_angle(stage)
+        lengths = ~self.equations.unknown_is_angle[stage.unknowns]
         if lengths.any():
             starts[:, lengths] = 0.0
             left, slope = closing(starts)
@@ -285,11 +282,6 @@ def block_residual_function(
         return left.reshape(count, -1), slopes.reshape(count, *slopes.shape[-2:]).transpose(0, 2, 1)
 
     return closing
-
-
-def _distances(is_angle: Array, a: Array, b: Array) -> Array:
-    """How far numbers are apart, those that are angles modulo a turn."""
-    return np.where(is_angle, np.abs(np.exp(1j * a) - np.exp(1j * b)), np.abs(a - b))
 
 
 def _spread_angles(unknowns: int) -> Array:

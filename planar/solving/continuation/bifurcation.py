@@ -21,6 +21,7 @@ from planar.solving.continuation.second_order import (
     branch_directions,
     is_same_direction,
     nearest_direction,
+    solve_third_order,
 )
 from planar.solving.continuation.solution_curve import Arc, CurvePoint, SolutionCurve, fit_polynomial
 from planar.solving.newton import settle
@@ -149,14 +150,14 @@ class _BranchConditions:
         base = -self.vt[:rank].T @ ((self.u[:, :rank].T @ curve.second_derivative(self.y, v)) / self.s[:rank])
         # of the null space only what is normal to the tangent
         across = np.linalg.svd(c[None])[2][1:].T
-        slope = 3.0 * (self.forms @ c) @ across
-        if np.linalg.svd(slope, compute_uv=False)[-1] < SINGULAR_TOLERANCE:
-            return None
-        third = curve.functions.third_rate_remainder(
-            curve.unknowns_and_inputs(self.y), curve.widen_direction(v), curve.widen_direction(base), curve.p
-        )
-        e = np.linalg.lstsq(slope, -(self.left_null.T @ third), rcond=None)[0]
-        return CurvePoint(self.y, v, base + self.null @ (across @ e), 0.0)
+        whole, ahead = curve.unknowns_and_inputs(self.y), curve.widen_direction(v)
+
+        def third_order(e: Array) -> Array:
+            second = curve.widen_direction(base + self.null @ (across @ e))
+            return self.left_null.T @ curve.functions.third_rate_remainder(whole, ahead, second, curve.p)
+
+        e = solve_third_order(third_order, across.shape[1])
+        return None if e is None else CurvePoint(self.y, v, base + self.null @ (across @ e), 0.0)
 
 
 def bifurcation_ahead(curve: SolutionCurve, here: CurvePoint, y: Array) -> Bifurcation | None:
