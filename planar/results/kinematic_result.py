@@ -94,9 +94,7 @@ class KinematicResult(Displayable):
         if name not in self._relative_motions:
             raise Unknown(f"there is no pair {name!r}; pairs are {join_names(self._relative_motions)}")
         pair = self._relative_motions[name]
-        numbers = pair.measure([self.shapes[link] for link in pair.bodies])
-        frames = [self.frames[link] for link in pair.bodies]
-        return pair, value_and_rates(pair.input_position(frames, numbers, self.own.get(pair.name, ())))
+        return pair, value_and_rates(pair.input_position_at(self.shapes, self.frames, self.own))
 
     def relative(self, point: str, other: str, axes: str | None = None) -> RelativeState:
         """How `point` moves against `other`, in the axes of a link.
