@@ -59,7 +59,7 @@ REAL_TOLERANCE = 1e-9
 NEARLY_REAL_TOLERANCE = 0.05
 """One that differs by less is tried on the real equations."""
 DOUBLE_ROOT_TOLERANCE = 3e-7
-"""Least singular value of the real slope, of the greatest, below which two assemblies may meet."""
+"""Least singular value of the real Jacobian, of the greatest, below which two assemblies may meet."""
 CORRECTION_STEPS = 12
 """Steps that put what else moves in its place on a way off along an open direction."""
 DOUBLE_ROOT_RATIO, ROUNDING_SINGULAR_VALUE = 30.0, 1e-9
@@ -341,7 +341,7 @@ def _linear_root(setup: PreparedMechanism, stage: Block, z: Array, slope: ca.Fun
 
 
 def _least_singular_ratio(closing: ResidualFunction, real: Array) -> Array:
-    """The least singular value of a block's slope, of the greatest (roots,): none where a direction is open."""
+    """The least singular value of a block's Jacobian, of the greatest (roots,): none where a direction is open."""
     if not real.size:
         return np.ones(len(real))
     values = np.linalg.svd(closing(real)[1], compute_uv=False)

@@ -23,9 +23,9 @@ BEST_TO_WORST = (Completeness.PROVED, Completeness.NUMERICALLY, Completeness.NOT
 SAME_ROOT_DISTANCE, SAME_DOUBLE_ROOT_DISTANCE = 1e-6, 1e-4
 """How near to a root unknowns are that root, and one where two meet, which rounding puts farther off."""
 REGULAR_SINGULAR_VALUE = 1e-9
-"""A linear block whose slope is weaker than this part of itself has no single assembly."""
+"""A linear block whose Jacobian is weaker than this part of itself has no single assembly."""
 JACOBIAN_ROUNDING = 1e-12
-"""What is rounding in a slope."""
+"""What is rounding in a Jacobian."""
 
 
 class AssemblyPath(NamedTuple):
@@ -254,7 +254,7 @@ def _uncertified_roots(real: Array, expected: int, said: str) -> BlockRoots:
 
 
 def is_linear(setup: PreparedMechanism, stage: Block, z: Array) -> bool:
-    """Whether the slope of a block does not depend on its own unknowns, those before it given in z (unknowns,)."""
+    """Whether the Jacobian of a block does not depend on its own unknowns, those before it given in z (unknowns,)."""
     rng, closing, many = np.random.default_rng(0), _residual_function(setup, stage, z), slice_length(stage.unknowns)
     slope = closing(np.zeros(many))[1]
     others = (closing(rng.uniform(0.5, 2.0, many))[1] for _ in range(2))
@@ -262,7 +262,7 @@ def is_linear(setup: PreparedMechanism, stage: Block, z: Array) -> bool:
 
 
 def _residual_function(setup: PreparedMechanism, stage: Block, z: Array) -> Callable[[Array], tuple[Array, Array]]:
-    """What a block leaves open (rows,) and its slope (rows, unknowns) at its own unknowns."""
+    """What a block leaves open (rows,) and its Jacobian (rows, unknowns) at its own unknowns."""
 
     def closing(own: Array) -> tuple[Array, Array]:
         whole = z.copy()

@@ -17,7 +17,7 @@ from planar.equations.linear import solve_vectors
 
 Array = np.ndarray
 ResidualFunction = Callable[[Array], tuple[Array, Array]]
-"""Unknowns (starts, n) -> what is left open (starts, m), and its slope (starts, m, n)."""
+"""Unknowns (starts, n) -> what is left open (starts, m), and its Jacobian (starts, m, n)."""
 SystemFunction = Callable[[Array], tuple[Array, Array]]
 """The same from one place: unknowns (n,) -> residuals (m,), Jacobian (m, n)."""
 StepSolver = Callable[[Array, Array], Array]
@@ -46,7 +46,7 @@ EPS = float(np.finfo(float).eps)
 
 
 class NewtonResult(NamedTuple):
-    """Where each start ended: the unknowns, the greatest part left open, and whether that closes the group."""
+    """Where each start ended: the unknowns, the greatest part left open, and whether that closes the block."""
 
     unknowns: Array
     residual: Array
@@ -61,7 +61,7 @@ def damped_newton(
 ) -> NewtonResult:
     """Solve from every start by Levenberg's and Marquardt's damping of Gauss and Newton's method.
 
-    The damping falls with every step that succeeds, so convergence at a simple root is quadratic; groups with more
+    The damping falls with every step that succeeds, so convergence at a simple root is quadratic; blocks with more
     constraints than unknowns are solved in the sense of least squares, singular ones by the shortest step.
     K. Madsen, H. B. Nielsen, O. Tingleff, Methods for Non-Linear Least Squares Problems, 2nd ed., 2004, sec. 3.2.
     """
@@ -200,7 +200,7 @@ def repeat_step(residual_function: SystemFunction, inverse: Array, y: Array, ste
 
 
 def truncated_step(jacobian: Array, residuals: Array, rank: int) -> Array:
-    """The shortest step that closes what is open, by so many of the directions in which the slope is steepest."""
+    """The shortest step that closes what is open, by so many of the directions in which the Jacobian is steepest."""
     u, s, vt = np.linalg.svd(jacobian, full_matrices=False)
     return vt[:rank].T @ ((u.T[:rank] @ residuals) / s[:rank])
 

@@ -99,7 +99,7 @@ class PositionSolver(PreparedMechanism):
         return (*self.mechanism.remarks, *sketch_remarks(self, BlockAssemblies(self), found))
 
     def _is_regular(self, z: Array) -> bool:
-        """Whether every group of an assembly is determined there."""
+        """Whether every block of an assembly is determined there."""
         if is_surely_regular(self, z):
             return True
         return bool(np.all(regularity(self, jacobian_at(self, z, self.inputs.u)) >= MIN_REGULARITY))
@@ -121,7 +121,7 @@ class PositionSolver(PreparedMechanism):
         """Why it cannot be assembled, and what would mend that, which takes about as long to find as an assembly."""
         found = regularity(self, jacobian_at(self, failure.z, self.inputs.u))
         for stage in self.equations.blocks[: failure.stage.block_index]:
-            # a group that could stand anywhere was put somewhere, and what comes after it need not fit there
+            # a block that could stand anywhere was put somewhere, and what comes after it need not fit there
             if found[stage.block_index] < MIN_REGULARITY and is_always_singular(self, stage, failure.z):
                 return refusals.always_free(self, stage.links)
         return (
@@ -139,7 +139,7 @@ class PositionSolver(PreparedMechanism):
         return 0 < bare.z.numel() - bare.F.numel() < len(self.mechanism.inputs)
 
     def state(self, z: Array, remarks: tuple[str, ...] = ()) -> State:
-        """The state at given unknowns, once they and their rates have passed the gate. Raises NoAnswer."""
+        """The state at given unknowns, once they and their rates have passed the residual check. Raises NoAnswer."""
         state = self._fast_state(z, remarks)
         if state is not None:
             return state

@@ -176,7 +176,7 @@ def isotropic_form(e: ConstraintEquations, stage: Block, p: Array | None = None)
 
 
 def constant_jacobian(e: ConstraintEquations, stage: Block) -> ca.Function | None:
-    """The slope (rows, unknowns) of a block in its own unknowns as a function of (z, u, p); None where it depends on
+    """The Jacobian (rows, unknowns) of a block in its own unknowns as a function of (z, u, p); None where it depends on
     them: such a block is linear."""
     if stage.is_free or any(row.kind is MeasureKind.ANGLE for row in e.rows[stage.rows]):
         return None

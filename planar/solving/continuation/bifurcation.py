@@ -35,7 +35,7 @@ ON_BRANCH_RATIO = 1e-2
 START_DISTANCE_TOLERANCE = 1e-6
 """rad or sizes: so far a position on a change point is from it at most, known to the root of rounding."""
 AT_BIFURCATION_DISTANCE = 1e-5
-"""So near to a singular slope a start may be a change point, known to the root of rounding."""
+"""So near to a singular Jacobian a start may be a change point, known to the root of rounding."""
 ZERO_INPUT_RATE = 1e-7
 """A rate of the inputs along a way below this is none."""
 HALF_ARC_LENGTH, MIN_HALF_ARC_LENGTH = 0.02, 1e-4
@@ -45,7 +45,7 @@ ARC_FIT_TOLERANCE = 1e-11
 
 
 class BifurcationCandidate(NamedTuple):
-    """The point nearest to which the slope has more than one null vector, those (n + 1, k), and what the constraints
+    """The point nearest to which the Jacobian has more than one null vector, those (n + 1, k), and what the constraints
     leave open there: nothing but rounding at a change point, more where the curve only comes near one."""
 
     y: Array
@@ -58,7 +58,7 @@ class Bifurcation(NamedTuple):
     leads from where the walk came.
 
     `whole` says whether these are all; where ways touch one another, or are many without an end, they are not told.
-    `lost` is how much rank the slope lacks.
+    `lost` is how much rank the Jacobian lacks.
     """
 
     y: Array
@@ -68,7 +68,7 @@ class Bifurcation(NamedTuple):
 
 
 def bifurcation_candidates(curve: SolutionCurve, here: CurvePoint) -> Iterator[BifurcationCandidate]:
-    """The points next to this one at which the slope has more than one null vector, those that Newton finds.
+    """The points next to this one at which the Jacobian has more than one null vector, those that Newton finds.
 
     Gauss and Newton's method for F = 0, J A = 0 with A0^T A = 1: regular wherever branches cross at an angle, and for
     any number of redundant constraints. Where several loops come near one at once, each is looked for.
@@ -88,7 +88,7 @@ def bifurcation_candidates(curve: SolutionCurve, here: CurvePoint) -> Iterator[B
 
 
 def _refine_candidate(curve: SolutionCurve, y: Array, null_start: Array) -> BifurcationCandidate | None:
-    """The point next to y at which the slope has null vectors next to these (n + 1, k)."""
+    """The point next to y at which the Jacobian has null vectors next to these (n + 1, k)."""
     size, count = null_start.shape
 
     def augmented(x: Array) -> tuple[Array, Array]:

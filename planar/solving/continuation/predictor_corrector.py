@@ -41,7 +41,7 @@ FIRST_TURN_RATIO, FIRST_DISTANCE_RATIO = 0.8, 1.2
 MAX_CORRECTED_RATIO, STEP_GROWTH = 2.0, 1.6
 """How many times longer than its step a move may be, and a next step than one that was taken."""
 SEARCH_DISTANCE, REPEATED_SEARCH_RATIO = 0.15, 0.2
-"""Where to look for a change point: so near to a singular slope, and again where it is so many times nearer."""
+"""Where to look for a change point: so near to a singular Jacobian, and again where it is so many times nearer."""
 MAX_AHEAD_RATIO = 10.0
 """A change point farther ahead than so many times the distance within which there is none is another one."""
 MAX_ARCS = 5_000
@@ -52,7 +52,7 @@ SHOWN_SLIDE_EXTENT = 100.0
 """Lengths of the size, or times the greatest number of a pair: so far out a slide is shown that goes out without an
 end."""
 MAX_SLIDE_EXTENT = 6e6
-"""Lengths of the size: farther out than this the gate tells nothing."""
+"""Lengths of the size: farther out than this the residual check tells nothing."""
 MIN_LIMIT_POWER = 0.25
 """Where a slide goes out without an end the inputs tend to a limit with a power of the slide's inverse; beyond half of
 the square root, which is the lowest that lines becoming parallel give, they do."""

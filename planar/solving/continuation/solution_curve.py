@@ -19,7 +19,7 @@ CLOSED_TOLERANCE = 1e-10
 ZERO_SINGULAR_VALUE = 1e-10
 """A singular value that is this part of the greatest is zero to rounding."""
 MIN_COLUMN_NORM = 1e-6
-"""A column of the slope is judged by its own size, down to this part of the size of the mechanism."""
+"""A column of the Jacobian is judged by its own size, down to this part of the size of the mechanism."""
 
 
 REGULAR_SINGULAR_VALUE = 1e-4
@@ -27,7 +27,7 @@ REGULAR_SINGULAR_VALUE = 1e-4
 MAX_TANGENT_RATIO = 100.0
 """How many times longer than its part in the direction asked for a tangent may be for that."""
 SHORT_REGULAR_DISTANCE = 0.25
-"""rad or sizes: a distance from singular slopes from which on no step is shortened."""
+"""rad or sizes: a distance from singular Jacobians from which on no step is shortened."""
 MAX_SOLVED_STEP = 1e3
 """A longer step is that of a singular system, solved once more in the sense of least squares."""
 
@@ -42,12 +42,12 @@ class CurveSolver(Protocol):
 
     @property
     def tolerance(self) -> float:
-        """What the gate lets pass."""
+        """What the residual check lets pass."""
 
 
 class CurvePoint(NamedTuple):
     """A point of the curve: y = (unknowns, how far the inputs are on their way), (n + 1,), its unit tangent, its second
-    derivative by arc length, and how far it is at least to where the slope could lose rank."""
+    derivative by arc length, and how far it is at least to where the Jacobian could lose rank."""
 
     y: Array
     tangent: Array
@@ -174,7 +174,7 @@ class SolutionCurve(ImplicitCurve):
         return self.functions.kinematics(self.unknowns_and_inputs(y), wide, 0.0 * wide, self.p).F2
 
     def is_closed(self, y: Array) -> bool:
-        """Whether a point passes the first part of the gate."""
+        """Whether a point passes the residual check."""
         return bool(self.solver.max_residuals(y[None, :-1], self.inputs(y)[None])[0] <= self.solver.tolerance)
 
     def _regular_distance(self, y: Array, tangent: Array, slope: Array, least: float) -> float:
@@ -198,7 +198,7 @@ class SolutionCurve(ImplicitCurve):
     def correct_beside_bifurcation(self, y: Array, rank_loss: int, with_inputs: bool) -> Array:
         """A position beside a change point, closed to round-off but not moved from one branch to the other.
 
-        `rank_loss` is by how much the slope's rank falls at the change point; the inputs move only `with_inputs`.
+        `rank_loss` is by how much the Jacobian's rank falls at the change point; the inputs move only `with_inputs`.
         """
         many = len(y) - 1
         return correct_at_rank(self.residuals_and_jacobian, y, many - rank_loss, many + with_inputs)

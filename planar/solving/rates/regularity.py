@@ -55,8 +55,8 @@ def _contradiction_rank(motion: EquationRates) -> int:
 def regularity(setup: PreparedMechanism, jacobian: Array) -> Array:
     """The least singular value of every group's slope (..., stages), each column by what its links could reach at best.
 
-    Zero at a dead point or a change point; lengths are divided by the reach of the group's links, so that neither
-    their size nor that of the whole matters. `slope` is (..., rows, unknowns).
+    Zero at a dead point or a change point; lengths are divided by the reach of the block's links, so that neither
+    their size nor that of the whole matters. `jacobian` is (..., rows, unknowns).
     """
     scaled = _scaled_jacobian(setup, jacobian)
     stages = setup.equations.blocks
@@ -74,9 +74,9 @@ def _least_singular_value(block_jacobian: Array) -> Array:
 
 
 def _scaled_jacobian(setup: PreparedMechanism, jacobian: Array) -> Array:
-    """A slope (..., rows, unknowns and inputs), every group's lengths in units of its reach, columns of one size.
+    """A Jacobian (..., rows, unknowns and inputs), every block's lengths in units of its reach, columns of one size.
 
-    The size of an unknown's column is that in its own group, whatever large or small things later groups hang on it.
+    The size of an unknown's column is that in its own block, whatever large or small things later blocks hang on it.
     A column that could reach further than it does now keeps what it lacks: it is that which vanishes.
     """
     scaled = jacobian / setup.row_scale[:, None]
@@ -95,7 +95,7 @@ def input_rates_agree(setup: PreparedMechanism, motion: EquationRates) -> bool:
 
 
 def is_always_singular(setup: PreparedMechanism, stage: Block, z: Array) -> bool:
-    """Whether a group is singular in closed positions near by too, so that it is no matter of this one."""
+    """Whether a block is singular in closed positions near by too, so that it is no matter of this one."""
     u, p = setup.inputs.u, setup.inputs.p
     for seed in range(3):
         rng = np.random.default_rng(seed)
