@@ -31,7 +31,7 @@ from planar.solving.position import PositionSolver, solve, solved_mechanism
 Array = np.ndarray
 
 MAX_SOLVED_FOR_COUNT = 4096
-"""Dyads, or larger blocks by what they take, that are solved for the sake of a number alone."""
+"""Dyads, or larger groups by what they take, that are solved for the sake of a number alone."""
 MAX_CERTIFIED_FOR_CLAIM = 256
 """The same, certified, for the sake of a claim about the whole list."""
 
@@ -40,8 +40,8 @@ MAX_CERTIFIED_FOR_CLAIM = 256
 def modes(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = (), *, certify: bool = True) -> Modes:
     """Every real assembly of a mechanism at its inputs.
 
-    `drives` change inputs, as {pair: position} (rad or m). With `certify` every assembly is proved by intervals, block
-    after block: dimensions, inputs and the blocks before it are taken as the floats they are. It needs python-flint.
+    `drives` change inputs, as {pair: position} (rad or m). With `certify` every assembly is proved by intervals, group
+    after group: dimensions, inputs and the groups before it are taken as the floats they are. It needs python-flint.
 
     Raises NoAnswer where the inputs leave links free whatever the dimensions.
 
@@ -61,10 +61,10 @@ def modes(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = 
 
 
 class ModesBlock(NamedTuple):
-    """One block of links that are assembled together, those before it given.
+    """One group of links that are assembled together, those before it given.
 
     `expected` complex solutions are there by the count for this structure (None: it is not known), `found` of them
-    were; `real` are assemblies. Where the block hangs on choices before it these are the least and the most.
+    were; `real` are assemblies. Where the group hangs on choices before it these are the least and the most.
     """
 
     links: tuple[str, ...]
@@ -81,9 +81,9 @@ class ModesBlock(NamedTuple):
 
 
 class Modes(Displayable, Sequence["Mode"]):
-    """All assemblies in a fixed order, which does not depend on the sketch: block after block of links.
+    """All assemblies in a fixed order, which does not depend on the sketch: group after group of links.
 
-    The list is made as it is read. It has a length where that can be told by solving a few thousand blocks, those that
+    The list is made as it is read. It has a length where that can be told by solving a few thousand groups, those that
     do not hang on each other not listed together; else TypeError is raised, and `bound` says how many there may be.
     """
 
@@ -143,7 +143,7 @@ class Modes(Displayable, Sequence["Mode"]):
 
     @property
     def total(self) -> int | None:
-        """How many assemblies there are; None where that cannot be told by solving a few thousand blocks."""
+        """How many assemblies there are; None where that cannot be told by solving a few thousand groups."""
         return len(self._listed) if self._ended else self._counted_total
 
     @cached_property
@@ -152,19 +152,19 @@ class Modes(Displayable, Sequence["Mode"]):
 
     @property
     def bound(self) -> int | None:
-        """How many complex solutions there may be: the product over the blocks; None where one is not known."""
+        """How many complex solutions there may be: the product over the groups; None where one is not known."""
         return None if None in self._expected else prod(self._expected)
 
     @property
     def _expected(self) -> list[int | None]:
-        """Of every block how many complex solutions its structure has."""
+        """Of every group how many complex solutions its structure has."""
         self._list_up_to(1)
         solved = [self._tree.solved_roots(index) for index in range(len(self._tree.stages))]
         return [_maximum_if_known([each.expected for each in of]) if of else None for of in solved]
 
     @property
     def complete(self) -> Completeness:
-        """Whether the list, read to its end, is the whole: as the worst of the blocks for whatever choices before them.
+        """Whether the list, read to its end, is the whole: as the worst of the groups for whatever choices before them.
 
         All are solved for that, the first few hundred certified; of more than a few thousand it is not known.
         """
@@ -174,7 +174,7 @@ class Modes(Displayable, Sequence["Mode"]):
 
     @property
     def groups(self) -> tuple[ModesBlock, ...]:
-        """The blocks of links in the order in which they are assembled, with what has been found of them so far."""
+        """The groups of links in the order in which they are assembled, with what has been found of them so far."""
         self._list_up_to(1)
         found = []
         for index, stage in enumerate(self._tree.stages):
@@ -201,7 +201,7 @@ class Modes(Displayable, Sequence["Mode"]):
 
     @property
     def said(self) -> tuple[str, ...]:
-        """What there is to say of the list: how the blocks were solved, and what is not proved."""
+        """What there is to say of the list: how the groups were solved, and what is not proved."""
         how: dict[str, list[int]] = {}
         for number, group in enumerate(self.groups, start=1):
             how.setdefault(group.said, []).append(number)
@@ -241,7 +241,7 @@ class Modes(Displayable, Sequence["Mode"]):
 
     @cached_property
     def places(self) -> dict[str, int]:
-        """Every named point, and after which of the blocks it stands (from 0; -1 where the inputs alone say so)."""
+        """Every named point, and after which of the groups it stands (from 0; -1 where the inputs alone say so)."""
         return {name: level for name, (level, _, _) in self._solver.structure.point_locations.first_link.items()}
 
     @cached_property
@@ -308,9 +308,9 @@ class Mode:
 
     number: int | None
     choices: tuple[int, ...]
-    "of every block the number of its assembly, those of the blocks before it given"
+    "of every group the number of its assembly, those of the groups before it given"
     certified: bool
-    "whether of every block this one is proved to be there, alone, for all numbers as the floats they are"
+    "whether of every group this one is proved to be there, alone, for all numbers as the floats they are"
     double: bool
     "whether two assemblies meet here: a dead point"
     z: Array

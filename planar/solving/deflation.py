@@ -83,7 +83,7 @@ def _correct(setup: PreparedMechanism, program: EquationFunctions, y: Array, fre
 
 
 def _minor_block(setup: PreparedMechanism, stage: Block, z: Array, with_earlier: bool) -> LowRankBlock | None:
-    """The low-rank part of a block's constraints, and of those on which it rests if wanted; None where that has full rank."""
+    """The low-rank part of a block's constraints, with those on which it rests if wanted; None of full rank."""
     columns_of = constraint_dependencies(setup.functions)
     stages = [stage]
     columns = _dependent_columns(columns_of, stage)

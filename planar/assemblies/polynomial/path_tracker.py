@@ -55,7 +55,7 @@ class PathEnds(NamedTuple):
 
 HomotopyValues = tuple[Array, Array, Array]
 Homotopy = Callable[[Array, Array], HomotopyValues]
-"""Solutions (paths, 2 many), how far on the way (paths,) -> equations (paths, rows), Jacobian, derivative along it."""
+"""Solutions (paths, 2 many), how far on the way (paths,) -> equations (paths, rows), slope, derivative along it."""
 
 
 class CoefficientHomotopy:
@@ -69,7 +69,7 @@ class CoefficientHomotopy:
         self.rows = 2 * m - 2
 
     def __call__(self, V: Array, way: Array) -> HomotopyValues:
-        """The equations, their Jacobian, and their derivative along the way."""
+        """The equations, their slope, and their derivative along the way."""
         m, products = self.many, self.products
         X, Y = V[:, :m], V[:, m:]
         A, B, a, b = (here + way[:, None, None] * change for here, change in zip(self.begin, self.change, strict=True))
@@ -109,7 +109,7 @@ class ProductHomotopy:
         self.turned = np.exp(1j * rng.uniform(0.0, 2.0 * np.pi))
 
     def __call__(self, V: Array, way: Array) -> HomotopyValues:
-        """The equations, their Jacobian, and their derivative along the way."""
+        """The equations, their slope, and their derivative along the way."""
         m, fixed = self.form.entry_count, 2 * len(self.end.A)
         left, slope, _ = self.whole(V, np.zeros(len(V)))
         one, other = V[:, :m] @ self.l.T, V[:, m:] @ self.r.T
@@ -190,7 +190,7 @@ def _runge_kutta_step(at: Homotopy, V: Array, way: Array, h: Array, ahead: Array
 
 
 def _with_patch_rows(slope: Array, patch: Array) -> Array:
-    """The Jacobian with the two rows that keep X and Y from growing."""
+    """The slope with the two rows that keep X and Y from growing."""
     half = patch.shape[1] // 2
     rows = np.zeros((len(patch), 2, 2 * half), dtype=complex)
     rows[:, 0, :half], rows[:, 1, half:] = patch[:, :half].conj(), patch[:, half:].conj()

@@ -33,8 +33,8 @@ class Assembly(NamedTuple):
 class AssemblySearchFailure(NamedTuple):
     """The block at which every way to assemble ends.
 
-    `z`: the unknowns where it is nearest to closing, those of earlier blocks filled in; `solved_blocks`: how many were solved
-    in search of it.
+    `z`: the unknowns where it is nearest to closing, those of earlier blocks filled in; `solved_blocks`: how many
+    were solved in search of it.
     """
 
     stage: Block

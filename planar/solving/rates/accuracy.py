@@ -81,7 +81,7 @@ def find_accuracy_doubts(
 ) -> AccuracyDoubts | None:
     """Which samples may be less accurate than they look; None where none is. Arguments as of `errors`, see there.
 
-    Jacobian (samples, rows, unknowns), w (samples, coordinates) in sizes.
+    slope (samples, rows, unknowns), w (samples, coordinates) in sizes.
     """
     lost, stages, arms = _error_amplification(setup, jacobian)
     counted = np.maximum(np.abs(w).max(axis=1, initial=0.0) / np.pi, 1.0)
@@ -99,9 +99,9 @@ def find_accuracy_doubts(
 
 
 def _error_amplification(setup: PreparedMechanism, slope: Array) -> tuple[Array, Array, Array]:
-    """By how much round-off is greater in the rates at most, and in which block (samples,); the arm of every unknown.
+    """By how much round-off is greater in the rates at most, and in which group (samples,); the arm of every unknown.
 
-    A place that is rounded by EPS turns a link whose arm is short by EPS / arm, the more where the block is nearly
+    A place that is rounded by EPS turns a link whose arm is short by EPS / arm, the more where the group is nearly
     singular; rates that are made of such angles lose as much once more.
     """
     found, which = np.ones(len(slope)), np.zeros(len(slope), dtype=int)
@@ -142,7 +142,7 @@ def rate_errors(setup: PreparedMechanism, y: Array, y1: Array, y2: Array) -> Rat
     """What round-off makes of y = (z, u) and its rates, each (samples, y), with no more known than doubles hold.
 
     Every number of a row may be wrong by EPS of itself, and the row by what it leaves open. So much is the position
-    wrong by the inverse of the Jacobian (N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., SIAM
+    wrong by the inverse of the slope (N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., SIAM
     2002, sec. 7.2: the componentwise condition), and the rates' rows by what that changes in them.
     """
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # what is not a number is not known
@@ -179,7 +179,7 @@ def _rate_errors(setup: PreparedMechanism, y: Array, y1: Array, y2: Array) -> Ra
 def _reference_rates(setup: PreparedMechanism, slope: Array, y1: Array, y2: Array) -> tuple[Array, Array]:
     """How fast everything in y moves, or would if it did not just come to rest (samples, y), to each order.
 
-    What comes first moves the rows of a block, and a row its unknowns, each by its arm. So a link that turns back is
+    What comes first moves the rows of a group, and a row its unknowns, each by its arm. So a link that turns back is
     judged by what moves it, and one that is slow because all is slow around it by that.
     """
     e = setup.equations

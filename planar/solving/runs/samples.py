@@ -32,7 +32,7 @@ Array = np.ndarray
 
 class RunSamples(NamedTuple):
     """Unknowns at the rows of a run (rows, unknowns), inputs with their rates, the rows that are dead points, rates
-    where the Jacobian is singular, and what was met on the way."""
+    where the slope is singular, and what was met on the way."""
 
     z: Array
     inputs: InputRates
@@ -136,7 +136,7 @@ def build_motion(
     course: FollowedPath,
     time: Array | None = None,
 ) -> Motion:
-    """The motion; raises NoAnswer where the residual check does not let it pass."""
+    """The motion; raises NoAnswer where the gate does not let it pass."""
     told, remarks = run.fast_samples if not with_jerk else None, ()
     if told is not None and told.is_sure.all():
         parts, residual = list(told.coordinate_rates.transpose(1, 0, 2)), told.residual
