@@ -52,7 +52,9 @@ class FullConstraints:
 
     def residuals(self, w: Array) -> Array:
         """What every constraint leaves open (rows,), of w (coordinates, many) of each (rows, many)."""
-        left = [wrapped_residual(value, row.kind) for row, value in self.row_residuals(w)]
+        # a complex step goes by no arc, and needs none
+        stepped = np.iscomplexobj(w)
+        left = [value if stepped else wrapped_residual(value, row.kind) for row, value in self.row_residuals(w)]
         return np.array(np.broadcast_arrays(*left)) if left else np.zeros((0, *w.shape[1:]))
 
     def row_residuals(self, w: Array | Sequence[Scalar]) -> Iterator[tuple[ConstraintRow, Scalar]]:
