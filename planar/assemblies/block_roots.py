@@ -33,15 +33,17 @@ from planar.assemblies.polynomial.path_tracker import (
 from planar.assemblies.solution_curves import SINGULAR_RATIO, STEP_LENGTH, is_on_curve, one_per_curve
 from planar.equations.constraint_equations import Block, ConstraintEquations, slice_length
 from planar.equations.functions import EquationFunctions
+from planar.foundation.angles import distances, wrap_angle
 from planar.foundation.arrays import Array, BoolArray, ComplexArray
-from planar.model.pairs import MeasureKind
 from planar.solving.assembly.block_assemblies import SAME_ASSEMBLY_TOLERANCE, BlockAssemblies, block_residual_function
 from planar.solving.newton import (
     CLOSED_TOLERANCE,
     ResidualFunction,
     damped_newton,
+    one_system,
     polish_root,
     refine_multiple_root,
+    repeat_step,
 )
 from planar.solving.prepared_mechanism import PreparedMechanism
 
@@ -56,7 +58,7 @@ REAL_TOLERANCE = 1e-9
 NEARLY_REAL_TOLERANCE = 0.05
 """One that differs by less is tried on the real equations."""
 DOUBLE_ROOT_TOLERANCE = 3e-7
-"""Least singular value of the real slope, of the greatest, below which two assemblies may meet."""
+"""Least singular value of the real Jacobian, of the greatest, below which two assemblies may meet."""
 CORRECTION_STEPS = 12
 """Steps that put what else moves in its place on a way off along an open direction."""
 DOUBLE_ROOT_RATIO, ROUNDING_SINGULAR_VALUE = 30.0, 1e-9
@@ -277,10 +279,8 @@ class _BlockRootSolver:
         return bool(np.max(np.abs(self.residual_function(root[None])[0]), initial=0.0) <= within)
 
     def _is_same_root(self, one: Array, other: Array, within: float = SAME_ASSEMBLY_TOLERANCE) -> bool:
-        angles = list(self.form.angles)
-        apart = np.abs(one - other)
-        apart[angles] = np.abs(np.exp(1j * one[angles]) - np.exp(1j * other[angles]))
-        return bool(np.all(apart < within))
+        is_angle = np.isin(np.arange(one.size), list(self.form.angles))
+        return bool(np.all(distances(is_angle, one, other) < within))
 
     def _certify_roots(self, found: _ComplexSolutions, real: Array) -> tuple[BoolArray, bool]:
         """Which assemblies are proved, and whether it is proved that there are no others."""
@@ -313,7 +313,7 @@ def _search_from_starts(setup: PreparedMechanism, stage: Block, z: Array, why: s
     isolated, curves = _isolated_and_curves(setup, stage, z, closing)
     real = np.array([*isolated, *curves]).reshape(-1, slice_length(stage.unknowns))
     if not setup.structure.counts:
-        real = np.where(_is_angle(setup, stage), np.arctan2(np.sin(real), np.cos(real)), real)
+        real = np.where(setup.equations.unknown_is_angle[stage.unknowns], wrap_angle(real), real)
     real = np.array(sorted(real, key=_rounded)).reshape(real.shape)
     none = np.zeros(len(real), dtype=bool)
     said = f"searched by starts only: {why}"
@@ -328,13 +328,7 @@ def _isolated_and_curves(
     going = [is_on_curve(closing, each) for each in there]
     on_curves = [each for each, on in zip(there, going, strict=True) if on]
     isolated = [each for each, on in zip(there, going, strict=True) if not on]
-    return isolated, one_per_curve(closing, on_curves, _is_angle(setup, stage))
-
-
-def _is_angle(setup: PreparedMechanism, stage: Block) -> BoolArray:
-    """Which unknowns of a block are angles (unknowns,)."""
-    own = (setup.equations.coordinates[column] for column in setup.equations.unknowns[stage.unknowns])
-    return np.array([each.kind is not MeasureKind.LENGTH for each in own], dtype=bool)
+    return isolated, one_per_curve(closing, on_curves, setup.equations.unknown_is_angle[stage.unknowns])
 
 
 def _linear_root(setup: PreparedMechanism, stage: Block, z: Array, slope: ca.Function, certify: bool) -> BlockRoots:
@@ -358,7 +352,7 @@ def _linear_root(setup: PreparedMechanism, stage: Block, z: Array, slope: ca.Fun
 
 
 def _least_singular_ratio(closing: ResidualFunction, real: Array) -> Array:
-    """The least singular value of a block's slope, of the greatest (roots,): none where a direction is open."""
+    """The least singular value of a block's Jacobian, of the greatest (roots,): none where a direction is open."""
     if not real.size:
         return np.ones(len(real))
     values = np.linalg.svd(closing(real)[1], compute_uv=False)
@@ -375,8 +369,7 @@ def _is_double_root(closing: ResidualFunction, real: Array) -> BoolArray:
         slope = closing(real[k][None])[1][0]
         values, way = np.linalg.svd(slope)[1:]
         others, off = np.linalg.pinv(slope, rcond=SINGULAR_RATIO), real[k] + STEP_LENGTH * way[-1]
-        for _ in range(CORRECTION_STEPS):  # the other directions only
-            off = off - others @ closing(off[None])[0][0]
+        off = repeat_step(one_system(closing), others, off, CORRECTION_STEPS)  # in the other directions only
         weakest = _least_singular_ratio(closing, off[None])[0]
         double[k] = weakest > DOUBLE_ROOT_RATIO * max(values[-1] / values[0], ROUNDING_SINGULAR_VALUE)
     return double

@@ -30,7 +30,7 @@ LARGE_CONFLICT = 8
 MAX_MOVING_LINKS = 12
 """Moving links among which a conflict is looked for."""
 MAX_SEED_PAIRS = 6
-"""Pairs of the group that stays open about which a smallest set is looked for."""
+"""Pairs of the block that stays open about which a smallest set is looked for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +137,7 @@ def conflict(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive]
 
 
 def _member_orders(joining: JointFeasibility, failure: AssemblySearchFailure) -> list[list[Requirement]]:
-    """All members in several orders: from some pair of the group that stays open, those next to it first."""
+    """All members in several orders: from some pair of the block that stays open, those next to it first."""
     mechanism = joining.setup.mechanism
     entry_of = {pair.name: pair.entry_name() for pair in mechanism.pairs}
     orders = []

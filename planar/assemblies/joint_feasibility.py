@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.foundation.angles import wrap_angle
 from planar.foundation.arrays import Array
 from planar.model.mechanism import pair_entries
 from planar.model.pairs import MeasureKind, Pair
@@ -164,5 +165,5 @@ class _PartialConstraints:
             return gaps
         drives = self.constraints.relative_positions(self.drives, w) - self.drive_positions
         if not np.iscomplexobj(drives):
-            drives[self.is_angle] = np.arctan2(np.sin(drives[self.is_angle]), np.cos(drives[self.is_angle]))
+            drives[self.is_angle] = wrap_angle(drives[self.is_angle])
         return np.concatenate([gaps, drives])

@@ -10,10 +10,11 @@ import numpy as np
 from planar.assemblies.polynomial.completeness import BlockRoots, Completeness
 from planar.equations.constraint_equations import Block, slice_length
 from planar.equations.functions import POLISHING_STEPS
+from planar.foundation.angles import distances
 from planar.foundation.arrays import Array
 from planar.model.pairs import MeasureKind
 from planar.solving.assembly.block_assemblies import MEETING_COSINE_SQUARED, block_dependencies
-from planar.solving.newton import CLOSED_TOLERANCE
+from planar.solving.newton import CLOSED_TOLERANCE, repeat_step
 from planar.solving.prepared_mechanism import PreparedMechanism
 
 BEST_TO_WORST = (Completeness.PROVED, Completeness.NUMERICALLY, Completeness.NOT)
@@ -21,9 +22,9 @@ BEST_TO_WORST = (Completeness.PROVED, Completeness.NUMERICALLY, Completeness.NOT
 SAME_ROOT_DISTANCE, SAME_DOUBLE_ROOT_DISTANCE = 1e-6, 1e-4
 """How near to a root unknowns are that root, and one where two meet, which rounding puts farther off."""
 REGULAR_SINGULAR_VALUE = 1e-9
-"""A linear block whose slope is weaker than this part of itself has no single assembly."""
+"""A linear block whose Jacobian is weaker than this part of itself has no single assembly."""
 JACOBIAN_ROUNDING = 1e-12
-"""What is rounding in a slope."""
+"""What is rounding in a Jacobian."""
 
 
 class AssemblyPath(NamedTuple):
@@ -149,10 +150,8 @@ class AssemblyTree:
             found = self.roots(index, z)
             if not len(found.real):
                 return None
-            own = [self.setup.equations.coordinates[column] for column in self.setup.equations.unknowns[stage.unknowns]]
-            angles = np.array([c.kind is not MeasureKind.LENGTH for c in own], dtype=bool)
-            gaps = found.real - target[stage.unknowns]
-            gaps = np.where(angles, np.abs(np.exp(1j * gaps) - 1.0), np.abs(gaps)).max(axis=1, initial=0.0)
+            is_angle = self.setup.equations.unknown_is_angle[stage.unknowns]
+            gaps = distances(is_angle, found.real, target[stage.unknowns]).max(axis=1, initial=0.0)
             rank = int(np.argmin(gaps))
             if gaps[rank] > (SAME_DOUBLE_ROOT_DISTANCE if found.double[rank] else SAME_ROOT_DISTANCE):
                 return None
@@ -240,7 +239,7 @@ def _in_known_order(known: BlockRoots, found: BlockRoots) -> BlockRoots:
     """What has been found and certified, in the order of what was known before, which stays as the block moves."""
     if len(known.real) != len(found.real) or found.complete is Completeness.NOT:
         return known
-    gaps = np.abs(np.exp(1j * known.real[:, None, :]) - np.exp(1j * found.real[None, :, :])).sum(axis=2)
+    gaps = distances(np.array(True), known.real[:, None, :], found.real[None, :, :]).sum(axis=2)
     order = gaps.argmin(axis=1) if len(known.real) else np.zeros(0, dtype=int)
     if sorted(order) != list(range(len(order))):
         return known
@@ -254,7 +253,7 @@ def _uncertified_roots(real: Array, expected: int, said: str) -> BlockRoots:
 
 
 def is_linear(setup: PreparedMechanism, stage: Block, z: Array) -> bool:
-    """Whether the slope of a block does not depend on its own unknowns, those before it given in z (unknowns,)."""
+    """Whether the Jacobian of a block does not depend on its own unknowns, those before it given in z (unknowns,)."""
     rng, closing, many = np.random.default_rng(0), _residual_function(setup, stage, z), slice_length(stage.unknowns)
     slope = closing(np.zeros(many))[1]
     others = (closing(rng.uniform(0.5, 2.0, many))[1] for _ in range(2))
@@ -262,7 +261,7 @@ def is_linear(setup: PreparedMechanism, stage: Block, z: Array) -> bool:
 
 
 def _residual_function(setup: PreparedMechanism, stage: Block, z: Array) -> Callable[[Array], tuple[Array, Array]]:
-    """What a block leaves open (rows,) and its slope (rows, unknowns) at its own unknowns."""
+    """What a block leaves open (rows,) and its Jacobian (rows, unknowns) at its own unknowns."""
 
     def closing(own: Array) -> tuple[Array, Array]:
         whole = z.copy()
@@ -281,18 +280,16 @@ def _linear_roots(setup: PreparedMechanism, stage: Block, z: Array) -> BlockRoot
         return None
 
     closing = _residual_function(setup, stage, z)
-    at = np.zeros(many)
-    left, slope = closing(at)
+    at: Array = np.zeros(many)
+    slope = closing(at)[1]
     if not is_linear(setup, stage, z):
         return None
     values = np.linalg.svd(slope, compute_uv=False)
     turns = any(row.kind is MeasureKind.ANGLE for row in rows) and abs(abs(slope[0, 0]) - 1.0) > JACOBIAN_ROUNDING
     if values[-1] < REGULAR_SINGULAR_VALUE * max(1.0, values[0]) or turns:
         return None
-    for _ in range(POLISHING_STEPS):
-        at = at - np.linalg.solve(slope, left)
-        left, _ = closing(at)
-    if np.abs(left).max() > CLOSED_TOLERANCE:
+    at = repeat_step(closing, np.linalg.inv(slope), at, POLISHING_STEPS)
+    if np.abs(closing(at)[0]).max() > CLOSED_TOLERANCE:
         return None
     return _uncertified_roots(at[None], 1, "its equations are linear")
 

@@ -21,7 +21,7 @@ SAME_POINT_TOLERANCE = 1e-6
 """Places of points are the same within this part of the greatest coordinate."""
 
 MAX_SOLVED_FOR_REMARK = 32
-"""Dyads, or larger groups by what they take, that are solved with every position for the sake of a remark."""
+"""Dyads, or larger blocks by what they take, that are solved with every position for the sake of a remark."""
 
 
 def with_assembly_number(mechanism: Mechanism) -> Mechanism:

@@ -6,14 +6,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from planar.foundation.angles import distances
 from planar.foundation.arrays import Array, BoolArray
-from planar.solving.newton import CLOSED_TOLERANCE, ResidualFunction, correct, damped_newton, one_system, shortest_step
+from planar.solving.continuation.predictor_corrector import next_point
+from planar.solving.continuation.solution_curve import ImplicitCurve
+from planar.solving.newton import ResidualFunction, damped_newton, one_system
 
 SINGULAR_RATIO = 1e-5
 """Least singular value, of the greatest, below which a direction may be open."""
 STEP_LENGTH = 0.05
 """How far along the direction that is open a curve of assemblies is looked for (rad, sizes)."""
-MAX_CORRECTIONS = 8
 MAX_CURVE_LENGTH = 20.0
 """How far a curve is followed each way (rad, sizes): eight links that turn right round together are shorter."""
 
@@ -46,34 +48,28 @@ def one_per_curve(closing: ResidualFunction, roots: Sequence[Array], angles: Boo
         if len(values) > 1 and values[-2] < SINGULAR_RATIO * values[0]:
             return kept
         curve = np.array(_follow_curve(closing, kept[-1], angles))
-        left = [each for each in left if _distances(curve, each, angles).min() > STEP_LENGTH]
+        left = [each for each in left if _distance(curve, each, angles).min() > STEP_LENGTH]
     return kept
 
 
 def _follow_curve(closing: ResidualFunction, start: Array, angles: BoolArray) -> list[Array]:
-    """Places along a curve a step of ALONG from each other, right round or so far both ways."""
-    way = np.linalg.svd(closing(start[None])[1][0])[2][-1]
+    """Places along a curve no more than STEP_LENGTH from each other, right round or so far both ways."""
+    curve = ImplicitCurve(one_system(closing))
+    direction = np.linalg.svd(curve.jacobian(start))[2][-1]
     found = [start]
-    for first in (way, -way):
-        here, forward = start, first
-        for count in range(round(MAX_CURVE_LENGTH / STEP_LENGTH)):
-            ahead = _correct(closing, here + STEP_LENGTH * forward)
-            if ahead is None or not 0.5 * STEP_LENGTH < np.linalg.norm(ahead - here) < 1.5 * STEP_LENGTH:
+    for first in (direction, -direction):
+        here, length = curve.point_at(start, first), 0.0
+        while length < MAX_CURVE_LENGTH:
+            after, step = next_point(curve, here, STEP_LENGTH)
+            if after is None:
                 break
-            found.append(ahead)
-            forward, here = (ahead - here) / np.linalg.norm(ahead - here), ahead
-            if count > 1 and _distances(here[None], start, angles)[0] < STEP_LENGTH:
+            found.append(after.y)
+            here, length = after, length + step
+            if length > 2.0 * STEP_LENGTH and _distance(here.y[None], start, angles)[0] < STEP_LENGTH:
                 return found
     return found
 
 
-def _correct(closing: ResidualFunction, tried: Array) -> Array | None:
-    """The place of a curve beside one that is tried."""
-    found, gap = correct(one_system(closing), shortest_step(SINGULAR_RATIO), tried, MAX_CORRECTIONS)
-    return found if gap <= CLOSED_TOLERANCE else None
-
-
-def _distances(curve: Array, place: Array, angles: BoolArray) -> Array:
-    """How far the places of a curve (places, unknowns) are from another one."""
-    gaps = np.where(angles, np.abs(np.exp(1j * curve) - np.exp(1j * place)), np.abs(curve - place))
-    return np.linalg.norm(gaps, axis=1)
+def _distance(curve: Array, point: Array, angles: BoolArray) -> Array:
+    """How far the points of a curve (points, unknowns) are from another one."""
+    return np.linalg.norm(distances(angles, curve, point), axis=1)

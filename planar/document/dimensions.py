@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass, replace
+from functools import cache
 from math import isfinite
 from numbers import Real
 from typing import Any, NamedTuple
@@ -219,7 +220,7 @@ def _every_dimension(mechanism: Mechanism) -> Iterator[Dimension]:
         yield from _written_numbers(["sketch", point], [_mark(x, "length"), _mark(y, "length")])
 
 
-def _link_dimensions(mechanism: Mechanism, index: int) -> Iterator[Dimension]:
+def _link_dimensions(mechanism: Mechanism, index: int) -> list[Dimension]:
     link = mechanism.links[index]
     written = write_link(_tagged(link, ("links", index)), _mark)
     return _written_numbers(["links", link.name], written, link.name, link=link.name)
@@ -262,6 +263,7 @@ def _load_dimensions(mechanism: Mechanism) -> Iterator[Dimension]:
 class _Tagged(float):
     """A number that knows where it is from, and is like no other, so that no writer leaves it out as a default."""
 
+    __slots__ = ("address",)
     address: Address
 
     def __eq__(self, other: object) -> bool:
@@ -288,46 +290,51 @@ def _mark(value: float, kind: str) -> Any:
 
 def _tagged(data: Any, address: Address) -> Any:
     """The same data, its numbers tagged with their places."""
-    if data is None or isinstance(data, str | bool):
+    kind = type(data)
+    if data is None or kind is str or kind is bool:
         return data
     if isinstance(data, tuple):
-        names: Iterable[str | int] = getattr(data, "_fields", range(len(data)))
-        items = [_tagged(each, (*address, name)) for name, each in zip(names, data, strict=True)]
-        make: Callable[[Iterable[Any]], Any] = getattr(type(data), "_make", tuple)
-        return make(items)
-    if isinstance(data, float | Real):
+        names: Iterable[str | int] = getattr(kind, "_fields", range(len(data)))
+        make: Callable[[Iterable[Any]], Any] = getattr(kind, "_make", tuple)
+        return make([_tagged(each, (*address, name)) for name, each in zip(names, data, strict=True)])
+    if isinstance(data, Real):
         found = _Tagged(data)
         found.address = address
         return found
-    if is_dataclass(data) and not isinstance(data, type):
-        return replace(
-            data, **{f.name: _tagged(getattr(data, f.name), (*address, f.name)) for f in fields(data) if f.init}
-        )
+    if is_dataclass(kind):
+        return replace(data, **{name: _tagged(getattr(data, name), (*address, name)) for name in _own_fields(kind)})
     return data
+
+
+@cache
+def _own_fields(kind: type) -> tuple[str, ...]:
+    """The names of what a dataclass is made of."""
+    return tuple(each.name for each in fields(kind) if each.init)
 
 
 def _written_numbers(
     start: list[str | int], written: Any, own: str | None = None, link: str = "", lists: frozenset[str] = frozenset()
-) -> Iterator[Dimension]:
+) -> list[Dimension]:
     """The marked numbers of what is written at a place of the file.
 
     `own` is how their names begin, else as the place; `lists` are keys whose numbers are counted, else x and y.
     """
-    prefix = [own] if own is not None else [str(each) for each in start]
+    found: list[Dimension] = []
 
-    def walk(value: Any, path: list[str | int], spelled: list[str]) -> Iterator[Dimension]:
+    def walk(value: Any, path: Address, name: str) -> None:
         if isinstance(value, _Mark):
-            yield Dimension(".".join(spelled), float(value.number), value.kind, link, tuple(path), value.number.address)
+            found.append(Dimension(name, float(value.number), value.kind, link, path, value.number.address))
         elif isinstance(value, dict):
             for key, each in value.items():
                 said = SPELLINGS.get((path[0], len(path), key), key)
-                yield from walk(each, [*path, key], [*spelled, *([said] if said else [])])
+                walk(each, (*path, key), f"{name}.{said}" if said else name)
         elif isinstance(value, list):
             counted = path[-1] in lists or len(value) != 2 or not isinstance(value[0], _Mark)
             for index, each in enumerate(value):
-                yield from walk(each, [*path, index], [*spelled, str(index) if counted else "xy"[index]])
+                walk(each, (*path, index), f"{name}.{index if counted else 'xy'[index]}")
 
-    return walk(written, start, prefix)
+    walk(written, tuple(start), own if own is not None else ".".join(map(str, start)))
+    return found
 
 
 def _value_at(data: Any, address: Address) -> Any:

@@ -202,7 +202,7 @@ class LagrangianFunctions:
         square = ca.dot(apart, apart)
         away = ca.sqrt(square)
         met = square <= (COINCIDENCE_TOLERANCE * self.size) ** 2
-        known = ca.if_else(met, np.nan, 1.0)  # as a factor, so that slopes have it too
+        known = ca.if_else(met, np.nan, 1.0)  # as a factor, so that Jacobians have it too
         stored = 0.5 * spring.stiffness * ((away - spring.free) ** 2 * known if spring.free else square)
         taken = ca.SX(0.0)
         if spring.damping:

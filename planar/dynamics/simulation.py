@@ -327,9 +327,7 @@ class _SimulationRun:
         inputs = {}
         for given in self.mechanism.inputs:
             pair = self.work.relative_motions[given.pair]
-            numbers = pair.measure([self.work.shapes[link] for link in pair.bodies])
-            drive = pair.input_position([frames[link] for link in pair.bodies], numbers, own.get(pair.name, ()))
-            inputs[given.pair] = InputMotion(*drive.parts[:3])
+            inputs[given.pair] = InputMotion(*pair.input_position_at(self.work.shapes, frames, own).parts[:3])
         motion = Motion(
             mechanism=self.mechanism,
             inputs=inputs,

@@ -10,7 +10,7 @@ import casadi as ca
 
 
 class BlockIndices(NamedTuple):
-    """Constraints and coordinates that are solved together: `rows` close them, given all earlier groups.
+    """Constraints and coordinates that are solved together: `rows` close them, given all earlier blocks.
 
     More rows than columns: some are redundant or in conflict. `free`: the constraints leave the columns free.
     """
@@ -21,12 +21,12 @@ class BlockIndices(NamedTuple):
 
 
 def decompose_blocks(rows: Sequence[AbstractSet[int]], columns: int) -> tuple[BlockIndices, ...]:
-    """Split constraints into groups, in an order in which they can be solved.
+    """Split constraints into blocks, in an order in which they can be solved.
 
     `rows[i]` holds the columns (coordinates) on which constraint i depends. Dulmage and Mendelsohn: a maximum matching
     parts the whole into an over-, a well- and an under-determined part, and the strong components of the matched
-    columns are the smallest groups (A. Pothen, C.-J. Fan, ACM Trans. Math. Softw. 16, 1990; both steps as in
-    T. Davis' CSparse, which casadi carries). What a constraint left unmatched reaches stays one group, with more rows
+    columns are the smallest blocks (A. Pothen, C.-J. Fan, ACM Trans. Math. Softw. 16, 1990; both steps as in
+    T. Davis' CSparse, which casadi carries). What a constraint left unmatched reaches stays one block, with more rows
     than columns, and comes first; columns left unmatched come last, and what rests on them is free.
     """
     row_of = _maximum_matching(rows, columns)

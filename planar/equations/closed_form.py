@@ -28,11 +28,11 @@ SAMPLE_POINTS = 3
 
 
 class ClosedForm(NamedTuple):
-    """One group in closed form, as expressions in the symbols of its equations and in `sign`.
+    """One block in closed form, as expressions in the symbols of its equations and in `sign`.
 
-    `found`: for each unknown the cos and sin of an angle, or a length alone, given those of earlier groups; `sign`: +1
+    `found`: for each unknown the cos and sin of an angle, or a length alone, given those of earlier blocks; `sign`: +1
     or -1, which of the two assemblies; `side`: an expression in all unknowns that has this sign; `bend`: 0 to 1, where
-    both assemblies meet, beyond it there is none: the squared cosine of the angle between what holds the group.
+    both assemblies meet, beyond it there is none: the squared cosine of the angle between what holds the block.
     """
 
     values: tuple[tuple[ca.SX, ...], ...]
@@ -77,7 +77,7 @@ class _ComplexNumber(NamedTuple):
 
 
 def find_closed_form(e: ConstraintEquations, stage: Block) -> ClosedForm | None:
-    """The closed form of a group; None where it has none of the three forms."""
+    """The closed form of a block; None where it has none of the three forms."""
     if stage.is_free or stage.rows.stop - stage.rows.start != 2 or stage.unknowns.stop - stage.unknowns.start != 2:
         return None
     angles = [e.coordinates[column].kind is MeasureKind.ANGLE for column in e.unknowns[stage.unknowns]]

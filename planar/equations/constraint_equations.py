@@ -30,7 +30,7 @@ from planar.model.pairs import MeasureKind
 
 
 class Block(NamedTuple):
-    """A group after elimination: which entries of z and of F it has, and the links and pairs that it is about."""
+    """A block after elimination: which entries of z and of F it has, and the links and pairs that it is about."""
 
     unknowns: slice
     rows: slice
@@ -54,7 +54,7 @@ class ConstraintEquations:
     rows: tuple[ConstraintRow, ...]
     blocks: tuple[Block, ...]
     known_after_block: tuple[int, ...]
-    """For every coordinate the stage after which it is known; -1 for one that follows from the inputs alone."""
+    """For every coordinate the block after which it is known; -1 for one that follows from the inputs alone."""
     z: ca.SX
     u: ca.SX
     p: ca.SX
@@ -62,6 +62,11 @@ class ConstraintEquations:
     F: ca.SX
     input_kinds: tuple[MeasureKind, ...]
     """What every entry of u is."""
+
+    @cached_property
+    def unknown_is_angle(self) -> np.ndarray:
+        """Which unknowns are angles (unknowns,)."""
+        return np.array([self.coordinates[column].kind is not MeasureKind.LENGTH for column in self.unknowns], bool)
 
     @cached_property
     def y(self) -> ca.SX:
@@ -180,8 +185,8 @@ def _split_into_blocks(mechanism: Mechanism, equations: ConstraintEquations) -> 
 def _drop_idle_unknowns(equations: ConstraintEquations) -> tuple[ca.SX, list[set[int]]]:
     """F and w, one below the other, with no unknown in an entry that does not move it; and those that move each.
 
-    What cancels in a sum shows in numbers only: an entry of the slope that vanishes at random places is none. Left
-    standing it would have a group, or a link, wait for unknowns that are solved after it.
+    What cancels in a sum shows in numbers only: an entry of the Jacobian that vanishes at random places is none. Left
+    standing it would have a block, or a link, wait for unknowns that are solved after it.
     """
     both = ca.vertcat(equations.F, equations.w)
     touched = _unknowns_in(both, equations.z)

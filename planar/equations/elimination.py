@@ -88,9 +88,9 @@ def split_constant_factors(closures: Sequence[ca.SX], symbols: CoordinateSymbols
 def eliminate(
     rows: Sequence[int], columns: Sequence[int], constraints: Sequence[EliminationRow], solved: EliminationSteps
 ) -> tuple[list[int], list[int]]:
-    """Solve constraints of a group for one coordinate each, the shortest first; `solved` grows by them.
+    """Solve constraints of a block for one coordinate each, the shortest first; `solved` grows by them.
 
-    Returns the rows and columns of the group that remain.
+    Returns the rows and columns of the block that remain.
     """
     remaining_rows, remaining = list(rows), set(columns)
     while True:

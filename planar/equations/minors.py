@@ -39,7 +39,7 @@ def constraint_dependencies(program: EquationFunctions) -> tuple[frozenset[int],
 
 
 def add_minors(program: EquationFunctions, blocks: Mapping[int, LowRankBlock]) -> EquationFunctions:
-    """The program whose groups have the minors of their blocks as constraints too."""
+    """The functions whose blocks have the minors of their low-rank parts as constraints too."""
     e = program.equations
     slope = e.jacobian
     rows: list[ConstraintRow] = []
@@ -57,7 +57,7 @@ def add_minors(program: EquationFunctions, blocks: Mapping[int, LowRankBlock]) -
 
 
 def _minors(slope: ca.SX, block: LowRankBlock) -> Iterator[ca.SX]:
-    """As many minors, one larger than the rank, as tell where the slope keeps it: of mixed rows and columns, so that
+    """As many minors, one larger than the rank, as tell where the Jacobian keeps it: of mixed rows and columns, so that
     none is special."""
     part = ca.densify(slope[list(block.rows), list(block.columns)]) / ca.DM(
         np.outer(block.row_scales, block.column_scales)

@@ -12,8 +12,9 @@ from typing import NamedTuple
 
 import casadi as ca
 
+from planar.foundation.angles import wrap_angle
 from planar.foundation.geometry import Frame
-from planar.foundation.jets import Scalar, atan2, cos, sin
+from planar.foundation.jets import Scalar, cos, sin
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import MeasureKind, Pair
 
@@ -92,4 +93,4 @@ def closing_error(residual: Scalar, kind: MeasureKind) -> Scalar:
 
 def wrapped_residual(residual: Scalar, kind: MeasureKind) -> Scalar:
     """A residual with its sign: an angle that closes modulo a turn between half a turn and minus that."""
-    return atan2(sin(residual), cos(residual)) if kind is MeasureKind.ANGLE else residual
+    return wrap_angle(residual) if kind is MeasureKind.ANGLE else residual

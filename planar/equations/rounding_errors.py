@@ -23,9 +23,9 @@ class RoundingTerms(NamedTuple):
     jacobian: Array
     "by y = (z, u), (samples, rows and coordinates, y)"
     first_rate_jacobian: Array
-    "the slope of the first rates, alike"
+    "the Jacobian of the first rates, alike"
     second_rate_jacobian: Array
-    "the slope of the second rates"
+    "the Jacobian of the second rates"
 
 
 def rounding_terms(equations: ConstraintEquations, y: Array, y1: Array, y2: Array, p: Array) -> RoundingTerms:

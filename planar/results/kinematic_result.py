@@ -21,11 +21,11 @@ from planar.results.records import (
     InputMotion,
     InputState,
     RelativeState,
+    principal_angle,
     principal_turns,
     rotate_quarter_turn,
     stack_vectors,
     vector_and_rates,
-    wrap_angle,
 )
 
 
@@ -73,7 +73,7 @@ class KinematicResult(Displayable):
         if name in self.inputs:
             started = float(np.ravel(self.inputs[name].position)[0])
             return 2.0 * np.pi * round((started - position) / (2.0 * np.pi))
-        return wrap_angle(position) - position
+        return principal_angle(position) - position
 
     def _turns_of_limit(self, name: str, positions: Array) -> float:
         """The whole turns (rad) by which the angle at a pair is told off these of its unknown; of a length 0."""
@@ -101,9 +101,7 @@ class KinematicResult(Displayable):
         if name not in self._relative_motions:
             raise Unknown(f"there is no pair {name!r}; pairs are {join_names(self._relative_motions)}")
         pair = self._relative_motions[name]
-        numbers = pair.measure([self.shapes[link] for link in pair.bodies])
-        frames = [self.frames[link] for link in pair.bodies]
-        return pair, value_and_rates(pair.input_position(frames, numbers, self.own.get(pair.name, ())))
+        return pair, value_and_rates(pair.input_position_at(self.shapes, self.frames, self.own))
 
     def relative(self, point: str, other: str, axes: str | None = None) -> RelativeState:
         """How `point` moves against `other`, in the axes of a link.

@@ -27,11 +27,11 @@ from planar.results.records import (
     PointMotion,
     PointState,
     ThirdRates,
+    principal_angle,
     scales,
     stack_vectors,
     third_rate,
     vector_and_rates,
-    wrap_angle,
 )
 
 
@@ -91,7 +91,7 @@ class State(KinematicResult):
         fastest, hardest = self.scales_of_links
         sense = _describe_sense(turning_sense(velocity, fastest), velocity * acceleration, abs(velocity) * hardest)
         return LinkState(
-            angle if name in self._links_counting_turns else wrap_angle(angle), velocity, acceleration, sense
+            angle if name in self._links_counting_turns else principal_angle(angle), velocity, acceleration, sense
         )
 
     def pair(self, name: str) -> dict[str, float | None]:
@@ -255,7 +255,7 @@ class Motion(KinematicResult):
         """A link by name. Its angle starts between -pi and pi unless a pair counts its turns. Raises Unknown."""
         angle, velocity, acceleration = self._broadcast_rows(value_and_rates(self._frame(name).angle))
         if name not in self._links_counting_turns:
-            angle = angle - (angle[0] - wrap_angle(float(angle[0])))
+            angle = angle - (angle[0] - principal_angle(float(angle[0])))
         return LinkMotion(angle, velocity, acceleration)
 
     def jerk(self, point: str) -> Array:

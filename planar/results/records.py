@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from planar.foundation.angles import wrap_angle
 from planar.foundation.arrays import Array
 from planar.foundation.geometry import Frame, Vector
 from planar.foundation.jets import Jet, value_and_rates
@@ -147,9 +148,9 @@ HALF_TURN_TOLERANCE = 1e-9
 """rad: an angle so little beyond half a turn is told as half a turn."""
 
 
-def wrap_angle(angle: float) -> float:
-    """The same direction as an angle between -pi and pi."""
-    return float(np.arctan2(np.sin(angle), np.cos(angle))) if abs(angle) > np.pi else angle
+def principal_angle(angle: float) -> float:
+    """The same direction as an angle between -pi and pi; one that is there already to the last bit."""
+    return wrap_angle(float(angle)) if abs(angle) > np.pi else angle
 
 
 def principal_turns(angles: Array) -> float:
@@ -158,7 +159,7 @@ def principal_turns(angles: Array) -> float:
     Of such as turn right round it is the first that lies there.
     """
     first = float(angles[0] if np.ptp(angles) >= 2.0 * np.pi else np.min(angles))
-    return 0.0 if abs(first) <= np.pi + HALF_TURN_TOLERANCE else wrap_angle(first) - first
+    return 0.0 if abs(first) <= np.pi + HALF_TURN_TOLERANCE else principal_angle(first) - first
 
 
 def third_rate(value: Any) -> Any:

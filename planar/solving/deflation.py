@@ -31,7 +31,7 @@ MAX_CORRECTIONS, CLOSED_TOLERANCE = 12, 1e-10
 
 
 def deflate(setup: PreparedMechanism, weak: Sequence[Block], z: Array) -> tuple[EquationFunctions, Array] | None:
-    """The program in which groups that are singular at z, and all along the motion, have the minors that vanish there
+    """The program in which blocks that are singular at z, and all along the motion, have the minors that vanish there
     as constraints too; and z by it. None where they are singular in this position alone, or something is free.
     """
     y = np.concatenate([z, setup.inputs.u])
@@ -82,7 +82,7 @@ def _correct(setup: PreparedMechanism, program: EquationFunctions, y: Array, fre
 
 
 def _minor_block(setup: PreparedMechanism, stage: Block, z: Array, with_earlier: bool) -> LowRankBlock | None:
-    """The block of a group's constraints, and of those on which it rests if wanted; None where that has full rank."""
+    """The low-rank part of a block's constraints, with those on which it rests if wanted; None of full rank."""
     columns_of = constraint_dependencies(setup.functions)
     stages = [stage]
     columns = _dependent_columns(columns_of, stage)
@@ -103,5 +103,5 @@ def _minor_block(setup: PreparedMechanism, stage: Block, z: Array, with_earlier:
 
 
 def _dependent_columns(columns_of: Sequence[frozenset[int]], stage: Block) -> set[int]:
-    """The columns that a group's constraints depend on."""
+    """The columns that a block's constraints depend on."""
     return set().union(*columns_of[stage.rows])

@@ -18,7 +18,7 @@ from planar.foundation.geometry import Frame
 from planar.foundation.jets import Scalar
 from planar.model.pairs import Pair
 from planar.solving.assembly.sketch_start import sketch_coordinates
-from planar.solving.checks.singular_values import null_space, rank
+from planar.solving.checks.singular_values import null_space
 from planar.solving.newton import damped_newton
 from planar.solving.prepared_mechanism import PreparedMechanism
 
@@ -63,7 +63,7 @@ class FullConstraints:
 
     def jacobian(self, w: Array) -> Array:
         """(rows, coordinates)"""
-        return np.imag(self.residuals(self._complex_steps(w))) / COMPLEX_STEP
+        return self._residuals_and_jacobian(w, (), np.zeros(0))[1]
 
     def relative_positions(self, names: tuple[str, ...], w: Array) -> Array:
         """The drives of these relative motions (names,)."""
@@ -71,36 +71,48 @@ class FullConstraints:
 
     def relative_jacobian(self, names: tuple[str, ...], w: Array) -> Array:
         """(names, coordinates)"""
-        nudged = self._complex_steps(w)
-        rows = [np.broadcast_to(np.imag(drive), (w.size,)) for drive in self._relative_positions(names, nudged)]
-        return np.array(rows).reshape(len(names), w.size) / COMPLEX_STEP
+        return _derivatives(self._relative_positions(names, _complex_steps(w)), w.size)[1]
 
     def _relative_positions(self, names: tuple[str, ...], w: Array) -> list[Array]:
         frames, own = self._frames_and_own(w)
         return input_positions([self.setup.relative_motions[name] for name in names], frames, self._numbers, own)
-
-    def _complex_steps(self, w: Array) -> Array:
-        return np.repeat(w[:, None].astype(complex), w.size, axis=1) + 1j * COMPLEX_STEP * np.eye(w.size)
 
     def _frames_and_own(self, w: Array | Sequence[Scalar]) -> tuple[dict[str, Frame], dict[str, tuple[Scalar, ...]]]:
         return frames_from_coordinates(w, self.setup.column, self.setup.shapes, self.setup.pairs)
 
     def correct(self, w: Array, held: tuple[str, ...] = (), positions: Array | None = None) -> Array | None:
         """The nearest closed position by Gauss and Newton's method, some drives held; None where there is none."""
+        wanted = np.zeros(len(held)) if positions is None else positions
 
         def here(starts: Array) -> tuple[Array, Array]:
-            left, slope = zip(*(self._residuals_and_jacobian(each, held, positions) for each in starts), strict=True)
+            left, slope = zip(*(self._residuals_and_jacobian(each, held, wanted) for each in starts), strict=True)
             return np.array(left), np.array(slope)
 
         found = damped_newton(here, w[None], CLOSED_TOLERANCE, NEAR_DAMPING)
         return found.unknowns[0] if found.converged[0] else None
 
-    def _residuals_and_jacobian(self, w: Array, drives: tuple[str, ...], at: Array | None) -> tuple[Array, Array]:
-        left, slope = self.residuals(w), self.jacobian(w)
-        if drives and at is not None:
-            left = np.concatenate([left, self.relative_positions(drives, w) - at])
-            slope = np.vstack([slope, self.relative_jacobian(drives, w)])
-        return left, slope
+    def _residuals_and_jacobian(self, w: Array, held: tuple[str, ...], positions: Array) -> tuple[Array, Array]:
+        """Residuals (rows,) and Jacobian (rows, coordinates) of the pairs, then of relative motions that are held."""
+        frames, own = self._frames_and_own(_complex_steps(w))
+        motions = [self.setup.relative_motions[name] for name in held]
+        rows = list(pair_residuals(self.pairs, frames, self._numbers, own))
+        reached = input_positions(motions, frames, self._numbers, own)
+        values, jacobian = _derivatives([*(value for _, value in rows), *reached], w.size)
+        pairs = [wrapped_residual(value, row.kind) for (row, _), value in zip(rows, values, strict=False)]
+        return np.concatenate([pairs, values[len(rows) :] - positions]), jacobian
+
+
+def _complex_steps(w: Array) -> Array:
+    """w with a step in one coordinate in each column (coordinates, coordinates)."""
+    return w[:, None] + 1j * COMPLEX_STEP * np.eye(w.size)
+
+
+def _derivatives(values: Sequence[Array], columns: int) -> tuple[Array, Array]:
+    """Values (rows,) and their derivatives (rows, columns), of what complex steps have made of them."""
+    stepped = np.empty((len(values), columns), dtype=complex)
+    for row, value in zip(stepped, values, strict=True):
+        row[:] = value
+    return stepped[:, :1].real.sum(axis=1), stepped.imag / COMPLEX_STEP
 
 
 def random_step(free: Array, rng: np.random.Generator, length: float) -> Array:
@@ -131,7 +143,8 @@ def motion_dimension(constraints: FullConstraints, w: Array) -> tuple[int, Array
         rng = np.random.default_rng(seed)
         away = constraints.correct(w + random_step(free, rng, PROBE_DISTANCE))
         if away is not None:
-            ways, holds = _spread_dimension(constraints, away, rng), rank(constraints.jacobian(away))
+            free_there = null_space(constraints.jacobian(away))
+            ways, holds = _spread_dimension(constraints, away, free_there, rng), w.size - free_there.shape[1]
             # of places that move alike the one where nothing is singular: some fall back beside w
             if (ways, holds) > (found, held):
                 found, place, held = ways, away, holds
@@ -140,9 +153,8 @@ def motion_dimension(constraints: FullConstraints, w: Array) -> tuple[int, Array
     return found, place
 
 
-def _spread_dimension(constraints: FullConstraints, w: Array, rng: np.random.Generator) -> int:
-    """In how many directions the closed positions next to one spread."""
-    free = null_space(constraints.jacobian(w))
+def _spread_dimension(constraints: FullConstraints, w: Array, free: Array, rng: np.random.Generator) -> int:
+    """In how many directions the closed positions next to one spread, of those that are `free` to first order."""
     many = 2 * free.shape[1] + 2
     moves = []
     for _ in range(many if free.size else 0):

@@ -14,10 +14,11 @@ import numpy as np
 from planar.equations.casadi_call import BufferedFunction
 from planar.equations.constraint_equations import slice_length
 from planar.equations.functions import EquationFunctions
+from planar.equations.linear import solve_vectors
 from planar.foundation.arrays import Array
 
 ResidualFunction = Callable[[Array], tuple[Array, Array]]
-"""Unknowns (starts, n) -> what is left open (starts, m), and its slope (starts, m, n)."""
+"""Unknowns (starts, n) -> what is left open (starts, m), and its Jacobian (starts, m, n)."""
 SystemFunction = Callable[[Array], tuple[Array, Array]]
 """The same from one place: unknowns (n,) -> residuals (m,), Jacobian (m, n)."""
 StepSolver = Callable[[Array, Array], Array]
@@ -29,7 +30,9 @@ STALLED_COST_RATIO = 1e-10
 FIRST_DAMPING = 1e-3
 """The damping from which steps start anywhere, for squares of singular values in parts of the greatest one's."""
 ROUNDED_COST = 1e-31
-"""Where the squares of all that is left open come to less, no step makes it any better."""
+"""Where the squares of residuals come to less, on average, no step makes them any better."""
+MAX_SMALL_UNKNOWNS, MIN_ROUGH_DAMPING = 24, 1e-12
+"""Of more unknowns steps that are damped by more than this are solved by the normal equations."""
 MAX_NEWTON_STEPS = 200
 """Iterations. A double root halves its error each time, so 27 take it from 1 to the square root of round-off."""
 MAX_POLISHING_STEPS = 4
@@ -44,7 +47,7 @@ EPS = float(np.finfo(float).eps)
 
 
 class NewtonResult(NamedTuple):
-    """Where each start ended: the unknowns, the greatest part left open, and whether that closes the group."""
+    """Where each start ended: the unknowns, the greatest part left open, and whether that closes the block."""
 
     unknowns: Array
     residual: Array
@@ -59,7 +62,7 @@ def damped_newton(
 ) -> NewtonResult:
     """Solve from every start by Levenberg's and Marquardt's damping of Gauss and Newton's method.
 
-    The damping falls with every step that succeeds, so convergence at a simple root is quadratic; groups with more
+    The damping falls with every step that succeeds, so convergence at a simple root is quadratic; blocks with more
     constraints than unknowns are solved in the sense of least squares, singular ones by the shortest step.
     K. Madsen, H. B. Nielsen, O. Tingleff, Methods for Non-Linear Least Squares Problems, 2nd ed., 2004, sec. 3.2.
     """
@@ -84,7 +87,7 @@ def damped_newton(
         small = np.max(np.abs(step), axis=1) < 1e-13
         # far from closed and hardly coming closer: a start that ends where nothing closes
         small |= better & (cost[busy] - new_cost < STALLED_COST_RATIO * cost[busy]) & (new_cost > 1e-8)
-        settled = small | (better & (new_cost <= ROUNDED_COST)) | (damping[busy] > 1e12)
+        settled = small | (better & (new_cost <= ROUNDED_COST * left.shape[1])) | (damping[busy] > 1e12)
         cost[taken] = new_cost[better]
         damping[busy] = np.where(better, np.maximum(damping[busy] * 0.1, 1e-17), damping[busy] * growth[busy])
         growth[busy] = np.where(better, 2.0, growth[busy] * 2.0)
@@ -93,7 +96,19 @@ def damped_newton(
 
 
 def _damped_step(residuals: Array, jacobian: Array, damping: Array) -> Array:
-    """The damped step, from a singular value decomposition, so that nothing is squared and nothing need be regular."""
+    """The damped step, from a singular value decomposition, so that nothing is squared and nothing need be regular.
+
+    Of many unknowns one that is damped a good deal by the normal equations, at a fraction of the cost.
+    """
+    unknowns = jacobian.shape[2]
+    if unknowns > MAX_SMALL_UNKNOWNS and damping.min() > MIN_ROUGH_DAMPING:
+        transposed = jacobian.swapaxes(1, 2)
+        squares = transposed @ jacobian
+        # the trace is the sum of the squares of all singular values
+        ridge = damping * np.maximum(np.trace(squares, axis1=1, axis2=2), 1e-300)
+        return -solve_vectors(
+            squares + ridge[:, None, None] * np.eye(unknowns), (transposed @ residuals[..., None])[..., 0]
+        )
     u, s, vt = np.linalg.svd(jacobian, full_matrices=False)
     along = np.einsum("kmr,km->kr", u, residuals)
     scale = np.maximum(s[:, :1], 1e-300)
@@ -178,8 +193,15 @@ def correct_at_rank(residual_function: SystemFunction, y: Array, rank: int, free
     return y
 
 
+def repeat_step(residual_function: SystemFunction, inverse: Array, y: Array, steps: int) -> Array:
+    """Where so many steps from y (n,) lead by one inverse (n, m) of the Jacobian, or of a part of it."""
+    for _ in range(steps):
+        y = y - inverse @ residual_function(y)[0]
+    return y
+
+
 def truncated_step(jacobian: Array, residuals: Array, rank: int) -> Array:
-    """The shortest step that closes what is open, by so many of the directions in which the slope is steepest."""
+    """The shortest step that closes what is open, by so many of the directions in which the Jacobian is steepest."""
     u, s, vt = np.linalg.svd(jacobian, full_matrices=False)
     return vt[:rank].T @ ((u.T[:rank] @ residuals) / s[:rank])
 

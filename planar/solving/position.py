@@ -13,7 +13,6 @@ from planar.document.first_argument import takes_mechanism
 from planar.equations.constraint_equations import slice_length
 from planar.equations.coordinates import frames_from_coordinates
 from planar.equations.functions import MAX_CACHED_STRUCTURES, EquationRates, equation_functions
-from planar.equations.linear import solve_vectors
 from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer, Outcome, TrackingEnd
 from planar.foundation.geometry import Frame
@@ -27,17 +26,12 @@ from planar.solving.continuation.fast_path import StraightPathCache, fast_positi
 from planar.solving.continuation.path import follow_straight
 from planar.solving.continuation.path_pieces import BranchRates
 from planar.solving.diagnosis import refusals
+from planar.solving.diagnosis.singular_refusals import SingularPosition, determined_mobility
 from planar.solving.lazy_frames import lazy_frames
+from planar.solving.newton import CLOSED_TOLERANCE
 from planar.solving.prepared_mechanism import PreparedMechanism
-from planar.solving.rates.accuracy import find_accuracy_doubts
-from planar.solving.rates.regularity import (
-    SingularPosition,
-    is_always_singular,
-    jacobian_at,
-    mobility_by_rank,
-    moved_links,
-    regularity,
-)
+from planar.solving.rates.regularity import is_always_singular, jacobian_at, moved_links, regularity
+from planar.solving.rates.sample_rates import InputRates, sample_rates
 
 if TYPE_CHECKING:
     from planar.solving.continuation.singular_rates import SingularRates
@@ -104,7 +98,7 @@ class PositionSolver(PreparedMechanism):
         return (*self.mechanism.remarks, *sketch_remarks(self, BlockAssemblies(self), found))
 
     def _is_regular(self, z: Array) -> bool:
-        """Whether every group of an assembly is determined there."""
+        """Whether every block of an assembly is determined there."""
         if is_surely_regular(self, z):
             return True
         return bool(np.all(regularity(self, jacobian_at(self, z, self.inputs.u)) >= MIN_REGULARITY))
@@ -126,7 +120,7 @@ class PositionSolver(PreparedMechanism):
         """Why it cannot be assembled, and what would mend that, which takes about as long to find as an assembly."""
         found = regularity(self, jacobian_at(self, failure.z, self.inputs.u))
         for stage in self.equations.blocks[: failure.stage.block_index]:
-            # a group that could stand anywhere was put somewhere, and what comes after it need not fit there
+            # a block that could stand anywhere was put somewhere, and what comes after it need not fit there
             if found[stage.block_index] < MIN_REGULARITY and is_always_singular(self, stage, failure.z):
                 return refusals.always_free(self, stage.links)
         return (
@@ -144,19 +138,16 @@ class PositionSolver(PreparedMechanism):
         return 0 < bare.z.numel() - bare.F.numel() < len(self.mechanism.inputs)
 
     def state(self, z: Array, remarks: tuple[str, ...] = ()) -> State:
-        """The state at given unknowns, once they and their rates have passed the gate. Raises NoAnswer."""
+        """The state at given unknowns, once they and their rates have passed the residual check. Raises NoAnswer."""
         state = self._fast_state(z, remarks)
         if state is not None:
             return state
         gaps = self.residuals(z[None], self.inputs.u[None])[:, 0]
         residual = float(gaps.max(initial=0.0))
         if residual > self.tolerance:
-            raise refusals.not_closed(self, self.residual_check.row_pairs[int(np.argmax(gaps))], residual)
-        s, rest = self.inputs, np.zeros_like(z)
-        y, given = np.concatenate([z, s.u]), np.concatenate([rest, s.u2])
-        still = self.functions.kinematics(y, np.concatenate([rest, s.u1]), given, s.p)
+            raise self._open_refusal(z, residual, self.residual_check.row_pairs[int(np.argmax(gaps))])
         try:
-            found = mobility_by_rank(self, z, still)
+            mobility = determined_mobility(self, z, self._kinematics_at_rest(z))
         except (SingularPosition, NoAnswer) as problem:
             regular = self.regularized(z)
             if regular is not None:
@@ -170,14 +161,33 @@ class PositionSolver(PreparedMechanism):
             if state is None:
                 raise problem.refusal() from None
             return state
-        y1 = np.concatenate([solve_vectors(still.jacobian, -still.F1), s.u1])
-        moving = self.functions.kinematics(y, y1, given, s.p)
-        y2 = np.concatenate([solve_vectors(moving.jacobian, -moving.F2), s.u2])
-        motion = self.functions.kinematics(y, y1, y2, s.p)
-        doubt = find_accuracy_doubts(self, motion.jacobian[None], motion.w[None], y[None], y1[None], y2[None])
+        rates = sample_rates(self, z[None], self._one_sample(), {}, False)
+        doubt = rates.doubts
         if doubt is not None and doubt.errors.is_too_inexact[0]:
             raise doubt.refusal(self, 0, self.describe_position())
-        return self._checked_state(motion, found, residual, (*remarks, doubt.remark()) if doubt else remarks)
+        remarks = (*remarks, doubt.remark()) if doubt else remarks
+        return self._checked_state([part[0] for part in rates.coordinate_rates], mobility, residual, remarks)
+
+    def _open_refusal(self, z: Array, residual: float, pair: str) -> NoAnswer:
+        """What to say of a position that does not close: where it all but does, it may be since it is singular."""
+        try:
+            if residual <= CLOSED_TOLERANCE:
+                determined_mobility(self, z, self._kinematics_at_rest(z))
+        except SingularPosition as singular:
+            return singular.refusal()
+        except NoAnswer as singular:
+            return singular
+        return refusals.not_closed(self, pair, residual)
+
+    def _kinematics_at_rest(self, z: Array) -> EquationRates:
+        """The rates of the constraints while the unknowns rest and the inputs move."""
+        s, rest = self.inputs, np.zeros_like(z)
+        y, y1, y2 = (np.concatenate(both) for both in ((z, s.u), (rest, s.u1), (rest, s.u2)))
+        return self.functions.kinematics(y, y1, y2, s.p)
+
+    def _one_sample(self) -> InputRates:
+        s = self.inputs
+        return InputRates(s.u[None], s.u1[None], s.u2[None], 0.0 * s.u[None])
 
     def _fast_state(self, z: Array, remarks: tuple[str, ...]) -> State | None:
         """The state by compiled functions alone, where they find nothing to look at."""
@@ -200,23 +210,20 @@ class PositionSolver(PreparedMechanism):
             return None
         y, y1, y2 = (np.concatenate(both) for both in ((rates.z, s.u), (rates.z1, s.u1), (rates.z2, s.u2)))
         told = "to first order there is one more motion here; the rates are those of the only one that goes on"
-        return self._checked_state(self.functions.kinematics(y, y1, y2, s.p), s.u.size, residual, (*remarks, told))
+        found = self.functions.kinematics(y, y1, y2, s.p)
+        return self._checked_state([found.w, found.w1, found.w2], s.u.size, residual, (*remarks, told))
 
     def state_on_branch(self, z: Array, local: BranchRates) -> State:
         """The state on a change point or beside it, with the rates of the branch that was followed there.
 
         Raises NoAnswer where the inputs do not run along the way on which it was followed.
         """
-        from planar.solving.rates.sample_rates import InputRates, sample_rates
-
-        s = self.inputs
-        residual = float(self.max_residuals(z[None], s.u[None])[0])
-        given = InputRates(s.u[None], s.u1[None], s.u2[None], 0.0 * s.u[None])
-        w, w1, w2 = (part[0] for part in sample_rates(self, z[None], given, {0: local}, False).coordinate_rates)
-        if residual > self.tolerance or not np.isfinite(w1).all():
+        residual = float(self.max_residuals(z[None], self.inputs.u[None])[0])
+        found = sample_rates(self, z[None], self._one_sample(), {0: local}, False)
+        rates = [part[0] for part in found.coordinate_rates]
+        if residual > self.tolerance or not np.isfinite(rates[1]).all():
             return self.state(z)  # says why not
-        none = np.zeros(0)
-        return self._checked_state(EquationRates(none, none, none, w, w1, w2, none, none), s.u.size, residual, ())
+        return self._checked_state(rates, self.inputs.u.size, residual, ())
 
     def state_with_rates(self, state: State) -> State:
         """The state in the same position as another's, with this mechanism's own rates."""
@@ -229,19 +236,21 @@ class PositionSolver(PreparedMechanism):
         if gap is not None:
             raise refusals.open_contact(self, *gap)
 
-    def _checked_state(self, motion: EquationRates, found: int, residual: float, remarks: tuple[str, ...]) -> State:
-        parts = np.stack([motion.w, motion.w1, motion.w2], axis=1) * self.scale[:, None]
+    def _checked_state(
+        self, coordinate_rates: Sequence[Array], mobility: int, residual: float, remarks: tuple[str, ...]
+    ) -> State:
+        parts = np.stack(coordinate_rates, axis=1) * self.scale[:, None]
         frames, own = frames_from_coordinates(
             [Jet(*each) for each in parts.tolist()], self.column, self.shapes, self.pairs
         )
         gaps = self.residual_check.rate_residuals(frames, own)
         for (gap, pair), what in zip(gaps, ("velocities", "accelerations"), strict=True):
             if float(np.max(gap)) > 1e3 * self.tolerance:
-                if self.inputs.u.size > found:
-                    raise refusals.disagreeing_inputs(self, found, what)
+                if self.inputs.u.size > mobility:
+                    raise refusals.disagreeing_inputs(self, mobility, what)
                 raise refusals.broken_rates(self, what, pair, float(np.max(gap)))
         self.refuse_open_contact(frames, own)
-        return State(self.mechanism, found, residual, remarks, frames, own, self.shapes)
+        return State(self.mechanism, mobility, residual, remarks, frames, own, self.shapes)
 
 
 class SolvedMechanism:

@@ -109,7 +109,7 @@ class PreparedMechanism:
 
     @cached_property
     def row_scale(self) -> Array:
-        """What every row of a slope is divided by (rows,): lengths by the reach of their group."""
+        """What every row of a Jacobian is divided by (rows,): lengths by the reach of their block."""
         e = self.equations
         by = np.ones(len(e.rows))
         for stage, reach in zip(e.blocks, self._block_reaches, strict=True):
@@ -118,7 +118,7 @@ class PreparedMechanism:
 
     @cached_property
     def min_column_scale(self) -> Array:
-        """What the column of every unknown could be at best in its group, rows divided so (unknowns,)."""
+        """What the column of every unknown could be at best in its block, rows divided so (unknowns,)."""
         e = self.equations
         least = np.ones(len(e.unknowns))
         for stage, reach in zip(e.blocks, self._block_reaches, strict=True):
@@ -131,7 +131,7 @@ class PreparedMechanism:
 
     @cached_property
     def _block_reaches(self) -> list[float]:
-        """The reach of every group's links (sizes); where they have but one point each, of the least link beside."""
+        """The reach of every block's links (sizes); where they have but one point each, of the least link beside."""
         found = []
         for stage in self.equations.blocks:
             own = max((self.reach[link] for link in stage.links), default=0.0)
@@ -141,7 +141,7 @@ class PreparedMechanism:
 
     @property
     def tolerance(self) -> float:
-        """What the gate lets pass: round-off of the residual, in lengths of the size."""
+        """What the residual check lets pass: round-off of the residual, in lengths of the size."""
         return self.residual_check.tolerance
 
     def residuals(self, z: Array, u: Array) -> Array:

@@ -37,7 +37,7 @@ def rest_position(mechanism: Mechanism, drives: Sequence[Drive] = ()) -> State:
     frames, own = frames_from_coordinates((w * solver.scale).tolist(), solver.column, solver.shapes, solver.pairs)
     solver.refuse_open_contact(frames, own)
     slopes = solver.functions.jacobians(z[None], u[None], p)
-    # what is held to second order only is no freedom: the pairs' own slope does not see it, the deflated one does
+    # what is held to second order only is no freedom: the pairs' own Jacobian does not see it, the deflated one does
     slope = np.hstack([each[0] for each in slopes]) if solver.is_deflated else FullConstraints(solver).jacobian(w)
     mobility = null_space(slope).shape[1] if w.size else 0
     if np.any(regularity(solver, slopes[0][0]) < MIN_REGULARITY):

@@ -25,8 +25,8 @@ from planar.model.pairs import MeasureKind, Pair
 
 
 class PointLocations(NamedTuple):
-    """Where named points are found: each by the first of its links to be placed, (stage, link, point), and the points
-    of each link with their names; `level` is the stage after which each link stands, -1 where inputs alone say so."""
+    """Where named points are found: each by the first of its links to be placed, (block, link, point), and the points
+    of each link with their names; `level` is the block after which each link stands, -1 where inputs alone say so."""
 
     first_link: dict[str, tuple[int, str, str]]
     points_of: dict[str, list[tuple[str, str]]]

@@ -9,6 +9,7 @@ from planar.solving import position
 from planar.solving.checks.branch_check import BranchCheck, is_move_allowed
 from planar.solving.continuation.path import follow_samples, follow_to
 from planar.solving.position import PositionSolver
+from planar.solving.rates import sample_rates
 from tests.builders import four_bar_document
 
 CRANK = four_bar_document(0.3, 0.9, 0.7, 1.0, 0.8, omega=2.0, alpha=1.0, sketch={"C": [0.9, 0.7]})
@@ -113,7 +114,7 @@ def test_samples_with_a_wrong_or_missing_value_go_to_the_general_path(solver, mo
 def test_wrong_velocities_and_accelerations_are_refused(solver, monkeypatch):
     z = solver.find_assembly().z
     monkeypatch.setattr(position, "fast_position", lambda *_: None)
-    real = position.solve_vectors
+    real = sample_rates.solve_vectors
     for order in (1, 2):
         calls = []
 
@@ -121,7 +122,7 @@ def test_wrong_velocities_and_accelerations_are_refused(solver, monkeypatch):
             calls.append(1)
             return real(slope, known) * (1.0 + (1e-7 if len(calls) == order else 0.0))
 
-        monkeypatch.setattr(position, "solve_vectors", wrong)
+        monkeypatch.setattr(sample_rates, "solve_vectors", wrong)
         with pytest.raises(NoAnswer) as refused:
             solver.state(z)
         assert ("velocities" if order == 1 else "accelerations") in refused.value.reason

@@ -18,9 +18,9 @@ from planar.assemblies.circuits.dead_points import (
 from planar.assemblies.circuits.traced_circuit import TracedCircuit, trace_circuit
 from planar.assemblies.modes import Mode, Modes
 from planar.assemblies.polynomial.completeness import Completeness
+from planar.foundation.angles import distances
 from planar.foundation.arrays import Array
 from planar.model.mechanism import Drive, Mechanism, replace_inputs
-from planar.model.pairs import MeasureKind
 from planar.model.wording import count_phrase
 from planar.solving.diagnosis import refusals
 from planar.solving.position import PositionSolver, solved_mechanism
@@ -84,10 +84,8 @@ class CircuitSearchResult(NamedTuple):
 def is_same_assembly(solver: PositionSolver, one: Array, others: Array) -> Array:
     """Which of others (others, unknowns) are the same assembly as one, rad and m, whole turns aside."""
     e = solver.equations
-    columns = list(e.unknowns)
-    lengths = np.array([e.coordinates[column].kind is MeasureKind.LENGTH for column in columns], dtype=bool)
-    gaps = (others - one) / solver.scale[columns]
-    return np.all(np.where(lengths, np.abs(gaps), np.abs(np.exp(1j * gaps) - 1.0)) < SAME_ASSEMBLY_DISTANCE, axis=1)
+    scale = solver.scale[list(e.unknowns)]
+    return np.all(distances(e.unknown_is_angle, others / scale, one / scale) < SAME_ASSEMBLY_DISTANCE, axis=1)
 
 
 class CircuitSearch:

@@ -41,7 +41,7 @@ class MovingSolutions:
         self._many: int | None = None
 
     def discriminant(self, z: Array, u: Array, p: Array) -> SignedLog:
-        """The product of the slope's determinant, X0 = Y0 = 1, over all solutions at finite places.
+        """The product of the Jacobian's determinant, X0 = Y0 = 1, over all solutions at finite places.
 
         Real up to a constant phase: the block is its own mirror image. Zero where some meet, or all but meet. Raises
         Unclaimed where there are not always as many.

@@ -156,7 +156,7 @@ class _BallPolynomials:
         return X.entries(), Y.entries()
 
     def _residuals_and_jacobian(self, w: Sequence[Any], slopes: bool) -> tuple[list[Any], list[list[Any]]]:
-        """The equations at w, and their slope."""
+        """The equations at w, and their Jacobian."""
         n = len(self.free)
         X, Y = self._expand_solution(w)
         P, conj = self.P, [[each.conjugate() for each in row] for row in self.P]

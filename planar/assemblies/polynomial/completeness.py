@@ -19,7 +19,7 @@ class Completeness(Enum):
 class BlockRoots(NamedTuple):
     """All assemblies of one block of links, those before it given.
 
-    `real`: (roots, unknowns) as in z[stage.unknowns] (rad, sizes), sorted, angles between -pi and pi or, if they count
+    `real`: (roots, unknowns) as in z[block.unknowns] (rad, sizes), sorted, angles between -pi and pi or, if they count
     turns, the least; `double`: (roots,) where two meet, at a dead point; `certified`: (roots,) whether a box of its own
     is proved to hold each; `expected`: complex solutions at finite places that the structure has, None where no number
     is known; `found`: those that were found, as often as they count; `curve`: whether a whole curve of assemblies is

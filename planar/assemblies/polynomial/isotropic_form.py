@@ -30,6 +30,7 @@ import numpy as np
 from planar.assemblies.polynomial.gear_powers import AngleArguments, GearPowers, angle_arguments, gear_powers
 from planar.equations.casadi_call import BufferedFunction
 from planar.equations.constraint_equations import Block, ConstraintEquations
+from planar.foundation.angles import wrap_angle
 from planar.foundation.arrays import Array, ComplexArray, IntArray
 from planar.model.pairs import MeasureKind
 
@@ -139,7 +140,7 @@ class IsotropicForm(NamedTuple):
         """The same assembly (unknowns,) with angles between -pi and pi, or the least that count turns."""
         angles, root = list(self.angles), root.copy()
         own = root[angles]
-        root[angles] = self.gears.least_angles(own) if self.gears else np.arctan2(np.sin(own), np.cos(own))
+        root[angles] = self.gears.least_angles(own) if self.gears else wrap_angle(own)
         return root
 
 
@@ -174,7 +175,7 @@ def isotropic_form(e: ConstraintEquations, stage: Block, p: Array | None = None)
 
 
 def constant_jacobian(e: ConstraintEquations, stage: Block) -> ca.Function | None:
-    """The slope (rows, unknowns) of a block in its own unknowns as a function of (z, u, p); None where it depends on
+    """The Jacobian (rows, unknowns) of a block in its own unknowns as a function of (z, u, p); None where it depends on
     them: such a block is linear."""
     if stage.is_free or any(row.kind is MeasureKind.ANGLE for row in e.rows[stage.rows]):
         return None

@@ -7,7 +7,7 @@ from itertools import chain
 from math import hypot
 from typing import Any
 
-from planar.drawing.paper.picture import Fill, Mark, Outline, Pen
+from planar.drawing.paper.picture import Fill, Outline, Pen
 from planar.drawing.paper.scales import Scale
 from planar.drawing.scheme import symbol_table, symbols
 from planar.drawing.scheme.link_bodies import LinkBody, distance_from_line
@@ -48,7 +48,7 @@ def body_marks(
     return tuple(stroke_marks(lines, frames, scale.per_mm))
 
 
-def moving_marks(scene: Scene, pen: Pen = Pen.LINK) -> tuple[Mark, ...]:
+def moving_marks(scene: Scene, pen: Pen = Pen.LINK) -> tuple[Outline, ...]:
     """Plates, wheels, bars, springs, slots, blocks, centres of mass and pins of a scene on paper."""
     strokes = chain.from_iterable(moving_strokes(scene, pen).values())
     return tuple(stroke_marks(strokes, scene.frames, scene.scale.per_mm))

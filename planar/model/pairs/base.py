@@ -87,6 +87,13 @@ class Pair(ABC):
     def input_position(self, frames: Sequence[Frame], numbers: Sequence[Scalar], own: Sequence[Scalar]) -> Scalar:
         """The relative motion that an input here prescribes (rad or m)."""
 
+    def input_position_at(
+        self, shapes: Mapping[str, LinkShape], frames: Mapping[str, Frame], own: Mapping[str, Sequence[Scalar]]
+    ) -> Scalar:
+        """The same where links of these shapes have these frames, own coordinates given by the names of pairs."""
+        numbers = self.measure([shapes[link] for link in self.bodies])
+        return self.input_position([frames[link] for link in self.bodies], numbers, own.get(self.name, ()))
+
     @abstractmethod
     def results(self, position: Scalar, rate: Scalar, second: Scalar) -> dict[str, Scalar | None]:
         """Its results by name, from its drive and the drive's derivatives (SI), numbers or arrays."""

@@ -7,6 +7,7 @@ import numpy as np
 
 from planar.codegen.javascript import write_javascript
 from planar.equations.coordinates import frames_from_coordinates
+from planar.equations.rates import first_and_second_rates
 from planar.foundation.errors import Outcome
 from planar.foundation.jets import Jet
 from planar.model.link_shapes import LinkShape
@@ -49,10 +50,8 @@ def reported_function(mechanism: Mechanism, solver: PositionSolver, d: ca.SX, ch
     w, w1, w2 = (ca.SX.sym(name, len(solver.equations.coordinates)) for name in ("w", "w1", "w2"))
     frames, own = frames_from_coordinates(ca.vertsplit(w), solver.column, changed, solver.pairs)
     values: list[ca.SX] = []
-    for name, pair in relative_motions(mechanism).items():
-        numbers = pair.measure([changed[link] for link in pair.bodies])
-        position = ca.SX(pair.input_position([frames[link] for link in pair.bodies], numbers, own.get(name, ())))
-        rate = ca.jtimes(position, w, w1)
-        second = ca.jtimes(rate, w, w1) + ca.jtimes(position, w, w2)
-        values += [ca.SX(each) for each in pair.results(position, rate, second).values() if each is not None]
+    for pair in relative_motions(mechanism).values():
+        position = ca.SX(pair.input_position_at(changed, frames, own))
+        rates = first_and_second_rates(position, w, w1, w2)
+        values += [ca.SX(each) for each in pair.results(position, *rates).values() if each is not None]
     return write_javascript("reported", ca.Function("reported", [w, w1, w2, d], [ca.vertcat(*values)]))

@@ -11,7 +11,8 @@ from planar.equations.constraint_equations import Block, slice_length
 from planar.equations.coordinates import frames_from_coordinates
 from planar.equations.functions import EquationFunctions
 from planar.equations.minors import constraint_dependencies
-from planar.foundation.arrays import Array, BoolArray
+from planar.foundation.angles import distances, wrap_angle
+from planar.foundation.arrays import Array
 from planar.foundation.geometry import Vector
 from planar.model.pairs import MeasureKind
 from planar.solving.assembly.sketch_start import turn_between
@@ -24,7 +25,7 @@ MEETING_COSINE_SQUARED = 1.0 - 1e-6
 """Squared cosine beyond which two assemblies are too near to where they meet to be told apart by a closed form."""
 MAX_STARTS = 160
 LARGE_BLOCK, START_BATCH = 10, 16
-"""Unknowns of a group from which on starts are tried in batches of so many."""
+"""Unknowns of a block from which on starts are tried in batches of so many."""
 START_ANGLE_SPREAD = 0.3
 """Radians: how far about the angles of a sketch starts are spread, so that near twins are both found."""
 CLEAR_SKETCH_DISTANCE = 0.03
@@ -32,7 +33,7 @@ CLEAR_SKETCH_DISTANCE = 0.03
 
 
 def block_dependencies(setup: PreparedMechanism) -> list[frozenset[int]]:
-    """The unknowns of earlier groups on which each group hangs."""
+    """The unknowns of earlier blocks on which each block hangs."""
     columns = constraint_dependencies(setup.functions)
     later = len(setup.equations.unknowns) + len(setup.inputs.u)
     return [
@@ -42,10 +43,10 @@ def block_dependencies(setup: PreparedMechanism) -> list[frozenset[int]]:
 
 
 class BlockAssembly(NamedTuple):
-    """One assembly of a group: all unknowns with this group's filled in, and how it lies.
+    """One assembly of a block: all unknowns with this block's filled in, and how it lies.
 
-    `distance`: squared distance to the sketch of the points that the group places (sizes squared); `behind`: how many
-    slides are not ahead of their `through`; `height`: mean y of the group's points; `far`: how far its slides are ahead
+    `distance`: squared distance to the sketch of the points that the block places (sizes squared); `behind`: how many
+    slides are not ahead of their `through`; `height`: mean y of the block's points; `far`: how far its slides are ahead
     together.
     """
 
@@ -57,7 +58,7 @@ class BlockAssembly(NamedTuple):
 
 
 class BlockAssemblies:
-    """Assemblies of the groups of one mechanism, at its own inputs."""
+    """Assemblies of the blocks of one mechanism, at its own inputs."""
 
     def __init__(self, setup: PreparedMechanism):
         mechanism, unit = setup.mechanism, setup.unit
@@ -81,7 +82,7 @@ class BlockAssemblies:
             self.sketched_by_level.setdefault(self.first_link[name][0], []).append(name)
 
     def near_sketch(self, stage: Block, z: Array, every: bool = False) -> tuple[list[BlockAssembly], Array]:
-        """All assemblies of a group that its starts lead to, the ones that an author would mean first.
+        """All assemblies of a block that its starts lead to, the ones that an author would mean first.
 
         Where one lies clearly at the sketch others are looked for only if `every` one is wanted.
 
@@ -117,7 +118,7 @@ class BlockAssemblies:
         return found, nearest
 
     def _closed_form(self, stage: Block, z: Array) -> list[BlockAssembly] | None:
-        """The two assemblies of a group in closed form; None where it has none, or where they all but meet."""
+        """The two assemblies of a block in closed form; None where it has none, or where they all but meet."""
         function = None if self.counts_turns else self.functions.block_assemblies(stage)
         if function is None:
             return None
@@ -128,7 +129,7 @@ class BlockAssemblies:
         return self._sorted_assemblies(stage, z, found)
 
     def _start_batches(self, stage: Block, closing: ResidualFunction) -> Iterator[Array]:
-        """Starts all over the circles; of a large group in batches, since any assembly will do without a sketch."""
+        """Starts all over the circles; of a large block in batches, since any assembly will do without a sketch."""
         starts = self._with_lengths(stage, closing, _spread_angles(slice_length(stage.unknowns)))
         many = len(starts) if slice_length(stage.unknowns) < LARGE_BLOCK else START_BATCH
         return (starts[first : first + many] for first in range(0, len(starts), many))
@@ -138,7 +139,7 @@ class BlockAssemblies:
     ) -> list[BlockAssembly]:
         if self.counts_turns:
             # angles take the turn nearest to none, wherever Newton's method wandered, if that is closed too
-            least = np.where(self._is_angle(stage), np.arctan2(np.sin(converged), np.cos(converged)), converged)
+            least = np.where(self.equations.unknown_is_angle[stage.unknowns], wrap_angle(converged), converged)
             still = (
                 np.abs(closing(least)[0]).max(axis=1, initial=0.0) < CLOSED_TOLERANCE if len(converged) else converged
             )
@@ -191,23 +192,19 @@ class BlockAssemblies:
         return self.functions.coordinates(z, self.u, self.p)
 
     def residual_function(self, stage: Block, z: Array, p: Array) -> ResidualFunction:
-        """A group's constraints at tries of its own unknowns, those of earlier groups and the pairs' numbers given."""
+        """A block's constraints at tries of its own unknowns, those of earlier blocks and the pairs' numbers given."""
         return block_residual_function(self.functions, stage, z, self.u, p)
 
     def from_all_starts(self, stage: Block, z: Array) -> list[BlockAssembly]:
-        """All assemblies of a group that starts about the sketch and all over the circles lead to."""
+        """All assemblies of a block that starts about the sketch and all over the circles lead to."""
         closing = self.residual_function(stage, z, self.p)
         starts = np.concatenate([self._starts_near_sketch(stage, z)[0], _spread_angles(slice_length(stage.unknowns))])
         ended = damped_newton(closing, self._with_lengths(stage, closing, starts))
         return self._from_converged(stage, z, closing, ended.unknowns[ended.converged])
 
-    def _is_angle(self, stage: Block) -> BoolArray:
-        columns = self.equations.unknowns[stage.unknowns]
-        return np.array([self.equations.coordinates[c].kind is not MeasureKind.LENGTH for c in columns], dtype=bool)
-
     def _is_same(self, stage: Block, z: Array, a: Array, b: Array) -> bool:
-        """Whether two roots of a group are one assembly; where turns count, they are if all that hangs on them is."""
-        if not np.all(_distances(self._is_angle(stage), a, b) < SAME_ASSEMBLY_TOLERANCE):
+        """Whether two roots of a block are one assembly; where turns count, they are if all that hangs on them is."""
+        if not np.all(distances(self.equations.unknown_is_angle[stage.unknowns], a, b) < SAME_ASSEMBLY_TOLERANCE):
             return False
         if not self.counts_turns:
             return True
@@ -216,15 +213,15 @@ class BlockAssemblies:
         angles = np.array([c.kind is not MeasureKind.LENGTH for c in self.equations.coordinates])
         return bool(
             np.all(
-                _distances(angles, *self.functions.coordinates(both, np.tile(self.u, (2, 1)), self.p))
+                distances(angles, *self.functions.coordinates(both, np.tile(self.u, (2, 1)), self.p))
                 < SAME_ASSEMBLY_TOLERANCE
             )
         )
 
     def _starts_near_sketch(self, stage: Block, z: Array) -> tuple[Array, bool]:
-        """Starts about the angles that the sketch shows, and whether it shows a large group whole.
+        """Starts about the angles that the sketch shows, and whether it shows a large block whole.
 
-        Of a large group that is shown whole only the surroundings of the sketch are searched, if an assembly lies
+        Of a large block that is shown whole only the surroundings of the sketch are searched, if an assembly lies
         there: its assemblies may be many, and the nearest is wanted.
         """
         unknowns = slice_length(stage.unknowns)
@@ -245,7 +242,7 @@ class BlockAssemblies:
 
     def _with_lengths(self, stage: Block, closing: ResidualFunction, starts: Array) -> Array:
         """Starts whose lengths follow from their angles: lengths enter linearly, so by least squares."""
-        lengths = ~self._is_angle(stage)
+        lengths = ~self.equations.unknown_is_angle[stage.unknowns]
         if lengths.any():
             starts[:, lengths] = 0.0
             left, slope = closing(starts)
@@ -253,7 +250,7 @@ class BlockAssemblies:
         return starts
 
     def _sketched_angles(self, stage: Block, z: Array) -> dict[str, float]:
-        """The angle at which the sketch, and the points that are known already, show a link of the group."""
+        """The angle at which the sketch, and the points that are known already, show a link of the block."""
         names = {name for link in stage.links for _, name in self.points_of[link]}
         known = {name: self.first_link[name] for name in names if self.first_link[name][0] < stage.block_index}
         frames, _ = frames_from_coordinates(
@@ -273,7 +270,7 @@ class BlockAssemblies:
 def block_residual_function(
     functions: EquationFunctions, stage: Block, z: Array, u: Array, p: Array
 ) -> ResidualFunction:
-    """A group's constraints at tries of its own unknowns, those of earlier groups and all numbers given."""
+    """A block's constraints at tries of its own unknowns, those of earlier blocks and all numbers given."""
     function = functions.block_call(stage)
 
     def closing(tried: Array) -> tuple[Array, Array]:
@@ -284,11 +281,6 @@ def block_residual_function(
         return left.reshape(count, -1), slopes.reshape(count, *slopes.shape[-2:]).transpose(0, 2, 1)
 
     return closing
-
-
-def _distances(is_angle: BoolArray, a: Array, b: Array) -> Array:
-    """How far numbers are apart, those that are angles modulo a turn."""
-    return np.where(is_angle, np.abs(np.exp(1j * a) - np.exp(1j * b)), np.abs(a - b))
 
 
 def _spread_angles(unknowns: int) -> Array:

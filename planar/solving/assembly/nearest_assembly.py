@@ -18,11 +18,11 @@ EQUAL_DISTANCE_TOLERANCE = 1e-9
 MAX_TIED = 64
 """Assemblies that fit alike among which one is looked for whose rates are determined."""
 MAX_EXPANSIONS = 1000
-"""Groups solved before the search stops looking for a nearer assembly and takes the best way to an end."""
+"""Blocks solved before the search stops looking for a nearer assembly and takes the best way to an end."""
 
 
 class Assembly(NamedTuple):
-    """The unknowns of an assembly, the groups that may as well stand otherwise, and whether the search was cut off."""
+    """The unknowns of an assembly, the blocks that may as well stand otherwise, and whether the search was cut off."""
 
     z: Array
     ties: tuple[int, ...] = ()
@@ -30,10 +30,10 @@ class Assembly(NamedTuple):
 
 
 class AssemblySearchFailure(NamedTuple):
-    """The group at which every way to assemble ends.
+    """The block at which every way to assemble ends.
 
-    `z`: the unknowns where it is nearest to closing, those of earlier groups filled in; `groups`: how many were solved
-    in search of it.
+    `z`: the unknowns where it is nearest to closing, those of earlier blocks filled in; `solved_blocks`: how many
+    were solved in search of it.
     """
 
     stage: Block
@@ -42,20 +42,20 @@ class AssemblySearchFailure(NamedTuple):
 
 
 class _BlockSearch:
-    """The candidates of groups, and where there are none: whatever the groups do on which one does not hang, at the
+    """The candidates of blocks, and where there are none: whatever the blocks do on which one does not hang, at the
     same places of those on which it hangs there are none again."""
 
     def __init__(self, candidates: BlockAssemblies):
         self.candidates = candidates
         self.last_failure: AssemblySearchFailure | None = None
-        "the last group that could not be assembled"
+        "the last block that could not be assembled"
         self.is_hopeless = False
         "whether one cannot be assembled that hangs on no other"
         self._dependencies: list[list[int]] | None = None
         self._dead_ends: dict[int, set[bytes]] = {}
 
     def find_assemblies(self, stage: Block, z: Array) -> list[BlockAssembly]:
-        """Those of a group, the unknowns before it in z; none as well where a later one would have none for these."""
+        """Those of a block, the unknowns before it in z; none as well where a later one would have none for these."""
         if self._is_dead_end(z, stage.unknowns.start):
             return []
         found, nearest = self.candidates.near_sketch(stage, z)
@@ -84,7 +84,7 @@ class _Node(NamedTuple):
     number: int
     z: Array
     ties: tuple[int, ...]
-    "groups in which another choice lies as near to the sketch"
+    "blocks in which another choice lies as near to the sketch"
 
 
 def find_nearest_assembly(
@@ -93,7 +93,7 @@ def find_nearest_assembly(
     """Best first: of all assemblies the one with the least sum of squared distances to the sketch.
 
     The cost of a partial assembly never falls as it grows, so the first whole one is the nearest. Of several that fit
-    alike a `sound` one is taken, whose rates are determined, if there is one among the first. After EXPANSIONS groups
+    alike a `sound` one is taken, whose rates are determined, if there is one among the first. After EXPANSIONS blocks
     the search only goes on to an end, and says so.
     """
     stages = candidates.equations.blocks

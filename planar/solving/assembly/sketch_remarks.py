@@ -14,11 +14,11 @@ from planar.solving.assembly.nearest_assembly import Assembly
 from planar.solving.prepared_mechanism import PreparedMechanism
 
 MAX_NAMED_BLOCKS = 4
-"""Groups of links that are named one by one."""
+"""Blocks of links that are named one by one."""
 
 
 def sketch_remarks(setup: PreparedMechanism, candidates: BlockAssemblies, found: Assembly) -> tuple[str, ...]:
-    """Sentences on groups whose assembly the sketch leaves open: how they stand, and how to choose."""
+    """Sentences on blocks whose assembly the sketch leaves open: how they stand, and how to choose."""
     open_ones = [setup.equations.blocks[index] for index in found.ties]
     told = []
     if open_ones:
@@ -62,7 +62,7 @@ def _second_order_remark(setup: PreparedMechanism) -> str:
 
 
 def _describe_block_position(setup: PreparedMechanism, candidates: BlockAssemblies, stage: Block, z: Array) -> str:
-    """Where a point of a group is: C at [80, 50] mm; of a group without points, its links."""
+    """Where a point of a block is: C at [80, 50] mm; of a block without points, its links."""
     placed_here = [
         (name, link, point)
         for name, (level, link, point) in candidates.first_link.items()

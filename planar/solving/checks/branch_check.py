@@ -22,8 +22,8 @@ ZERO_SINGULAR_VALUE = 1e-6
 class BranchCheck:
     """Judges the steps of runs of one program, with one set of numbers p.
 
-    Two positions lie on one branch if every unknown has moved as its rates allow, and if no group can have been
-    singular between. A slope stays regular until it has changed by its least singular value (Weyl), so least value
+    Two positions lie on one branch if every unknown has moved as its rates allow, and if no block can have been
+    singular between. A Jacobian stays regular until it has changed by its least singular value (Weyl), so least value
     over rate of change is a distance in which nothing happens: a step must be shorter than those at its two ends
     together. So a change point, where branches cross, is not passed within a step, whichever sign the determinant has
     beyond it and however the rates there agree.
@@ -45,7 +45,7 @@ class BranchCheck:
         return smooth & np.all(first + second > SINGULAR_DISTANCE_RATIO, axis=1)
 
     def _keeps_direction(self, before: Array, after: Array, input_step: Array) -> Array:
-        """For each step whether every group goes on as it came (steps,): less than a right angle between the tangents.
+        """For each step whether every block goes on as it came (steps,): less than a right angle between the tangents.
 
         Beside a limit both ends of a step may be closed, and any move allowed by rates that grow beyond all bounds
         there; but on the branch that comes back from the limit they have the other sign.
@@ -59,7 +59,7 @@ class BranchCheck:
         )
 
     def _singular_distances(self, z: Array, u: Array, slopes: Array, rates: Array, input_step: Array) -> Array:
-        """How far each group is from where it could be singular (samples, stages), in steps of rates and way."""
+        """How far each block is from where it could be singular (samples, blocks), in steps of rates and way."""
         pace = np.maximum(np.max(np.abs(np.hstack([rates, input_step])), axis=1, initial=0.0), 1e-300)[:, None]
         nudge = DIFFERENCE_STEP / np.maximum(pace, DIFFERENCE_STEP)
         moved, _ = self.functions.jacobians(z + nudge * rates, u + nudge * input_step, self.p)

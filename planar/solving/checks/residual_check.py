@@ -34,7 +34,7 @@ NEGLIGIBLE_ERROR = 1e-7
 MAX_RATE_ERROR = 1e-3
 """Angles (rad) and rates that may have greater relative errors are no answer: less than three digits are sure."""
 SHORT_ARM = EPS / (NEGLIGIBLE_ERROR * 1e-2**2)
-"""Sizes: where no link has a shorter arm and no group is nearer than 1e-2 to being singular, which backends keep clear
+"""Sizes: where no link has a shorter arm and no block is nearer than 1e-2 to being singular, which backends keep clear
 of, rounding surely takes no more than that."""
 
 

@@ -22,6 +22,7 @@ from planar.solving.continuation.second_order import (
     branch_directions,
     is_same_direction,
     nearest_direction,
+    solve_third_order,
 )
 from planar.solving.continuation.solution_curve import Arc, CurvePoint, SolutionCurve, fit_polynomial
 from planar.solving.newton import settle
@@ -33,7 +34,7 @@ ON_BRANCH_RATIO = 1e-2
 START_DISTANCE_TOLERANCE = 1e-6
 """rad or sizes: so far a position on a change point is from it at most, known to the root of rounding."""
 AT_BIFURCATION_DISTANCE = 1e-5
-"""So near to a singular slope a start may be a change point, known to the root of rounding."""
+"""So near to a singular Jacobian a start may be a change point, known to the root of rounding."""
 ZERO_INPUT_RATE = 1e-7
 """A rate of the inputs along a way below this is none."""
 HALF_ARC_LENGTH, MIN_HALF_ARC_LENGTH = 0.02, 1e-4
@@ -43,7 +44,7 @@ ARC_FIT_TOLERANCE = 1e-11
 
 
 class BifurcationCandidate(NamedTuple):
-    """The point nearest to which the slope has more than one null vector, those (n + 1, k), and what the constraints
+    """The point nearest to which the Jacobian has more than one null vector, those (n + 1, k), and what the constraints
     leave open there: nothing but rounding at a change point, more where the curve only comes near one."""
 
     y: Array
@@ -56,7 +57,7 @@ class Bifurcation(NamedTuple):
     leads from where the walk came.
 
     `whole` says whether these are all; where ways touch one another, or are many without an end, they are not told.
-    `lost` is how much rank the slope lacks.
+    `lost` is how much rank the Jacobian lacks.
     """
 
     y: Array
@@ -66,7 +67,7 @@ class Bifurcation(NamedTuple):
 
 
 def bifurcation_candidates(curve: SolutionCurve, here: CurvePoint) -> Iterator[BifurcationCandidate]:
-    """The points next to this one at which the slope has more than one null vector, those that Newton finds.
+    """The points next to this one at which the Jacobian has more than one null vector, those that Newton finds.
 
     Gauss and Newton's method for F = 0, J A = 0 with A0^T A = 1: regular wherever branches cross at an angle, and for
     any number of redundant constraints. Where several loops come near one at once, each is looked for.
@@ -86,7 +87,7 @@ def bifurcation_candidates(curve: SolutionCurve, here: CurvePoint) -> Iterator[B
 
 
 def _refine_candidate(curve: SolutionCurve, y: Array, null_start: Array) -> BifurcationCandidate | None:
-    """The point next to y at which the slope has null vectors next to these (n + 1, k)."""
+    """The point next to y at which the Jacobian has null vectors next to these (n + 1, k)."""
     size, count = null_start.shape
 
     def augmented(x: Array) -> tuple[Array, Array]:
@@ -148,14 +149,14 @@ class _BranchConditions:
         base = -self.vt[:rank].T @ ((self.u[:, :rank].T @ curve.second_derivative(self.y, v)) / self.s[:rank])
         # of the null space only what is normal to the tangent
         across = np.linalg.svd(c[None])[2][1:].T
-        slope = 3.0 * (self.forms @ c) @ across
-        if np.linalg.svd(slope, compute_uv=False)[-1] < SINGULAR_TOLERANCE:
-            return None
-        third = curve.functions.third_rate_remainder(
-            curve.unknowns_and_inputs(self.y), curve.widen_direction(v), curve.widen_direction(base), curve.p
-        )
-        e = np.linalg.lstsq(slope, -(self.left_null.T @ third), rcond=None)[0]
-        return CurvePoint(self.y, v, base + self.null @ (across @ e), 0.0)
+        whole, ahead = curve.unknowns_and_inputs(self.y), curve.widen_direction(v)
+
+        def third_order(e: Array) -> Array:
+            second = curve.widen_direction(base + self.null @ (across @ e))
+            return self.left_null.T @ curve.functions.third_rate_remainder(whole, ahead, second, curve.p)
+
+        e = solve_third_order(third_order, across.shape[1])
+        return None if e is None else CurvePoint(self.y, v, base + self.null @ (across @ e), 0.0)
 
 
 def bifurcation_ahead(curve: SolutionCurve, here: CurvePoint, y: Array) -> Bifurcation | None:

@@ -62,11 +62,7 @@ class WatchedOutputs(NamedTuple):
         frames, own = frames_from_coordinates(
             [Jet(*each) for each in parts.tolist()], setup.column, setup.shapes, setup.pairs
         )
-        found = []
-        for pair in self.pairs:
-            numbers = pair.measure([setup.shapes[link] for link in pair.bodies])
-            drive = pair.input_position([frames[link] for link in pair.bodies], numbers, own.get(pair.name, ()))
-            found.append(value_and_rates(drive))
+        found = [value_and_rates(pair.input_position_at(setup.shapes, frames, own)) for pair in self.pairs]
         return np.array(found, dtype=float)
 
     def piece_end(self, curve: SolutionCurve, point: CurvePoint) -> _PieceEnd:

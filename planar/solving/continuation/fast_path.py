@@ -16,7 +16,7 @@ from planar.solving.checks.singular_values import SINGULAR_DISTANCE_RATIO
 from planar.solving.prepared_mechanism import PositionInputs, PreparedMechanism
 
 MIN_FAST_REGULARITY = 1e-3
-"""Strength of a group from which on its rates are taken as they come; what is weaker is looked at in doubles' whole
+"""Strength of a block from which on its rates are taken as they come; what is weaker is looked at in doubles' whole
 precision, see `regularity.SINGULAR_TOLERANCE`."""
 MIN_SINGULAR_VALUE = 0.05
 """Least singular value (columns of one size) at both ends of a stride: no change point is near, not even of a
@@ -54,7 +54,7 @@ def fast_position(setup: PreparedMechanism, z: Array) -> FastPosition | None:
 
 
 def is_surely_regular(setup: PreparedMechanism, z: Array) -> bool:
-    """Whether every group is surely determined at a position."""
+    """Whether every block is surely determined at a position."""
     if setup.acceptance is None:
         return False
     s = setup.inputs
@@ -128,7 +128,7 @@ class FastRun(NamedTuple):
 
 def fast_run(setup: FastSolver, z: Array, u: Array, u1: Array, u2: Array) -> FastRun | None:
     """A run along a straight way of inputs (rows, inputs) with rates u1, u2 from the unknowns of its first row, as far
-    as it is surely sound: both parts of the gate, rates, contacts. None for what is no such run."""
+    as it is surely sound: both checks, rates, contacts. None for what is no such run."""
     judged, p = setup.acceptance, setup.inputs.p
     if judged is None or not u.size:
         return None
@@ -175,7 +175,7 @@ def _is_accepted(setup: PreparedMechanism, verdict: AcceptanceResult[float]) -> 
 def _keeps_branch(starts: IntArray, z: Array, gone: Array, rates: Array, distances: Array, square: float) -> BoolArray:
     """For each step of a run whether it keeps to its branch; see `branch`.
 
-    Steps have `gone` (steps,) along the axis of the inputs; rates `ways` (rows, unknowns) and distances (rows, stages)
+    Steps have `gone` (steps,) along the axis of the inputs; rates `ways` (rows, unknowns) and distances (rows, blocks)
     are along it too.
     """
     step = gone[:, None]

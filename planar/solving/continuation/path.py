@@ -43,7 +43,7 @@ class FollowedSamples(NamedTuple):
     """Unknowns at every sample that was reached (samples, unknowns), how many of them the general path had to solve,
     and why the rest was not reached, if not, with the last unknowns and inputs before that.
 
-    `local` are rates by sample where the slope is singular; `met` the change points passed, `missed` those near by.
+    `local` are rates by sample where the Jacobian is singular; `met` the change points passed, `missed` those near by.
     """
 
     z: Array
@@ -115,7 +115,7 @@ class PathFollower:
         return found[0], found[1]
 
     def unknowns_at(self, position: float) -> tuple[Array, BranchRates | None] | None:
-        """The unknowns so far along the way, with rates where the slope is singular; None if it ends before."""
+        """The unknowns so far along the way, with rates where the Jacobian is singular; None if it ends before."""
         self._wanted = position
         while self._piece is None or not self.has_position(position):
             if self.dead_point is not None:
@@ -175,7 +175,7 @@ def follow_samples(
 ) -> FollowedSamples:
     """The unknowns at every sample of a run of inputs u (samples, inputs), from those of the first.
 
-    The whole run is one call of the compiled program; every sample then passes both parts of the gate, and from
+    The whole run is one call of the compiled program; every sample then passes both checks, and from
     one that does not the general path goes on until the compiled program can take over again. With first and second
     `rates` of the inputs the run tells those of its samples as well, so far as they are surely sound. What the general
     path does is counted in `work`.
@@ -340,7 +340,7 @@ def path_end_refusal(solver: PathSolver, trip: PathFollower) -> NoAnswer:
 
 
 def _count_accepted(solver: PathSolver, p: Array, z: Array, u: Array) -> int:
-    """How many samples after the first pass both parts of the gate, up to the first that does not."""
+    """How many samples after the first pass both checks, up to the first that does not."""
     closed = solver.max_residuals(z, u) <= solver.tolerance
     whole = len(closed) if closed.all() else int(np.argmin(closed))
     if whole < 2:

@@ -22,7 +22,7 @@ END_TOLERANCE = 1e-9
 
 class BranchRates(NamedTuple):
     """Rates where a slope is singular: first, second and third derivative of the unknowns (3, unknowns) by the distance
-    of the inputs along a way; and how much rank the slope lacks at the change point."""
+    of the inputs along a way; and how much rank the Jacobian lacks at the change point."""
 
     rates: Array
     input_direction: Array
@@ -53,7 +53,7 @@ class PathPiece(NamedTuple):
         return min(self.start, self.stop) <= position <= max(self.start, self.stop)
 
     def unknowns_at(self, curve: SolutionCurve, position: float) -> tuple[Array, BranchRates | None]:
-        """The unknowns where the inputs are at a place, with their rates where the slope is singular."""
+        """The unknowns where the inputs are at a place, with their rates where the Jacobian is singular."""
         arc = self.arc
         if self.dead_point is not None and position == self.stop:
             return self.dead_point.y[:-1], None

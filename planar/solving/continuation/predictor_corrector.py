@@ -21,15 +21,26 @@ from planar.solving.continuation.bifurcation import (
     bifurcation_candidates,
     branch_crossing,
 )
-from planar.solving.continuation.solution_curve import Arc, CurvePoint, CurveSolver, SolutionCurve, arc_between
+from planar.solving.continuation.solution_curve import (
+    Arc,
+    CurvePoint,
+    CurveSolver,
+    ImplicitCurve,
+    SolutionCurve,
+    arc_between,
+)
 from planar.solving.continuation.turning_points import start_point
 
 FIRST_STEP, LONGEST_STEP, SHORTEST_STEP = 0.05, 0.25, 1e-9
 """Steps of arc length (rad, lengths of the size): the first, the longest, and one at which the curve ends."""
 MAX_TANGENT_TURN = 0.4
 """rad by which the tangent may turn in a step."""
+FIRST_TURN_RATIO, FIRST_DISTANCE_RATIO = 0.8, 1.2
+"""Steps that are tried first: by what they turn of that, and as parts of the distance from singular positions."""
+MAX_CORRECTED_RATIO, STEP_GROWTH = 2.0, 1.6
+"""How many times longer than its step a move may be, and a next step than one that was taken."""
 SEARCH_DISTANCE, REPEATED_SEARCH_RATIO = 0.15, 0.2
-"""Where to look for a change point: so near to a singular slope, and again where it is so many times nearer."""
+"""Where to look for a change point: so near to a singular Jacobian, and again where it is so many times nearer."""
 MAX_AHEAD_RATIO = 10.0
 """A change point farther ahead than so many times the distance within which there is none is another one."""
 MAX_ARCS = 5_000
@@ -40,7 +51,7 @@ SHOWN_SLIDE_EXTENT = 100.0
 """Lengths of the size, or times the greatest number of a pair: so far out a slide is shown that goes out without an
 end."""
 MAX_SLIDE_EXTENT = 6e6
-"""Lengths of the size: farther out than this the gate tells nothing."""
+"""Lengths of the size: farther out than this the residual check tells nothing."""
 MIN_LIMIT_POWER = 0.25
 """Where a slide goes out without an end the inputs tend to a limit with a power of the slide's inverse; beyond half of
 the square root, which is the lowest that lines becoming parallel give, they do."""
@@ -87,6 +98,27 @@ class ArcBudget:
         return self.arcs_left >= 0
 
 
+def next_point(curve: ImplicitCurve, here: CurvePoint, longest: float) -> tuple[CurvePoint | None, float]:
+    """The next point of a curve, and the step to it, no longer than `longest`; None where no step leads on.
+
+    A predictor of second order, Newton's corrector; a step that turns the tangent, or that could pass a singular
+    position, is halved.
+    """
+    bent = max(float(np.linalg.norm(here.curvature)), 1e-300)
+    step = min(longest, FIRST_DISTANCE_RATIO * here.regular_distance, FIRST_TURN_RATIO * MAX_TANGENT_TURN / bent)
+    while step > SHORTEST_STEP:
+        y = curve.correct(here.y + step * here.tangent + 0.5 * step**2 * here.curvature, here.tangent)
+        if y is not None:
+            after = curve.point_at(y, here.tangent)
+            gone = float(np.linalg.norm(y - here.y))
+            onwards = after.tangent @ here.tangent > np.cos(MAX_TANGENT_TURN)
+            is_regular = SINGULAR_DISTANCE_RATIO * gone < here.regular_distance + after.regular_distance
+            if onwards and is_regular and gone < MAX_CORRECTED_RATIO * step:
+                return after, step
+        step *= 0.5
+    return None, step
+
+
 class CurveTracker:
     """One walk along a curve from a point: its arcs, one after the other, and what it met on the way.
 
@@ -111,14 +143,13 @@ class CurveTracker:
         self.far_point: CurvePoint | None = None
         "where a slide has come out far, and went on"
         equations = curve.functions.equations
-        kinds = [equations.coordinates[column].kind for column in equations.unknowns]
-        self._is_length = np.array([kind is MeasureKind.LENGTH for kind in kinds], dtype=bool)
+        self._is_length = ~equations.unknown_is_angle
         turns = any(
             kind is not MeasureKind.LENGTH
             for kind, way in zip(equations.input_kinds, curve.input_direction, strict=True)
             if way
         )
-        self.is_periodic = np.append(~self._is_length, turns)
+        self.is_periodic = np.append(equations.unknown_is_angle, turns)
         "which entries of y come back after whole turns: angles, and the place of inputs that turn"
 
     @classmethod
@@ -215,29 +246,17 @@ class CurveTracker:
         return float(np.max(np.abs(y[:-1][self._is_length]), initial=0.0))
 
     def _next_point(self) -> CurvePoint | None:
-        """The next point: a predictor of second order, Newton's corrector, and the second part of the gate."""
+        """The next point, as far ahead as the curve and slides that are far out allow."""
         here, curve = self.point, self.curve
-        bent = float(np.linalg.norm(here.curvature))
         # far out a step of a slide may be longer, but not that of an angle
         out = max(self._slide_extent(here.y), 0.0 if self.is_periodic[-1] else abs(float(here.y[-1])))
         turning = float(np.max(np.abs(here.tangent[self.is_periodic]), initial=0.0))
         longest = LONGEST_STEP / max(turning, min(1.0, NEAR_SLIDE_EXTENT / max(out, 1.0)))
-        step = min(self.step, longest, 1.2 * here.regular_distance, 0.8 * MAX_TANGENT_TURN / max(bent, 1e-300))
-        while step > SHORTEST_STEP:
-            y = curve.correct(here.y + step * here.tangent + 0.5 * step**2 * here.curvature, here.tangent)
-            if y is not None:
-                after = curve.point_at(y, here.tangent)
-                gone = float(np.linalg.norm(y - here.y))
-                onwards = after.tangent @ here.tangent > np.cos(MAX_TANGENT_TURN)
-                if (
-                    onwards
-                    and SINGULAR_DISTANCE_RATIO * gone < here.regular_distance + after.regular_distance
-                    and gone < 2.0 * step
-                ):
-                    self.step = 1.6 * step
-                    return after
-            step *= 0.5
-        return None
+        step = min(self.step, longest)
+        after, taken = next_point(curve, here, step)
+        if after is not None:
+            self.step = STEP_GROWTH * taken
+        return after
 
     def _arcs_through_bifurcation(self) -> Iterator[Arc]:
         """The arcs through a change point that lies just ahead, if one does."""

@@ -1,11 +1,15 @@
-"""Directions of the branches through a singular position: those in which the conditions of second order are met.
+"""Branches through a singular position: their directions by the conditions of second order, what follows by the third.
 
 Constraints F = 0 with a Jacobian J that has null vectors N (n, k) and left ones L allow to second order the directions
-v = N c with L^T F''(v, v) = 0: quadratic forms in c, one for each left null vector. (A. Mueller, Higher-order analysis
+v = N c with L^T F''(v, v) = 0: quadratic forms in c, one for each left null vector. Their second
+derivatives w with J w + F''(v, v) = 0 allow to third order those with L^T (F'''(v, v, v) + 3 F''(v, w)) = 0, which is
+linear in w. (A. Mueller, Higher-order analysis
 of kinematic singularities of lower pair linkages and serial manipulators, J. Mech. Robotics 10, 2018.)
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 
@@ -62,6 +66,19 @@ def branch_directions(forms: Array, tolerance: float = EXACT_FORM_TOLERANCE) -> 
 def is_same_direction(c: Array, other: Array) -> bool:
     """Whether two directions of length one are one, whichever sense they have."""
     return bool(min(np.linalg.norm(c - other), np.linalg.norm(c + other)) <= SAME_DIRECTION_TOLERANCE)
+
+
+def solve_third_order(condition: Callable[[Array], Array], count: int, tolerance: float = np.inf) -> Array | None:
+    """The part e (count,) of a second derivative in the null space that meets a condition (forms,) linear in it.
+
+    None where it leaves e open, or is not met within this part of one and of its size.
+    """
+    base = condition(np.zeros(count))
+    jacobian = np.stack([condition(unit) - base for unit in np.eye(count)], axis=1)
+    if np.linalg.svd(jacobian, compute_uv=False)[-1] < SINGULAR_TOLERANCE:
+        return None
+    e = np.linalg.lstsq(jacobian, -base, rcond=None)[0]
+    return e if np.max(np.abs(base + jacobian @ e)) <= tolerance * (1.0 + np.max(np.abs(base))) else None
 
 
 def _roots_of_two(forms: Array, tolerance: float) -> list[Array]:

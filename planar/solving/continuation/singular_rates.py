@@ -17,7 +17,7 @@ from planar.equations.functions import EquationRates
 from planar.foundation.arrays import Array
 from planar.solving.checks.singular_values import SINGULAR_TOLERANCE
 from planar.solving.continuation.bifurcation import ZERO_INPUT_RATE
-from planar.solving.continuation.second_order import EXACT_SINGULAR_TOLERANCE, branch_directions
+from planar.solving.continuation.second_order import EXACT_SINGULAR_TOLERANCE, branch_directions, solve_third_order
 from planar.solving.prepared_mechanism import PreparedMechanism
 
 CONDITION_TOLERANCE, FORM_TOLERANCE = 1e-6, 1e-5
@@ -128,16 +128,9 @@ class _RateConditions:
         base = -np.linalg.pinv(known.jacobian, rcond=SINGULAR_TOLERANCE) @ known.F2
         free = tangents.null[:, 0]
 
-        def open_at(e: float) -> Array:
-            return tangents.left_null.T @ self.program.third_rate_remainder(
-                *self._with_inputs(z, z1, base + e * free), self.p
-            )
+        def third_order(e: Array) -> Array:
+            whole = self._with_inputs(z, z1, base + e[0] * free)
+            return tangents.left_null.T @ self.program.third_rate_remainder(*whole, self.p)
 
-        here, above = open_at(0.0), open_at(1.0)
-        slope = above - here
-        if np.linalg.norm(slope) < CONDITION_TOLERANCE:
-            return None
-        e = -float(slope @ here) / float(slope @ slope)
-        if np.max(np.abs(here + e * slope)) > FORM_TOLERANCE * (1.0 + np.max(np.abs(here))):
-            return None
-        return base + e * free
+        e = solve_third_order(third_order, 1, FORM_TOLERANCE)
+        return None if e is None else base + e[0] * free

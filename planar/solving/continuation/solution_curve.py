@@ -10,7 +10,7 @@ import numpy as np
 from planar.equations.functions import EquationFunctions
 from planar.foundation.arrays import Array
 from planar.solving.checks.singular_values import DIFFERENCE_STEP, column_norms, singular_distance
-from planar.solving.newton import correct, correct_at_rank
+from planar.solving.newton import SystemFunction, correct, correct_at_rank
 
 MAX_CORRECTIONS = 10
 CLOSED_TOLERANCE = 1e-10
@@ -18,7 +18,7 @@ CLOSED_TOLERANCE = 1e-10
 ZERO_SINGULAR_VALUE = 1e-10
 """A singular value that is this part of the greatest is zero to rounding."""
 MIN_COLUMN_NORM = 1e-6
-"""A column of the slope is judged by its own size, down to this part of the size of the mechanism."""
+"""A column of the Jacobian is judged by its own size, down to this part of the size of the mechanism."""
 
 
 REGULAR_SINGULAR_VALUE = 1e-4
@@ -26,7 +26,7 @@ REGULAR_SINGULAR_VALUE = 1e-4
 MAX_TANGENT_RATIO = 100.0
 """How many times longer than its part in the direction asked for a tangent may be for that."""
 SHORT_REGULAR_DISTANCE = 0.25
-"""rad or sizes: a distance from singular slopes from which on no step is shortened."""
+"""rad or sizes: a distance from singular Jacobians from which on no step is shortened."""
 MAX_SOLVED_STEP = 1e3
 """A longer step is that of a singular system, solved once more in the sense of least squares."""
 
@@ -41,12 +41,12 @@ class CurveSolver(Protocol):
 
     @property
     def tolerance(self) -> float:
-        """What the gate lets pass."""
+        """What the residual check lets pass."""
 
 
 class CurvePoint(NamedTuple):
     """A point of the curve: y = (unknowns, how far the inputs are on their way), (n + 1,), its unit tangent, its second
-    derivative by arc length, and how far it is at least to where the slope could lose rank."""
+    derivative by arc length, and how far it is at least to where the Jacobian could lose rank."""
 
     y: Array
     tangent: Array
@@ -63,32 +63,19 @@ class CurvePoint(NamedTuple):
         return self._replace(tangent=-self.tangent)
 
 
-class SolutionCurve:
-    """All positions F(z, start + t way) = 0 near by, as a curve in y = (z, t): dead points are on it as any others.
+class ImplicitCurve:
+    """A curve F(y) = 0 in y (n + 1,) by its residuals (rows,) and Jacobian J (rows, n + 1) alone.
 
-    Lengths are in sizes of the mechanism, angles in rad. The slope J = dF/dy (rows, n + 1) has rank n but at change
-    points; its null vector is the tangent. E. Allgower, K. Georg, Introduction to Numerical Continuation Methods, 2003.
+    J has rank n but where curves cross; its null vector is the tangent. E. Allgower, K. Georg, Introduction to
+    Numerical Continuation Methods, 2003.
     """
 
-    def __init__(self, solver: CurveSolver, p: Array, start: Array, way: Array):
-        self.solver, self.functions, self.p, self.start, self.input_direction = solver, solver.functions, p, start, way
+    def __init__(self, system: SystemFunction):
+        self._system = system
 
-    def inputs(self, y: Array) -> Array:
-        """The inputs (inputs,) at a point, or at points (points, inputs)."""
-        return self.start + y[..., -1:] * self.input_direction
-
-    def unknowns_and_inputs(self, y: Array) -> Array:
-        """Unknowns and inputs at a point, as the program takes them."""
-        return np.concatenate([y[:-1], self.inputs(y)])
-
-    def widen_direction(self, direction: Array) -> Array:
-        """A direction along the curve, as one of unknowns and inputs."""
-        return np.concatenate([direction[:-1], direction[-1] * self.input_direction])
-
-    def narrow_columns(self, matrix: Array) -> Array:
-        """A matrix whose columns belong to unknowns and inputs, as one whose columns belong to y."""
-        many = len(matrix[0]) - len(self.input_direction) if matrix.size else 0
-        return np.hstack([matrix[:, :many], matrix[:, many:] @ self.input_direction[:, None]])
+    def residuals_and_jacobian(self, y: Array) -> tuple[Array, Array]:
+        """F (rows,) and J (rows, n + 1)."""
+        return self._system(y)
 
     def jacobian(self, y: Array) -> Array:
         """J (rows, n + 1)."""
@@ -98,23 +85,10 @@ class SolutionCurve:
         """F (rows,)."""
         return self.residuals_and_jacobian(y)[0]
 
-    def residuals_and_jacobian(self, y: Array) -> tuple[Array, Array]:
-        """F (rows,) and J (rows, n + 1)."""
-        left, slope = self.functions.residuals_and_jacobian(y[:-1], self.inputs(y), self.p)
-        many = len(y) - 1
-        narrow = np.empty((len(slope), many + 1))
-        narrow[:, :many] = slope[:, :many]
-        narrow[:, many] = slope[:, many:] @ self.input_direction
-        return left, narrow
-
     def second_derivative(self, y: Array, direction: Array) -> Array:
         """The second derivative of F along a direction (rows,)."""
-        wide = self.widen_direction(direction)
-        return self.functions.kinematics(self.unknowns_and_inputs(y), wide, 0.0 * wide, self.p).F2
-
-    def is_closed(self, y: Array) -> bool:
-        """Whether a point passes the first part of the gate."""
-        return bool(self.solver.max_residuals(y[None, :-1], self.inputs(y)[None])[0] <= self.solver.tolerance)
+        change = self.jacobian(y + DIFFERENCE_STEP * direction) - self.jacobian(y)
+        return change @ direction / DIFFERENCE_STEP
 
     def point_at(self, y: Array, towards: Array) -> CurvePoint:
         """The point at y, its tangent less than a right angle from a direction."""
@@ -144,6 +118,64 @@ class SolutionCurve:
             return 1.0
         return float(np.linalg.svd(slope / column_norms(slope, MIN_COLUMN_NORM), compute_uv=False)[many - 1])
 
+    def _regular_distance(self, y: Array, tangent: Array, jacobian: Array, least: float) -> float:
+        """How far along the curve J is known to keep its rank: not asked of a curve that may cross others."""
+        return np.inf
+
+    def correct(self, y: Array, normal: Array) -> Array | None:
+        """The point of the curve near y in the plane through y with this normal; None where Newton finds none."""
+
+        def step(slope: Array, left: Array) -> Array:
+            return _solve_shortest(np.vstack([slope, normal]), np.append(-left, 0.0))
+
+        y, gap = correct(self.residuals_and_jacobian, step, y, MAX_CORRECTIONS)
+        return y if gap <= CLOSED_TOLERANCE * max(1.0, float(np.max(np.abs(y)))) else None
+
+
+class SolutionCurve(ImplicitCurve):
+    """All positions F(z, start + t way) = 0 near by, as a curve in y = (z, t): dead points are on it as any others.
+
+    Lengths are in sizes of the mechanism, angles in rad. J = dF/dy loses rank at change points.
+    """
+
+    def __init__(self, solver: CurveSolver, p: Array, start: Array, way: Array):
+        self.solver, self.functions, self.p, self.start, self.input_direction = solver, solver.functions, p, start, way
+
+    def inputs(self, y: Array) -> Array:
+        """The inputs (inputs,) at a point, or at points (points, inputs)."""
+        return self.start + y[..., -1:] * self.input_direction
+
+    def unknowns_and_inputs(self, y: Array) -> Array:
+        """Unknowns and inputs at a point, as the program takes them."""
+        return np.concatenate([y[:-1], self.inputs(y)])
+
+    def widen_direction(self, direction: Array) -> Array:
+        """A direction along the curve, as one of unknowns and inputs."""
+        return np.concatenate([direction[:-1], direction[-1] * self.input_direction])
+
+    def narrow_columns(self, matrix: Array) -> Array:
+        """A matrix whose columns belong to unknowns and inputs, as one whose columns belong to y."""
+        many = len(matrix[0]) - len(self.input_direction) if matrix.size else 0
+        return np.hstack([matrix[:, :many], matrix[:, many:] @ self.input_direction[:, None]])
+
+    def residuals_and_jacobian(self, y: Array) -> tuple[Array, Array]:
+        """F (rows,) and J (rows, n + 1)."""
+        left, slope = self.functions.residuals_and_jacobian(y[:-1], self.inputs(y), self.p)
+        many = len(y) - 1
+        narrow = np.empty((len(slope), many + 1))
+        narrow[:, :many] = slope[:, :many]
+        narrow[:, many] = slope[:, many:] @ self.input_direction
+        return left, narrow
+
+    def second_derivative(self, y: Array, direction: Array) -> Array:
+        """The second derivative of F along a direction (rows,)."""
+        wide = self.widen_direction(direction)
+        return self.functions.kinematics(self.unknowns_and_inputs(y), wide, 0.0 * wide, self.p).F2
+
+    def is_closed(self, y: Array) -> bool:
+        """Whether a point passes the residual check."""
+        return bool(self.solver.max_residuals(y[None, :-1], self.inputs(y)[None])[0] <= self.solver.tolerance)
+
     def _regular_distance(self, y: Array, tangent: Array, slope: Array, least: float) -> float:
         """How far along the curve J keeps its rank: until it has changed by its least singular value (Weyl).
 
@@ -162,19 +194,10 @@ class SolutionCurve:
         turned = np.linalg.lstsq(slope / sizes, change, rcond=0.1 * ZERO_SINGULAR_VALUE)[0]
         return max(clear, 1.0 / max(float(np.linalg.norm(turned)), 1e-300))
 
-    def correct(self, y: Array, normal: Array) -> Array | None:
-        """The point of the curve near y in the plane through y with this normal; None where Newton finds none."""
-
-        def step(slope: Array, left: Array) -> Array:
-            return _solve_shortest(np.vstack([slope, normal]), np.append(-left, 0.0))
-
-        y, gap = correct(self.residuals_and_jacobian, step, y, MAX_CORRECTIONS)
-        return y if gap <= CLOSED_TOLERANCE * max(1.0, float(np.max(np.abs(y)))) else None
-
     def correct_beside_bifurcation(self, y: Array, rank_loss: int, with_inputs: bool) -> Array:
         """A position beside a change point, closed to round-off but not moved from one branch to the other.
 
-        `rank_loss` is by how much the slope's rank falls at the change point; the inputs move only `with_inputs`.
+        `rank_loss` is by how much the Jacobian's rank falls at the change point; the inputs move only `with_inputs`.
         """
         many = len(y) - 1
         return correct_at_rank(self.residuals_and_jacobian, y, many - rank_loss, many + with_inputs)

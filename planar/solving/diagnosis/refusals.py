@@ -195,7 +195,7 @@ def motion_ended(setup: PreparedMechanism, links: Sequence[str], where: str, end
 
 
 def not_closed(setup: PreparedMechanism, pair: str, gap: float, at: str = "") -> NoAnswer:
-    """A position that the gate does not let pass; the file's own, or another in words."""
+    """A position that the residual check does not let pass; the file's own, or another in words."""
     return NoAnswer(
         Outcome.CANNOT_BE_ASSEMBLED,
         f"{at or setup.describe_position()} the nearest position leaves pair {pair!r} open by {gap:.2g} of the "
@@ -218,7 +218,7 @@ def open_contact(setup: PreparedMechanism, pair: str, gap: float) -> NoAnswer:
 
 
 def not_assembled(setup: PreparedMechanism, failure: AssemblySearchFailure) -> NoAnswer:
-    """A group that cannot be joined: by how much, at which pair, and what would mend it."""
+    """A block that cannot be joined: by how much, at which pair, and what would mend it."""
     from planar.solving.diagnosis.remedy import describe_remedy
 
     stage = failure.stage
@@ -279,7 +279,7 @@ def disagreeing_inputs(setup: PreparedMechanism, mobility: int, what: str) -> No
 
 
 def broken_rates(setup: PreparedMechanism, what: str, pair: str, gap: float, at: str = "") -> NoAnswer:
-    """Rates that the gate does not let pass, at the file's own position or at another in words."""
+    """Rates that the residual check does not let pass, at the file's own position or at another in words."""
     return NoAnswer(
         Outcome.DEAD_POINT,
         f"{at or setup.describe_position()} the {what} break pair {pair!r} by {gap:.2g} of the greatest; move "

@@ -29,14 +29,14 @@ MAX_DIMENSIONS = 40
 MAX_NEWTON_STEPS = 30
 """Newton's steps of a number; what stays open falls about linearly with it, so a few do."""
 MAX_HALVINGS = 4
-"""Times that a step is halved since the groups before do not go together where it leads."""
+"""Times that a step is halved since the blocks before do not go together where it leads."""
 MAX_STEP = 1.0
 """The farthest that a step goes (sizes, rad)."""
 CLOSED_TOLERANCE = 1e-9
 MIN_DECREASE = 0.1
 """Below CLOSED steps go on as long as each leaves only so much of what the one before left open."""
 OVERSHOOT_RATIO = 1e-4
-"""Where so much of the last step less leaves a group open, the step did not go too far."""
+"""Where so much of the last step less leaves a block open, the step did not go too far."""
 ROUNDING_TOLERANCE = 1e-6
 SMALLER_CHANGE_RATIO = 0.99
 """Part of a change that is tried for whether it will do."""
@@ -48,23 +48,23 @@ MAX_CHANGES_TRIED = 4
 """Changes, the least first, that are tried by assembling the whole."""
 PRINTED_DIGITS, ALL_DIGITS = 5, 15
 MIN_BLOCK_BUDGET = 200
-"""Groups that may be solved in search of a remedy though that of an assembly took fewer."""
+"""Blocks that may be solved in search of a remedy though that of an assembly took fewer."""
 MOVED_BLOCK_COST = 0.1
-"""What it takes to move a group on from where it was, for one of solving it from a sketch."""
+"""What it takes to move a block on from where it was, for one of solving it from a sketch."""
 
 
 class BlockBudgetSpent(Exception):
-    """More groups would have to be solved than may be."""
+    """More blocks would have to be solved than may be."""
 
 
 class BlockBudget:
-    """How many groups may yet be solved."""
+    """How many blocks may yet be solved."""
 
     def __init__(self, groups: float):
         self.blocks_left = groups
 
     def spend(self, groups: float) -> None:
-        """Count groups. Raises BlockBudgetSpent where there are none left."""
+        """Count blocks. Raises BlockBudgetSpent where there are none left."""
         self.blocks_left -= groups
         if self.blocks_left < 0.0:
             raise BlockBudgetSpent
@@ -255,7 +255,7 @@ def _closing_value(
         if here is None or beside is None:
             if retreats == MAX_HALVINGS:
                 break
-            value, retreats = 0.5 * (open_at + value), retreats + 1  # there the groups before it do not close
+            value, retreats = 0.5 * (open_at + value), retreats + 1  # there the blocks before it do not close
             continue
         nearest = here.nearest_unknowns()
         gap = float(np.linalg.norm(here.residuals(nearest)))
@@ -294,7 +294,7 @@ def _closing_boundary(
     z: Array,
     effort: BlockBudget,
 ) -> float:
-    """Of a value at which a group is open and one at which it is closed, the one between them where that changes.
+    """Of a value at which a block is open and one at which it is closed, the one between them where that changes.
 
     The last step of Newton's method may have gone too far.
     """
@@ -312,14 +312,14 @@ def _closing_boundary(
 
 
 class _ChangedBlock:
-    """What a group leaves open when numbers have been changed, the groups before it standing where they then do."""
+    """What a block leaves open when numbers have been changed, the blocks before it standing where they then do."""
 
     def __init__(self, setup: PreparedMechanism, stage: Block, z: Array, u: Array, p: Array):
         self._stage, self._z = stage, z
         self._residual_function = block_residual_function(setup.functions, stage, z, u, p)
 
     def nearest_unknowns(self) -> Array:
-        """All unknowns (unknowns,), those of the group where it is nearest to closing."""
+        """All unknowns (unknowns,), those of the block where it is nearest to closing."""
         z = self._z.copy()
         z[self._stage.unknowns] = damped_newton(self._residual_function, self._z[None, self._stage.unknowns]).unknowns[
             0
@@ -327,14 +327,14 @@ class _ChangedBlock:
         return z
 
     def residuals(self, z: Array) -> Array:
-        """What is left open (rows,) with the group's unknowns as in z (unknowns,)."""
+        """What is left open (rows,) with the block's unknowns as in z (unknowns,)."""
         return self._residual_function(z[None, self._stage.unknowns])[0][0]
 
 
 def _changed_block(
     setup: PreparedMechanism, stage: Block, mechanism: Mechanism, z: Array, effort: BlockBudget
 ) -> _ChangedBlock | None:
-    """A group of a mechanism with other numbers, those before it moved on from z; None where they cannot be."""
+    """A block of a mechanism with other numbers, those before it moved on from z; None where they cannot be."""
     effort.spend(MOVED_BLOCK_COST)
     try:
         p = pair_numbers(mechanism, shapes_of_links(mechanism), setup.unit)

@@ -183,9 +183,7 @@ def _reference_rates(setup: PreparedMechanism, slope: Array, y1: Array, y2: Arra
     """
     e = setup.equations
     many = len(e.unknowns)
-    angles = np.array(
-        [e.coordinates[c].kind is not MeasureKind.LENGTH for c in e.unknowns] + [True] * (y1.shape[1] - many)
-    )
+    angles = np.append(e.unknown_is_angle, np.ones(y1.shape[1] - many, dtype=bool))
     one, two = y1.copy(), np.maximum(y2, y1 * y1 * angles)
     for stage in e.blocks:
         own = slice(stage.unknowns.start, stage.unknowns.stop)

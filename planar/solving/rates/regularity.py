@@ -1,18 +1,16 @@
-"""How a mechanism can move from a position: its mobility by rank, and whether its inputs determine its motion."""
+"""How regular the Jacobian of a position is: of each block, its mobility by rank, the links that are free."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
-from planar.equations.constraint_equations import Block, slice_length
+from planar.equations.constraint_equations import Block
 from planar.equations.functions import EquationRates
 from planar.equations.linear import solve_vectors
 from planar.foundation.arrays import Array
-from planar.foundation.errors import NoAnswer
 from planar.solving.checks.singular_values import MIN_REGULARITY, ZERO_REGULARITY, null_space, rank
-from planar.solving.diagnosis import refusals
 from planar.solving.newton import correct_blocks
 from planar.solving.prepared_mechanism import PreparedMechanism
 
@@ -20,52 +18,27 @@ NEIGHBOUR_DISTANCE = 1e-2
 """How far (rad, or lengths of the size) a position is moved to see whether what holds there holds elsewhere."""
 
 
-class SingularPosition(Exception):
-    """A position with one freedom more than inputs, to first order; `refusal` says what to say if it is so in truth."""
-
-    def __init__(self, refused: Callable[[], NoAnswer]):
-        super().__init__()
-        self.refusal = refused
-
-
-def mobility_by_rank(setup: PreparedMechanism, z: Array, motion: EquationRates) -> int:
-    """The mobility at a position by rank; raises NoAnswer where the velocity is not determined, or contradicted.
-
-    Raises SingularPosition where the next orders have to tell whether it is determined.
+class Freedom(NamedTuple):
+    """How a mechanism can move from a position, to first order: its mobility, and the blocks that are singular there.
 
     With the inputs' positions counted as unknowns, what the pairs leave free is unknowns + inputs - rank.
     """
+
+    mobility: int
+    weak_blocks: tuple[Block, ...]
+
+
+def freedom_by_rank(setup: PreparedMechanism, motion: EquationRates) -> Freedom:
+    """The freedom at a position by rank."""
     inputs = setup.inputs.u.size
     found_weak = regularity(setup, motion.jacobian) < MIN_REGULARITY
-    weak = [stage for stage, is_weak in zip(setup.equations.blocks, found_weak, strict=True) if is_weak]
-    square = all(slice_length(stage.rows) == slice_length(stage.unknowns) for stage in setup.equations.blocks)
-    if not weak and square:
-        return inputs
+    weak = tuple(block for block, is_weak in zip(setup.equations.blocks, found_weak, strict=True) if is_weak)
     if not weak:
         # the unknowns are determined; each independent way in which the inputs break the rest is a freedom less
-        found = inputs - _contradiction_rank(motion)
-        if found < inputs and not _input_rates_agree(setup, motion):
-            raise refusals.disagreeing_inputs(setup, found, "velocities")
-        return found
-    found = (
-        z.size
-        + inputs
-        - rank(_scaled_jacobian(setup, np.hstack([motion.jacobian, motion.input_jacobian])), MIN_REGULARITY, unit=1.0)
-    )
-    links = _links_free_at_rest(setup, motion.jacobian) or list(
-        dict.fromkeys(link for stage in weak for link in stage.links)
-    )
-    if found <= inputs:
-        raise refusals.dead_point(setup, links)
-
-    def refused() -> NoAnswer:
-        from planar.solving.diagnosis.redundancy import count_motions  # only where something is refused
-
-        ways = count_motions(setup, motion.w)
-        always = any(is_always_singular(setup, stage, z) for stage in weak) if ways is None else ways > inputs
-        return refusals.always_free(setup, links) if always else refusals.change_point(setup, links, found, z)
-
-    raise SingularPosition(refused) if found == inputs + 1 else refused()
+        return Freedom(inputs - _contradiction_rank(motion), ())
+    whole = np.hstack([motion.jacobian, motion.input_jacobian])
+    held = rank(_scaled_jacobian(setup, whole), MIN_REGULARITY, unit=1.0)
+    return Freedom(len(setup.equations.unknowns) + inputs - held, weak)
 
 
 def _contradiction_rank(motion: EquationRates) -> int:
@@ -81,8 +54,8 @@ def _contradiction_rank(motion: EquationRates) -> int:
 def regularity(setup: PreparedMechanism, jacobian: Array) -> Array:
     """The least singular value of every group's slope (..., stages), each column by what its links could reach at best.
 
-    Zero at a dead point or a change point; lengths are divided by the reach of the group's links, so that neither
-    their size nor that of the whole matters. `slope` is (..., rows, unknowns).
+    Zero at a dead point or a change point; lengths are divided by the reach of the block's links, so that neither
+    their size nor that of the whole matters. `jacobian` is (..., rows, unknowns).
     """
     scaled = _scaled_jacobian(setup, jacobian)
     stages = setup.equations.blocks
@@ -100,9 +73,9 @@ def _least_singular_value(block_jacobian: Array) -> Array:
 
 
 def _scaled_jacobian(setup: PreparedMechanism, jacobian: Array) -> Array:
-    """A slope (..., rows, unknowns and inputs), every group's lengths in units of its reach, columns of one size.
+    """A Jacobian (..., rows, unknowns and inputs), every block's lengths in units of its reach, columns of one size.
 
-    The size of an unknown's column is that in its own group, whatever large or small things later groups hang on it.
+    The size of an unknown's column is that in its own block, whatever large or small things later blocks hang on it.
     A column that could reach further than it does now keeps what it lacks: it is that which vanishes.
     """
     scaled = jacobian / setup.row_scale[:, None]
@@ -113,7 +86,7 @@ def _scaled_jacobian(setup: PreparedMechanism, jacobian: Array) -> Array:
     return scaled / sizes[..., None, :]
 
 
-def _input_rates_agree(setup: PreparedMechanism, motion: EquationRates) -> bool:
+def input_rates_agree(setup: PreparedMechanism, motion: EquationRates) -> bool:
     """Whether rates of the inputs that are more than the freedom do not contradict one another."""
     left = motion.F1 - motion.jacobian @ solve_vectors(motion.jacobian, motion.F1)
     scale = np.max(np.abs(setup.inputs.u1), initial=0.0) or 1.0
@@ -121,7 +94,7 @@ def _input_rates_agree(setup: PreparedMechanism, motion: EquationRates) -> bool:
 
 
 def is_always_singular(setup: PreparedMechanism, stage: Block, z: Array) -> bool:
-    """Whether a group is singular in closed positions near by too, so that it is no matter of this one."""
+    """Whether a block is singular in closed positions near by too, so that it is no matter of this one."""
     u, p = setup.inputs.u, setup.inputs.p
     for seed in range(3):
         rng = np.random.default_rng(seed)
@@ -146,9 +119,9 @@ def jacobian_at(setup: PreparedMechanism, z: Array, u: Array) -> Array:
     return setup.functions.jacobians(z[None], u[None], setup.inputs.p)[0][0]
 
 
-def _links_free_at_rest(setup: PreparedMechanism, slope: Array) -> list[str]:
-    """The links that can move while the inputs are held, from the slope's null vectors."""
-    null = null_space(_scaled_jacobian(setup, slope), MIN_REGULARITY, unit=1.0)
+def links_free_at_rest(setup: PreparedMechanism, jacobian: Array) -> list[str]:
+    """The links that can move while the inputs are held, from the null vectors of the Jacobian."""
+    null = null_space(_scaled_jacobian(setup, jacobian), MIN_REGULARITY, unit=1.0)
     return moved_links(setup, np.max(np.abs(null), axis=1)) if null.size else []
 
 

@@ -17,7 +17,7 @@ from planar.solving.rates.accuracy import AccuracyDoubts, find_accuracy_doubts
 from planar.solving.rates.regularity import regularity
 
 MIN_REGULARITY_FOR_RATES = 1e-3
-"""Strength of a group from which on its rates are taken from its slope, however near a change point is."""
+"""Strength of a block from which on its rates are taken from its Jacobian, however near a change point is."""
 DIRECTION_TOLERANCE = 1e-9
 """A part of the inputs' rates that is this much aside of the way along which a change point was passed is none."""
 

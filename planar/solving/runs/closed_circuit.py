@@ -26,7 +26,7 @@ class CircuitBranch(NamedTuple):
         return self.pieces[0].start, self.pieces[-1].stop
 
     def unknowns_at(self, curve: SolutionCurve, position: float) -> tuple[Array, BranchRates | None]:
-        """The unknowns where the input is at a place, with their rates where the slope is singular."""
+        """The unknowns where the input is at a place, with their rates where the Jacobian is singular."""
         return next((each for each in self.pieces if each.has_position(position)), self.pieces[-1]).unknowns_at(
             curve, position
         )

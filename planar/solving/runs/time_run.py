@@ -10,7 +10,7 @@ import numpy as np
 from planar.equations.coordinates import frames_from_coordinates
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, Outcome
-from planar.foundation.jets import Jet
+from planar.foundation.jets import Jet, value_and_rates
 from planar.foundation.root_finding import find_root
 from planar.model.mechanism import Input, Mechanism
 from planar.results.motion import Motion
@@ -173,7 +173,7 @@ class _TimeCourse:
         ]
         jets = [Jet(*(float(part[column]) for part in parts)) for column in range(len(parts[0]))]
         frames, own = frames_from_coordinates(jets, solver.column, solver.shapes, solver.pairs)
-        named = solver.relative_motions[pair]
-        numbers = named.measure([solver.shapes[link] for link in named.bodies])
-        drive = named.input_position([frames[link] for link in named.bodies], numbers, own.get(pair, ()))
-        return (float(drive.parts[0]), float(drive.parts[1])) if isinstance(drive, Jet) else (float(drive), 0.0)
+        position, velocity, *_ = value_and_rates(
+            solver.relative_motions[pair].input_position_at(solver.shapes, frames, own)
+        )
+        return float(position), float(velocity)
