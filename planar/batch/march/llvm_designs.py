@@ -9,14 +9,8 @@ from collections.abc import Sequence
 from math import inf
 from typing import NamedTuple
 
-from planar.batch.march.kernel import (
-    BareAngle,
-    KernelBlock,
-    KernelEquations,
-    Operand,
-    OperandNames,
-)
-from planar.batch.march.point_outputs import PointKernelWriter
+from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations, Operand
+from planar.batch.march.llvm_kernel import KernelWriter, OperandNames
 from planar.batch.march.prediction import MAX_TURN_PER_STEP
 from planar.batch.march.regularity import LEAST_KERNEL_REGULARITY, least_regularity
 from planar.codegen.instructions import UnsupportedOperation
@@ -68,7 +62,7 @@ def write_designs_kernel(
             carried |= {angle.operand}
 
 
-class _DesignsKernelWriter(PointKernelWriter):
+class _DesignsKernelWriter(KernelWriter):
     def __init__(
         self,
         equations: KernelEquations,
@@ -81,19 +75,9 @@ class _DesignsKernelWriter(PointKernelWriter):
         super().__init__(equations, links, rates, lanes, frozenset({"p", "q", "u1", "u2"}), carried)
         self.point_blocks = levels
         self.other_points: dict[int, list[str]] = {}
-        self.state = tuple(leaf for k, turns in enumerate(equations.is_angle) for leaf in self._operands("z", k, turns))
-        self.input_operands = tuple(
-            leaf
-            for k, turns in enumerate(equations.input_is_angle)
-            for leaf in (("uc", k), ("us", k), ("u", k))[0 if turns else 2 :]
-        )
+        self.state = tuple(leaf for k in range(len(equations.is_angle)) for leaf in self.unknown_operands(k))
         self.input_count = len(equations.input_is_angle)
         self.newton_unknowns = [k for part in equations.blocks if part.closed_form is None for k in part.unknowns]
-
-    def _operands(self, name: str, k: int, turns: bool) -> list[Operand]:
-        if not turns:
-            return [(name, k)]
-        return [(name + "c", k), (name + "s", k), *([(name, k)] if self.is_carried((name, k)) else [])]
 
     def write(self) -> DesignsKernelLayout:
         """The whole function: blocks of designs, in each the steps."""

@@ -11,13 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planar.batch.march.kernel import (
-    BareAngle,
-    KernelEquations,
-    Operand,
-    OperandNames,
-)
-from planar.batch.march.point_outputs import PointKernelWriter
+from planar.batch.march.kernel import BareAngle, KernelEquations, Operand
+from planar.batch.march.llvm_kernel import KernelWriter, OperandNames
 from planar.batch.march.prediction import MAX_TURN_PER_STEP
 from planar.batch.march.regularity import LEAST_KERNEL_REGULARITY
 from planar.codegen.instructions import UnsupportedOperation
@@ -43,18 +38,13 @@ class PositionsKernelLayout(NamedTuple):
     ir: str
 
 
-class _PositionsKernelWriter(PointKernelWriter):
+class _PositionsKernelWriter(KernelWriter):
     def __init__(self, equations: KernelEquations, links: tuple[str, ...], rates: bool):
         super().__init__(equations, links, rates, LANES, frozenset({"p", "q", "u1", "u2", "sign"}), frozenset())
         if any(part.closed_form is None for part in equations.blocks):
             raise UnsupportedOperation("a group is not in closed form")
         sizes = {name: self.symbols[name].numel() for name in ("p", "q", "sign", *(("u1", "u2") if rates else ()))}
         self.numbers = tuple((name, k) for name, size in sizes.items() for k in range(size))
-        self.input_operands = tuple(
-            leaf
-            for k, turns in enumerate(equations.input_is_angle)
-            for leaf in (("uc", k), ("us", k), ("u", k))[0 if turns else 2 :]
-        )
 
     def write(self) -> PositionsKernelLayout:
         """The whole function: blocks of positions, then whether the groups keep clear of their dead points."""
