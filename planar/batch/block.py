@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -14,7 +13,7 @@ from planar.batch.general_path import OUTCOMES, SolvedDesign, solve_design
 from planar.batch.initial_assembly import find_assemblies
 from planar.batch.march.backend import DesignBatch, DesignRunner, UnsupportedStructure
 from planar.batch.march.choice import find_runner
-from planar.batch.march.numpy_backend import iterate_steps
+from planar.batch.march.numpy_backend import NumpyRunner
 from planar.batch.reference_design import ReferenceDesign, reference_design, stack_rows
 from planar.codegen.aligned_arrays import allocate_aligned
 from planar.foundation.errors import Outcome
@@ -219,10 +218,8 @@ class _DesignBlockSolver:
             return march, fit
         if far > LARGEST_INPUT_POSITION:
             return march, np.zeros_like(fit)
-        places = np.linspace(0.0, 1.0, int(np.ceil(far / LEAD_IN_STEP)) + 2)
-        with np.errstate(all="ignore"):
-            (last,) = deque(iterate_steps(march, (self.u + place * gone for place in places)), maxlen=1)
-        return march._replace(z0=last.z.T), fit & last.passed
+        z, passed = NumpyRunner().lead(march._replace(u0=self.u), gone, LEAD_IN_STEP)
+        return march._replace(z0=z), fit & passed
 
     def _with_frame_points(self, out: Array, told: Mapping[str, tuple[str, str]], shapes) -> Array:  # noqa: ANN001
         """The rows of all points, those on the frame filled in."""

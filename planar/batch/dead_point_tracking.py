@@ -7,9 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.batch.march.backend import DesignBatch, DesignRunner
-from planar.batch.march.checks import DesignBranchCheck
+from planar.batch.march.checks import PointWriter, design_positions
 from planar.batch.march.design_functions import DesignFunctions
-from planar.batch.march.numpy_backend import DesignsAtStep, PointWriter, make_residual_check
 from planar.equations.linear import solve_vectors
 from planar.solving.checks.singular_values import SINGULAR_DISTANCE_RATIO
 from planar.solving.continuation.predictor_corrector import (
@@ -120,7 +119,7 @@ class _DesignCurves:
             np.linalg.norm((self.jacobians(y + DIFFERENCE_STEP * tangent) - slope) / sizes, axis=(1, 2))
             / DIFFERENCE_STEP
         )
-        least = np.linalg.svd(np.nan_to_num(slope / sizes), compute_uv=False)[:, -1]
+        least = np.linalg.svd(np.nan_to_num(slope / sizes), compute_uv=False).min(axis=1, initial=np.inf)
         return _CurvePoints(y, tangent, bend, least / np.maximum(change, 1e-300))
 
 
@@ -281,10 +280,6 @@ class _DeadPointTracker:
         u = own.u0 + place * self.direction[:, None]
         z = columns.correct(y[:, :-1], u.T)
         fine &= np.max(np.abs(z - y[:, :-1]), axis=1, initial=0.0) < 1e-3
-        w = columns.coordinates(z, u.T)
-        branches, closed = DesignBranchCheck(columns, own.p), make_residual_check(own)
-        here = branches.evaluate(z, u.T)
-        fine &= (closed.worst_residual(w, u) <= march.tolerance) & branches.is_regular(here)
-        out = np.empty((wide, len(step)))
-        fine &= PointWriter(own, columns).write(out, DesignsAtStep(z, u, w, fine, here))
+        row, out = design_positions(columns, own, z, u), np.empty((wide, len(step)))
+        fine &= row.passed & PointWriter(own, columns).write(out, row)
         return out, fine

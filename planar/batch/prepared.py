@@ -111,8 +111,8 @@ class PreparedSweep:
         if any(link == frame for link, _ in self.members.values()) or not base_.can_run_backend:
             return None
         try:
+            from planar.batch.march.kernel import kernel_equations
             from planar.batch.march.llvm_positions import PositionsKernel
-            from planar.batch.march.llvm_runner import kernel_equations
             from planar.codegen.instructions import UnsupportedOperation
             from planar.equations.mechanism_numbers import equation_structure
         except ImportError:

@@ -81,7 +81,7 @@ def sweep_each(  # many: the public signature
     input that runs, and those that come so near to where two assemblies meet that steps eight times finer do not show
     on which side they pass. A linkage that comes to a dead point has NaN from there on, and says so.
 
-    `backend` "native" runs compiled machine code, "casadi" numpy, "auto" the faster that is there. `executor`, any of
+    `backend` "native" runs compiled machine code, "numpy" numpy, "auto" the faster that is there. `executor`, any of
     `concurrent.futures`' kind, solves parts of the whole elsewhere. `progress` is called with how many mechanisms are
     done, and how many there are.
 

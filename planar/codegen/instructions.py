@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from math import cos, sin
 from typing import NamedTuple
 
@@ -136,16 +136,17 @@ class InstructionList:
         raise UnsupportedOperation(f"operation {code}")
 
 
-def required_values(listing: InstructionList, wanted: Iterable[int]) -> list[int]:
-    """The values on which the wanted ones depend, and these, in their order."""
-    found: set[int] = set()
+def required_values(instructions: InstructionList, wanted: Iterable[int], known: Container[int] = ()) -> list[int]:
+    """The values on which the wanted ones depend, and these, in their order; not what known ones are made of."""
+    required: set[int] = set()
     stack = list(wanted)
     while stack:
         each = stack.pop()
-        if each not in found:
-            found.add(each)
-            stack += listing.instructions[each].operands
-    return sorted(found)
+        if each not in required:
+            required.add(each)
+            if each not in known:
+                stack += instructions.instructions[each].operands
+    return sorted(required)
 
 
 class CosSin(NamedTuple):

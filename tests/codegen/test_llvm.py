@@ -198,7 +198,7 @@ def test_a_longer_function_is_left_to_casadi_and_printed_once_in_vain(monkeypatc
 
     at, pair = mechanism.inputs[0].position, mechanism.inputs[0].pair
     designs, run_ = {f"{pair}.velocity": np.linspace(1, 2, 6)}, {"start": at, "stop": at + 0.1, "pair": pair}
-    wanted = planar.sweep(mechanism, designs, 5, backend="casadi", **run_)
+    wanted = planar.sweep(mechanism, designs, 5, backend="numpy", **run_)
     monkeypatch.setattr(instructions, "MAX_INSTRUCTIONS", 100)
     monkeypatch.setattr(llvm_runner, "write_designs_kernel", printing)
     llvm_runner._designs_kernel_or_reason.cache_clear()

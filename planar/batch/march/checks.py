@@ -1,4 +1,4 @@
-"""Both parts of the gate for many designs at once, each at the same step."""
+"""The residual check, the regularity and the points of many designs at once, by casadi's functions."""
 
 from __future__ import annotations
 
@@ -7,16 +7,19 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.batch.march.backend import DesignBatch
 from planar.batch.march.design_functions import DesignFunctions
 from planar.batch.march.regularity import LEAST_NUMPY_REGULARITY, least_regularity
 from planar.equations.coordinates import coordinate_columns, frames_from_coordinates
-from planar.equations.functions import EquationFunctions
-from planar.equations.linear import solve_arrays
+from planar.equations.functions import EquationFunctions, EquationRates
+from planar.equations.linear import solve_arrays, solve_vectors
+from planar.equations.mechanism_numbers import mechanism_size, shapes_of_links
 from planar.equations.residuals import split_pair_numbers
+from planar.foundation.geometry import Vector
+from planar.foundation.jets import Jet
 from planar.model.mechanism import Mechanism
-from planar.solving.checks.branch_check import BranchCheck, is_move_allowed
+from planar.solving.checks.branch_check import BranchCheck
 from planar.solving.checks.residual_check import EPS, NEGLIGIBLE_ERROR, ResidualCheck
-from planar.solving.checks.singular_values import SINGULAR_DISTANCE_RATIO
 
 Array = np.ndarray
 
@@ -40,26 +43,6 @@ class DesignBranchCheck(BranchCheck):
         """What is judged at a step; z (designs, unknowns), u (designs, inputs)."""
         slopes, drives = self.functions.jacobians(z, u, self.p)
         return DesignPositions(z, u, slopes, -solve_arrays(slopes, drives))
-
-    def check_step(
-        self, before: DesignPositions, after: DesignPositions, regular_distance: Array | None
-    ) -> tuple[Array, Array]:
-        """Whether each design kept to its branch in a step (designs,), and how far ahead each is from leaving it.
-
-        `ahead` is the latter from the step before, where that went as far as this one.
-        """
-        way = after.u - before.u
-        first, second = ((each.sensitivities @ way[:, :, None])[..., 0] for each in (before, after))
-        keeps = np.all(is_move_allowed(after.z - before.z, first, second), axis=1) & self._keeps_direction(
-            first, second, way
-        )
-        clear = (
-            self._singular_distances(before.z, before.u, before.jacobians, first, way)
-            if regular_distance is None
-            else regular_distance
-        )
-        further = self._singular_distances(after.z, after.u, after.jacobians, second, way)
-        return keeps & np.all(clear + further > SINGULAR_DISTANCE_RATIO, axis=1), further
 
     def is_regular(self, positions: DesignPositions) -> Array:
         """Whether the slope of every group is regular enough for a backend (designs,)."""
@@ -111,3 +94,77 @@ class DesignResidualCheck:
         frames, own = self.frames_from_coordinates(w)
         gaps = self.residual_check.residuals(frames, own, u)
         return np.broadcast_to(gaps.max(axis=0, initial=0.0), w.shape[1:] or u.shape[1:])
+
+
+class DesignsAtStep(NamedTuple):
+    """All designs at one step: z (designs, unknowns), u (inputs, designs), w (coordinates, designs), which of them have
+    passed the gate at this step and all before, and the slopes by which they were judged."""
+
+    z: Array
+    u: Array
+    w: Array
+    passed: Array
+    positions: DesignPositions
+
+
+def make_residual_check(task: DesignBatch) -> DesignResidualCheck:
+    """The first part of the gate for a march."""
+    own = shapes_of_links(task.mechanism)
+    return DesignResidualCheck(
+        ResidualCheck(task.mechanism, own, mechanism_size(task.mechanism, own)), task.mechanism, task.program, task.p
+    )
+
+
+def design_positions(functions: DesignFunctions, batch: DesignBatch, z: Array, u: Array) -> DesignsAtStep:
+    """Designs at unknowns z (designs, unknowns) and inputs u (inputs, designs), with which of them pass."""
+    w, regularity, closed = (
+        functions.coordinates(z, u.T),
+        DesignBranchCheck(functions, batch.p),
+        make_residual_check(batch),
+    )
+    here = regularity.evaluate(z, u.T)
+    passed = (closed.worst_residual(w, u) <= batch.tolerance) & closed.is_resolved(w) & regularity.is_regular(here)
+    return DesignsAtStep(z, u, w, passed, here)
+
+
+class PointWriter:
+    """The points of a march, with their rates."""
+
+    def __init__(self, task: DesignBatch, functions: DesignFunctions):
+        self.task, self.functions, self.residual_check = task, functions, make_residual_check(task)
+
+    def write(self, out: Array, row: DesignsAtStep) -> Array:
+        """Write the points of a step (rows, designs); whether their rates break no constraint (designs,)."""
+        task = self.task
+        if not task.rates:
+            self._write_points(out, row.w)
+            return np.ones(row.w.shape[1:] or row.passed.shape, dtype=bool)
+        found = self._rates(row)
+        w = [Jet(*(np.ascontiguousarray(part[:, k]) for part in found)) for k in range(found[0].shape[1])]
+        self._write_points(out, w)
+        frames, own = self.residual_check.frames_from_coordinates(w)
+        inputs = [Jet(u, u1, u2) for u, u1, u2 in zip(row.u, task.u1, task.u2, strict=True)]
+        gaps = self.residual_check.residual_check.rate_residuals(frames, own, inputs)
+        return np.all([np.broadcast_to(gap, row.passed.shape) <= 1e3 * task.tolerance for gap, _ in gaps], axis=0)
+
+    def _rates(self, row: DesignsAtStep) -> tuple[Array, Array, Array]:
+        """w with its first and second rates, each (designs, coordinates)."""
+        task, none = self.task, np.zeros_like(row.z)
+        y, u1, u2 = np.hstack([row.z, row.u.T]), task.u1.T, task.u2.T
+
+        def at(z1: Array, z2: Array) -> EquationRates:
+            return self.functions.kinematics(y, np.hstack([z1, u1]), np.hstack([z2, u2]))
+
+        z1 = (row.positions.sensitivities @ u1[:, :, None])[..., 0]
+        z2 = -solve_vectors(row.positions.jacobians, at(z1, none).F2)
+        found = at(z1, z2)
+        return found.w, found.w1, found.w2
+
+    def _write_points(self, out: Array, w) -> None:  # noqa: ANN001 - arrays or jets alike
+        frames, _ = self.residual_check.frames_from_coordinates(w)
+        many = 2 * len(self.task.links)
+        for k, link in enumerate(self.task.links):
+            place = frames[link].to_world(Vector(*self.task.q[2 * k : 2 * k + 2]))
+            for axis, value in enumerate(place):
+                for order, part in enumerate(value.parts if isinstance(value, Jet) else (value,)):
+                    np.multiply(part, self.task.unit, out=out[order * many + 2 * k + axis])

@@ -8,7 +8,7 @@ then is brought to it. So no sine stands in the loop, and few divisions.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import casadi as ca
@@ -25,6 +25,7 @@ from planar.codegen.invariant_hoisting import InvariantHoister
 from planar.equations.closed_form import ClosedForm, find_closed_form
 from planar.equations.constraint_equations import Block, ConstraintEquations, slice_length
 from planar.equations.coordinates import coordinate_columns, frames_from_coordinates
+from planar.equations.functions import EquationFunctions
 from planar.equations.linear import solve_by_determinants, solve_with_volume
 from planar.equations.rates import UnknownRates, block_jacobian, first_and_second_rates
 from planar.equations.residuals import closing_error, residuals, scalars, split_pair_numbers
@@ -116,6 +117,12 @@ class KernelEquations:
         lengths."""
         e = self.equations
         return list(solve_with_volume(block_jacobian(e, block.rows, block.unknowns), e.F[block.rows]))
+
+
+@lru_cache(maxsize=256)
+def kernel_equations(functions: EquationFunctions, structure: Mechanism) -> KernelEquations:
+    """The equations of a structure, kept. Raises UnsupportedOperation."""
+    return KernelEquations(functions.equations, structure)
 
 
 class KernelInstructions:

@@ -11,12 +11,12 @@ from typing import NamedTuple
 
 from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations, Operand
 from planar.batch.march.llvm_kernel import KernelWriter, OperandNames
-from planar.batch.march.prediction import MAX_TURN_PER_STEP
+from planar.batch.march.prediction import MAX_TURN_PER_STEP, PREDICTOR_ORDER
 from planar.batch.march.regularity import LEAST_KERNEL_REGULARITY, least_regularity
 from planar.codegen.instructions import UnsupportedOperation
 
-PREDICTOR_ORDER, HISTORY_LENGTH = 6, 8
-"""Steps before from which the next is predicted, and for how many there is room: a power of two."""
+HISTORY_LENGTH = 8
+"""Steps before for which there is room: a power of two, more than `PREDICTOR_ORDER`."""
 FUNCTION_NAME = "march"
 ARGUMENT_TYPES = (*("int",) * 5, *("array",) * 7, *("float",) * 3, "array", "array")
 """Of the function's arguments: blocks, steps, width of the arrays that are read, how far a row and a step of `out` are

@@ -9,15 +9,21 @@ from typing import Any
 import numpy as np
 
 from planar.batch.march.backend import CorrectedAssemblies, DesignBatch
-from planar.batch.march.kernel import KernelEquations
+from planar.batch.march.kernel import kernel_equations
 from planar.batch.march.llvm_designs import (
     ARGUMENT_TYPES,
     FUNCTION_NAME,
-    PREDICTOR_ORDER,
     DesignsKernelLayout,
     write_designs_kernel,
 )
-from planar.batch.march.prediction import COARSE_STEP, LONGEST_STEP, correction_limit, extrapolation_weights
+from planar.batch.march.prediction import (
+    LONGEST_STEP,
+    PREDICTOR_ORDER,
+    correction_counts,
+    correction_limit,
+    extrapolation_weights,
+    longest_step,
+)
 from planar.codegen.aligned_arrays import allocate_aligned, is_aligned
 from planar.codegen.instructions import UnsupportedOperation
 from planar.codegen.llvm_compile import compile_function
@@ -29,16 +35,6 @@ Array = np.ndarray
 
 LANES = 16
 """Designs at once: two vectors of the widest machines, so that one waits while the other works."""
-CORRECTIONS, FIRST_CORRECTIONS = 1, 6
-"""Steps of Newton's method where the run has come far enough to be predicted, and before."""
-COARSE_STEPS = (COARSE_STEP, 0.12)
-"""rad or sizes: where the inputs go farther in a step, what is predicted takes one more of Newton's, and another."""
-
-
-@lru_cache(maxsize=256)
-def kernel_equations(program: EquationFunctions, mechanism: Mechanism) -> KernelEquations:
-    """A structure ready to be printed. Raises UnsupportedOperation."""
-    return KernelEquations(program.equations, mechanism)
 
 
 def designs_kernel(
@@ -110,7 +106,7 @@ def correct_designs(batch: DesignBatch, point_blocks: Sequence[int], corrections
 
 def _longest_step(batch: DesignBatch) -> float:
     """How far an input goes in a step at most. Raises UnsupportedOperation where that is too far."""
-    longest = float(np.max(np.abs(np.diff(batch.input_offsets, axis=0)), initial=0.0))
+    longest = longest_step(batch.input_offsets)
     if longest > LONGEST_STEP or len(batch.input_offsets) == 2:
         raise UnsupportedOperation("steps so long do not show what lies between them")
     return longest
@@ -199,16 +195,13 @@ def _operand_rows(operands: Sequence[tuple[str, int]], values: Array) -> Array:
 def _step_table(offsets: Array) -> tuple[Array, Array]:
     """What every step needs to know: the weights of the steps before, and how far each input has gone."""
     steps, inputs = offsets.shape
-    table, counts = np.zeros((steps, PREDICTOR_ORDER + 3 * inputs)), np.full(steps, CORRECTIONS, dtype=np.int64)
+    table = np.zeros((steps, PREDICTOR_ORDER + 3 * inputs))
     for step in range(min(steps, PREDICTOR_ORDER)):
         # ahead of the first there is its start
         table[step, : max(step, 1)] = extrapolation_weights(max(step, 1))
     table[PREDICTOR_ORDER:, :PREDICTOR_ORDER] = extrapolation_weights(PREDICTOR_ORDER)
-    longest = float(np.max(np.abs(np.diff(offsets, axis=0)), initial=0.0))
-    counts[:] = CORRECTIONS + sum(longest > each for each in COARSE_STEPS)
-    counts[: PREDICTOR_ORDER + 1] = FIRST_CORRECTIONS
     for k in range(inputs):
         table[:, PREDICTOR_ORDER + 3 * k : PREDICTOR_ORDER + 3 * k + 3] = np.stack(
             [offsets[:, k], np.cos(offsets[:, k]), np.sin(offsets[:, k])], axis=1
         )
-    return table, counts
+    return table, correction_counts(steps, longest_step(offsets))
