@@ -2,28 +2,15 @@
 
 from __future__ import annotations
 
-import operator
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from planar.codegen.instructions import InstructionList, required_values
+from planar.codegen.numpy_code import NumpyFunction, compile_numpy
 
 Array = np.ndarray
-
-NUMPY_OPERATIONS = {
-    "add": operator.add,
-    "sub": operator.sub,
-    "mul": operator.mul,
-    "div": operator.truediv,
-    "neg": operator.neg,
-    "abs": np.abs,
-    "sqrt": np.sqrt,
-    "cos": np.cos,
-    "sin": np.sin,
-    "minnum": np.fmin,
-    "maxnum": np.fmax,
-}
 
 
 class FormulaInput(NamedTuple):
@@ -42,18 +29,13 @@ class BlockFormula:
         self.order = required_values(listing, wanted)
 
     def evaluate_numpy(self, taken: dict[FormulaInput, Any]) -> list[Any]:
-        """The wanted values where the leaves are arrays, or numbers."""
-        values, listing = {}, self.instructions.instructions
+        """The wanted values where what the formula takes are arrays, or numbers."""
         with np.errstate(all="ignore"):  # what cannot be assembled is no number, and judged as such
-            for number in self.order:
-                value = listing[number]
-                if value.operation == "input":
-                    values[number] = taken[self.inputs[number]]
-                elif value.operation == "const":
-                    values[number] = value.data
-                else:
-                    values[number] = NUMPY_OPERATIONS[value.operation](*(values[k] for k in value.operands))
-        return [values[number] for number in self.outputs]
+            return list(self._numpy_function(*(taken[each] for each in self.inputs.values())))
+
+    @cached_property
+    def _numpy_function(self) -> NumpyFunction:
+        return compile_numpy(self.instructions, self.outputs, tuple(self.inputs))
 
 
 class KernelLayout(NamedTuple):

@@ -14,12 +14,17 @@ from planar.batch.march.backend import CorrectedAssemblies, DesignBatch, Unsuppo
 from planar.batch.march.checks import PointWriter, design_positions
 from planar.batch.march.design_functions import DesignFunctions
 from planar.batch.march.kernel import kernel_equations
-from planar.batch.march.numpy_kernel import DesignMarch, MarchedSteps, NumpyKernel, make_numpy_kernel
+from planar.batch.march.numpy_kernel import (
+    MAX_EXPRESSION_UNKNOWNS,
+    DesignMarch,
+    MarchedSteps,
+    NumpyKernel,
+    make_numpy_kernel,
+)
 from planar.batch.march.prediction import LONGEST_STEP, correction_counts, correction_limit, longest_step
 from planar.codegen.instructions import UnsupportedOperation
 from planar.equations.constraint_equations import slice_length
 from planar.equations.functions import EquationFunctions
-from planar.equations.linear import MAX_CRAMER_UNKNOWNS
 from planar.equations.mechanism_numbers import equation_structure
 from planar.model.mechanism import Mechanism
 
@@ -139,7 +144,7 @@ class StartRunner:
 
 def has_large_block(functions: EquationFunctions) -> bool:
     """Whether a block has more unknowns than are solved by expressions."""
-    return any(slice_length(block.unknowns) > MAX_CRAMER_UNKNOWNS for block in functions.equations.blocks)
+    return any(slice_length(block.unknowns) > MAX_EXPRESSION_UNKNOWNS for block in functions.equations.blocks)
 
 
 def _kernel(

@@ -14,11 +14,14 @@ from planar.batch.march.prediction import MAX_TURN_PER_STEP, PREDICTOR_ORDER, ex
 from planar.batch.march.regularity import LEAST_KERNEL_REGULARITY, least_regularity
 from planar.codegen.instructions import UnsupportedOperation, required_values
 from planar.codegen.numpy_code import NumpyFunction, compile_numpy
-from planar.equations.linear import MAX_CRAMER_UNKNOWNS, solve_vectors
+from planar.equations.linear import solve_vectors
 from planar.equations.rates import block_jacobian
 
 Array = np.ndarray
 OperandArrays = dict[Operand, Any]
+
+MAX_EXPRESSION_UNKNOWNS = 8
+"""Unknowns of a block that expressions solve; of larger ones these grow too long."""
 
 
 class _KernelPart(NamedTuple):
@@ -74,7 +77,7 @@ class NumpyKernel(KernelInstructions):
 
     def _newton_outputs(self, part: KernelBlock) -> list[ca.SX]:
         """Newton's step with how regular the Jacobian is; of large blocks the residuals and the Jacobian's rows."""
-        if len(part.unknowns) <= MAX_CRAMER_UNKNOWNS:
+        if len(part.unknowns) <= MAX_EXPRESSION_UNKNOWNS:
             return self.equations.newton_step(part.block)
         e = self.equations.equations
         jacobian = block_jacobian(e, part.block.rows, part.block.unknowns)
@@ -352,7 +355,7 @@ def _normalise(cos: Any, sin: Any) -> tuple[Any, Any]:
 
 def _newton_step(count: int, values: Sequence[Any]) -> tuple[Sequence[Any], Any]:
     """Newton's step of a block of so many unknowns, and the square of how regular its Jacobian is."""
-    if count <= MAX_CRAMER_UNKNOWNS:
+    if count <= MAX_EXPRESSION_UNKNOWNS:
         *step, volume, lengths = values
         return step, volume / lengths
     flat = np.stack(np.broadcast_arrays(*values), axis=-1)
