@@ -64,12 +64,11 @@ def find_assemblies(
     shapes: Mapping[str, LinkShape],
     p: Array,
     u: Array,
-    tolerance: float,
     runner: DesignRunner,
 ) -> DesignAssemblies:
     """The assemblies at inputs u (inputs, designs), of designs with numbers p (numbers, designs) and these shapes."""
     with np.errstate(all="ignore"):  # starts that lead nowhere end as what is no number
-        near = find_nearest_assemblies(reference, shapes, p, u, tolerance, runner)
+        near = find_nearest_assemblies(reference, shapes, p, u, runner)
         if near is None:
             return _AssemblySearch(reference, shapes, p, u).search()
         every, rest = (

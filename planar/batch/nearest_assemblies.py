@@ -14,8 +14,8 @@ from planar.batch.assembly_scores import (
     is_clearly_regular,
     is_surely_farther,
 )
-from planar.batch.march.backend import CorrectedAssemblies, DesignBatch, DesignRunner, UnsupportedStructure
-from planar.batch.reference_design import ReferenceDesign, stack_rows
+from planar.batch.march.backend import CorrectedAssemblies, DesignRunner, UnsupportedStructure
+from planar.batch.reference_design import ReferenceDesign
 from planar.equations.constraint_equations import Block, slice_length
 from planar.model.link_shapes import LinkShape
 from planar.solving.assembly.block_assemblies import SAME_ASSEMBLY_TOLERANCE, BlockAssemblies
@@ -38,7 +38,6 @@ def find_nearest_assemblies(
     shapes: Mapping[str, LinkShape],
     p: Array,
     u: Array,
-    tolerance: float,
     runner: DesignRunner,
 ) -> NearestAssemblies | None:
     """The assemblies at inputs u (inputs, designs); None where the sketch does not show every group, or no
@@ -57,7 +56,7 @@ def find_nearest_assemblies(
     ):
         return None
     try:
-        return _NearestAssemblySearch(reference, shapes, p, u, tolerance, runner, candidates, stages).search()
+        return _NearestAssemblySearch(reference, shapes, p, u, runner, candidates, stages).search()
     except UnsupportedStructure:
         return None
 
@@ -69,7 +68,6 @@ class _NearestAssemblySearch:
         shapes: Mapping[str, LinkShape],
         p: Array,
         u: Array,
-        tolerance: float,
         runner: DesignRunner,
         candidates: BlockAssemblies,
         stages: list[Block],
@@ -84,30 +82,12 @@ class _NearestAssemblySearch:
         self.point_blocks = tuple(stage.block_index for stage in stages for _ in at[stage.block_index])
         self.sketch = np.array([candidates.sketch[name] for name in self.names]).reshape(-1, 2, 1)
         members = [candidates.first_link[name][1:] for name in self.names]
-        q = (
-            stack_rows([part for link, point in members for part in shapes[link].position(point)], self.design_count)
-            / base.unit
-        )
-        links = tuple(link for link, _ in members)
         start = np.concatenate([np.zeros(0), *(roots[0] for roots, _ in self.roots.values() if len(roots))])
-        self.batch = DesignBatch(
-            base.functions,
-            base.mechanism,
-            p,
-            q,
-            np.repeat(start[:, None], self.design_count, axis=1),
-            np.zeros((1, len(u))),
-            u,
-            u,
-            u,
-            links,
-            False,
-            tolerance,
-            base.unit,
-        )
+        self.batch = base.design_batch(shapes, p, (u, u, u), members)
+        self.batch.z0[:] = start[:, None]
 
     def search(self) -> NearestAssemblies:
-        """See `nearby`."""
+        """See `find_nearest_assemblies`."""
         found = self.runner.correct_assemblies(self.batch, self.point_blocks, CORRECTIONS)
         costs, others = (np.square(places - self.sketch).sum(axis=1) for places in (found.points, found.other_points))
         clear, total, before = found.converged.copy(), costs.sum(axis=0), np.zeros(self.design_count)

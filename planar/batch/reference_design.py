@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property, lru_cache
 from itertools import combinations
 
 import numpy as np
 
 from planar.batch.design_arrays import design_variables
+from planar.batch.march.backend import DesignBatch
 from planar.document.cursor import suggest_spelling
 from planar.equations.mechanism_numbers import scaled_pair_numbers
 from planar.foundation.errors import BadInput
@@ -115,6 +116,32 @@ class ReferenceDesign:
         position, velocity, acceleration = (stack_rows(part, many) / self.input_scale[:, None] for part in parts)
         runs = np.arange(len(self.input_scale))[:, None] == self.running_index
         return position, np.where(runs, velocity, 0.0), np.where(runs, acceleration, 0.0)
+
+    def design_batch(
+        self,
+        shapes: Mapping[str, LinkShape],
+        p: Array,
+        inputs: tuple[Array, Array, Array],
+        members: Iterable[tuple[str, str]],
+        rates: bool = False,
+    ) -> DesignBatch:
+        """Designs of these shapes and numbers, at their inputs (position, first and second rate), with points to tell.
+
+        `members`: (link, point) of each, none on the frame. The unknowns, and where the inputs go, are still to be set.
+        """
+        u, u1, u2 = inputs
+        members, many = tuple(members), p.shape[1]
+        q = stack_rows([part for link, point in members for part in shapes[link].position(point)], many) / self.unit
+        links, z0 = tuple(link for link, _ in members), np.zeros((len(self.functions.equations.unknowns), many))
+        offsets, tolerance = np.zeros((1, len(u))), self.tolerance(p)
+        return DesignBatch(
+            self.functions, self.mechanism, p, q, z0, offsets, u, u1, u2, links, rates, tolerance, self.unit
+        )
+
+    def is_fit(self, values: Mapping[str, Array], shapes: Mapping[str, LinkShape], p: Array) -> Array:
+        """The designs that a backend may run (designs,): see `is_unfit` and `has_short_arm`."""
+        fit = np.all(np.isfinite(p), axis=0) & ~self.has_short_arm(shapes, p.shape[1])
+        return fit & ~self.is_unfit(values, shapes) if values else fit
 
     def is_unfit(self, values: Mapping[str, Array], shapes: Mapping[str, LinkShape]) -> Array:
         """The designs that the pairs may refuse before anything moves (designs,): they are looked at one by one."""
