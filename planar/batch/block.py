@@ -79,7 +79,7 @@ class _DesignBlockSolver:
         "how many steps are solved of a design that was followed to its end, or to a dead point"
         self.followed_positions = 0
         self.failed_block = np.full(self.design_count, -1)
-        "the group that cannot be joined, where a design surely cannot be assembled"
+        "the block that cannot be joined, where a design surely cannot be assembled"
         length = FULL_TURN if block.stop is None else block.stop - self.start
         self.range_length = np.broadcast_to(np.asarray(length, dtype=float), (self.design_count,))
 
@@ -113,7 +113,7 @@ class _DesignBlockSolver:
                 status[index, self.solved_steps[index] :] = code
             first = int(dead[0])
             said[code] = dead.size, self._solve_one_design(first, inputs if alike else inputs[first]).message
-        refused: dict[int, SolvedDesign] = {}  # by the group that cannot be joined: the first design says it for all
+        refused: dict[int, SolvedDesign] = {}  # by the block that cannot be joined: the first design says it for all
         for index in rest:
             ends = int(self.failed_block[index])
             row = None if self.has_own_range else inputs if alike else inputs[index]

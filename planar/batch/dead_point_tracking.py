@@ -78,7 +78,7 @@ class _DesignCurves:
     """The curves of some designs; `SolutionCurve` in `solving` is that of one."""
 
     def __init__(self, march: DesignBatch, design: Array, direction: Array):
-        self.functions = DesignFunctions(march.program, march.p[:, design])
+        self.functions = DesignFunctions(march.functions, march.p[:, design])
         self.start, self.direction = march.u0.T[design], direction
 
     def inputs(self, y: Array) -> Array:
@@ -124,7 +124,7 @@ class _DesignCurves:
 
 
 def _solve_bordered(jacobians: Array, normal: Array, right: Array, last: float) -> Array:
-    """x with slope x = left and normal x = last, for each design; not numbers where that is singular."""
+    """x with Jacobian x = left and normal x = last, for each design; not numbers where that is singular."""
     whole = np.concatenate([jacobians, normal[:, None]], axis=1)
     right = np.concatenate([right, np.full((len(right), 1), last)], axis=1)
     return solve_vectors(whole, right, least_determinant=1e-12)
@@ -268,7 +268,7 @@ class _DeadPointTracker:
         return FollowedDesigns(self.is_settled, solved, design[kept], step[kept], out[:, kept])
 
     def _points_at_steps(self, arcs: _CurveArcs, step: Array) -> tuple[Array, Array]:
-        """The points (rows, steps) where arcs come to steps, and which of them pass the gate."""
+        """The points (rows, steps) where arcs come to steps, and which of them pass the checks."""
         march = self.batch
         wide = march.output_row_count
         if not len(step):
@@ -276,7 +276,7 @@ class _DeadPointTracker:
         place = self.distances[step]
         y, fine = self._find_falling_zero(arcs, lambda _, y: place - y[:, -1])
         own = march.select(arcs.design, y[:, :-1].T)
-        columns = DesignFunctions(march.program, own.p)
+        columns = DesignFunctions(march.functions, own.p)
         u = own.u0 + place * self.direction[:, None]
         z = columns.correct(y[:, :-1], u.T)
         fine &= np.max(np.abs(z - y[:, :-1]), axis=1, initial=0.0) < 1e-3

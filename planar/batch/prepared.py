@@ -50,7 +50,7 @@ def prepared(
     """A mechanism made ready to be run over and over; calling what is returned solves it for one design after another.
 
     See `planar.sweep` for what is taken, and raised: this is a sweep of one design at a time, without its preparations.
-    With llvmlite, and where every group of the mechanism is in closed form, a run of the same design again takes some
+    With llvmlite, and where every block of the mechanism is in closed form, a run of the same design again takes some
     microseconds; anything else goes through `planar.sweep` each time.
     """
     return PreparedSweep(mechanism, steps, points, rates, start, stop, pair)

@@ -1,4 +1,4 @@
-"""What the designs of a sweep have in common: one program, one size, the points that are wanted."""
+"""What the designs of a sweep have in common: the equation functions, one size, the points that are wanted."""
 
 from __future__ import annotations
 
@@ -52,12 +52,12 @@ class ReferenceDesign:
 
     @cached_property
     def candidates(self) -> BlockAssemblies:
-        """The assemblies of the base's groups."""
+        """The assemblies of the base's blocks."""
         return BlockAssemblies(self.solver)
 
     @property
     def can_run_backend(self) -> bool:
-        """Whether a backend can run the structure: every group closes once, and no contact is kept closed by others."""
+        """Whether a backend can run the structure: every block closes once, and no contact is kept closed by others."""
         watched = any(type(pair).contact_gap is not Pair.contact_gap for pair in self.mechanism.pairs)
         return self.functions.is_square and not watched
 
@@ -102,7 +102,7 @@ class ReferenceDesign:
         return stack_rows(rows, many)
 
     def tolerance(self, p: Array) -> float:
-        """What the gate lets pass for these designs: as `ResidualCheck.tolerance`, of the longest of any."""
+        """What the residual check lets pass for these designs: as `ResidualCheck.tolerance`, of the longest of any."""
         kinds = [kind for pair in self.mechanism.pairs for kind in pair.number_kinds]
         lengths = np.array([kind is MeasureKind.LENGTH for kind in kinds], dtype=bool)
         reach = float(np.nanmax(np.abs(p[lengths]), initial=0.0))
@@ -169,7 +169,7 @@ class ReferenceDesign:
             pinned = {
                 point
                 for pair in self.mechanism.pairs
-                if all(known[other] <= known[link] for other in pair.bodies)  # later groups ask for places alone
+                if all(known[other] <= known[link] for other in pair.bodies)  # later blocks ask for places alone
                 for owner, point in pair.coincident_points()
                 if owner == link
             }
@@ -179,7 +179,7 @@ class ReferenceDesign:
         return found
 
     def block_assemblies(self) -> tuple[tuple[Array, int], ...]:
-        """For every group the assemblies (roots, unknowns) from which those of designs start, and how many one finds.
+        """For every block the assemblies (roots, unknowns) from which those of designs start, and how many one finds.
 
         Looked for once, when first asked for.
         """
@@ -192,13 +192,13 @@ class ReferenceDesign:
     def _search_block_assemblies(self):  # noqa: ANN202
         candidates = self.candidates
         nodes = [(0.0, np.zeros(len(self.solver.equations.unknowns)))]
-        for stage in self.solver.equations.blocks:
+        for block in self.solver.equations.blocks:
             ways = []
             for cost, z in nodes:
-                found, nearest = candidates.near_sketch(stage, z, every=True)
+                found, nearest = candidates.near_sketch(block, z, every=True)
                 ways.append([(cost + each.distance, each.z) for each in found] or [(cost + 1e3, nearest)])
             most = max(ways, key=len)
-            starts = [z[stage.unknowns] for _, z in sorted((*most, *ways[0]), key=lambda each: each[0])]
+            starts = [z[block.unknowns] for _, z in sorted((*most, *ways[0]), key=lambda each: each[0])]
             apart = [
                 z for k, z in enumerate(starts) if all(np.max(np.abs(z - o), initial=0.0) > 1e-6 for o in starts[:k])
             ]

@@ -79,10 +79,10 @@ def sweep_each(  # many: the public signature
     the names of those that are wanted, of every mechanism that has them; all that move, if left out. With `rates` their
     velocities and accelerations too.
 
-    No mechanism is compiled by itself: it is parted into groups of links, of kinds that many have in common, and runs
-    as data. Single links and dyads are solved in closed form, groups of up to eight links by Newton's method from step
+    No mechanism is compiled by itself: it is parted into blocks of links, of kinds that many have in common, and runs
+    as data. Single links and dyads are solved in closed form, blocks of up to eight links by Newton's method from step
     to step. To the general path, which is counted and said, fall mechanisms with wheels or racks, with links held more
-    than once, with larger groups, without a sketch that tells the assemblies of every group apart, with a slide as the
+    than once, with larger blocks, without a sketch that tells the assemblies of every block apart, with a slide as the
     input that runs, and those that come so near to where two assemblies meet that steps eight times finer do not show
     on which side they pass. A linkage that comes to a dead point has NaN from there on, and says so.
 

@@ -1,4 +1,4 @@
-"""A formula that many groups share, and its run by numpy over slots of memory."""
+"""A formula that many blocks share, and its run by numpy over slots of memory."""
 
 from __future__ import annotations
 

@@ -83,7 +83,7 @@ def test_a_run_of_a_model_is_the_one_that_casadi_gives(stem, runner):
     assert motion.outcome is Outcome.SOLVED
     points = motion.point_names[-3:]
     given = repeated(arguments(motion, points), 3)
-    if not given.program.is_square:
+    if not given.functions.is_square:
         with pytest.raises(UnsupportedStructure, match="more than once"):
             run(runner, given)
         return
@@ -150,7 +150,7 @@ def test_both_runners_correct_assemblies_alike_and_come_to_the_same_unknowns(ste
     motion = planar.cycle(MODELS[stem], pair=MODELS[stem].inputs[0].pair)
     given = repeated(arguments(motion, motion.point_names[-3:]), 3)
     given.z0[:] += 1e-3 * np.arange(3)
-    blocks = [block.block_index for block in given.program.equations.blocks][-1:] * 3
+    blocks = [block.block_index for block in given.functions.equations.blocks][-1:] * 3
     one, other = (runner.correct_assemblies(given, blocks, 6) for runner in (LLVMRunner(), NumpyRunner()))
     for first, second in zip(one, other, strict=True):
         np.testing.assert_allclose(first, second, rtol=1e-9, atol=1e-12)

@@ -29,7 +29,7 @@ class DesignBatch(NamedTuple):
     may leave open. `mechanism` has the pairs and inputs; its numbers are not those of the designs. `unit`: the size, m.
     """
 
-    program: EquationFunctions
+    functions: EquationFunctions
     mechanism: Mechanism
     p: Array
     q: Array

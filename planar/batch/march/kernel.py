@@ -75,6 +75,7 @@ class KernelEquations:
         self.is_angle = tuple(e.coordinates[column].kind is MeasureKind.ANGLE for column in e.unknowns)
         self.input_is_angle = tuple(kind is MeasureKind.ANGLE for kind in e.input_kinds)
         self.closed_forms = tuple(part.closed_form for part in self.blocks if part.closed_form is not None)
+        self.has_newton_blocks = len(self.closed_forms) < len(self.blocks)
         self.sides = ca.vertcat(ca.SX(0, 1), *(form.sign_expression for form in self.closed_forms))
         self.column_of = coordinate_columns(e.coordinates)
 

@@ -47,9 +47,9 @@ def write_designs_kernel(
 ) -> DesignsKernelLayout:
     """The function for points on these links, none of which is the frame. Raises UnsupportedOperation.
 
-    A step gives x and y of every point, then with `rates` all first and all second rates. With `levels`, of the group
-    that places each point, it gives more: x and y of every point in the other assembly of its group (infinite where
-    that is not in closed form), the state, and how regular the least regular of the groups is that Newton's method
+    A step gives x and y of every point, then with `rates` all first and all second rates. With `levels`, of the block
+    that places each point, it gives more: x and y of every point in the other assembly of its block (infinite where
+    that is not in closed form), the state, and how regular the least regular of the blocks is that Newton's method
     solves.
     """
     carried: frozenset[Operand] = frozenset()
@@ -57,7 +57,7 @@ def write_designs_kernel(
         try:
             return _DesignsKernelWriter(equations, tuple(links), rates, lanes, point_blocks, carried).write()
         except BareAngle as angle:
-            if angle.operand in carried:  # its value is wanted before its own group is solved
+            if angle.operand in carried:  # its value is wanted before its own block is solved
                 raise UnsupportedOperation(f"a group stands in an angle of a later one: {angle.operand}") from None
             carried |= {angle.operand}
 
@@ -192,10 +192,10 @@ class _DesignsKernelWriter(KernelWriter):
         ]
 
     def _write_closed_form_block(self, part: KernelBlock, have: OperandNames) -> list[str]:
-        """A group in closed form; flags that say where its two assemblies keep apart.
+        """A block in closed form; flags that say where its two assemblies keep apart.
 
         Between steps too: the bend does not reach one, by as much as it bends over the last three steps. So it may be
-        the step before at which a group had come too near.
+        the step before at which a block had come too near.
         """
         t = self.ir
         if self.point_blocks is not None:
@@ -216,7 +216,7 @@ class _DesignsKernelWriter(KernelWriter):
         return [t.compare("oge", t.binary("sub", room, kept), t.constant(LEAST_KERNEL_REGULARITY**2))]
 
     def _write_other_assembly(self, part: KernelBlock, have: OperandNames) -> None:
-        """Where the group places its points in its other assembly."""
+        """Where the block places its points in its other assembly."""
         assert self.point_blocks is not None
         level, there = part.block.block_index, dict(have)
         there["sign", self.sign_index[level]] = self.ir.add_instruction(
@@ -238,7 +238,7 @@ class _DesignsKernelWriter(KernelWriter):
             t.store(have[leaf, k], self.state_slots[leaf, k])
 
     def _write_newton_block(self, part: KernelBlock, have: OperandNames) -> None:
-        """Newton's method for a group from where it would be if it went on as before, so often as the step says."""
+        """Newton's method for a block from where it would be if it went on as before, so often as the step says."""
         t, level = self.ir, part.block.block_index
         own = {leaf: slot for leaf, slot in self.state_slots.items() if leaf[1] in part.unknowns}
         ahead = {
@@ -305,7 +305,7 @@ class _DesignsKernelWriter(KernelWriter):
         return flags
 
     def _write_regularity(self, spanned: str, lengths: str, count: int) -> str:
-        """How regular a slope is, where that is told; else only whether it is enough: not below nothing."""
+        """How regular a Jacobian is, where that is told; else only whether it is enough: not below nothing."""
         t = self.ir
         if self.point_blocks is not None:
             return t.binary("div", spanned, lengths)

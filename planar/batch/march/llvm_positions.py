@@ -1,6 +1,6 @@
 """One linkage at many positions of its inputs, these in the lanes, as one function of LLVM IR.
 
-Only where every group is in closed form: then nothing goes from one position to the next but the signs of the groups.
+Only where every block is in closed form: then nothing goes from one position to the next but the signs of the blocks.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ fine."""
 
 class PositionsKernelLayout(NamedTuple):
     """numbers: what is the same at every position, one after the other; drives: rows of cos, sin and value of what is
-    given; out: rows that are told, of which the last are counted angles and the groups' bends."""
+    given; out: rows that are told, of which the last are counted angles and the blocks' bends."""
 
     numbers: tuple[Operand, ...]
     inputs: tuple[Operand, ...]
@@ -47,7 +47,7 @@ class _PositionsKernelWriter(KernelWriter):
         self.numbers = tuple((name, k) for name, size in sizes.items() for k in range(size))
 
     def write(self) -> PositionsKernelLayout:
-        """The whole function: blocks of positions, then whether the groups keep clear of their dead points."""
+        """The whole function: blocks of positions, then whether the blocks keep clear of their dead points."""
         t, of = self.ir, self.equations
         t.write_line(
             f"define void @{FUNCTION_NAME}(i64 %blocks, i64 %positions, ptr noalias readonly %numbers, "
@@ -178,7 +178,7 @@ class PositionsKernel:
 
     def __call__(self, numbers: Array, tolerance: float, scale: float) -> tuple[Array, bool]:
         """x and y of every point, then with rates their first and second rates, (rows, positions), times `scale`; and
-        whether all passed both parts of the gate."""
+        whether all passed both checks."""
         width = self.lane_blocks * LANES
         # two more positions than there are may be looked at
         out = np.empty(self.row_count * width + 2)

@@ -45,7 +45,7 @@ class NumpyRunner:
 
     def run(self, batch: DesignBatch, out: Array) -> Array:
         """See `DesignRunner`."""
-        by_casadi = batch.rates and has_large_block(batch.program)
+        by_casadi = batch.rates and has_large_block(batch.functions)
         kernel = _kernel(batch, () if by_casadi else batch.links, batch.rates and not by_casadi)
         good = _run(kernel, batch, out, 0)
         rest = np.flatnonzero(good < len(batch.input_offsets))
@@ -119,9 +119,9 @@ class StartRunner:
 
     def run(self, batch: DesignBatch, out: Array) -> Array:
         """See `DesignRunner`."""
-        if not batch.program.is_square:
+        if not batch.functions.is_square:
             raise UnsupportedStructure("constraints hold each other more than once")
-        functions = DesignFunctions(batch.program, batch.p)
+        functions = DesignFunctions(batch.functions, batch.p)
         with np.errstate(all="ignore"):
             row = design_positions(functions, batch, self._start(functions, batch), batch.u0)
             return (PointWriter(batch, functions).write(out[0], row) & row.passed).astype(int)
@@ -129,7 +129,7 @@ class StartRunner:
     def last_good_unknowns(self, batch: DesignBatch, good: Array) -> Array:
         """See `DesignRunner`."""
         with np.errstate(all="ignore"):
-            return self._start(DesignFunctions(batch.program, batch.p), batch).T
+            return self._start(DesignFunctions(batch.functions, batch.p), batch).T
 
     def correct_assemblies(
         self, batch: DesignBatch, point_blocks: Sequence[int], corrections: int
@@ -151,7 +151,7 @@ def _kernel(
     batch: DesignBatch, links: tuple[str, ...], rates: bool, point_blocks: tuple[int, ...] | None = None
 ) -> NumpyKernel:
     try:
-        return _cached_kernel(batch.program, equation_structure(batch.mechanism), links, rates, point_blocks)
+        return _cached_kernel(batch.functions, equation_structure(batch.mechanism), links, rates, point_blocks)
     except UnsupportedOperation as why:
         raise UnsupportedStructure(str(why)) from None
 
@@ -241,7 +241,7 @@ def _write_with_casadi(
 ) -> Array:
     """The same at one step, points and rates by casadi's functions; which designs' rates break no constraint."""
     step, lanes = target
-    functions, rows = DesignFunctions(batch.program, batch.p), np.empty((out.shape[1], lanes.size))
+    functions, rows = DesignFunctions(batch.functions, batch.p), np.empty((out.shape[1], lanes.size))
     row = design_positions(functions, batch, marched.unknowns(len(batch.z0)).T, u)
     fine = PointWriter(batch, functions).write(rows, row)
     out[step][:, lanes] = rows

@@ -48,7 +48,7 @@ class NumpyKernel(KernelInstructions):
     ):
         super().__init__(equations, links, rates, frozenset({"p", "q", "u1", "u2"}), carried)
         self.point_blocks = point_blocks
-        self.has_newton_blocks = any(part.closed_form is None for part in equations.blocks)
+        self.has_newton_blocks = equations.has_newton_blocks
         self.is_sequential = self.has_newton_blocks or bool(carried)
         "whether a step needs the one before"
         known: set[Operand] = set(self.input_operands)

@@ -12,7 +12,7 @@ Array = np.ndarray
 MAX_TURN_PER_STEP = 0.5
 """rad that a link may turn from one step to the next: farther apart they do not show what lies between."""
 LONGEST_STEP = 0.5
-"""rad or sizes that an input may go in a step: positions that are farther apart do not show whether a group comes to a
+"""rad or sizes that an input may go in a step: positions that are farther apart do not show whether a block comes to a
 dead point between them."""
 COARSE_STEP = 0.04
 """rad or sizes: up to this step of the inputs the limit of what may be corrected stays as it is."""
