@@ -25,7 +25,7 @@ MAX_EXPRESSION_UNKNOWNS = 8
 
 
 class _KernelPart(NamedTuple):
-    """A function of operands, then of values by number that do not vary; `sizes` of its results."""
+    """A function of operands, then of values by number that do not vary."""
 
     function: NumpyFunction
     operands: tuple[Operand, ...]
@@ -157,7 +157,7 @@ class MarchedSteps(NamedTuple):
 class DesignMarch:
     """Designs of a batch on their way: where the inputs start, and what is known of the steps before.
 
-    The residuals' sum may be `batch.tolerance`, and what is corrected `correction_limit` (rad or sizes).
+    The sum of the residuals may be `batch.tolerance` at most, and what is corrected `correction_limit` (rad or sizes).
     """
 
     def __init__(self, kernel: NumpyKernel, batch: DesignBatch, counts: Array, correction_limit: float):
