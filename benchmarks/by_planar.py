@@ -15,7 +15,7 @@ from planar.results.motion import Motion
 from planar.solving.continuation.path import follow_samples
 from planar.solving.position import PositionSolver
 
-BACKENDS = {"native": 10**9, "casadi": 200}
+BACKENDS = {"native": 10**9, "numpy": 2000}
 """The backends of `planar.sweep`, and to how many designs each is put."""
 CYCLED = 3
 """So many designs are enough to time `planar.cycle` design by design."""

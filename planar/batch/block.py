@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -14,8 +13,8 @@ from planar.batch.general_path import OUTCOMES, SolvedDesign, solve_design
 from planar.batch.initial_assembly import find_assemblies
 from planar.batch.march.backend import DesignBatch, DesignRunner, UnsupportedStructure
 from planar.batch.march.choice import find_runner
-from planar.batch.march.numpy_backend import iterate_steps
-from planar.batch.reference_design import ReferenceDesign, reference_design, stack_rows
+from planar.batch.march.numpy_backend import NumpyRunner
+from planar.batch.reference_design import ReferenceDesign, reference_design
 from planar.codegen.aligned_arrays import allocate_aligned
 from planar.foundation.errors import Outcome
 from planar.model.link_shapes import LinkShape
@@ -81,7 +80,7 @@ class _DesignBlockSolver:
         "how many steps are solved of a design that was followed to its end, or to a dead point"
         self.followed_positions = 0
         self.failed_block = np.full(self.design_count, -1)
-        "the group that cannot be joined, where a design surely cannot be assembled"
+        "the block that cannot be joined, where a design surely cannot be assembled"
         length = FULL_TURN if block.stop is None else block.stop - self.start
         self.range_length = np.broadcast_to(np.asarray(length, dtype=float), (self.design_count,))
 
@@ -115,7 +114,7 @@ class _DesignBlockSolver:
                 status[index, self.solved_steps[index] :] = code
             first = int(dead[0])
             said[code] = dead.size, self._solve_one_design(first, inputs if alike else inputs[first]).message
-        refused: dict[int, SolvedDesign] = {}  # by the group that cannot be joined: the first design says it for all
+        refused: dict[int, SolvedDesign] = {}  # by the block that cannot be joined: the first design says it for all
         for index in rest:
             ends = int(self.failed_block[index])
             row = None if self.has_own_range else inputs if alike else inputs[index]
@@ -139,39 +138,23 @@ class _DesignBlockSolver:
         return solve_design(mechanism, self.reference.pair, grid, block.steps, ends, block.points, block.rates)
 
     def _run_with_backend(self) -> tuple[Array, Array] | None:
-        """out (m, s), and how many of the first steps passed the gate; None where no backend can run the structure."""
+        """out (m, s), and how many of the first steps passed; None where no backend can run the structure."""
         block, base_, runner = self.block, self.reference, find_runner(self.block.backend)
         shapes = base_.shapes(self.all_designs)
         p = base_.pair_numbers(shapes, self.design_count)
         told = {name: base_.point_member(name) for name in block.points}
         moving = {name: each for name, each in told.items() if each[0] != base_.mechanism.frame}
-        q = [part for link, point in moving.values() for part in shapes[link].position(point)]
-        tolerance = base_.tolerance(p)
-        start = find_assemblies(base_, shapes, p, self.u, tolerance, runner)
+        start = find_assemblies(base_, shapes, p, self.u, runner)
         self.failed_block = start.failed_block
-        fit = start.is_sure & ~base_.is_unfit(block.designs, shapes) & np.all(np.isfinite(p), axis=0)
-        fit &= ~base_.has_short_arm(shapes, self.design_count)
+        fit = start.is_sure & base_.is_fit(block.designs, shapes, p)
         offsets = np.zeros((block.steps + 1, len(self.u)))
         u0 = self.u.copy()
         u0[base_.running_index] = self.start / self.scale
         offsets[:, base_.running_index] = np.linspace(0.0, self.range_length[0] / self.scale, block.steps + 1)
-        march = DesignBatch(
-            base_.functions,
-            base_.mechanism,
-            p,
-            stack_rows(q, self.design_count) / base_.unit,
-            start.z,
-            offsets,
-            u0,
-            self.u1,
-            self.u2,
-            tuple(link for link, _ in moving.values()),
-            block.rates,
-            tolerance,
-            base_.unit,
-        )
-        march, fit = self._lead_to_start(march, fit)
+        march = base_.design_batch(shapes, p, (u0, self.u1, self.u2), moving.values(), block.rates)
+        march = march._replace(z0=start.z, input_offsets=offsets)
         try:
+            march, fit = self._lead_to_start(march, fit)
             out, good = self._run_fit_designs(runner, march, fit)
         except UnsupportedStructure:
             return None
@@ -220,10 +203,8 @@ class _DesignBlockSolver:
             return march, fit
         if far > LARGEST_INPUT_POSITION:
             return march, np.zeros_like(fit)
-        places = np.linspace(0.0, 1.0, int(np.ceil(far / LEAD_IN_STEP)) + 2)
-        with np.errstate(all="ignore"):
-            (last,) = deque(iterate_steps(march, (self.u + place * gone for place in places)), maxlen=1)
-        return march._replace(z0=last.z.T), fit & last.passed
+        z, passed = NumpyRunner().lead(march._replace(u0=self.u), gone, LEAD_IN_STEP)
+        return march._replace(z0=z), fit & passed
 
     def _with_frame_points(
         self, out: Array, told: Mapping[str, tuple[str, str]], shapes: Mapping[str, LinkShape]

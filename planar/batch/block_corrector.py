@@ -19,7 +19,7 @@ Array = np.ndarray
 LONGEST_NEWTON_STEP = 0.8
 """rad or sizes: no step of Newton's method is longer."""
 NEARLY_CLOSED_TOLERANCE = 1e-5
-"""Lengths of the size, or rad: a group that is open by less is closed by the step from there."""
+"""Lengths of the size, or rad: a block that is open by less is closed by the step from there."""
 COMPACTION_INTERVAL = 4
 """Steps after which those that have closed are left out."""
 SPREAD_STARTS = 24
@@ -49,30 +49,30 @@ class BlockCorrector:
         """The same for some of the designs, which may stand there twice."""
         return BlockCorrector(self.functions, self.p[:, designs], self.u[:, designs], self.counts_turns)
 
-    def correct(self, stage: Block, z: Array, exists: Array, starts: Array, steps: int) -> CorrectedBlocks:
+    def correct(self, block: Block, z: Array, exists: Array, starts: Array, steps: int) -> CorrectedBlocks:
         """Newton's method for a block from every start (starts, unknowns) beside z (unknowns, designs, ways).
 
         `exists` (designs, ways) are the ways that are there."""
         count = len(starts)
         shape = (*exists.shape, count)
         z = np.repeat(z[..., None], count, axis=3)
-        z[stage.unknowns] = starts.T[:, None, None, :]
+        z[block.unknowns] = starts.T[:, None, None, :]
         each = np.broadcast_to(np.arange(self.p.shape[1])[:, None, None], shape).ravel()
         flat = z.reshape(len(z), -1)
         closed = np.zeros(flat.shape[1], dtype=bool)
         busy = np.flatnonzero(np.repeat(exists[..., None], count, axis=2).ravel())
         at, *given = self._open_columns(flat, busy, each)
-        closing = self.functions.block_call(stage)
+        closing = self.functions.block_call(block)
         regularity = np.zeros(flat.shape[1])
         for step in range(steps + 1):
-            left, slope = closing.evaluate_batch(len(at), at, *given)
-            left, slope = left[:, 0], slope.transpose(0, 2, 1)
+            residuals, jacobian = closing.evaluate_batch(len(at), at, *given)
+            residuals, jacobian = residuals[:, 0], jacobian.transpose(0, 2, 1)
             # the error of the next step is the square of this one, which the march looks at again
-            done = np.max(np.abs(left), axis=1, initial=0.0) <= NEARLY_CLOSED_TOLERANCE
-            regularity[busy] = column_volume(slope)
-            move = solve_vectors(slope, left, least_squares=True)
+            done = np.max(np.abs(residuals), axis=1, initial=0.0) <= NEARLY_CLOSED_TOLERANCE
+            regularity[busy] = column_volume(jacobian)
+            move = solve_vectors(jacobian, residuals, least_squares=True)
             far = np.maximum(np.max(np.abs(move), axis=1), LONGEST_NEWTON_STEP)[:, None] / LONGEST_NEWTON_STEP
-            at[:, stage.unknowns] -= move / far
+            at[:, block.unknowns] -= move / far
             if step == steps or np.all(done):
                 flat[:, busy[done]] = at[done].T
                 closed[busy[done]] = True
@@ -85,29 +85,29 @@ class BlockCorrector:
                     break
                 at, *given = self._open_columns(flat, busy, each)
         if self.counts_turns:
-            flat = self._wind_back(stage, flat, closed, each)
+            flat = self._wind_back(block, flat, closed, each)
         return CorrectedBlocks(flat.reshape(z.shape), closed.reshape(shape), regularity.reshape(shape))
 
     def _open_columns(self, flat: Array, busy: Array, each: Array) -> tuple[Array, Array, Array]:
         """Columns of z (columns, unknowns) that are not closed yet, with their inputs and numbers."""
         return np.ascontiguousarray(flat[:, busy].T), self.u.T[each[busy]], self.p.T[each[busy]]
 
-    def _wind_back(self, stage: Block, z: Array, closed: Array, each: Array) -> Array:
+    def _wind_back(self, block: Block, z: Array, closed: Array, each: Array) -> Array:
         """The same assemblies with angles at the turn nearest to none where that is closed too, as in `Candidates`."""
         least = z.copy()
-        own, angles = least[stage.unknowns], self._is_angle(stage)
+        own, angles = least[block.unknowns], self._is_angle(block)
         own[angles] = np.arctan2(np.sin(own[angles]), np.cos(own[angles]))
-        left = self.functions.block_function(stage)(least, self.u[:, each], self.p[:, each])[0].full()
-        still = closed & (np.max(np.abs(left), axis=0, initial=0.0) <= 10.0 * CLOSED_TOLERANCE)
+        residuals = self.functions.block_function(block)(least, self.u[:, each], self.p[:, each])[0].full()
+        still = closed & (np.max(np.abs(residuals), axis=0, initial=0.0) <= 10.0 * CLOSED_TOLERANCE)
         return np.where(still, least, z)
 
-    def _is_angle(self, stage: Block) -> Array:
-        columns = self.equations.unknowns[stage.unknowns]
+    def _is_angle(self, block: Block) -> Array:
+        columns = self.equations.unknowns[block.unknowns]
         return np.array([self.equations.coordinates[c].kind is not MeasureKind.LENGTH for c in columns], dtype=bool)
 
-    def spread_starts(self, stage: Block, roots: Array) -> Array:
+    def spread_starts(self, block: Block, roots: Array) -> Array:
         """Starts with angles spread over the circles, and lengths as the base has them."""
-        angles = self._is_angle(stage)
+        angles = self._is_angle(block)
         grid = (
             np.arange(SPREAD_STARTS)[:, None] * np.sqrt([2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0])[: roots.shape[1]] % 1.0
         )
@@ -115,9 +115,9 @@ class BlockCorrector:
         like = roots[np.arange(SPREAD_STARTS) % len(roots)]
         return np.where(angles, 2.0 * np.pi * grid - np.pi, like)
 
-    def is_distinct(self, stage: Block, z: Array, there: Array) -> Array:
+    def is_distinct(self, block: Block, z: Array, there: Array) -> Array:
         """Which of the ways from one partial assembly are not the same as one before (designs, ways, starts)."""
-        own, angles = z[stage.unknowns], self._is_angle(stage)
+        own, angles = z[block.unknowns], self._is_angle(block)
         found = there.copy()
         for k in range(1, there.shape[2]):
             for other in range(k):

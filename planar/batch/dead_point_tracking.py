@@ -8,9 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.batch.march.backend import DesignBatch, DesignRunner
-from planar.batch.march.checks import DesignBranchCheck
+from planar.batch.march.checks import PointWriter, design_positions
 from planar.batch.march.design_functions import DesignFunctions
-from planar.batch.march.numpy_backend import DesignsAtStep, PointWriter, make_residual_check
 from planar.equations.linear import solve_vectors
 from planar.solving.checks.singular_values import SINGULAR_DISTANCE_RATIO
 from planar.solving.continuation.predictor_corrector import (
@@ -80,7 +79,7 @@ class _DesignCurves:
     """The curves of some designs; `SolutionCurve` in `solving` is that of one."""
 
     def __init__(self, march: DesignBatch, design: Array, direction: Array):
-        self.functions = DesignFunctions(march.program, march.p[:, design])
+        self.functions = DesignFunctions(march.functions, march.p[:, design])
         self.start, self.direction = march.u0.T[design], direction
 
     def inputs(self, y: Array) -> Array:
@@ -121,12 +120,12 @@ class _DesignCurves:
             np.linalg.norm((self.jacobians(y + DIFFERENCE_STEP * tangent) - slope) / sizes, axis=(1, 2))
             / DIFFERENCE_STEP
         )
-        least = np.linalg.svd(np.nan_to_num(slope / sizes), compute_uv=False)[:, -1]
+        least = np.linalg.svd(np.nan_to_num(slope / sizes), compute_uv=False).min(axis=1, initial=np.inf)
         return _CurvePoints(y, tangent, bend, least / np.maximum(change, 1e-300))
 
 
 def _solve_bordered(jacobians: Array, normal: Array, right: Array, last: float) -> Array:
-    """x with slope x = left and normal x = last, for each design; not numbers where that is singular."""
+    """x with Jacobian x = left and normal x = last, for each design; not numbers where that is singular."""
     whole = np.concatenate([jacobians, normal[:, None]], axis=1)
     right = np.concatenate([right, np.full((len(right), 1), last)], axis=1)
     return solve_vectors(whole, right, least_determinant=1e-12)
@@ -272,7 +271,7 @@ class _DeadPointTracker:
         return FollowedDesigns(self.is_settled, solved, design[kept], step[kept], out[:, kept])
 
     def _points_at_steps(self, arcs: _CurveArcs, step: Array) -> tuple[Array, Array]:
-        """The points (rows, steps) where arcs come to steps, and which of them pass the gate."""
+        """The points (rows, steps) where arcs come to steps, and which of them pass the checks."""
         march = self.batch
         wide = march.output_row_count
         if not len(step):
@@ -280,14 +279,10 @@ class _DeadPointTracker:
         place = self.distances[step]
         y, fine = self._find_falling_zero(arcs, lambda _, y: place - y[:, -1])
         own = march.select(arcs.design, y[:, :-1].T)
-        columns = DesignFunctions(march.program, own.p)
+        columns = DesignFunctions(march.functions, own.p)
         u = own.u0 + place * self.direction[:, None]
         z = columns.correct(y[:, :-1], u.T)
         fine &= np.max(np.abs(z - y[:, :-1]), axis=1, initial=0.0) < 1e-3
-        w = columns.coordinates(z, u.T)
-        branches, closed = DesignBranchCheck(columns), make_residual_check(own)
-        here = branches.evaluate(z, u.T)
-        fine &= (closed.worst_residual(w, u) <= march.tolerance) & branches.is_regular(here)
-        out = np.empty((wide, len(step)))
-        fine &= PointWriter(own, columns).write(out, DesignsAtStep(z, u, w, fine, here))
+        row, out = design_positions(columns, own, z, u), np.empty((wide, len(step)))
+        fine &= row.passed & PointWriter(own, columns).write(out, row)
         return out, fine

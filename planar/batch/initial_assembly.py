@@ -28,7 +28,7 @@ NEWTON_STEPS, SPREAD_NEWTON_STEPS = 8, 40
 DAMPED_STARTS = 6
 """Starts of the damped method, by which a design is refused."""
 REFUSAL_TOLERANCE = 1e-6
-"""Lengths of the size by which a group stays open that is not sure to be refused."""
+"""Lengths of the size by which a block stays open that is not sure to be refused."""
 MAX_PARTIAL_ASSEMBLIES = 8
 """Partial assemblies of a design that are carried on, those nearest to the sketch."""
 
@@ -36,7 +36,7 @@ MAX_PARTIAL_ASSEMBLIES = 8
 class DesignAssemblies(NamedTuple):
     """z (unknowns, designs), and for which of them it is surely the one that the search one by one would take.
 
-    `ends`: the level of the group that surely cannot be joined to the rest, -1 where all can (designs,).
+    `ends`: the level of the block that surely cannot be joined to the rest, -1 where all can (designs,).
     """
 
     z: Array
@@ -46,7 +46,7 @@ class DesignAssemblies(NamedTuple):
 
 class _PartialAssemblies(NamedTuple):
     """Partial assemblies of all designs: z (unknowns, designs, ways), which of the ways there are (designs, ways), and
-    what they are told apart by: the squared distance to the sketch, and for each group how its slides and points lie.
+    what they are told apart by: the squared distance to the sketch, and for each block how its slides and points lie.
     """
 
     z: Array
@@ -65,12 +65,11 @@ def find_assemblies(
     shapes: Mapping[str, LinkShape],
     p: Array,
     u: Array,
-    tolerance: float,
     runner: DesignRunner,
 ) -> DesignAssemblies:
     """The assemblies at inputs u (inputs, designs), of designs with numbers p (numbers, designs) and these shapes."""
     with np.errstate(all="ignore"):  # starts that lead nowhere end as what is no number
-        near = find_nearest_assemblies(reference, shapes, p, u, tolerance, runner)
+        near = find_nearest_assemblies(reference, shapes, p, u, runner)
         if near is None:
             return _AssemblySearch(reference, shapes, p, u).search()
         every, rest = (
@@ -107,7 +106,7 @@ class _AssemblySearch:
         """See `find_assemblies`."""
         here, hasty = self._join_blocks(True)
         found = self._choose(here)
-        # a group that lies where it is meant may leave the later ones no place near the sketch
+        # a block that lies where it is meant may leave the later ones no place near the sketch
         cost = np.where(here.exists, here.distance, np.inf).min(axis=1)
         again = np.flatnonzero(hasty & ~is_at_sketch(cost, self._sketched_point_count()))
         if again.size:
@@ -119,23 +118,23 @@ class _AssemblySearch:
         return found
 
     def _join_blocks(self, quick: bool) -> tuple[_PartialAssemblies, Array]:
-        """All groups joined, and which designs had one that was clear by itself; without `quick` none is."""
+        """All blocks joined, and which designs had one that was clear by itself; without `quick` none is."""
         hasty = np.zeros(self.design_count, dtype=bool)
         unknowns = len(self.equations.unknowns)
         zero = np.zeros((self.design_count, 1))
         here = _PartialAssemblies(np.zeros((unknowns, self.design_count, 1)), zero == 0.0, zero)
-        for stage, (roots, most) in zip(self.equations.blocks, self.reference.block_assemblies(), strict=True):
-            if slice_length(stage.rows):
-                on, rest = self._extend_clearly(stage, here, roots) if quick else (here, np.arange(self.design_count))
+        for block, (roots, most) in zip(self.equations.blocks, self.reference.block_assemblies(), strict=True):
+            if slice_length(block.rows):
+                on, rest = self._extend_clearly(block, here, roots) if quick else (here, np.arange(self.design_count))
                 hasty[np.setdiff1d(np.arange(self.design_count), rest)] = True
                 if rest.size:
-                    others, sure = self._extend(self.corrector.select(rest), stage, here.select(rest), roots, most)
+                    others, sure = self._extend(self.corrector.select(rest), block, here.select(rest), roots, most)
                     on = self._merge_extensions(here, on, rest, others)
                     self.is_sure[rest] &= sure
                     none = np.flatnonzero(here.exists.any(axis=1) & ~on.exists.any(axis=1))
                     if none.size:
-                        self._refuse_designs(stage, none, here, roots)
-                    on = self._score(stage, on)
+                        self._refuse_designs(block, none, here, roots)
+                    on = self._score(block, on)
                 here = self._keep_nearest(on)
         return here, hasty
 
@@ -143,28 +142,28 @@ class _AssemblySearch:
         """How many points the sketch shows."""
         return sum(map(len, self.candidates.sketched_by_level.values()))
 
-    def _refuse_designs(self, stage: Block, designs: Array, here: _PartialAssemblies, roots: Array) -> None:
+    def _refuse_designs(self, block: Block, designs: Array, here: _PartialAssemblies, roots: Array) -> None:
         """Of designs that no start has led to an assembly, those that have none: where the damped method says so too.
 
-        Only of groups of two unknowns, whose least squares it cannot miss from starts on all sides.
+        Only of blocks of two unknowns, whose least squares it cannot miss from starts on all sides.
         """
-        unknowns = slice_length(stage.unknowns)
+        unknowns = slice_length(block.unknowns)
         if unknowns > 2:
             return
         ways = [(design, way) for design in designs for way in np.flatnonzero(here.exists[design])]
         starts = np.repeat(
-            self.corrector.spread_starts(stage, roots)[:: SPREAD_STARTS // DAMPED_STARTS], len(ways), axis=0
+            self.corrector.spread_starts(block, roots)[:: SPREAD_STARTS // DAMPED_STARTS], len(ways), axis=0
         )
         each = np.tile(np.arange(len(ways)), len(starts) // len(ways))
         design, way = np.array(ways).T
         whole = here.z[:, design, way]
-        function = self.functions.block_call(stage)
+        function = self.functions.block_call(block)
 
         def closing(tried: Array) -> tuple[Array, Array]:
             # the last entry tells the columns apart: nothing depends on it, so no step moves it
             which = np.rint(tried[:, -1]).astype(int)
             z = whole[:, which].T
-            z[:, stage.unknowns] = tried[:, :-1]
+            z[:, block.unknowns] = tried[:, :-1]
             left, slope = function.evaluate_batch(len(which), z, self.u.T[design[which]], self.p.T[design[which]])
             slope = np.concatenate([slope.transpose(0, 2, 1), np.zeros((len(which), left.shape[2], 1))], axis=2)
             return left[:, 0], slope
@@ -173,20 +172,20 @@ class _AssemblySearch:
         # nearly closed is neither the one nor the other
         near = np.zeros(self.design_count, dtype=bool)
         near[design[each[ended.residual < REFUSAL_TOLERANCE]]] = True
-        self.failed_block[designs[~near[designs]]] = stage.block_index
+        self.failed_block[designs[~near[designs]]] = block.block_index
 
-    def _extend_clearly(self, stage: Block, here: _PartialAssemblies, roots: Array) -> tuple[_PartialAssemblies, Array]:
-        """Every design with one way to add a group, and the designs for which that is not clearly the one meant.
+    def _extend_clearly(self, block: Block, here: _PartialAssemblies, roots: Array) -> tuple[_PartialAssemblies, Array]:
+        """Every design with one way to add a block, and the designs for which that is not clearly the one meant.
 
-        It is where it lies at the sketch, and the slope is so regular that no other is near: see `BlockAssemblies`.
+        It is where it lies at the sketch, and the Jacobian is so regular that no other is near: see `BlockAssemblies`.
         """
         every = np.arange(self.design_count)
-        sketched = len(self.candidates.sketched_by_level.get(stage.block_index, ()))
-        # of a group of two both assemblies may be near the sketch, where its links are short
-        if not sketched or here.exists.shape[1] > 1 or slice_length(stage.unknowns) <= 2:
+        sketched = len(self.candidates.sketched_by_level.get(block.block_index, ()))
+        # of a block of two both assemblies may be near the sketch, where its links are short
+        if not sketched or here.exists.shape[1] > 1 or slice_length(block.unknowns) <= 2:
             return here, every
-        z, closed, regularity = self.corrector.correct(stage, here.z, here.exists, roots[:1], NEWTON_STEPS)
-        on = self._score(stage, here._replace(z=z[:, :, :, 0], exists=closed[:, :, 0]))
+        z, closed, regularity = self.corrector.correct(block, here.z, here.exists, roots[:1], NEWTON_STEPS)
+        on = self._score(block, here._replace(z=z[:, :, :, 0], exists=closed[:, :, 0]))
         near = is_at_sketch(on.distance - here.distance, sketched)
         clear = on.exists[:, 0] & near[:, 0] & is_clearly_regular(regularity[:, 0, 0])
         return on, every[~clear]
@@ -209,27 +208,27 @@ class _AssemblySearch:
         return _PartialAssemblies(widened(clear.z, others.z), there, widened(here.distance, others.distance), lying)
 
     def _extend(
-        self, corrector: BlockCorrector, stage: Block, here: _PartialAssemblies, roots: Array, most: int
+        self, corrector: BlockCorrector, block: Block, here: _PartialAssemblies, roots: Array, most: int
     ) -> tuple[_PartialAssemblies, Array]:
-        """Every partial assembly with the ways in which a group may be added, and for which designs these are sure."""
+        """Every partial assembly with the ways in which a block may be added, and for which designs these are sure."""
         sure = np.ones(len(here.exists), dtype=bool)
-        found, there, _ = corrector.correct(stage, here.z, here.exists, roots, NEWTON_STEPS)
-        there &= corrector.is_distinct(stage, found, there)
+        found, there, _ = corrector.correct(block, here.z, here.exists, roots, NEWTON_STEPS)
+        there &= corrector.is_distinct(block, found, there)
         few = here.exists & (there.sum(axis=2) < most)
         if few.any():
             # where some starts led astray or to one end, others are tried as well
             designs, ways = np.nonzero(few)
             part = corrector.select(designs)
             more, closed, _ = part.correct(
-                stage,
+                block,
                 here.z[:, designs, ways][:, :, None],
                 here.exists[designs, ways][:, None],
-                part.spread_starts(stage, roots),
+                part.spread_starts(block, roots),
                 SPREAD_NEWTON_STEPS,
             )
             old = found[:, designs, ways][:, :, None], there[designs, ways][:, None]
             more, closed = np.concatenate([old[0], more], axis=3), np.concatenate([old[1], closed], axis=2)
-            closed &= part.is_distinct(stage, more, closed)
+            closed &= part.is_distinct(block, more, closed)
             order = np.argsort(~closed[:, 0], axis=1, kind="stable")[:, : len(roots)]
             kept = np.take_along_axis(closed[:, 0], order, axis=1)
             # more than the base has, or some but fewer: the search one by one may see it otherwise
@@ -243,17 +242,17 @@ class _AssemblySearch:
         z, exists = found.reshape(len(found), len(sure), width), there.reshape(len(sure), width)
         return _PartialAssemblies(z, exists, spread, lying), sure
 
-    def _score(self, stage: Block, here: _PartialAssemblies) -> _PartialAssemblies:
-        """The partial assemblies with what a group adds to how they are told apart."""
+    def _score(self, block: Block, here: _PartialAssemblies) -> _PartialAssemblies:
+        """The partial assemblies with what a block adds to how they are told apart."""
         candidates, width = self.candidates, here.exists.shape[1]
         u, p = (np.repeat(part.T, width, axis=0) for part in (self.u, self.p))
         found = self.functions.coordinates(here.z.reshape(len(here.z), -1).T, u, p)
         w = np.ascontiguousarray(found.T).reshape(-1, self.design_count, width)
         sketched = {
-            name: candidates.first_link[name] for name in candidates.sketched_by_level.get(stage.block_index, ())
+            name: candidates.first_link[name] for name in candidates.sketched_by_level.get(block.block_index, ())
         }
-        pairs = {name: candidates.pairs[name] for name in stage.pairs}
-        links = {*stage.links, *(link for pair in pairs.values() for link in pair.bodies)}
+        pairs = {name: candidates.pairs[name] for name in block.pairs}
+        links = {*block.links, *(link for pair in pairs.values() for link in pair.bodies)}
         links |= {link for _, link, _ in sketched.values()}
         frames, own = frames_from_coordinates(w, candidates.column, links, pairs)
 
@@ -276,7 +275,7 @@ class _AssemblySearch:
                 drive = np.asarray(pair.input_position([frames[link] for link in pair.bodies], numbers, own[name]))
                 behind += ~np.vectorize(pair.is_intended_assembly, otypes=[bool])(drive)
                 far = far + drive
-        heights = [carried(link, point).y for link in stage.links for point in self.local_points[link]]
+        heights = [carried(link, point).y for link in block.links for point in self.local_points[link]]
         height = np.mean(np.broadcast_arrays(*heights, far), axis=0) if heights else far * 0.0
         return here._replace(distance=distance, tie_keys=(*here.tie_keys, behind, -height, -far))
 
@@ -306,7 +305,7 @@ class _AssemblySearch:
         tied = np.flatnonzero(alike.sum(axis=1) > 1)
         if tied.size:
             keys = [each[tied] for each in here.tie_keys]
-            # behind counts over all groups, the rest group after group
+            # behind counts over all blocks, the rest block after block
             keys = [reduce(np.add, keys[::3]), *(key for k, key in enumerate(keys) if k % 3)] if keys else []
             left = alike[tied]
             for key in keys:
@@ -318,7 +317,7 @@ class _AssemblySearch:
         shown = self._sketched_point_count()
         clear = is_at_sketch(least, shown) & (shown > 0) & ~np.isin(np.arange(self.design_count), tied)
         sure = (self.is_sure | clear) & np.isfinite(least) & (least < self.dropped_distance - EQUAL_DISTANCE_TOLERANCE)
-        largest = max((slice_length(stage.unknowns) for stage in self.equations.blocks), default=0)
+        largest = max((slice_length(block.unknowns) for block in self.equations.blocks), default=0)
         if largest > 2:
             # it may have assemblies that no start has led to: none of these is nearer than what is near
             sure &= is_at_sketch(least, shown, NEAR_SKETCH if largest <= MAX_BLOCK_UNKNOWNS else CLEAR_SKETCH_DISTANCE)

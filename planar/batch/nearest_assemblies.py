@@ -1,4 +1,4 @@
-"""Designs whose assembly is clearly the one of the base: found by a backend from there, all groups at once."""
+"""Designs whose assembly is clearly the one of the base: found by a backend from there, all blocks at once."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from planar.batch.assembly_scores import (
     is_clearly_regular,
     is_surely_farther,
 )
-from planar.batch.march.backend import CorrectedAssemblies, DesignBatch, DesignRunner, UnsupportedStructure
-from planar.batch.reference_design import ReferenceDesign, stack_rows
+from planar.batch.march.backend import CorrectedAssemblies, DesignRunner, UnsupportedStructure
+from planar.batch.reference_design import ReferenceDesign
 from planar.equations.constraint_equations import Block, slice_length
 from planar.model.link_shapes import LinkShape
 from planar.solving.assembly.block_assemblies import SAME_ASSEMBLY_TOLERANCE, BlockAssemblies
@@ -38,26 +38,25 @@ def find_nearest_assemblies(
     shapes: Mapping[str, LinkShape],
     p: Array,
     u: Array,
-    tolerance: float,
     runner: DesignRunner,
 ) -> NearestAssemblies | None:
-    """The assemblies at inputs u (inputs, designs); None where the sketch does not show every group, or no
+    """The assemblies at inputs u (inputs, designs); None where the sketch does not show every block, or no
     runner can correct them.
 
-    Costs never fall: where the nearest assembly is taken of every group, and each group's next one alone would cost
-    more than all these, there is no nearer one of the whole. A group in closed form has two assemblies; any other as
+    Costs never fall: where the nearest assembly is taken of every block, and each block's next one alone would cost
+    more than all these, there is no nearer one of the whole. A block in closed form has two assemblies; any other as
     many as the base has, if they are found again, or it lies where it does at the sketch, and so regular that no other
     is near.
     """
     candidates = reference.candidates
-    stages = [stage for stage in reference.functions.equations.blocks if slice_length(stage.unknowns)]
-    at = {stage.block_index: candidates.sketched_by_level.get(stage.block_index, ()) for stage in stages}
+    blocks = [block for block in reference.functions.equations.blocks if slice_length(block.unknowns)]
+    at = {block.block_index: candidates.sketched_by_level.get(block.block_index, ()) for block in blocks}
     if candidates.counts_turns or any(
-        slice_length(stage.unknowns) > MAX_BLOCK_UNKNOWNS or not at[stage.block_index] for stage in stages
+        slice_length(block.unknowns) > MAX_BLOCK_UNKNOWNS or not at[block.block_index] for block in blocks
     ):
         return None
     try:
-        return _NearestAssemblySearch(reference, shapes, p, u, tolerance, runner, candidates, stages).search()
+        return _NearestAssemblySearch(reference, shapes, p, u, runner, candidates, blocks).search()
     except UnsupportedStructure:
         return None
 
@@ -69,71 +68,52 @@ class _NearestAssemblySearch:
         shapes: Mapping[str, LinkShape],
         p: Array,
         u: Array,
-        tolerance: float,
         runner: DesignRunner,
         candidates: BlockAssemblies,
-        stages: list[Block],
+        blocks: list[Block],
     ):
-        self.design_count, self.runner, self.blocks = p.shape[1], runner, stages
+        self.design_count, self.runner, self.blocks = p.shape[1], runner, blocks
         at = candidates.sketched_by_level
         self.roots = {
-            stage.block_index: each
-            for stage, each in zip(base.functions.equations.blocks, base.block_assemblies(), strict=True)
+            block.block_index: each
+            for block, each in zip(base.functions.equations.blocks, base.block_assemblies(), strict=True)
         }
-        self.names = [name for stage in stages for name in at[stage.block_index]]
-        self.point_blocks = tuple(stage.block_index for stage in stages for _ in at[stage.block_index])
+        self.names = [name for block in blocks for name in at[block.block_index]]
+        self.point_blocks = tuple(block.block_index for block in blocks for _ in at[block.block_index])
         self.sketch = np.array([candidates.sketch[name] for name in self.names]).reshape(-1, 2, 1)
         members = [candidates.first_link[name][1:] for name in self.names]
-        q = (
-            stack_rows([part for link, point in members for part in shapes[link].position(point)], self.design_count)
-            / base.unit
-        )
-        links = tuple(link for link, _ in members)
         start = np.concatenate([np.zeros(0), *(roots[0] for roots, _ in self.roots.values() if len(roots))])
-        self.batch = DesignBatch(
-            base.functions,
-            base.mechanism,
-            p,
-            q,
-            np.repeat(start[:, None], self.design_count, axis=1),
-            np.zeros((1, len(u))),
-            u,
-            u,
-            u,
-            links,
-            False,
-            tolerance,
-            base.unit,
-        )
+        self.batch = base.design_batch(shapes, p, (u, u, u), members)
+        self.batch.z0[:] = start[:, None]
 
     def search(self) -> NearestAssemblies:
-        """See `nearby`."""
+        """See `find_nearest_assemblies`."""
         found = self.runner.correct_assemblies(self.batch, self.point_blocks, CORRECTIONS)
         costs, others = (np.square(places - self.sketch).sum(axis=1) for places in (found.points, found.other_points))
         clear, total, before = found.converged.copy(), costs.sum(axis=0), np.zeros(self.design_count)
-        for stage in self.blocks:
-            own = np.array(self.point_blocks) == stage.block_index
+        for block in self.blocks:
+            own = np.array(self.point_blocks) == block.block_index
             cost, other, own_count = costs[own].sum(axis=0), others[own].sum(axis=0), int(own.sum())
             if np.all(np.isinf(other)):
                 clear &= is_at_sketch(cost, own_count, NEAR_SKETCH) & is_clearly_regular(found.regularity)
                 near = is_at_sketch(cost, own_count)
                 clear &= (
-                    near if near.all() else near | is_surely_farther(before + self._next_cost(stage, found, own), total)
+                    near if near.all() else near | is_surely_farther(before + self._next_cost(block, found, own), total)
                 )
             else:
                 clear &= is_surely_farther(before + other, total)
             before += cost
         return NearestAssemblies(found.z, clear)
 
-    def _next_cost(self, stage: Block, found: CorrectedAssemblies, own: Array) -> Array:
-        """The least cost of a group's other assemblies (designs,); nothing where not as many are found as it has."""
-        roots, most = self.roots[stage.block_index]
-        least, known = np.full(self.design_count, np.inf), [found.z[stage.unknowns]]
+    def _next_cost(self, block: Block, found: CorrectedAssemblies, own: Array) -> Array:
+        """The least cost of a block's other assemblies (designs,); nothing where not as many are found as it has."""
+        roots, most = self.roots[block.block_index]
+        least, known = np.full(self.design_count, np.inf), [found.z[block.unknowns]]
         count = np.ones(self.design_count, dtype=int)
         for root in roots[1:]:
-            self.batch.z0[stage.unknowns] = root[:, None]
+            self.batch.z0[block.unknowns] = root[:, None]
             other = self.runner.correct_assemblies(self.batch, self.point_blocks, CORRECTIONS)
-            z = other.z[stage.unknowns]
+            z = other.z[block.unknowns]
             apart = [
                 ~(np.max(np.abs(np.exp(1j * z) - np.exp(1j * each)), axis=0) <= SAME_ASSEMBLY_TOLERANCE)
                 for each in known
@@ -143,5 +123,5 @@ class _NearestAssemblySearch:
             least = np.where(new, np.minimum(least, cost), least)
             count += new
             known.append(np.where(new, z, np.nan))
-        self.batch.z0[stage.unknowns] = roots[0][:, None]
+        self.batch.z0[block.unknowns] = roots[0][:, None]
         return np.where(count == most, least, -np.inf)

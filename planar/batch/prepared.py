@@ -62,7 +62,7 @@ def prepared(
     """A mechanism made ready to be run over and over; calling what is returned solves it for one design after another.
 
     See `planar.sweep` for what is taken, and raised: this is a sweep of one design at a time, without its preparations.
-    With llvmlite, and where every group of the mechanism is in closed form, a run of the same design again takes some
+    With llvmlite, and where every block of the mechanism is in closed form, a run of the same design again takes some
     microseconds; anything else goes through `planar.sweep` each time.
     """
     return PreparedSweep(mechanism, steps, points, rates, start, stop, pair)
@@ -123,8 +123,8 @@ class PreparedSweep:
         if any(link == frame for link, _ in self.members.values()) or not base_.can_run_backend:
             return None
         try:
+            from planar.batch.march.kernel import kernel_equations
             from planar.batch.march.llvm_positions import PositionsKernel
-            from planar.batch.march.llvm_runner import kernel_equations
             from planar.codegen.instructions import UnsupportedOperation
             from planar.equations.mechanism_numbers import equation_structure
         except ImportError:
@@ -167,30 +167,22 @@ class PreparedSweep:
         arrays = read_designs(self.mechanism, values) if values else {}
         design = with_design_values(base_.mechanism, arrays)
         shapes = base_.shapes(design)
-        p, (u, u1, u2) = base_.pair_numbers(shapes, 1), base_.inputs(design, 1)
-        self.tolerance, self.current_design = base_.tolerance(p), None
+        p, inputs = base_.pair_numbers(shapes, 1), base_.inputs(design, 1)
+        batch = base_.design_batch(shapes, p, inputs, self.members.values())
+        self.tolerance, self.current_design = batch.tolerance, None
         given = [each.position for each in design.inputs]
         if any(
             float(np.ravel(each)[0]) != own.position for each, own in zip(given, base_.mechanism.inputs, strict=True)
         ):
             return False
-        if (
-            not np.all(np.isfinite(p))
-            or base_.has_short_arm(shapes, 1).any()
-            or (arrays and base_.is_unfit(arrays, shapes).any())
-        ):
+        if not base_.is_fit(arrays, shapes, p)[0]:
             return False
-        start = find_assemblies(base_, shapes, p, u, self.tolerance, find_runner("native"))
+        start = find_assemblies(base_, shapes, p, batch.u0, find_runner("native"))
         if not start.is_sure[0]:
             return False
-        q = [
-            float(np.ravel(part)[0]) / base_.unit
-            for link, point in self.members.values()
-            for part in shapes[link].position(point)
-        ]
-        sign = self.kernel_equations.assembly_signs(start.z[:, 0], u[:, 0], p[:, 0])
-        rates = {"u1": u1[:, 0], "u2": u2[:, 0]}
-        self.kernel_numbers = kernel.pack_numbers(p=p[:, 0], q=np.array(q), sign=sign, **rates)
+        rows = {name: getattr(batch, name)[:, 0] for name in ("p", "q", "u1", "u2")}
+        sign = self.kernel_equations.assembly_signs(start.z[:, 0], batch.u0[:, 0], rows["p"])
+        self.kernel_numbers = kernel.pack_numbers(sign=sign, **rows)
         self.current_design = values
         return True
 

@@ -1,14 +1,15 @@
-"""What the designs of a sweep have in common: one program, one size, the points that are wanted."""
+"""What the designs of a sweep have in common: the equation functions, one size, the points that are wanted."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property, lru_cache
 from itertools import combinations
 
 import numpy as np
 
 from planar.batch.design_arrays import design_variables
+from planar.batch.march.backend import DesignBatch
 from planar.document.cursor import suggest_spelling
 from planar.equations.mechanism_numbers import scaled_pair_numbers
 from planar.foundation.errors import BadInput
@@ -52,12 +53,12 @@ class ReferenceDesign:
 
     @cached_property
     def candidates(self) -> BlockAssemblies:
-        """The assemblies of the base's groups."""
+        """The assemblies of the base's blocks."""
         return BlockAssemblies(self.solver)
 
     @property
     def can_run_backend(self) -> bool:
-        """Whether a backend can run the structure: every group closes once, and no contact is kept closed by others."""
+        """Whether a backend can run the structure: every block closes once, and no contact is kept closed by others."""
         watched = any(type(pair).contact_gap is not Pair.contact_gap for pair in self.mechanism.pairs)
         return self.functions.is_square and not watched
 
@@ -102,7 +103,7 @@ class ReferenceDesign:
         return stack_rows(rows, many)
 
     def tolerance(self, p: Array) -> float:
-        """What the gate lets pass for these designs: as `ResidualCheck.tolerance`, of the longest of any."""
+        """What the residual check lets pass for these designs: as `ResidualCheck.tolerance`, of the longest of any."""
         kinds = [kind for pair in self.mechanism.pairs for kind in pair.number_kinds]
         lengths = np.array([kind is MeasureKind.LENGTH for kind in kinds], dtype=bool)
         reach = float(np.nanmax(np.abs(p[lengths]), initial=0.0))
@@ -116,6 +117,32 @@ class ReferenceDesign:
         position, velocity, acceleration = (stack_rows(part, many) / self.input_scale[:, None] for part in parts)
         runs = np.arange(len(self.input_scale))[:, None] == self.running_index
         return position, np.where(runs, velocity, 0.0), np.where(runs, acceleration, 0.0)
+
+    def design_batch(
+        self,
+        shapes: Mapping[str, LinkShape],
+        p: Array,
+        inputs: tuple[Array, Array, Array],
+        members: Iterable[tuple[str, str]],
+        rates: bool = False,
+    ) -> DesignBatch:
+        """Designs of these shapes and numbers, at their inputs (position, first and second rate), with points to tell.
+
+        `members`: (link, point) of each, none on the frame. The unknowns, and where the inputs go, are still to be set.
+        """
+        u, u1, u2 = inputs
+        members, many = tuple(members), p.shape[1]
+        q = stack_rows([part for link, point in members for part in shapes[link].position(point)], many) / self.unit
+        links, z0 = tuple(link for link, _ in members), np.zeros((len(self.functions.equations.unknowns), many))
+        offsets, tolerance = np.zeros((1, len(u))), self.tolerance(p)
+        return DesignBatch(
+            self.functions, self.mechanism, p, q, z0, offsets, u, u1, u2, links, rates, tolerance, self.unit
+        )
+
+    def is_fit(self, values: Mapping[str, Array], shapes: Mapping[str, LinkShape], p: Array) -> Array:
+        """The designs that a backend may run (designs,): see `is_unfit` and `has_short_arm`."""
+        fit = np.all(np.isfinite(p), axis=0) & ~self.has_short_arm(shapes, p.shape[1])
+        return fit & ~self.is_unfit(values, shapes) if values else fit
 
     def is_unfit(self, values: Mapping[str, Array], shapes: Mapping[str, LinkShape]) -> Array:
         """The designs that the pairs may refuse before anything moves (designs,): they are looked at one by one."""
@@ -143,7 +170,7 @@ class ReferenceDesign:
             pinned = {
                 point
                 for pair in self.mechanism.pairs
-                if all(known[other] <= known[link] for other in pair.bodies)  # later groups ask for places alone
+                if all(known[other] <= known[link] for other in pair.bodies)  # later blocks ask for places alone
                 for owner, point in pair.coincident_points()
                 if owner == link
             }
@@ -153,7 +180,7 @@ class ReferenceDesign:
         return found
 
     def block_assemblies(self) -> tuple[tuple[Array, int], ...]:
-        """For every group the assemblies (roots, unknowns) from which those of designs start, and how many one finds.
+        """For every block the assemblies (roots, unknowns) from which those of designs start, and how many one finds.
 
         Looked for once, when first asked for.
         """
@@ -166,13 +193,13 @@ class ReferenceDesign:
     def _search_block_assemblies(self) -> Iterator[tuple[Array, int]]:
         candidates = self.candidates
         nodes: list[tuple[float, Array]] = [(0.0, np.zeros(len(self.solver.equations.unknowns)))]
-        for stage in self.solver.equations.blocks:
+        for block in self.solver.equations.blocks:
             ways = []
             for cost, z in nodes:
-                found, nearest = candidates.near_sketch(stage, z, every=True)
+                found, nearest = candidates.near_sketch(block, z, every=True)
                 ways.append([(cost + each.distance, each.z) for each in found] or [(cost + 1e3, nearest)])
             most = max(ways, key=len)
-            starts = [z[stage.unknowns] for _, z in sorted((*most, *ways[0]), key=lambda each: each[0])]
+            starts = [z[block.unknowns] for _, z in sorted((*most, *ways[0]), key=lambda each: each[0])]
             apart = [
                 z for k, z in enumerate(starts) if all(np.max(np.abs(z - o), initial=0.0) > 1e-6 for o in starts[:k])
             ]

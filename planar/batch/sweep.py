@@ -57,7 +57,7 @@ def sweep(  # many: the public signature; # long: its docstring
     `points` are those whose positions are wanted, and with `rates` velocities and accelerations; all that move, if left
     out. A design that comes to a dead point has NaN from there on, and `status` says why.
 
-    `backend` "native" runs compiled machine code, "casadi" is always there, "auto" takes the faster that is there. What
+    `backend` "native" runs compiled machine code, "numpy" is always there, "auto" takes the faster that is there. What
     a backend cannot do, or its gate does not let pass, the general path does, which is counted and said.
 
     `executor`, any of `concurrent.futures`' kind, solves the blocks elsewhere; a block that is lost there is tried

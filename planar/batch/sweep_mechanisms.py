@@ -7,6 +7,7 @@ from concurrent.futures import Executor
 from dataclasses import replace
 from functools import partial
 from math import ceil
+from os import PathLike
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +20,8 @@ from planar.batch.mechanisms.initial_assembly import StartAssemblies, find_start
 from planar.batch.mechanisms.linkage_groups import LinkageGroup, SweepRequest, linkage_groups, wanted_points
 from planar.batch.mechanisms.march import run_linkages
 from planar.batch.mechanisms.results import Each, PointMapping, Swept
+from planar.document.files import as_mechanism
+from planar.document.first_argument import MechanismSource
 from planar.foundation.errors import BadInput, Outcome
 from planar.model.mechanism import Mechanism, named_points, relative_motions, running_input_index
 from planar.model.pairs import MeasureKind as Measure
@@ -57,7 +60,7 @@ that can give extremes."""
 
 
 def sweep_each(  # many: the public signature
-    mechanisms: Iterable[Mechanism],
+    mechanisms: Iterable[MechanismSource],
     steps: int = 200,
     points: Sequence[str] | str | None = None,
     *,
@@ -69,29 +72,29 @@ def sweep_each(  # many: the public signature
 ) -> Each:
     """The motions of mechanisms of any structure, each as `planar.sweep` would have it as a single design.
 
+    `mechanisms` are mechanisms, files or names of models.
+
     Each runs from the assembly nearest to its sketch, at `steps` + 1 positions of its input (the only one, else the one
     at `pair`; the others stand still), a turn on from its own position; a slide runs between its limits. `points` are
     the names of those that are wanted, of every mechanism that has them; all that move, if left out. With `rates` their
     velocities and accelerations too.
 
-    No mechanism is compiled by itself: it is parted into groups of links, of kinds that many have in common, and runs
-    as data. Single links and dyads are solved in closed form, groups of up to eight links by Newton's method from step
+    No mechanism is compiled by itself: it is parted into blocks of links, of kinds that many have in common, and runs
+    as data. Single links and dyads are solved in closed form, blocks of up to eight links by Newton's method from step
     to step. To the general path, which is counted and said, fall mechanisms with wheels or racks, with links held more
-    than once, with larger groups, without a sketch that tells the assemblies of every group apart, with a slide as the
+    than once, with larger blocks, without a sketch that tells the assemblies of every block apart, with a slide as the
     input that runs, and those that come so near to where two assemblies meet that steps eight times finer do not show
     on which side they pass. A linkage that comes to a dead point has NaN from there on, and says so.
 
-    `backend` "native" runs compiled machine code, "casadi" numpy, "auto" the faster that is there. `executor`, any of
+    `backend` "native" runs compiled machine code, "numpy" numpy, "auto" the faster that is there. `executor`, any of
     `concurrent.futures`' kind, solves parts of the whole elsewhere. `progress` is called with how many mechanisms are
     done, and how many there are.
 
-    Raises BadInput for a point that no mechanism has, an input that is not there, or steps that cannot be.
+    Raises BadInput for what is no mechanism, a point that none has, an input that is not there, impossible steps.
     """
-    whole = list(mechanisms)
+    whole = _read_mechanisms(mechanisms)
     step_count = check_steps(steps)
     for k, mechanism in enumerate(whole):
-        if not isinstance(mechanism, Mechanism):
-            raise BadInput(f"mechanisms[{k}]", f"a mechanism is wanted, not {mechanism!r:.40}")
         if pair is not None or not isinstance(mechanism, PinnedMechanism) or mechanism.layout is None:
             running_input_index(mechanism, pair, f"mechanisms[{k}]")
     names = (points,) if isinstance(points, str) else None if points is None else tuple(dict.fromkeys(points))
@@ -109,6 +112,24 @@ def sweep_each(  # many: the public signature
             raise BadInput("points", f"no mechanism has a point {name!r:.60}")
     general = [each for each in found if each.general]
     return Each(tuple(found), sum(int(np.sum(each.status == 0)) for each in general), len(general), _messages(found))
+
+
+def _read_mechanisms(sources: Iterable[MechanismSource]) -> list[Mechanism]:
+    """The mechanisms, each file or model read once. Raises BadInput."""
+    if isinstance(sources, str | PathLike | Mechanism) or not isinstance(sources, Iterable):
+        raise BadInput("mechanisms", f"a list of mechanisms is wanted, not {type(sources).__name__} {sources!r:.40}")
+    read: dict[str | PathLike[str], Mechanism] = {}
+    mechanisms = []
+    for source in sources:
+        if isinstance(source, Mechanism):
+            mechanisms.append(source)
+        elif isinstance(source, str | PathLike):
+            if source not in read:
+                read[source] = as_mechanism(source)
+            mechanisms.append(read[source])
+        else:
+            raise BadInput(f"mechanisms[{len(mechanisms)}]", f"a mechanism is wanted, not {source!r:.40}")
+    return mechanisms
 
 
 def _messages(found: Sequence[Swept]) -> tuple[str, ...]:

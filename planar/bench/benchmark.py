@@ -33,7 +33,7 @@ SWEEP_STEPS, CYCLE_STEPS = 200, 360
 """Steps of a sweep, and of a cycle."""
 LENGTH_VARIATIONS = (0.01, 1e-4)
 """Of itself that every length of a design may differ from the file's; the second where the first lets none move."""
-BACKEND_LIBRARIES = {"native": "llvmlite", "casadi": "casadi"}
+BACKEND_LIBRARIES = {"native": "llvmlite", "numpy": "numpy"}
 """The backends of sweeps, and the library that each needs."""
 MAX_DESIGNS, FIRST_DESIGNS, SWEEP_SECONDS = 2000, 50, 3.0
 """Designs in a sweep at most, and where it is not known yet how long one takes; s that all sweeps should take about."""

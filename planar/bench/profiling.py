@@ -13,7 +13,7 @@ FunctionKey = tuple[str, ...]
 SWEEP_PARTS: dict[FunctionKey, str] = {
     ("batch", "initial_assembly.py", "find_assemblies"): "assembling the starts",
     ("march", "llvm_backend.py", "run"): "machine code",
-    ("march", "numpy_backend.py", "run"): "casadi's program",
+    ("march", "numpy_backend.py", "run"): "numpy",
     ("batch", "block.py", "_lead_to_start"): "leading designs to where the run starts",
     ("batch", "dead_point_tracking.py", "follow_to_dead_points"): "following designs to where they stop",
     ("batch", "general_path.py", "solve_design"): "the general path",

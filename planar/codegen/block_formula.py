@@ -1,29 +1,15 @@
-"""A formula that many groups share, and its run by numpy over slots of memory."""
+"""A formula that many blocks share, and its run by numpy over slots of memory."""
 
 from __future__ import annotations
 
-import operator
-from collections.abc import Callable, Mapping
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from planar.codegen.instructions import InstructionList, required_values
+from planar.codegen.numpy_code import NumpyFunction, compile_numpy
 from planar.foundation.arrays import Array
-
-NUMPY_OPERATIONS: Mapping[str, Callable[..., Any]] = {
-    "add": operator.add,
-    "sub": operator.sub,
-    "mul": operator.mul,
-    "div": operator.truediv,
-    "neg": operator.neg,
-    "abs": np.abs,
-    "sqrt": np.sqrt,
-    "cos": np.cos,
-    "sin": np.sin,
-    "minnum": np.fmin,
-    "maxnum": np.fmax,
-}
 
 
 class FormulaInput(NamedTuple):
@@ -44,19 +30,13 @@ class BlockFormula:
         self.order = required_values(listing, wanted)
 
     def evaluate_numpy(self, taken: dict[FormulaInput, Any]) -> list[Any]:
-        """The wanted values where the leaves are arrays, or numbers."""
-        values: dict[int, Any] = {}
-        listing = self.instructions.instructions
+        """The wanted values where what the formula takes are arrays, or numbers."""
         with np.errstate(all="ignore"):  # what cannot be assembled is no number, and judged as such
-            for number in self.order:
-                value = listing[number]
-                if value.operation == "input":
-                    values[number] = taken[self.inputs[number]]
-                elif value.operation == "const":
-                    values[number] = value.number
-                else:
-                    values[number] = NUMPY_OPERATIONS[value.operation](*(values[k] for k in value.operands))
-        return [values[number] for number in self.outputs]
+            return list(self._numpy_function(*(taken[each] for each in self.inputs.values())))
+
+    @cached_property
+    def _numpy_function(self) -> NumpyFunction:
+        return compile_numpy(self.instructions, self.outputs, tuple(self.inputs))
 
 
 class KernelLayout(NamedTuple):

@@ -1,4 +1,4 @@
-"""A formula that many groups share as machine code that walks over slots of memory."""
+"""A formula that many blocks share as machine code that walks over slots of memory."""
 
 from __future__ import annotations
 

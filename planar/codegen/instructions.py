@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Hashable, Iterable, Mapping, Sequence
 from math import cos, sin
 from typing import Any, Generic, NamedTuple, TypeVar
 
@@ -149,16 +149,17 @@ class InstructionList(Generic[Key]):
         raise UnsupportedOperation(f"operation {code}")
 
 
-def required_values(listing: InstructionList[Any], wanted: Iterable[int]) -> list[int]:
-    """The values on which the wanted ones depend, and these, in their order."""
-    found: set[int] = set()
+def required_values(instructions: InstructionList[Any], wanted: Iterable[int], known: Container[int] = ()) -> list[int]:
+    """The values on which the wanted ones depend, and these, in their order; not what known ones are made of."""
+    required: set[int] = set()
     stack = list(wanted)
     while stack:
         each = stack.pop()
-        if each not in found:
-            found.add(each)
-            stack += listing.instructions[each].operands
-    return sorted(found)
+        if each not in required:
+            required.add(each)
+            if each not in known:
+                stack += instructions.instructions[each].operands
+    return sorted(required)
 
 
 class CosSin(NamedTuple):

@@ -107,7 +107,10 @@ def build_equations(mechanism: Mechanism, given_links: Sequence[str] = ()) -> Co
     )
     u = ca.SX.sym("u", len(drives))
     unknown = _make_coordinates(mechanism, {link: u[3 * k : 3 * k + 3] for k, link in enumerate(given_links)})
-    p = stack_expressions(ca.SX.sym(f"of {pair.name}") for pair in mechanism.pairs for _ in pair.number_kinds)
+    # each by a name of its own: casadi's search for common expressions (3.8.2) may take those of one name for one
+    p = stack_expressions(
+        ca.SX.sym(f"of {pair.name} {k}") for pair in mechanism.pairs for k in range(len(pair.number_kinds))
+    )
     numbers = split_pair_numbers(mechanism.pairs, p)
     closing = list(residuals(mechanism, unknown.frames, numbers, unknown.own, u[3 * len(given_links) :]))
     rows = [row for row, _ in closing]

@@ -60,7 +60,7 @@ def ticks(monkeypatch):
 
 def test_bench_prints_tables_and_says_what_bounds_it(tmp_path, ticks):
     said = run(tmp_path, "bench", "000-P1", "--seconds", "0.2").done()
-    for word in ("assembly", "Four-bar", "native", "casadi", "machine code", "general path", "2 unknowns at once"):
+    for word in ("assembly", "Four-bar", "native", "numpy", "machine code", "general path", "2 unknowns at once"):
         assert word in said
 
 
@@ -69,17 +69,17 @@ def test_bench_gives_a_record(tmp_path, ticks):
     assert (record["links"], record["unknowns"]) == (4, 2)
     assert min(record[name] for name in ("equations", "assembly", "solve", "cycle")) > 0.0
     sweeps = [(each["backend"], each["rates"]) for each in record["sweeps"]]
-    assert sweeps == [("native", True), ("native", False), ("casadi", True), ("casadi", False)]
+    assert sweeps == [("native", True), ("native", False), ("numpy", True), ("numpy", False)]
     for each in record["sweeps"]:
         assert each["seconds"] > 0.0
         assert (each["refused"], each["general"], each["within"]) == (0, 0, LENGTH_VARIATIONS[0])
-        assert (each["compiling"] is None) == (each["backend"] == "casadi")
+        assert (each["compiling"] is None) == (each["backend"] == "numpy")
         # nothing is counted twice
         assert sum(each["parts"].values()) == pytest.approx(1.0, abs=1e-9)
     native = record["sweeps"][0]
     assert 0.0 < native["compiling"] <= native["first"] + TICK
     assert {"machine code", "assembling the starts"} <= set(native["parts"])
-    assert "casadi's program" in record["sweeps"][2]["parts"]
+    assert "numpy" in record["sweeps"][2]["parts"]
 
 
 def instead(monkeypatch, clock, each, closes):

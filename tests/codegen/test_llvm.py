@@ -1,4 +1,4 @@
-"""What LLVM is told equals what casadi computes: runs of many designs against runs of one."""
+"""What kernels compute, as machine code and by numpy, equals what casadi computes: runs of designs against one."""
 
 from pathlib import Path
 
@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 
 import planar
-from planar.batch.march import llvm_designs, llvm_runner
-from planar.batch.march.backend import DesignBatch
+from planar.batch.march import llvm_designs, llvm_runner, numpy_backend, numpy_kernel
+from planar.batch.march.backend import DesignBatch, UnsupportedStructure
 from planar.batch.march.kernel import BareAngle
-from planar.batch.march.llvm_runner import designs_kernel, run_designs_kernel
+from planar.batch.march.llvm_backend import LLVMRunner
+from planar.batch.march.llvm_runner import designs_kernel
+from planar.batch.march.numpy_backend import NumpyRunner
 from planar.batch.reference_design import reference_design
-from planar.codegen import instructions, llvm_compile
+from planar.codegen import instructions, llvm_compile, numpy_code
+from planar.codegen.aligned_arrays import allocate_aligned
 from planar.codegen.instructions import (
     MAX_INSTRUCTIONS,
     CosSin,
@@ -22,6 +25,7 @@ from planar.codegen.instructions import (
 from planar.equations.mechanism_numbers import equation_structure
 from planar.foundation.errors import BadInput, Outcome
 from planar.model.mechanism import named_points
+from tests.builders import designs_around
 from tests.draws import part
 from tests.known import MODELS
 from tests.linkages import random_linkage
@@ -61,8 +65,15 @@ def repeated(given, designs):
     return given.select(np.zeros(designs, dtype=int))
 
 
+def run(runner, batch):
+    """The points and the good steps of a batch."""
+    out = allocate_aligned(len(batch.input_offsets), batch.output_row_count, batch.p.shape[1])
+    return out, runner.run(batch, out)
+
+
+@pytest.mark.parametrize("runner", [LLVMRunner(), NumpyRunner()])
 @pytest.mark.parametrize("stem", part([stem for stem, mechanism in MODELS.items() if mechanism.inputs], 6))
-def test_a_run_of_a_model_is_the_one_that_casadi_gives(stem):
+def test_a_run_of_a_model_is_the_one_that_casadi_gives(stem, runner):
     mechanism = MODELS[stem]
     try:
         motion = planar.cycle(mechanism, pair=mechanism.inputs[0].pair)
@@ -72,12 +83,11 @@ def test_a_run_of_a_model_is_the_one_that_casadi_gives(stem):
     assert motion.outcome is Outcome.SOLVED
     points = motion.point_names[-3:]
     given = repeated(arguments(motion, points), 3)
-    if not given.program.is_square:
-        with pytest.raises(UnsupportedOperation, match="more than once"):
-            run_designs_kernel(given)
+    if not given.functions.is_square:
+        with pytest.raises(UnsupportedStructure, match="more than once"):
+            run(runner, given)
         return
-    out, good = run_designs_kernel(given)
-    assert out.shape == (len(given.input_offsets), 6 * len(points), 3)
+    out, good = run(runner, given)
     np.testing.assert_array_equal(out, np.repeat(out[:, :, :1], 3, axis=2))
     # what is near a change point, or moves too far in a step, is left to the general path; a step condemns that before
     first = int(good[0])
@@ -126,12 +136,65 @@ def test_cos_and_sin_of_sums_are_put_together_from_the_angles_own():
     np.testing.assert_allclose([found[k] for k in numbers], [np.cos(angle), np.sin(angle)], atol=1e-15)
 
 
-def test_what_is_not_a_number_is_not_good():
+@pytest.mark.parametrize("runner", [LLVMRunner(), NumpyRunner()])
+def test_what_is_not_a_number_is_not_good(runner):
     motion = planar.cycle(MODELS["crank-rocker"])
     given = repeated(arguments(motion, motion.point_names[-1:]), 2)
     given.p[0, 1] = np.nan
-    _, good = run_designs_kernel(given)
+    _, good = run(runner, given)
     assert good.tolist() == [len(given.input_offsets), 0]
+
+
+@pytest.mark.parametrize("stem", part(["crank-rocker", "004-QR", "double-butterfly", "geared-five-bar"], 2))
+def test_both_runners_correct_assemblies_alike_and_come_to_the_same_unknowns(stem):
+    motion = planar.cycle(MODELS[stem], pair=MODELS[stem].inputs[0].pair)
+    given = repeated(arguments(motion, motion.point_names[-3:]), 3)
+    given.z0[:] += 1e-3 * np.arange(3)
+    blocks = [block.block_index for block in given.functions.equations.blocks][-1:] * 3
+    one, other = (runner.correct_assemblies(given, blocks, 6) for runner in (LLVMRunner(), NumpyRunner()))
+    for first, second in zip(one, other, strict=True):
+        np.testing.assert_allclose(first, second, rtol=1e-9, atol=1e-12)
+    steps = np.array([1, 20, 100])
+    one, other = (runner.last_good_unknowns(given, steps) for runner in (LLVMRunner(), NumpyRunner()))
+    np.testing.assert_allclose(np.exp(1j * one), np.exp(1j * other), atol=1e-10)
+
+
+@pytest.mark.parametrize("most", [1, 2])
+def test_blocks_too_large_for_expressions_are_solved_by_arrays_to_the_same(monkeypatch, most):
+    mechanism = MODELS["double-butterfly"]
+    designs = designs_around(mechanism, 0.005, 3)
+    wanted = planar.sweep(mechanism, designs, 60, backend="numpy")
+    monkeypatch.setattr(numpy_kernel, "MAX_EXPRESSION_UNKNOWNS", most)
+    monkeypatch.setattr(numpy_backend, "MAX_EXPRESSION_UNKNOWNS", most)
+    numpy_backend._cached_kernel.cache_clear()
+    found = planar.sweep(mechanism, designs, 60, backend="numpy")
+    numpy_backend._cached_kernel.cache_clear()
+    assert (found.general, found.whole.all()) == (0, True)
+    for point in found.points:
+        for order in ("position", "velocity", "acceleration"):
+            np.testing.assert_allclose(
+                getattr(found, order)[point], getattr(wanted, order)[point], rtol=1e-8, atol=1e-8
+            )
+
+
+def test_numpy_source_says_each_value_once_and_takes_names_again():
+    made = InstructionList()
+    a, b = (made.add("input", data=("p", k)) for k in range(2))
+    whole = made.add("mul", made.add("add", a, b), made.add("sqrt", b))
+    wanted = [made.add("neg", whole), made.add("minnum", whole, made.add_constant(2.0)), a]
+    assert numpy_code.write_numpy(made, wanted, (a, b)).splitlines() == [
+        "def values(x0, x1):",
+        "    r0 = x0 + x1",
+        "    r1 = sqrt(x1)",
+        "    r1 = r0 * r1",
+        "    r0 = -r1",
+        "    r1 = minnum(r1, (2.0))",
+        "    return (r0, r1, x0, )",
+    ]
+    found = numpy_code.compile_numpy(made, wanted, (a, b))(np.array([1.0, 2.0]), 4.0)
+    np.testing.assert_allclose(np.stack(found), [[-10.0, -12.0], [2.0, 2.0], [1.0, 2.0]])
+    with pytest.raises(UnsupportedOperation, match="no less"):
+        numpy_code.write_numpy(made, [made.add("less", a, b)], (a, b))
 
 
 # how much is printed
@@ -198,7 +261,7 @@ def test_a_longer_function_is_left_to_casadi_and_printed_once_in_vain(monkeypatc
 
     at, pair = mechanism.inputs[0].position, mechanism.inputs[0].pair
     designs, run_ = {f"{pair}.velocity": np.linspace(1, 2, 6)}, {"start": at, "stop": at + 0.1, "pair": pair}
-    wanted = planar.sweep(mechanism, designs, 5, backend="casadi", **run_)
+    wanted = planar.sweep(mechanism, designs, 5, backend="numpy", **run_)
     monkeypatch.setattr(instructions, "MAX_INSTRUCTIONS", 100)
     monkeypatch.setattr(llvm_runner, "write_designs_kernel", printing)
     llvm_runner._designs_kernel_or_reason.cache_clear()

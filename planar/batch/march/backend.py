@@ -29,7 +29,7 @@ class DesignBatch(NamedTuple):
     may leave open. `mechanism` has the pairs and inputs; its numbers are not those of the designs. `unit`: the size, m.
     """
 
-    program: EquationFunctions
+    functions: EquationFunctions
     mechanism: Mechanism
     p: Array
     q: Array
@@ -48,7 +48,7 @@ class DesignBatch(NamedTuple):
         """What is told at a step: x and y of each point, then their first, then second rates."""
         return 2 * len(self.links) * (3 if self.rates else 1)
 
-    def select(self, designs: Array, z0: Array | None = None) -> DesignBatch:
+    def select(self, designs: Array | slice, z0: Array | None = None) -> DesignBatch:
         """The batch of some of the designs, from other unknowns if they are given."""
         parts = {name: getattr(self, name)[:, designs] for name in ("p", "q", "z0", "u0", "u1", "u2")}
         return self._replace(**parts | ({} if z0 is None else {"z0": z0}))

@@ -1,4 +1,4 @@
-"""Both parts of the gate for many designs at once, each at the same step."""
+"""The residual check, the regularity and the points of many designs at once, by casadi's functions."""
 
 from __future__ import annotations
 
@@ -8,24 +8,24 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.batch.march.backend import DesignBatch
 from planar.batch.march.design_functions import DesignFunctions
-from planar.batch.march.regularity import LEAST_NUMPY_REGULARITY, least_regularity
+from planar.batch.march.regularity import LEAST_START_REGULARITY, least_regularity
 from planar.equations.coordinates import coordinate_columns, frames_from_coordinates
-from planar.equations.functions import EquationFunctions
-from planar.equations.linear import solve_arrays
+from planar.equations.functions import EquationFunctions, EquationRates
+from planar.equations.linear import solve_arrays, solve_vectors
+from planar.equations.mechanism_numbers import mechanism_size, shapes_of_links
 from planar.equations.residuals import split_pair_numbers
-from planar.foundation.geometry import Frame
-from planar.foundation.jets import Scalar
+from planar.foundation.geometry import Frame, Vector
+from planar.foundation.jets import Jet, Scalar
 from planar.model.mechanism import Mechanism
-from planar.solving.checks.branch_check import BranchCheck, is_move_allowed
 from planar.solving.checks.residual_check import EPS, NEGLIGIBLE_ERROR, ResidualCheck
-from planar.solving.checks.singular_values import SINGULAR_DISTANCE_RATIO
 
 Array = np.ndarray
 
 
 class DesignPositions(NamedTuple):
-    """Where all designs are: z (designs, unknowns), u (designs, inputs), with the slopes of F and of the unknowns."""
+    """Where all designs are: z (designs, unknowns), u (designs, inputs), the Jacobians of F and of the unknowns."""
 
     z: Array
     u: Array
@@ -33,52 +33,27 @@ class DesignPositions(NamedTuple):
     sensitivities: Array
 
 
-class DesignBranchCheck(BranchCheck):
-    """The second part of the gate, for designs each with its own p: see `BranchCheck`."""
+def find_sensitivities(functions: DesignFunctions, z: Array, u: Array) -> DesignPositions:
+    """Positions z (designs, unknowns), u (designs, inputs), with their derivatives."""
+    jacobians, input_jacobians = functions.jacobians(z, u)
+    return DesignPositions(z, u, jacobians, -solve_arrays(jacobians, input_jacobians))
 
-    def __init__(self, functions: DesignFunctions):
-        super().__init__(functions.program, functions.p)
 
-    def evaluate(self, z: Array, u: Array) -> DesignPositions:
-        """What is judged at a step; z (designs, unknowns), u (designs, inputs)."""
-        slopes, drives = self.functions.jacobians(z, u, self.p)
-        return DesignPositions(z, u, slopes, -solve_arrays(slopes, drives))
-
-    def check_step(
-        self, before: DesignPositions, after: DesignPositions, regular_distance: Array | None
-    ) -> tuple[Array, Array]:
-        """Whether each design kept to its branch in a step (designs,), and how far ahead each is from leaving it.
-
-        `ahead` is the latter from the step before, where that went as far as this one.
-        """
-        way = after.u - before.u
-        first, second = ((each.sensitivities @ way[:, :, None])[..., 0] for each in (before, after))
-        keeps = np.all(is_move_allowed(after.z - before.z, first, second), axis=1) & self._keeps_direction(
-            first, second, way
-        )
-        clear = (
-            self._singular_distances(before.z, before.u, before.jacobians, first, way)
-            if regular_distance is None
-            else regular_distance
-        )
-        further = self._singular_distances(after.z, after.u, after.jacobians, second, way)
-        return keeps & np.all(clear + further > SINGULAR_DISTANCE_RATIO, axis=1), further
-
-    def is_regular(self, positions: DesignPositions) -> Array:
-        """Whether the slope of every group is regular enough for a backend (designs,)."""
-        found = np.ones(len(positions.z), dtype=bool)
-        for stage in self.functions.equations.blocks:
-            own = positions.jacobians[:, stage.rows, stage.unknowns]
-            if own.size:
-                arm = np.minimum(np.linalg.norm(own, axis=1).min(axis=1), 1.0)
-                # short arms lose digits too, see `SHORT_ARM`
-                least = np.maximum(LEAST_NUMPY_REGULARITY, np.sqrt(EPS / NEGLIGIBLE_ERROR / np.maximum(arm, 1e-300)))
-                found &= column_volume(own) > (least_regularity(least, own.shape[1]))
-        return found
+def is_regular(functions: DesignFunctions, positions: DesignPositions) -> Array:
+    """Whether the Jacobian of every block is regular enough to start from (designs,)."""
+    regular = np.ones(len(positions.z), dtype=bool)
+    for block in functions.equations.blocks:
+        own = positions.jacobians[:, block.rows, block.unknowns]
+        if own.size:
+            arm = np.minimum(np.linalg.norm(own, axis=1).min(axis=1), 1.0)
+            # short arms lose digits too, see `SHORT_ARM`
+            least = np.maximum(LEAST_START_REGULARITY, np.sqrt(EPS / NEGLIGIBLE_ERROR / np.maximum(arm, 1e-300)))
+            regular &= column_volume(own) > least_regularity(least, own.shape[1])
+    return regular
 
 
 def column_volume(jacobians: Array) -> Array:
-    """The volume that the columns of a slope (designs, rows, unknowns) span, each of length one (designs,)."""
+    """The volume that the columns of a Jacobian (designs, rows, unknowns) span, each of length one (designs,)."""
     if jacobians.shape[1:] == (2, 2):
         a, b, c, d = (jacobians[:, i, j] for i in (0, 1) for j in (0, 1))
         return np.abs(a * d - b * c) / np.sqrt(np.maximum((a * a + c * c) * (b * b + d * d), 1e-300))
@@ -87,17 +62,17 @@ def column_volume(jacobians: Array) -> Array:
 
 
 class DesignResidualCheck:
-    """The first part of the gate, for designs each with its own p (numbers, designs), in units of the size."""
+    """The residual check, for designs each with its own p (numbers, designs), in units of the size."""
 
-    def __init__(self, residual_check: ResidualCheck, mechanism: Mechanism, program: EquationFunctions, p: Array):
-        self.mechanism, self.program = mechanism, program
+    def __init__(self, residual_check: ResidualCheck, mechanism: Mechanism, functions: EquationFunctions, p: Array):
+        self.mechanism, self.functions = mechanism, functions
         self.residual_check = copy(residual_check)
         self.residual_check.unit = 1.0
         self.residual_check.numbers = {**split_pair_numbers(mechanism.pairs, list(p))}
         # a pin of many links has motions between links that no pair of its own joins
         for given in mechanism.inputs:
             self.residual_check.numbers.setdefault(given.pair, tuple(residual_check.numbers[given.pair]))
-        self.column = coordinate_columns(program.equations.coordinates)
+        self.column = coordinate_columns(functions.equations.coordinates)
         self.links = [link.name for link in mechanism.links]
         self.pairs = {pair.name: pair for pair in mechanism.pairs}
 
@@ -116,3 +91,79 @@ class DesignResidualCheck:
         frames, own = self.frames_from_coordinates(w)
         gaps = self.residual_check.residuals(frames, own, u)
         return np.broadcast_to(gaps.max(axis=0, initial=0.0), w.shape[1:] or u.shape[1:])
+
+
+class DesignsAtStep(NamedTuple):
+    """All designs at one step: z (designs, unknowns), u (inputs, designs), w (coordinates, designs), which of them have
+    passed the checks at this step and all before, and the Jacobians by which they were judged."""
+
+    z: Array
+    u: Array
+    w: Array
+    passed: Array
+    positions: DesignPositions
+
+
+def make_residual_check(batch: DesignBatch) -> DesignResidualCheck:
+    """The residual check for a march."""
+    own = shapes_of_links(batch.mechanism)
+    return DesignResidualCheck(
+        ResidualCheck(batch.mechanism, own, mechanism_size(batch.mechanism, own)),
+        batch.mechanism,
+        batch.functions,
+        batch.p,
+    )
+
+
+def design_positions(functions: DesignFunctions, batch: DesignBatch, z: Array, u: Array) -> DesignsAtStep:
+    """Designs at unknowns z (designs, unknowns) and inputs u (inputs, designs), with which of them pass."""
+    w, check, positions = (
+        functions.coordinates(z, u.T),
+        make_residual_check(batch),
+        find_sensitivities(functions, z, u.T),
+    )
+    passed = (check.worst_residual(w, u) <= batch.tolerance) & check.is_resolved(w) & is_regular(functions, positions)
+    return DesignsAtStep(z, u, w, passed, positions)
+
+
+class PointWriter:
+    """The points of a march, with their rates."""
+
+    def __init__(self, batch: DesignBatch, functions: DesignFunctions):
+        self.batch, self.functions, self.residual_check = batch, functions, make_residual_check(batch)
+
+    def write(self, out: Array, row: DesignsAtStep) -> Array:
+        """Write the points of a step (rows, designs); whether their rates break no constraint (designs,)."""
+        batch = self.batch
+        if not batch.rates:
+            self._write_points(out, row.w)
+            return np.ones(row.w.shape[1:] or row.passed.shape, dtype=bool)
+        found = self._rates(row)
+        w = [Jet(*(np.ascontiguousarray(part[:, k]) for part in found)) for k in range(found[0].shape[1])]
+        self._write_points(out, w)
+        frames, own = self.residual_check.frames_from_coordinates(w)
+        inputs = [Jet(u, u1, u2) for u, u1, u2 in zip(row.u, batch.u1, batch.u2, strict=True)]
+        gaps = self.residual_check.residual_check.rate_residuals(frames, own, inputs)
+        return np.all([np.broadcast_to(gap, row.passed.shape) <= 1e3 * batch.tolerance for gap, _ in gaps], axis=0)
+
+    def _rates(self, row: DesignsAtStep) -> tuple[Array, Array, Array]:
+        """w with its first and second rates, each (designs, coordinates)."""
+        batch, none = self.batch, np.zeros_like(row.z)
+        y, u1, u2 = np.hstack([row.z, row.u.T]), batch.u1.T, batch.u2.T
+
+        def at(z1: Array, z2: Array) -> EquationRates:
+            return self.functions.kinematics(y, np.hstack([z1, u1]), np.hstack([z2, u2]))
+
+        z1 = (row.positions.sensitivities @ u1[:, :, None])[..., 0]
+        z2 = -solve_vectors(row.positions.jacobians, at(z1, none).F2)
+        found = at(z1, z2)
+        return found.w, found.w1, found.w2
+
+    def _write_points(self, out: Array, w: Sequence[Scalar] | Array) -> None:
+        frames, _ = self.residual_check.frames_from_coordinates(w)
+        many = 2 * len(self.batch.links)
+        for k, link in enumerate(self.batch.links):
+            place = frames[link].to_world(Vector(*self.batch.q[2 * k : 2 * k + 2]))
+            for axis, value in enumerate(place):
+                for order, part in enumerate(value.parts if isinstance(value, Jet) else (value,)):
+                    np.multiply(part, self.batch.unit, out=out[order * many + 2 * k + axis])

@@ -20,11 +20,8 @@ def _numpy_attempts() -> tuple[RunnerAttempt, ...]:
     return (RunnerAttempt(NumpyRunner(), False),)
 
 
-BACKENDS: dict[str, Callable[[], tuple[RunnerAttempt, ...]]] = {"native": _native_attempts, "casadi": _numpy_attempts}
-"""The attempts of each backend, the faster first; "casadi" evaluates casadi's functions over arrays of numpy.
-
-One whose library is not installed raises ImportError.
-"""
+BACKENDS: dict[str, Callable[[], tuple[RunnerAttempt, ...]]] = {"native": _native_attempts, "numpy": _numpy_attempts}
+"""The attempts of each backend, the faster first. One whose library is not installed raises ImportError."""
 
 
 def available_backends(backend: str) -> list[str]:
@@ -34,14 +31,17 @@ def available_backends(backend: str) -> list[str]:
 
 def find_runner(backend: str) -> RunnerLadder:
     """What runs the designs of a sweep by a backend, or "auto". Raises BadInput."""
-    return RunnerLadder([each for _, attempts in _available_attempts(backend) for each in attempts])
+    from planar.batch.march.numpy_backend import StartRunner
+
+    attempts = [each for _, attempts in _available_attempts(backend) for each in attempts]
+    return RunnerLadder([*attempts, RunnerAttempt(StartRunner(), False)])
 
 
 def _available_attempts(backend: str) -> list[tuple[str, tuple[RunnerAttempt, ...]]]:
     if backend not in ("auto", *BACKENDS):
         raise BadInput("backend", f"there is no backend {backend!r:.40}; choose from auto, {', '.join(BACKENDS)}")
     found = []
-    for name in BACKENDS if backend == "auto" else dict.fromkeys((backend, "casadi")):
+    for name in BACKENDS if backend == "auto" else dict.fromkeys((backend, "numpy")):
         try:
             found.append((name, BACKENDS[name]()))
         except ImportError:

@@ -1,4 +1,4 @@
-"""The program's functions over many designs at once, each with numbers of its own."""
+"""The equation functions over many designs at once, each with numbers of its own."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ Array = np.ndarray
 
 
 class DesignFunctions:
-    """A program over many designs, each with its own p (numbers, designs)."""
+    """Equation functions over many designs, each with its own p (numbers, designs)."""
 
-    def __init__(self, program: EquationFunctions, p: Array):
-        self.program = program
-        self.equations: ConstraintEquations = program.equations
+    def __init__(self, functions: EquationFunctions, p: Array):
+        self.functions = functions
+        self.equations: ConstraintEquations = functions.equations
         self.p = np.ascontiguousarray(p.T)
 
     def correct(self, z: Array, u: Array) -> Array:
         """Newton's method from z (designs, unknowns) near by, at inputs u (designs, inputs)."""
-        return self.program.correct_samples(z, u, self.p) if z.size else z
+        return self.functions.correct_samples(z, u, self.p) if z.size else z
 
     def coordinates(self, z: Array, u: Array) -> Array:
         """w (coordinates, designs)."""
-        return np.ascontiguousarray(self.program.coordinates(z, u, self.p).T)
+        return np.ascontiguousarray(self.functions.coordinates(z, u, self.p).T)
 
-    def jacobians(self, z: Array, u: Array, p: Array | None = None) -> tuple[Array, Array]:
+    def jacobians(self, z: Array, u: Array) -> tuple[Array, Array]:
         """dF/dz (designs, rows, unknowns) and dF/du (designs, rows, inputs), as `EquationFunctions.jacobians`."""
-        return self.program.jacobians(z, u, self.p)
+        return self.functions.jacobians(z, u, self.p)
 
     def kinematics(self, y: Array, y1: Array, y2: Array) -> EquationRates:
         """As `EquationFunctions.kinematics`, with an entry for each design."""
-        return self.program.kinematics(y, y1, y2, self.p)
+        return self.functions.kinematics(y, y1, y2, self.p)

@@ -1,14 +1,14 @@
-"""What every function of LLVM IR that solves positions is made of: a mechanism's equations, printed group by group.
+"""A mechanism's equations block by block as lists of instructions: what kernels of every format are made of.
 
-The angles' cos and sin are carried, never the angles. A group in closed form is written as that; any other is solved by
-Newton's method, whose step turns an angle by the first terms of its cos and sin; what is not quite of length one then
-is brought to it. So no sine stands in the loop, and few divisions.
+The angles' cos and sin are carried, never the angles. A block in closed form is computed by that; any other is solved
+by Newton's method, whose step turns an angle by the first terms of its cos and sin; what is not quite of length one
+then is brought to it. So no sine stands in the loop, and few divisions.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from functools import cached_property
+from collections.abc import Sequence
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import casadi as ca
@@ -20,28 +20,25 @@ from planar.codegen.instructions import (
     UnsupportedOperation,
     check_length,
     expand_angle_sums,
-    required_values,
 )
 from planar.codegen.invariant_hoisting import InvariantHoister
-from planar.codegen.llvm_ir import IRWriter
 from planar.equations.closed_form import ClosedForm, find_closed_form
 from planar.equations.constraint_equations import Block, ConstraintEquations, slice_length
 from planar.equations.coordinates import coordinate_columns, frames_from_coordinates
+from planar.equations.functions import EquationFunctions
 from planar.equations.linear import solve_by_determinants, solve_with_volume
-from planar.equations.rates import UnknownRates, block_jacobian
+from planar.equations.rates import UnknownRates, block_jacobian, first_and_second_rates
 from planar.equations.residuals import closing_error, residuals, scalars, split_pair_numbers
-from planar.foundation.geometry import GROUND, Frame, frame_at
-from planar.model.mechanism import Mechanism
+from planar.foundation.geometry import GROUND, Frame, Vector, frame_at
+from planar.model.mechanism import Mechanism, links_counting_turns
 from planar.model.pairs import MeasureKind
 
 Operand = tuple[str, int]
 """A number that the expressions take: which kind of it, and its index.
 
 "z" of an unknown, "zc" and "zs" the cos and sin of an angle; "u", "uc", "us" the same of what is given; "p" the numbers
-of pairs, "q" those of points; "u1", "u2" rates of what is given; "sign" of a group in closed form.
+of pairs, "q" those of points; "u1", "u2" rates of what is given; "sign" of a block in closed form.
 """
-OperandNames = dict[Operand, str]
-"""The names under which numbers stand in the text."""
 
 
 class BareAngle(Exception):
@@ -53,7 +50,7 @@ class BareAngle(Exception):
 
 
 class KernelBlock(NamedTuple):
-    """A group: its stage, and its closed form if it has one."""
+    """A block, and its closed form if it has one."""
 
     block: Block
     closed_form: ClosedForm | None
@@ -64,7 +61,7 @@ class KernelBlock(NamedTuple):
 
 
 class KernelEquations:
-    """A mechanism's equations with the groups' closed forms. Raises UnsupportedOperation where a group holds itself
+    """A mechanism's equations with the blocks' closed forms. Raises UnsupportedOperation where a block holds itself
     twice."""
 
     def __init__(self, equations: ConstraintEquations, mechanism: Mechanism, given: Sequence[str] = ()):
@@ -73,16 +70,17 @@ class KernelEquations:
             raise UnsupportedOperation("constraints hold each other more than once")
         self.mechanism, self.given_links = mechanism, tuple(given)
         self.blocks = tuple(
-            KernelBlock(stage, find_closed_form(e, stage)) for stage in e.blocks if slice_length(stage.unknowns)
+            KernelBlock(block, find_closed_form(e, block)) for block in e.blocks if slice_length(block.unknowns)
         )
         self.is_angle = tuple(e.coordinates[column].kind is MeasureKind.ANGLE for column in e.unknowns)
         self.input_is_angle = tuple(kind is MeasureKind.ANGLE for kind in e.input_kinds)
         self.closed_forms = tuple(part.closed_form for part in self.blocks if part.closed_form is not None)
+        self.has_newton_blocks = len(self.closed_forms) < len(self.blocks)
         self.sides = ca.vertcat(ca.SX(0, 1), *(form.sign_expression for form in self.closed_forms))
         self.column_of = coordinate_columns(e.coordinates)
 
     def assembly_signs(self, z: np.ndarray, u: np.ndarray, p: np.ndarray) -> np.ndarray:
-        """Which assembly every group in closed form is in (groups,), +1 or -1."""
+        """Which assembly every block in closed form is in (blocks,), +1 or -1."""
         return np.sign(self._sides_function(z, u, p).full().ravel())
 
     @cached_property
@@ -112,53 +110,76 @@ class KernelEquations:
         return ca.vertcat(*(closing_error(value, row.kind) for row, value in rows))
 
     def rates(self, u1: ca.SX, u2: ca.SX) -> tuple[ca.SX, ca.SX]:
-        """First and second rates of the unknowns, group after group."""
+        """First and second rates of the unknowns, block after block."""
         return UnknownRates(self.equations, solve_by_determinants).first_and_second(u1, u2)
 
-    def newton_step(self, stage: Block) -> list[ca.SX]:
-        """Newton's step of a group, the square of the volume that its slope's columns span, and that of their
+    def newton_step(self, block: Block) -> list[ca.SX]:
+        """Newton's step of a block, the square of the volume that its Jacobian's columns span, and that of their
         lengths."""
         e = self.equations
-        return list(solve_with_volume(block_jacobian(e, stage.rows, stage.unknowns), e.F[stage.rows]))
+        return list(solve_with_volume(block_jacobian(e, block.rows, block.unknowns), e.F[block.rows]))
 
 
-class KernelWriter:
-    """The text of one function, written front to back: expressions of a structure as values of the lanes."""
+@lru_cache(maxsize=256)
+def kernel_equations(functions: EquationFunctions, structure: Mechanism) -> KernelEquations:
+    """The equations of a structure, kept. Raises UnsupportedOperation."""
+    return KernelEquations(functions.equations, structure)
+
+
+class KernelInstructions:
+    """What a kernel computes as instructions, all in one list: blocks, checks, and points on links with their rates.
+
+    `links` are those of the points, none of which is the frame. What depends on `invariant` kinds of operands alone is
+    kept apart, in `hoister.invariants`; `carried` are the angles whose own values stand beside their cos and sin.
+    """
 
     def __init__(
         self,
         equations: KernelEquations,
-        lanes: int,
-        points: int,
+        links: tuple[str, ...],
+        rates: bool,
         invariant: frozenset[str],
         carried: frozenset[Operand],
     ):
-        self.equations, self.ir, self.carried = equations, IRWriter(lanes), carried
+        self.equations, self.links, self.rates, self.carried = equations, links, rates, carried
         e = equations.equations
         self.symbols: dict[str, ca.SX] = {
             "z": e.z,
             "u": e.u,
             "p": e.p,
-            "q": ca.SX.sym("q", 2 * points),
+            "q": ca.SX.sym("q", 2 * len(links)),
             "u1": ca.SX.sym("u1", e.u.numel()),
             "u2": ca.SX.sym("u2", e.u.numel()),
             "sign": ca.vertcat(ca.SX(0, 1), *(form.sign for form in equations.closed_forms)),
         }
         self.hoister = InvariantHoister[Operand](lambda operand: operand[0] in invariant)
-        self.hoisted_names: dict[int, str] = {}
-        "of what does not vary"
         self.sign_index = {
             part.block.block_index: k for k, part in enumerate(p for p in equations.blocks if p.closed_form is not None)
         }
+        self.input_operands = tuple(
+            operand
+            for k, is_angle in enumerate(equations.input_is_angle)
+            for operand in (("uc", k), ("us", k), ("u", k))[0 if is_angle else 2 :]
+        )
 
-    def is_carried(self, leaf: Operand) -> bool:
+    def is_carried(self, operand: Operand) -> bool:
         """Whether an angle's own value is carried beside its cos and sin."""
-        return leaf in self.carried
+        return operand in self.carried
 
-    def write_values(self, outputs: Sequence[ca.SX], names: Mapping[Operand, str]) -> list[str]:
-        """The values of expressions where numbers stand under these names. Raises BareAngle, UnsupportedOperation."""
+    def unknown_operands(self, k: int) -> list[Operand]:
+        """What stands for an unknown: a length, or the cos and sin of an angle, and its value where that is carried."""
+        if not self.equations.is_angle[k]:
+            return [("z", k)]
+        return [("zc", k), ("zs", k), *([("z", k)] if self.is_carried(("z", k)) else [])]
+
+    def list_values(self, outputs: Sequence[ca.SX], written: int | None = None) -> list[int]:
+        """The numbers, in `hoister.result`, of the values of expressions. Raises UnsupportedOperation.
+
+        `written`: so many are there already, see `check_length`; where it is None there may be any number.
+        """
         function = ca.Function("part", list(self.symbols.values()), [ca.densify(ca.vertcat(*outputs))], {"cse": True})
-        check_length(self.ir.count + function.n_instructions())
+        if written is not None:
+            check_length(written + function.n_instructions())
         listing: InstructionList[Operand] = InstructionList()
         angles: dict[int, CosSin] = {}
         arguments = []
@@ -170,80 +191,47 @@ class KernelWriter:
                 if is_angle:
                     angles[numbers[k]] = CosSin(*(listing.add_input((name + part, k)) for part in "cs"))
         wanted = [each for output in listing.inline_function(function, arguments) for each in output]
-        turned_out, wanted = expand_angle_sums(listing, wanted, angles)
-        numbers = self.hoister.rebuild(turned_out, wanted)
-        written = self._write_instructions(numbers, names)
-        check_length(self.ir.count)
-        return written
+        return self.hoister.rebuild(*expand_angle_sums(listing, wanted, angles))
 
-    def write_separately(self, outputs: Sequence[ca.SX], have: Mapping[Operand, str]) -> list[list[str]]:
-        """The same, of each expression by itself."""
-        values = iter(self.write_values(outputs, have))
-        return [[next(values) for _ in range(each.numel())] for each in outputs]
-
-    def _write_instructions(self, wanted: Sequence[int], have: Mapping[Operand, str]) -> list[str]:
-        made, still = self.hoister.result, self.hoister.invariants
-        order = required_values(made, wanted)
-        names = {}
-        for k in order:
-            operand = made.instructions[k].key
-            if operand is not None:
-                if operand not in have:
-                    raise BareAngle(operand)
-                names[k] = have[operand]
-        ahead = [k for k in order if k in still and k not in self.hoisted_names]
-        with self.ir.hoisted():
-            self.ir.write_values(made, ahead, self.hoisted_names, names)
-        names |= {k: self.hoisted_names[k] for k in order if k in still}
-        self.ir.write_values(made, [k for k in order if k not in still], names, names)
-        return [names[k] for k in wanted]
-
-    def write_closed_form(self, part: KernelBlock, names: OperandNames) -> str:
-        """A group in closed form: its unknowns put into `have`, and the bend."""
+    def closed_form_operands(self, part: KernelBlock) -> list[Operand]:
+        """What stands for the unknowns of a block in closed form, in the order of `closed_form_outputs`."""
         assert part.closed_form is not None
-        leaves = [
-            leaf
-            for k, values in zip(part.unknowns, part.closed_form.values, strict=True)
-            for leaf in ([("zc", k), ("zs", k)] if len(values) == 2 else [("z", k)])
-        ]
-        *values, bend = self.write_values(
-            [*(each for of in part.closed_form.values for each in of), part.closed_form.coalescence], names
-        )
-        names.update(zip(leaves, values, strict=True))
-        return bend
-
-    def write_angle_sum(self, cos: str, sin: str, c: str, s: str) -> tuple[str, str]:
-        """The cos and sin of a sum of two angles."""
-        t = self.ir
-        return (
-            t.binary("sub", t.binary("mul", cos, c), t.binary("mul", sin, s)),
-            t.binary("add", t.binary("mul", sin, c), t.binary("mul", cos, s)),
-        )
-
-    def write_small_rotation(self, c: str, s: str, angle: str) -> tuple[str, str]:
-        """The cos and sin of an angle turned by a little."""
-        t = self.ir
-        square = t.binary("mul", angle, angle)
-        cos = t.binary("sub", t.constant(1.0), t.binary("mul", square, t.constant(0.5)))
-        sin = t.binary("mul", angle, t.binary("sub", t.constant(1.0), t.binary("mul", square, t.constant(1.0 / 6.0))))
-        return self.write_normalised(*self.write_angle_sum(c, s, cos, sin))
-
-    def write_normalised(self, c: str, s: str) -> tuple[str, str]:
-        """What is nearly of length one, nearer to it: the inverse root by its first terms."""
-        t = self.ir
-        square = t.binary("add", t.binary("mul", c, c), t.binary("mul", s, s))
-        scale = t.binary("sub", t.constant(1.5), t.binary("mul", square, t.constant(0.5)))
-        return t.binary("mul", c, scale), t.binary("mul", s, scale)
-
-    def write_circle_residuals(self, have: OperandNames) -> list[str]:
-        """How far the square of every unknown angle's cos and sin is from one."""
-        t = self.ir
         return [
-            t.binary(
-                "sub",
-                t.add_all([t.binary("mul", have[part, k], have[part, k]) for part in ("zc", "zs")]),
-                t.constant(1.0),
-            )
-            for k, turns in enumerate(self.equations.is_angle)
-            if turns
+            operand
+            for k, values in zip(part.unknowns, part.closed_form.values, strict=True)
+            for operand in ([("zc", k), ("zs", k)] if len(values) == 2 else [("z", k)])
         ]
+
+    def closed_form_outputs(self, part: KernelBlock) -> list[ca.SX]:
+        """The unknowns of a block in closed form, then how near its two assemblies are to where they meet."""
+        assert part.closed_form is not None
+        return [*(value for values in part.closed_form.values for value in values), part.closed_form.coalescence]
+
+    def point_coordinates(self, points: Sequence[int]) -> ca.SX:
+        """x and y of some of the points."""
+        q = self.symbols["q"]
+        positions = [self.equations.frame(self.links[k]).to_world(Vector(q[2 * k], q[2 * k + 1])) for k in points]
+        return ca.vertcat(ca.SX(0, 1), *(part for position in positions for part in position))
+
+    def counted_angles(self) -> ca.SX:
+        """Angles of links that wheels or racks tie: they may turn much farther in a step than the inputs do."""
+        e, links = self.equations.equations, links_counting_turns(self.equations.mechanism)
+        unknown = {column: k for k, column in enumerate(e.unknowns)}
+        columns = [
+            column
+            for column, each in enumerate(e.coordinates)
+            if each.owner in links and each.of_link and each.kind is MeasureKind.ANGLE
+        ]
+        # what nothing is made of but cos and sin is as fast as the block that it is in
+        counted = [e.w[k] for k in columns if k not in unknown or self.is_carried(("z", unknown[k]))]
+        return ca.vertcat(ca.SX(0, 1), *counted)
+
+    def output_expressions(self) -> list[ca.SX]:
+        """The points' positions, and rates."""
+        e, s = self.equations.equations, self.symbols
+        positions = self.point_coordinates(range(len(self.links)))
+        if not self.rates:
+            return [positions]
+        z1, z2 = self.equations.rates(s["u1"], s["u2"])
+        y, y1, y2 = e.y, ca.vertcat(z1, s["u1"]), ca.vertcat(z2, s["u2"])
+        return [positions, *first_and_second_rates(positions, y, y1, y2)]

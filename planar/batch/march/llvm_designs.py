@@ -9,20 +9,14 @@ from collections.abc import Sequence
 from math import inf
 from typing import NamedTuple
 
-from planar.batch.march.kernel import (
-    BareAngle,
-    KernelBlock,
-    KernelEquations,
-    Operand,
-    OperandNames,
-)
-from planar.batch.march.point_outputs import PointKernelWriter
-from planar.batch.march.prediction import MAX_TURN_PER_STEP
+from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations, Operand
+from planar.batch.march.llvm_kernel import KernelWriter, OperandNames
+from planar.batch.march.prediction import MAX_TURN_PER_STEP, PREDICTOR_ORDER
 from planar.batch.march.regularity import LEAST_KERNEL_REGULARITY, least_regularity
 from planar.codegen.instructions import UnsupportedOperation
 
-PREDICTOR_ORDER, HISTORY_LENGTH = 6, 8
-"""Steps before from which the next is predicted, and for how many there is room: a power of two."""
+HISTORY_LENGTH = 8
+"""Steps before for which there is room: a power of two, more than `PREDICTOR_ORDER`."""
 FUNCTION_NAME = "march"
 ARGUMENT_TYPES = (*("int",) * 5, *("array",) * 7, *("float",) * 3, "array", "array")
 """Of the function's arguments: blocks, steps, width of the arrays that are read, how far a row and a step of `out` are
@@ -53,9 +47,9 @@ def write_designs_kernel(
 ) -> DesignsKernelLayout:
     """The function for points on these links, none of which is the frame. Raises UnsupportedOperation.
 
-    A step gives x and y of every point, then with `rates` all first and all second rates. With `levels`, of the group
-    that places each point, it gives more: x and y of every point in the other assembly of its group (infinite where
-    that is not in closed form), the state, and how regular the least regular of the groups is that Newton's method
+    A step gives x and y of every point, then with `rates` all first and all second rates. With `levels`, of the block
+    that places each point, it gives more: x and y of every point in the other assembly of its block (infinite where
+    that is not in closed form), the state, and how regular the least regular of the blocks is that Newton's method
     solves.
     """
     carried: frozenset[Operand] = frozenset()
@@ -63,12 +57,12 @@ def write_designs_kernel(
         try:
             return _DesignsKernelWriter(equations, tuple(links), rates, lanes, point_blocks, carried).write()
         except BareAngle as angle:
-            if angle.operand in carried:  # its value is wanted before its own group is solved
+            if angle.operand in carried:  # its value is wanted before its own block is solved
                 raise UnsupportedOperation(f"a group stands in an angle of a later one: {angle.operand}") from None
             carried |= {angle.operand}
 
 
-class _DesignsKernelWriter(PointKernelWriter):
+class _DesignsKernelWriter(KernelWriter):
     def __init__(
         self,
         equations: KernelEquations,
@@ -81,19 +75,9 @@ class _DesignsKernelWriter(PointKernelWriter):
         super().__init__(equations, links, rates, lanes, frozenset({"p", "q", "u1", "u2"}), carried)
         self.point_blocks = levels
         self.other_points: dict[int, list[str]] = {}
-        self.state = tuple(leaf for k, turns in enumerate(equations.is_angle) for leaf in self._operands("z", k, turns))
-        self.input_operands = tuple(
-            leaf
-            for k, turns in enumerate(equations.input_is_angle)
-            for leaf in (("uc", k), ("us", k), ("u", k))[0 if turns else 2 :]
-        )
+        self.state = tuple(leaf for k in range(len(equations.is_angle)) for leaf in self.unknown_operands(k))
         self.input_count = len(equations.input_is_angle)
         self.newton_unknowns = [k for part in equations.blocks if part.closed_form is None for k in part.unknowns]
-
-    def _operands(self, name: str, k: int, turns: bool) -> list[Operand]:
-        if not turns:
-            return [(name, k)]
-        return [(name + "c", k), (name + "s", k), *([(name, k)] if self.is_carried((name, k)) else [])]
 
     def write(self) -> DesignsKernelLayout:
         """The whole function: blocks of designs, in each the steps."""
@@ -208,10 +192,10 @@ class _DesignsKernelWriter(PointKernelWriter):
         ]
 
     def _write_closed_form_block(self, part: KernelBlock, have: OperandNames) -> list[str]:
-        """A group in closed form; flags that say where its two assemblies keep apart.
+        """A block in closed form; flags that say where its two assemblies keep apart.
 
         Between steps too: the bend does not reach one, by as much as it bends over the last three steps. So it may be
-        the step before at which a group had come too near.
+        the step before at which a block had come too near.
         """
         t = self.ir
         if self.point_blocks is not None:
@@ -232,7 +216,7 @@ class _DesignsKernelWriter(PointKernelWriter):
         return [t.compare("oge", t.binary("sub", room, kept), t.constant(LEAST_KERNEL_REGULARITY**2))]
 
     def _write_other_assembly(self, part: KernelBlock, have: OperandNames) -> None:
-        """Where the group places its points in its other assembly."""
+        """Where the block places its points in its other assembly."""
         assert self.point_blocks is not None
         level, there = part.block.block_index, dict(have)
         there["sign", self.sign_index[level]] = self.ir.add_instruction(
@@ -254,7 +238,7 @@ class _DesignsKernelWriter(PointKernelWriter):
             t.store(have[leaf, k], self.state_slots[leaf, k])
 
     def _write_newton_block(self, part: KernelBlock, have: OperandNames) -> None:
-        """Newton's method for a group from where it would be if it went on as before, so often as the step says."""
+        """Newton's method for a block from where it would be if it went on as before, so often as the step says."""
         t, level = self.ir, part.block.block_index
         own = {leaf: slot for leaf, slot in self.state_slots.items() if leaf[1] in part.unknowns}
         ahead = {
@@ -321,7 +305,7 @@ class _DesignsKernelWriter(PointKernelWriter):
         return flags
 
     def _write_regularity(self, spanned: str, lengths: str, count: int) -> str:
-        """How regular a slope is, where that is told; else only whether it is enough: not below nothing."""
+        """How regular a Jacobian is, where that is told; else only whether it is enough: not below nothing."""
         t = self.ir
         if self.point_blocks is not None:
             return t.binary("div", spanned, lengths)

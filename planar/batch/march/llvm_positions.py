@@ -1,6 +1,6 @@
 """One linkage at many positions of its inputs, these in the lanes, as one function of LLVM IR.
 
-Only where every group is in closed form: then nothing goes from one position to the next but the signs of the groups.
+Only where every block is in closed form: then nothing goes from one position to the next but the signs of the blocks.
 """
 
 from __future__ import annotations
@@ -11,13 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planar.batch.march.kernel import (
-    BareAngle,
-    KernelEquations,
-    Operand,
-    OperandNames,
-)
-from planar.batch.march.point_outputs import PointKernelWriter
+from planar.batch.march.kernel import BareAngle, KernelEquations, Operand
+from planar.batch.march.llvm_kernel import KernelWriter, OperandNames
 from planar.batch.march.prediction import MAX_TURN_PER_STEP
 from planar.batch.march.regularity import LEAST_KERNEL_REGULARITY
 from planar.codegen.instructions import UnsupportedOperation
@@ -35,7 +30,7 @@ fine."""
 
 class PositionsKernelLayout(NamedTuple):
     """numbers: what is the same at every position, one after the other; drives: rows of cos, sin and value of what is
-    given; out: rows that are told, of which the last are counted angles and the groups' bends."""
+    given; out: rows that are told, of which the last are counted angles and the blocks' bends."""
 
     numbers: tuple[Operand, ...]
     inputs: tuple[Operand, ...]
@@ -43,21 +38,16 @@ class PositionsKernelLayout(NamedTuple):
     ir: str
 
 
-class _PositionsKernelWriter(PointKernelWriter):
+class _PositionsKernelWriter(KernelWriter):
     def __init__(self, equations: KernelEquations, links: tuple[str, ...], rates: bool):
         super().__init__(equations, links, rates, LANES, frozenset({"p", "q", "u1", "u2", "sign"}), frozenset())
         if any(part.closed_form is None for part in equations.blocks):
             raise UnsupportedOperation("a group is not in closed form")
         sizes = {name: self.symbols[name].numel() for name in ("p", "q", "sign", *(("u1", "u2") if rates else ()))}
         self.numbers = tuple((name, k) for name, size in sizes.items() for k in range(size))
-        self.input_operands = tuple(
-            leaf
-            for k, turns in enumerate(equations.input_is_angle)
-            for leaf in (("uc", k), ("us", k), ("u", k))[0 if turns else 2 :]
-        )
 
     def write(self) -> PositionsKernelLayout:
-        """The whole function: blocks of positions, then whether the groups keep clear of their dead points."""
+        """The whole function: blocks of positions, then whether the blocks keep clear of their dead points."""
         t, of = self.ir, self.equations
         t.write_line(
             f"define void @{FUNCTION_NAME}(i64 %blocks, i64 %positions, ptr noalias readonly %numbers, "
@@ -188,7 +178,7 @@ class PositionsKernel:
 
     def __call__(self, numbers: Array, tolerance: float, scale: float) -> tuple[Array, bool]:
         """x and y of every point, then with rates their first and second rates, (rows, positions), times `scale`; and
-        whether all passed both parts of the gate."""
+        whether all passed both checks."""
         width = self.lane_blocks * LANES
         # two more positions than there are may be looked at
         out = np.empty(self.row_count * width + 2)

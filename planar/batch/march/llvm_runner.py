@@ -9,15 +9,21 @@ from typing import Any
 import numpy as np
 
 from planar.batch.march.backend import CorrectedAssemblies, DesignBatch
-from planar.batch.march.kernel import KernelEquations
+from planar.batch.march.kernel import kernel_equations
 from planar.batch.march.llvm_designs import (
     ARGUMENT_TYPES,
     FUNCTION_NAME,
-    PREDICTOR_ORDER,
     DesignsKernelLayout,
     write_designs_kernel,
 )
-from planar.batch.march.prediction import COARSE_STEP, LONGEST_STEP, correction_limit, extrapolation_weights
+from planar.batch.march.prediction import (
+    LONGEST_STEP,
+    PREDICTOR_ORDER,
+    correction_counts,
+    correction_limit,
+    extrapolation_weights,
+    longest_step,
+)
 from planar.codegen.aligned_arrays import allocate_aligned, is_aligned
 from planar.codegen.instructions import UnsupportedOperation
 from planar.codegen.llvm_compile import compile_function
@@ -29,27 +35,17 @@ Array = np.ndarray
 
 LANES = 16
 """Designs at once: two vectors of the widest machines, so that one waits while the other works."""
-CORRECTIONS, FIRST_CORRECTIONS = 1, 6
-"""Steps of Newton's method where the run has come far enough to be predicted, and before."""
-COARSE_STEPS = (COARSE_STEP, 0.12)
-"""rad or sizes: where the inputs go farther in a step, what is predicted takes one more of Newton's, and another."""
-
-
-@lru_cache(maxsize=256)
-def kernel_equations(program: EquationFunctions, mechanism: Mechanism) -> KernelEquations:
-    """A structure ready to be printed. Raises UnsupportedOperation."""
-    return KernelEquations(program.equations, mechanism)
 
 
 def designs_kernel(
-    program: EquationFunctions,
+    functions: EquationFunctions,
     mechanism: Mechanism,
     links: tuple[str, ...],
     rates: bool,
     point_blocks: tuple[int, ...] | None = None,
 ) -> DesignsKernelLayout:
     """The function for points on links of a structure, see `march`. Raises UnsupportedOperation."""
-    found = _designs_kernel_or_reason(program, mechanism, links, rates, point_blocks)
+    found = _designs_kernel_or_reason(functions, mechanism, links, rates, point_blocks)
     if isinstance(found, str):
         raise UnsupportedOperation(found)
     return found
@@ -57,7 +53,7 @@ def designs_kernel(
 
 @lru_cache(maxsize=256)
 def _designs_kernel_or_reason(
-    program: EquationFunctions,
+    functions: EquationFunctions,
     mechanism: Mechanism,
     links: tuple[str, ...],
     rates: bool,
@@ -65,7 +61,7 @@ def _designs_kernel_or_reason(
 ) -> DesignsKernelLayout | str:
     """The same, or why there is none: every block of a sweep would find that out again."""
     try:
-        return write_designs_kernel(kernel_equations(program, mechanism), links, rates, LANES, point_blocks)
+        return write_designs_kernel(kernel_equations(functions, mechanism), links, rates, LANES, point_blocks)
     except UnsupportedOperation as why:
         return str(why)
 
@@ -77,7 +73,7 @@ def run_designs_kernel(batch: DesignBatch, extra_corrections: int = 0, out: Arra
     rows, designs), as for `DesignRunner`. Raises UnsupportedOperation where the structure is not for machine code.
     """
     longest = _longest_step(batch)
-    kernel = designs_kernel(batch.program, equation_structure(batch.mechanism), tuple(batch.links), batch.rates)
+    kernel = designs_kernel(batch.functions, equation_structure(batch.mechanism), tuple(batch.links), batch.rates)
     table, counts = _step_table(batch.input_offsets)
     tolerances = batch.tolerance, correction_limit(longest), batch.unit
     out, good = _run_kernel(kernel, batch, batch.rates, (table, counts + extra_corrections), tolerances, out)
@@ -87,7 +83,7 @@ def run_designs_kernel(batch: DesignBatch, extra_corrections: int = 0, out: Arra
 
 def unknowns_at_steps(batch: DesignBatch, extra_corrections: int, steps: Array) -> Array:
     """The unknowns (unknowns, designs) of a run that came to these steps, at (designs,), of each design to one."""
-    kernel = designs_kernel(batch.program, equation_structure(batch.mechanism), (), False, ())
+    kernel = designs_kernel(batch.functions, equation_structure(batch.mechanism), (), False, ())
     table, counts = _step_table(batch.input_offsets)
     tolerances = batch.tolerance, correction_limit(_longest_step(batch)), 1.0
     found, _ = _run_kernel(kernel, batch, False, (table, counts + extra_corrections), tolerances, None)
@@ -97,7 +93,7 @@ def unknowns_at_steps(batch: DesignBatch, extra_corrections: int, steps: Array) 
 def correct_designs(batch: DesignBatch, point_blocks: Sequence[int], corrections: int) -> CorrectedAssemblies:
     """Designs corrected from unknowns near by, at the inputs where they start. Raises UnsupportedOperation."""
     kernel = designs_kernel(
-        batch.program, equation_structure(batch.mechanism), tuple(batch.links), False, tuple(point_blocks)
+        batch.functions, equation_structure(batch.mechanism), tuple(batch.links), False, tuple(point_blocks)
     )
     table, counts = _step_table(np.zeros((1, len(batch.u0))))
     counts[:] = corrections
@@ -110,7 +106,7 @@ def correct_designs(batch: DesignBatch, point_blocks: Sequence[int], corrections
 
 def _longest_step(batch: DesignBatch) -> float:
     """How far an input goes in a step at most. Raises UnsupportedOperation where that is too far."""
-    longest = float(np.max(np.abs(np.diff(batch.input_offsets, axis=0)), initial=0.0))
+    longest = longest_step(batch.input_offsets)
     if longest > LONGEST_STEP or len(batch.input_offsets) == 2:
         raise UnsupportedOperation("steps so long do not show what lies between them")
     return longest
@@ -199,16 +195,13 @@ def _operand_rows(operands: Sequence[tuple[str, int]], values: Array) -> Array:
 def _step_table(offsets: Array) -> tuple[Array, Array]:
     """What every step needs to know: the weights of the steps before, and how far each input has gone."""
     steps, inputs = offsets.shape
-    table, counts = np.zeros((steps, PREDICTOR_ORDER + 3 * inputs)), np.full(steps, CORRECTIONS, dtype=np.int64)
+    table = np.zeros((steps, PREDICTOR_ORDER + 3 * inputs))
     for step in range(min(steps, PREDICTOR_ORDER)):
         # ahead of the first there is its start
         table[step, : max(step, 1)] = extrapolation_weights(max(step, 1))
     table[PREDICTOR_ORDER:, :PREDICTOR_ORDER] = extrapolation_weights(PREDICTOR_ORDER)
-    longest = float(np.max(np.abs(np.diff(offsets, axis=0)), initial=0.0))
-    counts[:] = CORRECTIONS + sum(longest > each for each in COARSE_STEPS)
-    counts[: PREDICTOR_ORDER + 1] = FIRST_CORRECTIONS
     for k in range(inputs):
         table[:, PREDICTOR_ORDER + 3 * k : PREDICTOR_ORDER + 3 * k + 3] = np.stack(
             [offsets[:, k], np.cos(offsets[:, k]), np.sin(offsets[:, k])], axis=1
         )
-    return table, counts
+    return table, correction_counts(steps, longest_step(offsets))

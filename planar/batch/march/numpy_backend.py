@@ -1,179 +1,269 @@
-"""The backend that is always there: the compiled program, step after step, over the designs of a block."""
+"""The runners that are always there: the kernel by numpy, and one that only looks at where designs start."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
+from functools import lru_cache
+from math import ceil
 from typing import NamedTuple
 
 import numpy as np
 
+from planar.batch.design_arrays import split_into_blocks
 from planar.batch.march.backend import CorrectedAssemblies, DesignBatch, UnsupportedStructure
-from planar.batch.march.checks import DesignBranchCheck, DesignPositions, DesignResidualCheck
+from planar.batch.march.checks import PointWriter, design_positions
 from planar.batch.march.design_functions import DesignFunctions
-from planar.batch.march.prediction import extrapolation_weights
-from planar.equations.functions import EquationRates
-from planar.equations.linear import solve_vectors
-from planar.equations.mechanism_numbers import mechanism_size, shapes_of_links
-from planar.foundation.geometry import Vector
-from planar.foundation.jets import Jet, Scalar
-from planar.solving.checks.residual_check import ResidualCheck
+from planar.batch.march.kernel import kernel_equations
+from planar.batch.march.numpy_kernel import (
+    MAX_EXPRESSION_UNKNOWNS,
+    DesignMarch,
+    MarchedSteps,
+    NumpyKernel,
+    make_numpy_kernel,
+)
+from planar.batch.march.prediction import (
+    LONGEST_STEP,
+    correction_counts,
+    correction_limit,
+    longest_step,
+)
+from planar.codegen.instructions import UnsupportedOperation
+from planar.equations.constraint_equations import slice_length
+from planar.equations.functions import EquationFunctions
+from planar.equations.mechanism_numbers import equation_structure
+from planar.model.mechanism import Mechanism
 
 Array = np.ndarray
 
-PREDICTOR_ORDER = 4
-"""Moves before from which the next is predicted, at most."""
-START_GROUPS = 6
-"""Groups of designs that are led to their last good step together."""
+LANES = 4096
+"""Positions at once: so many that an array's work is more than the call, so few that all arrays stay in the cache."""
+REFINED_STEP = 0.12
+"""rad or sizes to which steps are divided that are too long."""
+EXTRA_CORRECTIONS = 2
+"""Further corrections at every step for designs that the usual ones leave open."""
 COMPACTION_RATIO = 0.7
 """Where less than this part of the designs goes on, the others are left behind."""
 
 
-class DesignsAtStep(NamedTuple):
-    """All designs at one step: z (designs, unknowns), u (inputs, designs), w (coordinates, designs), which of them have
-    passed the gate at this step and all before, and the slopes by which they were judged."""
-
-    z: Array
-    u: Array
-    w: Array
-    passed: Array
-    positions: DesignPositions
-
-
 class NumpyRunner:
-    """See `DesignRunner`."""
+    """See `DesignRunner`. Raises UnsupportedStructure where blocks hold more constraints than unknowns."""
 
     def run(self, batch: DesignBatch, out: Array) -> Array:
-        """See `DesignRunner`; raises UnsupportedStructure where blocks hold more constraints than unknowns."""
-        steps, designs = len(batch.input_offsets), batch.p.shape[1]
-        good, some, first, part = np.zeros(designs, dtype=int), np.arange(designs), 0, batch
-        with np.errstate(all="ignore"):  # designs that have failed run on as what is no number
-            while some.size and first < steps:
-                first, row = _run_until_many_fail(part, first, some, out, good)
-                # those that have failed are left behind; the others go on from the step where they are
-                some, part = some[row.passed], batch.select(some[row.passed], row.z[row.passed].T)
+        """See `DesignRunner`."""
+        by_casadi = batch.rates and has_large_block(batch.functions)
+        kernel = _kernel(batch, () if by_casadi else batch.links, batch.rates and not by_casadi)
+        good = _run(kernel, batch, out, 0)
+        rest = np.flatnonzero(good < len(batch.input_offsets))
+        if kernel.has_newton_blocks and rest.size:
+            own = np.empty((*out.shape[:2], rest.size))
+            good[rest] = _run(kernel, batch.select(rest), own, EXTRA_CORRECTIONS)
+            out[:, :, rest] = own
         return good
 
     def last_good_unknowns(self, batch: DesignBatch, good: Array) -> Array:
         """See `DesignRunner`."""
-        designs = len(good)
-        found = np.full((len(batch.z0), designs), np.nan)
-        # those that come about as far are led together
-        for some in np.array_split(np.argsort(good), min(START_GROUPS, designs)):
-            part, own = batch.select(some), good[some]
-            inputs = (part.u0 + each[:, None] for each in part.input_offsets[: int(own.max())])
-            for k, row in enumerate(iterate_steps(part, inputs)):
-                last = (own == k + 1) & row.passed
-                found[:, some[last]] = row.z[last].T
-        return found
+        kernel, last = _kernel(batch, (), False), np.maximum(good, 1) - 1
+        z = np.empty_like(batch.z0)
+        # those that come about as far go together
+        with np.errstate(all="ignore"):
+            for which in np.array_split(np.argsort(last), ceil(len(last) / LANES)):
+                if kernel.is_sequential:
+                    z[:, which] = _unknowns_at_steps(kernel, batch.select(which), last[which])
+                else:
+                    march = DesignMarch(kernel, batch.select(which), np.zeros(1, dtype=int), np.inf)
+                    z[:, which] = march.advance(batch.input_offsets[last[which]].T[:, None]).unknowns(len(z))
+        return z
 
     def correct_assemblies(
         self, batch: DesignBatch, point_blocks: Sequence[int], corrections: int
     ) -> CorrectedAssemblies:
-        """See `DesignRunner`: none here, they are left to the search block after block."""
+        """See `DesignRunner`."""
+        kernel, designs = _kernel(batch, batch.links, False, tuple(point_blocks)), batch.p.shape[1]
+        converged, regularity, z = np.empty(designs, dtype=bool), np.empty(designs), np.empty_like(batch.z0)
+        points, other_points = (np.full((len(batch.links), 2, designs), np.inf) for _ in range(2))
+        counts = np.array([corrections])
+        with np.errstate(all="ignore"):
+            for part in split_into_blocks(designs, LANES):
+                march = DesignMarch(kernel, batch.select(part), counts, np.inf)
+                marched = march.advance(np.zeros((len(batch.u0), 1, 1)))
+                converged[part], z[:, part] = marched.passed[0], marched.unknowns(len(z))
+                regularity[part] = np.sqrt(np.maximum(marched.squared_regularity, 0.0))
+                for k in range(len(batch.links)):
+                    for axis in range(2):
+                        points[k, axis, part] = marched.outputs[2 * k + axis]
+                        if k in marched.other_points:
+                            other_points[k, axis, part] = marched.other_points[k][axis]
+        return CorrectedAssemblies(converged, regularity, z, points, other_points)
+
+    def lead(self, batch: DesignBatch, span: Array, step: float) -> tuple[Array, Array]:
+        """Designs led on from where they start, each input by its `span` (inputs, designs), in steps of so much.
+
+        The unknowns there (unknowns, designs), and which designs passed all checks on the way (designs,).
+        """
+        kernel, designs = _kernel(batch, (), False), batch.p.shape[1]
+        fractions = np.linspace(0.0, 1.0, ceil(np.max(np.abs(span), initial=0.0) / step) + 2)
+        counts, z, passed = (
+            correction_counts(len(fractions), step),
+            np.empty_like(batch.z0),
+            np.empty(designs, dtype=bool),
+        )
+        with np.errstate(all="ignore"):
+            for part in split_into_blocks(designs, LANES):
+                march = DesignMarch(kernel, batch.select(part), counts, correction_limit(step))
+                for fraction in fractions:
+                    marched = march.advance(fraction * span[:, None, part])
+                z[:, part], passed[part] = marched.unknowns(len(z)), march.passed
+        return z, passed
+
+
+class StartRunner:
+    """See `DesignRunner`: of designs that no other begins, whether they can start; they are followed from there.
+
+    They may start nearer to where assemblies meet than others do, in structures of any size.
+    """
+
+    def run(self, batch: DesignBatch, out: Array) -> Array:
+        """See `DesignRunner`."""
+        if not batch.functions.is_square:
+            raise UnsupportedStructure("constraints hold each other more than once")
+        functions = DesignFunctions(batch.functions, batch.p)
+        with np.errstate(all="ignore"):
+            row = design_positions(functions, batch, self._start(functions, batch), batch.u0)
+            return (PointWriter(batch, functions).write(out[0], row) & row.passed).astype(int)
+
+    def last_good_unknowns(self, batch: DesignBatch, good: Array) -> Array:
+        """See `DesignRunner`."""
+        with np.errstate(all="ignore"):
+            return self._start(DesignFunctions(batch.functions, batch.p), batch).T
+
+    def correct_assemblies(
+        self, batch: DesignBatch, point_blocks: Sequence[int], corrections: int
+    ) -> CorrectedAssemblies:
+        """See `DesignRunner`: none here."""
         raise UnsupportedStructure("assemblies are searched for block after block")
 
-
-def _run_until_many_fail(
-    part: DesignBatch, first: int, some: Array, out: Array, good: Array
-) -> tuple[int, DesignsAtStep]:
-    """March some designs on from a step, to the end or to where most have failed: the step after it, or that itself."""
-    columns = DesignFunctions(part.program, part.p)
-    told, last = PointWriter(part, columns), len(part.input_offsets) - 1
-    whole = out.shape[2] == len(some)
-    own = None if whole else np.empty((out.shape[1], len(some)))
-    inputs = (part.u0 + each[:, None] for each in part.input_offsets[first:])
-    for step, row in enumerate(iterate_steps(part, inputs, columns), start=first):
-        into = out[step] if own is None else own
-        fine = told.write(into, row)
-        if own is not None:
-            out[step][:, some] = own
-        good[some] += row.passed & fine & (good[some] == step)
-        if step in (last, first):
-            continue
-        if np.count_nonzero(row.passed) < COMPACTION_RATIO * len(some):
-            return step, row
-    return last + 1, row
+    @staticmethod
+    def _start(functions: DesignFunctions, batch: DesignBatch) -> Array:
+        return functions.correct(np.ascontiguousarray(batch.z0.T), batch.u0.T)
 
 
-def iterate_steps(
-    task: DesignBatch, inputs: Iterable[Array], functions: DesignFunctions | None = None
-) -> Iterator[DesignsAtStep]:
-    """The designs at inputs (inputs, designs), one step after the other, from the unknowns at the first."""
-    if not task.program.is_square:
-        raise UnsupportedStructure("constraints hold each other more than once")
-    functions = functions or DesignFunctions(task.program, task.p)
-    closed, branches = make_residual_check(task), DesignBranchCheck(functions)
-    z = np.ascontiguousarray(task.z0.T)
-    moves: list[Array] = []
-    before, ahead, last_way = None, None, None
-    good = np.ones(len(z), dtype=bool)
-    for u in inputs:
-        near = z.copy()
-        for weight, move in zip(extrapolation_weights(len(moves)), moves, strict=True):
-            near += weight * move
-        after = functions.correct(near, u.T)
-        if before is not None:
-            moves = [after - z, *moves[: PREDICTOR_ORDER - 1]]
-        z = after
-        w = functions.coordinates(z, u.T)
-        good = good & (closed.worst_residual(w, u) <= task.tolerance) & closed.is_resolved(w)
-        here = branches.evaluate(z, u.T)
-        good = good & branches.is_regular(here)
-        if before is not None:
-            way = here.u - before.u
-            same = last_way is not None and np.allclose(way, last_way, rtol=1e-9, atol=1e-12)
-            keeps, ahead = branches.check_step(before, here, ahead if same else None)
-            good, last_way = good & keeps, way
-        before = here
-        yield DesignsAtStep(z, u, w, good, here)
+def has_large_block(functions: EquationFunctions) -> bool:
+    """Whether a block has more unknowns than are solved by expressions."""
+    return any(slice_length(block.unknowns) > MAX_EXPRESSION_UNKNOWNS for block in functions.equations.blocks)
 
 
-def make_residual_check(task: DesignBatch) -> DesignResidualCheck:
-    """The first part of the gate for a march."""
-    own = shapes_of_links(task.mechanism)
-    return DesignResidualCheck(
-        ResidualCheck(task.mechanism, own, mechanism_size(task.mechanism, own)), task.mechanism, task.program, task.p
-    )
+def _kernel(
+    batch: DesignBatch, links: tuple[str, ...], rates: bool, point_blocks: tuple[int, ...] | None = None
+) -> NumpyKernel:
+    try:
+        return _cached_kernel(batch.functions, equation_structure(batch.mechanism), links, rates, point_blocks)
+    except UnsupportedOperation as why:
+        raise UnsupportedStructure(str(why)) from None
 
 
-class PointWriter:
-    """The points of a march, with their rates."""
+@lru_cache(maxsize=256)
+def _cached_kernel(
+    functions: EquationFunctions,
+    structure: Mechanism,
+    links: tuple[str, ...],
+    rates: bool,
+    point_blocks: tuple[int, ...] | None,
+) -> NumpyKernel:
+    return make_numpy_kernel(kernel_equations(functions, structure), links, rates, point_blocks)
 
-    def __init__(self, task: DesignBatch, functions: DesignFunctions):
-        self.task, self.functions, self.residual_check = task, functions, make_residual_check(task)
 
-    def write(self, out: Array, row: DesignsAtStep) -> Array:
-        """Write the points of a step (rows, designs); whether their rates break no constraint (designs,)."""
-        task = self.task
-        if not task.rates:
-            self._write_points(out, row.w)
-            return np.ones(row.w.shape[1:] or row.passed.shape, dtype=bool)
-        found = self._rates(row)
-        w = [Jet(*(np.ascontiguousarray(part[:, k]) for part in found)) for k in range(found[0].shape[1])]
-        self._write_points(out, w)
-        frames, own = self.residual_check.frames_from_coordinates(w)
-        inputs = [Jet(u, u1, u2) for u, u1, u2 in zip(row.u, task.u1, task.u2, strict=True)]
-        gaps = self.residual_check.residual_check.rate_residuals(frames, own, inputs)
-        return np.all([np.broadcast_to(gap, row.passed.shape) <= 1e3 * task.tolerance for gap, _ in gaps], axis=0)
+class _Division(NamedTuple):
+    """Steps divided into so many each: where the inputs are (inputs, parts + 1), and how far one goes in a part."""
 
-    def _rates(self, row: DesignsAtStep) -> tuple[Array, Array, Array]:
-        """w with its first and second rates, each (designs, coordinates)."""
-        task, none = self.task, np.zeros_like(row.z)
-        y, u1, u2 = np.hstack([row.z, row.u.T]), task.u1.T, task.u2.T
+    part_count: int
+    offsets: Array
+    longest: float
 
-        def at(z1: Array, z2: Array) -> EquationRates:
-            return self.functions.kinematics(y, np.hstack([z1, u1]), np.hstack([z2, u2]))
 
-        z1 = (row.positions.sensitivities @ u1[:, :, None])[..., 0]
-        z2 = -solve_vectors(row.positions.jacobians, at(z1, none).F2)
-        found = at(z1, z2)
-        return found.w, found.w1, found.w2
+def _divide_steps(offsets: Array) -> _Division:
+    """Steps as they are, or divided where they do not show what lies between, by offsets (steps + 1, inputs)."""
+    steps, longest = len(offsets), longest_step(offsets)
+    count = ceil(longest / REFINED_STEP) if longest > LONGEST_STEP or steps == 2 else 1
+    count = max(count, 2) if steps == 2 else count
+    knots = np.arange(count * (steps - 1) + 1) / count
+    fine = np.array([np.interp(knots, np.arange(steps), each) for each in offsets.T]) if count > 1 else offsets.T
+    return _Division(count, fine, longest / count)
 
-    def _write_points(self, out: Array, w: Sequence[Scalar] | Array) -> None:
-        frames, _ = self.residual_check.frames_from_coordinates(w)
-        many = 2 * len(self.task.links)
-        for k, link in enumerate(self.task.links):
-            place = frames[link].to_world(Vector(*self.task.q[2 * k : 2 * k + 2]))
-            for axis, value in enumerate(place):
-                for order, part in enumerate(value.parts if isinstance(value, Jet) else (value,)):
-                    np.multiply(part, self.task.unit, out=out[order * many + 2 * k + axis])
+
+def _run(kernel: NumpyKernel, batch: DesignBatch, out: Array, extra_corrections: int) -> Array:
+    """Fill out (steps + 1, rows, designs); how many of the first steps passed (designs,)."""
+    division = _divide_steps(batch.input_offsets)
+    parts, good = division.offsets.shape[1], np.zeros(out.shape[2], dtype=int)
+    with np.errstate(all="ignore"):  # designs that have failed run on as what is no number
+        for lanes in split_into_blocks(out.shape[2], LANES):
+            good[lanes] = _run_lanes(kernel, batch.select(lanes), division, out[:, :, lanes], extra_corrections)
+    # what is seen of a step only at the next one condemns the step too
+    good = np.where((good > 1) & (good < parts), good - 1, good)
+    return np.where(good > 0, (good - 1) // division.part_count + 1, 0)
+
+
+def _run_lanes(
+    kernel: NumpyKernel, batch: DesignBatch, division: _Division, out: Array, extra_corrections: int
+) -> Array:
+    """The same of some designs; how many parts of steps passed (designs,)."""
+    parts, designs = division.offsets.shape[1], out.shape[2]
+    counts = correction_counts(parts, division.longest) + extra_corrections
+    march = DesignMarch(kernel, batch, counts, correction_limit(division.longest))
+    good, lanes, first = np.zeros(designs, dtype=int), np.arange(designs), 0
+    while first < parts and lanes.size:
+        last = min(parts, first + (1 if kernel.is_sequential else max(1, LANES // lanes.size)))
+        marched = march.advance(division.offsets[:, first:last, None])
+        skipped = -first % division.part_count
+        rows = slice((first + skipped) // division.part_count, (last - 1) // division.part_count + 1)
+        if rows.start < rows.stop:
+            if kernel.links == batch.links:
+                _write_points(marched, batch.unit, slice(skipped, None, division.part_count), out, (rows, lanes))
+            else:
+                here = batch.u0[:, lanes] + division.offsets[:, first, None]
+                march.passed &= _write_with_casadi(marched, batch.select(lanes), here, out, (rows.start, lanes))
+        good[lanes] += marched.passed.sum(axis=0)
+        first = last
+        if np.count_nonzero(march.passed) < COMPACTION_RATIO * lanes.size:
+            lanes = lanes[march.passed]
+            march.select(march.passed)
+    return good
+
+
+def _write_points(marched: MarchedSteps, unit: float, parts: slice, out: Array, target: tuple[slice, Array]) -> None:
+    """Write the points at some parts of steps into rows of out (steps + 1, rows, designs), for some designs."""
+    rows, lanes = target
+    shape, whole = marched.passed.shape, len(lanes) == out.shape[2]
+    for k, value in enumerate(marched.outputs):
+        own = np.broadcast_to(value, shape)[parts]
+        if whole:
+            np.multiply(own, unit, out=out[rows, k])
+        else:
+            out[rows, k, lanes] = own * unit
+
+
+def _write_with_casadi(
+    marched: MarchedSteps, batch: DesignBatch, u: Array, out: Array, target: tuple[int, Array]
+) -> Array:
+    """The same at one step, points and rates by casadi's functions; which designs' rates break no constraint."""
+    step, lanes = target
+    functions, rows = DesignFunctions(batch.functions, batch.p), np.empty((out.shape[1], lanes.size))
+    row = design_positions(functions, batch, marched.unknowns(len(batch.z0)).T, u)
+    fine = PointWriter(batch, functions).write(rows, row)
+    out[step][:, lanes] = rows
+    marched.passed[-1] &= fine
+    return fine
+
+
+def _unknowns_at_steps(kernel: NumpyKernel, batch: DesignBatch, steps: Array) -> Array:
+    """The unknowns (unknowns, designs) where each design comes to a step of its own (designs,)."""
+    division = _divide_steps(batch.input_offsets)
+    counts = correction_counts(division.offsets.shape[1], division.longest) + EXTRA_CORRECTIONS
+    march, z, lanes = DesignMarch(kernel, batch, counts, np.inf), np.empty_like(batch.z0), np.arange(len(steps))
+    for part in range(int(steps.max()) * division.part_count + 1):
+        marched = march.advance(division.offsets[:, part : part + 1, None])
+        here = steps[lanes] * division.part_count == part
+        if here.any():
+            z[:, lanes[here]] = marched.unknowns(len(z))[:, here]
+            lanes = lanes[~here]
+            march.select(~here)
+    return z

@@ -5,13 +5,23 @@ from __future__ import annotations
 from functools import lru_cache
 from math import comb
 
+import numpy as np
+
+Array = np.ndarray
+
 MAX_TURN_PER_STEP = 0.5
 """rad that a link may turn from one step to the next: farther apart they do not show what lies between."""
 LONGEST_STEP = 0.5
-"""rad or sizes that an input may go in a step: positions that are farther apart do not show whether a group comes to a
+"""rad or sizes that an input may go in a step: positions that are farther apart do not show whether a block comes to a
 dead point between them."""
 COARSE_STEP = 0.04
 """rad or sizes: up to this step of the inputs the limit of what may be corrected stays as it is."""
+PREDICTOR_ORDER = 6
+"""Steps before from which the next is predicted."""
+CORRECTIONS, FIRST_CORRECTIONS = 1, 6
+"""Steps of Newton's method where the run has come far enough to be predicted, and before."""
+COARSE_STEPS = (COARSE_STEP, 0.12)
+"""rad or sizes: where the inputs go farther in a step, what is predicted takes one more of Newton's, and another."""
 CORRECTION_LIMIT, MAX_CORRECTION_LIMIT = 3e-3, 0.05
 """rad or sizes by which Newton's method may correct what was predicted for steps of `COARSE_STEP`, and at most."""
 
@@ -28,3 +38,15 @@ def extrapolation_weights(order: int) -> tuple[float, ...]:
 def correction_limit(step: float) -> float:
     """rad or sizes by which Newton's method may correct what was predicted, where inputs go so far in a step."""
     return min(CORRECTION_LIMIT * max(1.0, step / COARSE_STEP) ** 2, MAX_CORRECTION_LIMIT)
+
+
+def longest_step(offsets: Array) -> float:
+    """How far an input goes in a step at most, by positions (steps + 1, inputs)."""
+    return float(np.max(np.abs(np.diff(offsets, axis=0)), initial=0.0))
+
+
+def correction_counts(steps: int, longest: float) -> Array:
+    """How many of Newton's steps each step of a run takes (steps,), where inputs go so far in one at most."""
+    counts = np.full(steps, CORRECTIONS + sum(longest > each for each in COARSE_STEPS), dtype=np.int64)
+    counts[: PREDICTOR_ORDER + 1] = FIRST_CORRECTIONS
+    return counts

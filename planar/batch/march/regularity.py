@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TypeVar
 
-import numpy as np
+from planar.foundation.arrays import Array
 
-Number = TypeVar("Number", float, np.ndarray)
+Number = TypeVar("Number", float, Array)
 
-LEAST_NUMPY_REGULARITY = 1e-4
-"""Below it a march by numpy does not go on."""
+LEAST_START_REGULARITY = 1e-4
+"""Below it a design does not start."""
 LEAST_KERNEL_REGULARITY = 1e-2
-"""Below it a march by machine code does not go on, so that between steps too no two assemblies meet."""
+"""Below it a march does not go on, so that between steps too no two assemblies meet."""
 CLEAR_REGULARITY = 0.2
 """From it on no other assembly is near."""
 

@@ -1,0 +1,102 @@
+"""A kernel's instructions as LLVM IR: blocks, angles and checks as values of the lanes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import casadi as ca
+
+from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations, KernelInstructions, Operand
+from planar.codegen.instructions import check_length, required_values
+from planar.codegen.llvm_ir import IRWriter
+
+OperandNames = dict[Operand, str]
+"""The names under which numbers stand in the text."""
+
+
+class KernelWriter(KernelInstructions):
+    """The text of one function, written front to back."""
+
+    def __init__(
+        self,
+        equations: KernelEquations,
+        links: tuple[str, ...],
+        rates: bool,
+        lanes: int,
+        invariant: frozenset[str],
+        carried: frozenset[Operand],
+    ):
+        super().__init__(equations, links, rates, invariant, carried)
+        self.ir = IRWriter(lanes)
+        self.hoisted_names: dict[int, str] = {}
+        "of what does not vary"
+
+    def write_values(self, outputs: Sequence[ca.SX], names: Mapping[Operand, str]) -> list[str]:
+        """The values of expressions where numbers stand under these names. Raises BareAngle, UnsupportedOperation."""
+        written = self._write_instructions(self.list_values(outputs, self.ir.count), names)
+        check_length(self.ir.count)
+        return written
+
+    def write_separately(self, outputs: Sequence[ca.SX], have: Mapping[Operand, str]) -> list[list[str]]:
+        """The same, of each expression by itself."""
+        values = iter(self.write_values(outputs, have))
+        return [[next(values) for _ in range(each.numel())] for each in outputs]
+
+    def _write_instructions(self, wanted: Sequence[int], have: Mapping[Operand, str]) -> list[str]:
+        made, still = self.hoister.result, self.hoister.invariants
+        order = required_values(made, wanted)
+        names = {}
+        for k in order:
+            operand = made.instructions[k].key
+            if operand is not None:
+                if operand not in have:
+                    raise BareAngle(operand)
+                names[k] = have[operand]
+        ahead = [k for k in order if k in still and k not in self.hoisted_names]
+        with self.ir.hoisted():
+            self.ir.write_values(made, ahead, self.hoisted_names, names)
+        names |= {k: self.hoisted_names[k] for k in order if k in still}
+        self.ir.write_values(made, [k for k in order if k not in still], names, names)
+        return [names[k] for k in wanted]
+
+    def write_closed_form(self, part: KernelBlock, names: OperandNames) -> str:
+        """A block in closed form: its unknowns put into `names`, and how near its two assemblies are."""
+        *values, coalescence = self.write_values(self.closed_form_outputs(part), names)
+        names.update(zip(self.closed_form_operands(part), values, strict=True))
+        return coalescence
+
+    def write_angle_sum(self, cos: str, sin: str, c: str, s: str) -> tuple[str, str]:
+        """The cos and sin of a sum of two angles."""
+        t = self.ir
+        return (
+            t.binary("sub", t.binary("mul", cos, c), t.binary("mul", sin, s)),
+            t.binary("add", t.binary("mul", sin, c), t.binary("mul", cos, s)),
+        )
+
+    def write_small_rotation(self, c: str, s: str, angle: str) -> tuple[str, str]:
+        """The cos and sin of an angle turned by a little."""
+        t = self.ir
+        square = t.binary("mul", angle, angle)
+        cos = t.binary("sub", t.constant(1.0), t.binary("mul", square, t.constant(0.5)))
+        sin = t.binary("mul", angle, t.binary("sub", t.constant(1.0), t.binary("mul", square, t.constant(1.0 / 6.0))))
+        return self.write_normalised(*self.write_angle_sum(c, s, cos, sin))
+
+    def write_normalised(self, c: str, s: str) -> tuple[str, str]:
+        """What is nearly of length one, nearer to it: the inverse root by its first terms."""
+        t = self.ir
+        square = t.binary("add", t.binary("mul", c, c), t.binary("mul", s, s))
+        scale = t.binary("sub", t.constant(1.5), t.binary("mul", square, t.constant(0.5)))
+        return t.binary("mul", c, scale), t.binary("mul", s, scale)
+
+    def write_circle_residuals(self, have: OperandNames) -> list[str]:
+        """How far the square of every unknown angle's cos and sin is from one."""
+        t = self.ir
+        return [
+            t.binary(
+                "sub",
+                t.add_all([t.binary("mul", have[part, k], have[part, k]) for part in ("zc", "zs")]),
+                t.constant(1.0),
+            )
+            for k, turns in enumerate(self.equations.is_angle)
+            if turns
+        ]
