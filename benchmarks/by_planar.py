@@ -52,7 +52,7 @@ def backends(mechanism: Mechanism, swept: Swept) -> list[str]:
 
 
 def turns(swept: Swept, steps: int) -> list[Entry]:
-    """The file's own design over a turn: a run through the gate, and `planar.cycle`, which has rates and limits too."""
+    """The file's own design over a turn: a run with its checks, and `planar.cycle`, which has rates and limits too."""
     mechanism = planar.from_dict(swept.document())
     solver = PositionSolver(mechanism)
     z, p = solver.find_assembly().z, solver.inputs.p
@@ -69,7 +69,7 @@ def turns(swept: Swept, steps: int) -> list[Entry]:
 
     one, all_steps = np.arange(1), np.arange(steps + 1)
     return [
-        Entry("planar, a run through the gate", False, one, all_steps, lambda: follow_samples(solver, p, z, u).z, read),
+        Entry("planar, a run with its checks", False, one, all_steps, lambda: follow_samples(solver, p, z, u).z, read),
         *(_prepared(mechanism, swept, steps, rates) for rates in (False, True)),
         Entry(
             "planar.cycle, from the sketch",

@@ -1,4 +1,4 @@
-"""How the rates of links and slides hang together: what ties them, read from the pairs' own formulas."""
+"""Linear equations between the rates of links and slides, read from the pairs' own residuals."""
 
 from __future__ import annotations
 

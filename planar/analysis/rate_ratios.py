@@ -1,4 +1,4 @@
-"""Ratios of the links' rates, from the linear equations round all loops at once: for what no two lines locate."""
+"""Ratios of the links' rates from the linear equations of all loops at once: for centres that no two lines locate."""
 
 from __future__ import annotations
 

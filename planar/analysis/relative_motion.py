@@ -1,4 +1,4 @@
-"""How one link moves as seen from another: the pole of the motion, and how fast that moves on."""
+"""The motion of one link seen from another: the pole, and how fast it moves on."""
 
 from __future__ import annotations
 

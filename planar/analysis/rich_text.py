@@ -1,4 +1,4 @@
-"""Sentences and formulas as data: words, symbols, letters of a polygon, numbers and fractions, for any page to set."""
+"""Sentences and formulas as data (words, symbols, numbers, fractions), to be typeset by any page."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Every assembly of one block of links, those before it given, and how surely there is no other."""
+"""Every assembly of one block of links, those before it given, and whether that is proved to be all."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Why a mechanism does not go together: pairs and inputs in conflict, and the changes that mend it."""
+"""Why a mechanism cannot be assembled: pairs and inputs in conflict, and the changes that mend it."""
 
 from __future__ import annotations
 

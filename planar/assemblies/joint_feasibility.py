@@ -1,4 +1,4 @@
-"""Whether some of a mechanism's pairs and inputs can be met together, whatever else it has."""
+"""Whether some of a mechanism's pairs and inputs can be satisfied together, the others left out."""
 
 from __future__ import annotations
 

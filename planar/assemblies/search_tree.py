@@ -1,4 +1,4 @@
-"""The tree of assemblies: the blocks of links one after the other, each with what the choices before leave it."""
+"""The search tree of assemblies: block after block, each with the assemblies that the choices before allow."""
 
 from __future__ import annotations
 

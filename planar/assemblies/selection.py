@@ -1,4 +1,4 @@
-"""Which of all assemblies is taken: the one of a number, else the one nearest to the sketch, and its number."""
+"""The assembly that is taken: the one of a number, else the one nearest to the sketch, and its number."""
 
 from __future__ import annotations
 

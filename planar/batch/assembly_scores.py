@@ -1,4 +1,4 @@
-"""By what the assembly that is meant is told from the others, for many designs at once: how far from the sketch."""
+"""Distances of assemblies from the sketch, by which the one that is meant is chosen, for many designs at once."""
 
 from __future__ import annotations
 

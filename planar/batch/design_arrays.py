@@ -1,4 +1,4 @@
-"""Designs: one mechanism whose dimensions and inputs are arrays, an entry for each design."""
+"""Designs as arrays: one mechanism whose dimensions and inputs have an entry for each design."""
 
 from __future__ import annotations
 

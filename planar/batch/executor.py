@@ -1,4 +1,4 @@
-"""Tasks in the hands of an executor, which may lose them: each is tried again, then done here."""
+"""Tasks given to an executor, which may lose them: retried, then done here."""
 
 from __future__ import annotations
 

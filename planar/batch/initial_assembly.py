@@ -1,4 +1,4 @@
-"""The assembly of every design that lies nearest to the sketch, found for all designs at once."""
+"""The assembly nearest to the sketch of every design, found for all designs at once."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Designs whose assembly is clearly the one of the base: found by a backend from there, all blocks at once."""
+"""Designs near the reference design: their assembly found from its own, all blocks at once."""
 
 from __future__ import annotations
 

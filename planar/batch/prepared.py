@@ -1,4 +1,4 @@
-"""One linkage made ready to be run over and over, as an optimiser does, its dimensions changed from run to run."""
+"""`planar.prepared`: one linkage made ready to be run again and again with other dimensions, as an optimiser does."""
 
 from __future__ import annotations
 

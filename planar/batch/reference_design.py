@@ -1,4 +1,4 @@
-"""What the designs of a sweep have in common: the equation functions, one size, the points that are wanted."""
+"""What the designs of a sweep share: compiled functions, size, output points."""
 
 from __future__ import annotations
 

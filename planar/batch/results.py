@@ -1,4 +1,4 @@
-"""What a sweep has found."""
+"""The result of a sweep: arrays over designs and positions."""
 
 from __future__ import annotations
 

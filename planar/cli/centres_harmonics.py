@@ -1,4 +1,4 @@
-"""The commands that answer one question about a mechanism."""
+"""The commands `centres` and `harmonics`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The command that lists circuits and branches."""
+"""The command `circuits`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The commands of forces: what they are in a motion that is given, and what motion comes of them."""
+"""The commands `forces` and `simulate`."""
 
 from __future__ import annotations
 

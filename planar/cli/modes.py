@@ -1,4 +1,4 @@
-"""The command that lists every assembly."""
+"""The command `modes`."""
 
 from __future__ import annotations
 

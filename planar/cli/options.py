@@ -1,4 +1,4 @@
-"""What several commands have in common: their options, where inputs are moved to, how results are shown."""
+"""Options that several commands share, input positions, and how results are printed or written."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The commands that draw."""
+"""The commands `plot` and `animate`."""
 
 from __future__ import annotations
 

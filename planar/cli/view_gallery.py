@@ -1,4 +1,4 @@
-"""The commands that write pages for a browser."""
+"""The commands `view` and `gallery`."""
 
 from __future__ import annotations
 

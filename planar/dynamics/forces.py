@@ -22,7 +22,7 @@ from planar.dynamics.free_body_check import free_body_imbalance
 from planar.dynamics.imbalance import explain_imbalance, imbalance_refusal
 from planar.dynamics.load_validation import check_loads
 from planar.dynamics.load_variation import load_factors
-from planar.dynamics.multipliers import ReactionSolver
+from planar.dynamics.reaction_solver import ReactionSolver
 from planar.dynamics.reactions import ZERO_COUPLE_TOLERANCE, Reaction, input_efforts, pair_reaction
 from planar.dynamics.virtual_velocities import has_length_motion, refuse_surplus_inputs, unit_rate_state
 from planar.dynamics.virtual_work import BalanceFunction, balance_function

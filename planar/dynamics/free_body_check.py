@@ -1,4 +1,4 @@
-"""Every link as a free body: whether all that is told to act on it balances.
+"""Every link as a free body: whether the forces and couples on it balance.
 
 Nothing here comes from the equations that were solved: places, velocities and accelerations are those of the solved
 position, and forces those that are printed.

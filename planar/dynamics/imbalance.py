@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from planar.dynamics.multipliers import ReactionSolver
+from planar.dynamics.reaction_solver import ReactionSolver
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.model.mechanism import Mechanism
 from planar.model.wording import quote_names

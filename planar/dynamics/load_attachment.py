@@ -1,4 +1,4 @@
-"""On which link of a pin acts what a file applies at the pin by its name."""
+"""The link of a pin on which a load acts that a file applies at the pin by its name."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is made in Python to act on a mechanism, held against it; what a file has is checked at its place there."""
+"""Loads, springs and masses made in Python, checked against their mechanism; a file has its own checks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How much of a load there is at a position of an input, or at a time."""
+"""The factor of a load at a position of an input, or at a time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What inputs supply and pairs carry, told at their places; not a number where equilibrium does not tell."""
+"""Reactions at pairs and efforts of inputs as results: NaN, and why, where equilibrium does not determine them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.dynamics.external_actions import KinematicArrays
-from planar.dynamics.multipliers import ForceSolution, ReactionSolver
+from planar.dynamics.reaction_solver import ForceSolution, ReactionSolver
 from planar.foundation.arrays import Array, BoolArray
 from planar.foundation.short_repr import short_repr
 from planar.model.pairs import Pair

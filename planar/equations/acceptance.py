@@ -1,4 +1,4 @@
-"""All that a position has to pass, with its rates, in one compiled function of a structure.
+"""The acceptance test of a position and its rates, all checks of it in one compiled function of a structure.
 
 It says yes to what is surely sound. To what it does not, the general path says why, or that it is sound nevertheless.
 """

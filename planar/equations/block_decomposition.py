@@ -1,4 +1,4 @@
-"""Constraints split into the smallest groups that can be solved one after the other."""
+"""Constraints decomposed into the smallest blocks that can be solved one after the other."""
 
 from __future__ import annotations
 

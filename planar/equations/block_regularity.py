@@ -1,4 +1,4 @@
-"""How regular blocks are, as casadi expressions: bounds of singular values, and how far along a direction they hold."""
+"""How regular blocks are, as casadi expressions: bounds of singular values, and how far they hold."""
 
 from __future__ import annotations
 

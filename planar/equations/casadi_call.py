@@ -1,4 +1,4 @@
-"""A compiled function called on arrays as they lie in memory, at one position or at many."""
+"""Calls of compiled casadi functions on arrays as they lie in memory, at one position or at many."""
 
 from __future__ import annotations
 

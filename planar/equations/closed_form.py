@@ -1,4 +1,4 @@
-"""Groups of two unknowns in closed form: how they can be assembled, derived from their equations.
+"""Closed forms of blocks of two unknowns: both assemblies, derived from their equations.
 
 Two constraints whose unknowns are angles, entering by their cosines and sines, or lengths, are an equation of complex
 numbers, in one of three forms where a, b, d, g do not depend on the unknowns and e is the unit vector of an angle:

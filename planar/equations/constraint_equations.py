@@ -1,4 +1,4 @@
-"""The constraint equations of a mechanism, built once as casadi SX, split into groups and shortened inside each.
+"""The constraint equations of a mechanism as casadi SX: built once, decomposed into blocks, simplified inside each.
 
 The symbols z, u, p, w and F are those of the table in `planar.equations`.
 """

@@ -1,4 +1,4 @@
-"""Equations as something that runs: casadi functions over the symbols z, u, p of the equations."""
+"""The compiled casadi functions of a structure's equations over z, u and p: residuals, Jacobians, rates."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Minors of the slope of constraints as further constraints: they vanish where the slope keeps a low rank."""
+"""Minors of the Jacobian as further constraints: they vanish where its rank is low."""
 
 from __future__ import annotations
 

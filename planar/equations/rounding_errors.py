@@ -1,4 +1,4 @@
-"""What rounding the numbers of a position's equations makes of them and of their rates, by slopes."""
+"""Rounding errors of a position's equations and of their rates, carried by derivatives."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Solved positions as arrays with names."""
+"""The results of one position and of a run: State and Motion, arrays with names."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is told of a position and of a motion: arrays with names."""
+"""Records in results: points, links, pairs, limits, as arrays with names."""
 
 from __future__ import annotations
 

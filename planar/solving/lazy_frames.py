@@ -1,4 +1,4 @@
-"""Links' frames and pairs' own coordinates of solved positions, made when they are first asked for."""
+"""Frames of links and pairs' own coordinates of solved positions, computed when first read."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One position: assembled, gated, and with its velocities and accelerations."""
+"""One position solved: assembled, checked, with its velocities and accelerations."""
 
 from __future__ import annotations
 

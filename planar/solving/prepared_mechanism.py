@@ -1,4 +1,4 @@
-"""One mechanism made ready to be solved and judged: its program, its numbers, its gate."""
+"""A mechanism prepared for solving: its compiled functions, its numbers, its residual check."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a mechanism stands, without rates: on dead points and change points too, where a velocity is none."""
+"""A position solved without rates, as dead points and change points allow."""
 
 from __future__ import annotations
 

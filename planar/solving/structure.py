@@ -1,4 +1,4 @@
-"""What mechanisms have in common that differ in their numbers alone: names, pairs, program, places of points."""
+"""The structure that mechanisms share which differ in numbers alone: names, pairs, functions, points."""
 
 from __future__ import annotations
 

@@ -179,7 +179,7 @@ def test_blocks_too_large_for_expressions_are_solved_by_arrays_to_the_same(monke
 
 def test_numpy_source_says_each_value_once_and_takes_names_again():
     made = InstructionList()
-    a, b = (made.add("input", data=("p", k)) for k in range(2))
+    a, b = (made.add_input(("p", k)) for k in range(2))
     whole = made.add("mul", made.add("add", a, b), made.add("sqrt", b))
     wanted = [made.add("neg", whole), made.add("minnum", whole, made.add_constant(2.0)), a]
     assert numpy_code.write_numpy(made, wanted, (a, b)).splitlines() == [

@@ -148,7 +148,7 @@ def test_forces_have_the_letters_that_they_have_on_paper(stem):
     }
     state = planar.solve(MODELS[stem])
     felt = action_arrows(planar.forces(state), mechanism_size(MODELS[stem], state.shapes))
-    lettered = {(link, each.symbol.base, each.symbol.index) for link, of in felt.items() for each in of}
+    lettered = {(link, each.symbol.base, each.symbol.subscript) for link, of in felt.items() for each in of}
     assert {each for each in lettered if not each[1].startswith("-")} <= carried
 
 

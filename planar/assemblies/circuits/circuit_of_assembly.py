@@ -1,4 +1,4 @@
-"""Where the assemblies at one position of the inputs lie: on which circuit, on which branch of it."""
+"""The circuit and branch on which each assembly at one position of the inputs lies."""
 
 from __future__ import annotations
 

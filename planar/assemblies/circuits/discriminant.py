@@ -1,4 +1,4 @@
-"""How far the solutions of a block are from where two of them meet: the product of slopes over all, complex ones too.
+"""The discriminant of a block: a product over all its solutions that is zero where two of them meet.
 
 They are found at once, as eigenvalues, or else followed from the position before: not straight, where on real ways
 solutions meet, but by a complex place beside it.

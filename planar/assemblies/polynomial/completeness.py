@@ -1,4 +1,4 @@
-"""What is told of all assemblies of one block of links, and how surely there is no other."""
+"""How complete a list of a block's assemblies is, as a result and in words."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Angles that gears tie to others, as whole multiples of a few new ones whose powers are entries of X like the rest.
+"""Angles tied by gears, as whole multiples of a few new angles whose powers enter the polynomials.
 
 Where cosines and sines are of a[j] theta + c[j] with rational a[j], these span a lattice: with a basis of it as new
 angles phi, a[j] theta = n[j] phi for whole n[j], and with t = exp(i phi) a direction is exp(i c[j]) t^n[j]. The powers

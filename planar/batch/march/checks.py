@@ -1,4 +1,4 @@
-"""The residual check, the regularity and the points of many designs at once, by casadi's functions."""
+"""Residual and branch checks for many designs at once, each at the same step."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A mechanism's equations block by block as lists of instructions: what kernels of every format are made of.
+"""The parts of LLVM functions that solve positions: a mechanism's equations, printed block by block.
 
 The angles' cos and sin are carried, never the angles. A block in closed form is computed by that; any other is solved
 by Newton's method, whose step turns an angle by the first terms of its cos and sin; what is not quite of length one

@@ -1,4 +1,4 @@
-"""The run of many designs, lane by lane, as one function of LLVM IR: predicted, solved, judged, told.
+"""The march of many designs, lane by lane, as one LLVM function: predict, correct, check, write.
 
 What Newton's method solves is predicted by the polynomial through the steps before.
 """

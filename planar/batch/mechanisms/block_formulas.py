@@ -1,4 +1,4 @@
-"""The formulas of a kind of groups: how it is assembled, run, judged, and followed by Newton's method."""
+"""The formulas of a block type: how it is assembled, marched, checked, and solved by Newton's method."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What runs the blocks of many linkages through their steps: numpy, or machine code where that is there."""
+"""Runners of the blocks of many linkages: numpy, or machine code where that is there."""
 
 from __future__ import annotations
 

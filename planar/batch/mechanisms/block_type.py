@@ -1,4 +1,4 @@
-"""What a kind of groups is: links that are solved together from other links whose places are given."""
+"""Block types: links that are solved together from other links whose poses are known."""
 
 from __future__ import annotations
 

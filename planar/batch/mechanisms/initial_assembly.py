@@ -1,4 +1,4 @@
-"""The assemblies nearest to their sketches of many linkages at once, group after group."""
+"""The assemblies nearest to their sketches of many linkages at once, block after block."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Many linkages as arrays: which groups they have, what drives them, what is known of their sketches."""
+"""Many linkages as arrays: their blocks, what drives them, their sketches."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Many assembled linkages through all steps, kind after kind, and how far each of them is sure to have come."""
+"""All positions of many assembled linkages, block type after block type, and how far each is sure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Groups that are not in closed form, followed by Newton's method from step to step: by numpy."""
+"""Blocks without closed form marched by Newton's method, by numpy."""
 
 from __future__ import annotations
 

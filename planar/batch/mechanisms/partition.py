@@ -1,4 +1,4 @@
-"""A mechanism parted into groups of links that can be solved one after the other, on the level of links and pairs."""
+"""A mechanism partitioned into blocks of links that can be solved one after the other."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a sweep over mechanisms of any structure has found."""
+"""The result of a sweep over mechanisms of any structure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Kinds of groups with the formulas by which they are solved, derived once each."""
+"""Block types with the formulas that solve them, derived once each."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the blocks of a sweep go: what every place for them does, and arrays in memory, which are one."""
+"""Stores of a sweep's blocks: what every store does, and arrays in memory, which are one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is printed for a terminal as HTML: the same tables and sentences, for notebooks."""
+"""Tables and sentences of the terminal as HTML, for notebooks."""
 
 from __future__ import annotations
 

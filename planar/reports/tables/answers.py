@@ -1,4 +1,4 @@
-"""What designers ask of a motion, as tables for a terminal, and as JSON values."""
+"""Answers about a motion (strokes, time ratios, extremes, dwells) as tables for a terminal, and as JSON values."""
 
 from __future__ import annotations
 

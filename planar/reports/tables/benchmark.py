@@ -1,4 +1,4 @@
-"""How fast mechanisms are solved, as tables for a terminal."""
+"""Measured solving speeds as tables for a terminal."""
 
 from __future__ import annotations
 

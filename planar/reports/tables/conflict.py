@@ -1,4 +1,4 @@
-"""Why a mechanism does not go together, as text for a terminal and as JSON values."""
+"""Conflicts and their remedies as text for a terminal and as JSON values."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a mechanism is, and which models there are, as text for a terminal."""
+"""What `inspect` and `models` say, as text for a terminal."""
 
 from __future__ import annotations
 

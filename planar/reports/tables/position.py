@@ -1,4 +1,4 @@
-"""Tables of one position: links, points, pairs, and printed values beside those that are found."""
+"""Tables of one position: links, points, pairs, and published values beside those computed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The motion of a mechanism that is let go: tables for a terminal, and what a file of it has of energies."""
+"""A simulated motion: tables for a terminal, and the energies in its files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The ways in which one group of links can be assembled, once all earlier groups stand."""
+"""The assemblies of one block, once all earlier blocks are placed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The assembly of a mechanism that lies nearest to a rough sketch, found group after group."""
+"""The assembly nearest to the sketch, found block after block."""
 
 from __future__ import annotations
 

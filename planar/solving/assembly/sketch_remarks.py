@@ -1,4 +1,4 @@
-"""What is to be said of how an assembly was chosen."""
+"""Remarks on how an assembly was chosen."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a sketch alone shows the links of a mechanism."""
+"""Start values of links from the sketch alone."""
 
 from __future__ import annotations
 

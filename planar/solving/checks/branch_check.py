@@ -1,4 +1,4 @@
-"""The second part of the gate: can two positions of a run lie on one branch, and on no other?"""
+"""The branch check: do two positions of a run lie on one branch, and on no other?"""
 
 from __future__ import annotations
 

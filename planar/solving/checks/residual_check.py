@@ -1,4 +1,4 @@
-"""The first part of the gate that every answer passes, whichever way it was found: is everything closed?
+"""The residual check that every answer passes: is every constraint closed, are its rates?
 
 It knows nothing of elimination or Newton: it runs the pairs' own formulas on plain numbers. The second part,
 since the residual of a flipped linkage is zero too, is `branch`.

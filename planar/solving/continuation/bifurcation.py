@@ -1,4 +1,4 @@
-"""Where branches of the motion cross: the point itself, the ways that lead through it, and the curve beside it.
+"""Bifurcations (change points): the point where branches cross, the branches through it, and the curve beside it.
 
 At a change point the slope J (rows, n + 1) of the constraints has k > 1 null vectors N (n + 1, k) and left ones L.
 Ways through it are v = N c with L^T F''(v, v) = 0, quadratic equations in c; their second derivatives w follow from

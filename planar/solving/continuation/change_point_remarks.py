@@ -1,4 +1,4 @@
-"""What is to be said of change points that a motion passes, or comes near."""
+"""Remarks on change points that a motion passes, or comes near."""
 
 from __future__ import annotations
 

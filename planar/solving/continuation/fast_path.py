@@ -1,4 +1,4 @@
-"""Along straight ways of the inputs in compiled functions alone, as far as everything there is surely sound."""
+"""The fast path along straight input paths: compiled functions alone, as far as every position is surely regular."""
 
 from __future__ import annotations
 

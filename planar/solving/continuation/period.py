@@ -1,4 +1,4 @@
-"""Where a curve of positions comes back to its start, whole turns on, so that what follows is known."""
+"""The period of a solution curve: where it comes back to its start, whole turns on."""
 
 from __future__ import annotations
 

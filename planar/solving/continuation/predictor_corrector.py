@@ -1,4 +1,4 @@
-"""Walking along the curve of positions, arc after arc, through dead points and smoothly through change points."""
+"""The curve tracker: predictor and corrector, arc after arc, through dead points and change points."""
 
 from __future__ import annotations
 

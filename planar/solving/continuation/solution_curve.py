@@ -1,4 +1,4 @@
-"""The curve of positions along a straight way of the inputs: points on it, their tangents, what lies between two."""
+"""The solution curve along a straight input path: points on it, tangents, curvature, what lies between two points."""
 
 from __future__ import annotations
 

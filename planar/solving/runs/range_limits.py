@@ -1,4 +1,4 @@
-"""What a run of one input meets between its first row and its last: dead points, ends of strokes, change points."""
+"""The limits of a run of one input: dead points, ends of strokes, change points between its first row and its last."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Positions of a run as a motion with its rates, once both parts of the gate have let them pass."""
+"""Positions of a run made into a Motion with its rates, once they have passed the residual and the branch check."""
 
 from __future__ import annotations
 
