@@ -481,7 +481,7 @@ def test_an_input_at_rest_or_twice_as_fast_changes_nothing(stem):
         alike(found(stem), centres(solve(other)), within=1e-13)
 
 
-@pytest.mark.parametrize("stem", some_models(2, 1))
+@pytest.mark.parametrize("stem", some_models(3, 1))
 def test_a_mechanism_has_the_centres_of_its_position(stem):
     alike(found(stem), centres(MODELS[stem]), within=1e-10)
 
@@ -669,7 +669,7 @@ def test_a_planetary_differential_follows_the_ratio_of_its_inputs():
 # velocities by centres
 
 
-@pytest.mark.parametrize("stem", some_models(2))
+@pytest.mark.parametrize("stem", some_models(3))
 def test_velocities_by_centres_are_those_of_the_state(stem):
     result = found(stem)
     points = result.state.points

@@ -29,7 +29,7 @@ def velocity_and_acceleration(found, at):
     )
 
 
-@pytest.mark.parametrize("model", some_models(2))
+@pytest.mark.parametrize("model", some_models(3))
 def test_euler_savary_agrees_with_velocity_and_acceleration_for_random_points_of_every_link(model):
     state = state_of(model)
     rng = np.random.default_rng(1)

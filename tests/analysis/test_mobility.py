@@ -372,7 +372,7 @@ def test_two_redundant_parts_are_told_apart():
 # any linkage
 
 
-@pytest.mark.parametrize("seed", part(range(40), 6))
+@pytest.mark.parametrize("seed", part(range(40), 8))
 @pytest.mark.parametrize(("links", "higher"), [(4, 0.0), (6, 0.0), (5, 0.5)])
 def test_of_random_linkages_that_are_solved_all_mobilities_are_the_number_of_inputs(seed, links, higher):
     built = random_linkage(seed, links, higher=higher)

@@ -352,7 +352,7 @@ LAWS = [
 ]
 
 
-@pytest.mark.parametrize("stem", some_models(2))
+@pytest.mark.parametrize("stem", some_models(3))
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law.__name__)
 def test_law_holds_for_every_model(law, stem):
     for kind in KINDS:

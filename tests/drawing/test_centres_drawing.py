@@ -26,7 +26,7 @@ from tests.known import found_centres as found
 from tests.known import some_models
 
 MODELS = {stem: mechanism for stem, mechanism in ALL.items() if stem != "chain-42"}
-every_model = pytest.mark.parametrize("stem", [stem for stem in some_models(2, 1) if stem in MODELS])
+every_model = pytest.mark.parametrize("stem", [stem for stem in some_models(3, 1) if stem in MODELS])
 INSIDE = 1e-6
 
 

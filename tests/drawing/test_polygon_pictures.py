@@ -23,7 +23,7 @@ from tests.known import MODELS, some_models, state_of
 
 KINDS = {"velocity": velocity_polygon, "acceleration": acceleration_polygon}
 LEGEND = "index 1: accelerations of points; other indices: ends of their parts"
-every_model = pytest.mark.parametrize("stem", some_models(2, 1))
+every_model = pytest.mark.parametrize("stem", some_models(3, 1))
 both_kinds = pytest.mark.parametrize("kind", KINDS)
 
 

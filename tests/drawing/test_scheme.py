@@ -36,7 +36,7 @@ from tests.linkages import random_linkage
 
 SAMPLES = [sample for kind in pair_types().values() for sample in kind.samples()]
 every_sample = pytest.mark.parametrize("sample", SAMPLES, ids=lambda sample: f"{sample.pair.keyword} {sample.entry}")
-every_model = pytest.mark.parametrize("name", some_models(2))
+every_model = pytest.mark.parametrize("name", some_models(3))
 UNIT = Scale("length", 1e-3, "mm")
 
 

@@ -91,7 +91,7 @@ def forces_of(number: int) -> Forces:
     return planar.forces(linkages()[number][2])
 
 
-numbered = pytest.mark.parametrize("number", part(range(40), 3))
+numbered = pytest.mark.parametrize("number", part(range(40), 4))
 
 
 def scale_of(found: Forces) -> float:
@@ -131,7 +131,7 @@ def test_they_are_of_all_sizes_and_types():
     assert len(told) >= 20
 
 
-@pytest.mark.parametrize("stem", some_models(4))
+@pytest.mark.parametrize("stem", some_models(6))
 def test_they_balance_on_every_model_at_every_step_of_a_motion(stem):
     pair, start, *_ = MODELS[stem].inputs[0]
     stop = start + (0.01 if has_length_motion(MODELS[stem], pair) else 6.0)

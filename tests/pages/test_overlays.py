@@ -50,7 +50,7 @@ def drawn() -> dict[str, Any]:
       });
       return found;
     """
-    return in_node(FEW | {stem: MODELS[stem] for stem in some_models(5)}, act, *SCRIPTS)
+    return in_node(FEW | {stem: MODELS[stem] for stem in some_models(8)}, act, *SCRIPTS)
 
 
 @needs_node

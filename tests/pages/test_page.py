@@ -433,7 +433,7 @@ def test_pages_of_models_solve_as_python_does():
     }
     return found;
     """
-    compared, some = 0, {stem: MODELS[stem] for stem in some_models(3)}
+    compared, some = 0, {stem: MODELS[stem] for stem in some_models(5)}
     for stem, positions in in_node(some, act).items():
         mechanism = MODELS[stem]
         given = mechanism.inputs[0]
@@ -589,7 +589,7 @@ def test_the_range_of_the_input_is_that_of_the_cycle_command():
     return page.course.limits;
     """
     free = {"davis-steering", "rack-differential", "rapsons-slide", "rolling-wheel"}  # slides without limits
-    some = {stem: each for stem, each in part(MODELS.items(), 8, 1) if each.inputs and stem not in free}
+    some = {stem: each for stem, each in part(MODELS.items(), 11, 1) if each.inputs and stem not in free}
     for stem, limits in in_node(some | {"hart-a-frame": MODELS["hart-a-frame"]}, act, "solve/course.js").items():
         mechanism = MODELS[stem]
         positions = planar.cycle(mechanism, 4, pair=mechanism.inputs[0].pair)

@@ -346,7 +346,7 @@ def limited(rng):
                 return (a, b, c, d), (high, -1.0) if rng.random() < 0.5 else (low, 1.0), high - low
 
 
-@pytest.mark.parametrize("seed", part(range(60), 3))
+@pytest.mark.parametrize("seed", part(range(60), 5))
 def test_a_run_that_starts_beside_a_limit_stays_on_its_branch(seed):
     """Two branches lead inwards from a limit; beside it both are near, and rates are beyond all bounds."""
     rng = np.random.default_rng(seed)

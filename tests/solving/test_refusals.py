@@ -207,7 +207,7 @@ def diagonal(a, d, theta):
 STATIONS = [(a, d, theta) for a, d in ((50, 100), (70, 100), (50, 130)) for theta in (120, 150, 180, -140)]
 
 
-@pytest.mark.parametrize(("a", "d", "theta"), part([each for each in STATIONS if diagonal(*each) > 123], 3))
+@pytest.mark.parametrize(("a", "d", "theta"), part([each for each in STATIONS if diagonal(*each) > 123], 5))
 def test_bars_that_are_too_short_are_told_the_gap_and_the_length_that_just_reaches(a, d, theta):
     given = mm_four_bar(a, 66, 56, d, theta)
     problem = refused(given)
