@@ -15,7 +15,7 @@ from tests.linkages import Built, assembled, conditioning, random_linkage, seeds
 
 sizes = st.integers(1, 12)
 many = settings(
-    max_examples=draws(20), deadline=None, suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow]
+    max_examples=draws(15), deadline=None, suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow]
 )
 
 
