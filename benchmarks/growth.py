@@ -13,9 +13,9 @@ from benchmarks import chain
 from benchmarks.comparison import error
 from benchmarks.timing import best
 from benchmarks.ways.trial import CRANK
-from planar.equations.constraint_equations import build_equations
 from planar.equations.functions import EquationFunctions
 from planar.equations.mechanism_numbers import equation_structure
+from planar.equations.symbolic_equations import build_equations
 from planar.solving.continuation.path import follow_samples
 from planar.solving.position import PositionSolver
 

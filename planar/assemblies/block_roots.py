@@ -31,8 +31,8 @@ from planar.assemblies.polynomial.path_tracker import (
     track_paths,
 )
 from planar.assemblies.solution_curves import SINGULAR_RATIO, STEP_LENGTH, is_on_curve, one_per_curve
-from planar.equations.constraint_equations import Block, ConstraintEquations, slice_length
 from planar.equations.functions import EquationFunctions
+from planar.equations.symbolic_equations import Block, ConstraintEquations, slice_length
 from planar.foundation.angles import distances, wrap_angle
 from planar.foundation.arrays import Array, BoolArray, ComplexArray
 from planar.solving.assembly.block_assemblies import SAME_ASSEMBLY_TOLERANCE, BlockAssemblies, block_residual_function

@@ -15,8 +15,8 @@ import numpy as np
 from planar.assemblies.polynomial.completeness import Completeness
 from planar.assemblies.search_tree import BEST_TO_WORST, AssemblyPath, AssemblyTree
 from planar.document.first_argument import takes_mechanism
-from planar.equations.constraint_equations import slice_length
 from planar.equations.coordinates import frames_from_coordinates
+from planar.equations.symbolic_equations import slice_length
 from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer, Outcome
 from planar.foundation.geometry import Frame

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planar.assemblies.polynomial.completeness import BlockRoots, Completeness
-from planar.equations.constraint_equations import Block, slice_length
 from planar.equations.functions import POLISHING_STEPS
+from planar.equations.symbolic_equations import Block, slice_length
 from planar.foundation.angles import distances
 from planar.foundation.arrays import Array
 from planar.model.pairs import MeasureKind

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.batch.march.checks import column_volume
-from planar.equations.constraint_equations import Block
 from planar.equations.functions import EquationFunctions
 from planar.equations.linear import solve_vectors
+from planar.equations.symbolic_equations import Block
 from planar.model.pairs import MeasureKind
 from planar.solving.assembly.block_assemblies import SAME_ASSEMBLY_TOLERANCE
 from planar.solving.newton import CLOSED_TOLERANCE

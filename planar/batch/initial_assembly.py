@@ -13,8 +13,8 @@ from planar.batch.block_corrector import SPREAD_STARTS, BlockCorrector
 from planar.batch.march.backend import DesignRunner
 from planar.batch.nearest_assemblies import find_nearest_assemblies
 from planar.batch.reference_design import ReferenceDesign, shape_of_designs
-from planar.equations.constraint_equations import Block, slice_length
 from planar.equations.coordinates import frames_from_coordinates
+from planar.equations.symbolic_equations import Block, slice_length
 from planar.foundation.geometry import Vector
 from planar.model.link_shapes import LinkShape
 from planar.solving.assembly.block_assemblies import CLEAR_SKETCH_DISTANCE

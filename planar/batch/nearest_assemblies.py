@@ -16,7 +16,7 @@ from planar.batch.assembly_scores import (
 )
 from planar.batch.march.backend import CorrectedAssemblies, DesignRunner, UnsupportedStructure
 from planar.batch.reference_design import ReferenceDesign
-from planar.equations.constraint_equations import Block, slice_length
+from planar.equations.symbolic_equations import Block, slice_length
 from planar.model.link_shapes import LinkShape
 from planar.solving.assembly.block_assemblies import SAME_ASSEMBLY_TOLERANCE, BlockAssemblies
 

@@ -20,9 +20,9 @@ from planar.batch.reference_design import reference_design
 from planar.batch.results import Sweep
 from planar.batch.sweep import sweep
 from planar.bench.profiling import profile_cycle, profile_first_call, profile_sweep
-from planar.equations.constraint_equations import Block, ConstraintEquations, build_equations
 from planar.equations.functions import EquationFunctions
 from planar.equations.mechanism_numbers import equation_structure
+from planar.equations.symbolic_equations import Block, ConstraintEquations, build_equations
 from planar.foundation.errors import BadInput
 from planar.model.mechanism import Mechanism
 from planar.model.wording import join_all_names

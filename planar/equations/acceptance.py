@@ -14,7 +14,6 @@ import numpy as np
 
 from planar.equations.block_regularity import greatest_entry, regular_distances, regularity_bound
 from planar.equations.casadi_call import BufferedFunction
-from planar.equations.constraint_equations import slice_length
 from planar.equations.coordinates import coordinate_columns, frames_from_coordinates
 from planar.equations.elimination import stack_expressions
 from planar.equations.functions import (
@@ -27,6 +26,7 @@ from planar.equations.functions import (
 from planar.equations.mechanism_numbers import equation_structure
 from planar.equations.rates import UnknownRates, first_and_second_rates, time_derivatives
 from planar.equations.residuals import closing_error, residuals, scalars, split_pair_numbers
+from planar.equations.symbolic_equations import slice_length
 from planar.foundation.geometry import Frame, frame_at, frame_term_sizes
 from planar.foundation.jets import Jet, TermSizes, term_sizes
 from planar.model.mechanism import Mechanism

@@ -5,9 +5,9 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from planar.equations.constraint_equations import slice_length
 from planar.equations.elimination import stack_expressions
 from planar.equations.rates import UnknownRates
+from planar.equations.symbolic_equations import slice_length
 
 
 def regular_distances(rates: UnknownRates, along: ca.SX) -> tuple[ca.SX, ca.SX]:

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from planar.equations.constraint_equations import Block, ConstraintEquations
+from planar.equations.symbolic_equations import Block, ConstraintEquations
 from planar.foundation.arrays import Array
 from planar.model.pairs import MeasureKind
 

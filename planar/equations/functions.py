@@ -11,11 +11,11 @@ import numpy as np
 
 from planar.equations.casadi_call import BufferedFunction, RunFunction
 from planar.equations.closed_form import ClosedForm, find_closed_form
-from planar.equations.constraint_equations import Block, ConstraintEquations, build_equations, slice_length
 from planar.equations.elimination import stack_expressions
 from planar.equations.linear import solve_linear
 from planar.equations.mechanism_numbers import equation_structure
 from planar.equations.rates import rate_symbols, time_derivatives
+from planar.equations.symbolic_equations import Block, ConstraintEquations, build_equations, slice_length
 from planar.foundation.arrays import Array
 from planar.model.mechanism import Mechanism
 

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import casadi as ca
 
-from planar.equations.constraint_equations import ConstraintEquations, slice_length
 from planar.equations.linear import solve_linear
+from planar.equations.symbolic_equations import ConstraintEquations, slice_length
 
 
 def rate_symbols(y: ca.SX, order: int) -> tuple[ca.SX, ...]:

@@ -14,9 +14,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from planar.equations.constraint_equations import Block
 from planar.equations.functions import EquationFunctions
 from planar.equations.minors import LowRankBlock, add_minors, constraint_dependencies
+from planar.equations.symbolic_equations import Block
 from planar.foundation.arrays import Array
 from planar.solving.checks.singular_values import MIN_REGULARITY, column_norms, null_space, rank
 from planar.solving.newton import correct, shortest_step

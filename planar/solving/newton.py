@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.equations.casadi_call import BufferedFunction
-from planar.equations.constraint_equations import slice_length
 from planar.equations.functions import EquationFunctions
 from planar.equations.linear import solve_vectors
+from planar.equations.symbolic_equations import slice_length
 from planar.foundation.arrays import Array
 
 ResidualFunction = Callable[[Array], tuple[Array, Array]]

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from planar.document.first_argument import takes_mechanism
-from planar.equations.constraint_equations import slice_length
 from planar.equations.coordinates import frames_from_coordinates
 from planar.equations.functions import MAX_CACHED_STRUCTURES, EquationRates, equation_functions
+from planar.equations.symbolic_equations import slice_length
 from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer, Outcome, TrackingEnd
 from planar.foundation.geometry import Frame

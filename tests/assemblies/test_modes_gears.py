@@ -12,7 +12,7 @@ from planar.assemblies.polynomial.completeness import Completeness
 from planar.assemblies.polynomial.gear_powers import gear_powers
 from planar.assemblies.polynomial.isotropic_form import isotropic_form
 from planar.document import files
-from planar.equations.constraint_equations import slice_length
+from planar.equations.symbolic_equations import slice_length
 from planar.solving.assembly.block_assemblies import BlockAssemblies
 from planar.solving.prepared_mechanism import PreparedMechanism
 from tests.inversions import unknowns_of

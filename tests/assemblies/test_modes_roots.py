@@ -15,7 +15,7 @@ from planar.assemblies.polynomial.completeness import Completeness
 from planar.assemblies.polynomial.isotropic_form import isotropic_form
 from planar.assemblies.polynomial.path_tracker import solve_generic_instance
 from planar.document import files
-from planar.equations.constraint_equations import slice_length
+from planar.equations.symbolic_equations import slice_length
 from planar.solving.prepared_mechanism import PreparedMechanism
 from tests.builders import four_bar_document
 from tests.draws import draws, part

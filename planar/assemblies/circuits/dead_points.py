@@ -21,7 +21,7 @@ from planar.assemblies.circuits.discriminant import DeadPointsUnclaimed, MovingS
 from planar.assemblies.polynomial.completeness import Completeness
 from planar.assemblies.polynomial.isotropic_form import isotropic_form
 from planar.assemblies.search_tree import is_linear
-from planar.equations.constraint_equations import Block, slice_length
+from planar.equations.symbolic_equations import Block, slice_length
 from planar.foundation.arrays import Array
 from planar.model.pairs import MeasureKind
 from planar.solving.assembly.block_assemblies import block_dependencies

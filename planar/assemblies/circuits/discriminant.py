@@ -18,7 +18,7 @@ from planar.assemblies.polynomial.path_tracker import (
     is_finite_solution,
     track_paths,
 )
-from planar.equations.constraint_equations import ConstraintEquations
+from planar.equations.symbolic_equations import ConstraintEquations
 from planar.foundation.arrays import Array, ComplexArray
 
 COMPLEX_MIDPOINT = 0.5 + 0.3j

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.assemblies.polynomial.isotropic_form import ZERO_TOLERANCE, BlockPolynomials, IsotropicForm
-from planar.equations.constraint_equations import ConstraintEquations
+from planar.equations.symbolic_equations import ConstraintEquations
 from planar.foundation.arrays import BoolArray, ComplexArray
 
 

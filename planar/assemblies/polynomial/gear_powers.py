@@ -20,7 +20,7 @@ import casadi as ca
 import numpy as np
 
 from planar.codegen.generic_evaluation import OPERATIONS, evaluate_function
-from planar.equations.constraint_equations import Block, ConstraintEquations
+from planar.equations.symbolic_equations import Block, ConstraintEquations
 from planar.foundation.arrays import Array
 from planar.model.pairs import MeasureKind
 

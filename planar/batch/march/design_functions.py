@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from planar.equations.constraint_equations import ConstraintEquations
 from planar.equations.functions import EquationFunctions, EquationRates
+from planar.equations.symbolic_equations import ConstraintEquations
 
 Array = np.ndarray
 

@@ -23,12 +23,12 @@ from planar.codegen.instructions import (
 )
 from planar.codegen.invariant_hoisting import InvariantHoister
 from planar.equations.closed_form import ClosedForm, find_closed_form
-from planar.equations.constraint_equations import Block, ConstraintEquations, slice_length
 from planar.equations.coordinates import coordinate_columns, frames_from_coordinates
 from planar.equations.functions import EquationFunctions
 from planar.equations.linear import solve_by_determinants, solve_with_volume
 from planar.equations.rates import UnknownRates, block_jacobian, first_and_second_rates
 from planar.equations.residuals import closing_error, residuals, scalars, split_pair_numbers
+from planar.equations.symbolic_equations import Block, ConstraintEquations, slice_length
 from planar.foundation.geometry import GROUND, Frame, Vector, frame_at
 from planar.model.mechanism import Mechanism, links_counting_turns
 from planar.model.pairs import MeasureKind

@@ -28,9 +28,9 @@ from planar.batch.march.prediction import (
     longest_step,
 )
 from planar.codegen.instructions import UnsupportedOperation
-from planar.equations.constraint_equations import slice_length
 from planar.equations.functions import EquationFunctions
 from planar.equations.mechanism_numbers import equation_structure
+from planar.equations.symbolic_equations import slice_length
 from planar.model.mechanism import Mechanism
 
 Array = np.ndarray

@@ -19,11 +19,11 @@ from planar.codegen.instructions import (
     required_values,
 )
 from planar.equations.closed_form import ClosedForm
-from planar.equations.constraint_equations import Block
 from planar.equations.coordinates import coordinate_columns, frames_from_coordinates
 from planar.equations.linear import solve_by_determinants, solve_with_volume
 from planar.equations.rates import UnknownRates, block_jacobian, first_and_second_rates
 from planar.equations.residuals import closing_error, input_residuals, pair_residuals, scalars, split_pair_numbers
+from planar.equations.symbolic_equations import Block
 from planar.foundation.geometry import GROUND, Frame, frame_at
 from planar.model.pairs import MeasureKind as Measure
 

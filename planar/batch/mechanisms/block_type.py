@@ -8,8 +8,8 @@ from typing import NamedTuple
 import casadi as ca
 
 from planar.equations.closed_form import ClosedForm, find_closed_form
-from planar.equations.constraint_equations import Block, ConstraintEquations, build_equations, slice_length
 from planar.equations.linear import solve_by_determinants
+from planar.equations.symbolic_equations import Block, ConstraintEquations, build_equations, slice_length
 from planar.model.link_shapes import Link
 from planar.model.mechanism import Input, Mechanism
 from planar.model.pairs import MeasureKind as Measure

@@ -12,8 +12,8 @@ from planar.assemblies.circuits.circuits import Circuits, circuits
 from planar.assemblies.modes import Mode, modes
 from planar.codegen.javascript import write_javascript
 from planar.document.dimensions import Dimension, change_dimension
-from planar.equations.constraint_equations import slice_length
 from planar.equations.mechanism_numbers import scale_lengths, shapes_of_links
+from planar.equations.symbolic_equations import slice_length
 from planar.foundation.units import display_unit
 from planar.model.link_graph import link_numbers
 from planar.model.link_shapes import PointPlacementError

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.equations.constraint_equations import Block, slice_length
 from planar.equations.coordinates import frames_from_coordinates
 from planar.equations.functions import EquationFunctions
 from planar.equations.minors import constraint_dependencies
+from planar.equations.symbolic_equations import Block, slice_length
 from planar.foundation.angles import distances, wrap_angle
 from planar.foundation.arrays import Array
 from planar.foundation.geometry import Vector

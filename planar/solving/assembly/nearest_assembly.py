@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.equations.constraint_equations import Block
+from planar.equations.symbolic_equations import Block
 from planar.foundation.arrays import Array
 from planar.solving.assembly.block_assemblies import BlockAssemblies, BlockAssembly, block_dependencies
 

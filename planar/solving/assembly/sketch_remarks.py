@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from planar.equations.constraint_equations import Block
 from planar.equations.coordinates import frames_from_coordinates
+from planar.equations.symbolic_equations import Block
 from planar.foundation.arrays import Array
 from planar.foundation.units import parse_unit
 from planar.model.pairs import MeasureKind

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from planar.equations.constraint_equations import slice_length
+from planar.equations.symbolic_equations import slice_length
 from planar.foundation.arrays import Array
 from planar.foundation.errors import MAX_NAMES_LISTED, NoAnswer, Outcome, TrackingEnd
 from planar.foundation.errors import join_names as several

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.document.dimensions import change_dimension, link_lengths
-from planar.equations.constraint_equations import Block
 from planar.equations.mechanism_numbers import pair_numbers, shapes_of_links
+from planar.equations.symbolic_equations import Block
 from planar.foundation.arrays import Array
 from planar.foundation.units import parse_unit
 from planar.model.link_shapes import PointPlacementError

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.equations.constraint_equations import Block
 from planar.equations.functions import EquationRates
 from planar.equations.linear import solve_vectors
+from planar.equations.symbolic_equations import Block
 from planar.foundation.arrays import Array
 from planar.solving.checks.singular_values import MIN_REGULARITY, ZERO_REGULARITY, null_space, rank
 from planar.solving.newton import correct_blocks

@@ -13,11 +13,11 @@ from scipy.sparse.csgraph import structural_rank
 
 from planar.document import files
 from planar.equations.block_decomposition import decompose_blocks
-from planar.equations.constraint_equations import build_equations, slice_length
 from planar.equations.coordinates import frames_from_coordinates
 from planar.equations.functions import equation_functions
 from planar.equations.mechanism_numbers import equation_structure, pair_numbers
 from planar.equations.mechanism_numbers import shapes_of_links as shapes_of
+from planar.equations.symbolic_equations import build_equations, slice_length
 from planar.model.link_graph import link_pair_graph, unconnected_links
 from planar.model.pairs import MeasureKind
 from tests.linkages import random_linkage
