@@ -97,7 +97,9 @@ class _DesignBlockSolver:
         status = np.zeros((self.design_count, block.steps + 1), dtype=np.int8)
         grid = np.linspace(0.0, 1.0, block.steps + 1)
         same = np.ptp(self.range_length) == 0.0
-        found = self._run_with_backend() if same and not self.has_own_range and self.reference.can_run_backend else None
+        runs = same and not self.has_own_range and self.reference.can_run_backend
+        runs = runs and abs(self.range_length[0]) <= LARGEST_INPUT_POSITION  # farther the general path counts turns
+        found = self._run_with_backend() if runs else None
         out, good = (self._output_array(), np.zeros(self.design_count, dtype=int)) if found is None else found
         ended = (self.solved_steps >= 0) & (good <= block.steps)
         rest = np.flatnonzero((good <= block.steps) & ~ended)
@@ -155,6 +157,7 @@ class _DesignBlockSolver:
         start = find_assemblies(base_, shapes, p, self.u, runner)
         self.failed_block = start.failed_block
         fit = start.is_sure & base_.is_fit(block.designs, shapes, p)
+        fit &= (np.abs(self.u).max(axis=0) <= LARGEST_INPUT_POSITION) & (np.abs(self.start) <= LARGEST_INPUT_POSITION)
         offsets = np.zeros((block.steps + 1, len(self.u)))
         u0 = self.u.copy()
         u0[base_.running_index] = self.start / self.scale

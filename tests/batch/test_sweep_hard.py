@@ -181,3 +181,17 @@ def test_a_sweep_of_mechanisms_says_how_many_lack_rates():
     found = planar.sweep_each(turned, 200)
     assert found[1].reason.startswith("1 row without rates")
     assert any(each.startswith("1 mechanism: rates are missing or have few digits") for each in found.said)
+
+
+@pytest.mark.parametrize("far", [1e5, 1e9])
+@pytest.mark.parametrize("backend", ["native", "numpy"])
+def test_inputs_stand_as_far_as_in_a_file(far, backend):
+    mechanism = bare_four_bar(1.0, 3.0, 3.0, 3.0, 1.0)
+    alone = planar.cycle(mechanism.with_values({"A.position": far}), 8, far, far + 1.0)
+    for swept in (
+        planar.sweep(mechanism, {"A.position": [far]}, 8, "C", stop=far + 1.0, backend=backend),
+        planar.sweep(mechanism, {"coupler.length": [3.0]}, 8, "C", start=far, stop=far + 1.0, backend=backend),
+    ):
+        assert swept.velocity["C"][0] == pytest.approx(alone.point("C").velocity, rel=1e-14 * far)
+        assert swept.whole.all()
+    assert planar.sweep(mechanism, {"A.position": [1.0]}, 8, "C", start=1.0, stop=1.0 + 2e4 * np.pi).whole.all()
