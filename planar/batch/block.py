@@ -46,7 +46,8 @@ class DesignBlock(NamedTuple):
 class SolvedDesigns(NamedTuple):
     """A solved block: out (steps + 1, rows, designs), x and y of every point, then first, then second rates (m, s);
     status (designs, steps + 1); positions of the running input (steps + 1,) or (designs, steps + 1); how many positions
-    the general path solved, how many designs it was given; by outcome how many designs ended so, and a sentence of one.
+    the general path solved, how many designs it was given; by outcome how many designs ended so, and a sentence of one:
+    by that of what is solved, how many lack rates, or digits of them.
     """
 
     out: Array
@@ -61,6 +62,12 @@ def solve_design_block(block: DesignBlock, out: Array | None = None) -> SolvedDe
     """Solve a block, in `out` (steps + 1, rows, designs) if that is given. Raises BadInput only for what holds for all
     designs."""
     return _DesignBlockSolver(block, out).solve()
+
+
+def _count_sentence(said: dict[int, tuple[int, str]], code: int, sentence: str) -> None:
+    """One design more of which this is said by a code; the first one's sentence is kept."""
+    many, first = said.get(code, (0, sentence))
+    said[code] = many + 1, first
 
 
 class _DesignBlockSolver:
@@ -90,7 +97,9 @@ class _DesignBlockSolver:
         status = np.zeros((self.design_count, block.steps + 1), dtype=np.int8)
         grid = np.linspace(0.0, 1.0, block.steps + 1)
         same = np.ptp(self.range_length) == 0.0
-        found = self._run_with_backend() if same and not self.has_own_range and self.reference.can_run_backend else None
+        runs = same and not self.has_own_range and self.reference.can_run_backend
+        runs = runs and abs(self.range_length[0]) <= LARGEST_INPUT_POSITION  # farther the general path counts turns
+        found = self._run_with_backend() if runs else None
         out, good = (self._output_array(), np.zeros(self.design_count, dtype=int)) if found is None else found
         ended = (self.solved_steps >= 0) & (good <= block.steps)
         rest = np.flatnonzero((good <= block.steps) & ~ended)
@@ -127,8 +136,9 @@ class _DesignBlockSolver:
             general += int(np.sum(told.status == 0))
             sent += ends < 0
             if told.message:
-                many, sentence = said.get(told.status[-1], (0, told.message))
-                said[int(told.status[-1])] = many + 1, sentence
+                _count_sentence(said, int(told.status[-1]), told.message)
+            if told.rate_remark:
+                _count_sentence(said, OUTCOMES.index(Outcome.SOLVED), told.rate_remark)
         return SolvedDesigns(out, status, inputs, general, sent, tuple((code, *each) for code, each in said.items()))
 
     def _solve_one_design(self, index: int, grid: Array | None) -> SolvedDesign:
@@ -147,6 +157,7 @@ class _DesignBlockSolver:
         start = find_assemblies(base_, shapes, p, self.u, runner)
         self.failed_block = start.failed_block
         fit = start.is_sure & base_.is_fit(block.designs, shapes, p)
+        fit &= (np.abs(self.u).max(axis=0) <= LARGEST_INPUT_POSITION) & (np.abs(self.start) <= LARGEST_INPUT_POSITION)
         offsets = np.zeros((block.steps + 1, len(self.u)))
         u0 = self.u.copy()
         u0[base_.running_index] = self.start / self.scale

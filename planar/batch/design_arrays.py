@@ -16,7 +16,7 @@ from planar.document.dimensions import (
     link_lengths,
 )
 from planar.foundation.errors import BadInput
-from planar.model.mechanism import LARGEST_INPUT_POSITION, Mechanism
+from planar.model.mechanism import LARGEST_COUNTED_ANGLE, Mechanism
 
 Array = np.ndarray
 
@@ -64,8 +64,8 @@ def _read_values(name: str, given: Any, known: Mapping[str, Dimension], mechanis
         raise BadInput(name, f"one row of numbers is wanted, not an array of {array.ndim} axes; ravel a grid of them")
     if not np.all(np.isfinite(array)):
         raise BadInput(name, "a number here is not finite")
-    if known[name].path[-1] == "position" and np.any(np.abs(array) > LARGEST_INPUT_POSITION):
-        raise BadInput(name, f"an input moves to {LARGEST_INPUT_POSITION:g} rad or m at most")
+    if known[name].path[-1] == "position" and np.any(np.abs(array) > LARGEST_COUNTED_ANGLE):
+        raise BadInput(name, f"an input moves to {LARGEST_COUNTED_ANGLE:g} rad or m at most")
     return array
 
 

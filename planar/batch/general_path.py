@@ -22,12 +22,13 @@ GRID_TOLERANCE = 1e-9
 
 class SolvedDesign(NamedTuple):
     """One design: positions of the running input (rows,), the points (rows, 2 a point and order; m, s), the status of
-    every row, and what there is to say."""
+    every row, what there is to say of its end, and of rates that are missing or of few digits."""
 
     input: Array
     out: Array
     status: Array
     message: str
+    rate_remark: str = ""
 
 
 def solve_design(
@@ -64,7 +65,8 @@ def solve_design(
         many = int(np.argmax(off)) if off.any() else both
     out[:many] = _point_rows(motion, points, rates)[:many]
     status[many:] = OUTCOMES.index(motion.outcome)
-    return SolvedDesign(input_, out, status, motion.reason if many <= steps else "")
+    told = "; ".join(motion.rate_remarks) if rates else ""
+    return SolvedDesign(input_, out, status, motion.reason if many <= steps else "", told)
 
 
 def _point_rows(motion: Motion, points: tuple[str, ...], rates: bool) -> Array:

@@ -17,7 +17,7 @@ from planar.batch.sweep import check_range, sweep
 from planar.document.first_argument import takes_mechanism
 from planar.foundation.errors import BadInput
 from planar.foundation.short_repr import short_repr
-from planar.model.mechanism import Mechanism
+from planar.model.mechanism import LARGEST_INPUT_POSITION, Mechanism
 
 if TYPE_CHECKING:
     from planar.batch.march.llvm_positions import PositionsKernel
@@ -132,7 +132,7 @@ class PreparedSweep:
         u, _, _ = base_.inputs(base_.mechanism, 1)
         inputs = np.repeat(u.T, self.steps + 1, axis=0)
         inputs[:, base_.running_index] = self.input / float(base_.input_scale[base_.running_index])
-        if np.max(np.abs(np.diff(inputs, axis=0))) > LONGEST_STEP:
+        if np.max(np.abs(np.diff(inputs, axis=0))) > LONGEST_STEP or np.max(np.abs(inputs)) > LARGEST_INPUT_POSITION:
             return None
         try:
             self.kernel_equations = kernel_equations(base_.functions, equation_structure(base_.mechanism))

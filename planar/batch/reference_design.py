@@ -160,8 +160,15 @@ class ReferenceDesign:
         return found
 
     def has_short_arm(self, shapes: Mapping[str, LinkShape], many: int) -> Array:
-        """The designs with a link whose arm is so short that rounding may take digits (designs,)."""
+        """The designs with a link whose arm is so short that rounding may take digits (designs,).
+
+        Beside the size of the base, or the farthest point of a link of the design itself where that is greater.
+        """
         found = np.zeros(many, dtype=bool)
+        size = np.full(many, self.unit)
+        for at in shapes.values():
+            for point in at.points.values():
+                size = np.fmax(size, np.hypot(point.x, point.y))
         column, known_from = self.solver.column, self.functions.equations.known_after_block
         known = {link: known_from[column[link, "angle"]] if (link, "angle") in column else -1 for link in shapes}
         for link, at in shapes.items():
@@ -176,7 +183,7 @@ class ReferenceDesign:
             }
             for one, other in combinations([at.points[point] for point in sorted(pinned)], 2):
                 arm = np.hypot(other.x - one.x, other.y - one.y)
-                found |= (arm > 0.0) & (arm < SHORT_ARM * self.unit)
+                found |= (arm > 0.0) & (arm < SHORT_ARM * size)
         return found
 
     def block_assemblies(self) -> tuple[tuple[Array, int], ...]:

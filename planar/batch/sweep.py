@@ -19,7 +19,7 @@ from planar.batch.results import Sweep
 from planar.batch.stores.store import SweepPlan, open_store
 from planar.document.first_argument import takes_mechanism
 from planar.foundation.errors import BadInput
-from planar.model.mechanism import LARGEST_INPUT_POSITION, Mechanism
+from planar.model.mechanism import LARGEST_COUNTED_ANGLE, Mechanism
 from planar.model.run_arguments import check_number, check_steps
 
 MAX_BLOCK_BYTES = 128 * 2**20
@@ -104,8 +104,8 @@ def sweep(  # many: the public signature; # long: its docstring
 def check_range(mechanism: Mechanism, steps: object, start: object, stop: object, pair: str | None) -> Mechanism:
     """The mechanism with inputs that run over a range at their own rates, whatever their laws. Raises BadInput."""
     check_steps(steps)
-    check_number("start", start, LARGEST_INPUT_POSITION)
-    check_number("stop", stop, LARGEST_INPUT_POSITION)
+    check_number("start", start, LARGEST_COUNTED_ANGLE)
+    check_number("stop", stop, LARGEST_COUNTED_ANGLE)
     lawful = [given.pair for given in mechanism.inputs if given.law is not None]
     if lawful and start is None and stop is None and pair is None:
         told = f"the input at {lawful[0]!r} has a law of time, which a sweep does not run; give it a start and a stop"

@@ -145,6 +145,10 @@ def _messages(found: Sequence[Swept]) -> tuple[str, ...]:
     told += [
         f"{count_phrase(len(own), 'mechanism')}: {OUTCOMES[code].value}; {own[0].reason}" for code, own in ended.items()
     ]
+    few = [each for each in found if each.reason and not each.status.any()]
+    if few:
+        phrase = count_phrase(len(few), "mechanism")
+        told.append(f"{phrase}: rates are missing or have few digits; {few[0].reason}")
     return tuple(told)
 
 
@@ -263,4 +267,4 @@ def _solve_with_general_path(mechanism: Mechanism, request: SweepRequest) -> Swe
     out = told.out.reshape(request.steps + 1, 3 if request.rates else 1, len(names), 2)
     parts = [{name: out[:, k, i] for i, name in enumerate(names)} for k in range(out.shape[1])]
     position, velocity, acceleration = parts if request.rates else (parts[0], None, None)
-    return Swept(position, velocity, acceleration, told.input, told.status, told.message, True)
+    return Swept(position, velocity, acceleration, told.input, told.status, told.message or told.rate_remark, True)

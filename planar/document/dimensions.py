@@ -28,7 +28,6 @@ from planar.document.writer import write_input, write_link, write_mechanism
 from planar.foundation.errors import BadInput, join_names
 from planar.model.input_laws import SEGMENT_TYPES
 from planar.model.mechanism import (
-    LARGEST_INPUT_POSITION,
     FileUnits,
     Mechanism,
     find_law_problem,
@@ -189,11 +188,6 @@ def _check_as_file(changed: Mechanism, chosen: Mapping[str, Dimension]) -> None:
     try:
         if wrong:
             raise BadInput(*wrong)
-        for name, each in chosen.items():
-            far = each.path[0] == "inputs" and each.path[-1] == "position"
-            value = _value_at(changed, each.address)
-            if far and abs(value) > LARGEST_INPUT_POSITION:
-                raise BadInput(name, f"an input moves to {LARGEST_INPUT_POSITION:g} rad or m at most")
         read_mechanism(write_mechanism(changed))
     except BadInput as problem:
         at = [name for name, each in chosen.items() if problem.place == _json_place(each.path)]

@@ -33,12 +33,14 @@ class ClosedForm(NamedTuple):
     `found`: for each unknown the cos and sin of an angle, or a length alone, given those of earlier blocks; `sign`: +1
     or -1, which of the two assemblies; `side`: an expression in all unknowns that has this sign; `bend`: 0 to 1, where
     both assemblies meet, beyond it there is none: the squared cosine of the angle between what holds the block.
+    `squared_arm`: of the arm on which a length turns, where that changes as the mechanism moves; else None.
     """
 
     values: tuple[tuple[ca.SX, ...], ...]
     sign: ca.SX
     sign_expression: ca.SX
     coalescence: ca.SX
+    squared_arm: ca.SX | None = None
 
 
 class _ComplexNumber(NamedTuple):
@@ -151,7 +153,8 @@ def _solve_angle_and_length(e: ConstraintEquations, stage: Block, unknowns: list
         unit = (-(g + way.scale(length))).multiply(a.conjugate).scale(1.0 / a.squared_length)
     else:
         unit = (-g).multiply((a + d.scale(length)).conjugate).scale(1.0 / g.squared_length)
-    return ClosedForm((tuple(unit), (length,)), sign, side, gap * gap / spanned)
+    squared_arm = None if way is fixed else g.squared_length
+    return ClosedForm((tuple(unit), (length,)), sign, side, gap * gap / spanned, squared_arm)
 
 
 def _cos_sin_coefficients(rows: ca.SX, angle: ca.SX) -> tuple[ca.SX, ca.SX]:

@@ -73,10 +73,10 @@ LARGEST_NUMBER = 10**100
 SMALLEST_NUMBER = 1e-100
 """SI; a number that is not 0 is no smaller, or its square is none."""
 LARGEST_INPUT_POSITION = 1e4
-"""rad or m: to where a sweep, a law or a number changed by name leads an input, and how far out `pinned` takes pins.
+"""rad or m: to where a law leads an input and the backends of a sweep follow it, and how far out `pinned` takes pins.
 
-Sweeps and laws follow the input sample by sample all the way, so that work and rounding grow with it. An angle that
-only stands somewhere, or that runs at a steady pace (`solve`, `cycle`), counts whole turns: see
+These follow the input sample by sample all the way, so that work and rounding grow with it. An angle that only stands
+somewhere, or that runs at a steady pace (`solve`, `cycle`, the general path of a sweep), counts whole turns: see
 `LARGEST_COUNTED_ANGLE`."""
 LARGEST_COUNTED_ANGLE = 1e12
 """rad: how far an angle may count; beyond it rounding leaves less than three digits of where it points."""

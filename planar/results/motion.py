@@ -158,7 +158,8 @@ class Motion(KinematicResult):
 
     `outcome` is solved where the run came to its end, else why it stopped, which `reason` says in a sentence;
     `residual` is what the worst constraint leaves open at any position, in lengths of the mechanism's size. `time` (s)
-    is there where the inputs run by laws of time, `jerked` where third rates were asked for.
+    is there where the inputs run by laws of time, `jerked` where third rates were asked for. `rate_remarks` are those
+    of the remarks that say which rows have no rates, or rates of few digits.
     """
 
     mechanism: Mechanism
@@ -174,6 +175,7 @@ class Motion(KinematicResult):
     time: Array | None = None
     jerked: ThirdRates | None = None
     course: FollowedPath | None = None
+    rate_remarks: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         ends = [

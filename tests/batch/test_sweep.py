@@ -291,7 +291,7 @@ WRONG = [
     ({"BC.length": ["long"]}, {}, "numbers .* are wanted"),
     ({"BC.length": []}, {}, "there is no design"),
     ({}, {}, "name what the designs differ in"),
-    ({"A.position": [1e9]}, {}, "at most"),
+    ({"A.position": [1e13]}, {}, "at most"),
     ({"BC.length": 0.9}, {"points": ["c"]}, "did you mean 'C'"),
     ({"BC.length": 0.9}, {"points": "none such"}, "points are"),
     ({"BC.length": 0.9}, {"steps": 0}, "whole number of steps"),

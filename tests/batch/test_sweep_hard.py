@@ -6,9 +6,10 @@ import pytest
 
 import planar
 from planar.batch.design_arrays import values_of_design, with_design_values
+from planar.batch.reference_design import reference_design
 from planar.document.dimensions import link_lengths
 from planar.foundation.errors import BadInput, Outcome
-from tests.builders import bar_linkage, four_bar_document
+from tests.builders import bar_linkage, bare_four_bar, four_bar_document
 from tests.draws import part
 from tests.linkages import random_linkage
 
@@ -118,3 +119,79 @@ def test_what_is_known_of_one_run_is_not_another_runs():
     ready({"AB.length": 0.31})
     np.testing.assert_array_equal(found.position["C"], first)
     np.testing.assert_array_equal(ready().position["C"], first)
+
+
+def crank_and_slotted_arm(crank):
+    """A block at the end of a crank slides on an arm that turns about Q, one metre from the crank's pivot."""
+    return planar.from_dict(
+        {
+            "planar": 1,
+            "frame": "f",
+            "links": {
+                "f": {"points": {"O": [0, 0], "Q": [1, 0]}},
+                "crank": {"ends": ["O", "A"], "length": crank},
+                "arm": {"points": {"Q": [0, 0], "E": [1.5, 0.5]}},
+                "block": {"points": {"A": [0, 0]}},
+            },
+            "pairs": [
+                {"turning": "O", "links": ["f", "crank"]},
+                {"turning": "Q", "links": ["f", "arm"]},
+                {"turning": "A", "links": ["crank", "block"]},
+                {"sliding": "s", "links": ["arm", "block"], "line": {"through": "Q", "angle": 0}, "point": "A"},
+            ],
+            "inputs": [{"pair": "O", "position": -0.5, "velocity": 1.0}],
+            "sketch": {"A": [0.7, -0.4], "E": [1, 1]},
+        }
+    )
+
+
+@pytest.mark.parametrize("backend", ["native", "numpy"])
+@pytest.mark.parametrize("left", [1e-3, 1e-6, 1e-12])
+def test_a_block_that_comes_to_the_pole_of_its_arm_has_the_rates_of_a_cycle(left, backend):
+    alone = planar.cycle(crank_and_slotted_arm(1.0 - left), 200, -1.0, 1.0).point("E").velocity
+    designs = {"crank.length": np.array([0.8, 1.0 - left])}
+    swept = planar.sweep(crank_and_slotted_arm(0.8), designs, 200, "E", start=-1.0, stop=1.0, backend=backend)
+    assert swept.velocity["E"][1] == pytest.approx(alone, rel=1e-6, nan_ok=True)
+    assert np.isnan(alone[100]).all() == (left < 1e-4)
+    told = "1 of 2 designs: rates are missing or have few digits (the first: 1 row without rates"
+    assert any(each.startswith(told) for each in swept.said) == (left < 1e-4)
+
+
+def test_a_design_much_larger_than_the_base_is_judged_by_its_own_size():
+    large = dict.fromkeys(("crank.length", "rocker.length"), np.array([1e6, 1e6]))
+    base = bare_four_bar(1.0, 0.5, 1.0, 1.0, 1.0)
+    reference = reference_design(base, None)
+    shapes = reference.shapes(with_design_values(base, large))
+    assert reference.has_short_arm(shapes, 2).all()
+
+
+@pytest.mark.parametrize(("coupler", "told"), [(1e-3, ""), (1e-9, "have few digits"), (1e-12, "too inexact")])
+def test_a_sweep_says_how_many_designs_have_few_digits(coupler, told):
+    ends = {"start": np.pi / 3.0 - coupler / 10.0, "stop": np.pi / 3.0 + coupler / 10.0}
+    designs = {"coupler.length": np.array([0.5, coupler, coupler])}
+    swept = planar.sweep(bare_four_bar(1.0, 0.5, 1.0, 1.0, np.pi / 3.0), designs, 4, **ends)
+    found = [each for each in swept.said if each.startswith("2 of 3 designs: ")]
+    assert [told in each for each in found] == ([True] if told else [])
+    assert swept.whole.tolist() == [True, *[told != "too inexact"] * 2]
+    assert np.isnan(swept.position["C"][1:]).all() == (told == "too inexact")
+
+
+def test_a_sweep_of_mechanisms_says_how_many_lack_rates():
+    turned = [crank_and_slotted_arm(each).with_values({"O.position": -np.pi}) for each in (0.8, 1.0 - 1e-6)]
+    found = planar.sweep_each(turned, 200)
+    assert found[1].reason.startswith("1 row without rates")
+    assert any(each.startswith("1 mechanism: rates are missing or have few digits") for each in found.said)
+
+
+@pytest.mark.parametrize("far", [1e5, 1e9])
+@pytest.mark.parametrize("backend", ["native", "numpy"])
+def test_inputs_stand_as_far_as_in_a_file(far, backend):
+    mechanism = bare_four_bar(1.0, 3.0, 3.0, 3.0, 1.0)
+    alone = planar.cycle(mechanism.with_values({"A.position": far}), 8, far, far + 1.0)
+    for swept in (
+        planar.sweep(mechanism, {"A.position": [far]}, 8, "C", stop=far + 1.0, backend=backend),
+        planar.sweep(mechanism, {"coupler.length": [3.0]}, 8, "C", start=far, stop=far + 1.0, backend=backend),
+    ):
+        assert swept.velocity["C"][0] == pytest.approx(alone.point("C").velocity, rel=1e-14 * far)
+        assert swept.whole.all()
+    assert planar.sweep(mechanism, {"A.position": [1.0]}, 8, "C", start=1.0, stop=1.0 + 2e4 * np.pi).whole.all()

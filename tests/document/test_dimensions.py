@@ -126,7 +126,7 @@ def test_a_pin_of_many_links_has_one_radius():
         ({"BC.length": None}, "BC.length: a number is wanted here"),
         ({"BC.length": float("nan")}, "BC.length: a finite number is wanted"),
         ({"BC.length": 5.0}, "BC.length: the triangle B-C-F does not close"),
-        ({"A.position": 1e6}, "A.position: an input moves to"),
+        ({"A.position": 1e13}, "A.position: beyond 1e+12 rad rounding leaves less than three digits"),
         ([("BC.length", 1.0)], "values: give the numbers by name"),
         ({3: 1.0}, "3: the mechanism has no number of that name"),
     ],
@@ -135,6 +135,18 @@ def test_what_a_file_would_be_refused_for_is_refused(values, told):
     with pytest.raises(BadInput) as problem:
         planar.load("four-bar").with_values(values)
     assert str(problem.value).startswith(told)
+
+
+def test_an_input_stands_as_far_as_in_a_file():
+    mechanism, far = planar.load("four-bar"), 1.0 + 2e5 * np.pi
+    by_name = mechanism.with_values({"A.position": far})
+    value = to_dict(mechanism)
+    value["inputs"][0]["position"] = f"{far!r} rad"
+    assert by_name.inputs[0].position == planar.from_dict(value).inputs[0].position
+    here, there = (
+        planar.solve(each).point("C").velocity for each in (mechanism.with_values({"A.position": 1.0}), by_name)
+    )
+    assert there == pytest.approx(here, rel=1e-8)
 
 
 def test_teeth_are_whole():

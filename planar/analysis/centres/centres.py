@@ -194,7 +194,7 @@ class _CentreSearch:
             a, b = two
             relative = moved.links[b] - moved.links[a]
             length = float(np.linalg.norm(relative))
-            if length <= AS_ONE_RATIO:
+            if length <= self.motions.as_one_ratio:
                 self.as_one.add(two)
                 continue
             nearly = self.construction.count_lines(two) > 1

@@ -12,16 +12,18 @@ from planar.analysis.centres.kennedy import LinkPair
 from planar.analysis.rate_equations import derivative
 from planar.analysis.rate_ratios import choose_motion
 from planar.foundation.arrays import Array
+from planar.model.wording import REST_TOLERANCE
 from planar.results.motion import State
 from planar.solving.checks.singular_values import null_space
 from planar.solving.full_constraints import FullConstraints
 from planar.solving.position import PositionSolver
 from planar.solving.prepared_mechanism import PreparedMechanism
+from planar.solving.rates.regularity import jacobian_at, regularity
 
 AS_ONE_RATIO = 1e-7
-"""Links that move this little against each other, beside the greatest motion, move as one.
+"""Links that move this little against each other, beside the greatest motion, move as one on a dead point.
 
-On a dead point a position is exact to the root of rounding only.
+There a position is exact to the root of rounding only; elsewhere see `AllowedMotions.as_one_ratio`.
 """
 
 
@@ -42,11 +44,12 @@ class AllowedMotions(NamedTuple):
     """The motions of a position: of every link w times its pole (x, y, 1), in sizes about the middle, (ways, 3).
 
     One where the inputs tell it, else all that are independent; none where nothing can move. The greatest is of length
-    one.
+    one. `as_one_ratio`: links that move so little against each other, beside the greatest, move as one.
     """
 
     poles: Mapping[str, Array]
     mobility: int
+    as_one_ratio: float
 
 
 class FullPosition(NamedTuple):
@@ -108,7 +111,14 @@ def allowed_motions(state: State, middle: Array, size: float) -> AllowedMotions:
         free = choice.motion[:, None] if np.any(choice.motion) else np.zeros((here.w.size, 0))
     found, count = poles_of_motions(state, here, free, middle, size), free.shape[1]
     most = np.max([np.linalg.norm(pole, axis=1) for pole in found.values()], axis=0) if count else np.ones(0)
-    return AllowedMotions({link: pole / most[:, None] for link, pole in found.items()}, count)
+    return AllowedMotions({link: pole / most[:, None] for link, pole in found.items()}, count, _as_one_ratio(here))
+
+
+def _as_one_ratio(here: FullPosition) -> float:
+    """What rounding leaves of no motion at a position: the more, the nearer to a dead point or a change point it is."""
+    setup = here.prepared
+    strength = regularity(setup, jacobian_at(setup, here.w[list(setup.equations.unknowns)], setup.inputs.u))
+    return min(AS_ONE_RATIO, REST_TOLERANCE / max(float(strength.min(initial=1.0)), REST_TOLERANCE))
 
 
 def prove_centres(found: Mapping[LinkPair, Array], links: Sequence[str], motions: AllowedMotions) -> CentresProof:
@@ -133,7 +143,7 @@ def prove_centres(found: Mapping[LinkPair, Array], links: Sequence[str], motions
     centres = np.array(list(found.values()))[:, None]
     relative = np.array([motions.poles[b] - motions.poles[a] for a, b in map(tuple, found)])
     lengths = np.linalg.norm(relative, axis=2)
-    moving = lengths > AS_ONE_RATIO
+    moving = lengths > motions.as_one_ratio
     apart = np.linalg.norm(np.cross(centres, relative), axis=2)
     x, y, w = np.moveaxis(centres, 2, 0)
     mx, my, turning = np.moveaxis(relative, 2, 0)
@@ -148,7 +158,7 @@ def links_moving_as_one(links: Sequence[str], motions: AllowedMotions) -> tuple[
     for link in links:
         for group in groups:
             apart = motions.poles[link] - motions.poles[group[0]]
-            if np.linalg.norm(apart, axis=1).max(initial=0.0) <= AS_ONE_RATIO:
+            if np.linalg.norm(apart, axis=1).max(initial=0.0) <= motions.as_one_ratio:
                 group.append(link)
                 break
         else:

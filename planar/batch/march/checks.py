@@ -48,7 +48,7 @@ def is_regular(functions: DesignFunctions, positions: DesignPositions) -> Array:
             arm = np.minimum(np.linalg.norm(own, axis=1).min(axis=1), 1.0)
             # short arms lose digits too, see `SHORT_ARM`
             least = np.maximum(LEAST_START_REGULARITY, np.sqrt(EPS / NEGLIGIBLE_ERROR / np.maximum(arm, 1e-300)))
-            regular &= column_volume(own) > least_regularity(least, own.shape[1])
+            regular &= (column_volume(own) > least_regularity(least, own.shape[1])) & (arm > LEAST_START_REGULARITY)
     return regular
 
 

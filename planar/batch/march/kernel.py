@@ -14,6 +14,7 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
+from planar.batch.march.regularity import LEAST_START_REGULARITY
 from planar.codegen.instructions import (
     CosSin,
     InstructionList,
@@ -203,9 +204,16 @@ class KernelInstructions:
         ]
 
     def closed_form_outputs(self, part: KernelBlock) -> list[ca.SX]:
-        """The unknowns of a block in closed form, then how near its two assemblies are to where they meet."""
-        assert part.closed_form is not None
-        return [*(value for values in part.closed_form.values for value in values), part.closed_form.coalescence]
+        """The unknowns of a block in closed form, then how near its two assemblies are to where they meet.
+
+        An arm that shrinks to `LEAST_START_REGULARITY` counts as that too: what turns on it is not determined.
+        """
+        form = part.closed_form
+        assert form is not None
+        near = form.coalescence
+        if form.squared_arm is not None:
+            near = near + LEAST_START_REGULARITY**2 * (1.0 / form.squared_arm)  # the form divides by it too
+        return [*(value for values in form.values for value in values), near]
 
     def point_coordinates(self, points: Sequence[int]) -> ca.SX:
         """x and y of some of the points."""

@@ -44,8 +44,8 @@ class Swept(NamedTuple):
 
     `position`, `velocity` and `acceleration` map names of points to arrays (steps + 1, 2); the two latter are None
     where no rates were asked for. NaN where a position is refused. `status` (steps + 1,): 0 is solved, any other
-    number k is `outcomes[k]` of the whole; `reason` says why, `input` (steps + 1,) where the running input is, and
-    `general` whether the general path solved it.
+    number k is `outcomes[k]` of the whole; `reason` says why, or what the rates lack, `input` (steps + 1,) where the
+    running input is, and `general` whether the general path solved it.
     """
 
     position: Mapping[str, Array]

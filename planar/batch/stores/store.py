@@ -101,7 +101,7 @@ class BlockStore(ABC):
             told = f"{sent} of {many} designs went to the general path, which solved {self.general_positions} positions"
             found.append(told)
         found += [
-            f"{count} of {many} designs: {outcomes[code].value} (the first: {sentence})"
+            f"{count} of {many} designs: {_describe_ending(outcomes[code])} (the first: {sentence})"
             for code, (count, sentence) in sorted(ended.items())
         ]
         if self.damaged:
@@ -130,6 +130,10 @@ class BlockStore(ABC):
             self.general_positions,
             self.messages(),
         )
+
+
+def _describe_ending(outcome: Outcome) -> str:
+    return "rates are missing or have few digits" if outcome is Outcome.SOLVED else outcome.value
 
 
 def open_store(store: str | Path | None, plan: SweepPlan) -> BlockStore:

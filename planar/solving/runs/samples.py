@@ -163,6 +163,7 @@ def build_motion(
         time=time,
         jerked=ThirdRates(*lazy_frames(solver, parts)) if with_jerk else None,
         course=course,
+        rate_remarks=remarks,
     )
 
 
