@@ -16,7 +16,7 @@ import casadi as ca
 import numpy as np
 
 from planar.dynamics.lagrangian import LagrangianFunctions
-from planar.dynamics.load_variation import load_factors
+from planar.dynamics.load_variation import CoursePiece, course_piece, load_factors
 from planar.equations.casadi_call import BufferedFunction
 from planar.foundation.arrays import Array
 from planar.foundation.errors import NoAnswer, Outcome
@@ -27,6 +27,8 @@ RANK_TOLERANCE = 1e-9
 """A singular value below this part of the greatest is none."""
 MASSLESS_TOLERANCE = 1e-12
 """Of the greatest inertia: a motion with less has none that could be accelerated."""
+FULL_RANK_REGULARITY = 1e-2
+"""Constraints whose weakest is above this beside the strongest are solved with the masses at once."""
 CLOSED_TOLERANCE, MAX_NEWTON_STEPS = 1e-14, 8
 """Sizes: what stays open of the constraints, and Newton's steps to there."""
 
@@ -83,7 +85,56 @@ class EquationsOfMotion:
         given = [q, q1, work.factors, work.spring_turns]
         self._called = BufferedFunction(ca.Function("accelerations", given, [ca.densify(each) for each in outputs]))
         self._closing = BufferedFunction(ca.Function("closing", [q], [ca.densify(rows), ca.densify(slope)]))
+        positions = work.input_positions
+        rates = ca.densify(ca.jtimes(positions, q, q1))
+        self._inputs = BufferedFunction(ca.Function("inputs", [q, q1], [ca.densify(positions), rates]))
+        names = [given.pair for given in work.mechanism.inputs]
+        varying = [(k, load.varies) for k, load in enumerate(work.mechanism.loads) if load.varies is not None]
+        self.varying = [(k, each, None if each.input is None else names.index(each.input)) for k, each in varying]
+        self.pieces: tuple[CoursePiece, ...] | None = None
+        "the pieces of the courses of varying loads on which these are held, so that nothing has kinks"
         self.rank: int | None = None
+
+    def course_places(self, time: float, q: Array, q1: Array) -> list[tuple[float, float]]:
+        """Where on its course each varying load is, and how fast it goes there."""
+        if not self.varying:
+            return []
+        at, rate = (each[0] for each in self._inputs(q, q1))
+        return [(time, 1.0) if k is None else (float(at[k]), float(rate[k])) for _, _, k in self.varying]
+
+    def course_pieces(self, places: Sequence[tuple[float, float]]) -> tuple[CoursePiece, ...]:
+        """The pieces of the courses at places, where two meet the one towards which it goes."""
+        turns = [
+            k is not None
+            and self.work.relative_motions[self.work.mechanism.inputs[k].pair].input_quantity_kinds()[0] == "angle"
+            for _, _, k in self.varying
+        ]
+        return tuple(
+            course_piece(course, at, -1.0 if rate < 0.0 else 1.0, turning)
+            for (_, course, _), (at, rate), turning in zip(self.varying, places, turns, strict=True)
+        )
+
+    def regular_accelerations(self, time: float, q: Array, q1: Array) -> AccelerationResult:
+        """As `accelerations_at`, in one solution where every constraint is needed and holds firmly."""
+        if self.rank is None or self.rank != self.work.residuals.numel() + len(self.driven.index):
+            return self.accelerations_at(time, q, q1)
+        _, slope, bend, inertia, force, rest, *_ = self._evaluate(time, q, q1)
+        given = self.driven.motion_at(time) if self.driven.index else None
+        wanted, held, many, index = -bend[0], slope.T * self.scale, len(q), len(self.driven.index)
+        if given is not None:
+            wanted[-index:] += given[2]
+        mass = inertia.T * self.scale * self.scale[:, None]
+        size = float(np.abs(mass).max()) or 1.0
+        whole = np.zeros((many + self.rank, many + self.rank))
+        whole[:many, :many], whole[many:, :many], whole[:many, many:] = mass / size, held, held.T
+        try:
+            found = np.linalg.solve(whole, np.concatenate([(force[0] + rest[0]) * self.scale / size, wanted]))
+        except np.linalg.LinAlgError:
+            return self.accelerations_at(time, q, q1)
+        power = float(force[0] @ q1)
+        if given is not None:
+            power -= size * float(found[-index:] @ given[1])
+        return AccelerationResult(found[:many] * self.scale, power, 1.0)
 
     def accelerations_at(self, time: float, q: Array, q1: Array) -> AccelerationResult:
         """The accelerations at a time, and the power that comes in."""
@@ -144,10 +195,17 @@ class EquationsOfMotion:
 
     def _evaluate(self, time: float, q: Array, q1: Array) -> list[Array]:
         by = np.ones(len(self.work.mechanism.loads))
-        if any(load.varies is not None for load in self.work.mechanism.loads):
-            drives = self._called(q, q1, by, self.spring_turns)[6][0]
+        places = self.course_places(time, q, q1)
+        if self.pieces is not None:
+            for (k, _, _), piece, (at, _) in zip(self.varying, self.pieces, places, strict=True):
+                by[k] = piece.factor_at(at)
+        elif self.varying:
             named = [given.pair for given in self.work.mechanism.inputs]
-            inputs = {name: np.array([at]) for name, at in zip(named, drives, strict=True)}
+            inputs = {
+                named[k]: np.array([at])
+                for (_, _, k), (at, _) in zip(self.varying, places, strict=True)
+                if k is not None
+            }
             by = load_factors(self.work.mechanism, inputs, np.array([time]), 1)[0]
         return self._called(q, q1, by, self.spring_turns)
 

@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 
 from planar.document.first_argument import takes_mechanism
-from planar.dynamics.equations_of_motion import EquationsOfMotion
+from planar.dynamics.equations_of_motion import FULL_RANK_REGULARITY, EquationsOfMotion
 from planar.dynamics.external_actions import KinematicArrays
 from planar.dynamics.imbalance import explain_loose_links
 from planar.dynamics.lagrangian import lagrangian_functions
 from planar.dynamics.load_validation import check_loads
+from planar.dynamics.load_variation import first_kink
 from planar.equations.mechanism_numbers import mechanism_size
 from planar.foundation.arrays import Array
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
@@ -141,10 +142,13 @@ class _SimulationRun:
         self.coordinate_count = len(q)
         q, q1 = self.equations.project(0.0, q, q1)
         self.initial_state = np.concatenate([q, q1, [0.0]])
+        self.is_firm = False
+        "whether constraints are far from a change point"
         self.time = np.linspace(0.0, duration, steps + 1)
 
     def run(self, tick: ProgressCallback | None) -> Simulation:
         rows, outcome, reason = self._integrate(tick)
+        self.equations.pieces = None
         time = self.time[: len(rows)]
         q, q1 = rows[:, : self.coordinate_count], rows[:, self.coordinate_count : 2 * self.coordinate_count]
         q2 = np.array([self._accelerations(*each) for each in zip(time, q, q1, strict=True)])
@@ -195,33 +199,70 @@ class _SimulationRun:
     def _add_rows(self, rows: list[Array], tick: ProgressCallback | None) -> str:
         """Add the rows after the first, as far as they can be told; why not all of them."""
         last = float(self.time[-1])
+        self._hold_pieces(0.0, self.initial_state)
         solver, tiny = self._integrator(0.0, self.initial_state), 0
         good: list[tuple[float, Array]] = []
         while solver.status == "running":
-            failed = False
+            before, failed = (solver.t, solver.y), False
             try:
                 solver.step()
             except FloatingPointError:
                 failed = True
             firm = self.equations.accelerations_at(solver.t, *self._split_state(solver.y)).regularity
+            self.is_firm = firm > FULL_RANK_REGULARITY
             y = self._project(solver.t, solver.y)
             failed = failed or self._relative_change(solver.y, y) > PROJECTION_TOLERANCE
-            tiny = tiny + 1 if (solver.step_size or 0.0) < SHORTEST_STEP_RATIO * last else 0
+            length = solver.step_size or 0.0
+            kink = None if failed or solver.status == "failed" else self._first_kink(solver, before)
+            done = length if kink is None else kink[0] - before[0]
+            tiny = tiny + 1 if done < SHORTEST_STEP_RATIO * last else 0
             if failed or solver.status == "failed" or tiny > MAX_SHORT_STEPS:
                 over = self._extrapolate_beyond(good, solver.t) if firm < CHANGE_POINT_REGULARITY else None
                 if over is None:
                     return _end_sentence(solver.t, self._explain_failure(solver.t, solver.y))
                 at, inner = over
                 self._add_rows_until(rows, at, inner)
-                solver, good, tiny = self._integrator(at, self._project(at, inner(at))), [], 0
+                y = self._project(at, inner(at))
+                self._hold_pieces(at, y)
+                solver, good, tiny = self._integrator(at, y), [], 0
                 continue
-            self._add_rows_until(rows, solver.t, solver.dense_output())
-            solver.y, solver.f = y, self._state_rate(solver.t, y)
+            at = solver.t if kink is None else kink[0]
+            if len(rows) < len(self.time) and self.time[len(rows)] <= at:
+                self._add_rows_until(rows, at, solver.dense_output())
+            if kink is not None:
+                y = self._project(*kink)
+                self._hold_pieces(at, y, solver.y if at == before[0] else None)
+                solver = self._integrator(at, y, length)
+            else:
+                solver.y, solver.f = y, self._state_rate(solver.t, y)
             if firm > CHANGE_POINT_REGULARITY:
-                good = [*good[-REMEMBERED_STEPS:], (solver.t, y)]
+                good = [*good[-REMEMBERED_STEPS:], (at, y)]
             if tick is not None:
-                tick(solver.t / last)
+                tick(at / last)
         return ""
+
+    def _hold_pieces(self, time: float, y: Array, ahead: Array | None = None) -> None:
+        """Hold loads that vary on the pieces of their courses on which they are, going on towards a state ahead."""
+        places = self.equations.course_places(time, *self._split_state(y))
+        if ahead is not None:
+            then = self.equations.course_places(time, *self._split_state(ahead))
+            places = [(at, beyond - at) for (at, _), (beyond, _) in zip(places, then, strict=True)]
+        self.equations.pieces = self.equations.course_pieces(places)
+
+    def _first_kink(self, solver: Any, before: tuple[float, Array]) -> tuple[float, Array] | None:
+        """Where in the last step a load first left the piece of its course, so that the next one holds from there."""
+        if not self.equations.pieces:
+            return None
+        course_places = self.equations.course_places
+        ends = [course_places(time, *self._split_state(y)) for time, y in (before, (solver.t, solver.y))]
+        inner: list[Any] = []
+
+        def places(time: float) -> list[tuple[float, float]]:
+            inner[:] = inner or [solver.dense_output()]
+            return course_places(time, *self._split_state(inner[0](time)))
+
+        found = first_kink(self.equations.pieces, (before[0], solver.t), (ends[0], ends[1]), places)
+        return None if found is None else (found, before[1] if found == before[0] else np.asarray(inner[0](found)))
 
     def _add_rows_until(self, rows: list[Array], end: float, interpolant: Callable[..., Array]) -> None:
         """Add the rows up to a time, on the constraints; with rates as they come where constraints would bend them."""
@@ -240,7 +281,7 @@ class _SimulationRun:
         )
         return float(np.abs((back - y)[:-1] / scale).max(initial=0.0))
 
-    def _integrator(self, time: float, y: Array) -> Any:
+    def _integrator(self, time: float, y: Array, step: float | None = None) -> Any:
         from scipy.integrate import DOP853  # slow to load, and only needed here
 
         last, n = float(self.time[-1]), self.coordinate_count
@@ -250,7 +291,9 @@ class _SimulationRun:
         scales[-1] = max(
             float(np.abs(self.equations.energies(0.0, *self._split_state(self.initial_state))).max()), 1e-9
         )
-        return DOP853(self._state_rate, time, y, last, rtol=RELATIVE_TOLERANCE, atol=RELATIVE_TOLERANCE * scales)
+        first = None if step is None or time >= last else min(step, last - time)
+        tolerances = {"rtol": RELATIVE_TOLERANCE, "atol": RELATIVE_TOLERANCE * scales}
+        return DOP853(self._state_rate, time, y, last, first_step=first, **tolerances)
 
     def _explain_failure(self, time: float, y: Array) -> str:
         loose = explain_loose_links(self.mechanism)
@@ -302,7 +345,8 @@ class _SimulationRun:
 
     def _state_rate(self, time: float, y: Array) -> Array:
         q, q1 = self._split_state(y)
-        found = self.equations.accelerations_at(time, q, q1)
+        way = self.equations.regular_accelerations if self.is_firm else self.equations.accelerations_at
+        found = way(time, q, q1)
         if not np.all(np.isfinite(found.q2)):
             raise FloatingPointError  # with no number the integrator would never end
         return np.concatenate([q1, found.q2, [found.power]])

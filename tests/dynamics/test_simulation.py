@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
 import planar
+from planar.dynamics.equations_of_motion import EquationsOfMotion
 from planar.dynamics.simulation import Simulation
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from tests.builders import bracket_document, dynamic_four_bar_document, lever_document, masses, piston_document
@@ -492,3 +493,42 @@ def test_a_door_with_a_closer_is_critically_damped():
 def test_a_door_with_a_closer_stands_in_a_wind_where_its_spring_balances_it():
     door = planar.load("door-closer").with_values({"H.velocity": 0.0, "H.position": 0.5})
     assert planar.forces(planar.solve(door)).inputs["H"] == pytest.approx(12.0 * 0.5, rel=1e-12)
+
+
+# loads by a table
+
+
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_between_the_kinks_of_a_load_that_varies_steps_are_as_long_as_of_a_smooth_one(monkeypatch, sense):
+    """m v^2 / 2 is the area under the table, and no step is tried again and again across a kink."""
+    at, factors = [0.3 + 0.1 * sense * k for k in range(21)], [1.0 + k % 2 for k in range(21)]
+    by = [list(each) for each in zip(*sorted(zip(at, factors, strict=True)), strict=True)]
+    load = {"pair": "way", "force": sense * 100.0, "varies": {"with": "way", "at": by[0], "factors": by[1]}}
+    calls = []
+    original = EquationsOfMotion._evaluate
+    monkeypatch.setattr(EquationsOfMotion, "_evaluate", lambda *given: calls.append(1) or original(*given))
+    found = run(slide(loads=[load]), 0.2, 40)
+    gone = np.abs(found.motion.inputs["way"].position - 0.3)
+    fine = np.sort(np.concatenate([np.linspace(0.0, 2.0, 20001), gone]))
+    area = np.concatenate([[0.0], np.cumsum(np.diff(fine) * 50.0 * (interp(fine[1:]) + interp(fine[:-1])))])
+    wanted = np.sqrt(area[np.searchsorted(fine, gone)])
+    assert gone[-1] > 1.0
+    np.testing.assert_allclose(np.abs(found.motion.inputs["way"].velocity), wanted, rtol=1e-9, atol=1e-9)
+    assert found.balance < 1e-11
+    assert len(calls) < 1500
+
+
+def interp(gone: np.ndarray) -> np.ndarray:
+    """The factor of the table: 1 and 2 in turn, every 0.1 m."""
+    return np.interp(gone, 0.1 * np.arange(21), [1.0 + k % 2 for k in range(21)])
+
+
+def test_a_load_that_turns_round_beyond_a_kink_within_a_step():
+    """A block thrown against a wall of stiffness k at s = 1 comes back as fast as it came, after pi sqrt(m / k)."""
+    wall = {"with": "way", "at": [0.0, 1.0, 2.0], "factors": [0.0, 0.0, -1.0]}
+    value = slide(loads=[{"pair": "way", "force": 800.0, "varies": wall}])
+    value["inputs"] = [{"pair": "way", "position": 0.3, "velocity": 0.7}]
+    after = 2.0 + pi * sqrt(2.0 / 800.0)
+    found = run(value, after, 8, moving=True)
+    assert found.motion.inputs["way"].position[-1] == pytest.approx(0.3, abs=1e-10)
+    assert found.motion.inputs["way"].velocity[-1] == pytest.approx(-0.7, abs=1e-10)
