@@ -550,6 +550,17 @@ def test_every_control_has_a_name(shown):
 # diagrams
 
 
+def test_what_rounding_leaves_of_a_rate_is_told_as_none_below_a_diagram(shown):
+    """The piston of a slider-crank moves along x alone."""
+    window = shown(MODELS["two-stroke-engine"])
+    window.wait_for_function("() => page.course !== null")
+    window.evaluate("for (const each of document.querySelectorAll('[name^=diagram]')) if (!each.checked) each.click();")
+    settled(window)
+    for what, unit in (("velocity", "m/s"), ("acceleration", "m/s²")):
+        figure = window.locator(f"figure[aria-label^='{what} along y']")
+        assert f"B 0 {unit}" in " ".join(figure.locator("figcaption").inner_text().split())
+
+
 def test_a_diagram_holds_the_whole_course_and_the_values_of_now_also_beside_a_dead_point(shown):
     """Where the input is 1e-9 rad from its limit, rates are greater than in any row of the course."""
     window = shown(MODELS["000-P1"])

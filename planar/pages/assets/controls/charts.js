@@ -96,6 +96,7 @@ class Charts {
       const columns = this.columns(kind, name, course);
       return Array.from(course.inputs, (_, i) => { const value = of(columns, i) * by; return Number.isFinite(value) ? value : null; });
     });
+    const most = Math.max(...lines.flat().map(Math.abs)); // what rounding leaves beside it is told as 0
     const least = unit === "length" ? page.data.size * by : 0, now = (name) => by * of(this.columns(kind, name, null), 0);
     const made = { by: byInput, tell: () => undefined, now: () => names.map(now), range: (here) => rangeOf([...lines, here], least) };
     made.limits = made.range(made.now());
@@ -130,7 +131,10 @@ class Charts {
     });
     Object.assign(made, { tell: (idx) => {
       where.textContent = `${pair} = ${idx === null ? inputTold(page, page.input(), k) : `${short(xs[idx])} ${inputUnit}`}:`;
-      told.forEach((each, i) => { each.textContent = `${short(idx === null ? now(names[i]) : lines[i][idx] ?? NaN)} ${unitName}`; });
+      told.forEach((each, i) => {
+        const value = idx === null ? now(names[i]) : lines[i][idx] ?? NaN;
+        each.textContent = `${short(Math.abs(value) <= NOTHING * most ? 0 : value)} ${unitName}`;
+      });
     } });
     plot.root.setAttribute("aria-hidden", "true"); // the table above says its numbers
     const marker = htmlPart("div", { class: "marker" }, plot.over);
