@@ -72,7 +72,7 @@ def run(runner, batch):
 
 
 @pytest.mark.parametrize("runner", [LLVMRunner(), NumpyRunner()])
-@pytest.mark.parametrize("stem", part([stem for stem, mechanism in MODELS.items() if mechanism.inputs], 6))
+@pytest.mark.parametrize("stem", part([stem for stem, mechanism in MODELS.items() if mechanism.inputs], 9))
 def test_a_run_of_a_model_is_the_one_that_casadi_gives(stem, runner):
     mechanism = MODELS[stem]
     try:

@@ -25,7 +25,7 @@ CELLS = [
 ]
 
 
-@pytest.mark.parametrize(("model", "what"), part(sorted(CELLS, key=lambda cell: cell[1]), 4))
+@pytest.mark.parametrize(("model", "what"), part(sorted(CELLS, key=lambda cell: cell[1]), 7))
 def test_texts_lie_on_the_sheet_and_apart_and_axes_have_units(model, what):
     figure = drawn(model, what)
     width, height = figure.get_size_inches() * figure.dpi
