@@ -457,6 +457,22 @@ def test_the_motion_is_saved_as_a_table(shown, tmp_path):
 # how it looks
 
 
+def test_a_drawing_leaves_room_for_all_that_a_slide_with_two_ends_can_do(shown):
+    """The foot of a scissor lift goes as far as its bars are long, both ways, and so does the platform's other end."""
+    window = shown(MODELS["scissor-lift"])
+    span = window.evaluate("motions(page).spans[0]")
+    assert [span["low"], span["high"], span["dead"]] == [
+        pytest.approx(-0.6, rel=1e-3),
+        pytest.approx(0.6, rel=1e-3),
+        [True] * 2,
+    ]
+    places = window.evaluate(
+        "motions(page).poses.map((frames) => page.view.toScreen(Plane.carry(frames['platform'], [0, 0])))"
+    )
+    box = window.locator("#drawing").bounding_box()
+    assert all(0.0 <= x <= box["width"] and 0.0 <= y <= box["height"] for x, y in places)
+
+
 @pytest.mark.parametrize("screens", [["phone"], ["desk", "projector"]], ids=" ".join)
 @pytest.mark.parametrize("stem", ["000-P2", "excavator-arm"])
 def test_nothing_is_wider_than_the_screen(stem, screens, shown):

@@ -2,6 +2,7 @@
 /* Positions over the range of every input, a few: for these a drawing leaves room. */
 
 const POSES = 24; // over the range of an input
+const SLIDE_SEARCH = 3; // times its size: how far the limits of a slide are looked for
 const FREE = 0.3; // of the mechanism's size: how far a slide without limits is shown
 
 /** Go through the motion of every input, the others where they are: {poses: the links' axes, spans: of every input from
@@ -9,25 +10,23 @@ const FREE = 0.3; // of the mechanism's size: how far a slide without limits is 
 function motions(page) {
   const { data, linkage } = page, poses = [page.frames];
   const spans = data.inputs.map((given, k) => {
-    const far = given.slides ? 1 : 2 * Math.PI, scale = linkage.scale[k];
+    const far = given.slides ? 1 : 2 * Math.PI, scale = linkage.scale[k], steps = given.slides ? SLIDE_SEARCH * POSES : POSES;
     const span = { low: 0, high: 2 * Math.PI, whole: true, dead: [false, false] };
-    let made;
     for (const sign of [1, -1]) {
-      made = linkage.copy();
-      for (let i = 1; i <= POSES; i++) {
+      const made = linkage.copy(), side = sign > 0 ? 1 : 0, seen = [];
+      let end = made.u[k];
+      for (let i = 1; i <= steps && !span.dead[side]; i++) {
         const u = Array.from(linkage.u);
         u[k] += (sign * far * i) / POSES;
-        const { reached } = made.moveTo(u);
-        // room for a slide without limits is made as it goes
-        if (!given.slides || i <= FREE * POSES || reached < 1) poses.push(page.framesOf(made.state()));
-        if (reached < 1) {
-          span.dead[sign > 0 ? 1 : 0] = true;
-          break;
-        }
-        if (i === POSES && !given.slides) return span; // a whole turn: nothing is left for the other way
+        span.dead[side] = made.moveTo(u).reached < 1;
+        seen.push(page.framesOf(made.state()));
+        if (i <= POSES || span.dead[side]) end = made.u[k];
       }
+      if (!given.slides && !span.dead[side]) return poses.push(...seen), span; // a whole turn: nothing is left for the other way
+      // room for a slide without limits is made as it goes
+      poses.push(...(span.dead[side] ? seen : seen.slice(0, FREE * POSES)));
       span.whole = false;
-      span[sign > 0 ? "high" : "low"] = made.u[k] * scale;
+      span[sign > 0 ? "high" : "low"] = end * scale;
     }
     return span;
   });
