@@ -8,7 +8,7 @@ import numpy as np
 
 import planar
 from benchmarks.entry import Array, Entry
-from planar.batch.mechanisms.results import Swept
+from benchmarks.swept.base import Swept
 from planar.document.dimensions import change_dimension, link_lengths
 from planar.model.mechanism import Mechanism
 from planar.results.motion import Motion
@@ -82,12 +82,35 @@ def turns(swept: Swept, steps: int) -> list[Entry]:
     ]
 
 
+def renewed(swept: Swept, d: Array, steps: int) -> list[Entry]:
+    """Designs d (dimensions, designs) by `planar.prepared`, a call each."""
+    mechanism = planar.from_dict(swept.document())
+    names = [dimension.name for dimension in swept.dimensions]
+    values = [dict(zip(names, map(float, each), strict=True)) for each in d.T]
+
+    def entry(rates: bool) -> Entry:
+        ready = planar.prepared(mechanism, steps, swept.point, rates=rates)
+
+        def read(found: list[Any]) -> Array:
+            return np.stack([_read_prepared(each, swept.point, rates) for each in found], axis=2)
+
+        known = np.arange(d.shape[1]), np.arange(steps + 1)
+        return Entry("planar.prepared", rates, *known, lambda: [ready(each) for each in values], read)
+
+    return [entry(rates) for rates in (False, True)]
+
+
+def _read_prepared(found: Any, point: str, rates: bool) -> Array:
+    """(2 or 6, steps) of a run."""
+    orders = (found.position, found.velocity, found.acceleration)[: 3 if rates else 1]
+    return np.concatenate([order[point].T for order in orders])
+
+
 def _prepared(mechanism: Mechanism, swept: Swept, steps: int, rates: bool) -> Entry:
     ready = planar.prepared(mechanism, steps, swept.point, rates=rates)
 
     def read(found: Any) -> Array:
-        orders = (found.position, found.velocity, found.acceleration)[: 3 if rates else 1]
-        return np.concatenate([order[swept.point].T for order in orders])[..., None]
+        return _read_prepared(found, swept.point, rates)[..., None]
 
     return Entry("planar.prepared", rates, np.arange(1), np.arange(steps + 1), ready, read)
 
@@ -124,9 +147,17 @@ def _cycled(mechanism: Mechanism, swept: Swept, d: Array, steps: int) -> Entry:
         True,
         np.arange(d.shape[1]),
         np.arange(steps + 1),
-        lambda: [planar.cycle(each, steps, *_turn(each)) for each in remade],
+        lambda: [_cycle(each, steps) for each in remade],
         lambda found: _read(found, swept.point, steps),
     )
+
+
+def _cycle(mechanism: Mechanism, steps: int) -> Motion | None:
+    """A turn; None where it does not go together."""
+    try:
+        return planar.cycle(mechanism, steps, *_turn(mechanism))
+    except planar.NoAnswer:
+        return None
 
 
 def _turn(mechanism: Mechanism) -> tuple[float, float]:
@@ -142,9 +173,11 @@ def _named(swept: Swept, d: Array) -> dict[str, Array]:
     return {dimension.name: values for dimension, values in zip(swept.dimensions, d, strict=True)}
 
 
-def _read(found: list[Motion], point: str, steps: int) -> Array:
+def _read(found: list[Motion | None], point: str, steps: int) -> Array:
     told = np.full((6, steps + 1, len(found)), np.nan)
     for design, motion in enumerate(found):
+        if motion is None:
+            continue
         moved = motion.point(point)
         # a motion that ends before has its dead point after the last step that is on the grid
         known = steps + 1 if motion.outcome.value == "solved" else len(moved.position) - 1

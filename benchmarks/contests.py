@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from benchmarks import by_planar, peers
 from benchmarks.entry import Array, Entry
-from benchmarks.limit import compiled
+from benchmarks.limit import Limit, Rates, compiled
 from benchmarks.swept import RATES, Stephenson, SweptFourBar, SweptQuickReturn, Watt, angles
+from benchmarks.swept.base import Swept
 from benchmarks.timing import best
-from planar.batch.mechanisms.results import Swept
 
 LIMIT = "C by hand"
 DESIGNS, STEPS, TURN = 10_000, 200, 360
-MIXED = 2_000
+MIXED, WIDE, NEW = 2_000, 20_000, 200
 SAMPLE = 40
 """Errors are taken over so many designs, evenly chosen."""
 ROUNDS = 5
@@ -42,12 +44,16 @@ class Result:
 
 @dataclass(frozen=True)
 class Contest:
-    """`d` (dimensions, designs), or None for the file's own design alone, over `steps` of one turn."""
+    """`d` (dimensions, designs), or None for the file's own design alone, over `steps` of one turn.
+
+    `limit` is the function of limit.c, where it is not the linkage's own.
+    """
 
     name: str
     swept: Swept
     d: Array | None
     steps: int
+    limit: str = ""
 
     def entries(self) -> list[Entry]:
         """Everybody who can solve it, the limit first."""
@@ -91,17 +97,14 @@ class Contest:
 
     def _cannot(self) -> Array:
         """Whether a design cannot be closed at a step (steps + 1, designs)."""
-        if not self.swept.dyadic:
-            return np.zeros((self.steps + 1, self._d().shape[1]), dtype=bool)
-        parts = np.array_split(self._d(), max(1, self._d().shape[1] // 1000), axis=1)
-        return np.hstack([np.isnan(self.swept.motion(part, angles(self.steps))[0]) for part in parts])
+        return self.swept.stopped(self._d(), angles(self.steps))
 
     def _limits(self, theta: Array) -> list[Entry]:
         limit = compiled()
         if limit is None:
             return []
         known = np.arange(self.d.shape[1]), np.arange(len(theta))
-        start = self.swept.start(self.d)
+        start, name = self.swept.start(self.d), self.limit or self.swept.limit
 
         def read(found: Array) -> Array:
             if start is None:
@@ -109,7 +112,7 @@ class Contest:
             return found.transpose(2, 1, 0, 3).reshape(*found.shape[2:0:-1], -1)
 
         return [
-            Entry(LIMIT, rates is not None, *known, limit.sweep(self.swept.limit, self.d, theta, rates, start), read)
+            Entry(LIMIT, rates is not None, *known, limit.sweep(name, self.d, theta, rates, start), read)
             for rates in (None, RATES)
         ]
 
@@ -128,6 +131,35 @@ class Contest:
             )
             for rates in (None, RATES)
         ]
+
+
+class Renewed(Contest):
+    """Designs `d` one after the other, each a call of its own with numbers that were not asked for before."""
+
+    def entries(self) -> list[Entry]:
+        """See `Contest`."""
+        theta = angles(self.steps)
+        found = [*by_planar.renewed(self.swept, self.d, self.steps), *peers.sweeps(self.swept, self.d, theta)]
+        limit = compiled()
+        if limit is None:
+            return found
+        known = np.arange(self.d.shape[1]), np.arange(len(theta))
+        return [
+            Entry(LIMIT, rates is not None, *known, *self._one_by_one(limit, theta, rates)) for rates in (None, RATES)
+        ] + found
+
+    def _one_by_one(self, limit: Limit, theta: Array, rates: Rates) -> tuple[Callable[[], Any], Callable[[Any], Array]]:
+        """C's calls for one design each, and how to read them."""
+        swept, columns = self.swept, [np.ascontiguousarray(each) for each in self.d.T]
+        if swept.start(self.d) is None:
+            calls = [limit.turn(f"{swept.limit}_turn", each, theta, rates) for each in columns]
+            return lambda: [call() for call in calls], lambda found: np.stack(found, axis=2)
+        calls = [
+            limit.sweep(swept.limit, each[:, None], theta, rates, swept.start(each[:, None]), True) for each in columns
+        ]
+        return lambda: [call() for call in calls], lambda found: np.concatenate(
+            [_of_march(each) for each in found], axis=2
+        )
 
 
 def _of_turn(found: Array) -> Array:
@@ -166,6 +198,15 @@ def contests() -> tuple[Contest, ...]:
             for swept in (four_bar, quick_return, watt, stephenson)
         ),
         Contest(f"four-bar, {MIXED:,} designs of which some cannot turn", four_bar, four_bar.mixed(MIXED), STEPS),
+        Contest(
+            f"four-bar, {WIDE:,} designs from a wide box, half of which cannot turn",
+            four_bar,
+            four_bar.wide(WIDE),
+            STEPS,
+            four_bar.wide_limit,
+        ),
+        Renewed(f"a new four-bar in each call, {TURN} steps", four_bar, four_bar.designs(NEW), TURN),
+        Renewed(f"a new six-bar without a dyad in each call, {TURN} steps", stephenson, stephenson.designs(NEW), TURN),
         Contest(f"one four-bar, {TURN} steps", four_bar, None, TURN),
         Contest(f"one six-bar without a dyad, {TURN} steps", stephenson, None, TURN),
     )

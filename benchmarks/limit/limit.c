@@ -132,6 +132,51 @@ INLINE moving lever_end(const double *d, long n, double c, double s, double w, d
 }
 
 SWEEP(four_bar, rocker_pin)
+
+/* Four-bars that may stop: NaN from where the crank cannot go on, which may lie between two steps. The diagonal from B
+ * to D is longest where the crank points away from D, and shortest where it points to it; the crank starts before the
+ * first of these and goes one turn on. */
+#define STOPPING_OF(RATES)                                                                                           \
+    for (long first = 0; first < n; first += CHUNK) {                                                                \
+        const long many = MIN(CHUNK, n - first);                                                                     \
+        const double *restrict of = d + first;                                                                       \
+        double least[CHUNK], most[CHUNK];                                                                            \
+        for (long i = 0; i < many; i++) {                                                                            \
+            const double a = of[i], b = of[n + i], c = of[2 * n + i], g = of[3 * n + i];                             \
+            const double begin = a * a + g * g - 2.0 * a * g * cs[0];                                                \
+            least[i] = (b - c) * (b - c), most[i] = (b + c) * (b + c);                                               \
+            if (!(begin >= least[i] && begin <= most[i])) most[i] = -1.0;                                            \
+        }                                                                                                            \
+        int away = 0, towards = 0;                                                                                   \
+        for (long step = 0; step < steps; step++) {                                                                  \
+            const double co = cs[2 * step], si = cs[2 * step + 1];                                                   \
+            if (!away && si < 0.0) {                                                                                 \
+                away = 1;                                                                                            \
+                for (long i = 0; i < many; i++)                                                                      \
+                    if ((of[i] + of[3 * n + i]) * (of[i] + of[3 * n + i]) > most[i]) most[i] = -1.0;                 \
+            }                                                                                                        \
+            if (away && !towards && si >= 0.0) {                                                                     \
+                towards = 1;                                                                                         \
+                for (long i = 0; i < many; i++)                                                                      \
+                    if ((of[i] - of[3 * n + i]) * (of[i] - of[3 * n + i]) < least[i]) most[i] = -1.0;                \
+            }                                                                                                        \
+            double *restrict to = out + step * (RATES ? 6 : 2) * n + first;                                          \
+            _Pragma("GCC ivdep") for (long i = 0; i < many; i++) {                                                   \
+                const double a = of[i], g = of[3 * n + i], far = a * a + g * g - 2.0 * a * g * co;                   \
+                moving C = rocker_pin(of + i, n, co, si, w, e, RATES);                                               \
+                const double gone = far >= least[i] && far <= most[i] ? 0.0 : NAN;                                   \
+                C.p.x += gone, C.p.y += gone;                                                                        \
+                if (RATES) C.v.x += gone, C.v.y += gone, C.a.x += gone, C.a.y += gone;                               \
+                put(to + i, n, C, RATES);                                                                            \
+            }                                                                                                        \
+        }                                                                                                            \
+    }
+
+void four_bar_stopping(long n, long steps, const double *d, const double *cs, double w, double e, int rates,
+                       double *out)
+{
+    if (rates) { STOPPING_OF(1) } else { STOPPING_OF(0) }
+}
 TURN(four_bar_turn, rocker_pin)
 SWEEP(watt, second_pin)
 SWEEP(quick_return, lever_end)

@@ -10,7 +10,7 @@ from importlib.metadata import version
 from importlib.util import find_spec
 
 from benchmarks.entry import Array, Entry
-from planar.batch.mechanisms.results import Swept
+from benchmarks.swept.base import Swept
 
 PACKAGES = {
     "pylinkage": "by_pylinkage",

@@ -8,7 +8,7 @@ from exudyn import itemInterface as item  # noqa: N813
 
 from benchmarks.entry import Array, Entry
 from benchmarks.peers.bodies import bodies
-from planar.batch.mechanisms.results import Swept
+from benchmarks.swept.base import Swept
 
 SYSTEM = "Exudyn"
 

@@ -8,7 +8,7 @@ import numpy as np
 from benchmarks.entry import Array, Entry
 from benchmarks.linkages.base import ALPHA, OMEGA
 from benchmarks.peers.bodies import bodies
-from planar.batch.mechanisms.results import Swept
+from benchmarks.swept.base import Swept
 
 SYSTEM = "kimech"
 FEW = 12

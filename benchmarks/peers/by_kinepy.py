@@ -11,7 +11,7 @@ from kinepy import System
 
 from benchmarks.entry import Array, Entry
 from benchmarks.peers.bodies import Bodies, bodies
-from planar.batch.mechanisms.results import Swept
+from benchmarks.swept.base import Swept
 
 SYSTEM = "kinepy"
 

@@ -16,9 +16,8 @@ from pylinkage.solver.simulation import simulate, simulate_with_kinematics
 from benchmarks.entry import Array, Entry
 from benchmarks.limit import Tape
 from benchmarks.swept import RATES
-from benchmarks.swept.base import crank_pin, dyad_pin, fixed
+from benchmarks.swept.base import Swept, crank_pin, dyad_pin, fixed
 from benchmarks.swept.six_bars import BELL
-from planar.batch.mechanisms.results import Swept
 
 SYSTEM = "pylinkage (numba)"
 FEW = {False: 2000, True: 500}

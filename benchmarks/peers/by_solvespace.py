@@ -7,7 +7,7 @@ from python_solvespace import ResultFlag, SolverSystem
 
 from benchmarks.entry import Array, Entry
 from benchmarks.peers.bodies import Bodies, bodies
-from planar.batch.mechanisms.results import Swept
+from benchmarks.swept.base import Swept
 
 SYSTEM = "SolveSpace"
 

@@ -63,6 +63,13 @@ class Swept(ABC):
         drawn = np.random.default_rng(0).uniform(-self.spread, self.spread, (len(self.dimensions), many))
         return np.ascontiguousarray(self.base()[:, None] * (1.0 + drawn))
 
+    def stopped(self, d: Array, theta: Array) -> Array:
+        """Which designs have stopped at a step, or before it (steps, designs)."""
+        if not self.dyadic:
+            return np.zeros((len(theta), d.shape[1]), dtype=bool)
+        parts = np.array_split(d, max(1, d.shape[1] // 1000), axis=1)
+        return np.hstack([np.isnan(self.motion(part, theta)[0]) for part in parts])
+
     def start(self, d: Array) -> Array | None:
         """From where Newton's iteration of limit.c sets out, where it has one."""
         return None
