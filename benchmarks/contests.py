@@ -180,9 +180,13 @@ def _error(contest: Contest, entry: Entry, found: Array, whole: Array) -> float:
     turning = np.flatnonzero(whole)
     chosen = turning[np.unique(np.linspace(0, len(turning) - 1, SAMPLE).astype(int))]
     wide = np.ascontiguousarray(contest._d()[:, entry.designs[chosen]]).astype(np.longdouble)
-    exact = contest.swept.motion(wide, angles(contest.steps).astype(np.longdouble))[: len(found), entry.steps]
-    off = np.abs(found[:, :, chosen] - exact)
-    greatest = np.abs(exact).max(axis=(1, 2))
+    both = contest.swept.assemblies(wide, angles(contest.steps).astype(np.longdouble))
+    every = [exact[: len(found), entry.steps] for exact in both]
+    apart = np.stack([np.abs(found[:, :, chosen] - exact) for exact in every])
+    # of each design the assembly that it was solved in
+    own = np.nanmax(apart[:, :2], axis=(1, 2)).argmin(axis=0)
+    off = np.take_along_axis(apart, own[None, None, None], axis=0)[0]
+    greatest = np.abs(every[0]).max(axis=(1, 2))
     # a component's error beside the greater of the two
     scale = np.repeat(greatest.reshape(-1, 2).max(axis=1), 2)
     return float(np.nanmax(off / scale[:, None, None]))

@@ -54,6 +54,10 @@ class Swept(ABC):
     def motion(self, d: Array, theta: Array) -> Array:
         """The point (6, steps, designs) in the arithmetic of `d` (dimensions, designs), theta (steps,): x, y, rates."""
 
+    def assemblies(self, d: Array, theta: Array) -> list[Array]:
+        """As `motion`, of every assembly that somebody may take."""
+        return [self.motion(d, theta)]
+
     def base(self) -> Array:
         """The file's own dimensions (dimensions,)."""
         return np.array([dimension.value for dimension in self.dimensions])

@@ -34,6 +34,12 @@ class SweptFourBar(Swept):
         a, b, c, g = d
         return rows(dyad_pin(crank_pin(a, theta[:, None]), fixed(g, 0.0 * g), b, c))
 
+    def assemblies(self, d: Array, theta: Array) -> list[Array]:
+        """Both: of wide designs the one nearer to the sketch may be to the right of the way from B to D."""
+        a, b, c, g = d
+        mirrored = rows(dyad_pin(fixed(g, 0.0 * g), crank_pin(a, theta[:, None]), c, b))
+        return [self.motion(d, theta), mirrored]
+
     def wide(self, many: int) -> Array:
         """Designs (4, designs) with lengths from 0.2 to 1.5, of which about half cannot turn."""
         return np.random.default_rng(0).uniform(0.2, 1.5, (4, many))
