@@ -1,0 +1,50 @@
+"""The guide's topics, in the order in which its first page lists them."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from typing import NamedTuple
+
+from planar.document.cursor import suggest_spelling
+from planar.document.files import read_packaged_text
+from planar.foundation.errors import BadInput
+
+FIRST_PAGE = "index"
+LIST_ENTRY = re.compile(r"^- \[(?P<title>[^\]]+)\]\((?P<name>[\w-]+)\.md\)(?:: (?P<summary>.*))?$", re.MULTILINE)
+
+
+class Topic(NamedTuple):
+    """A page: its name, as after `planar guide`, its title, and what it is about in a few words or nothing."""
+
+    name: str
+    title: str
+    summary: str
+
+    def text(self) -> str:
+        """The page, in Markdown."""
+        return read_page(self.name)
+
+
+def read_page(name: str) -> str:
+    """The Markdown of a page by its name."""
+    return read_packaged_text("guide", f"{name}.md")
+
+
+@cache
+def guide_topics() -> tuple[Topic, ...]:
+    """All topics but the first page, which lists them."""
+    entries = LIST_ENTRY.finditer(read_page(FIRST_PAGE))
+    return tuple(Topic(each["name"], each["title"], each["summary"] or "") for each in entries)
+
+
+def find_topic(name: str) -> Topic:
+    """The topic of a name or a title. Raises BadInput."""
+    known = {each.name: each for each in guide_topics()}
+    titles = {each.title.lower(): each for each in guide_topics()}
+    wanted = name.strip().lower()
+    found = known.get(wanted) or titles.get(wanted)
+    if found is None:
+        meant = suggest_spelling(wanted, known, cutoff=0.5) or f"; topics are {', '.join(known)}"
+        raise BadInput("TOPIC", f"the guide has no page {name!r:.60}{meant}")
+    return found
