@@ -29,10 +29,10 @@ def guide(topic: str | None, as_site: bool, output: Path | None) -> None:
     from rich.console import Console
     from rich.markdown import Markdown
 
-    from planar.guide.topics import FIRST_PAGE, find_topic, read_page
+    from planar.guide.topics import FIRST_PAGE, find_topic, read_page, terminal_text
 
     text = find_topic(topic).text() if topic else read_page(FIRST_PAGE)
-    Console().print(Markdown(text, hyperlinks=False))
+    Console().print(Markdown(terminal_text(text), hyperlinks=False))
 
 
 def _write_site(output: Path | None) -> None:

@@ -12,6 +12,8 @@ from planar.foundation.errors import BadInput
 
 FIRST_PAGE = "index"
 LIST_ENTRY = re.compile(r"^- \[(?P<title>[^\]]+)\]\((?P<name>[\w-]+)\.md\)(?:: (?P<summary>.*))?$", re.MULTILINE)
+PAGE_LINK = re.compile(r"(?<!!)\[(?P<title>[^\]]+)\]\((?P<name>[\w-]+)\.md\)")
+PICTURE = re.compile(r"^!\[(?P<title>[^\]]+)\]\([^)]+\)\n", re.MULTILINE)
 
 
 class Topic(NamedTuple):
@@ -29,6 +31,12 @@ class Topic(NamedTuple):
 def read_page(name: str) -> str:
     """The Markdown of a page by its name."""
     return read_packaged_text("guide", f"{name}.md")
+
+
+def terminal_text(page: str) -> str:
+    """A page as a terminal shows it: other pages by their command, no pictures, no marks of files."""
+    text = PAGE_LINK.sub(r"\g<title> (`planar guide \g<name>`)", page)
+    return PICTURE.sub("", re.sub(r"<!--.*?-->\n", "", text))
 
 
 @cache
