@@ -8,6 +8,7 @@ from planar.cli import (
     inspect_models_schema_bench,
     modes,
     plot_animate,
+    problem_mark,
     solve_cycle_explain,
     view_gallery,
 )
@@ -25,6 +26,7 @@ __all__ = [
     "main",
     "modes",
     "plot_animate",
+    "problem_mark",
     "solve_cycle_explain",
     "view_gallery",
 ]

@@ -12,6 +12,7 @@ from warnings import catch_warnings, simplefilter
 
 import planar
 from planar.foundation.errors import BadInput, WriteFailure
+from planar.foundation.safe_files import save_file
 from planar.guide.reference import reference_pages
 from planar.guide.topics import FIRST_PAGE, guide_topics, read_page
 
@@ -71,13 +72,12 @@ def _skip_unexplained(_: Any, __: str, ___: str, value: Any, skips: bool, ____: 
 
 def _write_sources(source: Path) -> None:
     """The pages as Sphinx reads them: those of the guide, and the reference."""
-    source.mkdir()
-    names = [each.name for each in guide_topics()]
-    reference = reference_pages()
-    contents = "\n".join(["```{toctree}", ":hidden:", "", *names, "reference", "```"])
-    (source / f"{FIRST_PAGE}.md").write_text(f"{read_page(FIRST_PAGE)}\n{contents}\n", encoding="utf-8")
-    for name in names:
-        (source / f"{name}.md").write_text(read_page(name), encoding="utf-8")
-    for name, text in reference.items():
-        (source / f"{name}.rst").write_text(text, encoding="utf-8")
+    paths = [each.path for each in guide_topics()]
+    contents = "\n".join(["```{toctree}", ":hidden:", "", *paths, "reference", "```"])
+    pages = {f"{path}.md": read_page(path) for path in paths}
+    pages[f"{FIRST_PAGE}.md"] = f"{read_page(FIRST_PAGE)}\n{contents}\n"
+    pages |= {f"{name}.rst": text for name, text in reference_pages().items()}
+    for path, text in pages.items():
+        (source / path).parent.mkdir(parents=True, exist_ok=True)
+        save_file(source / path, text)
     shutil.copytree(GUIDE_FOLDER / "pictures", source / "pictures")

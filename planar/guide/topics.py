@@ -11,26 +11,31 @@ from planar.document.files import read_packaged_text
 from planar.foundation.errors import BadInput
 
 FIRST_PAGE = "index"
-LIST_ENTRY = re.compile(r"^- \[(?P<title>[^\]]+)\]\((?P<name>[\w-]+)\.md\)(?:: (?P<summary>.*))?$", re.MULTILINE)
-PAGE_LINK = re.compile(r"(?<!!)\[(?P<title>[^\]]+)\]\((?P<name>[\w-]+)\.md\)")
+LIST_ENTRY = re.compile(r"^- \[(?P<title>[^\]]+)\]\((?P<path>[\w/-]+)\.md\)(?:: (?P<summary>.*))?$", re.MULTILINE)
+PAGE_LINK = re.compile(r"(?<!!)\[(?P<title>[^\]]+)\]\((?:[\w./-]*/)?(?P<name>[\w-]+)\.md\)")
 PICTURE = re.compile(r"^!\[(?P<title>[^\]]+)\]\([^)]+\)\n", re.MULTILINE)
 
 
 class Topic(NamedTuple):
-    """A page: its name, as after `planar guide`, its title, and what it is about in a few words or nothing."""
+    """A page: its path below the guide, its title, and what it is about in a few words or nothing."""
 
-    name: str
+    path: str
     title: str
     summary: str
 
+    @property
+    def name(self) -> str:
+        """As after `planar guide`."""
+        return self.path.rpartition("/")[2]
+
     def text(self) -> str:
         """The page, in Markdown."""
-        return read_page(self.name)
+        return read_page(self.path)
 
 
-def read_page(name: str) -> str:
-    """The Markdown of a page by its name."""
-    return read_packaged_text("guide", f"{name}.md")
+def read_page(path: str) -> str:
+    """The Markdown of a page by its path below the guide."""
+    return read_packaged_text("guide", f"{path}.md")
 
 
 def terminal_text(page: str) -> str:
@@ -43,7 +48,7 @@ def terminal_text(page: str) -> str:
 def guide_topics() -> tuple[Topic, ...]:
     """All topics but the first page, which lists them."""
     entries = LIST_ENTRY.finditer(read_page(FIRST_PAGE))
-    return tuple(Topic(each["name"], each["title"], each["summary"] or "") for each in entries)
+    return tuple(Topic(each["path"], each["title"], each["summary"] or "") for each in entries)
 
 
 def find_topic(name: str) -> Topic:
