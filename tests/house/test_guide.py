@@ -8,13 +8,16 @@ import sys
 from pathlib import Path
 
 import pytest
+from PIL import Image, ImageChops, ImageStat
 
 import planar
+from planar import plot
 from planar.foundation.errors import BadInput
 from planar.guide.keys_page import keys_page
 from planar.guide.reference import reference_names
 from planar.guide.topics import FIRST_PAGE, find_topic, guide_topics, read_page
 from tests import command
+from tests.guide_pictures import PICTURES
 
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "planar" / "guide"
@@ -121,3 +124,12 @@ def test_the_site_is_made_without_a_warning_and_holds_all(tmp_path):
         path.read_text(encoding="utf-8") for name, path in whole.items() if name.startswith("reference")
     )
     assert all(f"planar.{name}" in reference for name in planar.__all__ if name != "plot")
+
+
+def test_every_picture_is_shown_and_one_is_what_the_tool_makes_now(tmp_path):
+    shown = {target for page in PAGES.values() for target in re.findall(r"\]\((?:\.\./)*pictures/(\S+)\.png\)", page)}
+    assert shown == set(PICTURES) == {path.stem for path in (FOLDER / "pictures").iterdir()}
+    plot.save(PICTURES["sliding"](), tmp_path / "now.png")
+    now, kept = (Image.open(path).convert("L") for path in (tmp_path / "now.png", FOLDER / "pictures" / "sliding.png"))
+    apart = ImageChops.difference(now.resize(kept.size), kept)
+    assert ImageStat.Stat(apart).mean[0] < 2.0  # of 255: other versions of the library smooth otherwise
