@@ -54,7 +54,7 @@ PICTURES: dict[str, Callable[[], object]] = {
     "points": lambda: plot.scheme(planar.solve(planar.from_dict(PLATE))),
     "wiper-path": lambda: plot.loci(planar.cycle(planar.from_dict(WIPER)), ["T"]),
     "sliding": scheme_of("slider-crank"),
-    "slot": scheme_of("rack-differential"),
+    "slot": scheme_of("slotted-lever"),
     "gear": scheme_of("planetary-gear-set"),
     "spring": scheme_of("door-closer"),
     "assemblies": lambda: plot.modes(planar.modes("four-bar")),

@@ -30,7 +30,6 @@ from planar.cli.options import (
 from planar.foundation.errors import BadInput, unknown_format_error
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
     from rich.console import RenderableType
 
     from planar.analysis.motion.answers import Answers
@@ -139,7 +138,7 @@ def _read_parts(also: str | None) -> tuple[str, ...]:
     return parts
 
 
-def _added_pages(state: State, parts: tuple[str, ...]) -> list[Figure]:
+def _added_pages(state: State, parts: tuple[str, ...]) -> list[Any]:
     """The pages of what `--with` adds."""
     from planar import plot
 
