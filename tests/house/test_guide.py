@@ -1,5 +1,6 @@
 """The guide: its commands and snippets run as a reader would, its links lead somewhere, its site is whole."""
 
+import json
 import os
 import re
 import shlex
@@ -8,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from jsonschema import Draft202012Validator
 from PIL import Image, ImageChops, ImageStat
 
 import planar
@@ -33,6 +35,8 @@ def blocks(page: str, kind: str) -> list[str]:
     return re.findall(rf"```{kind}\n(.*?)```", PAGES[page], re.DOTALL)
 
 
+TIMES = ("time-designs", "time-links")
+"""Pictures of speeds, which `python -m benchmarks` draws."""
 COMMANDS = {
     line: None
     for page in PAGES
@@ -128,8 +132,29 @@ def test_the_site_is_made_without_a_warning_and_holds_all(tmp_path):
 
 def test_every_picture_is_shown_and_one_is_what_the_tool_makes_now(tmp_path):
     shown = {target for page in PAGES.values() for target in re.findall(r"\]\((?:\.\./)*pictures/(\S+)\.png\)", page)}
-    assert shown == set(PICTURES) == {path.stem for path in (FOLDER / "pictures").iterdir()}
+    assert shown == {*PICTURES, *TIMES} == {path.stem for path in (FOLDER / "pictures").iterdir()}
     plot.save(PICTURES["sliding"](), tmp_path / "now.png")
     now, kept = (Image.open(path).convert("L") for path in (tmp_path / "now.png", FOLDER / "pictures" / "sliding.png"))
     apart = ImageChops.difference(now.resize(kept.size), kept)
     assert ImageStat.Stat(apart).mean[0] < 2.0  # of 255: other versions of the library smooth otherwise
+
+
+def test_entries_that_the_page_on_writing_shows_are_such(folder):
+    """Every entry of pairs, and of loads, springs and masses put into its own mechanism file."""
+    check = Draft202012Validator({"$ref": "#/$defs/pair", "$defs": planar.schema()["$defs"]})
+    shown = [text for block in blocks("begin/writing", "json") for text in block.splitlines()]
+    pairs = [json.loads(text) for text in shown if re.match(r'\{"(turning|sliding|slot|gear|belt|rack)"', text)]
+    assert len(pairs) >= 7
+    for entry in pairs:
+        check.validate(entry)
+    value = json.loads((folder / "press.json").read_text(encoding="utf-8"))
+    acting = next(block for block in blocks("begin/writing", "json") if '"loads"' in block)
+    mechanism = planar.from_dict(value | json.loads("{" + acting + "}"))
+    assert [len(each) for each in (mechanism.loads, mechanism.springs, mechanism.masses)] == [3, 1, 1]
+    assert planar.forces(planar.solve(mechanism)).proof.equilibrium < 1e-10
+
+
+def test_the_page_on_how_it_is_built_names_every_room():
+    rooms = {path.relative_to(ROOT / "planar").with_suffix("").parts[0] for path in (ROOT / "planar").rglob("*.py")}
+    rooms -= {"__init__", "__main__"}
+    assert [room for room in rooms if not re.search(rf"\b{room}\b", PAGES["look-up/house"])] == []
