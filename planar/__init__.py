@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from planar.analysis.centres.curvature import Curvature, curvature
     from planar.analysis.centres.two_directions import centre_of
     from planar.analysis.centres.velocities import velocity_by_centres
+    from planar.analysis.classroom.marking import mark_answers
+    from planar.analysis.classroom.variants import problem_variants
     from planar.analysis.identity.inspection import Inspection, inspect
     from planar.analysis.identity.mobility import Mobility, mobility
     from planar.analysis.motion.answers import Answers, answers
@@ -181,7 +183,9 @@ _ROOMS = {
     "load": "document.files",
     "loads": "document.files",
     "mobility": "analysis.identity.mobility",
+    "mark_answers": "analysis.classroom.marking",
     "modes": "assemblies.modes",
+    "problem_variants": "analysis.classroom.variants",
     "pinned": "model.pin_linkage",
     "plot": "plot",
     "prepared": "batch.prepared",
@@ -305,11 +309,13 @@ __all__ = [
     "inspect",
     "load",
     "loads",
+    "mark_answers",
     "mobility",
     "modes",
     "pinned",
     "plot",
     "prepared",
+    "problem_variants",
     "schema",
     "simulate",
     "solve",

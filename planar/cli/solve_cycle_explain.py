@@ -39,6 +39,8 @@ if TYPE_CHECKING:
 
 PAGES = (".pdf", ".png")
 """Files of pages with drawings."""
+ADDED_PARTS = ("centres", "forces")
+"""What `explain --with` adds to a worked solution."""
 
 
 @main.command()
@@ -76,12 +78,30 @@ def solve(
 @at_option
 @mode_option
 @scale_option
+@click.option(
+    "--with",
+    "also",
+    metavar="PARTS",
+    help=f"What is added behind it: {' and '.join(ADDED_PARTS)}, or both with a comma between.",
+)
 @output_option("Write the text to a .txt, .svg or .html file, or pages with drawings to scale to a .pdf or .png file.")
-def explain(
-    model: str, as_json: bool, at: tuple[str, ...], mode: int | None, scales: tuple[str, ...], output: Path | None
+def explain(  # many: one for each option
+    model: str,
+    as_json: bool,
+    at: tuple[str, ...],
+    mode: int | None,
+    scales: tuple[str, ...],
+    also: str | None,
+    output: Path | None,
 ) -> None:
     """The worked solution: vector equations and tables, both polygons step by step, results."""
     from planar.drawing.paper.scales import parse_scales as read
+
+    parts = _read_parts(also)
+    if parts and as_json:
+        raise BadInput(
+            "--with", "what is added has records of its own: `planar centres --json`, `planar forces --json`"
+        )
 
     on_pages = output is not None and output.suffix.lower() in PAGES
     if output is not None and not on_pages:
@@ -96,7 +116,8 @@ def explain(
         from planar.foundation.safe_files import save_file
 
         with show_status(state.mechanism.name):
-            save_file(output, encode_sheets(solution_pages(state, comparisons, given), output.suffix))
+            pages = solution_pages(state, comparisons, given) + _added_pages(state, parts)
+            save_file(output, encode_sheets(pages, output.suffix))
         return
     from planar.analysis.worked.solution import worked_solution
     from planar.reports.tables.worked_solution import record, solution_text
@@ -105,7 +126,46 @@ def explain(
     if as_json:
         click.echo(json.dumps(record(solution, given), ensure_ascii=False, indent=1, allow_nan=False))
         return
-    print_or_write(solution_text(solution, given), output)
+    print_or_write(_with_parts(solution_text(solution, given), state, parts), output)
+
+
+def _read_parts(also: str | None) -> tuple[str, ...]:
+    """The parts that `--with` names."""
+    parts = tuple(dict.fromkeys(part.strip() for part in (also or "").split(",") if part.strip()))
+    for part in parts:
+        if part not in ADDED_PARTS:
+            raise BadInput("--with", f"there is no part {part!r:.40}; parts are {' and '.join(ADDED_PARTS)}")
+    return parts
+
+
+def _added_pages(state: State, parts: tuple[str, ...]) -> list[Any]:
+    """The pages of what `--with` adds."""
+    from planar import plot
+
+    made = {"centres": lambda: [plot.centres(state)], "forces": lambda: plot.forces(state)}
+    return [page for part in parts for page in made[part]()]
+
+
+def _with_parts(text: RenderableType, state: State, parts: tuple[str, ...]) -> RenderableType:
+    """A text with the tables of what `--with` adds."""
+    if not parts:
+        return text
+    from rich.console import Group
+    from rich.text import Text
+
+    found = [text]
+    if "centres" in parts:
+        from planar.analysis.centres.centres import centres
+        from planar.reports.tables.centres import table
+
+        found += [Text(), table(centres(state))]
+    if "forces" in parts:
+        from planar.analysis.motion.mechanical_advantage import advantages
+        from planar.dynamics.forces import forces
+        from planar.reports.tables.forces.position_forces import tables
+
+        found += [Text(), tables(forces(state), advantages(state))]
+    return Group(*found)
 
 
 def _solve_model(

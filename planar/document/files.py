@@ -74,9 +74,14 @@ def as_mechanism(source: Any) -> Mechanism:
     raise BadInput("mechanism", f"a Mechanism, a file or a model's name is wanted, not {told}")
 
 
+def read_packaged_text(room: str, name: str) -> str:
+    """A text that comes along in a room of the package, by its path there."""
+    return (Path(__file__).parents[1] / room / name).read_text(encoding="utf-8")
+
+
 def read_asset(name: str) -> str:
     """A text that comes along for pages."""
-    return (Path(__file__).parents[1] / "pages" / "assets" / name).read_text(encoding="utf-8")
+    return read_packaged_text("pages", f"assets/{name}")
 
 
 def find_model_file(model: str | Path) -> Path:

@@ -11,7 +11,7 @@ from planar.foundation.units import MAX_QUANTITY_LENGTH
 from planar.model.input_laws import MAX_LAW_ITEMS, SEGMENT_TYPES, LawSegment
 from planar.model.mechanism import LARGEST_NUMBER, PUBLISHED_QUANTITIES, SMALLEST_NUMBER
 from planar.model.pairs import Pair, pair_types
-from planar.model.pairs.base import Schema, list_schema, schema_reference
+from planar.model.pairs.base import Schema, described, list_schema, schema_reference
 
 FORMAT_VERSION = 1
 FORBIDDEN_IN_NAMES = ".:,"
@@ -51,122 +51,184 @@ def _vector_schema(kind: str) -> Schema:
     return list_schema(kind, 2, 2)
 
 
-UNITS_SCHEMA: Schema = {"length": _TEXT, "angle": _TEXT}
+UNITS_SCHEMA: Schema = {
+    "length": described(_TEXT, "the unit of bare lengths, as mm; left out: m"),
+    "angle": described(_TEXT, "the unit of bare angles, deg or rad; left out: rad"),
+}
 ALONG_SCHEMA: Schema = {
-    "along": list_schema("name", 2, 2) | {"uniqueItems": True},
-    "distance": schema_reference("length"),
-    "angle": schema_reference("angle"),
+    "along": described(
+        list_schema("name", 2, 2) | {"uniqueItems": True},
+        "two points of the link: the way from the first to the second",
+    ),
+    "distance": described(
+        schema_reference("length"), "how far from the first point along that way; negative behind it"
+    ),
+    "angle": described(
+        schema_reference("angle"),
+        "by how much the way is turned about the first point, anticlockwise, as on a bell crank",
+    ),
 }
 DISTANCES_SCHEMA: Schema = {
-    "distances": _named_values_schema(schema_reference("size"), minProperties=2, maxProperties=2),
-    "left_of": list_schema("name", 2, 2),
-    "right_of": list_schema("name", 2, 2),
+    "distances": described(
+        _named_values_schema(schema_reference("size"), minProperties=2, maxProperties=2),
+        "how far it is from two points of the link, by their names",
+    ),
+    "left_of": described(
+        list_schema("name", 2, 2), "it lies to the left of the way from the first of these to the second"
+    ),
+    "right_of": described(list_schema("name", 2, 2), "it lies to the right of the way from the first to the second"),
 }
 LINK_SCHEMA: Schema = {
-    "ends": list_schema("name", 2, 2) | {"uniqueItems": True},
-    "length": schema_reference("size"),
-    "points": _named_values_schema(schema_reference("place")),
-    "axis": list_schema("name", 2, 2) | {"uniqueItems": True},
+    "ends": described(
+        list_schema("name", 2, 2) | {"uniqueItems": True},
+        "two points: the first is the link's origin, the second lies on its x-axis",
+    ),
+    "length": described(schema_reference("size"), "the distance between the ends"),
+    "points": described(_named_values_schema(schema_reference("place")), "its points by their names, in its own axes"),
+    "axis": described(
+        list_schema("name", 2, 2) | {"uniqueItems": True},
+        "two points whose direction is the link's angle, where coordinates were read off a drawing",
+    ),
 }
 INPUT_SCHEMA: Schema = {
-    "pair": _TEXT,
-    "position": schema_reference("quantity"),
-    "velocity": schema_reference("quantity"),
-    "acceleration": schema_reference("quantity"),
-    "law": {"anyOf": [schema_reference("piece"), list_schema("piece", 1, MAX_LAW_ITEMS)]},
+    "pair": described(_TEXT, "the pair that is driven; at a pin of several links as B:a,b, link b against a"),
+    "position": described(
+        schema_reference("quantity"),
+        "the angle of the driven link at a pin on the frame, of the second against the first elsewhere; "
+        "at a slide the distance along its line",
+    ),
+    "velocity": described(schema_reference("quantity"), "its rate, as 210 rpm or 2 m/s; left out: 0"),
+    "acceleration": described(schema_reference("quantity"), "its second rate, as 60 rad/s^2; left out: 0"),
+    "law": described(
+        {"anyOf": [schema_reference("piece"), list_schema("piece", 1, MAX_LAW_ITEMS)]},
+        "its motion in time: one piece, or a list of pieces, one after the other",
+    ),
 }
 DRIVE_SCHEMA: Schema = {key: INPUT_SCHEMA[key] for key in ("position", "velocity", "acceleration")}
 VARIATION_SCHEMA: Schema = {
-    "with": _TEXT,
-    "at": list_schema("quantity", 2, MAX_LAW_ITEMS),
-    "factors": list_schema("number", 2, MAX_LAW_ITEMS),
+    "with": described(_TEXT, "the input's pair whose position it varies with; left out: time"),
+    "at": described(
+        list_schema("quantity", 2, MAX_LAW_ITEMS), "rising positions or times; one that stands twice is a step"
+    ),
+    "factors": described(
+        list_schema("number", 2, MAX_LAW_ITEMS), "by what the load is multiplied there, straight between"
+    ),
 }
+_VARIES = described(schema_reference("varies"), "how it varies with an input's position, or with time")
 PIN_POINT_NOTE: Schema = {
     "description": "at a pin: on the link that slides there, else on the first, or on the one that is named, as rod.B"
 }
 """Of the name of a point where something acts."""
 FORCE_SCHEMA: Schema = {
     "point": _TEXT | PIN_POINT_NOTE,
-    "force": _vector_schema("quantity"),
-    "axes": _TEXT,
-    "varies": schema_reference("varies"),
+    "force": described(_vector_schema("quantity"), "its x and y parts, in N unless a unit is written"),
+    "axes": described(_TEXT, "the link in whose axes the force is given, and turns; left out: the frame"),
+    "varies": _VARIES,
 }
-TORQUE_SCHEMA: Schema = {"link": _TEXT, "torque": schema_reference("quantity"), "varies": schema_reference("varies")}
+TORQUE_SCHEMA: Schema = {
+    "link": described(_TEXT, "the link on which the torque acts"),
+    "torque": described(schema_reference("quantity"), "the torque, anticlockwise, in N m unless a unit is written"),
+    "varies": _VARIES,
+}
 EFFORT_SCHEMA: Schema = {
-    "pair": _TEXT,
-    "force": schema_reference("quantity"),
-    "torque": schema_reference("quantity"),
-    "varies": schema_reference("varies"),
+    "pair": described(_TEXT, "the pair between whose links it acts"),
+    "force": described(schema_reference("quantity"), "the force at a slide, positive the way its displacement grows"),
+    "torque": described(schema_reference("quantity"), "the torque at a pin or wheel, positive the way its angle grows"),
+    "varies": _VARIES,
 }
 SPRING_SCHEMA: Schema = {
     "points": list_schema("text", 2, 2) | {"uniqueItems": True} | PIN_POINT_NOTE,
-    "stiffness": schema_reference("amount"),
-    "free_length": schema_reference("amount"),
-    "damping": schema_reference("amount"),
+    "stiffness": described(schema_reference("amount"), "force by length, in N/m unless a unit is written"),
+    "free_length": described(schema_reference("amount"), "its length when nothing pulls; left out: 0"),
+    "damping": described(schema_reference("amount"), "force by speed of its length, in N s/m unless a unit is written"),
 }
 TORSION_SPRING_SCHEMA: Schema = {
-    "links": list_schema("name", 2, 2) | {"uniqueItems": True},
-    "stiffness": schema_reference("amount"),
-    "free_angle": schema_reference("angle"),
-    "damping": schema_reference("amount"),
+    "links": described(list_schema("name", 2, 2) | {"uniqueItems": True}, "the links between which it turns"),
+    "stiffness": described(schema_reference("amount"), "torque by angle, in N m/rad unless a unit is written"),
+    "free_angle": described(
+        schema_reference("angle"), "the angle of the second link against the first at rest; left out: 0"
+    ),
+    "damping": described(schema_reference("amount"), "torque by angular speed, in N m s/rad unless a unit is written"),
 }
 MASS_SCHEMA: Schema = {
-    "link": _TEXT,
-    "mass": schema_reference("amount"),
-    "at": schema_reference("spot"),
-    "inertia": schema_reference("amount"),
+    "link": described(_TEXT, "the link that it belongs to; several on a link add up"),
+    "mass": described(schema_reference("amount"), "the mass, in kg unless a unit is written"),
+    "at": described(schema_reference("spot"), "its centre: a point of the link, or [x, y] in the link's axes"),
+    "inertia": described(
+        schema_reference("amount"), "about that centre, in kg m^2 unless a unit is written; left out: 0"
+    ),
 }
 PUBLISHED_SCHEMA: Schema = {
-    "symbol": _TEXT,
-    "quantity": {"enum": list(PUBLISHED_QUANTITIES)},
-    "of": _TEXT,
-    "value": {"anyOf": [{"type": "null"}, schema_reference("quantity")]},
-    "tolerance": {"type": "number", "minimum": 0, "exclusiveMaximum": LARGEST_NUMBER},
-    "relative_to": _TEXT,
-    "component": {"enum": ["x", "y"]},
-    "sense": {"enum": list(SENSE_WORDS)},
-    "case": _TEXT,
-    "note": _TEXT,
-    "slip": _TEXT,
-    "inputs": schema_reference("drives"),
-    "from": schema_reference("drives"),
+    "symbol": described(_TEXT, "how the book writes it, as v_C"),
+    "quantity": described({"enum": list(PUBLISHED_QUANTITIES)}, "what it is"),
+    "of": described(_TEXT, "the point, link, pair or input that it is of"),
+    "value": described(
+        {"anyOf": [{"type": "null"}, schema_reference("quantity")]}, "what the book prints; null where it prints none"
+    ),
+    "tolerance": described(
+        {"type": "number", "minimum": 0, "exclusiveMaximum": LARGEST_NUMBER},
+        "the part of the exact value by which a drawing may be off; left out: 0.02",
+    ),
+    "relative_to": described(_TEXT, "the point or link against which it is told; left out: the frame"),
+    "component": described({"enum": ["x", "y"]}, "which part of a vector; left out: its size"),
+    "sense": described({"enum": list(SENSE_WORDS)}, "the sense that the book gives it"),
+    "case": described(_TEXT, "which of the book's cases it belongs to"),
+    "note": described(_TEXT, "what there is to say of it"),
+    "slip": described(_TEXT, "why the printed value is wrong, where it is"),
+    "inputs": described(schema_reference("drives"), "inputs that are changed for it, by their pairs"),
+    "from": described(schema_reference("drives"), "inputs at the position from which a displacement counts"),
+}
+_LOADS: Schema = {
+    "type": "array",
+    "items": {
+        "anyOf": [
+            _object_schema(FORCE_SCHEMA, "point", "force"),
+            _object_schema(TORQUE_SCHEMA, "link", "torque"),
+            _object_schema(EFFORT_SCHEMA, "pair", oneOf=[{"required": ["force"]}, {"required": ["torque"]}]),
+        ]
+    },
+}
+_SPRINGS: Schema = {
+    "type": "array",
+    "items": {
+        "anyOf": [
+            _object_schema(kind, ends, anyOf=[{"required": ["stiffness"]}, {"required": ["damping"]}])
+            for kind, ends in ((SPRING_SCHEMA, "points"), (TORSION_SPRING_SCHEMA, "links"))
+        ]
+    },
 }
 FILE_SCHEMA: Schema = {
-    "planar": {"const": FORMAT_VERSION},
-    "name": _TEXT,
-    "ids": _TEXTS,
-    "about": _TEXT,
-    "source": _TEXT,
-    "geometry": {"enum": list(GEOMETRY_SOURCES)},
-    "notes": _TEXTS,
-    "units": _object_schema(UNITS_SCHEMA),
-    "frame": _TEXT,
-    "links": _named_values_schema(schema_reference("link"), minProperties=1),
-    "pairs": {"type": "array", "items": schema_reference("pair")},
-    "inputs": {"type": "array", "items": _object_schema(INPUT_SCHEMA, "pair", "position")},
-    "loads": {
-        "type": "array",
-        "items": {
-            "anyOf": [
-                _object_schema(FORCE_SCHEMA, "point", "force"),
-                _object_schema(TORQUE_SCHEMA, "link", "torque"),
-                _object_schema(EFFORT_SCHEMA, "pair", oneOf=[{"required": ["force"]}, {"required": ["torque"]}]),
-            ]
-        },
-    },
-    "springs": {
-        "type": "array",
-        "items": {
-            "anyOf": [
-                _object_schema(kind, ends, anyOf=[{"required": ["stiffness"]}, {"required": ["damping"]}])
-                for kind, ends in ((SPRING_SCHEMA, "points"), (TORSION_SPRING_SCHEMA, "links"))
-            ]
-        },
-    },
-    "masses": {"type": "array", "items": _object_schema(MASS_SCHEMA, "link", "mass", "at")},
-    "gravity": _vector_schema("quantity"),
-    "sketch": {"type": "object", "additionalProperties": _vector_schema("length")},
-    "published": {"type": "array", "items": _object_schema(PUBLISHED_SCHEMA, "symbol", "quantity", "of")},
+    "planar": described({"const": FORMAT_VERSION}, "the version of this form of file"),
+    "name": described(_TEXT, "the mechanism's name, as titles have it"),
+    "ids": described(_TEXTS, "other names under which a model is found"),
+    "about": described(_TEXT, "what it does, in a sentence"),
+    "source": described(_TEXT, "the book or drawing that it is from"),
+    "geometry": described(
+        {"enum": list(GEOMETRY_SOURCES)}, "whether its dimensions are given there, or were recovered"
+    ),
+    "notes": described(_TEXTS, "remarks that are shown with its results"),
+    "units": described(_object_schema(UNITS_SCHEMA), "the units of bare numbers in this file, and of results"),
+    "frame": described(_TEXT, "the link that stands still"),
+    "links": described(_named_values_schema(schema_reference("link"), minProperties=1), "the links by their names"),
+    "pairs": described({"type": "array", "items": schema_reference("pair")}, "what joins the links"),
+    "inputs": described(
+        {"type": "array", "items": _object_schema(INPUT_SCHEMA, "pair", "position")},
+        "what is driven: as many as the mechanism has freedoms",
+    ),
+    "loads": described(_LOADS, "forces and torques that act on it"),
+    "springs": described(_SPRINGS, "springs and dampers, between two points or two links"),
+    "masses": described(
+        {"type": "array", "items": _object_schema(MASS_SCHEMA, "link", "mass", "at")}, "the masses of its links"
+    ),
+    "gravity": described(_vector_schema("quantity"), "the acceleration of weights, as [0, -9.81], in m/s^2"),
+    "sketch": described(
+        {"type": "object", "additionalProperties": _vector_schema("length")},
+        "roughly where some points are, in the frame's axes: the assembly nearest to them is taken",
+    ),
+    "published": described(
+        {"type": "array", "items": _object_schema(PUBLISHED_SCHEMA, "symbol", "quantity", "of")},
+        "values that the source prints, which are shown beside the exact ones",
+    ),
 }
 """Every key of a file, and what its value is."""
 
@@ -219,15 +281,17 @@ def schema() -> dict[str, Any]:
 
 
 def _pair_schema(kind: type[Pair]) -> Schema:
-    properties = {kind.keyword: schema_reference("name"), **kind.entry_schemas}
+    properties = {kind.keyword: described(schema_reference("name"), kind.entry_description), **kind.entry_schemas}
     return _object_schema(properties, kind.keyword, *kind.required_keys) | dict(kind.entry_rule)
 
 
 def _segment_schema(kind: type[LawSegment]) -> Schema:
     """The schema of one motion of an input's law."""
     values = {"time": schema_reference("time"), "number": {"type": "number", "exclusiveMinimum": 0, "maximum": 1}}
-    properties: Schema = {"motion": {"const": kind.motion}}
+    properties: Schema = {"motion": described({"const": kind.motion}, kind.description)}
     for name, key in kind.keys.items():
         value = values.get(key.value_kind, schema_reference("quantity"))
-        properties[name] = list_schema("quantity", 2, MAX_LAW_ITEMS) if key.is_list else value
+        properties[name] = described(
+            list_schema("quantity", 2, MAX_LAW_ITEMS) if key.is_list else value, key.description
+        )
     return _object_schema(properties, "motion", *(name for name, key in kind.keys.items() if key.is_required))

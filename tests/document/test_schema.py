@@ -87,6 +87,24 @@ def test_every_reference_of_the_schema_leads_somewhere_and_every_definition_is_u
     assert text.count('"$ref"') == sum(text.count(f'"#/$defs/{name}"') for name in schema()["$defs"])
 
 
+def keys_of(part, place="file"):
+    """Every key of a schema with its place and what is said of it."""
+    if isinstance(part, dict):
+        for name, own in part.get("properties", {}).items():
+            yield f"{place}.{name}", own
+        for name, own in part.items():
+            yield from keys_of(own, f"{place}/{name}")
+    elif isinstance(part, list):
+        for index, own in enumerate(part):
+            yield from keys_of(own, f"{place}[{index}]")
+
+
+def test_every_key_says_what_it_means():
+    conditions = {"minProperties"}  # no key of its own: what another way of writing it asks for
+    silent = [place for place, own in keys_of(schema()) if "description" not in own and set(own) != conditions]
+    assert silent == []
+
+
 @pytest.mark.parametrize("name", MODELS)
 def test_a_model_is_valid_as_it_is_written_and_as_it_is_written_back(name):
     assert wrong(MODELS[name]) is None

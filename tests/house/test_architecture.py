@@ -23,7 +23,7 @@ FLOORS = (
     {"dynamics", "batch", "assemblies"},
     {"analysis", "bench"},
     {"drawing", "reports"},
-    {"pages", "plot"},
+    {"pages", "plot", "guide"},
     {"cli"},
     {"__main__"},
 )

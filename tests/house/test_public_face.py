@@ -180,7 +180,10 @@ def test_every_command_of_a_model_takes_set_and_what_is_piped_in(name, tmp_path,
         "simulate": ["--duration", "0.01s", "--steps", "2"],
         "bench": ["--seconds", "0"],
         "cycle": ["--steps", "4"],
+        "problem": ["--vary", "2"],
+        "mark": ["answers.csv"],
     }
+    (tmp_path / "answers.csv").write_text("seed 1\nstudent,variant,quantity,value\nAnn,1,velocity of B,1\n")
     model = {"forces": "two-stroke-engine", "simulate": "physical-pendulum", "animate": "slider-crank"}
     monkeypatch.chdir(tmp_path)
     piped = json.dumps(write_mechanism(planar.load(model.get(name, "slider-crank")))).encode()

@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 from PIL import Image, ImageChops, ImageStat
 
-import planar
 from tests import command
 from tests.draws import SEARCH
 
@@ -36,7 +35,7 @@ COMMANDS = [
     for text in blocks("sh")
     for line in text.splitlines()
     if line.startswith("planar ")
-]
+] + [shlex.split(text) for text in re.findall(r"\) `(planar [^`]*)` \|", README)]
 
 
 @pytest.mark.parametrize("words", COMMANDS, ids=" ".join)
@@ -49,6 +48,12 @@ def test_commands_of_the_tour_run(words, folder):
         assert (folder / words[words.index("-o") + 1]).stat().st_size > 1000
     else:
         assert len(done.out) > 100
+
+
+def test_the_tour_has_ten_pictures_which_are_there_as_all_that_it_leads_to():
+    targets = re.findall(r"\]\(([^)\s]+)\)", README)
+    assert sum(target.startswith("planar/guide/pictures/") for target in targets) == 10
+    assert [target for target in targets if not (ROOT / target).is_file()] == []
 
 
 def test_the_tour_runs_as_it_stands_once_the_environment_is_activated(folder):
@@ -83,51 +88,21 @@ def test_the_python_snippet_runs(folder):
     assert done.returncode == 0, done.stderr
 
 
-def test_entries_of_pairs_that_it_shows_are_such():
-    from jsonschema import Draft202012Validator
-
-    whole = planar.schema()
-    check = Draft202012Validator({"$ref": "#/$defs/pair", "$defs": whole["$defs"]})
-    shown = [json.loads(text) for text in re.findall(r"`(\{.*?\})` \|", README)]
-    assert len(shown) >= 4
-    for entry in shown:
-        check.validate(entry)
-
-
-def test_what_acts_is_written_as_it_shows(folder):
-    """Every entry of loads, springs and masses, and how a load varies, put into its own mechanism file."""
-    told = README[README.index("- **Loads**") : README.index("- **Units**")].replace("\n ", "")
-    value = json.loads((folder / "press.json").read_text(encoding="utf-8"))
-    kinds = dict(zip(("loads", "springs", "masses"), told.split("\n- **"), strict=True))
-    for kind, text in kinds.items():
-        value[kind] = [json.loads(entry) for entry in re.findall(r"`(\{.*?\})`", text)]
-    value["loads"][0] |= json.loads("{" + re.search(r'`("varies": .*?)`', told).group(1) + "}")
-    value["loads"][0] |= {"axes": "BD"}
-    value |= json.loads("{" + re.search(r'`("gravity": .*?)`', told).group(1) + "}")
-    mechanism = planar.from_dict(value)
-    assert [len(getattr(mechanism, kind)) for kind in kinds] == [3, 2, 1]
-    assert planar.forces(planar.solve(mechanism)).proof.equilibrium < 1e-10
-
-
-def test_the_readme_names_every_room():
-    rooms = {path.relative_to(ROOT / "planar").with_suffix("").parts[0] for path in (ROOT / "planar").rglob("*.py")}
-    rooms -= {"__init__", "__main__"}
-    table = README.split("## How it works")[1]
-    assert all(re.search(rf"\b{room}\b", table) for room in rooms)
-
-
 def test_the_first_screen_has_a_sentence_a_picture_and_two_commands():
     first = README.splitlines()[:24]
-    assert any(re.fullmatch(r"!\[.+\]\(\.pictures/four-bar\.png\)", line) for line in first)
+    assert any(re.fullmatch(r"!\[.+\]\(\.pictures/klann-leg\.gif\)", line) for line in first)
     assert sum(line == "```sh" for line in first) == 2
 
 
-def test_the_picture_is_what_the_tool_makes_now(tmp_path):
-    command.run(tmp_path, "plot", "002-E3.1", "acceleration", "-o", "now.png").done()
-    now, shown = (Image.open(path).convert("L") for path in (tmp_path / "now.png", ROOT / ".pictures/four-bar.png"))
-    assert now.size == pytest.approx(shown.size, rel=0.02)
-    apart = ImageChops.difference(now, shown.resize(now.size))
-    assert ImageStat.Stat(apart).mean[0] < 2.0  # of 255: other versions of the library smooth otherwise
+def test_the_moving_picture_is_what_the_tool_makes_now(tmp_path):
+    command.run(tmp_path, "animate", "klann-leg", "--point", "foot", "-o", "now.gif").done()
+    with Image.open(tmp_path / "now.gif") as now, Image.open(ROOT / ".pictures/klann-leg.gif") as shown:
+        assert (now.n_frames, now.size) == (shown.n_frames, pytest.approx(shown.size, rel=0.02))
+        for frame in (0, now.n_frames // 3):
+            now.seek(frame)
+            shown.seek(frame)
+            apart = ImageChops.difference(now.convert("L"), shown.convert("L").resize(now.size))
+            assert ImageStat.Stat(apart).mean[0] < 2.0  # of 255: other versions of the library smooth otherwise
 
 
 def test_the_checks_run_exactly_the_readmes_test_command():

@@ -61,6 +61,11 @@ def compare_published(state: State) -> tuple[Comparison, ...]:
     return tuple(_compare(item, at(item.inputs), at(item.start)) for item in state.mechanism.published)
 
 
+def compare_value(item: PublishedValue, state: State) -> Comparison:
+    """One value beside that of a position."""
+    return _compare(item, state, state)
+
+
 def _compare(item: PublishedValue, state: State, start: State) -> Comparison:
     value = _solved_value(item, state, start)
     solved, sense = (value, _turning_sense(item, value)) if isinstance(value, float) else _size_and_sense(item, value)

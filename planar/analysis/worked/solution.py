@@ -94,7 +94,7 @@ def worked_solution(state: State, comparisons: Sequence[Comparison] = ()) -> Wor
     return WorkedSolution(
         state,
         tuple(given_data(state)),
-        tuple(_asked_for(state.mechanism.published)),
+        tuple(asked_phrases(state.mechanism.published)),
         velocity,
         acceleration,
         tuple(_link_results(state)),
@@ -105,7 +105,7 @@ def worked_solution(state: State, comparisons: Sequence[Comparison] = ()) -> Wor
     )
 
 
-def _asked_for(published: Sequence[PublishedValue]) -> Iterator[Phrase]:
+def asked_phrases(published: Sequence[PublishedValue]) -> Iterator[Phrase]:
     """What the book asks for, else all that there is."""
     found: dict[str, list[str]] = {}
     wanted = [item for item in published if PUBLISHED_QUANTITIES[item.quantity] in POLYGON_QUANTITIES]

@@ -68,9 +68,14 @@ INDENT = 8.0
 
 
 def solution_pages(
-    state: State, comparisons: Sequence[Comparison] = (), scales: Mapping[str, Scale] | None = None
+    state: State,
+    comparisons: Sequence[Comparison] = (),
+    scales: Mapping[str, Scale] | None = None,
+    title: str | None = None,
 ) -> list[Figure]:
     """The worked solution of a position on upright A4 pages, drawings to round scales unless they are given.
+
+    `title` stands on top in place of the mechanism's name.
 
     Raises BadInput where a given scale would make a drawing larger than a page, or matplotlib is missing.
     """
@@ -80,7 +85,7 @@ def solution_pages(
     solution = worked_solution(state, comparisons)
     used = {**_fitting_scales(solution), **(scales or {})}
     with rc_context(MATPLOTLIB_SETTINGS):
-        return lay_out_pages(_solution_strips(solution, used))
+        return lay_out_pages(_solution_strips(solution, used, title or state.mechanism.name))
 
 
 def encode_sheets(figures: Sequence[Figure], suffix: str) -> bytes:
@@ -139,10 +144,10 @@ def _fitting_scales(solution: WorkedSolution) -> dict[str, Scale]:
         found[half.kind] = round_scale(
             half.kind, unit_of_kind(half.kind, solution.state.mechanism.units)[0], width, height, most
         )
-    return found | {"length": _space_diagram_scale(solution.state)}
+    return found | {"length": space_diagram_scale(solution.state)}
 
 
-def _space_diagram_scale(state: State) -> Scale:
+def space_diagram_scale(state: State) -> Scale:
     """A round scale at which the strokes of the space diagram fit their room, wheels and guides included."""
     scale, length = space_scale(state.mechanism, plain_frames(state.frames), state.shapes), state.mechanism.units.length
     for _ in range(3):
@@ -155,9 +160,9 @@ def _space_diagram_scale(state: State) -> Scale:
     return scale
 
 
-def _solution_strips(solution: WorkedSolution, scales: Mapping[str, Scale]) -> Iterator[Strip]:
+def _solution_strips(solution: WorkedSolution, scales: Mapping[str, Scale], title: str) -> Iterator[Strip]:
     mechanism = solution.state.mechanism
-    yield from paragraph((mechanism.name,), TITLE_STYLE)
+    yield from paragraph((title,), TITLE_STYLE)
     if mechanism.source:
         yield from paragraph((mechanism.source,), TextStyle(9.5, slanted=True), space_before=0.5)
     yield from paragraph(("Given",), TOPIC_STYLE, space_before=3.0, keep_with_next=True)
@@ -171,7 +176,7 @@ def _solution_strips(solution: WorkedSolution, scales: Mapping[str, Scale]) -> I
         pictures.append(
             polygon_picture(half.polygon, scales[half.kind])._replace(title=f"{half.kind.capitalize()} polygon")
         )
-    yield from _picture_strips([_shorten_notes(picture) for picture in pictures])
+    yield from picture_strips([shorten_notes(picture) for picture in pictures])
     for count, half in enumerate(solution.worked_polygons, 1):
         yield from paragraph(
             (f"{count}. {half.kind.capitalize()} polygon",), SECTION_STYLE, space_before=5.0, keep_with_next=True
@@ -188,13 +193,13 @@ def _solution_strips(solution: WorkedSolution, scales: Mapping[str, Scale]) -> I
         yield from paragraph((note,), SMALL_STYLE, label="–", indent=4.0)
 
 
-def _shorten_notes(picture: Picture) -> Picture:
+def shorten_notes(picture: Picture) -> Picture:
     """A picture whose notes do not say its title again."""
     notes = [note.removeprefix("Space diagram, ").replace("^2", "²") for note in picture.notes]
     return picture._replace(notes=tuple(n for n in notes if n.lower() != picture.title.lower() and n[:1] != "μ"))
 
 
-def _picture_strips(pictures: Sequence[Picture]) -> Iterator[Strip]:
+def picture_strips(pictures: Sequence[Picture]) -> Iterator[Strip]:
     """Pictures side by side where they fit, else below each other."""
     made = [lay_out_picture(picture) for picture in pictures]
     for each in made:

@@ -29,8 +29,8 @@ class CamRise(LawSegment):
     duration: float
     by: float
     keys: ClassVar[Mapping[str, SegmentKey]] = {
-        "by": SegmentKey("by", "position"),
-        "in": SegmentKey("duration", "time"),
+        "by": SegmentKey("by", "position", "how far the input goes, from rest to rest"),
+        "in": SegmentKey("duration", "time", "how long it takes"),
     }
 
     @abstractmethod
@@ -69,6 +69,7 @@ class Polynomial345Rise(PolynomialRise):
     """3-4-5: velocity and acceleration are zero at both ends. Greatest 1.875, 5.7735, 60 times by / duration^k."""
 
     motion = "3-4-5"
+    description = "a rise by the polynomial 3-4-5: velocity and acceleration are zero at both ends"
     coefficients = (0, 0, 0, 10, -15, 6)
 
 
@@ -76,6 +77,7 @@ class Polynomial4567Rise(PolynomialRise):
     """4-5-6-7: jerk is zero at both ends too. Greatest 2.1875, 7.5132, 52.5 times by / duration^k."""
 
     motion = "4-5-6-7"
+    description = "a rise by the polynomial 4-5-6-7: jerk is zero at both ends too"
     coefficients = (0, 0, 0, 0, 35, -84, 70, -20)
 
 
@@ -83,6 +85,7 @@ class CycloidalRise(CamRise):
     """Cycloidal: acceleration is a full sine. Greatest 2, 2 pi, 4 pi^2 times by / duration^k."""
 
     motion = "cycloidal"
+    description = "a cycloidal rise: its acceleration is a full sine"
 
     def first_half(self, x: Array, is_mirrored: BoolArray) -> Array:
         turn = 2.0 * pi
@@ -94,6 +97,7 @@ class HarmonicRise(CamRise):
     """Simple harmonic: half a cosine, so acceleration jumps at both ends. Greatest pi/2, pi^2/2, pi^3/2."""
 
     motion = "harmonic"
+    description = "a simple harmonic rise: its acceleration jumps at both ends"
 
     def first_half(self, x: Array, is_mirrored: BoolArray) -> Array:
         c, s = np.cos(pi * x), np.sin(pi * x)
@@ -109,7 +113,15 @@ class RampedRise(CamRise):
     """
 
     ramp: float = 0.125
-    keys: ClassVar[Mapping[str, SegmentKey]] = {**CamRise.keys, "ramp": SegmentKey("ramp", "number", is_required=False)}
+    keys: ClassVar[Mapping[str, SegmentKey]] = {
+        **CamRise.keys,
+        "ramp": SegmentKey(
+            "ramp",
+            "number",
+            "the part of the time that each of four ramps takes, 1/4 at most; left out: 1/8",
+            is_required=False,
+        ),
+    }
     ramp_mean: ClassVar[float]
     "the mean of acceleration over a ramp, of its greatest"
 
@@ -152,6 +164,7 @@ class TrapezoidalRise(RampedRise):
     """
 
     motion = "trapezoidal"
+    description = "a rise of trapezoidal acceleration: jerk is constant piece by piece"
     ramp_mean = 0.5
 
     def ramp_integrals(self, x: Array) -> Array:
@@ -165,6 +178,7 @@ class ModifiedTrapezoidalRise(RampedRise):
     """
 
     motion = "modified trapezoidal"
+    description = "a rise of modified trapezoidal acceleration, with ramps that are quarters of a sine"
     ramp_mean = 2.0 / pi
 
     def ramp_integrals(self, x: Array) -> Array:

@@ -18,7 +18,8 @@ class DwellSegment(LawSegment):
 
     duration: float
     motion: ClassVar[str] = "dwell"
-    keys: ClassVar[Mapping[str, SegmentKey]] = {"in": SegmentKey("duration", "time")}
+    description: ClassVar[str] = "the input rests"
+    keys: ClassVar[Mapping[str, SegmentKey]] = {"in": SegmentKey("duration", "time", "how long it takes")}
 
     def evaluate(self, t: Array, velocity: float) -> Array:
         return np.zeros((4, len(t)))
@@ -38,10 +39,13 @@ class ConstantSpeedSegment(LawSegment):
     by: float | None = None
     speed: float | None = None
     motion: ClassVar[str] = "constant speed"
+    description: ClassVar[str] = "the input goes on at constant speed"
     keys: ClassVar[Mapping[str, SegmentKey]] = {
-        "by": SegmentKey("by", "position", is_required=False),
-        "speed": SegmentKey("speed", "velocity", is_required=False),
-        "in": SegmentKey("duration", "time"),
+        "by": SegmentKey("by", "position", "how far the input goes, in place of speed", is_required=False),
+        "speed": SegmentKey(
+            "speed", "velocity", "its speed; with neither, that of the piece before", is_required=False
+        ),
+        "in": SegmentKey("duration", "time", "how long it takes"),
     }
 
     def evaluate(self, t: Array, velocity: float) -> Array:
@@ -71,9 +75,12 @@ class ConstantAccelerationSegment(LawSegment):
     duration: float
     acceleration: float
     motion: ClassVar[str] = "constant acceleration"
+    description: ClassVar[str] = "the input goes on at constant acceleration"
     keys: ClassVar[Mapping[str, SegmentKey]] = {
-        "acceleration": SegmentKey("acceleration", "acceleration"),
-        "in": SegmentKey("duration", "time"),
+        "acceleration": SegmentKey(
+            "acceleration", "acceleration", "its acceleration, from the speed of the piece before"
+        ),
+        "in": SegmentKey("duration", "time", "how long it takes"),
     }
 
     def evaluate(self, t: Array, velocity: float) -> Array:

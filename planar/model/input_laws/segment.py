@@ -19,11 +19,13 @@ MAX_LAW_ITEMS = 10_000
 class SegmentKey(NamedTuple):
     """A key of a piece in a file: the field that it fills, and what its value is.
 
-    `what` is "time", "number", or what of the input it is: "position", "velocity", "acceleration".
+    `value_kind` is "time", "number", or what of the input it is: "position", "velocity", "acceleration";
+    `description` says what it means, for who writes a file.
     """
 
     field: str
     value_kind: str
+    description: str
     is_required: bool = True
     is_list: bool = False
 
@@ -36,6 +38,8 @@ class LawSegment(ABC):
     """
 
     motion: ClassVar[str]
+    description: ClassVar[str]
+    "what it does, for who writes a file"
     keys: ClassVar[Mapping[str, SegmentKey]]
 
     if TYPE_CHECKING:  # a field, or made of the fields
@@ -61,7 +65,7 @@ class LawSegment(ABC):
 
     def find_problem(self) -> tuple[str, str] | None:
         """The key whose value cannot be meant, and why."""
-        for key, (field, _, _, many) in self.keys.items():
+        for key, (field, _, _, _, many) in self.keys.items():
             value = getattr(self, field)
             if value is None and getattr(type(self), field, 0.0) is None:
                 continue  # left out

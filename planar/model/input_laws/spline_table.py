@@ -39,9 +39,12 @@ class TableSegment(LawSegment):
     times: tuple[float, ...]
     positions: tuple[float, ...]
     motion: ClassVar[str] = "table"
+    description: ClassVar[str] = "a smooth spline through the points of a table"
     keys: ClassVar[Mapping[str, SegmentKey]] = {
-        "times": SegmentKey("times", "time", is_list=True),
-        "positions": SegmentKey("positions", "position", is_list=True),
+        "times": SegmentKey(
+            "times", "time", "rising times from where the piece starts, the first of them 0", is_list=True
+        ),
+        "positions": SegmentKey("positions", "position", "the input's positions at them", is_list=True),
     }
 
     @property

@@ -43,6 +43,8 @@ class Pair(ABC):
 
     keyword: ClassVar[str]
     """The key that marks the type in a mechanism file."""
+    entry_description: ClassVar[str]
+    """What the value of its keyword is, for who writes a file."""
     entry_schemas: ClassVar[Mapping[str, Schema]]
     """The other keys of its entry, each with what JSON Schema says of its value."""
     required_keys: ClassVar[tuple[str, ...]] = ()
@@ -247,6 +249,11 @@ Schema = dict[str, Any]
 def schema_reference(name: str) -> Schema:
     """The schema of a kind of value that several entries have, such as "length" or "point"."""
     return {"$ref": f"#/$defs/{name}"}
+
+
+def described(schema: Schema, text: str) -> Schema:
+    """A key's schema with what the key means, which editors show while one types."""
+    return {**schema, "description": text}
 
 
 def list_schema(item: str, least: int, most: int | None = None) -> Schema:

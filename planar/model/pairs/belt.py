@@ -15,6 +15,7 @@ from planar.model.pairs.base import (
     PairSample,
     QuantityWriter,
     Schema,
+    described,
     list_schema,
     schema_reference,
 )
@@ -32,15 +33,21 @@ class BeltPair(WheelPair):
     crossed: bool = False
 
     keyword: ClassVar[str] = "belt"
+    entry_description: ClassVar[str] = "a belt on two wheels: its name"
     acts_at_distance: ClassVar[bool] = True
     entry_schemas: ClassVar[Mapping[str, Schema]] = {
         **WheelPair.entry_schemas,
-        "radii": list_schema("size", 2, 2),
-        "teeth": {
-            **list_schema("number", 2, 2),
-            "items": {"type": "integer", **schema_reference("number"), "minimum": 1},
-        },
-        "crossed": {"type": "boolean"},
+        "radii": described(list_schema("size", 2, 2), "the radii of both wheels"),
+        "teeth": described(
+            {
+                **list_schema("number", 2, 2),
+                "items": {"type": "integer", **schema_reference("number"), "minimum": 1},
+            },
+            "the numbers of teeth of both wheels, in place of radii",
+        ),
+        "crossed": described(
+            {"type": "boolean"}, "true where the loop crosses itself, so that the wheels turn opposite ways"
+        ),
     }
     entry_rule: ClassVar[Schema] = {**WheelPair.entry_rule, "not": {"required": ["ratio", "crossed"]}}
 
@@ -107,3 +114,4 @@ class ChainPair(BeltPair):
     """Sprockets: ratio of their teeth or radii."""
 
     keyword: ClassVar[str] = "chain"
+    entry_description: ClassVar[str] = "a chain on two wheels: its name"

@@ -22,6 +22,7 @@ class GearPair(WheelPair):
     pressure_angle: float = STANDARD_PRESSURE_ANGLE
 
     keyword: ClassVar[str] = "gear"
+    entry_description: ClassVar[str] = "a pair of gears: its name"
     entry_schemas: ClassVar[Mapping[str, Schema]] = {**WheelPair.entry_schemas, **TEETH_SCHEMA}
 
     def ratio(self) -> Scalar:

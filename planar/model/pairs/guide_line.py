@@ -16,15 +16,18 @@ from planar.model.pairs.base import (
     Pair,
     QuantityWriter,
     Schema,
+    described,
     schema_reference,
 )
 
 LINE_SCHEMA: Schema = {
     "type": "object",
     "properties": {
-        "through": schema_reference("spot"),
-        "to": schema_reference("spot"),
-        "angle": schema_reference("angle"),
+        "through": described(schema_reference("spot"), "a point of the link, or [x, y], from which distances count"),
+        "to": described(schema_reference("spot"), "a second point of the line, in place of its angle"),
+        "angle": described(
+            schema_reference("angle"), "the line's direction, anticlockwise from the link's x-axis; left out: 0"
+        ),
     },
     "required": ["through"],
     "not": {"required": ["to", "angle"]},

@@ -19,6 +19,7 @@ from planar.model.pairs.base import (
     QuantityWriter,
     Schema,
     ToothContact,
+    described,
     list_schema,
     sample_shape,
     schema_reference,
@@ -42,17 +43,27 @@ class RackPair(GuidedPair):
     pressure_angle: float = STANDARD_PRESSURE_ANGLE
 
     keyword: ClassVar[str] = "rack"
+    entry_description: ClassVar[str] = "a rack with its pinion: its name"
     entry_schemas: ClassVar[Mapping[str, Schema]] = {
-        "links": list_schema("name", 2, 2) | {"uniqueItems": True},
-        "line": LINE_SCHEMA,
-        "point": schema_reference("name"),
-        "radius": {**schema_reference("length"), "not": {"const": 0}},
-        "mesh": {
-            "type": "object",
-            "properties": {"displacement": schema_reference("length"), "angle": schema_reference("angle")},
-            "required": ["displacement", "angle"],
-            "additionalProperties": False,
-        },
+        "links": described(list_schema("name", 2, 2) | {"uniqueItems": True}, "the rack, then the pinion"),
+        "line": described(LINE_SCHEMA, "the pitch line, in the rack"),
+        "point": described(schema_reference("name"), "the pinion's centre"),
+        "radius": described(
+            {**schema_reference("length"), "not": {"const": 0}},
+            "the pinion's pitch radius; negative where its centre lies to the right of the pitch line",
+        ),
+        "mesh": described(
+            {
+                "type": "object",
+                "properties": {
+                    "displacement": described(schema_reference("length"), "how far along the line the pinion stands"),
+                    "angle": described(schema_reference("angle"), "the pinion's angle against the rack there"),
+                },
+                "required": ["displacement", "angle"],
+                "additionalProperties": False,
+            },
+            "where the pinion stands along the line at one of its angles; left out: 0 meets 0",
+        ),
         **TEETH_SCHEMA,
     }
     required_keys: ClassVar[tuple[str, ...]] = ("links", "line", "point", "radius")

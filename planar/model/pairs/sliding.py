@@ -18,6 +18,7 @@ from planar.model.pairs.base import (
     PairSample,
     QuantityWriter,
     Schema,
+    described,
     list_schema,
     sample_shape,
     schema_reference,
@@ -36,13 +37,23 @@ class SlidingPair(GuidedPair):
     block_angle: float = 0.0
 
     keyword: ClassVar[str] = "sliding"
+    entry_description: ClassVar[str] = "a sliding pair: its name"
     entry_schemas: ClassVar[Mapping[str, Schema]] = {
-        "links": list_schema("name", 2, 2) | {"uniqueItems": True},
-        "on": schema_reference("name"),
-        "block": schema_reference("name"),
-        "line": LINE_SCHEMA,
-        "point": schema_reference("name"),
-        "turn": schema_reference("angle"),
+        "links": described(
+            list_schema("name", 2, 2) | {"uniqueItems": True},
+            "the link with the line, then the one that slides along it",
+        ),
+        "on": described(schema_reference("name"), "the link with the line, where a block slides on it"),
+        "block": described(
+            schema_reference("name"),
+            "a point: a block slides that is pinned there to the links that carry it, in place of links and point",
+        ),
+        "line": described(LINE_SCHEMA, "the line of sliding, in the first link"),
+        "point": described(schema_reference("name"), "the point of the second link that stays on the line"),
+        "turn": described(
+            schema_reference("angle"),
+            "the fixed angle, anticlockwise, from the line to the second link's x-axis; left out: 0",
+        ),
     }
     required_keys: ClassVar[tuple[str, ...]] = ("line",)
     entry_rule: ClassVar[Schema] = {

@@ -16,6 +16,7 @@ from planar.model.pairs.base import (
     PairSample,
     QuantityWriter,
     Schema,
+    described,
     list_schema,
     sample_shape,
     schema_reference,
@@ -29,10 +30,13 @@ class SlotPair(GuidedPair):
     """A slot along a line of the first link, in which a pin at `point` of the second link slides."""
 
     keyword: ClassVar[str] = "slot"
+    entry_description: ClassVar[str] = "a pin in a slot: its name"
     entry_schemas: ClassVar[Mapping[str, Schema]] = {
-        "links": list_schema("name", 2, 2) | {"uniqueItems": True},
-        "line": LINE_SCHEMA,
-        "point": schema_reference("name"),
+        "links": described(
+            list_schema("name", 2, 2) | {"uniqueItems": True}, "the link with the slot, then that of the pin"
+        ),
+        "line": described(LINE_SCHEMA, "the slot's middle line, in the first link"),
+        "point": described(schema_reference("name"), "the pin, a point of the second link, which may turn in the slot"),
     }
     required_keys: ClassVar[tuple[str, ...]] = ("links", "line", "point")
     is_lower_pair: ClassVar[bool] = False

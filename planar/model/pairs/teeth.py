@@ -6,11 +6,15 @@ from collections.abc import Mapping
 from math import pi, radians
 from typing import Any
 
-from planar.model.pairs.base import EntryReader, QuantityWriter, Schema, schema_reference
+from planar.model.pairs.base import EntryReader, QuantityWriter, Schema, described, schema_reference
 
 STANDARD_PRESSURE_ANGLE = radians(20.0)
 """Of involute teeth by ISO 53, unless said."""
-TEETH_SCHEMA: Mapping[str, Schema] = {"pressure_angle": schema_reference("angle")}
+TEETH_SCHEMA: Mapping[str, Schema] = {
+    "pressure_angle": described(
+        schema_reference("angle"), "the angle at which the teeth press, which forces need; left out: 20 degrees"
+    )
+}
 
 
 def read_pressure_angle(entry: EntryReader) -> float:

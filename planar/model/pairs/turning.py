@@ -18,6 +18,7 @@ from planar.model.pairs.base import (
     PairSample,
     QuantityWriter,
     Schema,
+    described,
     list_schema,
     sample_shape,
     schema_reference,
@@ -34,11 +35,19 @@ class TurningPair(Pair):
     radius: float | None = None
 
     keyword: ClassVar[str] = "turning"
+    entry_description: ClassVar[str] = (
+        "a turning pair: the point that its links carry, or its name where their points have others"
+    )
     entry_schemas: ClassVar[Mapping[str, Schema]] = {
-        "links": list_schema("name", 2) | {"uniqueItems": True},
-        "points": list_schema("name", 2),
-        "pin_radius": schema_reference("size"),
-        "pin_diameter": schema_reference("size"),
+        "links": described(
+            list_schema("name", 2) | {"uniqueItems": True},
+            "the links that the pin holds, two or more; left out: all that carry a point of its name, the frame first",
+        ),
+        "points": described(
+            list_schema("name", 2), "the pin's point on each of the links, where they have other names for it"
+        ),
+        "pin_radius": described(schema_reference("size"), "the pin's radius, for rubbing speeds"),
+        "pin_diameter": described(schema_reference("size"), "the pin's diameter, in place of pin_radius"),
     }
     entry_rule: ClassVar[Schema] = {"not": {"required": ["pin_radius", "pin_diameter"]}}
     is_lower_pair: ClassVar[bool] = True

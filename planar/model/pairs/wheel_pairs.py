@@ -20,6 +20,7 @@ from planar.model.pairs.base import (
     PairSample,
     QuantityWriter,
     Schema,
+    described,
     list_schema,
     sample_shape,
     schema_reference,
@@ -46,26 +47,40 @@ class WheelPair(Pair):
     mesh_reference: tuple[float, float] = (0.0, 0.0)
 
     entry_schemas: ClassVar[Mapping[str, Schema]] = {
-        "links": list_schema("name", 2, 2) | {"uniqueItems": True},
-        "carrier": schema_reference("name"),
-        "radii": {**list_schema("length", 2, 2), "items": {**schema_reference("length"), **NONZERO_SCHEMA}},
-        "teeth": {
-            **list_schema("number", 2, 2),
-            "items": {**schema_reference("number"), **NONZERO_SCHEMA, "type": "integer"},
-        },
-        "ratio": {
-            **schema_reference("number"),
-            "anyOf": [
-                {"minimum": 1.0 / LARGEST_RATIO, "maximum": LARGEST_RATIO},
-                {"minimum": -LARGEST_RATIO, "maximum": -1.0 / LARGEST_RATIO},
-            ],
-        },
-        "mesh": {
-            "type": "object",
-            "additionalProperties": schema_reference("angle"),
-            "minProperties": 2,
-            "maxProperties": 2,
-        },
+        "links": described(list_schema("name", 2, 2) | {"uniqueItems": True}, "the first and the second wheel"),
+        "carrier": described(
+            schema_reference("name"), "the link on which both wheels turn, as the arm of planets; left out: the frame"
+        ),
+        "radii": described(
+            {**list_schema("length", 2, 2), "items": {**schema_reference("length"), **NONZERO_SCHEMA}},
+            "the pitch radii of both; that of an internal wheel is negative; the centres lie as far apart as they say",
+        ),
+        "teeth": described(
+            {
+                **list_schema("number", 2, 2),
+                "items": {**schema_reference("number"), **NONZERO_SCHEMA, "type": "integer"},
+            },
+            "the numbers of teeth, in place of radii; those of an internal wheel are negative",
+        ),
+        "ratio": described(
+            {
+                **schema_reference("number"),
+                "anyOf": [
+                    {"minimum": 1.0 / LARGEST_RATIO, "maximum": LARGEST_RATIO},
+                    {"minimum": -LARGEST_RATIO, "maximum": -1.0 / LARGEST_RATIO},
+                ],
+            },
+            "how fast the second turns beside the first, against the carrier; negative where they turn opposite ways",
+        ),
+        "mesh": described(
+            {
+                "type": "object",
+                "additionalProperties": schema_reference("angle"),
+                "minProperties": 2,
+                "maxProperties": 2,
+            },
+            "an angle of each wheel against the carrier, by the links' names, at which they meet; left out: 0 meets 0",
+        ),
     }
     required_keys: ClassVar[tuple[str, ...]] = ("links",)
     entry_rule: ClassVar[Schema] = {"oneOf": [{"required": [key]} for key in SIZE_KEYS]}

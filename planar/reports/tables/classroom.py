@@ -1,0 +1,93 @@
+"""Variants of a problem and marks, as tables for a terminal and as JSON values."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from rich.console import Group, RenderableType
+from rich.text import Text
+
+from planar.analysis.classroom.marking import RIGHT, MarkedValue, StudentMarks
+from planar.analysis.classroom.questions import problem_questions, question_text, solve_question
+from planar.analysis.classroom.variants import Variant
+from planar.document.dimensions import file_dimensions
+from planar.foundation.units import display_unit
+from planar.model.mechanism import PUBLISHED_QUANTITIES, FileUnits
+from planar.reports.fitted_table import plain_table
+from planar.reports.number_format import DIGITS
+from planar.results.motion import State
+
+
+def variants_tables(base: State, variants: Sequence[Variant], seed: int) -> RenderableType:
+    """The numbers of all variants, then what is asked with the answers."""
+    mechanism = base.mechanism
+    kinds = {name: display_unit(each.kind, mechanism.units) for name, each in file_dimensions(mechanism).items()}
+    names = list(variants[0].values)
+    numbers = plain_table("Numbers", "variant", *(f"{name} ({kinds[name][0]})" for name in names), keys=1)
+    for each in variants:
+        shown = (f"{kinds[name][1].from_si(value):.{DIGITS}g}" for name, value in each.values.items())
+        numbers.add_row(str(each.number), *shown)
+    questions = problem_questions(base)
+    units = [display_unit(PUBLISHED_QUANTITIES[item.quantity], mechanism.units) for item in questions]
+    heads = (f"{question_text(item)} ({name})" for item, (name, _) in zip(questions, units, strict=True))
+    answers = plain_table("Answers", "variant", *heads, keys=1)
+    for each in variants:
+        solved = (solve_question(each.state, item).solved for item in questions)
+        values = (f"{unit.from_si(value):.{DIGITS}g}" for value, (_, unit) in zip(solved, units, strict=True))
+        answers.add_row(str(each.number), *values)
+    return Group(Text(f"{mechanism.name}: problem {seed}", style="bold"), Text(), numbers, Text(), answers)
+
+
+def variants_record(base: State, variants: Sequence[Variant], seed: int) -> dict[str, Any]:
+    """The same as a JSON value (SI)."""
+    questions = problem_questions(base)
+
+    def record(variant: Variant) -> dict[str, Any]:
+        answers = {question_text(item): solve_question(variant.state, item).solved for item in questions}
+        return {"variant": variant.number, "values": variant.values, "answers": answers}
+
+    return {"mechanism": base.mechanism.name, "seed": seed, "variants": [record(each) for each in variants]}
+
+
+def marks_tables(marks: Sequence[StudentMarks], units: FileUnits) -> RenderableType:
+    """How many answers of each student are right, then each that is not."""
+    whole = plain_table("Marks", "student", "variant", "right", "of", left=(0,), keys=2)
+    wrong = plain_table(
+        "Not right", "student", "variant", "what", "handed in", "solved", "unit", "why", left=(0, 2, 5, 6)
+    )
+    for each in marks:
+        whole.add_row(each.student, str(each.variant), str(each.right), str(each.asked))
+        for value in each.values:
+            if value.verdict != RIGHT:
+                wrong.add_row(each.student, str(each.variant), *_wrong_cells(value, units))
+    return Group(whole, Text(), wrong) if any(each.right < len(each.values) for each in marks) else whole
+
+
+def _wrong_cells(value: MarkedValue, units: FileUnits) -> tuple[str, ...]:
+    name, unit = display_unit(PUBLISHED_QUANTITIES[value.question.quantity], units)
+    handed_in = "-" if value.handed_in is None else f"{unit.from_si(value.handed_in):.{DIGITS}g}"
+    solved = f"{unit.from_si(value.solved):.{DIGITS}g}"
+    return question_text(value.question), handed_in, solved, name, value.verdict
+
+
+def marks_record(marks: Sequence[StudentMarks]) -> list[dict[str, Any]]:
+    """The same as a JSON value (SI)."""
+    return [
+        {
+            "student": each.student,
+            "variant": each.variant,
+            "right": each.right,
+            "asked": each.asked,
+            "values": [
+                {
+                    "quantity": question_text(value.question),
+                    "handed_in": value.handed_in,
+                    "solved": value.solved,
+                    "verdict": value.verdict,
+                }
+                for value in each.values
+            ],
+        }
+        for each in marks
+    ]

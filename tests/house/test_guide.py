@@ -1,0 +1,160 @@
+"""The guide: its commands and snippets run as a reader would, its links lead somewhere, its site is whole."""
+
+import json
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from jsonschema import Draft202012Validator
+from PIL import Image, ImageChops, ImageStat
+
+import planar
+from planar import plot
+from planar.foundation.errors import BadInput
+from planar.guide.keys_page import keys_page
+from planar.guide.reference import reference_names
+from planar.guide.topics import FIRST_PAGE, find_topic, guide_topics, read_page
+from tests import command
+from tests.guide_pictures import PICTURES
+
+ROOT = Path(__file__).parents[2]
+FOLDER = ROOT / "planar" / "guide"
+PAGES = {path: read_page(path) for path in (FIRST_PAGE, *(each.path for each in guide_topics()))}
+FILES = {
+    name: text
+    for page in PAGES.values()
+    for name, text in re.findall(r"<!-- file: (\S+) -->\n```json\n(.*?)```", page, re.DOTALL)
+}
+
+
+def blocks(page: str, kind: str) -> list[str]:
+    return re.findall(rf"```{kind}\n(.*?)```", PAGES[page], re.DOTALL)
+
+
+TIMES = ("time-designs", "time-links")
+"""Pictures of speeds, which `python -m benchmarks` draws."""
+COMMANDS = {
+    line: None
+    for page in PAGES
+    for text in blocks(page, "sh")
+    for line in text.splitlines()
+    if line.startswith("planar ")
+}
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    for name, text in FILES.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    return tmp_path
+
+
+@pytest.mark.parametrize("line", COMMANDS)
+def test_a_command_of_the_guide_runs(line, folder):
+    line = line.partition(" > ")[0]
+    words = shlex.split(line, comments=True)
+    done = command.run(folder, *words[1:])
+    if "# refused" in line:
+        assert done.status in (1, 2)
+        assert done.err
+        return
+    done.done()
+    if "-o" in words:
+        made = folder / words[words.index("-o") + 1]
+        assert made.is_dir() or made.stat().st_size > 500
+    else:
+        assert len(done.out) > 100
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if blocks(page, "python")])
+def test_the_snippets_of_a_page_run(page, folder):
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONWARNINGS": "error"}
+    code = [sys.executable, "-c", "\n".join(blocks(page, "python"))]
+    done = subprocess.run(code, cwd=folder, capture_output=True, text=True, env=environment, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_link_and_picture_of_a_page_is_there(page):
+    for target in re.findall(r"\]\(([^)\s]+)\)", PAGES[page]):
+        if not target.startswith("http"):
+            assert ((FOLDER / page).parent / target).is_file(), target
+
+
+def test_every_page_is_listed_once_and_begins_with_its_title():
+    held = [path.relative_to(FOLDER).with_suffix("").as_posix() for path in FOLDER.rglob("*.md")]
+    assert sorted(PAGES) == sorted(held)
+    assert len({each.name for each in guide_topics()}) == len(guide_topics())
+    for each in guide_topics():
+        assert each.text().startswith(f"# {each.title}\n")
+
+
+def test_the_page_of_keys_is_that_of_the_schema():
+    assert PAGES["begin/keys"] == keys_page()
+
+
+def test_a_topic_is_known_by_its_name_and_its_title_and_others_are_offered():
+    assert find_topic("first-hour") == find_topic("The first hour")
+    with pytest.raises(BadInput, match="did you mean 'first-hour'"):
+        find_topic("first-our")
+
+
+def test_the_terminal_shows_a_page_and_what_there_is(tmp_path):
+    shown = command.run(tmp_path, "guide").done()
+    assert all(each.title in shown for each in guide_topics())
+    assert "dead point" in command.run(tmp_path, "guide", "glossary").done()
+
+
+def test_every_public_name_is_in_the_reference():
+    held = [name for names in reference_names().values() for name in names]
+    assert sorted(held) == sorted(planar.__all__)
+    assert all(reference_names().values())
+
+
+def test_the_site_is_made_without_a_warning_and_holds_all(tmp_path):
+    done = command.run(tmp_path, "guide", "--html", "-o", "site").done()
+    site = tmp_path / "site"
+    assert Path(done.strip()).name == "index.html"
+    whole = {path.relative_to(site).as_posix(): path for path in site.rglob("*") if path.is_file()}
+    assert {f"{path}.html" for path in PAGES} <= set(whole)
+    assert sum(path.stat().st_size for path in whole.values()) < 5e6
+    index = whole["searchindex.js"].read_text(encoding="utf-8")
+    assert "transmiss" in index  # what is searched are stems
+    reference = "".join(
+        path.read_text(encoding="utf-8") for name, path in whole.items() if name.startswith("reference")
+    )
+    assert all(f"planar.{name}" in reference for name in planar.__all__ if name != "plot")
+
+
+def test_every_picture_is_shown_and_one_is_what_the_tool_makes_now(tmp_path):
+    shown = {target for page in PAGES.values() for target in re.findall(r"\]\((?:\.\./)*pictures/(\S+)\.png\)", page)}
+    assert shown == {*PICTURES, *TIMES} == {path.stem for path in (FOLDER / "pictures").iterdir()}
+    plot.save(PICTURES["sliding"](), tmp_path / "now.png")
+    now, kept = (Image.open(path).convert("L") for path in (tmp_path / "now.png", FOLDER / "pictures" / "sliding.png"))
+    apart = ImageChops.difference(now.resize(kept.size), kept)
+    assert ImageStat.Stat(apart).mean[0] < 2.0  # of 255: other versions of the library smooth otherwise
+
+
+def test_entries_that_the_page_on_writing_shows_are_such(folder):
+    """Every entry of pairs, and of loads, springs and masses put into its own mechanism file."""
+    check = Draft202012Validator({"$ref": "#/$defs/pair", "$defs": planar.schema()["$defs"]})
+    shown = [text for block in blocks("begin/writing", "json") for text in block.splitlines()]
+    pairs = [json.loads(text) for text in shown if re.match(r'\{"(turning|sliding|slot|gear|belt|rack)"', text)]
+    assert len(pairs) >= 7
+    for entry in pairs:
+        check.validate(entry)
+    value = json.loads((folder / "press.json").read_text(encoding="utf-8"))
+    acting = next(block for block in blocks("begin/writing", "json") if '"loads"' in block)
+    mechanism = planar.from_dict(value | json.loads("{" + acting + "}"))
+    assert [len(each) for each in (mechanism.loads, mechanism.springs, mechanism.masses)] == [3, 1, 1]
+    assert planar.forces(planar.solve(mechanism)).proof.equilibrium < 1e-10
+
+
+def test_the_page_on_how_it_is_built_names_every_room():
+    rooms = {path.relative_to(ROOT / "planar").with_suffix("").parts[0] for path in (ROOT / "planar").rglob("*.py")}
+    rooms -= {"__init__", "__main__"}
+    assert [room for room in rooms if not re.search(rf"\b{room}\b", PAGES["look-up/house"])] == []
