@@ -1,4 +1,4 @@
-"""`python -m benchmarks` measures everything in one run and prints it; `--readme` writes README's table and plots."""
+"""`python -m benchmarks` measures everything in one run and prints it; `--write` writes the guide's page on speed."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rich.console import Console, RenderableType
 from rich.progress import Progress
 from rich.text import Text
 
-from benchmarks import readme, tables
+from benchmarks import speed_page, tables
 from benchmarks.comparison import compare
 from benchmarks.compiling import compilings
 from benchmarks.contests import contests
@@ -31,7 +31,7 @@ LONG, CODE, COLD = "up to ten thousand links", "machine code", "cold start"
 def main() -> None:
     """Measure, then print, then write."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description="Measures everything in one run.")
-    parser.add_argument("--readme", action="store_true", help="write README's table and plots")
+    parser.add_argument("--write", action="store_true", help="write the guide's page on speed, with its plots")
     wanted = parser.parse_args()
     console = Console()
     if not console.is_terminal:
@@ -61,9 +61,9 @@ def main() -> None:
     console.print(tables.notes())
     for name, each in found.items():
         console.print(_shown(name, each, {contest.name for contest in held}))
-    if wanted.readme:
+    if wanted.write:
         results = [result for contest in held for result in found[contest.name]]
-        readme.write(
+        speed_page.write(
             ROOT, versions(), results, found[DESIGNS], found[ROW], tables=(found[LONG], found[CODE], found[COLD])
         )
 

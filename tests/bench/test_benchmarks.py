@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import planar
-from benchmarks import by_planar, compiling, dyadic, long, peers, readme
+from benchmarks import by_planar, compiling, dyadic, long, peers, speed_page
 from benchmarks.contests import Contest, Result
 from benchmarks.curves import Curve
 from benchmarks.limit import LANES, compiled
@@ -122,23 +122,25 @@ def test_peers_find_what_planar_finds(name):
             assert far(entry.read(entry.solve()), exact).max() < WITHIN.get(name, 1e-9), (name, swept.name)
 
 
-def test_readme_gets_its_table_and_plots_between_its_markers(tmp_path):
+def test_the_page_on_speed_gets_its_table_and_plots_between_its_markers(tmp_path):
     results = [
         Result("four-bar", "C by hand", False, 1e-9, 1.0, 1e-16, 10, 1, 0),
         Result("four-bar", "planar.sweep, native", False, 5e-9, 5.0, 2e-16, 10, 1, 0),
         Result("four-bar", "planar.sweep, native", True, 1.1e-8, 2.5, 3e-15, 10, 1, 0),
     ]
     curves = [Curve("C by hand", (1, 10), (1e-8, 1e-9), 1e-16), Curve("planar", (1, 10), (1e-6, 1e-7), 1e-16)]
-    path = tmp_path / "README.md"
+    path = tmp_path / speed_page.PAGE
+    path.parent.mkdir(parents=True)
     path.write_text("nothing", encoding="utf-8")
-    with pytest.raises(ValueError, match="README"):
-        readme.write(tmp_path, "planar", results, curves, curves)
-    path.write_text(f"before\n{readme.START}\nold\n{readme.END}\nafter\n", encoding="utf-8")
-    readme.write(tmp_path, "planar", results, curves, curves)
+    with pytest.raises(ValueError, match="speed"):
+        speed_page.write(tmp_path, "planar", results, curves, curves)
+    path.write_text(f"before\n{speed_page.START}\nold\n{speed_page.END}\nafter\n", encoding="utf-8")
+    speed_page.write(tmp_path, "planar", results, curves, curves)
     text = path.read_text(encoding="utf-8")
     assert text.startswith("before\n") and text.endswith("\nafter\n") and "old" not in text
     assert "|  | planar.sweep, native | 5 ns | 11 ns | 5 / 2.5 | 3e-15 | 1 of 10 (0) |" in text
-    assert all((tmp_path / picture).stat().st_size > 5000 for picture in readme.PICTURES.values())
+    folder = tmp_path / speed_page.PICTURES_FOLDER
+    assert all((folder / picture).stat().st_size > 5000 for picture in speed_page.PICTURES.values())
 
 
 def test_random_linkages_of_dyads_are_c_by_hand_and_numpys_closed_form(limit):
@@ -238,7 +240,7 @@ def test_code_is_printed_and_compiled_by_one_process_and_read_by_another():
     assert first.reading < first.compiling
 
 
-def test_readme_has_the_other_tables_too():
+def test_the_page_on_speed_has_the_other_tables_too():
     tables = (
         [
             long.Long("rows", (10, 100), (2e-9, 3e-9), (1e-9, None), 1e-15),
@@ -247,7 +249,7 @@ def test_readme_has_the_other_tables_too():
         [compiling.Compiling("four-bar", 0.01, 0.04, 0.002)],
         [Process("python -c pass", 0.1, 1.0)],
     )
-    text = readme.section("planar", [], tables)
+    text = speed_page.section("planar", [], tables)
     assert "| rows | 2 ns (2 times C) | 3 ns | 1e-15 |" in text
     assert "| triads | 5 ns | not waited for | 0e+00 |" in text
     assert "| four-bar | 10 ms | 40 ms | 2 ms |" in text

@@ -1,4 +1,4 @@
-"""README's table and plots, written between their markers from one run's measurements."""
+"""The guide's page on speed: its tables and plots, written between their markers from one run's measurements."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from benchmarks.processes import Process
 from benchmarks.tables import time
 
 START, END = "<!-- benchmarks -->", "<!-- /benchmarks -->"
-PICTURES = {"designs": ".pictures/time-designs.png", "links": ".pictures/time-links.png"}
+PAGE, PICTURES_FOLDER = "planar/guide/look-up/speed.md", "planar/guide/pictures"
+PICTURES = {"designs": "time-designs.png", "links": "time-links.png"}
 
 
 Tables = tuple[Sequence[Long], Sequence[Compiling], Sequence[Process]]
@@ -28,20 +29,20 @@ def write(
     links: Sequence[Curve],
     tables: Tables = ((), (), ()),
 ) -> None:
-    """README.md and its two plots. Raises ValueError where README has no markers."""
-    readme = root / "README.md"
-    text = readme.read_text(encoding="utf-8")
+    """The page and its two plots. Raises ValueError where the page has no markers."""
+    page = root / PAGE
+    text = page.read_text(encoding="utf-8")
     if text.count(START) != 1 or text.count(END) != 1 or text.index(END) < text.index(START):
-        raise ValueError(f"README.md has no {START} before an {END}")
+        raise ValueError(f"{PAGE} has no {START} before an {END}")
     for what, title, along, curves in (
         ("designs", "Four-bars, 200 steps round, positions", "designs in one call", designs),
         ("links", "One row of four-bars, over a turn, positions", "links", links),
     ):
-        path = root / PICTURES[what]
-        path.parent.mkdir(exist_ok=True)
+        path = root / PICTURES_FOLDER / PICTURES[what]
+        path.parent.mkdir(exist_ok=True, parents=True)
         plots.save(path, title, along, curves)
     before, after = text.split(START)[0], text.split(END)[1]
-    readme.write_text(f"{before}{START}\n{section(versions, results, tables)}\n{END}{after}", encoding="utf-8")
+    page.write_text(f"{before}{START}\n{section(versions, results, tables)}\n{END}{after}", encoding="utf-8")
 
 
 def section(versions: str, results: Iterable[Result], tables: Tables = ((), (), ())) -> str:
@@ -62,9 +63,9 @@ def section(versions: str, results: Iterable[Result], tables: Tables = ((), (), 
     lines += [*_long(long), *_code(code), *_processes(processes)]
     lines += [
         "",
-        f"![Time a position against the number of designs]({PICTURES['designs']})",
+        f"![Time a position against the number of designs](../pictures/{PICTURES['designs']})",
         "",
-        f"![Time a position against the number of links]({PICTURES['links']})",
+        f"![Time a position against the number of links](../pictures/{PICTURES['links']})",
     ]
     return "\n".join(lines)
 
