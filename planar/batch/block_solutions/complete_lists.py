@@ -1,0 +1,146 @@
+"""All assemblies of a larger block, of many designs at once, where that these are all is seen.
+
+A block has as many complex solutions as it has at numbers drawn at random, at most. Where so many are found, each with
+its conjugate, none is missing; the assemblies are the real ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from planar.batch.block_solutions.block_paths import BlockPaths, Tolerances
+from planar.batch.block_solutions.generic_start import (
+    SAME_SOLUTION,
+    GenericStart,
+    find_generic_start,
+    move_generic_start,
+    solution_keys,
+)
+from planar.batch.march.kernel import kernel_equations
+from planar.batch.reference_design import ReferenceDesign
+from planar.codegen.instructions import UnsupportedOperation
+from planar.equations.mechanism_numbers import equation_structure
+from planar.equations.symbolic_equations import Block, slice_length
+from planar.foundation.arrays import Array, BoolArray, ComplexArray
+from planar.foundation.errors import NoAnswer
+
+MAX_UNKNOWNS = 10
+"""Unknowns of a block of which all solutions are looked for."""
+REAL_TOLERANCE, UNDECIDED_TOLERANCE = 1e-7, 1e-4
+"""Imaginary parts (rad, sizes) up to which a solution is real, and above which it surely is not."""
+MAX_LANES = 2**16
+"""Solutions that are followed in one go, so that they find room."""
+
+
+class CompleteLists(NamedTuple):
+    """Assemblies of a block: its unknowns (unknowns, lanes, solutions), which of them are real (lanes, solutions), and
+    for which lanes these surely are all (lanes,)."""
+
+    unknowns: Array
+    exists: BoolArray
+    is_complete: BoolArray
+
+
+class BlockListing:
+    """All assemblies of one block of a reference design's designs. Raises UnsupportedOperation."""
+
+    def __init__(self, reference: ReferenceDesign, block: Block):
+        equations = kernel_equations(reference.functions, equation_structure(reference.mechanism))
+        if reference.candidates.counts_turns or slice_length(block.unknowns) > MAX_UNKNOWNS:
+            raise UnsupportedOperation("its solutions are not all followed")
+        solver = reference.solver
+        try:
+            z = solver.find_assembly().z
+        except NoAnswer:
+            raise UnsupportedOperation("the reference design has no assembly") from None
+        rows = {"p": solver.inputs.p[:, None], "u": solver.inputs.u[:, None], "z": z[:, None]}
+        self.paths = BlockPaths(equations, block, rows)
+        self.base_numbers = self.paths.numbers(rows)
+        self.root = z[block.unknowns][:, None]
+        self._varied = np.zeros(len(self.base_numbers), dtype=bool)
+        self._starts: tuple[GenericStart | None, ...] = ()
+
+    def assemblies(self, rows: Mapping[str, Array]) -> CompleteLists | None:
+        """Of designs with arrays p, u and z (rows, lanes), where the unknowns before the block are known in z.
+
+        None where not all solutions are found of which they would be made.
+        """
+        numbers = self.paths.numbers(rows)
+        starts = self._generic_starts(np.any(numbers != self.base_numbers, axis=1))
+        if starts[0] is None:
+            return None
+        lanes, count = numbers.shape[1], starts[0].count
+        found = CompleteLists(
+            np.full((self.paths.unknown_count, lanes, count), np.nan),
+            np.zeros((lanes, count), dtype=bool),
+            np.zeros(lanes, dtype=bool),
+        )
+        for start, tolerances in zip(starts, (Tolerances(), Tolerances().narrowed()), strict=True):
+            left = np.flatnonzero(~found.is_complete)
+            for first in range(0, len(left) if start is not None else 0, max(1, MAX_LANES // count)):
+                some = left[first : first + max(1, MAX_LANES // count)]
+                assert start is not None
+                part = self._lead(start, numbers[:, some], tolerances)
+                found.unknowns[:, some], found.exists[some], found.is_complete[some] = part
+        return found
+
+    def _generic_starts(self, varied: BoolArray) -> tuple[GenericStart | None, ...]:
+        """Two, at numbers that differ from the base's where those of any designs yet did."""
+        if not self._starts or np.any(varied & ~self._varied):
+            self._varied = self._varied | varied
+            first = find_generic_start(self.paths, self.base_numbers, self.root, self._varied)
+            self._starts = first, first and move_generic_start(self.paths, first, 1)
+        return self._starts
+
+    def _lead(self, start: GenericStart, numbers: Array, tolerances: Tolerances) -> CompleteLists:
+        """All solutions of a start led to designs (numbers, lanes)."""
+        lanes, count, paths = numbers.shape[1], start.count, self.paths
+        at = type(start.solutions)(*(np.tile(each, (1, lanes)) for each in start.solutions))
+        begin = np.repeat(start.numbers, lanes * count, axis=1)
+        followed = paths.follow(at, begin, np.repeat(numbers, count, axis=1).astype(complex), tolerances)
+        unknowns, arrived = followed.solutions.unknowns.reshape(-1, lanes, count), followed.arrived.reshape(lanes, count)
+        away = np.max(np.abs(unknowns.imag), axis=0)
+        exists, undecided = away <= REAL_TOLERANCE, (away > REAL_TOLERANCE) & (away < UNDECIDED_TOLERANCE)
+        keys = solution_keys(paths, followed.solutions).reshape(lanes, count)
+        ordered = np.sort(keys, axis=1)
+        distinct = np.all(~_is_same(ordered[:, 1:], ordered[:, :-1]), axis=1)
+        complete = arrived.all(axis=1) & distinct & (np.count_nonzero(~exists, axis=1) % 2 == 0)
+        some = np.flatnonzero(~complete)
+        if some.size:
+            mirrored = solution_keys(paths, paths.conjugate(followed.solutions)).reshape(lanes, count)
+            complete[some], first = _whole_with_conjugates(keys[some], mirrored[some], arrived[some], exists[some])
+            exists[some] &= first
+        complete &= ~np.any(undecided & arrived, axis=1)
+        return CompleteLists(unknowns.real, exists & complete[:, None], complete)
+
+
+def _is_same(one: ComplexArray, other: ComplexArray) -> BoolArray:
+    return np.asarray(np.abs(one - other) < SAME_SOLUTION * (1.0 + np.abs(one)))
+
+
+def _whole_with_conjugates(
+    keys: ComplexArray, mirrored: ComplexArray, arrived: BoolArray, is_real: BoolArray
+) -> tuple[BoolArray, BoolArray]:
+    """Whether the solutions that arrived are all with their conjugates (lanes,): these are solutions too.
+
+    And which of them are not there before (lanes, solutions). `keys` are theirs, `mirrored` those of their conjugates.
+    """
+    count = keys.shape[1]
+    earlier = np.tri(count, k=-1, dtype=bool) & arrived[:, None, :]
+    first = arrived & ~np.any(_is_same(keys[:, :, None], keys[:, None, :]) & earlier, axis=2)
+    partner = np.any(_is_same(mirrored[:, :, None], keys[:, None, :]) & first[:, None, :], axis=2)
+    found = np.count_nonzero(first, axis=1) + np.count_nonzero(first & ~is_real & ~partner, axis=1)
+    return found == count, first
+
+
+@lru_cache(maxsize=64)
+def block_listing(reference: ReferenceDesign, block_index: int) -> BlockListing | None:
+    """The listing of a block, kept; None where its equations are not for that."""
+    try:
+        return BlockListing(reference, reference.functions.equations.blocks[block_index])
+    except UnsupportedOperation:
+        return None
