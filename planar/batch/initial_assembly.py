@@ -10,6 +10,7 @@ import numpy as np
 
 from planar.batch.assembly_scores import MAX_BLOCK_UNKNOWNS, NEAR_SKETCH, is_at_sketch, is_clearly_regular
 from planar.batch.block_corrector import SPREAD_STARTS, BlockCorrector
+from planar.batch.block_solutions.complete_lists import block_listing
 from planar.batch.march.backend import DesignRunner
 from planar.batch.nearest_assemblies import find_nearest_assemblies
 from planar.batch.reference_design import ReferenceDesign, shape_of_designs
@@ -59,6 +60,27 @@ class _PartialAssemblies(NamedTuple):
         lying = tuple(each[designs] for each in self.tie_keys)
         return _PartialAssemblies(self.z[:, designs], self.exists[designs], self.distance[designs], lying)
 
+    def replace(self, designs: Array, others: _PartialAssemblies) -> _PartialAssemblies:
+        """The same with other ones of some designs; of the two as many ways as there are of either."""
+        width = max(self.exists.shape[1], others.exists.shape[1])
+
+        def merged(own: Array, of_others: Array) -> Array:
+            filled = [(0, 0)] * (own.ndim - 1)
+            whole, part = (
+                np.pad(each, [*filled, (0, width - each.shape[-1])], mode="edge" if each.dtype != bool else "constant")
+                for each in (own, of_others)
+            )
+            whole[..., designs, :] = part
+            return whole
+
+        lying = tuple(merged(*both) for both in zip(self.tie_keys, others.tie_keys, strict=True))
+        return _PartialAssemblies(
+            merged(self.z, others.z),
+            merged(self.exists, others.exists),
+            merged(self.distance, others.distance),
+            lying,
+        )
+
 
 def find_assemblies(
     reference: ReferenceDesign,
@@ -98,6 +120,8 @@ class _AssemblySearch:
         self.numbers = dict(zip(self.candidates.pairs, np.split(p, ends[:-1]), strict=True))
         self.is_sure = np.ones(self.design_count, dtype=bool)
         self.failed_block = np.full(self.design_count, -1)
+        self.is_listed = np.ones(self.design_count, dtype=bool)
+        "of which all assemblies of every larger block are known"
         self.dropped_distance = np.full(self.design_count, np.inf)
         "the nearest partial assembly that was not carried on"
         self.corrector = BlockCorrector(self.functions, p, u, self.candidates.counts_turns)
@@ -126,11 +150,15 @@ class _AssemblySearch:
         for block, (roots, most) in zip(self.equations.blocks, self.reference.block_assemblies(), strict=True):
             if slice_length(block.rows):
                 on, rest = self._extend_clearly(block, here, roots) if quick else (here, np.arange(self.design_count))
-                hasty[np.setdiff1d(np.arange(self.design_count), rest)] = True
+                clear = np.setdiff1d(np.arange(self.design_count), rest)
+                hasty[clear], self.is_listed[clear] = True, False
                 if rest.size:
-                    others, sure = self._extend(self.corrector.select(rest), block, here.select(rest), roots, most)
+                    others, sure, listed = self._extend(
+                        self.corrector.select(rest), block, here.select(rest), roots, most
+                    )
                     on = self._merge_extensions(here, on, rest, others)
                     self.is_sure[rest] &= sure
+                    self.is_listed[rest] &= listed
                     none = np.flatnonzero(here.exists.any(axis=1) & ~on.exists.any(axis=1))
                     if none.size:
                         self._refuse_designs(block, none, here, roots)
@@ -149,6 +177,8 @@ class _AssemblySearch:
         """
         unknowns = slice_length(block.unknowns)
         if unknowns > 2:
+            all_known = self.is_listed[designs] & self.is_sure[designs] & np.isinf(self.dropped_distance[designs])
+            self.failed_block[designs[all_known]] = block.block_index
             return
         ways = [(design, way) for design in designs for way in np.flatnonzero(here.exists[design])]
         starts = np.repeat(
@@ -209,8 +239,32 @@ class _AssemblySearch:
 
     def _extend(
         self, corrector: BlockCorrector, block: Block, here: _PartialAssemblies, roots: Array, most: int
+    ) -> tuple[_PartialAssemblies, Array, Array]:
+        """Every partial assembly with the ways in which a block may be added, for which designs these are sure, and for
+        which they are all there are."""
+        count = len(here.exists)
+        listing = block_listing(self.reference, block.block_index)
+        if listing is None:
+            on, sure = self._extend_from_starts(corrector, block, here, roots, most)
+            return on, sure, np.full(count, slice_length(block.unknowns) <= 2)
+        listed = listing.extend(here.z, here.exists, corrector.p, corrector.u)
+        width = listed.exists.shape[1] // here.exists.shape[1]
+        on = _PartialAssemblies(
+            listed.unknowns,
+            listed.exists,
+            np.repeat(here.distance, width, axis=1),
+            tuple(np.repeat(each, width, axis=1) for each in here.tie_keys),
+        )
+        rest, sure = np.flatnonzero(~listed.is_complete), np.ones(count, dtype=bool)
+        if rest.size:
+            others, sure[rest] = self._extend_from_starts(corrector.select(rest), block, here.select(rest), roots, most)
+            on = on.replace(rest, others)
+        return on, sure, listed.is_complete
+
+    def _extend_from_starts(
+        self, corrector: BlockCorrector, block: Block, here: _PartialAssemblies, roots: Array, most: int
     ) -> tuple[_PartialAssemblies, Array]:
-        """Every partial assembly with the ways in which a block may be added, and for which designs these are sure."""
+        """The same by Newton's method from the base's assemblies, and from starts all over the circles."""
         sure = np.ones(len(here.exists), dtype=bool)
         found, there, _ = corrector.correct(block, here.z, here.exists, roots, NEWTON_STEPS)
         there &= corrector.is_distinct(block, found, there)
@@ -320,5 +374,8 @@ class _AssemblySearch:
         largest = max((slice_length(block.unknowns) for block in self.equations.blocks), default=0)
         if largest > 2:
             # it may have assemblies that no start has led to: none of these is nearer than what is near
-            sure &= is_at_sketch(least, shown, NEAR_SKETCH if largest <= MAX_BLOCK_UNKNOWNS else CLEAR_SKETCH_DISTANCE)
+            reach = NEAR_SKETCH if largest <= MAX_BLOCK_UNKNOWNS else CLEAR_SKETCH_DISTANCE
+            sure &= self.is_listed | is_at_sketch(least, shown, reach)
+            # of two that lie where they are meant the search one by one may see one alone
+            sure &= np.count_nonzero(here.exists & is_at_sketch(cost, shown), axis=1) <= 1
         return DesignAssemblies(z, sure, self.failed_block)

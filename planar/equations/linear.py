@@ -77,22 +77,24 @@ def solve_by_elimination(matrix: ca.SX, right_side: ca.SX, sample: Array) -> ca.
     count = right_side.numel()
     if count <= MAX_CRAMER_UNKNOWNS:
         return solve_by_determinants(matrix, right_side)
-    rows = [[matrix[i, j] for j in range(count)] + [right_side[i]] for i in range(count)]
-    numbers, order = np.array(sample, dtype=float), []
-    for _ in range(count):
-        left = [i for i in range(count) if i not in dict(order)]
-        free = [j for j in range(count) if j not in dict(map(reversed, order))]
-        i, j = max(((i, j) for i in left for j in free), key=lambda at: abs(numbers[at]))
-        order.append((i, j))
+    rows = [[*(matrix[i, j] for j in range(count)), right_side[i]] for i in range(count)]
+    numbers = np.array(sample, dtype=float)
+    pivots: list[tuple[int, int]] = []
+    left, free = list(range(count)), list(range(count))
+    while left:
+        i, j = max(((i, j) for i in left for j in free), key=lambda at: abs(float(numbers[at])))
+        pivots.append((i, j))
+        left.remove(i)
+        free.remove(j)
         scale = 1.0 / rows[i][j]
         for other in left:
-            if other != i and not rows[other][j].is_zero():
+            if not rows[other][j].is_zero():
                 factor = rows[other][j] * scale
                 rows[other] = [a if b.is_zero() else a - factor * b for a, b in zip(rows[other], rows[i], strict=True)]
                 rows[other][j] = ca.SX(0.0)
                 numbers[other] -= numbers[other, j] / numbers[i, j] * numbers[i]
     solution: dict[int, ca.SX] = {}
-    for i, j in reversed(order):
+    for i, j in reversed(pivots):
         known = sum((rows[i][k] * value for k, value in solution.items() if not rows[i][k].is_zero()), ca.SX(0.0))
         solution[j] = (rows[i][-1] - known) / rows[i][j]
     return ca.vertcat(*(solution[k] for k in range(count)))

@@ -1,7 +1,7 @@
 """Solutions of a block followed as its numbers change, every solution of every design in a lane of its own.
 
-Predicted by the polynomial through the places before, corrected by Newton's method, each lane in steps of its own length.
-Angles and numbers may be complex: there solutions meet nowhere on a path that is drawn at random.
+Predicted by the polynomial through the places before, corrected by Newton's method, each lane in steps of its own
+length. Angles and numbers may be complex: there solutions meet nowhere on a path that is drawn at random.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class BlockSolutions(NamedTuple):
     unknowns: ComplexArray
     directions: ComplexArray
 
-    def select(self, lanes: Array | slice) -> BlockSolutions:
+    def select(self, lanes: IntArray | BoolArray | slice) -> BlockSolutions:
         """Those of some lanes."""
         return BlockSolutions(self.unknowns[:, lanes], self.directions[:, lanes])
 
@@ -80,9 +80,7 @@ class BlockPaths:
         held = dict.fromkeys((name[0], k) for name, k in self.step.operands if name[0] != "z" or k not in own)
         turned = {"z": equations.is_angle, "u": equations.input_is_angle}
         self.number_operands: tuple[Operand, ...] = tuple(held)
-        self.base_angles = [
-            float(base[name][k][0]) if name in turned and turned[name][k] else None for name, k in held
-        ]
+        self.base_angles = [float(base[name][k][0]) if name in turned and turned[name][k] else None for name, k in held]
 
     def numbers(self, rows: Mapping[str, Array]) -> Array:
         """The block's numbers (numbers, lanes), of arrays p, u and z (rows, lanes)."""
@@ -93,7 +91,7 @@ class BlockPaths:
                 row[:] = np.tan(0.25 * (np.remainder(row - angle + np.pi, 2.0 * np.pi) - np.pi))
         return found
 
-    def solutions(self, unknowns: ComplexArray) -> BlockSolutions:
+    def solutions(self, unknowns: Array | ComplexArray) -> BlockSolutions:
         """Solutions from their unknowns (unknowns, lanes)."""
         whole = unknowns.astype(complex)
         return BlockSolutions(whole, np.exp(1j * whole[self.angles]))

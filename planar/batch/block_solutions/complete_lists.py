@@ -52,6 +52,10 @@ class BlockListing:
         equations = kernel_equations(reference.functions, equation_structure(reference.mechanism))
         if reference.candidates.counts_turns or slice_length(block.unknowns) > MAX_UNKNOWNS:
             raise UnsupportedOperation("its solutions are not all followed")
+        if not reference.candidates.sketched_by_level.get(block.block_index):
+            raise UnsupportedOperation("without a sketch any assembly will do")
+        if any(part.block == block and part.closed_form is not None for part in equations.blocks):
+            raise UnsupportedOperation("it is in closed form")
         solver = reference.solver
         try:
             z = solver.find_assembly().z
@@ -73,7 +77,7 @@ class BlockListing:
         starts = self._generic_starts(np.any(numbers != self.base_numbers, axis=1))
         if starts[0] is None:
             return None
-        lanes, count = numbers.shape[1], starts[0].count
+        lanes, count = numbers.shape[1], starts[0].solution_count
         found = CompleteLists(
             np.full((self.paths.unknown_count, lanes, count), np.nan),
             np.zeros((lanes, count), dtype=bool),
@@ -88,6 +92,28 @@ class BlockListing:
                 found.unknowns[:, some], found.exists[some], found.is_complete[some] = part
         return found
 
+    def extend(self, z: Array, exists: BoolArray, p: Array, u: Array) -> CompleteLists:
+        """Partial assemblies z (unknowns, designs, ways), of which some exist (designs, ways), each with all assemblies
+        of the block: all unknowns (unknowns, designs, ways of both), which exist, and for which designs these are all.
+
+        p and u are (rows, designs).
+        """
+        designs, ways = np.nonzero(exists)
+        found = self.assemblies({"p": p[:, designs], "u": u[:, designs], "z": z[:, designs, ways]})
+        if found is None:
+            return CompleteLists(z, exists, np.zeros(len(exists), dtype=bool))
+        complete = np.ones(len(exists), dtype=bool)
+        complete[designs[~found.is_complete]] = False
+        width = int(found.exists.sum(axis=1).max(initial=1))
+        order = np.argsort(~found.exists, axis=1, kind="stable")[:, :width]
+        whole = np.repeat(z[..., None], width, axis=3)
+        there = np.zeros((*exists.shape, width), dtype=bool)
+        there[designs, ways] = np.take_along_axis(found.exists, order, axis=1)
+        own = whole[self.paths.block.unknowns]
+        own[:, designs, ways] = np.take_along_axis(found.unknowns, order[None], axis=2)
+        shape = len(exists), exists.shape[1] * width
+        return CompleteLists(whole.reshape(len(z), *shape), there.reshape(shape), complete)
+
     def _generic_starts(self, varied: BoolArray) -> tuple[GenericStart | None, ...]:
         """Two, at numbers that differ from the base's where those of any designs yet did."""
         if not self._starts or np.any(varied & ~self._varied):
@@ -98,11 +124,14 @@ class BlockListing:
 
     def _lead(self, start: GenericStart, numbers: Array, tolerances: Tolerances) -> CompleteLists:
         """All solutions of a start led to designs (numbers, lanes)."""
-        lanes, count, paths = numbers.shape[1], start.count, self.paths
+        lanes, count, paths = numbers.shape[1], start.solution_count, self.paths
         at = type(start.solutions)(*(np.tile(each, (1, lanes)) for each in start.solutions))
         begin = np.repeat(start.numbers, lanes * count, axis=1)
         followed = paths.follow(at, begin, np.repeat(numbers, count, axis=1).astype(complex), tolerances)
-        unknowns, arrived = followed.solutions.unknowns.reshape(-1, lanes, count), followed.arrived.reshape(lanes, count)
+        unknowns, arrived = (
+            followed.solutions.unknowns.reshape(-1, lanes, count),
+            followed.arrived.reshape(lanes, count),
+        )
         away = np.max(np.abs(unknowns.imag), axis=0)
         exists, undecided = away <= REAL_TOLERANCE, (away > REAL_TOLERANCE) & (away < UNDECIDED_TOLERANCE)
         keys = solution_keys(paths, followed.solutions).reshape(lanes, count)

@@ -7,12 +7,13 @@ One solution is followed round loops of complex numbers, at whose end it is anot
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from planar.batch.block_solutions.block_paths import BlockPaths, BlockSolutions, Tolerances
-from planar.foundation.arrays import Array, BoolArray, ComplexArray
+from planar.foundation.arrays import Array, BoolArray, ComplexArray, IntArray
 
 MAX_SOLUTIONS = 64
 """Complex solutions of a block of which all are followed; what has more is searched from starts."""
@@ -33,7 +34,7 @@ class GenericStart(NamedTuple):
     solutions: BlockSolutions
 
     @property
-    def count(self) -> int:
+    def solution_count(self) -> int:
         """How many solutions there are."""
         return self.solutions.unknowns.shape[1]
 
@@ -67,7 +68,7 @@ def find_generic_start(
         whole = _spread(start, count * LOOPS)
         corners = [whole, *(np.repeat(drawn(LOOPS), count, axis=1) for _ in range(2)), whole]
         arrived = np.ones(count * LOOPS, dtype=bool)
-        for begin, end in zip(corners, corners[1:], strict=False):
+        for begin, end in pairwise(corners):
             followed = paths.follow(at, begin, end, tolerances)
             at, arrived = followed.solutions, arrived & followed.arrived
         both = BlockSolutions(
@@ -84,7 +85,7 @@ def move_generic_start(paths: BlockPaths, start: GenericStart, seed: int) -> Gen
     turned = np.exp(1j * rng.uniform(0.0, 2.0 * np.pi, start.numbers.shape))
     real = start.numbers.real
     other = real + (start.numbers - real) * turned
-    count = start.count
+    count = start.solution_count
     followed = paths.follow(
         start.solutions, _spread(start.numbers, count), _spread(other, count), Tolerances().narrowed()
     )
@@ -100,11 +101,11 @@ def solution_keys(paths: BlockPaths, solutions: BlockSolutions) -> ComplexArray:
     return np.asarray(weights @ parts)
 
 
-def first_of_each(paths: BlockPaths, solutions: BlockSolutions) -> Array:
+def first_of_each(paths: BlockPaths, solutions: BlockSolutions) -> IntArray:
     """The lanes of solutions of which none before is the same, in their order."""
     keys = solution_keys(paths, solutions)
     same = np.abs(keys[:, None] - keys) < SAME_SOLUTION * (1.0 + np.abs(keys))
-    return np.flatnonzero(np.argmax(same, axis=1) == np.arange(len(keys)))
+    return np.asarray(np.flatnonzero(np.argmax(same, axis=1) == np.arange(len(keys))), dtype=int)
 
 
 def _spread(numbers: ComplexArray | Array, lanes: int) -> ComplexArray:
