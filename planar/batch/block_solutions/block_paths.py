@@ -37,12 +37,12 @@ LARGEST_UNKNOWN = 40.0
 class Tolerances(NamedTuple):
     """By how much (rad, sizes) Newton's method may correct what was predicted, and what its second step may add."""
 
-    first: float = 0.1
-    second: float = 3e-3
+    first: float = 0.2
+    second: float = 1e-2
 
     def narrowed(self) -> Tolerances:
         """Tolerances at which paths keep apart that came to one end by these."""
-        return Tolerances(0.2 * self.first, 0.04 * self.second)
+        return Tolerances(0.1 * self.first, 0.01 * self.second)
 
 
 class BlockSolutions(NamedTuple):

@@ -83,13 +83,13 @@ class BlockListing:
             np.zeros((lanes, count), dtype=bool),
             np.zeros(lanes, dtype=bool),
         )
-        for start, tolerances in zip(starts, (Tolerances(), Tolerances().narrowed()), strict=True):
-            left = np.flatnonzero(~found.is_complete)
-            for first in range(0, len(left) if start is not None else 0, max(1, MAX_LANES // count)):
-                some = left[first : first + max(1, MAX_LANES // count)]
-                assert start is not None
-                part = self._lead(start, numbers[:, some], tolerances)
-                found.unknowns[:, some], found.exists[some], found.is_complete[some] = part
+        known, most = np.isfinite(numbers).all(axis=0), max(1, MAX_LANES // count)
+        with np.errstate(all="ignore"):  # what goes astray ends as what is no number
+            for start, tolerances in zip(starts, (Tolerances(), Tolerances().narrowed()), strict=True):
+                left = np.flatnonzero(known & ~found.is_complete)
+                for some in np.split(left, range(most, len(left), most)) if start is not None and left.size else ():
+                    part = self._lead(start, numbers[:, some], tolerances)
+                    found.unknowns[:, some], found.exists[some], found.is_complete[some] = part
         return found
 
     def extend(self, z: Array, exists: BoolArray, p: Array, u: Array) -> CompleteLists:
