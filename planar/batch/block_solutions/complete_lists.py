@@ -16,8 +16,7 @@ from planar.batch.block_solutions.block_paths import BlockPaths, Tolerances
 from planar.batch.block_solutions.generic_start import (
     SAME_SOLUTION,
     GenericStart,
-    find_generic_start,
-    move_generic_start,
+    find_generic_starts,
     solution_keys,
 )
 from planar.batch.march.kernel import kernel_equations
@@ -26,10 +25,11 @@ from planar.codegen.instructions import UnsupportedOperation
 from planar.equations.mechanism_numbers import equation_structure
 from planar.equations.symbolic_equations import Block, slice_length
 from planar.foundation.arrays import Array, BoolArray, ComplexArray
-from planar.foundation.errors import NoAnswer
 
-MAX_UNKNOWNS = 10
-"""Unknowns of a block of which all solutions are looked for."""
+MAX_UNKNOWNS = 8
+"""Unknowns of a block of which all solutions are looked for, once, in about a second at most."""
+TOLERANCES = (Tolerances(), Tolerances().narrowed())
+"""Of the paths from one start, and from another where some of these are lost."""
 REAL_TOLERANCE, UNDECIDED_TOLERANCE = 1e-7, 1e-4
 """Imaginary parts (rad, sizes) up to which a solution is real, and above which it surely is not."""
 MAX_LANES = 2**16
@@ -56,17 +56,13 @@ class BlockListing:
             raise UnsupportedOperation("without a sketch any assembly will do")
         if any(part.block == block and part.closed_form is not None for part in equations.blocks):
             raise UnsupportedOperation("it is in closed form")
-        solver = reference.solver
-        try:
-            z = solver.find_assembly().z
-        except NoAnswer:
-            raise UnsupportedOperation("the reference design has no assembly") from None
-        rows = {"p": solver.inputs.p[:, None], "u": solver.inputs.u[:, None], "z": z[:, None]}
-        self.paths = BlockPaths(equations, block, rows)
-        self.base_numbers = self.paths.numbers(rows)
-        self.root = z[block.unknowns][:, None]
+        solver, unknowns = reference.solver, len(reference.functions.equations.unknowns)
+        u, p = solver.inputs.u[:, None], solver.inputs.p[:, None]
+        self.setup, self.base = solver, {"p": p, "u": u, "z": np.zeros((unknowns, 1))}
+        self.paths = BlockPaths(equations, block, self.base)
+        self.base_numbers = self.paths.numbers(self.base)
         self._varied = np.zeros(len(self.base_numbers), dtype=bool)
-        self._starts: tuple[GenericStart | None, ...] = ()
+        self._starts: tuple[GenericStart, ...] = ()
 
     def assemblies(self, rows: Mapping[str, Array]) -> CompleteLists | None:
         """Of designs with arrays p, u and z (rows, lanes), where the unknowns before the block are known in z.
@@ -75,7 +71,7 @@ class BlockListing:
         """
         numbers = self.paths.numbers(rows)
         starts = self._generic_starts(np.any(numbers != self.base_numbers, axis=1))
-        if starts[0] is None:
+        if not starts:
             return None
         lanes, count = numbers.shape[1], starts[0].solution_count
         found = CompleteLists(
@@ -85,9 +81,9 @@ class BlockListing:
         )
         known, most = np.isfinite(numbers).all(axis=0), max(1, MAX_LANES // count)
         with np.errstate(all="ignore"):  # what goes astray ends as what is no number
-            for start, tolerances in zip(starts, (Tolerances(), Tolerances().narrowed()), strict=True):
+            for start, tolerances in zip(starts, TOLERANCES, strict=True):
                 left = np.flatnonzero(known & ~found.is_complete)
-                for some in np.split(left, range(most, len(left), most)) if start is not None and left.size else ():
+                for some in np.split(left, range(most, len(left), most)) if left.size else ():
                     part = self._lead(start, numbers[:, some], tolerances)
                     found.unknowns[:, some], found.exists[some], found.is_complete[some] = part
         return found
@@ -114,12 +110,11 @@ class BlockListing:
         shape = len(exists), exists.shape[1] * width
         return CompleteLists(whole.reshape(len(z), *shape), there.reshape(shape), complete)
 
-    def _generic_starts(self, varied: BoolArray) -> tuple[GenericStart | None, ...]:
-        """Two, at numbers that differ from the base's where those of any designs yet did."""
-        if not self._starts or np.any(varied & ~self._varied):
+    def _generic_starts(self, varied: BoolArray) -> tuple[GenericStart, ...]:
+        """Starts at numbers that differ from the base's where those of any designs yet did; none where there are none."""
+        if np.any(varied & ~self._varied) or not np.any(self._varied):
             self._varied = self._varied | varied
-            first = find_generic_start(self.paths, self.base_numbers, self.root, self._varied)
-            self._starts = first, first and move_generic_start(self.paths, first, 1)
+            self._starts = find_generic_starts(self.setup, self.paths, self.base, self._varied, len(TOLERANCES))
         return self._starts
 
     def _lead(self, start: GenericStart, numbers: Array, tolerances: Tolerances) -> CompleteLists:
