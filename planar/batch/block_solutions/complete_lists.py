@@ -111,7 +111,7 @@ class BlockListing:
         return CompleteLists(whole.reshape(len(z), *shape), there.reshape(shape), complete)
 
     def _generic_starts(self, varied: BoolArray) -> tuple[GenericStart, ...]:
-        """Starts at numbers that differ from the base's where those of any designs yet did; none where there are none."""
+        """Starts at numbers that differ from the base's where those of any designs yet did; or none."""
         if np.any(varied & ~self._varied) or not np.any(self._varied):
             self._varied = self._varied | varied
             self._starts = find_generic_starts(self.setup, self.paths, self.base, self._varied, len(TOLERANCES))

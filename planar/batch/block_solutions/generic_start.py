@@ -60,9 +60,8 @@ def find_generic_starts(
     size = SPREAD * np.maximum(np.abs(paths.numbers(base)), LEAST_SIZE) * varied[:, None]
     starts: list[GenericStart] = []
     for _ in range(TRIES + many):
-        drawn: ComplexArray = paths.numbers(base) + size * (
-            rng.normal(size=size.shape) + 1j * rng.normal(size=size.shape)
-        )
+        off = rng.normal(size=size.shape) + 1j * rng.normal(size=size.shape)
+        drawn = np.asarray(paths.numbers(base) + size * off, dtype=complex)
         followed = paths.follow(here, begin, np.repeat(drawn, count, axis=1), Tolerances().narrowed())
         if followed.arrived.all() and len(first_of_each(paths, followed.solutions)) == count:
             starts.append(GenericStart(drawn, followed.solutions))
