@@ -9,19 +9,21 @@ import casadi as ca
 import numpy as np
 
 from planar.batch.march.backend import DesignBatch
-from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations, KernelInstructions, Operand
+from planar.batch.march.kernel import (
+    BareAngle,
+    KernelBlock,
+    KernelEquations,
+    KernelInstructions,
+    Operand,
+)
 from planar.batch.march.prediction import MAX_TURN_PER_STEP, PREDICTOR_ORDER, extrapolation_weights
 from planar.batch.march.regularity import LEAST_KERNEL_REGULARITY, least_regularity
 from planar.codegen.instructions import UnsupportedOperation, required_values
 from planar.codegen.numpy_code import NumpyFunction, compile_numpy
 from planar.equations.linear import solve_vectors
-from planar.equations.rates import block_jacobian
 
 Array = np.ndarray
 OperandArrays = dict[Operand, Any]
-
-MAX_EXPRESSION_UNKNOWNS = 8
-"""Unknowns of a block that expressions solve; of larger ones these grow too long."""
 
 
 class _KernelPart(NamedTuple):
@@ -70,18 +72,23 @@ class NumpyKernel(KernelInstructions):
             points = [k for k, each in enumerate(point_blocks or ()) if each == index]
             if points:
                 self.block_points[index] = points, self._make_part([self.point_coordinates(points)], known)
+        self.rate_parts: list[tuple[KernelBlock, list[_KernelPart]]] = []
+        "of each block the Jacobian's rows, then what its first and its second rates make up for"
+        known |= {(name, k) for name in ("u1", "u2") for k in range(len(equations.input_is_angle))}
+        for part, system in zip(equations.blocks, self.rate_systems(), strict=False):
+            steps = []
+            for output, own in ((ca.vec(system.jacobian.T), ""), (system.first, "z1"), (system.second, "z2")):
+                steps.append(self._make_part([output], known))
+                known |= {(own, k) for k in part.unknowns} if own else set()
+            self.rate_parts.append((part, steps))
         ends = [equations.residuals(), self.counted_angles(), *self.output_expressions()]
         self.residual_count, self.counted_angle_count = (each.numel() for each in ends[:2])
         self.end = self._make_part(ends, known)
         self._compile_invariants()
 
     def _newton_outputs(self, part: KernelBlock) -> list[ca.SX]:
-        """Newton's step with how regular the Jacobian is; of large blocks the residuals and the Jacobian's rows."""
-        if len(part.unknowns) <= MAX_EXPRESSION_UNKNOWNS:
-            return self.equations.newton_step(part.block)
-        e = self.equations.equations
-        jacobian = block_jacobian(e, part.block.rows, part.block.unknowns)
-        return [e.F[part.block.rows], ca.densify(ca.vec(jacobian.T))]
+        """Newton's step with how regular the Jacobian is; of large blocks the residuals and the Jacobian's columns."""
+        return self.newton_system(part) if part.is_large else self.equations.newton_step(part.block)
 
     def _make_part(self, outputs: Sequence[ca.SX], known: Iterable[Operand]) -> _KernelPart:
         """Raises BareAngle for an operand that is not known."""
@@ -109,6 +116,7 @@ class NumpyKernel(KernelInstructions):
             self.end,
             *(own for _, own in self.blocks),
             *(own for _, own in self.block_points.values()),
+            *(own for _, steps in self.rate_parts for own in steps),
         )
         self.invariant_numbers = tuple(dict.fromkeys(number for part in parts for number in part.invariants))
         made = self.hoister.result
@@ -225,6 +233,7 @@ class DesignMarch:
                 if part.block.block_index in kernel.block_points:
                     other_points |= self._other_points(part, own, values)
                 fine &= self._keeps_apart(part, self._solve_closed_form(part, own, values), steps, shape)
+        self._add_rates(values, shape)
         found = self._evaluate(kernel.end, values)
         first = kernel.residual_count + kernel.counted_angle_count
         for k, angle in enumerate(found[kernel.residual_count : first]):
@@ -241,6 +250,15 @@ class DesignMarch:
         passed = np.logical_and.accumulate(fine, axis=0) & self.passed
         self.passed, self.step = passed[-1], self.step + shape[0]
         return MarchedSteps(values, found[first:], other_points, regularity, passed)
+
+    def _add_rates(self, values: OperandArrays, shape: tuple[int, int]) -> None:
+        """The rates of the unknowns put into `values`, where they are solved in numbers."""
+        for part, (jacobian, *right_sides) in self.kernel.rate_parts:
+            matrices = _stack_values(self._evaluate(jacobian, values), shape)
+            matrices = matrices.reshape(*shape, len(part.unknowns), len(part.unknowns))
+            for name, own in zip(("z1", "z2"), right_sides, strict=True):
+                found = solve_vectors(matrices, _stack_values(self._evaluate(own, values), shape))
+                values |= {(name, k): -found[..., n] for n, k in enumerate(part.unknowns)}
 
     def _inputs(self, offsets: Array) -> OperandArrays:
         """Where the inputs are, with the signs of the blocks."""
@@ -319,7 +337,7 @@ class DesignMarch:
                 values["zc", k], values["zs", k] = _normalise(values["zc", k], values["zs", k])
         regularity, corrected = np.inf, np.zeros(1)
         for _ in range(int(self.counts[self.step])):
-            step, regularity = _newton_step(len(part.unknowns), self._evaluate(own, values))
+            step, regularity = _newton_step(part, self._evaluate(own, values))
             for k, each in zip(part.unknowns, step, strict=True):
                 corrected = corrected + np.abs(each)
                 if ("z", k) in values:
@@ -354,13 +372,20 @@ def _normalise(cos: Any, sin: Any) -> tuple[Any, Any]:
     return cos * scale, sin * scale
 
 
-def _newton_step(count: int, values: Sequence[Any]) -> tuple[Sequence[Any], Any]:
-    """Newton's step of a block of so many unknowns, and the square of how regular its Jacobian is."""
-    if count <= MAX_EXPRESSION_UNKNOWNS:
+def _stack_values(values: Sequence[Any], shape: tuple[int, ...]) -> Array:
+    """Values of one shape, or spread over it, along a last axis."""
+    return np.stack([np.broadcast_to(each, shape) for each in values], axis=-1)
+
+
+def _newton_step(part: KernelBlock, values: Sequence[Any]) -> tuple[Sequence[Any], Any]:
+    """Newton's step of a block, and the square of how regular its Jacobian is."""
+    if not part.is_large:
         *step, volume, lengths = values
         return step, volume / lengths
-    flat = np.stack(np.broadcast_arrays(*values), axis=-1)
-    residuals, jacobians = flat[..., :count], flat[..., count:].reshape(*flat.shape[:-1], count, count)
+    count = len(part.unknowns)
+    flat = _stack_values(values, np.broadcast_shapes(*(np.shape(each) for each in values)))
+    residuals, columns = flat[..., :count], flat[..., count:].reshape(*flat.shape[:-1], count, count)
+    jacobians = columns.swapaxes(-1, -2)
     regular = np.isfinite(jacobians).all(axis=(-2, -1))
     diagonals = np.diagonal(np.linalg.qr(np.where(regular[..., None, None], jacobians, 0.0))[1], axis1=-2, axis2=-1)
     least = np.min(diagonals**2 / np.sum(jacobians * jacobians, axis=-2), axis=-1)
