@@ -91,6 +91,13 @@ class BlockPaths:
                 row[:] = np.tan(0.25 * (np.remainder(row - angle + np.pi, 2.0 * np.pi) - np.pi))
         return found
 
+    def rows(self, numbers: Array, others: Mapping[str, Array]) -> dict[str, Array]:
+        """Arrays p, u and z (rows, lanes) with the block's numbers; what it does not take is as in `others`."""
+        found = {name: np.repeat(row, numbers.shape[1], axis=1) for name, row in others.items()}
+        for row, (name, k), angle in zip(numbers, self.number_operands, self.base_angles, strict=True):
+            found[name][k] = row if angle is None else angle + 4.0 * np.arctan(row)
+        return found
+
     def solutions(self, unknowns: Array | ComplexArray) -> BlockSolutions:
         """Solutions from their unknowns (unknowns, lanes)."""
         whole = unknowns.astype(complex)

@@ -32,6 +32,8 @@ TOLERANCES = (Tolerances(), Tolerances().narrowed())
 """Of the paths from one start, and from another where some of these are lost."""
 REAL_TOLERANCE, UNDECIDED_TOLERANCE = 1e-7, 1e-4
 """Imaginary parts (rad, sizes) up to which a solution is real, and above which it surely is not."""
+NEW_DIRECTION, MAX_SPANNING = 1e-8, 200
+"""How far numbers lie off the directions that are known where that is a new one; designs that are looked at at once."""
 MAX_LANES = 2**16
 """Solutions that are followed in one go, so that they find room."""
 
@@ -50,19 +52,18 @@ class BlockListing:
 
     def __init__(self, reference: ReferenceDesign, block: Block):
         equations = kernel_equations(reference.functions, equation_structure(reference.mechanism))
-        if reference.candidates.counts_turns or slice_length(block.unknowns) > MAX_UNKNOWNS:
+        if reference.candidates.counts_turns or not 2 < slice_length(block.unknowns) <= MAX_UNKNOWNS:
             raise UnsupportedOperation("its solutions are not all followed")
         if not reference.candidates.sketched_by_level.get(block.block_index):
             raise UnsupportedOperation("without a sketch any assembly will do")
-        if any(part.block == block and part.closed_form is not None for part in equations.blocks):
-            raise UnsupportedOperation("it is in closed form")
         solver, unknowns = reference.solver, len(reference.functions.equations.unknowns)
         u, p = solver.inputs.u[:, None], solver.inputs.p[:, None]
         self.setup, self.base = solver, {"p": p, "u": u, "z": np.zeros((unknowns, 1))}
         self.paths = BlockPaths(equations, block, self.base)
         self.base_numbers = self.paths.numbers(self.base)
-        self._varied = np.zeros(len(self.base_numbers), dtype=bool)
-        self._starts: tuple[GenericStart, ...] = ()
+        self._span = np.zeros((len(self.base_numbers), 0))
+        "directions in which numbers of any designs yet differ from the base's, orthonormal"
+        self._starts: tuple[GenericStart, ...] | None = None
 
     def assemblies(self, rows: Mapping[str, Array]) -> CompleteLists | None:
         """Of designs with arrays p, u and z (rows, lanes), where the unknowns before the block are known in z.
@@ -70,7 +71,8 @@ class BlockListing:
         None where not all solutions are found of which they would be made.
         """
         numbers = self.paths.numbers(rows)
-        starts = self._generic_starts(np.any(numbers != self.base_numbers, axis=1))
+        known = np.isfinite(numbers).all(axis=0)
+        starts = self._generic_starts(numbers[:, known])
         if not starts:
             return None
         lanes, count = numbers.shape[1], starts[0].solution_count
@@ -79,7 +81,7 @@ class BlockListing:
             np.zeros((lanes, count), dtype=bool),
             np.zeros(lanes, dtype=bool),
         )
-        known, most = np.isfinite(numbers).all(axis=0), max(1, MAX_LANES // count)
+        most = max(1, MAX_LANES // count)
         with np.errstate(all="ignore"):  # what goes astray ends as what is no number
             for start, tolerances in zip(starts, TOLERANCES, strict=True):
                 left = np.flatnonzero(known & ~found.is_complete)
@@ -110,11 +112,24 @@ class BlockListing:
         shape = len(exists), exists.shape[1] * width
         return CompleteLists(whole.reshape(len(z), *shape), there.reshape(shape), complete)
 
-    def _generic_starts(self, varied: BoolArray) -> tuple[GenericStart, ...]:
-        """Starts at numbers that differ from the base's where those of any designs yet did; or none."""
-        if np.any(varied & ~self._varied) or not np.any(self._varied):
-            self._varied = self._varied | varied
-            self._starts = find_generic_starts(self.setup, self.paths, self.base, self._varied, len(TOLERANCES))
+    def _generic_starts(self, numbers: Array) -> tuple[GenericStart, ...]:
+        """Starts at numbers that differ from the base's where those of any designs yet did; none where there are none.
+
+        Numbers that are tied to each other in all designs stay so: there may be fewer solutions then.
+        """
+        grown = self._starts is None
+        while True:
+            away = numbers - self.base_numbers
+            away = away - self._span @ (self._span.T @ away)
+            far = np.flatnonzero(np.linalg.norm(away, axis=0) > NEW_DIRECTION)
+            if not far.size:
+                break
+            some = away[:, far[:: -(-len(far) // MAX_SPANNING)]]
+            directions, sizes, _ = np.linalg.svd(some / np.linalg.norm(some, axis=0), full_matrices=False)
+            self._span = np.linalg.qr(np.hstack([self._span, directions[:, sizes > NEW_DIRECTION]]))[0]
+            grown = True
+        if grown or self._starts is None:
+            self._starts = find_generic_starts(self.setup, self.paths, self.base, self._span, len(TOLERANCES))
         return self._starts
 
     def _lead(self, start: GenericStart, numbers: Array, tolerances: Tolerances) -> CompleteLists:

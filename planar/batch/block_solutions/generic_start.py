@@ -14,7 +14,7 @@ import numpy as np
 
 from planar.assemblies.block_roots import complex_assemblies
 from planar.batch.block_solutions.block_paths import BlockPaths, BlockSolutions, Tolerances
-from planar.foundation.arrays import Array, BoolArray, ComplexArray, IntArray
+from planar.foundation.arrays import Array, ComplexArray, IntArray
 from planar.solving.prepared_mechanism import PreparedMechanism
 
 MAX_SOLUTIONS = 64
@@ -41,27 +41,25 @@ class GenericStart(NamedTuple):
 
 
 def find_generic_starts(
-    setup: PreparedMechanism, paths: BlockPaths, base: Mapping[str, Array], varied: BoolArray, many: int
+    setup: PreparedMechanism, paths: BlockPaths, base: Mapping[str, Array], span: Array, many: int
 ) -> tuple[GenericStart, ...]:
-    """So many starts about a design with arrays p, u and z (rows, 1); only numbers that are `varied` differ from its.
+    """So many starts about a design with arrays p, u and z (rows, 1), from which they differ in the directions of
+    `span` (numbers, directions), orthonormal.
 
     None of them where not all solutions are found, or they are too many.
     """
-    rng = np.random.default_rng(0)
-    rows = {name: np.array(row, dtype=float) for name, row in base.items()}
-    for (name, k), varies in zip(paths.number_operands, varied, strict=True):
-        size = REAL_SPREAD * np.maximum(np.abs(rows[name][k]), LEAST_SIZE)
-        rows[name][k] += size * rng.normal() if varies else 0.0
+    rng, own = np.random.default_rng(0), paths.numbers(base)
+    sizes = np.linalg.norm(span * np.maximum(np.abs(own), LEAST_SIZE), axis=0)
+    rows = paths.rows(own + span @ (REAL_SPREAD * sizes * rng.normal(size=len(sizes)))[:, None], base)
     found = complex_assemblies(setup, paths.block, (rows["z"][:, 0], rows["u"][:, 0], rows["p"][:, 0]))
     if found is None or not 0 < len(found) <= MAX_SOLUTIONS:
         return ()
     count = len(found)
     here, begin = paths.solutions(found.T), np.repeat(paths.numbers(rows), count, axis=1).astype(complex)
-    size = SPREAD * np.maximum(np.abs(paths.numbers(base)), LEAST_SIZE) * varied[:, None]
     starts: list[GenericStart] = []
     for _ in range(TRIES + many):
-        off = rng.normal(size=size.shape) + 1j * rng.normal(size=size.shape)
-        drawn = np.asarray(paths.numbers(base) + size * off, dtype=complex)
+        away = SPREAD * sizes * (rng.normal(size=len(sizes)) + 1j * rng.normal(size=len(sizes)))
+        drawn = np.asarray(own + span @ away[:, None], dtype=complex)
         followed = paths.follow(here, begin, np.repeat(drawn, count, axis=1), Tolerances().narrowed())
         if followed.arrived.all() and len(first_of_each(paths, followed.solutions)) == count:
             starts.append(GenericStart(drawn, followed.solutions))
