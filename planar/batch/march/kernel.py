@@ -156,10 +156,20 @@ class KernelEquations:
         return [RateSystem(*each) for each in zip(jacobians, firsts, seconds, strict=True)]
 
     def newton_step(self, block: Block) -> list[ca.SX]:
-        """Newton's step of a block, the square of the volume that its Jacobian's columns span, and that of their
-        lengths."""
+        """Newton's step of a block, the square of the volume that its Jacobian's columns span, that of their lengths,
+        and the square of the least of these."""
         e = self.equations
-        return list(solve_with_volume(block_jacobian(e, block.rows, block.unknowns), e.F[block.rows]))
+        jacobian = block_jacobian(e, block.rows, block.unknowns)
+        return [*solve_with_volume(jacobian, e.F[block.rows]), _squared_arm(jacobian)]
+
+
+def _squared_arm(jacobian: ca.SX) -> ca.SX:
+    """The square of a Jacobian's shortest column: where it vanishes, as with the arm of a slide on which a link turns,
+    an unknown is not determined, however far the others' columns are from each other."""
+    least = ca.SX(1.0)
+    for k in range(jacobian.shape[1]):
+        least = ca.fmin(least, ca.sumsqr(jacobian[:, k]))
+    return least
 
 
 @lru_cache(maxsize=256)
@@ -275,9 +285,10 @@ class KernelInstructions:
         return ca.vertcat(ca.SX(0, 1), *(part for position in positions for part in position))
 
     def newton_system(self, part: KernelBlock) -> list[ca.SX]:
-        """What a block leaves open, and its Jacobian column after column."""
+        """What a block leaves open, its Jacobian column after column, and the square of the shortest of these."""
         e = self.equations.equations
-        return [e.F[part.block.rows], ca.vec(block_jacobian(e, part.block.rows, part.block.unknowns))]
+        jacobian = block_jacobian(e, part.block.rows, part.block.unknowns)
+        return [e.F[part.block.rows], ca.vec(jacobian), _squared_arm(jacobian)]
 
     def rate_systems(self) -> list[RateSystem]:
         """See `KernelEquations.rate_systems`; where all rates are expressions there are none."""

@@ -14,7 +14,7 @@ import casadi as ca
 from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations, Operand
 from planar.batch.march.llvm_kernel import KernelWriter, OperandNames
 from planar.batch.march.prediction import MAX_TURN_PER_STEP, PREDICTOR_ORDER
-from planar.batch.march.regularity import LEAST_KERNEL_REGULARITY, least_regularity
+from planar.batch.march.regularity import LEAST_KERNEL_REGULARITY, LEAST_START_REGULARITY, least_regularity
 from planar.codegen.instructions import UnsupportedOperation
 from planar.codegen.llvm_linear import LinearSystems
 from planar.equations.linear import solve_by_determinants
@@ -273,7 +273,7 @@ class _DesignsKernelWriter(KernelWriter):
         t.write_label(f"newton{level}")
         t.write_line(f"%n{level} = phi i64 [0, %from{level}], [%n{level}next, %newton{level}]")
         now = {leaf: t.load(slot) for leaf, slot in own.items()}
-        *delta, spanned, lengths = self._write_newton_step(part, have | now)
+        *delta, spanned, lengths, squared_arm = self._write_newton_step(part, have | now)
         far = []
         for k, each in zip(part.unknowns, delta, strict=True):
             far.append(t.call_intrinsic("fabs", each))
@@ -291,7 +291,9 @@ class _DesignsKernelWriter(KernelWriter):
         t.write_label(f"solved{level}")
         have.update({leaf: t.load(slot) for leaf, slot in own.items()})
         t.store(
-            t.call_intrinsic("minnum", strong, self._write_regularity(spanned, lengths, len(part.unknowns))),
+            t.call_intrinsic(
+                "minnum", strong, self._write_regularity(spanned, lengths, squared_arm, len(part.unknowns))
+            ),
             self.regularity_slot,
         )
         t.store(t.binary("add", before, t.load(moved)), self.correction_slot)
@@ -304,9 +306,9 @@ class _DesignsKernelWriter(KernelWriter):
         if not part.is_large:
             return self.write_values(self.equations.newton_step(part.block), names)
         assert self.linear_systems is not None
-        residuals, columns = self.write_separately(self.newton_system(part), names)
+        residuals, columns, squared_arm = self.write_separately(self.newton_system(part), names)
         least = self.linear_systems.factorise(columns, len(residuals))
-        return [*self.linear_systems.solve(residuals), least, self.ir.constant(1.0)]
+        return [*self.linear_systems.solve(residuals), least, self.ir.constant(1.0), *squared_arm]
 
     def _write_rates(self, have: OperandNames) -> None:
         """The rates of the unknowns put into `have`, block after block, where large blocks' are solved in numbers."""
@@ -338,13 +340,14 @@ class _DesignsKernelWriter(KernelWriter):
             )
         return flags
 
-    def _write_regularity(self, spanned: str, lengths: str, count: int) -> str:
+    def _write_regularity(self, spanned: str, lengths: str, squared_arm: str, count: int) -> str:
         """How regular a Jacobian is, where that is told; else only whether it is enough: not below nothing."""
         t = self.ir
         if self.point_blocks is not None:
             return t.binary("div", spanned, lengths)
         least = least_regularity(LEAST_KERNEL_REGULARITY**2, count)
-        return t.binary("sub", spanned, t.binary("mul", lengths, t.constant(least)))
+        room = t.binary("sub", spanned, t.binary("mul", lengths, t.constant(least)))
+        return t.call_intrinsic("minnum", room, t.binary("sub", squared_arm, t.constant(LEAST_START_REGULARITY**2)))
 
     def _write_step_end(self, have: OperandNames, flags: list[str], scale: str) -> None:
         """The step ends: its results are written, and judged."""

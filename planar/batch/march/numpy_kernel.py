@@ -16,8 +16,9 @@ from planar.batch.march.kernel import (
     KernelInstructions,
     Operand,
 )
+from planar.batch.march.numpy_systems import newton_step, stack_values
 from planar.batch.march.prediction import MAX_TURN_PER_STEP, PREDICTOR_ORDER, extrapolation_weights
-from planar.batch.march.regularity import LEAST_KERNEL_REGULARITY, least_regularity
+from planar.batch.march.regularity import LEAST_KERNEL_REGULARITY, LEAST_START_REGULARITY, least_regularity
 from planar.codegen.instructions import UnsupportedOperation, required_values
 from planar.codegen.numpy_code import NumpyFunction, compile_numpy
 from planar.equations.linear import solve_vectors
@@ -225,10 +226,11 @@ class DesignMarch:
         other_points: dict[int, Sequence[Any]] = {}
         for part, own in kernel.blocks:
             if part.closed_form is None:
-                own_regularity, moved = self._correct_block(part, own, values)
+                own_regularity, squared_arm, moved = self._correct_block(part, own, values)
                 regularity, corrected = np.minimum(regularity, own_regularity), corrected + moved
                 if kernel.point_blocks is None:
                     fine &= own_regularity >= least_regularity(LEAST_KERNEL_REGULARITY**2, len(part.unknowns))
+                    fine &= squared_arm >= LEAST_START_REGULARITY**2
             else:
                 if part.block.block_index in kernel.block_points:
                     other_points |= self._other_points(part, own, values)
@@ -254,10 +256,10 @@ class DesignMarch:
     def _add_rates(self, values: OperandArrays, shape: tuple[int, int]) -> None:
         """The rates of the unknowns put into `values`, where they are solved in numbers."""
         for part, (jacobian, *right_sides) in self.kernel.rate_parts:
-            matrices = _stack_values(self._evaluate(jacobian, values), shape)
+            matrices = stack_values(self._evaluate(jacobian, values), shape)
             matrices = matrices.reshape(*shape, len(part.unknowns), len(part.unknowns))
             for name, own in zip(("z1", "z2"), right_sides, strict=True):
-                found = solve_vectors(matrices, _stack_values(self._evaluate(own, values), shape))
+                found = solve_vectors(matrices, stack_values(self._evaluate(own, values), shape))
                 values |= {(name, k): -found[..., n] for n, k in enumerate(part.unknowns)}
 
     def _inputs(self, offsets: Array) -> OperandArrays:
@@ -326,8 +328,9 @@ class DesignMarch:
         self.counted_angles[index] = rows[-1]
         return near
 
-    def _correct_block(self, part: KernelBlock, own: _KernelPart, values: OperandArrays) -> tuple[Any, Any]:
-        """Newton's method from where the block would be if it went on as before: how regular, how far corrected."""
+    def _correct_block(self, part: KernelBlock, own: _KernelPart, values: OperandArrays) -> tuple[Any, Any, Any]:
+        """Newton's method from where the block would be if it went on as before: how regular, how short the shortest
+        arm (squared), how far corrected."""
         kernel, is_angle = self.kernel, self.kernel.equations.is_angle
         weights = extrapolation_weights(min(max(self.step, 1), PREDICTOR_ORDER))
         for each in (operand for k in part.unknowns for operand in kernel.unknown_operands(k)):
@@ -335,9 +338,9 @@ class DesignMarch:
         for k in part.unknowns:
             if is_angle[k]:
                 values["zc", k], values["zs", k] = _normalise(values["zc", k], values["zs", k])
-        regularity, corrected = np.inf, np.zeros(1)
+        regularity, squared_arm, corrected = np.inf, 1.0, np.zeros(1)
         for _ in range(int(self.counts[self.step])):
-            step, regularity = _newton_step(part, self._evaluate(own, values))
+            step, regularity, squared_arm = newton_step(part, self._evaluate(own, values))
             for k, each in zip(part.unknowns, step, strict=True):
                 corrected = corrected + np.abs(each)
                 if ("z", k) in values:
@@ -346,7 +349,7 @@ class DesignMarch:
                     values["zc", k], values["zs", k] = np.cos(values["z", k]), np.sin(values["z", k])
                 elif is_angle[k]:
                     values["zc", k], values["zs", k] = _rotate_little(values["zc", k], values["zs", k], -each)
-        return regularity, corrected
+        return regularity, squared_arm, corrected
 
 
 def _operand(operand: Operand, rows: Array) -> Array:
@@ -370,23 +373,3 @@ def _normalise(cos: Any, sin: Any) -> tuple[Any, Any]:
     """What is nearly of length one, nearer to it: the inverse root by its first terms."""
     scale = 1.5 - 0.5 * (cos * cos + sin * sin)
     return cos * scale, sin * scale
-
-
-def _stack_values(values: Sequence[Any], shape: tuple[int, ...]) -> Array:
-    """Values of one shape, or spread over it, along a last axis."""
-    return np.stack([np.broadcast_to(each, shape) for each in values], axis=-1)
-
-
-def _newton_step(part: KernelBlock, values: Sequence[Any]) -> tuple[Sequence[Any], Any]:
-    """Newton's step of a block, and the square of how regular its Jacobian is."""
-    if not part.is_large:
-        *step, volume, lengths = values
-        return step, volume / lengths
-    count = len(part.unknowns)
-    flat = _stack_values(values, np.broadcast_shapes(*(np.shape(each) for each in values)))
-    residuals, columns = flat[..., :count], flat[..., count:].reshape(*flat.shape[:-1], count, count)
-    jacobians = columns.swapaxes(-1, -2)
-    regular = np.isfinite(jacobians).all(axis=(-2, -1))
-    diagonals = np.diagonal(np.linalg.qr(np.where(regular[..., None, None], jacobians, 0.0))[1], axis1=-2, axis2=-1)
-    least = np.min(diagonals**2 / np.sum(jacobians * jacobians, axis=-2), axis=-1)
-    return list(np.moveaxis(solve_vectors(jacobians, residuals), -1, 0)), np.minimum(least, 1.0)
