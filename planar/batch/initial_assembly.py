@@ -17,9 +17,10 @@ from planar.batch.partial_assemblies import PartialAssemblies
 from planar.batch.reference_design import ReferenceDesign, shape_of_designs
 from planar.equations.coordinates import frames_from_coordinates
 from planar.equations.symbolic_equations import Block, slice_length
+from planar.foundation.angles import distances
 from planar.foundation.geometry import Vector
 from planar.model.link_shapes import LinkShape
-from planar.solving.assembly.block_assemblies import CLEAR_SKETCH_DISTANCE
+from planar.solving.assembly.block_assemblies import CLEAR_SKETCH_DISTANCE, SAME_ASSEMBLY_TOLERANCE
 from planar.solving.assembly.nearest_assembly import EQUAL_DISTANCE_TOLERANCE
 from planar.solving.newton import damped_newton
 
@@ -91,6 +92,8 @@ class _AssemblySearch:
         self.failed_block = np.full(self.design_count, -1)
         self.is_listed = np.ones(self.design_count, dtype=bool)
         "of which all assemblies of every larger block are known"
+        self.clear_ways: list[tuple[Block, Array]] = []
+        "of larger blocks what lies where it is meant, not a number where nothing does (unknowns, designs)"
         self.dropped_distance = np.full(self.design_count, np.inf)
         "the nearest partial assembly that was not carried on"
         self.corrector = BlockCorrector(self.functions, p, u, self.candidates.counts_turns)
@@ -131,9 +134,19 @@ class _AssemblySearch:
                     none = np.flatnonzero(here.exists.any(axis=1) & ~on.exists.any(axis=1))
                     if none.size:
                         self._refuse_designs(block, none, here, roots)
-                    on = self._score(block, on)
+                    before, on = on.distance, self._score(block, on)
+                    self._keep_clear_ways(block, on, on.distance - before)
                 here = self._keep_nearest(on)
         return here, hasty
+
+    def _keep_clear_ways(self, block: Block, on: PartialAssemblies, cost: Array) -> None:
+        """Keep which way of a larger block lies where it is meant: the search one by one may not look for others then,
+        though later blocks can be joined to one of those alone."""
+        sketched = len(self.candidates.sketched_by_level.get(block.block_index, ()))
+        if sketched and slice_length(block.unknowns) > 2:
+            own = np.where(on.exists & is_at_sketch(cost, sketched), cost, np.inf)
+            nearest = np.take_along_axis(on.z[block.unknowns], np.argmin(own, axis=1)[None, :, None], axis=2)[..., 0]
+            self.clear_ways.append((block, np.where(np.isfinite(own).any(axis=1), nearest, np.nan)))
 
     def _sketched_point_count(self) -> int:
         """How many points the sketch shows."""
@@ -351,4 +364,7 @@ class _AssemblySearch:
             sure &= is_at_sketch(least, shown, reach)
             # of two that lie where they are meant the search one by one may see one alone
             sure &= np.count_nonzero(here.exists & is_at_sketch(cost, shown), axis=1) <= 1
+            for block, clear_way in self.clear_ways:
+                angles = self.equations.unknown_is_angle[block.unknowns]
+                sure &= ~np.any(distances(angles, z[block.unknowns].T, clear_way.T) > SAME_ASSEMBLY_TOLERANCE, axis=1)
         return DesignAssemblies(z, sure, self.failed_block)
