@@ -155,7 +155,8 @@ class _AssemblySearch:
     def _refuse_designs(self, block: Block, designs: Array, here: PartialAssemblies, roots: Array) -> None:
         """Of designs that no start has led to an assembly, those that have none: where the damped method says so too.
 
-        Only of blocks of two unknowns, whose least squares it cannot miss from starts on all sides.
+        That of blocks of two unknowns, whose least squares it cannot miss from starts on all sides; of larger ones
+        where the complete list says so.
         """
         unknowns = slice_length(block.unknowns)
         if unknowns > 2:

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import lru_cache
+from threading import Lock
 from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.block_solutions.block_paths import BlockPaths, Tolerances
+from planar.batch.block_solutions.block_paths import BlockPaths, BlockSolutions, Tolerances
 from planar.batch.block_solutions.generic_start import (
     SAME_SOLUTION,
     GenericStart,
@@ -48,7 +49,11 @@ class CompleteLists(NamedTuple):
 
 
 class BlockListing:
-    """All assemblies of one block of a reference design's designs. Raises UnsupportedOperation."""
+    """All assemblies of one block of a reference design's designs. Raises UnsupportedOperation.
+
+    The complete list is made when designs are first asked for, and again where they differ from the base's in what none
+    did before.
+    """
 
     def __init__(self, reference: ReferenceDesign, block: Block):
         equations = kernel_equations(reference.functions, equation_structure(reference.mechanism))
@@ -64,6 +69,7 @@ class BlockListing:
         self._span = np.zeros((len(self.base_numbers), 0))
         "directions in which numbers of any designs yet differ from the base's, orthonormal"
         self._starts: tuple[GenericStart, ...] | None = None
+        self._lock = Lock()  # one listing serves all threads
 
     def assemblies(self, rows: Mapping[str, Array]) -> CompleteLists | None:
         """Of designs with arrays p, u and z (rows, lanes), where the unknowns before the block are known in z.
@@ -72,7 +78,8 @@ class BlockListing:
         """
         numbers = self.paths.numbers(rows)
         known = np.isfinite(numbers).all(axis=0)
-        starts = self._generic_starts(numbers[:, known])
+        with self._lock:
+            starts = self._generic_starts(numbers[:, known])
         if not starts:
             return None
         lanes, count = numbers.shape[1], starts[0].solution_count
@@ -135,13 +142,11 @@ class BlockListing:
     def _lead(self, start: GenericStart, numbers: Array, tolerances: Tolerances) -> CompleteLists:
         """All solutions of a start led to designs (numbers, lanes)."""
         lanes, count, paths = numbers.shape[1], start.solution_count, self.paths
-        at = type(start.solutions)(*(np.tile(each, (1, lanes)) for each in start.solutions))
+        at = BlockSolutions(*(np.tile(each, (1, lanes)) for each in start.solutions))
         begin = np.repeat(start.numbers, lanes * count, axis=1)
         followed = paths.follow(at, begin, np.repeat(numbers, count, axis=1).astype(complex), tolerances)
-        unknowns, arrived = (
-            followed.solutions.unknowns.reshape(-1, lanes, count),
-            followed.arrived.reshape(lanes, count),
-        )
+        unknowns = followed.solutions.unknowns.reshape(-1, lanes, count)
+        arrived = followed.arrived.reshape(lanes, count)
         away = np.max(np.abs(unknowns.imag), axis=0)
         exists, undecided = away <= REAL_TOLERANCE, (away > REAL_TOLERANCE) & (away < UNDECIDED_TOLERANCE)
         keys = solution_keys(paths, followed.solutions).reshape(lanes, count)
