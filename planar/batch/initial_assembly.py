@@ -10,7 +10,6 @@ import numpy as np
 
 from planar.batch.assembly_scores import MAX_BLOCK_UNKNOWNS, NEAR_SKETCH, is_at_sketch, is_clearly_regular
 from planar.batch.block_corrector import SPREAD_STARTS, BlockCorrector
-from planar.batch.block_solutions.complete_lists import block_listing
 from planar.batch.march.backend import DesignRunner
 from planar.batch.nearest_assemblies import find_nearest_assemblies
 from planar.batch.partial_assemblies import PartialAssemblies
@@ -225,11 +224,14 @@ class _AssemblySearch:
     ) -> tuple[PartialAssemblies, Array, Array]:
         """Every partial assembly with the ways in which a block may be added, for which designs these are sure, and for
         which they are all there are."""
-        count = len(here.exists)
-        listing = block_listing(self.reference, block.block_index)
+        count, listing, is_large = len(here.exists), None, slice_length(block.unknowns) > 2
+        if is_large:
+            from planar.batch.block_solutions.complete_lists import block_listing  # only where it is needed
+
+            listing = block_listing(self.reference, block.block_index)
         if listing is None:
             on, sure = self._extend_from_starts(corrector, block, here, roots, most)
-            return on, sure, np.full(count, slice_length(block.unknowns) <= 2)
+            return on, sure, np.full(count, not is_large)
         listed = listing.extend(here.z, here.exists, corrector.p, corrector.u)
         width = listed.exists.shape[1] // here.exists.shape[1]
         on = PartialAssemblies(
