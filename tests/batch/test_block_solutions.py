@@ -16,9 +16,7 @@ from planar.solving.assembly.nearest_assembly import AssemblySearchFailure
 from planar.solving.position import PositionSolver
 from tests.linkages import random_linkage
 
-CASES = {name: name for name in ("stephenson-2-six-bar", "stephenson-3-five-bar", "double-butterfly")} | {
-    str(seed): seed for seed in (0, 5, 19)
-}
+CASES = {"stephenson-3-five-bar": "stephenson-3-five-bar", "double-butterfly": "double-butterfly", "0": 0, "19": 19}
 """Models, and random linkages, whose first block has four unknowns or six."""
 
 
@@ -42,9 +40,9 @@ def drawn(mechanism, spread, many):
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
 def test_wide_designs_have_the_assemblies_of_the_complete_list(case):
     mechanism = mechanism_of(case)
-    values, common, _, p, u = drawn(mechanism, 0.3, 6)
+    values, common, _, p, u = drawn(mechanism, 0.3, 4)
     block = common.functions.equations.blocks[0]
-    z = np.zeros((len(common.functions.equations.unknowns), 6))
+    z = np.zeros((len(common.functions.equations.unknowns), 4))
     found = BlockListing(common, block).assemblies({"p": p, "u": u, "z": z})
     assert found.is_complete[np.isfinite(p).all(axis=0)].mean() > 0.8
     for index in np.flatnonzero(found.is_complete):
@@ -65,7 +63,7 @@ def test_of_all_assemblies_the_nearest_is_taken_and_none_where_none_is():
     refused = found.failed_block == 0
     assert np.all(found.is_sure | refused | ~np.isfinite(p).all(axis=0))
     assert np.any(refused)
-    for index in [*np.flatnonzero(refused)[:2], *np.flatnonzero(found.is_sure)[:6]]:
+    for index in [*np.flatnonzero(refused)[:2], *np.flatnonzero(found.is_sure)[:4]]:
         nearest = PositionSolver(with_design_values(common.mechanism, values_of_design(values, index))).nearest()
         assert isinstance(nearest, AssemblySearchFailure) == refused[index]
         if not refused[index]:
