@@ -52,7 +52,7 @@ class UnknownRates:
     def right_sides(self, y1: ca.SX, y2: ca.SX | None = None) -> list[ca.SX]:
         """What the rate of each block's residuals is without the unknowns' own part, at first rates y1, or second ones.
 
-        Blocks without rows are left out. Rates of later blocks do not stand in it.
+        Blocks without unknowns are left out. Rates of later blocks do not stand in it.
         """
         count = self.equations.z.numel()
         rate, own = (self._first, y1) if y2 is None else (ca.substitute(self._second, self._y1, y1), y2)

@@ -149,10 +149,10 @@ class KernelEquations:
 
     def rate_systems(self, z1: ca.SX, z2: ca.SX, u1: ca.SX, u2: ca.SX) -> list[RateSystem]:
         """The systems of all blocks, in symbols for the rates of unknowns and of inputs."""
-        rates, e = UnknownRates(self.equations), self.equations
+        rates, blocks = UnknownRates(self.equations), self.equations.blocks
         firsts = rates.right_sides(ca.vertcat(z1, u1))
         seconds = rates.right_sides(ca.vertcat(z1, u1), ca.vertcat(z2, u2))
-        jacobians = [part for part, block in zip(rates.jacobians, e.blocks, strict=True) if slice_length(block.rows)]
+        jacobians = [each for each, of in zip(rates.jacobians, blocks, strict=True) if slice_length(of.unknowns)]
         return [RateSystem(*each) for each in zip(jacobians, firsts, seconds, strict=True)]
 
     def newton_step(self, block: Block) -> list[ca.SX]:
