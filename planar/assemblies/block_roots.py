@@ -94,7 +94,8 @@ def block_roots(setup: PreparedMechanism, stage: Block, z: Array, certify: bool 
         return _search_from_starts(setup, stage, z, "its equations are no polynomials of this kind")
     if known.form.bezout_number > (MAX_GEARED_PATHS if known.form.gears else MAX_PATHS):
         return _search_from_starts(setup, stage, z, f"there may be up to {known.form.bezout_number} complex ones")
-    found = _BlockRootSolver(setup, stage, z, known.form, known.instances).roots(certify)
+    given = (z, setup.inputs.u, setup.inputs.p)
+    found = _BlockRootSolver(setup, stage, given, known.form, known.instances).roots(certify)
     return found or _search_from_starts(setup, stage, z, "linkages of this structure have no single solutions")
 
 
@@ -148,25 +149,47 @@ class _ComplexSolutions(NamedTuple):
     method: str
 
 
+def complex_assemblies(
+    setup: PreparedMechanism, stage: Block, given: tuple[Array, Array, Array]
+) -> ComplexArray | None:
+    """All complex solutions of a block (solutions, unknowns) where z, u and p are `given`, those at infinity left out.
+
+    None where it is no block of polynomials without gears, may have more than `MAX_PATHS`, or where some do not count
+    once or are not reached.
+    """
+    known = _block_structure(setup, stage)
+    form = known.form
+    if form is None or form.gears or form.is_redundant or form.bezout_number > MAX_PATHS:
+        return None
+    found = _BlockRootSolver(setup, stage, given, form, known.instances).complex_solutions()
+    if found is None or not found.all_paths_ended or np.any(is_finite_solution(found.multiple, 1e-4)):
+        return None
+    return form.complex_unknowns(found.single[is_finite_solution(found.single)])
+
+
 class _BlockRootSolver:
-    """One block with its numbers."""
+    """One block where z, u and p are given."""
 
     def __init__(
         self,
         setup: PreparedMechanism,
         stage: Block,
-        z: Array,
+        given: tuple[Array, Array, Array],
         form: IsotropicForm,
         instances: dict[bytes, GenericInstance],
     ):
-        self.setup, self.stage, self.z, self.form, self.instances = setup, stage, z, form, instances
-        self.given = (z, setup.inputs.u, setup.inputs.p)
+        self.setup, self.stage, self.z, self.form, self.instances = setup, stage, given[0], form, instances
+        self.given = given
         self.polynomials: BlockPolynomials = self.form.polynomials(*self.given)
-        self.residual_function: ResidualFunction = block_residual_function(setup.functions, stage, z, *self.given[1:])
+        self.residual_function: ResidualFunction = block_residual_function(setup.functions, stage, *self.given)
+
+    def complex_solutions(self) -> _ComplexSolutions | None:
+        """All of them; None where not even a random linkage of the structure has any that count once."""
+        return self._solve_by_eigenvalues() or self._solve_by_paths()
 
     def roots(self, certify: bool) -> BlockRoots | None:
         """See `roots`; None where not even a random linkage of the structure has solutions that count once."""
-        found = self._solve_by_eigenvalues() or self._solve_by_paths()
+        found = self.complex_solutions()
         if found is None:
             return None
         single = found.single[is_finite_solution(found.single)]

@@ -17,7 +17,9 @@ MAX_BLOCK_UNKNOWNS = 4
 """Unknowns of the largest block whose regularity tells whether another assembly is near."""
 
 
-def is_at_sketch(squared_distance: Array, point_count: int | Array, reach: float = CLEAR_SKETCH_DISTANCE) -> Array:
+def is_at_sketch(
+    squared_distance: Array, point_count: int | Array, reach: float | Array = CLEAR_SKETCH_DISTANCE
+) -> Array:
     """Whether points lie where the sketch shows them, by the sum of their squared distances (squared sizes)."""
     return squared_distance <= point_count * reach**2
 

@@ -12,12 +12,14 @@ from planar.batch.assembly_scores import MAX_BLOCK_UNKNOWNS, NEAR_SKETCH, is_at_
 from planar.batch.block_corrector import SPREAD_STARTS, BlockCorrector
 from planar.batch.march.backend import DesignRunner
 from planar.batch.nearest_assemblies import find_nearest_assemblies
+from planar.batch.partial_assemblies import PartialAssemblies
 from planar.batch.reference_design import ReferenceDesign, shape_of_designs
 from planar.equations.coordinates import frames_from_coordinates
 from planar.equations.symbolic_equations import Block, slice_length
+from planar.foundation.angles import distances
 from planar.foundation.geometry import Vector
 from planar.model.link_shapes import LinkShape
-from planar.solving.assembly.block_assemblies import CLEAR_SKETCH_DISTANCE
+from planar.solving.assembly.block_assemblies import CLEAR_SKETCH_DISTANCE, SAME_ASSEMBLY_TOLERANCE
 from planar.solving.assembly.nearest_assembly import EQUAL_DISTANCE_TOLERANCE
 from planar.solving.newton import damped_newton
 
@@ -33,6 +35,11 @@ MAX_PARTIAL_ASSEMBLIES = 8
 """Partial assemblies of a design that are carried on, those nearest to the sketch."""
 
 
+MAX_SEARCHED_UNKNOWNS = 6
+"""Unknowns of a block of which the search one by one finds every assembly from its starts; of a larger one it may not
+find the nearest where that lies far from the sketch."""
+
+
 class DesignAssemblies(NamedTuple):
     """z (unknowns, designs), and for which of them it is surely the one that the search one by one would take.
 
@@ -42,22 +49,6 @@ class DesignAssemblies(NamedTuple):
     z: Array
     is_sure: Array
     failed_block: Array
-
-
-class _PartialAssemblies(NamedTuple):
-    """Partial assemblies of all designs: z (unknowns, designs, ways), which of the ways there are (designs, ways), and
-    what they are told apart by: the squared distance to the sketch, and for each block how its slides and points lie.
-    """
-
-    z: Array
-    exists: Array
-    distance: Array
-    tie_keys: tuple[Array, ...] = ()
-
-    def select(self, designs: Array) -> _PartialAssemblies:
-        """Those of some designs."""
-        lying = tuple(each[designs] for each in self.tie_keys)
-        return _PartialAssemblies(self.z[:, designs], self.exists[designs], self.distance[designs], lying)
 
 
 def find_assemblies(
@@ -98,6 +89,10 @@ class _AssemblySearch:
         self.numbers = dict(zip(self.candidates.pairs, np.split(p, ends[:-1]), strict=True))
         self.is_sure = np.ones(self.design_count, dtype=bool)
         self.failed_block = np.full(self.design_count, -1)
+        self.is_listed = np.ones(self.design_count, dtype=bool)
+        "of which all assemblies of every larger block are known"
+        self.clear_ways: list[tuple[Block, Array]] = []
+        "of larger blocks what lies where it is meant, not a number where nothing does (unknowns, designs)"
         self.dropped_distance = np.full(self.design_count, np.inf)
         "the nearest partial assembly that was not carried on"
         self.corrector = BlockCorrector(self.functions, p, u, self.candidates.counts_turns)
@@ -117,38 +112,55 @@ class _AssemblySearch:
             )
         return found
 
-    def _join_blocks(self, quick: bool) -> tuple[_PartialAssemblies, Array]:
+    def _join_blocks(self, quick: bool) -> tuple[PartialAssemblies, Array]:
         """All blocks joined, and which designs had one that was clear by itself; without `quick` none is."""
         hasty = np.zeros(self.design_count, dtype=bool)
         unknowns = len(self.equations.unknowns)
         zero = np.zeros((self.design_count, 1))
-        here = _PartialAssemblies(np.zeros((unknowns, self.design_count, 1)), zero == 0.0, zero)
+        here = PartialAssemblies(np.zeros((unknowns, self.design_count, 1)), zero == 0.0, zero)
         for block, (roots, most) in zip(self.equations.blocks, self.reference.block_assemblies(), strict=True):
             if slice_length(block.rows):
                 on, rest = self._extend_clearly(block, here, roots) if quick else (here, np.arange(self.design_count))
-                hasty[np.setdiff1d(np.arange(self.design_count), rest)] = True
+                clear = np.setdiff1d(np.arange(self.design_count), rest)
+                hasty[clear], self.is_listed[clear] = True, False
                 if rest.size:
-                    others, sure = self._extend(self.corrector.select(rest), block, here.select(rest), roots, most)
+                    others, sure, listed = self._extend(
+                        self.corrector.select(rest), block, here.select(rest), roots, most
+                    )
                     on = self._merge_extensions(here, on, rest, others)
                     self.is_sure[rest] &= sure
+                    self.is_listed[rest] &= listed
                     none = np.flatnonzero(here.exists.any(axis=1) & ~on.exists.any(axis=1))
                     if none.size:
                         self._refuse_designs(block, none, here, roots)
-                    on = self._score(block, on)
+                    before, on = on.distance, self._score(block, on)
+                    self._keep_clear_ways(block, on, on.distance - before)
                 here = self._keep_nearest(on)
         return here, hasty
+
+    def _keep_clear_ways(self, block: Block, on: PartialAssemblies, cost: Array) -> None:
+        """Keep which way of a larger block lies where it is meant: the search one by one may not look for others then,
+        though later blocks can be joined to one of those alone."""
+        sketched = len(self.candidates.sketched_by_level.get(block.block_index, ()))
+        if sketched and slice_length(block.unknowns) > 2:
+            own = np.where(on.exists & is_at_sketch(cost, sketched), cost, np.inf)
+            nearest = np.take_along_axis(on.z[block.unknowns], np.argmin(own, axis=1)[None, :, None], axis=2)[..., 0]
+            self.clear_ways.append((block, np.where(np.isfinite(own).any(axis=1), nearest, np.nan)))
 
     def _sketched_point_count(self) -> int:
         """How many points the sketch shows."""
         return sum(map(len, self.candidates.sketched_by_level.values()))
 
-    def _refuse_designs(self, block: Block, designs: Array, here: _PartialAssemblies, roots: Array) -> None:
+    def _refuse_designs(self, block: Block, designs: Array, here: PartialAssemblies, roots: Array) -> None:
         """Of designs that no start has led to an assembly, those that have none: where the damped method says so too.
 
-        Only of blocks of two unknowns, whose least squares it cannot miss from starts on all sides.
+        That of blocks of two unknowns, whose least squares it cannot miss from starts on all sides; of larger ones
+        where the complete list says so.
         """
         unknowns = slice_length(block.unknowns)
         if unknowns > 2:
+            all_known = self.is_listed[designs] & self.is_sure[designs] & np.isinf(self.dropped_distance[designs])
+            self.failed_block[designs[all_known]] = block.block_index
             return
         ways = [(design, way) for design in designs for way in np.flatnonzero(here.exists[design])]
         starts = np.repeat(
@@ -174,7 +186,7 @@ class _AssemblySearch:
         near[design[each[ended.residual < REFUSAL_TOLERANCE]]] = True
         self.failed_block[designs[~near[designs]]] = block.block_index
 
-    def _extend_clearly(self, block: Block, here: _PartialAssemblies, roots: Array) -> tuple[_PartialAssemblies, Array]:
+    def _extend_clearly(self, block: Block, here: PartialAssemblies, roots: Array) -> tuple[PartialAssemblies, Array]:
         """Every design with one way to add a block, and the designs for which that is not clearly the one meant.
 
         It is where it lies at the sketch, and the Jacobian is so regular that no other is near: see `BlockAssemblies`.
@@ -191,8 +203,8 @@ class _AssemblySearch:
         return on, every[~clear]
 
     def _merge_extensions(
-        self, here: _PartialAssemblies, clear: _PartialAssemblies, rest: Array, others: _PartialAssemblies
-    ) -> _PartialAssemblies:
+        self, here: PartialAssemblies, clear: PartialAssemblies, rest: Array, others: PartialAssemblies
+    ) -> PartialAssemblies:
         """The ways of all designs: one of those that are clear, and those of the rest; not measured yet."""
         width = others.exists.shape[1]
 
@@ -205,12 +217,39 @@ class _AssemblySearch:
         there[:, 0] = clear.exists[:, 0]
         there[rest] = others.exists
         lying = tuple(widened(*both) for both in zip(here.tie_keys, others.tie_keys, strict=True))
-        return _PartialAssemblies(widened(clear.z, others.z), there, widened(here.distance, others.distance), lying)
+        return PartialAssemblies(widened(clear.z, others.z), there, widened(here.distance, others.distance), lying)
 
     def _extend(
-        self, corrector: BlockCorrector, block: Block, here: _PartialAssemblies, roots: Array, most: int
-    ) -> tuple[_PartialAssemblies, Array]:
-        """Every partial assembly with the ways in which a block may be added, and for which designs these are sure."""
+        self, corrector: BlockCorrector, block: Block, here: PartialAssemblies, roots: Array, most: int
+    ) -> tuple[PartialAssemblies, Array, Array]:
+        """Every partial assembly with the ways in which a block may be added, for which designs these are sure, and for
+        which they are all there are."""
+        count, listing, is_large = len(here.exists), None, slice_length(block.unknowns) > 2
+        if is_large:
+            from planar.batch.block_solutions.complete_lists import block_listing  # only where it is needed
+
+            listing = block_listing(self.reference, block.block_index)
+        if listing is None:
+            on, sure = self._extend_from_starts(corrector, block, here, roots, most)
+            return on, sure, np.full(count, not is_large)
+        listed = listing.extend(here.z, here.exists, corrector.p, corrector.u)
+        width = listed.exists.shape[1] // here.exists.shape[1]
+        on = PartialAssemblies(
+            listed.unknowns,
+            listed.exists,
+            np.repeat(here.distance, width, axis=1),
+            tuple(np.repeat(each, width, axis=1) for each in here.tie_keys),
+        )
+        rest, sure = np.flatnonzero(~listed.is_complete), np.ones(count, dtype=bool)
+        if rest.size:
+            others, sure[rest] = self._extend_from_starts(corrector.select(rest), block, here.select(rest), roots, most)
+            on = on.replace(rest, others)
+        return on, sure, listed.is_complete
+
+    def _extend_from_starts(
+        self, corrector: BlockCorrector, block: Block, here: PartialAssemblies, roots: Array, most: int
+    ) -> tuple[PartialAssemblies, Array]:
+        """The same by Newton's method from the base's assemblies, and from starts all over the circles."""
         sure = np.ones(len(here.exists), dtype=bool)
         found, there, _ = corrector.correct(block, here.z, here.exists, roots, NEWTON_STEPS)
         there &= corrector.is_distinct(block, found, there)
@@ -240,9 +279,9 @@ class _AssemblySearch:
         spread = np.repeat(here.distance, there.shape[2], axis=1)
         lying = tuple(np.repeat(each, there.shape[2], axis=1) for each in here.tie_keys)
         z, exists = found.reshape(len(found), len(sure), width), there.reshape(len(sure), width)
-        return _PartialAssemblies(z, exists, spread, lying), sure
+        return PartialAssemblies(z, exists, spread, lying), sure
 
-    def _score(self, block: Block, here: _PartialAssemblies) -> _PartialAssemblies:
+    def _score(self, block: Block, here: PartialAssemblies) -> PartialAssemblies:
         """The partial assemblies with what a block adds to how they are told apart."""
         candidates, width = self.candidates, here.exists.shape[1]
         u, p = (np.repeat(part.T, width, axis=0) for part in (self.u, self.p))
@@ -279,7 +318,7 @@ class _AssemblySearch:
         height = np.mean(np.broadcast_arrays(*heights, far), axis=0) if heights else far * 0.0
         return here._replace(distance=distance, tie_keys=(*here.tie_keys, behind, -height, -far))
 
-    def _keep_nearest(self, here: _PartialAssemblies) -> _PartialAssemblies:
+    def _keep_nearest(self, here: PartialAssemblies) -> PartialAssemblies:
         """The partial assemblies nearest to the sketch, so many as are carried on."""
         if here.exists.shape[1] <= MAX_PARTIAL_ASSEMBLIES:
             return here
@@ -290,14 +329,14 @@ class _AssemblySearch:
         )
         order = order[:, :MAX_PARTIAL_ASSEMBLIES]
         lying = tuple(np.take_along_axis(each, order, axis=1) for each in here.tie_keys)
-        return _PartialAssemblies(
+        return PartialAssemblies(
             np.take_along_axis(here.z, order[None], axis=2),
             np.take_along_axis(here.exists, order, axis=1),
             np.take_along_axis(here.distance, order, axis=1),
             lying,
         )
 
-    def _choose(self, here: _PartialAssemblies) -> DesignAssemblies:
+    def _choose(self, here: PartialAssemblies) -> DesignAssemblies:
         cost = np.where(here.exists, here.distance, np.inf)
         least = cost.min(axis=1)
         best = np.argmin(cost, axis=1)
@@ -320,5 +359,15 @@ class _AssemblySearch:
         largest = max((slice_length(block.unknowns) for block in self.equations.blocks), default=0)
         if largest > 2:
             # it may have assemblies that no start has led to: none of these is nearer than what is near
-            sure &= is_at_sketch(least, shown, NEAR_SKETCH if largest <= MAX_BLOCK_UNKNOWNS else CLEAR_SKETCH_DISTANCE)
+            reach = np.where(
+                self.is_listed,
+                np.inf if largest <= MAX_SEARCHED_UNKNOWNS else NEAR_SKETCH,
+                NEAR_SKETCH if largest <= MAX_BLOCK_UNKNOWNS else CLEAR_SKETCH_DISTANCE,
+            )
+            sure &= is_at_sketch(least, shown, reach)
+            # of two that lie where they are meant the search one by one may see one alone
+            sure &= np.count_nonzero(here.exists & is_at_sketch(cost, shown), axis=1) <= 1
+            for block, clear_way in self.clear_ways:
+                angles = self.equations.unknown_is_angle[block.unknowns]
+                sure &= ~np.any(distances(angles, z[block.unknowns].T, clear_way.T) > SAME_ASSEMBLY_TOLERANCE, axis=1)
         return DesignAssemblies(z, sure, self.failed_block)

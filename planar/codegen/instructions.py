@@ -43,7 +43,7 @@ ANGLE_MULTIPLES = (-3.0, -2.0, -1.0, 1.0, 2.0, 3.0)
 """Multiples of an angle that are put together from its own cos and sin."""
 
 
-MAX_INSTRUCTIONS = 16_000
+MAX_INSTRUCTIONS = 14_000
 """Of one function: longer ones would take more than about a second to compile."""
 
 

@@ -68,6 +68,38 @@ def solve_with_volume(matrix: ca.SX, right_side: ca.SX) -> tuple[ca.SX, ca.SX, c
     return ca.vertcat(*solution), determinant * determinant, lengths
 
 
+def solve_by_elimination(matrix: ca.SX, right_side: ca.SX, sample: Array) -> ca.SX:
+    """matrix^-1 right side: up to four unknowns by determinants, of more by Gauss's elimination.
+
+    Pivots stand where they are greatest in `sample`, the matrix at one place; so the expressions grow by what is there
+    alone, but where one of these entries vanishes nothing is found.
+    """
+    count = right_side.numel()
+    if count <= MAX_CRAMER_UNKNOWNS:
+        return solve_by_determinants(matrix, right_side)
+    rows = [[*(matrix[i, j] for j in range(count)), right_side[i]] for i in range(count)]
+    numbers = np.array(sample, dtype=float)
+    pivots: list[tuple[int, int]] = []
+    left, free = list(range(count)), list(range(count))
+    while left:
+        i, j = max(((i, j) for i in left for j in free), key=lambda at: abs(float(numbers[at])))
+        pivots.append((i, j))
+        left.remove(i)
+        free.remove(j)
+        scale = 1.0 / rows[i][j]
+        for other in left:
+            if not rows[other][j].is_zero():
+                factor = rows[other][j] * scale
+                rows[other] = [a if b.is_zero() else a - factor * b for a, b in zip(rows[other], rows[i], strict=True)]
+                rows[other][j] = ca.SX(0.0)
+                numbers[other] -= numbers[other, j] / numbers[i, j] * numbers[i]
+    solution: dict[int, ca.SX] = {}
+    for i, j in reversed(pivots):
+        known = sum((rows[i][k] * value for k, value in solution.items() if not rows[i][k].is_zero()), ca.SX(0.0))
+        solution[j] = (rows[i][-1] - known) / rows[i][j]
+    return ca.vertcat(*(solution[k] for k in range(count)))
+
+
 def _minors(matrix: ca.SX) -> dict[tuple[int, ...], ca.SX]:
     """The determinants of all rows with as many columns, by those of two rows at a time (Laplace)."""
     rows, columns = matrix.shape

@@ -49,6 +49,21 @@ class UnknownRates:
         self._first, self._second = time_derivatives(e.F, self.y, self._y1, self._y2)
         self.jacobians = [block_jacobian(e, block.rows, block.unknowns) for block in e.blocks]
 
+    def right_sides(self, y1: ca.SX, y2: ca.SX | None = None) -> list[ca.SX]:
+        """What the rate of each block's residuals is without the unknowns' own part, at first rates y1, or second ones.
+
+        Blocks without unknowns are left out. Rates of later blocks do not stand in it.
+        """
+        count = self.equations.z.numel()
+        rate, own = (self._first, y1) if y2 is None else (ca.substitute(self._second, self._y1, y1), y2)
+        symbol = self._y1 if y2 is None else self._y2
+        found = []
+        for block in self.equations.blocks:
+            if slice_length(block.unknowns):
+                known = ca.vertcat(own[: block.unknowns.start], ca.SX.zeros(count - block.unknowns.start), own[count:])
+                found.append(ca.substitute(rate[block.rows], symbol, known))
+        return found
+
     def first(self, u1: ca.SX) -> ca.SX:
         """The first rates of the unknowns (unknowns,) for those of the inputs (inputs,)."""
         return self._solve_blocks(self._first, self._y1, u1)

@@ -6,6 +6,7 @@ import pytest
 
 import planar
 from planar.batch.design_arrays import values_of_design, with_design_values
+from planar.batch.march import kernel
 from planar.batch.reference_design import reference_design
 from planar.document.dimensions import link_lengths
 from planar.foundation.errors import BadInput, Outcome
@@ -195,3 +196,28 @@ def test_inputs_stand_as_far_as_in_a_file(far, backend):
         assert swept.velocity["C"][0] == pytest.approx(alone.point("C").velocity, rel=1e-14 * far)
         assert swept.whole.all()
     assert planar.sweep(mechanism, {"A.position": [1.0]}, 8, "C", start=1.0, stop=1.0 + 2e4 * np.pi).whole.all()
+
+
+@pytest.mark.parametrize("backend", ["native", "numpy"])
+def test_newton_does_not_turn_a_link_on_an_arm_that_vanishes(monkeypatch, backend):
+    monkeypatch.setattr(kernel, "find_closed_form", lambda equations, block: None)
+    value = {
+        "planar": 1,
+        "name": "a slot over its own pivot",
+        "frame": "frame",
+        "links": {
+            "frame": {"points": {"O": [0, 0], "Q": [1, 0]}},
+            "OA": {"ends": ["O", "A"], "length": 1.0},
+            "L": {"points": {"Q": [0, 0], "E": [0.5, 0.3]}},
+        },
+        "pairs": [
+            {"turning": "O"},
+            {"turning": "Q"},
+            {"slot": "S", "links": ["L", "OA"], "line": {"through": "Q", "angle": 0.0}, "point": "A"},
+        ],
+        "inputs": [{"pair": "O", "position": 0.5, "velocity": 1.0}],
+        "sketch": {"A": [0.88, 0.48], "E": [0.6, 0.6]},
+    }
+    mechanism, lengths = planar.from_dict(value), {"OA.length": np.full(2, 1.0)}
+    agrees(mechanism, lengths, 20, points="E", start=0.5, stop=-0.5, backend=backend)
+    assert planar.sweep(mechanism, lengths, 20, points="E", start=0.5, stop=-0.5, backend=backend).general > 0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import planar
-from planar.batch.march import llvm_designs, llvm_runner, numpy_backend, numpy_kernel
+from planar.batch.march import kernel, llvm_designs, llvm_runner, numpy_backend
 from planar.batch.march.backend import DesignBatch, UnsupportedStructure
 from planar.batch.march.kernel import BareAngle, kernel_equations
 from planar.batch.march.llvm_backend import LLVMRunner
@@ -159,16 +159,17 @@ def test_both_runners_correct_assemblies_alike_and_come_to_the_same_unknowns(ste
     np.testing.assert_allclose(np.exp(1j * one), np.exp(1j * other), atol=1e-10)
 
 
-@pytest.mark.parametrize("most", [1, 2])
-def test_blocks_too_large_for_expressions_are_solved_by_arrays_to_the_same(monkeypatch, most):
-    mechanism = MODELS["double-butterfly"]
+@pytest.mark.parametrize(("stem", "backend"), [("stephenson-2-six-bar", "native"), ("double-butterfly", "numpy")])
+def test_blocks_too_large_for_expressions_are_solved_in_numbers_to_the_same(monkeypatch, stem, backend):
+    mechanism, caches = MODELS[stem], (numpy_backend._cached_kernel, llvm_runner._designs_kernel_or_reason)
     designs = designs_around(mechanism, 0.005, 3)
-    wanted = planar.sweep(mechanism, designs, 60, backend="numpy")
-    monkeypatch.setattr(numpy_kernel, "MAX_EXPRESSION_UNKNOWNS", most)
-    monkeypatch.setattr(numpy_backend, "MAX_EXPRESSION_UNKNOWNS", most)
-    numpy_backend._cached_kernel.cache_clear()
-    found = planar.sweep(mechanism, designs, 60, backend="numpy")
-    numpy_backend._cached_kernel.cache_clear()
+    wanted = planar.sweep(mechanism, designs, 30, backend=backend)
+    monkeypatch.setattr(kernel, "MAX_EXPRESSION_UNKNOWNS", 3)
+    for cache in (kernel.kernel_equations, *caches):
+        cache.cache_clear()
+    found = planar.sweep(mechanism, designs, 30, backend=backend)
+    for cache in (kernel.kernel_equations, *caches):
+        cache.cache_clear()
     assert (found.general, found.whole.all()) == (0, True)
     for point in found.points:
         for order in ("position", "velocity", "acceleration"):

@@ -4,10 +4,17 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from planar.equations.linear import inverse_arrays, solve_arrays, solve_linear, solve_vectors, solve_with_volume
+from planar.equations.linear import (
+    inverse_arrays,
+    solve_arrays,
+    solve_by_elimination,
+    solve_linear,
+    solve_vectors,
+    solve_with_volume,
+)
 
 
-@pytest.mark.parametrize("count", [1, 2, 3, 4, 5])
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 5, 7])
 def test_expressions_and_arrays_have_the_same_solution(count):
     rng = np.random.default_rng(count)
     matrices, right = rng.normal(size=(7, count, count)), rng.normal(size=(7, count, 1))
@@ -15,7 +22,11 @@ def test_expressions_and_arrays_have_the_same_solution(count):
     np.testing.assert_allclose(matrices @ found, right, atol=1e-10)
     np.testing.assert_allclose(solve_vectors(matrices[0], right[0, :, 0]), found[0, :, 0], rtol=1e-9)
     np.testing.assert_allclose(inverse_arrays(matrices) @ right, found, rtol=1e-9)
-    for solved in (solve_linear, lambda a, b: solve_with_volume(a, b)[0]):
+    for solved in (
+        solve_linear,
+        lambda a, b: solve_with_volume(a, b)[0],
+        lambda a, b: solve_by_elimination(a, b, matrices[1]),
+    ):
         one = ca.evalf(solved(ca.SX(matrices[0]), ca.SX(right[0])))
         np.testing.assert_allclose(one.full(), found[0], rtol=1e-9)
 

@@ -136,6 +136,15 @@ class IsotropicForm(NamedTuple):
             found[:, own] = (X[:, k] * (Y[:, j] if j else 1.0)).real
         return found
 
+    def complex_unknowns(self, V: ComplexArray) -> ComplexArray:
+        """The unknowns of the block (solutions, unknowns) at solutions at finite places, where no gears tie angles."""
+        X, Y = (each / each[:, :1] for each in np.split(V, 2, axis=1))
+        found = np.zeros((len(X), len(self.angles) + len(self.lengths)), dtype=complex)
+        found[:, list(self.angles)] = -1j * np.log(X[:, 1 : self.first_length])
+        for k, (own, j) in enumerate(zip(self.lengths, self.direction_index, strict=True), self.first_length):
+            found[:, own] = X[:, k] * (Y[:, j] if j else 1.0)
+        return found
+
     def wrap_angles(self, root: Array) -> Array:
         """The same assembly (unknowns,) with angles between -pi and pi, or the least that count turns."""
         angles, root = list(self.angles), root.copy()

@@ -44,6 +44,10 @@ of pairs, "q" those of points; "u1", "u2" rates of what is given; "sign" of a bl
 """
 
 
+MAX_EXPRESSION_UNKNOWNS = 8
+"""Unknowns of a block that expressions solve; of larger ones these grow too long, and the numbers are solved."""
+
+
 class BareAngle(Exception):
     """An angle stands outside cos and sin, so that its value has to be carried beside them."""
 
@@ -61,6 +65,23 @@ class KernelBlock(NamedTuple):
     @property
     def unknowns(self) -> range:
         return range(self.block.unknowns.start, self.block.unknowns.stop)
+
+    @property
+    def is_large(self) -> bool:
+        """Whether its systems are solved in numbers, not by expressions."""
+        return len(self.unknowns) > MAX_EXPRESSION_UNKNOWNS
+
+
+class RateSystem(NamedTuple):
+    """What the rates of a block's unknowns follow from: minus the Jacobian's inverse times the right sides.
+
+    In symbols for the rates of unknowns that are known before: the first for the first, and all the first ones and the
+    second ones of earlier blocks for the second.
+    """
+
+    jacobian: ca.SX
+    first: ca.SX
+    second: ca.SX
 
 
 class KernelEquations:
@@ -88,6 +109,7 @@ class KernelEquations:
         self.input_is_angle = tuple(kind is MeasureKind.ANGLE for kind in e.input_kinds)
         self.closed_forms = tuple(part.closed_form for part in self.blocks if part.closed_form is not None)
         self.has_newton_blocks = len(self.closed_forms) < len(self.blocks)
+        self.has_large_blocks = any(part.is_large for part in self.blocks)
         self.sides = ca.vertcat(ca.SX(0, 1), *(form.sign_expression for form in self.closed_forms))
         self.column_of = coordinate_columns(e.coordinates)
 
@@ -125,11 +147,29 @@ class KernelEquations:
         """First and second rates of the unknowns, block after block."""
         return UnknownRates(self.equations, solve_by_determinants).first_and_second(u1, u2)
 
+    def rate_systems(self, z1: ca.SX, z2: ca.SX, u1: ca.SX, u2: ca.SX) -> list[RateSystem]:
+        """The systems of all blocks, in symbols for the rates of unknowns and of inputs."""
+        rates, blocks = UnknownRates(self.equations), self.equations.blocks
+        firsts = rates.right_sides(ca.vertcat(z1, u1))
+        seconds = rates.right_sides(ca.vertcat(z1, u1), ca.vertcat(z2, u2))
+        jacobians = [each for each, of in zip(rates.jacobians, blocks, strict=True) if slice_length(of.unknowns)]
+        return [RateSystem(*each) for each in zip(jacobians, firsts, seconds, strict=True)]
+
     def newton_step(self, block: Block) -> list[ca.SX]:
-        """Newton's step of a block, the square of the volume that its Jacobian's columns span, and that of their
-        lengths."""
+        """Newton's step of a block, the square of the volume that its Jacobian's columns span, that of their lengths,
+        and the square of the least of these."""
         e = self.equations
-        return list(solve_with_volume(block_jacobian(e, block.rows, block.unknowns), e.F[block.rows]))
+        jacobian = block_jacobian(e, block.rows, block.unknowns)
+        return [*solve_with_volume(jacobian, e.F[block.rows]), _squared_arm(jacobian)]
+
+
+def _squared_arm(jacobian: ca.SX) -> ca.SX:
+    """The square of a Jacobian's shortest column: where it vanishes, as with the arm of a slide on which a link turns,
+    an unknown is not determined, however far the others' columns are from each other."""
+    least = ca.SX(1.0)
+    for k in range(jacobian.shape[1]):
+        least = ca.fmin(least, ca.sumsqr(jacobian[:, k]))
+    return least
 
 
 @lru_cache(maxsize=256)
@@ -169,6 +209,8 @@ class KernelInstructions:
             "q": ca.SX.sym("q", 2 * len(links)),
             "u1": ca.SX.sym("u1", e.u.numel()),
             "u2": ca.SX.sym("u2", e.u.numel()),
+            "z1": ca.SX.sym("z1", e.z.numel()),
+            "z2": ca.SX.sym("z2", e.z.numel()),
             "sign": ca.vertcat(ca.SX(0, 1), *(form.sign for form in equations.closed_forms)),
         }
         self.hoister = InvariantHoister[Operand](lambda operand: operand[0] in invariant)
@@ -242,6 +284,18 @@ class KernelInstructions:
         positions = [self.equations.frame(self.links[k]).to_world(Vector(q[2 * k], q[2 * k + 1])) for k in points]
         return ca.vertcat(ca.SX(0, 1), *(part for position in positions for part in position))
 
+    def newton_system(self, part: KernelBlock) -> list[ca.SX]:
+        """What a block leaves open, its Jacobian column after column, and the square of the shortest of these."""
+        e = self.equations.equations
+        jacobian = block_jacobian(e, part.block.rows, part.block.unknowns)
+        return [e.F[part.block.rows], ca.vec(jacobian), _squared_arm(jacobian)]
+
+    def rate_systems(self) -> list[RateSystem]:
+        """See `KernelEquations.rate_systems`; where all rates are expressions there are none."""
+        if not (self.rates and self.equations.has_large_blocks):
+            return []
+        return self.equations.rate_systems(*(self.symbols[name] for name in ("z1", "z2", "u1", "u2")))
+
     def counted_angles(self) -> ca.SX:
         """Angles of links that wheels or racks tie: they may turn much farther in a step than the inputs do."""
         e, links = self.equations.equations, links_counting_turns(self.equations.mechanism)
@@ -261,6 +315,8 @@ class KernelInstructions:
         positions = self.point_coordinates(range(len(self.links)))
         if not self.rates:
             return [positions]
-        z1, z2 = self.equations.rates(s["u1"], s["u2"])
+        # of large blocks the rates are solved in numbers
+        symbols = s["z1"], s["z2"]
+        z1, z2 = symbols if self.equations.has_large_blocks else self.equations.rates(s["u1"], s["u2"])
         y, y1, y2 = e.y, ca.vertcat(z1, s["u1"]), ca.vertcat(z2, s["u2"])
         return [positions, *first_and_second_rates(positions, y, y1, y2)]

@@ -9,11 +9,15 @@ from collections.abc import Sequence
 from math import inf
 from typing import NamedTuple
 
+import casadi as ca
+
 from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations, Operand
 from planar.batch.march.llvm_kernel import KernelWriter, OperandNames
 from planar.batch.march.prediction import MAX_TURN_PER_STEP, PREDICTOR_ORDER
-from planar.batch.march.regularity import LEAST_KERNEL_REGULARITY, least_regularity
+from planar.batch.march.regularity import LEAST_KERNEL_REGULARITY, LEAST_START_REGULARITY, least_regularity
 from planar.codegen.instructions import UnsupportedOperation
+from planar.codegen.llvm_linear import LinearSystems
+from planar.equations.linear import solve_by_determinants
 
 HISTORY_LENGTH = 8
 """Steps before for which there is room: a power of two, more than `PREDICTOR_ORDER`."""
@@ -103,6 +107,8 @@ class _DesignsKernelWriter(KernelWriter):
         self.bend_slots = [[t.allocate() for _ in range(2)] for _ in self.equations.closed_forms]
         self.regularity_slot, self.passed_slot, self.good_count_slot = (t.allocate() for _ in range(3))
         self.counted_angle_slots = [t.allocate() for _ in range(self.counted_angles().numel())]
+        large = [len(part.unknowns) for part in self.equations.blocks if part.is_large]
+        self.linear_systems = LinearSystems(t, max(large)) if large else None
         scale = t.broadcast("%scale")
         t.write_line("br label %block")
         have, at_start = self._write_lanes_start()
@@ -123,6 +129,8 @@ class _DesignsKernelWriter(KernelWriter):
         t.write_label("done")
         t.write_line("ret void")
         t.write_line("}")
+        if self.linear_systems is not None:
+            t.write_line(self.linear_systems.function_text)
         return DesignsKernelLayout(
             self.state, self.input_operands, rows, PREDICTOR_ORDER + 3 * self.input_count, t.module_text(), t.lanes
         )
@@ -265,7 +273,7 @@ class _DesignsKernelWriter(KernelWriter):
         t.write_label(f"newton{level}")
         t.write_line(f"%n{level} = phi i64 [0, %from{level}], [%n{level}next, %newton{level}]")
         now = {leaf: t.load(slot) for leaf, slot in own.items()}
-        *delta, spanned, lengths = self.write_values(self.equations.newton_step(part.block), have | now)
+        *delta, spanned, lengths, squared_arm = self._write_newton_step(part, have | now)
         far = []
         for k, each in zip(part.unknowns, delta, strict=True):
             far.append(t.call_intrinsic("fabs", each))
@@ -283,13 +291,41 @@ class _DesignsKernelWriter(KernelWriter):
         t.write_label(f"solved{level}")
         have.update({leaf: t.load(slot) for leaf, slot in own.items()})
         t.store(
-            t.call_intrinsic("minnum", strong, self._write_regularity(spanned, lengths, len(part.unknowns))),
+            t.call_intrinsic(
+                "minnum", strong, self._write_regularity(spanned, lengths, squared_arm, len(part.unknowns))
+            ),
             self.regularity_slot,
         )
         t.store(t.binary("add", before, t.load(moved)), self.correction_slot)
         here = t.add_instruction(f"and i64 %k, {HISTORY_LENGTH - 1}")
         for leaf in own:
             t.store(have[leaf], t.element_pointer(self.history_slots[leaf], here))
+
+    def _write_newton_step(self, part: KernelBlock, names: OperandNames) -> list[str]:
+        """See `KernelEquations.newton_step`."""
+        if not part.is_large:
+            return self.write_values(self.equations.newton_step(part.block), names)
+        assert self.linear_systems is not None
+        residuals, columns, squared_arm = self.write_separately(self.newton_system(part), names)
+        least = self.linear_systems.factorise(columns, len(residuals))
+        return [*self.linear_systems.solve(residuals), least, self.ir.constant(1.0), *squared_arm]
+
+    def _write_rates(self, have: OperandNames) -> None:
+        """The rates of the unknowns put into `have`, block after block, where large blocks' are solved in numbers."""
+        t = self.ir
+        for part, system in zip(self.equations.blocks, self.rate_systems(), strict=False):
+            if part.is_large:
+                assert self.linear_systems is not None
+                self.linear_systems.factorise(self.write_values([ca.vec(system.jacobian)], have), len(part.unknowns))
+            for name, right_side in (("z1", system.first), ("z2", system.second)):
+                if part.is_large and self.linear_systems is not None:
+                    found = self.linear_systems.solve(self.write_values([right_side], have))
+                else:
+                    found = self.write_values([solve_by_determinants(system.jacobian, right_side)], have)
+                have |= {
+                    (name, k): t.add_instruction(f"fneg {t.vector} {value}")
+                    for k, value in zip(part.unknowns, found, strict=True)
+                }
 
     def _write_turn_checks(self, angles: Sequence[str]) -> list[str]:
         """Flags that say of counted angles that they are not far from where they were a step before."""
@@ -304,17 +340,19 @@ class _DesignsKernelWriter(KernelWriter):
             )
         return flags
 
-    def _write_regularity(self, spanned: str, lengths: str, count: int) -> str:
+    def _write_regularity(self, spanned: str, lengths: str, squared_arm: str, count: int) -> str:
         """How regular a Jacobian is, where that is told; else only whether it is enough: not below nothing."""
         t = self.ir
         if self.point_blocks is not None:
             return t.binary("div", spanned, lengths)
         least = least_regularity(LEAST_KERNEL_REGULARITY**2, count)
-        return t.binary("sub", spanned, t.binary("mul", lengths, t.constant(least)))
+        room = t.binary("sub", spanned, t.binary("mul", lengths, t.constant(least)))
+        return t.call_intrinsic("minnum", room, t.binary("sub", squared_arm, t.constant(LEAST_START_REGULARITY**2)))
 
     def _write_step_end(self, have: OperandNames, flags: list[str], scale: str) -> None:
         """The step ends: its results are written, and judged."""
         t, told = self.ir, self.output_expressions()
+        self._write_rates(have)
         left, counted, *values = self.write_separately([self.equations.residuals(), self.counted_angles(), *told], have)
         flags = [*flags, *self._write_turn_checks(counted)]
         many = [t.binary("mul", scale, each) for of in values for each in of]

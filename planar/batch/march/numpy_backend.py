@@ -15,7 +15,6 @@ from planar.batch.march.checks import PointWriter, design_positions
 from planar.batch.march.design_functions import DesignFunctions
 from planar.batch.march.kernel import KernelEquations, batch_equations
 from planar.batch.march.numpy_kernel import (
-    MAX_EXPRESSION_UNKNOWNS,
     DesignMarch,
     MarchedSteps,
     NumpyKernel,
@@ -28,8 +27,6 @@ from planar.batch.march.prediction import (
     longest_step,
 )
 from planar.codegen.instructions import UnsupportedOperation
-from planar.equations.functions import EquationFunctions
-from planar.equations.symbolic_equations import slice_length
 
 Array = np.ndarray
 
@@ -48,8 +45,7 @@ class NumpyRunner:
 
     def run(self, batch: DesignBatch, out: Array) -> Array:
         """See `DesignRunner`."""
-        by_casadi = batch.rates and has_large_block(batch.functions)
-        kernel = _kernel(batch, () if by_casadi else batch.links, batch.rates and not by_casadi)
+        kernel = _kernel(batch, batch.links, batch.rates)
         good = _run(kernel, batch, out, 0)
         rest = np.flatnonzero(good < len(batch.input_offsets))
         if kernel.has_newton_blocks and rest.size:
@@ -145,11 +141,6 @@ class StartRunner:
         return functions.correct(np.ascontiguousarray(batch.z0.T), batch.u0.T)
 
 
-def has_large_block(functions: EquationFunctions) -> bool:
-    """Whether a block has more unknowns than are solved by expressions."""
-    return any(slice_length(block.unknowns) > MAX_EXPRESSION_UNKNOWNS for block in functions.equations.blocks)
-
-
 def _kernel(
     batch: DesignBatch, links: tuple[str, ...], rates: bool, point_blocks: tuple[int, ...] | None = None
 ) -> NumpyKernel:
@@ -210,11 +201,7 @@ def _run_lanes(
         skipped = -first % division.part_count
         rows = slice((first + skipped) // division.part_count, (last - 1) // division.part_count + 1)
         if rows.start < rows.stop:
-            if kernel.links == batch.links:
-                _write_points(marched, batch.unit, slice(skipped, None, division.part_count), out, (rows, lanes))
-            else:
-                here = batch.u0[:, lanes] + division.offsets[:, first, None]
-                march.passed &= _write_with_casadi(marched, batch.select(lanes), here, out, (rows.start, lanes))
+            _write_points(marched, batch.unit, slice(skipped, None, division.part_count), out, (rows, lanes))
         good[lanes] += marched.passed.sum(axis=0)
         first = last
         if np.count_nonzero(march.passed) < COMPACTION_RATIO * lanes.size:
@@ -233,19 +220,6 @@ def _write_points(marched: MarchedSteps, unit: float, parts: slice, out: Array, 
             np.multiply(own, unit, out=out[rows, k])
         else:
             out[rows, k, lanes] = own * unit
-
-
-def _write_with_casadi(
-    marched: MarchedSteps, batch: DesignBatch, u: Array, out: Array, target: tuple[int, Array]
-) -> Array:
-    """The same at one step, points and rates by casadi's functions; which designs' rates break no constraint."""
-    step, lanes = target
-    functions, rows = DesignFunctions(batch.functions, batch.p), np.empty((out.shape[1], lanes.size))
-    row = design_positions(functions, batch, marched.unknowns(len(batch.z0)).T, u)
-    fine = PointWriter(batch, functions).write(rows, row)
-    out[step][:, lanes] = rows
-    marched.passed[-1] &= fine
-    return fine
 
 
 def _unknowns_at_steps(kernel: NumpyKernel, batch: DesignBatch, steps: Array) -> Array:

@@ -9,19 +9,22 @@ import casadi as ca
 import numpy as np
 
 from planar.batch.march.backend import DesignBatch
-from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations, KernelInstructions, Operand
+from planar.batch.march.kernel import (
+    BareAngle,
+    KernelBlock,
+    KernelEquations,
+    KernelInstructions,
+    Operand,
+)
+from planar.batch.march.numpy_systems import newton_step, stack_values
 from planar.batch.march.prediction import MAX_TURN_PER_STEP, PREDICTOR_ORDER, extrapolation_weights
-from planar.batch.march.regularity import LEAST_KERNEL_REGULARITY, least_regularity
+from planar.batch.march.regularity import LEAST_KERNEL_REGULARITY, LEAST_START_REGULARITY, least_regularity
 from planar.codegen.instructions import UnsupportedOperation, required_values
 from planar.codegen.numpy_code import NumpyFunction, compile_numpy
 from planar.equations.linear import solve_vectors
-from planar.equations.rates import block_jacobian
 
 Array = np.ndarray
 OperandArrays = dict[Operand, Any]
-
-MAX_EXPRESSION_UNKNOWNS = 8
-"""Unknowns of a block that expressions solve; of larger ones these grow too long."""
 
 
 class _KernelPart(NamedTuple):
@@ -70,18 +73,23 @@ class NumpyKernel(KernelInstructions):
             points = [k for k, each in enumerate(point_blocks or ()) if each == index]
             if points:
                 self.block_points[index] = points, self._make_part([self.point_coordinates(points)], known)
+        self.rate_parts: list[tuple[KernelBlock, list[_KernelPart]]] = []
+        "of each block the Jacobian's rows, then what its first and its second rates make up for"
+        known |= {(name, k) for name in ("u1", "u2") for k in range(len(equations.input_is_angle))}
+        for part, system in zip(equations.blocks, self.rate_systems(), strict=False):
+            steps = []
+            for output, own in ((ca.vec(system.jacobian.T), ""), (system.first, "z1"), (system.second, "z2")):
+                steps.append(self._make_part([output], known))
+                known |= {(own, k) for k in part.unknowns} if own else set()
+            self.rate_parts.append((part, steps))
         ends = [equations.residuals(), self.counted_angles(), *self.output_expressions()]
         self.residual_count, self.counted_angle_count = (each.numel() for each in ends[:2])
         self.end = self._make_part(ends, known)
         self._compile_invariants()
 
     def _newton_outputs(self, part: KernelBlock) -> list[ca.SX]:
-        """Newton's step with how regular the Jacobian is; of large blocks the residuals and the Jacobian's rows."""
-        if len(part.unknowns) <= MAX_EXPRESSION_UNKNOWNS:
-            return self.equations.newton_step(part.block)
-        e = self.equations.equations
-        jacobian = block_jacobian(e, part.block.rows, part.block.unknowns)
-        return [e.F[part.block.rows], ca.densify(ca.vec(jacobian.T))]
+        """Newton's step with how regular the Jacobian is; of large blocks the residuals and the Jacobian's columns."""
+        return self.newton_system(part) if part.is_large else self.equations.newton_step(part.block)
 
     def _make_part(self, outputs: Sequence[ca.SX], known: Iterable[Operand]) -> _KernelPart:
         """Raises BareAngle for an operand that is not known."""
@@ -109,6 +117,7 @@ class NumpyKernel(KernelInstructions):
             self.end,
             *(own for _, own in self.blocks),
             *(own for _, own in self.block_points.values()),
+            *(own for _, steps in self.rate_parts for own in steps),
         )
         self.invariant_numbers = tuple(dict.fromkeys(number for part in parts for number in part.invariants))
         made = self.hoister.result
@@ -217,14 +226,16 @@ class DesignMarch:
         other_points: dict[int, Sequence[Any]] = {}
         for part, own in kernel.blocks:
             if part.closed_form is None:
-                own_regularity, moved = self._correct_block(part, own, values)
+                own_regularity, squared_arm, moved = self._correct_block(part, own, values)
                 regularity, corrected = np.minimum(regularity, own_regularity), corrected + moved
                 if kernel.point_blocks is None:
                     fine &= own_regularity >= least_regularity(LEAST_KERNEL_REGULARITY**2, len(part.unknowns))
+                    fine &= squared_arm >= LEAST_START_REGULARITY**2
             else:
                 if part.block.block_index in kernel.block_points:
                     other_points |= self._other_points(part, own, values)
                 fine &= self._keeps_apart(part, self._solve_closed_form(part, own, values), steps, shape)
+        self._add_rates(values, shape)
         found = self._evaluate(kernel.end, values)
         first = kernel.residual_count + kernel.counted_angle_count
         for k, angle in enumerate(found[kernel.residual_count : first]):
@@ -241,6 +252,15 @@ class DesignMarch:
         passed = np.logical_and.accumulate(fine, axis=0) & self.passed
         self.passed, self.step = passed[-1], self.step + shape[0]
         return MarchedSteps(values, found[first:], other_points, regularity, passed)
+
+    def _add_rates(self, values: OperandArrays, shape: tuple[int, int]) -> None:
+        """The rates of the unknowns put into `values`, where they are solved in numbers."""
+        for part, (jacobian, *right_sides) in self.kernel.rate_parts:
+            matrices = stack_values(self._evaluate(jacobian, values), shape)
+            matrices = matrices.reshape(*shape, len(part.unknowns), len(part.unknowns))
+            for name, own in zip(("z1", "z2"), right_sides, strict=True):
+                found = solve_vectors(matrices, stack_values(self._evaluate(own, values), shape))
+                values |= {(name, k): -found[..., n] for n, k in enumerate(part.unknowns)}
 
     def _inputs(self, offsets: Array) -> OperandArrays:
         """Where the inputs are, with the signs of the blocks."""
@@ -308,8 +328,9 @@ class DesignMarch:
         self.counted_angles[index] = rows[-1]
         return near
 
-    def _correct_block(self, part: KernelBlock, own: _KernelPart, values: OperandArrays) -> tuple[Any, Any]:
-        """Newton's method from where the block would be if it went on as before: how regular, how far corrected."""
+    def _correct_block(self, part: KernelBlock, own: _KernelPart, values: OperandArrays) -> tuple[Any, Any, Any]:
+        """Newton's method from where the block would be if it went on as before: how regular, how short the shortest
+        arm (squared), how far corrected."""
         kernel, is_angle = self.kernel, self.kernel.equations.is_angle
         weights = extrapolation_weights(min(max(self.step, 1), PREDICTOR_ORDER))
         for each in (operand for k in part.unknowns for operand in kernel.unknown_operands(k)):
@@ -317,9 +338,9 @@ class DesignMarch:
         for k in part.unknowns:
             if is_angle[k]:
                 values["zc", k], values["zs", k] = _normalise(values["zc", k], values["zs", k])
-        regularity, corrected = np.inf, np.zeros(1)
+        regularity, squared_arm, corrected = np.inf, 1.0, np.zeros(1)
         for _ in range(int(self.counts[self.step])):
-            step, regularity = _newton_step(len(part.unknowns), self._evaluate(own, values))
+            step, regularity, squared_arm = newton_step(part, self._evaluate(own, values))
             for k, each in zip(part.unknowns, step, strict=True):
                 corrected = corrected + np.abs(each)
                 if ("z", k) in values:
@@ -328,7 +349,7 @@ class DesignMarch:
                     values["zc", k], values["zs", k] = np.cos(values["z", k]), np.sin(values["z", k])
                 elif is_angle[k]:
                     values["zc", k], values["zs", k] = _rotate_little(values["zc", k], values["zs", k], -each)
-        return regularity, corrected
+        return regularity, squared_arm, corrected
 
 
 def _operand(operand: Operand, rows: Array) -> Array:
@@ -352,16 +373,3 @@ def _normalise(cos: Any, sin: Any) -> tuple[Any, Any]:
     """What is nearly of length one, nearer to it: the inverse root by its first terms."""
     scale = 1.5 - 0.5 * (cos * cos + sin * sin)
     return cos * scale, sin * scale
-
-
-def _newton_step(count: int, values: Sequence[Any]) -> tuple[Sequence[Any], Any]:
-    """Newton's step of a block of so many unknowns, and the square of how regular its Jacobian is."""
-    if count <= MAX_EXPRESSION_UNKNOWNS:
-        *step, volume, lengths = values
-        return step, volume / lengths
-    flat = np.stack(np.broadcast_arrays(*values), axis=-1)
-    residuals, jacobians = flat[..., :count], flat[..., count:].reshape(*flat.shape[:-1], count, count)
-    regular = np.isfinite(jacobians).all(axis=(-2, -1))
-    diagonals = np.diagonal(np.linalg.qr(np.where(regular[..., None, None], jacobians, 0.0))[1], axis1=-2, axis2=-1)
-    least = np.min(diagonals**2 / np.sum(jacobians * jacobians, axis=-2), axis=-1)
-    return list(np.moveaxis(solve_vectors(jacobians, residuals), -1, 0)), np.minimum(least, 1.0)
