@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import re
 import sys
@@ -55,11 +56,25 @@ COMMAND_SYNONYMS = {
 """Commands by other words for what they do."""
 
 
+COLLECTION_THRESHOLD = 200_000
+"""Objects made before the rings among them are looked for: more than loading and one solution make."""
+
+
 class CommandGroup(click.Group):
     """Every command ends with the same sentences and exit statuses."""
 
     def main(self, *args: Any, **more: Any) -> Any:
         """As click's, but that output which cannot be written ends in a status of its own, the last of it too."""
+        if args or "args" in more:
+            return self._checked_main(*args, **more)
+        # a process of its own, most of whose objects are modules that last as long as it
+        gc.set_threshold(COLLECTION_THRESHOLD)
+        try:
+            return self._checked_main(**more)
+        finally:
+            gc.freeze()  # nothing is looked through on the way out
+
+    def _checked_main(self, *args: Any, **more: Any) -> Any:
         if sys.stdout is None:
             from planar.foundation.safe_files import closed_output
 

@@ -1,0 +1,64 @@
+"""Texts by name of one subject, kept on disk in one file: what processes before made, and what this one adds."""
+
+from __future__ import annotations
+
+import atexit
+import json
+from collections.abc import Callable
+
+from planar.foundation.private_cache import PrivateCache
+
+MAX_SUBJECTS = 32
+"""Subjects of a process to which texts are added: of those that search through many, what is made first is kept."""
+MAX_TEXT_LENGTH = 4 * 2**20
+"""Characters of all texts of a subject; what would be more is not kept."""
+
+_added: list[KeptTexts] = []
+"""Subjects with texts that are to be written when the process ends."""
+
+
+class KeptTexts:
+    """The texts of the subject with a fingerprint. They are read with the first, and written as the process ends."""
+
+    def __init__(self, cache: PrivateCache, key: str):
+        self._cache, self._key = cache, key
+        self._found: dict[str, str] | None = None
+        self._new: dict[str, Callable[[], str]] = {}
+
+    def take(self, name: str) -> str | None:
+        """The text of a name, if it is kept; it is given once, and not held any longer."""
+        if self._found is None:
+            self._found = self._read_all()
+        return self._found.pop(name, None)
+
+    def add(self, name: str, make: Callable[[], str]) -> None:
+        """Keep what `make` returns, which is called as the process ends."""
+        if not self._new:
+            if len(_added) >= MAX_SUBJECTS or self._cache.folder() is None:
+                return
+            _added.append(self)
+        self._new[name] = make
+
+    def write(self) -> None:
+        """Write what was added, beside what another process has written meanwhile."""
+        texts = self._read_all()
+        length = sum(map(len, texts.values()))
+        for name, make in self._new.items():
+            text = make()
+            length += len(text)
+            if length <= MAX_TEXT_LENGTH:
+                texts[name] = text
+        self._new.clear()
+        self._cache.write(self._key, json.dumps(texts).encode())
+
+    def _read_all(self) -> dict[str, str]:
+        whole = self._cache.read(self._key)
+        found: dict[str, str] = {} if whole is None else json.loads(whole)
+        return found
+
+
+@atexit.register
+def write_added_texts() -> None:
+    """Write what was added to any subject."""
+    while _added:
+        _added.pop().write()
