@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Sequence
 from functools import cached_property, lru_cache
-from hashlib import sha256
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -18,7 +17,7 @@ import numpy as np
 from planar.equations.casadi_call import BufferedFunction, RunFunction
 from planar.equations.elimination import stack_expressions
 from planar.equations.linear import solve_linear
-from planar.equations.mechanism_numbers import equation_structure
+from planar.equations.mechanism_numbers import equation_structure, structure_fingerprint
 from planar.equations.rates import rate_symbols, time_derivatives
 from planar.equations.symbolic_equations import (
     Block,
@@ -29,17 +28,14 @@ from planar.equations.symbolic_equations import (
 )
 from planar.foundation.arrays import Array
 from planar.foundation.kept_texts import KeptTexts
-from planar.foundation.private_cache import PrivateCache, source_stamp
+from planar.foundation.private_cache import PrivateCache
 from planar.model.mechanism import Mechanism
-from planar.model.pairs import Pair
 
 MAX_CACHED_STRUCTURES = 256
 """Mechanisms of which what was derived is kept: more than come along, so that none is derived twice in a round."""
 
-KEPT_EQUATIONS = PrivateCache("equations", ".equations", b"planar equations\n", 64 * 2**20)
-"""Equations and functions of structures, as casadi writes them."""
-EQUATION_ROOMS = ("equations", "foundation", "model")
-"""The rooms whose files say what is derived of a structure."""
+KEPT_EQUATIONS = PrivateCache("equations", ".equations", b"planar equations\n", 128 * 2**20)
+"""Equations and functions of structures, as casadi writes them; those of one take from 0.1 to 1 MB."""
 POLISHING_STEPS = 2
 """Newton's steps that carry a closed form to round-off."""
 RUN_NEWTON_STEPS = 4
@@ -108,13 +104,14 @@ class EquationFunctions:
 
     def kept(self, name: str, make: Callable[[], ca.Function | None]) -> ca.Function | None:
         """What `make` makes of this structure, from the disk where it is kept there by this name."""
-        text = self._texts and self._texts.take(name)
-        if text is not None:
-            return ca.Function.deserialize(text) if text else None
-        made = make()
-        if self._texts is not None:
+        if self._texts is None:
+            return make()
+        text = self._texts.take(name)
+        if text is None:
+            made = make()
             self._texts.add(name, made.serialize if made is not None else str)
-        return made
+            return made
+        return ca.Function.deserialize(text) if text else None
 
     def block_function(self, block: Block) -> ca.Function:
         """(z, u, p) -> F of this block (rows,) and its Jacobian in the block's own unknowns (rows, unknowns)."""
@@ -372,7 +369,7 @@ def equation_functions(mechanism: Mechanism) -> EquationFunctions:
 
 @lru_cache(maxsize=MAX_CACHED_STRUCTURES)
 def _cached_equation_functions(structure: Mechanism) -> EquationFunctions:
-    key = _fingerprint(structure)
+    key = structure_fingerprint(structure)
     texts = None if key is None or KEPT_EQUATIONS.folder() is None else KeptTexts(KEPT_EQUATIONS, key)
     told, outline = (texts.take("function"), texts.take("outline")) if texts else (None, None)
     if told is not None and outline is not None:
@@ -382,13 +379,3 @@ def _cached_equation_functions(structure: Mechanism) -> EquationFunctions:
         texts.add("function", lambda: equations.as_function().serialize())
         texts.add("outline", lambda: json.dumps(equations.outline()))
     return EquationFunctions(equations, texts)
-
-
-def _fingerprint(structure: Mechanism) -> str | None:
-    """Of a structure and all that its equations depend on; None where a pair's formulas are not known by it."""
-    stamp, own = source_stamp(EQUATION_ROOMS), f"{Pair.__module__.rpartition('.')[0]}."
-    if stamp is None or not all(type(pair).__module__.startswith(own) for pair in structure.pairs):
-        return None
-    inputs, links = [given.pair for given in structure.inputs], [link.name for link in structure.links]
-    said = (stamp, ca.__version__, repr((structure.frame, links, inputs, structure.pairs)))
-    return sha256("\0".join(said).encode()).hexdigest()

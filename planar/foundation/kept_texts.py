@@ -47,7 +47,7 @@ class KeptTexts:
             text = make()
             length += len(text)
             if length <= MAX_TEXT_LENGTH:
-                texts[name] = text
+                texts.setdefault(name, text)
         self._new.clear()
         self._cache.write(self._key, json.dumps(texts).encode())
 
