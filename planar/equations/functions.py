@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Sequence
 from functools import cached_property, lru_cache
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar, cast
 
 import casadi as ca
 import numpy as np
@@ -40,6 +40,9 @@ POLISHING_STEPS = 2
 """Newton's steps that carry a closed form to round-off."""
 RUN_NEWTON_STEPS = 4
 """Unrolled steps of a position within a run: from a start a degree or so away, four square the error away."""
+
+
+Kept = TypeVar("Kept", bound=ca.Function | None)
 
 
 class EquationRates(NamedTuple):
@@ -102,7 +105,7 @@ class EquationFunctions:
     def __init__(self, equations: ConstraintEquations, texts: KeptTexts | None = None):
         self.equations, self._texts = equations, texts
 
-    def kept(self, name: str, make: Callable[[], ca.Function | None]) -> ca.Function | None:
+    def kept(self, name: str, make: Callable[[], Kept]) -> Kept:
         """What `make` makes of this structure, from the disk where it is kept there by this name."""
         if self._texts is None:
             return make()
@@ -111,7 +114,7 @@ class EquationFunctions:
             made = make()
             self._texts.add(name, made.serialize if made is not None else str)
             return made
-        return ca.Function.deserialize(text) if text else None
+        return cast("Kept", ca.Function.deserialize(text) if text else None)
 
     def block_function(self, block: Block) -> ca.Function:
         """(z, u, p) -> F of this block (rows,) and its Jacobian in the block's own unknowns (rows, unknowns)."""

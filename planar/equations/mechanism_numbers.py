@@ -36,7 +36,7 @@ def structure_fingerprint(structure: Mechanism) -> str | None:
     if stamp is None or not all(type(pair).__module__.startswith(own) for pair in structure.pairs):
         return None
     inputs, links = [given.pair for given in structure.inputs], [link.name for link in structure.links]
-    told = (stamp, ca.__version__, repr((structure.frame, links, inputs, structure.pairs)))
+    told = (stamp, ca.CasadiMeta.version(), repr((structure.frame, links, inputs, structure.pairs)))
     return sha256("\0".join(told).encode()).hexdigest()
 
 
