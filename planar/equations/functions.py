@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, TypeVar, cast
 import casadi as ca
 import numpy as np
 
-from planar.equations.casadi_call import BufferedFunction, RunFunction
+from planar.equations.casadi_call import BufferedFunction, RunFunction, read_function
 from planar.equations.elimination import stack_expressions
 from planar.equations.linear import solve_linear
 from planar.equations.mechanism_numbers import equation_structure, structure_fingerprint
@@ -107,14 +107,16 @@ class EquationFunctions:
 
     def kept(self, name: str, make: Callable[[], Kept]) -> Kept:
         """What `make` makes of this structure, from the disk where it is kept there by this name."""
-        if self._texts is None:
-            return make()
-        text = self._texts.take(name)
-        if text is None:
-            made = make()
+        text = None if self._texts is None else self._texts.take(name)
+        if text == "":  # what cannot be made
+            return cast("Kept", None)
+        found = read_function(text)
+        if found is not None:
+            return cast("Kept", found)
+        made = make()
+        if self._texts is not None:
             self._texts.add(name, made.serialize if made is not None else str)
-            return made
-        return cast("Kept", ca.Function.deserialize(text) if text else None)
+        return made
 
     def block_function(self, block: Block) -> ca.Function:
         """(z, u, p) -> F of this block (rows,) and its Jacobian in the block's own unknowns (rows, unknowns)."""
@@ -375,8 +377,9 @@ def _cached_equation_functions(structure: Mechanism) -> EquationFunctions:
     key = structure_fingerprint(structure)
     texts = None if key is None or KEPT_EQUATIONS.folder() is None else KeptTexts(KEPT_EQUATIONS, key)
     told, outline = (texts.take("function"), texts.take("outline")) if texts else (None, None)
-    if told is not None and outline is not None:
-        return EquationFunctions(equations_from_outline(json.loads(outline), ca.Function.deserialize(told)), texts)
+    function = read_function(told)
+    if function is not None and outline is not None:
+        return EquationFunctions(equations_from_outline(json.loads(outline), function), texts)
     equations = build_equations(structure)
     if texts is not None:
         texts.add("function", lambda: equations.as_function().serialize())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import json
+from collections import deque
 from collections.abc import Callable
 
 from planar.foundation.private_cache import PrivateCache
@@ -12,13 +13,17 @@ MAX_SUBJECTS = 32
 """Subjects of a process to which texts are added: of those that search through many, what is made first is kept."""
 MAX_TEXT_LENGTH = 4 * 2**20
 """Characters of all texts of a subject; what would be more is not kept."""
+MAX_IN_MEMORY = 8
+"""Subjects whose texts are in memory at a time; those of others are read again where one is asked for."""
 
+_in_memory: deque[KeptTexts] = deque()
 _added: list[KeptTexts] = []
 """Subjects with texts that are to be written when the process ends."""
 
 
 class KeptTexts:
-    """The texts of the subject with a fingerprint. They are read with the first, and written as the process ends."""
+    """The texts of the subject with a fingerprint. They are read when the first is asked for; those that are added are
+    written as the process ends."""
 
     def __init__(self, cache: PrivateCache, key: str):
         self._cache, self._key = cache, key
@@ -29,6 +34,9 @@ class KeptTexts:
         """The text of a name, if it is kept; it is given once, and not held any longer."""
         if self._found is None:
             self._found = self._read_all()
+            _in_memory.append(self)
+            if len(_in_memory) > MAX_IN_MEMORY:
+                _in_memory.popleft()._found = None
         return self._found.pop(name, None)
 
     def add(self, name: str, make: Callable[[], str]) -> None:
@@ -41,14 +49,16 @@ class KeptTexts:
 
     def write(self) -> None:
         """Write what was added, beside what another process has written meanwhile."""
+        made, self._new = self._new, {}
+        if not self._cache.is_writable():
+            return
         texts = self._read_all()
         length = sum(map(len, texts.values()))
-        for name, make in self._new.items():
+        for name, make in made.items():
             text = make()
             length += len(text)
             if length <= MAX_TEXT_LENGTH:
-                texts.setdefault(name, text)
-        self._new.clear()
+                texts[name] = text
         self._cache.write(self._key, json.dumps(texts).encode())
 
     def _read_all(self) -> dict[str, str]:

@@ -96,6 +96,15 @@ class PrivateCache:
             os.utime(path)
         return content
 
+    def is_writable(self) -> bool:
+        """Whether there is a folder in which something can be kept, which is made where there is none."""
+        place = self.folder()
+        if place is None:
+            return False
+        with suppress(OSError):
+            place.mkdir(mode=0o700, parents=True, exist_ok=True)
+        return os.access(place, os.W_OK)
+
     def write(self, key: str, content: bytes) -> bool:
         """Keep the content of a fingerprint; whether that was possible."""
         place = self.folder()

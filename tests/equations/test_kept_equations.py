@@ -98,6 +98,20 @@ def test_a_damaged_file_is_not_read_and_replaced(where, place, derived):
     assert path.read_bytes() == right
 
 
+def test_a_text_that_casadi_does_not_read_is_made_again(place, derived):
+    mechanism = planar.load("slider-crank")
+    first = texts_of(in_a_new_process(mechanism), mechanism)
+    write_added_texts()
+    (path,) = files(place)
+    KEPT_EQUATIONS.write(
+        path.stem, json.dumps(dict.fromkeys(json.loads(KEPT_EQUATIONS.read(path.stem)), "other")).encode()
+    )
+    assert texts_of(in_a_new_process(mechanism), mechanism) == first
+    assert len(derived) == 2
+    assert texts_of(in_a_new_process(mechanism), mechanism) == first
+    assert len(derived) == 2
+
+
 def test_nothing_is_kept_where_that_is_not_wanted_or_cannot_be(place, derived, tmp_path, monkeypatch):
     mechanism = planar.load("slider-crank")
     (tmp_path / "file").write_text("")
@@ -145,6 +159,14 @@ def test_a_pair_type_from_elsewhere_is_derived_each_time():
     assert structure_fingerprint(structure) is not None
     own = OwnPair(first.name, first.links, first.points, first.pin)
     assert structure_fingerprint(replace(structure, pairs=(own, *others))) is None
+
+
+def test_nothing_is_written_out_for_a_folder_that_takes_nothing(place, tmp_path, monkeypatch):
+    made = []
+    monkeypatch.setattr(private_cache.os, "access", lambda path, mode: False)
+    KeptTexts(KEPT_EQUATIONS, "0" * 64).add("a", lambda: made.append(1) or "1")
+    write_added_texts()
+    assert (made, files(place)) == ([], [])
 
 
 def test_what_two_processes_add_is_there_and_no_more_than_has_room(place, monkeypatch):
