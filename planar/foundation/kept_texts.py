@@ -6,6 +6,7 @@ import atexit
 import json
 from collections import deque
 from collections.abc import Callable
+from pathlib import Path
 
 from planar.foundation.private_cache import PrivateCache
 
@@ -26,31 +27,32 @@ class KeptTexts:
     written as the process ends."""
 
     def __init__(self, cache: PrivateCache, key: str):
-        self._cache, self._key = cache, key
+        self._cache, self._key, self._folder = cache, key, _absolute_folder(cache)
         self._found: dict[str, str] | None = None
         self._new: dict[str, Callable[[], str]] = {}
 
     def take(self, name: str) -> str | None:
         """The text of a name, if it is kept; it is given once, and not held any longer."""
-        if self._found is None:
-            self._found = self._read_all()
+        found = self._found
+        if found is None:
+            found = self._found = self._read_all()
             _in_memory.append(self)
             if len(_in_memory) > MAX_IN_MEMORY:
                 _in_memory.popleft()._found = None
-        return self._found.pop(name, None)
+        return found.pop(name, None)
 
     def add(self, name: str, make: Callable[[], str]) -> None:
         """Keep what `make` returns, which is called as the process ends."""
         if not self._new:
-            if len(_added) >= MAX_SUBJECTS or self._cache.folder() is None:
+            if len(_added) >= MAX_SUBJECTS or self._folder is None:
                 return
             _added.append(self)
         self._new[name] = make
 
     def write(self) -> None:
-        """Write what was added, beside what another process has written meanwhile."""
+        """Write what was added, beside what another process has written meanwhile; not where the folder is another."""
         made, self._new = self._new, {}
-        if not self._cache.is_writable():
+        if _absolute_folder(self._cache) != self._folder or not self._cache.is_writable():
             return
         texts = self._read_all()
         length = sum(map(len, texts.values()))
@@ -65,6 +67,11 @@ class KeptTexts:
         whole = self._cache.read(self._key)
         found: dict[str, str] = {} if whole is None else json.loads(whole)
         return found
+
+
+def _absolute_folder(cache: PrivateCache) -> Path | None:
+    place = cache.folder()
+    return place and place.absolute()
 
 
 @atexit.register

@@ -167,6 +167,14 @@ def test_nothing_is_written_out_for_a_folder_that_takes_nothing(place, tmp_path,
     KeptTexts(KEPT_EQUATIONS, "0" * 64).add("a", lambda: made.append(1) or "1")
     write_added_texts()
     assert (made, files(place)) == ([], [])
+    monkeypatch.undo()
+    monkeypatch.setenv("PLANAR_CACHE", "here")
+    monkeypatch.chdir(tmp_path)
+    KeptTexts(KEPT_EQUATIONS, "0" * 64).add("a", lambda: made.append(1) or "1")
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    write_added_texts()
+    assert made == list((tmp_path / "elsewhere").iterdir()) == []
 
 
 def test_what_two_processes_add_is_there_and_no_more_than_has_room(place, monkeypatch):
