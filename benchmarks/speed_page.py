@@ -101,7 +101,10 @@ def _processes(measured: Sequence[Process]) -> list[str]:
     if not measured:
         return []
     lines = ["", "| a whole process | time | ratio |", "|---|---|---|"]
-    return lines + [f"| `{each.command}` | {time(each.seconds)} | {each.ratio:.2g} |" for each in measured]
+    for each in measured:
+        remark = f", {each.remark}" if each.remark else ""
+        lines.append(f"| `{each.command}`{remark} | {time(each.seconds)} | {each.ratio:.2g} |")
+    return lines
 
 
 def _key(found: dict[bool, Result]) -> float:

@@ -144,7 +144,8 @@ def processes(measured: Iterable[Process]) -> RenderableType:
     """Whole processes, from start to end."""
     table = _table("cold start, whole processes", "command", "time", "ratio")
     for each in measured:
-        table.add_row(each.command, time(each.seconds), ratio(each.ratio))
+        command = f"{each.command} ({each.remark})" if each.remark else each.command
+        table.add_row(command, time(each.seconds), ratio(each.ratio))
     return table
 
 

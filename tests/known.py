@@ -50,5 +50,5 @@ def loop_sizes(model: str) -> list[int]:
     """The number of links in each loop."""
     import networkx as nx
 
-    cycles = nx.simple_cycles(link_pair_graph(MODELS[model]))
+    cycles = nx.simple_cycles(nx.Graph(link_pair_graph(MODELS[model])))
     return sorted(sum(kind == "link" for kind, _ in cycle) for cycle in cycles)

@@ -12,6 +12,7 @@ from planar.equations.functions import POLISHING_STEPS
 from planar.equations.symbolic_equations import Block, slice_length
 from planar.foundation.angles import distances
 from planar.foundation.arrays import Array
+from planar.foundation.generic_numbers import generic_numbers
 from planar.model.pairs import MeasureKind
 from planar.solving.assembly.block_assemblies import MEETING_COSINE_SQUARED, block_dependencies
 from planar.solving.newton import CLOSED_TOLERANCE, repeat_step
@@ -254,9 +255,9 @@ def _uncertified_roots(real: Array, expected: int, said: str) -> BlockRoots:
 
 def is_linear(setup: PreparedMechanism, stage: Block, z: Array) -> bool:
     """Whether the Jacobian of a block does not depend on its own unknowns, those before it given in z (unknowns,)."""
-    rng, closing, many = np.random.default_rng(0), _residual_function(setup, stage, z), slice_length(stage.unknowns)
+    closing, many = _residual_function(setup, stage, z), slice_length(stage.unknowns)
     slope = closing(np.zeros(many))[1]
-    others = (closing(rng.uniform(0.5, 2.0, many))[1] for _ in range(2))
+    others = (closing(each)[1] for each in generic_numbers(2, many))
     return all(np.abs(other - slope).max(initial=0.0) <= JACOBIAN_ROUNDING for other in others)
 
 

@@ -8,6 +8,8 @@ from cProfile import Profile
 from time import perf_counter
 from typing import Any, NamedTuple
 
+from planar.foundation.private_cache import disable_cache
+
 FunctionKey = tuple[str, ...]
 
 SWEEP_PARTS: dict[FunctionKey, str] = {
@@ -34,11 +36,11 @@ class CallProfile(NamedTuple):
 def profile_first_call(task: Callable[[], Any]) -> tuple[float, float]:
     """Seconds of a task, with none of its machine code known before, and of these to compile it."""
     try:
-        from planar.codegen import code_cache, llvm_compile
+        from planar.codegen import llvm_compile
     except ImportError:
         return profile_call(task).seconds, 0.0
     llvm_compile.compile_function.cache_clear()
-    with code_cache.disable_cache():
+    with disable_cache():
         found = profile_call(task)
     return found.seconds, found.total_seconds.get(("codegen", "llvm_compile.py", "_compile_object"), 0.0)
 

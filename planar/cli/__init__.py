@@ -1,32 +1,28 @@
 """The command line: words to calls."""
 
-from planar.cli import (
-    centres_harmonics,
-    circuits,
-    forces_simulate,
-    guide,
-    inspect_models_schema_bench,
-    modes,
-    plot_animate,
-    problem_mark,
-    solve_cycle_explain,
-    view_gallery,
-)
 from planar.cli.options import main
 
-for _command in main.commands.values():
-    _command.short_help = _command.help  # of one sentence: the list of commands has it whole
+main.modules = {
+    "animate": "planar.cli.plot_animate",
+    "bench": "planar.cli.inspect_models_schema_bench",
+    "centres": "planar.cli.centres_harmonics",
+    "circuits": "planar.cli.circuits",
+    "cycle": "planar.cli.solve_cycle_explain",
+    "explain": "planar.cli.solve_cycle_explain",
+    "forces": "planar.cli.forces_simulate",
+    "gallery": "planar.cli.view_gallery",
+    "guide": "planar.cli.guide",
+    "harmonics": "planar.cli.centres_harmonics",
+    "inspect": "planar.cli.inspect_models_schema_bench",
+    "mark": "planar.cli.problem_mark",
+    "models": "planar.cli.inspect_models_schema_bench",
+    "modes": "planar.cli.modes",
+    "plot": "planar.cli.plot_animate",
+    "problem": "planar.cli.problem_mark",
+    "schema": "planar.cli.inspect_models_schema_bench",
+    "simulate": "planar.cli.forces_simulate",
+    "solve": "planar.cli.solve_cycle_explain",
+    "view": "planar.cli.view_gallery",
+}
 
-__all__ = [
-    "centres_harmonics",
-    "circuits",
-    "forces_simulate",
-    "guide",
-    "inspect_models_schema_bench",
-    "main",
-    "modes",
-    "plot_animate",
-    "problem_mark",
-    "solve_cycle_explain",
-    "view_gallery",
-]
+__all__ = ["main"]

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import re
 import sys
 import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext
+from importlib import import_module
 from types import MappingProxyType
 from typing import Any, NoReturn, TextIO
 
@@ -55,11 +57,45 @@ COMMAND_SYNONYMS = {
 """Commands by other words for what they do."""
 
 
+COLLECTION_THRESHOLD = 200_000
+"""Objects made before the rings among them are looked for: more than loading and one solution make."""
+
+
 class CommandGroup(click.Group):
-    """Every command ends with the same sentences and exit statuses."""
+    """Every command ends with the same sentences and exit statuses; its module is loaded when it is asked for."""
+
+    modules: Mapping[str, str] = MappingProxyType({})
+    """The commands by name, and the module of each."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return sorted(self.modules)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in self.modules:
+            return None
+        import_module(self.modules[cmd_name])
+        found = self.commands[cmd_name]
+        found.short_help = found.help  # of one sentence: the list of commands has it whole
+        return found
+
+    def load_commands(self) -> Mapping[str, click.Command]:
+        """Every command by its name."""
+        for module in self.modules.values():
+            import_module(module)
+        return self.commands
 
     def main(self, *args: Any, **more: Any) -> Any:
         """As click's, but that output which cannot be written ends in a status of its own, the last of it too."""
+        if args or "args" in more:
+            return self._checked_main(*args, **more)
+        # a process of its own, most of whose objects are modules that last as long as it
+        gc.set_threshold(COLLECTION_THRESHOLD)
+        try:
+            return self._checked_main(**more)
+        finally:
+            gc.freeze()  # nothing is looked through on the way out
+
+    def _checked_main(self, *args: Any, **more: Any) -> Any:
         if sys.stdout is None:
             from planar.foundation.safe_files import closed_output
 
@@ -87,10 +123,10 @@ class CommandGroup(click.Group):
         if not name.startswith("-") and self.get_command(ctx, name) is None:
             from difflib import get_close_matches
 
-            near = get_close_matches(name.lower(), self.commands, 1) or [COMMAND_SYNONYMS.get(name.lower(), "")]
+            near = get_close_matches(name.lower(), self.modules, 1) or [COMMAND_SYNONYMS.get(name.lower(), "")]
             if near[0]:
                 ctx.fail(f"no such command {name!r}; did you mean {near[0]!r}?")
-            ctx.fail(f"no such command {name!r}; commands are {join_names(sorted(self.commands), None)}")
+            ctx.fail(f"no such command {name!r}; commands are {join_names(sorted(self.modules), None)}")
         return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: click.Context) -> Any:

@@ -11,7 +11,7 @@ from typing import Any
 import llvmlite
 import llvmlite.binding as llvm
 
-from planar.codegen import code_cache
+from planar.codegen.code_cache import MACHINE_CODE
 
 PASS_LEVEL, CODEGEN_LEVEL, FAST_CODEGEN_LEVEL = 1, 2, 0
 """How much the passes over the text, and the making of code, may take: more costs time and gives none back."""
@@ -37,10 +37,10 @@ def compile_function(text: str, name: str, *kinds: str) -> Any:
 def _load_or_compile(text: str) -> Any:
     """The text's machine code, from the disk or new."""
     key = fingerprint(text)
-    code = code_cache.read_code(key)
+    code = MACHINE_CODE.read(key)
     if code is None:
         code = _compile_object(text)
-        code_cache.write_code(key, code)
+        MACHINE_CODE.write(key, code)
     return _load_object(code)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from difflib import get_close_matches
 from functools import cached_property
 from math import isnan
 from typing import Any
@@ -349,5 +348,7 @@ def suggest_name(word: str, known: Iterable[str], what: str) -> str:
 
 def suggest_spelling(word: str, known: Any, sentence: str = "did you mean {!r}?", cutoff: float = 0.6) -> str:
     """A clause that offers the nearest known word, or nothing."""
+    from difflib import get_close_matches
+
     near = get_close_matches(word, list(known), 1, cutoff) or [each for each in known if each.lower() == word.lower()]
     return "; " + sentence.format(near[0]) if near else ""

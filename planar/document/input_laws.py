@@ -7,7 +7,8 @@ from typing import Any
 
 from planar.document.cursor import Cursor, suggest_spelling
 from planar.foundation.units import SI_UNITS, parse_unit
-from planar.model.input_laws import MAX_LAW_ITEMS, SEGMENT_TYPES, InputLaw, LawSegment, SegmentKey, TableSegment
+from planar.model.input_laws import SEGMENT_TYPES, InputLaw, LawSegment, SegmentKey, TableSegment
+from planar.model.loads import MAX_LAW_ITEMS
 from planar.model.mechanism import LARGEST_INPUT_POSITION, Input
 from planar.model.pairs import Pair, QuantityWriter
 

@@ -5,13 +5,16 @@ What a schema cannot say (that a link exists, that a triangle closes, that a uni
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from planar.foundation.units import MAX_QUANTITY_LENGTH
-from planar.model.input_laws import MAX_LAW_ITEMS, SEGMENT_TYPES, LawSegment
+from planar.model.loads import MAX_LAW_ITEMS
 from planar.model.mechanism import LARGEST_NUMBER, PUBLISHED_QUANTITIES, SMALLEST_NUMBER
 from planar.model.pairs import Pair, pair_types
 from planar.model.pairs.base import Schema, described, list_schema, schema_reference
+
+if TYPE_CHECKING:
+    from planar.model.input_laws import LawSegment
 
 FORMAT_VERSION = 1
 FORBIDDEN_IN_NAMES = ".:,"
@@ -235,6 +238,8 @@ FILE_SCHEMA: Schema = {
 
 def schema() -> dict[str, Any]:
     """The JSON Schema (draft 2020-12) of a mechanism file."""
+    from planar.model.input_laws import SEGMENT_TYPES  # which few files have
+
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "A planar mechanism",

@@ -24,6 +24,6 @@ residuals             the residuals of all pairs and inputs, for every arithmeti
 linear                small linear systems, as expressions and for arrays
 constraint_equations  z, u, p, w, F built as casadi expressions: elimination, then blocks
 rates                 time derivatives of expressions in y, and of the unknowns
-functions             the same as compiled functions of arrays
+functions             the same as compiled functions of arrays, kept on disk for other processes
 acceptance            all that a position has to pass, as one compiled function
 """

@@ -94,6 +94,9 @@ class AcceptanceFunctions:
     @cached_property
     def corrected_position(self) -> BufferedFunction:
         """The same as `position`, after one more of Newton's corrections: first the corrected z."""
+        return BufferedFunction(self.functions.kept("corrected position", self._make_corrected_position))
+
+    def _make_corrected_position(self) -> ca.Function:
         e = self.equations
         sizes = (e.z, e.u, e.u, e.u, e.u, e.p, e.F, e.z)
         names = ("z", "axis", "u", "u1", "u2", "p", "by", "least")
@@ -103,7 +106,7 @@ class AcceptanceFunctions:
         # one step from a position that is not closed to round-off does not make it so where blocks are weak
         open_ = ca.fmax(verdict[0], greatest_entry(ca.fabs(left)))
         verdict = ca.vertcat(open_, verdict[1] + ca.sum1(left), verdict[2:])
-        return BufferedFunction(function_with_cse("row", given, [settled, parts, verdict, *along]))
+        return function_with_cse("row", given, [settled, parts, verdict, *along])
 
     @cached_property
     def position(self) -> BufferedFunction:
@@ -116,6 +119,9 @@ class AcceptanceFunctions:
 
     @cached_property
     def _position(self) -> ca.Function:
+        return self.functions.kept("position", self._make_position)
+
+    def _make_position(self) -> ca.Function:
         e = self.equations
         axis, u1, u2 = (ca.SX.sym(name, e.u.numel()) for name in ("axis", "u1", "u2"))
         by, least = ca.SX.sym("by", e.F.numel()), ca.SX.sym("least", e.z.numel())
@@ -140,6 +146,9 @@ class AcceptanceFunctions:
     @cached_property
     def step_check(self) -> BufferedFunction:
         """(z, u, step of u, p) -> z after the step, and what is judged of the step, see `Stride`."""
+        return BufferedFunction(self.functions.kept("step check", self._make_step_check))
+
+    def _make_step_check(self) -> ca.Function:
         e, rates = self.equations, UnknownRates(self.equations)
         z, u, du, p = (
             ca.SX.sym(name, size.numel())
@@ -169,7 +178,7 @@ class AcceptanceFunctions:
             safe = ca.fmin(safe, each)
         whole = whole + ca.sum1(there) + ca.sum1(before)
         judged = stack_expressions([open_, whole, astray, onwards, safe, ca.fmin(clear, clear_there)])
-        return BufferedFunction(function_with_cse("stride", [z, u, du, p], [after, ca.densify(judged)]))
+        return function_with_cse("stride", [z, u, du, p], [after, ca.densify(judged)])
 
     def _residual_check(self, *given: ca.SX) -> list[ca.SX]:
         """What `ResidualCheck` of `solving` judges, by coordinates and rates alone, without the elimination."""

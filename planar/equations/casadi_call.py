@@ -1,16 +1,25 @@
-"""Calls of compiled casadi functions on arrays as they lie in memory, at one position or at many."""
+"""Compiled casadi functions, read from texts, and called on arrays as they lie in memory, at one position or many."""
 
 from __future__ import annotations
 
 from threading import Lock
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from planar.foundation.arrays import Array
 
 CHUNK_SIZES = (256, 32, 8)
 """Positions that are worked on by one call."""
+
+
+def read_function(text: str | None) -> ca.Function | None:
+    """A function as casadi wrote it; None where there is none, or this build of casadi writes them otherwise."""
+    try:
+        return None if text is None else ca.Function.deserialize(text)
+    except RuntimeError:
+        return None
 
 
 class BufferedFunction:

@@ -19,6 +19,7 @@ import numpy as np
 
 from planar.equations.symbolic_equations import Block, ConstraintEquations
 from planar.foundation.arrays import Array
+from planar.foundation.generic_numbers import generic_numbers
 from planar.model.pairs import MeasureKind
 
 ZERO_TOLERANCE = 1e-10
@@ -203,7 +204,7 @@ def _which_vanish(e: ConstraintEquations, parts: list[ca.SX]) -> list[bool]:
 def _evaluate_at_random(e: ConstraintEquations, parts: list[ca.SX]) -> list[Array]:
     """Expressions (2,) in numbers (2, places): at random places an identity holds by accident nowhere."""
     function = ca.Function("parts", [e.z, e.u, e.p], [ca.densify(part) for part in parts])
-    rng = np.random.default_rng(0)
-    values = [rng.uniform(0.5, 2.0, (symbol.numel(), SAMPLE_POINTS)) for symbol in (e.z, e.u, e.p)]
+    ends = np.cumsum([symbol.numel() for symbol in (e.z, e.u, e.p)])
+    values = np.split(generic_numbers(ends[2], SAMPLE_POINTS), ends[:2])
     found = function(*values)
     return [each.full() for each in (found if isinstance(found, tuple) else (found,))]

@@ -1,31 +1,48 @@
-"""The compiled casadi functions of a structure's equations over z, u and p: residuals, Jacobians, rates."""
+"""The compiled casadi functions of a structure's equations over z, u and p: residuals, Jacobians, rates.
+
+What is derived of a structure is kept on disk, its equations as well as its functions, by a fingerprint of all that
+it depends on: to derive it takes many times as long as to read it.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import json
+from collections.abc import Callable, Sequence
 from functools import cached_property, lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar, cast
 
 import casadi as ca
 import numpy as np
 
-from planar.equations.casadi_call import BufferedFunction, RunFunction
-from planar.equations.closed_form import ClosedForm, find_closed_form
+from planar.equations.casadi_call import BufferedFunction, RunFunction, read_function
 from planar.equations.elimination import stack_expressions
 from planar.equations.linear import solve_linear
-from planar.equations.mechanism_numbers import equation_structure
+from planar.equations.mechanism_numbers import equation_structure, structure_fingerprint
 from planar.equations.rates import rate_symbols, time_derivatives
-from planar.equations.symbolic_equations import Block, ConstraintEquations, build_equations, slice_length
+from planar.equations.symbolic_equations import (
+    Block,
+    ConstraintEquations,
+    build_equations,
+    equations_from_outline,
+    slice_length,
+)
 from planar.foundation.arrays import Array
+from planar.foundation.kept_texts import KeptTexts
+from planar.foundation.private_cache import PrivateCache
 from planar.model.mechanism import Mechanism
 
 MAX_CACHED_STRUCTURES = 256
 """Mechanisms of which what was derived is kept: more than come along, so that none is derived twice in a round."""
 
+KEPT_EQUATIONS = PrivateCache("equations", ".equations", b"planar equations\n", 128 * 2**20)
+"""Equations and functions of structures, as casadi writes them; those of one take from 0.1 to 1 MB."""
 POLISHING_STEPS = 2
 """Newton's steps that carry a closed form to round-off."""
 RUN_NEWTON_STEPS = 4
 """Unrolled steps of a position within a run: from a start a degree or so away, four square the error away."""
+
+
+Kept = TypeVar("Kept", bound=ca.Function | None)
 
 
 class EquationRates(NamedTuple):
@@ -72,25 +89,50 @@ class ClosedFormAssemblies:
         return found, float(left), bend
 
 
-class EquationFunctions:
-    """The casadi functions of one structure, each built when it is first asked for."""
+def kept_function(make: Callable[[Any], ca.Function]) -> cached_property[ca.Function]:
+    """A property of `EquationFunctions`: a function that is made once, in this process or in one before."""
 
-    def __init__(self, equations: ConstraintEquations):
-        self.equations = equations
+    def get(functions: EquationFunctions) -> ca.Function:
+        return functions.kept(make.__name__, lambda: make(functions))
+
+    get.__doc__ = make.__doc__
+    return cached_property(get)
+
+
+class EquationFunctions:
+    """The casadi functions of one structure, each built when it is first asked for; `texts` is where they are kept."""
+
+    def __init__(self, equations: ConstraintEquations, texts: KeptTexts | None = None):
+        self.equations, self._texts = equations, texts
+
+    def kept(self, name: str, make: Callable[[], Kept]) -> Kept:
+        """What `make` makes of this structure, from the disk where it is kept there by this name."""
+        text = None if self._texts is None else self._texts.take(name)
+        if text == "":  # what cannot be made
+            return cast("Kept", None)
+        found = read_function(text)
+        if found is not None:
+            return cast("Kept", found)
+        made = make()
+        if self._texts is not None:
+            self._texts.add(name, made.serialize if made is not None else str)
+        return made
 
     def block_function(self, block: Block) -> ca.Function:
         """(z, u, p) -> F of this block (rows,) and its Jacobian in the block's own unknowns (rows, unknowns)."""
-        return self._block_functions[block.block_index]
+        k = block.block_index
+        if k not in self._block_functions:
+            self._block_functions[k] = self.kept(f"closing {k}", lambda: self._make_block_function(block))
+        return self._block_functions[k]
 
     @cached_property
     def _block_functions(self) -> dict[int, ca.Function]:
+        return {}
+
+    def _make_block_function(self, block: Block) -> ca.Function:
         e = self.equations
-        return {
-            block.block_index: ca.Function(
-                "closing", [e.z, e.u, e.p], [e.F[block.rows], ca.densify(e.jacobian[block.rows, block.unknowns])]
-            )
-            for block in e.blocks
-        }
+        outputs = [e.F[block.rows], ca.densify(e.jacobian[block.rows, block.unknowns])]
+        return ca.Function("closing", [e.z, e.u, e.p], outputs)
 
     def block_call(self, block: Block) -> BufferedFunction:
         """The same, called on arrays: F and the Jacobian's columns (unknowns, rows)."""
@@ -105,26 +147,39 @@ class EquationFunctions:
     def block_assemblies(self, block: Block) -> ClosedFormAssemblies | None:
         """Both assemblies of a block; None for one without a closed form."""
         if block.block_index not in self._block_assemblies:
-            form = find_closed_form(self.equations, block)
-            self._block_assemblies[block.block_index] = form and self._make_assemblies(block, form)
+            self._block_assemblies[block.block_index] = self._make_assemblies(block)
         return self._block_assemblies[block.block_index]
 
     @cached_property
     def _block_assemblies(self) -> dict[int, ClosedFormAssemblies | None]:
         return {}
 
-    def _make_assemblies(self, block: Block, form: ClosedForm) -> ClosedFormAssemblies:
-        e = self.equations
+    def _make_assemblies(self, block: Block) -> ClosedFormAssemblies | None:
+        k = block.block_index
+        form = self.kept(f"assembly {k}", lambda: self._make_assembly_function(block))
+        if form is None:
+            return None
+        polished = self.kept(f"polished {k}", lambda: self._make_polished_function(block))
+        return ClosedFormAssemblies(block.unknowns, BufferedFunction(form), BufferedFunction(polished))
+
+    def _make_assembly_function(self, block: Block) -> ca.Function | None:
+        """(z, u, p, sign) -> the unknowns of a block in closed form, and where its assemblies meet, if it has one."""
+        from planar.equations.closed_form import find_closed_form  # most functions are read
+
+        e, form = self.equations, find_closed_form(self.equations, block)
+        if form is None:
+            return None
         found = stack_expressions(ca.atan2(each[1], each[0]) if len(each) == 2 else each[0] for each in form.values)
+        return ca.Function("assembly", [e.z, e.u, e.p, form.sign], [found, form.coalescence])
+
+    def _make_polished_function(self, block: Block) -> ca.Function:
+        """(z, u, p) -> the unknowns of a block after one of Newton's steps, and what was open before it."""
+        e = self.equations
         left, slope = self.block_function(block)(e.z, e.u, e.p)
         polished = [e.z[block.unknowns] - solve_linear(slope, left), ca.norm_inf(left)]
-        return ClosedFormAssemblies(
-            block.unknowns,
-            BufferedFunction(ca.Function("assembly", [e.z, e.u, e.p, form.sign], [found, form.coalescence])),
-            BufferedFunction(ca.Function("polished", [e.z, e.u, e.p], polished)),
-        )
+        return ca.Function("polished", [e.z, e.u, e.p], polished)
 
-    @cached_property
+    @kept_function
     def coordinate_function(self) -> ca.Function:
         """(z, u, p) -> w."""
         e = self.equations
@@ -144,7 +199,7 @@ class EquationFunctions:
     def _kinematics_calls(self) -> tuple[BufferedFunction, BufferedFunction]:
         return BufferedFunction(self.kinematics_function), BufferedFunction(self._jacobian_function)
 
-    @cached_property
+    @kept_function
     def kinematics_function(self) -> ca.Function:
         """(y, y1, y2, p) -> F and w, one after the other, with their first and second rates, and dF/dy."""
         e = self.equations
@@ -155,7 +210,7 @@ class EquationFunctions:
         outputs = [ca.horzcat(both, first, second), e.jacobian]
         return ca.Function("kinematics", [y, y1, y2, e.p], [ca.densify(output) for output in outputs])
 
-    @cached_property
+    @kept_function
     def _third_rate_function(self) -> ca.Function:
         e = self.equations
         y = e.y
@@ -163,7 +218,7 @@ class EquationFunctions:
         third = time_derivatives(e.F, y, y1, y2, ca.SX.zeros(y.numel()))[-1]
         return ca.Function("third", [y, y1, y2, e.p], [ca.densify(third)])
 
-    @cached_property
+    @kept_function
     def _jerk_function(self) -> ca.Function:
         e = self.equations
         y = e.y
@@ -200,7 +255,7 @@ class EquationFunctions:
         """The second derivatives (y, y) of the sum of the rows of F, each times its number."""
         return self._second_derivative_functions[1](y, weights, p).full()
 
-    @cached_property
+    @kept_function
     def _deflated_function(self) -> ca.Function:
         e = self.equations
         z1, u1 = ca.SX.sym("z1", e.z.numel()), ca.SX.sym("u1", e.u.numel())
@@ -228,7 +283,7 @@ class EquationFunctions:
         parted = *parts[..., :rows], *parts[..., rows:], slopes[..., :unknowns], slopes[..., unknowns:]
         return EquationRates._make(parted)
 
-    @cached_property
+    @kept_function
     def newton_function(self) -> ca.Function:
         """(z, u, p) -> z: Newton block after block, unrolled.
 
@@ -268,7 +323,7 @@ class EquationFunctions:
     def _run_function(self) -> RunFunction:
         return RunFunction(self.newton_function)
 
-    @cached_property
+    @kept_function
     def _jacobian_function(self) -> ca.Function:
         e = self.equations
         return ca.Function("slopes", [e.z, e.u, e.p], [ca.densify(e.jacobian)])
@@ -285,10 +340,14 @@ class EquationFunctions:
         ).transpose(0, 2, 1)
         return both[:, :, :unknowns], both[:, :, unknowns:]
 
+    @kept_function
+    def _residual_function(self) -> ca.Function:
+        e = self.equations
+        return ca.Function("left", [e.z, e.u, e.p], [ca.densify(e.F), ca.densify(e.jacobian)])
+
     @cached_property
     def _residual_call(self) -> BufferedFunction:
-        e = self.equations
-        return BufferedFunction(ca.Function("left", [e.z, e.u, e.p], [ca.densify(e.F), ca.densify(e.jacobian)]))
+        return BufferedFunction(self._residual_function)
 
     def residuals_and_jacobian(self, z: Array, u: Array, p: Array) -> tuple[Array, Array]:
         """F (rows,) and its Jacobian (rows, unknowns and inputs) at one position."""
@@ -315,4 +374,14 @@ def equation_functions(mechanism: Mechanism) -> EquationFunctions:
 
 @lru_cache(maxsize=MAX_CACHED_STRUCTURES)
 def _cached_equation_functions(structure: Mechanism) -> EquationFunctions:
-    return EquationFunctions(build_equations(structure))
+    key = structure_fingerprint(structure)
+    texts = None if key is None or KEPT_EQUATIONS.folder() is None else KeptTexts(KEPT_EQUATIONS, key)
+    told, outline = (texts.take("function"), texts.take("outline")) if texts else (None, None)
+    function = read_function(told)
+    if function is not None and outline is not None:
+        return EquationFunctions(equations_from_outline(json.loads(outline), function), texts)
+    equations = build_equations(structure)
+    if texts is not None:
+        texts.add("function", lambda: equations.as_function().serialize())
+        texts.add("outline", lambda: json.dumps(equations.outline()))
+    return EquationFunctions(equations, texts)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -24,6 +24,7 @@ from planar.equations.elimination import (
     stack_expressions,
 )
 from planar.equations.residuals import ConstraintRow, residuals, split_pair_numbers, wrapped_residual
+from planar.foundation.generic_numbers import generic_numbers
 from planar.foundation.geometry import GROUND, Frame, frame_at
 from planar.model.mechanism import Mechanism, relative_motions
 from planar.model.pairs import MeasureKind
@@ -84,6 +85,46 @@ class ConstraintEquations:
     def jacobian(self) -> ca.SX:
         """dF/dy (rows, y)."""
         return ca.jacobian(self.F, self.y)
+
+    def as_function(self) -> ca.Function:
+        """(z, u, p) -> F, w."""
+        return ca.Function("equations", [self.z, self.u, self.p], [self.F, self.w])
+
+    def outline(self) -> dict[str, Any]:
+        """All but the expressions, as a JSON value; with `as_function` it is what `equations_from_outline` takes."""
+        return {
+            "coordinates": [(each.owner, each.part, each.kind.value, each.of_link) for each in self.coordinates],
+            "unknowns": self.unknowns,
+            "rows": [(row.pair, row.kind.value) for row in self.rows],
+            "blocks": [
+                (each.unknowns.start, each.unknowns.stop, each.rows.start, each.rows.stop, *each[2:])
+                for each in self.blocks
+            ],
+            "known_after_block": self.known_after_block,
+            "input_kinds": [kind.value for kind in self.input_kinds],
+        }
+
+
+def equations_from_outline(outline: Mapping[str, Any], function: ca.Function) -> ConstraintEquations:
+    """The equations of an outline, the same as those of which it was made, and their function (z, u, p) -> F, w."""
+    z, u, p = (function.sx_in(k) for k in range(3))
+    F, w = function(z, u, p)
+    return ConstraintEquations(
+        tuple(Coordinate(owner, part, MeasureKind(kind), own) for owner, part, kind, own in outline["coordinates"]),
+        tuple(outline["unknowns"]),
+        tuple(ConstraintRow(pair, MeasureKind(kind)) for pair, kind in outline["rows"]),
+        tuple(
+            Block(slice(*each[:2]), slice(*each[2:4]), tuple(each[4]), tuple(each[5]), *each[6:])
+            for each in outline["blocks"]
+        ),
+        tuple(outline["known_after_block"]),
+        z,
+        u,
+        p,
+        w,
+        F,
+        tuple(map(MeasureKind, outline["input_kinds"])),
+    )
 
 
 class _MechanismCoordinates(NamedTuple):
@@ -196,9 +237,8 @@ def _drop_idle_unknowns(equations: ConstraintEquations) -> tuple[ca.SX, list[set
     if not any(touched):
         return both, touched
     slope = ca.Function("slope", [equations.z, equations.u, equations.p], [ca.jacobian(both, equations.z)])
-    rng = np.random.default_rng(0)
-    sizes = [symbol.numel() for symbol in (equations.z, equations.u, equations.p)]
-    found = [slope(*(rng.uniform(0.5, 2.0, size) for size in sizes)) for _ in range(2)]
+    ends = np.cumsum([symbol.numel() for symbol in (equations.z, equations.u, equations.p)])
+    found = [slope(*np.split(numbers, ends[:2])) for numbers in generic_numbers(2, ends[2])]
     seen = sum(np.abs(np.array(each.nonzeros())) for each in found)
     rows, columns = found[0].sparsity().get_triplet()
     alive = {(row, column) for row, column, value in zip(rows, columns, seen, strict=True) if value > 1e-12}

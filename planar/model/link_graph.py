@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import combinations, count
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from planar.model.mechanism import Mechanism, pair_entries, relative_motions
 from planar.model.pairs import MeasureKind, Pair
@@ -14,42 +14,61 @@ from planar.model.pairs import MeasureKind, Pair
 if TYPE_CHECKING:
     import networkx as nx
 
+Node = tuple[str, Any]
+"""What a node stands for, a link or a pair, and its name or number."""
+Neighbours = dict[Node, dict[Node, None]]
+"""A graph: the nodes next to each, in the order of the file. The graph library is slow to load beside small graphs."""
 _LINK_NUMBER = re.compile(r"0|[1-9][0-9]{0,3}")
 """A link's name that is its number."""
 
 
-def link_pair_graph(mechanism: Mechanism) -> nx.Graph:
+def link_pair_graph(mechanism: Mechanism) -> Neighbours:
     """Links and pairs, both as nodes ("link", name) and ("pair", name), so that two links may share two pairs.
 
     A pin of n links is one pair node with n edges.
     """
-    import networkx as nx
-
-    graph = nx.Graph(name=mechanism.name)
-    graph.add_nodes_from(("link", link.name) for link in mechanism.links)
-    for group in pair_entries(mechanism):
-        node = ("pair", group[0].entry_name())
-        for pair in group:
-            graph.add_edges_from((node, ("link", link)) for link in pair.links)
-    return graph
+    edges = (
+        (("pair", group[0].entry_name()), ("link", link))
+        for group in pair_entries(mechanism)
+        for pair in group
+        for link in pair.links
+    )
+    return _neighbours((("link", link.name) for link in mechanism.links), edges)
 
 
 def unconnected_links(mechanism: Mechanism) -> tuple[str, ...]:
     """Links that no chain of pairs joins to the frame."""
-    import networkx as nx
-
-    joined = nx.node_connected_component(link_pair_graph(mechanism), ("link", mechanism.frame))
+    joined = _distances(link_pair_graph(mechanism), ("link", mechanism.frame))
     return tuple(link.name for link in mechanism.links if ("link", link.name) not in joined)
 
 
 def pairs_farthest_first(mechanism: Mechanism, name: str) -> tuple[str, ...]:
     """The other pairs, those first that are most links and pairs away from this one."""
-    import networkx as nx
-
     entry_of = {pair.name: pair.entry_name() for pair in mechanism.pairs}
-    away = nx.single_source_shortest_path_length(link_pair_graph(mechanism), ("pair", entry_of[name]))
+    away = _distances(link_pair_graph(mechanism), ("pair", entry_of[name]))
     others = [other for other in entry_of if other != name]
     return tuple(sorted(others, key=lambda other: -away.get(("pair", entry_of[other]), 0)))
+
+
+def _neighbours(nodes: Iterable[Node], edges: Iterable[tuple[Node, Node]]) -> Neighbours:
+    """The graph of some nodes and edges, and of the nodes that edges join."""
+    found: Neighbours = {node: {} for node in nodes}
+    for one, other in edges:
+        found.setdefault(one, {})[other] = None
+        found.setdefault(other, {})[one] = None
+    return found
+
+
+def _distances(graph: Neighbours, start: Node) -> dict[Node, int]:
+    """How many edges away every node is that can be reached, this one first."""
+    found, waiting = {start: 0}, deque([start])
+    while waiting:
+        node = waiting.popleft()
+        for other in graph[node]:
+            if other not in found:
+                found[other] = found[node] + 1
+                waiting.append(other)
+    return found
 
 
 class JointDiagram(NamedTuple):
@@ -70,52 +89,78 @@ def isomorphisms(first: JointDiagram, second: JointDiagram) -> Iterator[JointIso
     """Every way in which two figures are the same but for names: joint for joint of one kind, frame for frame."""
     if len(first.joints) != len(second.joints):
         return
-    a, b = _labelled_graph(first), _labelled_graph(second)
-    marks = (sorted((graph.degree(node), mark) for node, mark in graph.nodes(data="mark")) for graph in (a, b))
+    marks = (
+        sorted((len(beside), _mark(figure, node)) for node, beside in _joint_graph(figure).items())
+        for figure in (first, second)
+    )
     if next(marks) != next(marks):
         return
     from networkx.algorithms.isomorphism import GraphMatcher
 
-    matcher = GraphMatcher(a, b, node_match=lambda one, other: one["mark"] == other["mark"])
+    matcher = GraphMatcher(
+        _labelled_graph(first), _labelled_graph(second), node_match=lambda one, other: one["mark"] == other["mark"]
+    )
     for found in matcher.isomorphisms_iter():
         links = {name: found[what, name][1] for what, name in found if what == "link"}
         yield JointIsomorphism(links, {index: found[what, index][1] for what, index in found if what == "pair"})
+
+
+def _joint_graph(figure: JointDiagram) -> Neighbours:
+    """The joints, ("pair", index), and the links that meet in them."""
+    joints = [(("pair", index), links) for index, (_, links) in enumerate(figure.joints)]
+    return _neighbours(
+        (node for node, _ in joints), ((node, ("link", link)) for node, links in joints for link in links)
+    )
+
+
+def _mark(figure: JointDiagram, node: Node) -> str:
+    """The kind of a joint, or whether a link is the frame."""
+    what, name = node
+    if what == "link":
+        return "frame" if name == figure.frame else "link"
+    return figure.joints[name][0].value
 
 
 def _labelled_graph(figure: JointDiagram) -> nx.Graph:
     import networkx as nx
 
     graph = nx.Graph()
-    for index, (kind, links) in enumerate(figure.joints):
-        graph.add_node(("pair", index), mark=kind.value)
-        for link in links:
-            graph.add_node(("link", link), mark="frame" if link == figure.frame else "link")
-            graph.add_edge(("pair", index), ("link", link))
+    for index, (_, links) in enumerate(figure.joints):
+        for node in (("pair", index), *(("link", link) for link in links)):
+            graph.add_node(node, mark=_mark(figure, node))
+            if node[0] == "link":
+                graph.add_edge(("pair", index), node)
     return graph
 
 
 def are_connected(figure: JointDiagram, links: Sequence[str]) -> bool:
     """Whether each of these links is joined to all the others."""
-    import networkx as nx
-
-    graph = _labelled_graph(figure)
-    return bool(graph) and nx.is_connected(graph) and all(("link", link) in graph for link in links)
+    graph = _joint_graph(figure)
+    reached = _distances(graph, next(iter(graph))) if graph else {}
+    return bool(graph) and len(reached) == len(graph) and all(("link", link) in graph for link in links)
 
 
 def independent_loop_count(figure: JointDiagram) -> int:
     """How many independent loops the links make."""
-    import networkx as nx
-
-    graph = _labelled_graph(figure)
-    return int(graph.number_of_edges() - graph.number_of_nodes() + nx.number_connected_components(graph))
+    graph = _joint_graph(figure)
+    edges, components, left = sum(map(len, graph.values())) // 2, 0, dict(graph)
+    while left:
+        components += 1
+        for node in _distances(graph, next(iter(left))):
+            del left[node]
+    return edges - len(graph) + components
 
 
 def pin_pair_trees(links: Sequence[str]) -> tuple[tuple[tuple[str, str], ...], ...]:
     """Every choice of n - 1 pairs that a pin of n links may stand for."""
-    import networkx as nx
-
     choices = combinations(tuple(combinations(links, 2)), len(links) - 1)
-    return tuple(pairs for pairs in choices if len({*sum(pairs, ())}) == len(links) and nx.is_forest(nx.Graph(pairs)))
+    return tuple(pairs for pairs in choices if len({*sum(pairs, ())}) == len(links) and _is_connected(pairs))
+
+
+def _is_connected(pairs: Sequence[tuple[str, str]]) -> bool:
+    """Whether edges join all that they join to one another."""
+    graph = _neighbours((), ((("link", one), ("link", other)) for one, other in pairs))
+    return not graph or len(_distances(graph, next(iter(graph)))) == len(graph)
 
 
 def link_numbers(mechanism: Mechanism) -> dict[str, str]:

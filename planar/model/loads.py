@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 from planar.model.link_shapes import PointReference
 
+MAX_LAW_ITEMS = 10_000
+"""Pieces of one law of an input, points of one table, places of the course of a load."""
 COINCIDENCE_TOLERANCE = 1e-12
 """Of a mechanism's size: ends of a spring that are nearer to each other have met, and nothing tells its direction."""
 

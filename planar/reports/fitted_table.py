@@ -77,23 +77,59 @@ class FittedTable:
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Segment | RenderableType]:
         if self.title:
             yield Text(self.title, style="bold")
-        for table, width in self._fitting_tables(options.max_width):
-            # a table that cannot be narrower than the terminal is not to be cut by it
-            yield from console.render(table, options.update_width(max(width, options.max_width)))
-
-    def __rich_measure__(self, console: Console, options: ConsoleOptions) -> Measurement:
-        widest = max((width for _, width in self._fitting_tables(options.max_width)), default=0)
-        return Measurement(widest, widest)
-
-    def _fitting_tables(self, width: int) -> Iterator[tuple[Table, int]]:
-        """The tables that fit, each with the characters that it takes."""
-        widths = [_column_widths(column, [row[k] for row in self.rows]) for k, column in enumerate(self.columns)]
-        parts = _split_columns(self.columns, self.keys, widths, width)
+        parts = self._fitting_parts(options.max_width)
         if parts is None:
-            yield from (self._draw_record(row, width) for row in self.rows)
+            for table, width in self._draw_records(options.max_width):
+                # a table that cannot be narrower than the terminal is not to be cut by it
+                yield from console.render(table, options.update_width(max(width, options.max_width)))
             return
         for part in parts:
-            yield self._draw_table(part), _total_width(part.values())
+            lines = None if console.record else self._plain_lines(part)
+            if lines is None:
+                width = max(_total_width(part.values()), options.max_width)
+                yield from console.render(self._draw_table(part), options.update_width(width))
+                continue
+            for line, style in lines:
+                yield Segment(line, console.get_style(style) if style else None)
+                yield Segment.line()
+
+    def __rich_measure__(self, console: Console, options: ConsoleOptions) -> Measurement:
+        parts = self._fitting_parts(options.max_width)
+        if parts is None:
+            widest = max((width for _, width in self._draw_records(options.max_width)), default=0)
+        else:
+            widest = max(_total_width(part.values()) for part in parts)
+        return Measurement(widest, widest)
+
+    def _fitting_parts(self, width: int) -> list[dict[int, int]] | None:
+        """The columns of each table that fits, by number, with their widths; None where only records of rows do."""
+        widths = [_column_widths(column, [row[k] for row in self.rows]) for k, column in enumerate(self.columns)]
+        return _split_columns(self.columns, self.keys, widths, width)
+
+    def _plain_lines(self, widths: dict[int, int]) -> list[tuple[str, str]] | None:
+        """The lines of `_draw_table`, each with the name of its style, many times as fast; None where a cell has a
+        style, is broken, or is not of printable characters alone."""
+        headings = [self.columns[k].lines for k in widths]
+        most = max(map(len, headings), default=0)
+        rows = [[([""] * most + lines)[len(lines) + row] for lines in headings] for row in range(most)]
+        for row in self.rows:
+            cells = [row[k] for k in widths]
+            if any(isinstance(cell, Text) and (cell.style or cell.spans) for cell in cells):
+                return None
+            rows.append([cell.plain if isinstance(cell, Text) else cell for cell in cells])
+        lines = []
+        for texts in rows:
+            line = []
+            for text, (k, width) in zip(texts, widths.items(), strict=True):
+                room = width - cell_len(text)
+                if room < 0 or not text.isprintable():
+                    return None
+                line.append(text + " " * room if self.columns[k].has_words else " " * room + text)
+            lines.append(f" {(' ' * COLUMN_GAP).join(line)} ")
+        width = _total_width(widths.values())
+        blank, rule = (" " * width, ""), (f" {SIMPLE_HEAD.head_row_horizontal * (width - EDGE_WIDTH)} ", "")
+        head = [(line, "table.header") for line in lines[:most]]
+        return [blank, *head, rule, *((line, "") for line in lines[most:]), blank]
 
     def _draw_table(self, widths: dict[int, int]) -> Table:
         """Some of the columns, by their numbers, with the width of each."""
@@ -105,6 +141,10 @@ class FittedTable:
         for row in self.rows:
             table.add_row(*(row[k] for k in widths))
         return table
+
+    def _draw_records(self, width: int) -> Iterator[tuple[Table, int]]:
+        """A table for every row, each with the characters that it takes."""
+        return (self._draw_record(row, width) for row in self.rows)
 
     def _draw_record(self, row: Sequence[Cell], room: int) -> tuple[Table, int]:
         """A row by itself: every cell behind its heading."""

@@ -23,18 +23,14 @@ from planar.solving.assembly.block_assemblies import BlockAssemblies
 from planar.solving.assembly.nearest_assembly import Assembly, AssemblySearchFailure, find_nearest_assembly
 from planar.solving.checks.singular_values import MIN_REGULARITY
 from planar.solving.continuation.fast_path import StraightPathCache, fast_position, is_surely_regular
-from planar.solving.continuation.path import follow_straight
-from planar.solving.continuation.path_pieces import BranchRates
-from planar.solving.diagnosis import refusals
-from planar.solving.diagnosis.singular_refusals import SingularPosition, determined_mobility
 from planar.solving.lazy_frames import lazy_frames
 from planar.solving.newton import CLOSED_TOLERANCE
 from planar.solving.prepared_mechanism import PreparedMechanism
-from planar.solving.rates.regularity import is_always_singular, jacobian_at, moved_links, regularity
-from planar.solving.rates.sample_rates import InputRates, sample_rates
 
 if TYPE_CHECKING:
+    from planar.solving.continuation.path_pieces import BranchRates
     from planar.solving.continuation.singular_rates import SingularRates
+    from planar.solving.rates.sample_rates import InputRates
 
 
 @takes_mechanism
@@ -61,6 +57,8 @@ def solve(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = 
     z = known.nearby_positions.unknowns_at(there.inputs.u) if there.unit == here.unit else None
     if z is not None:
         return there.state(z, known.remarks)
+    from planar.solving.continuation.path import follow_straight  # most ways are surely regular
+
     # in the lengths of the size here: without a link's length a farther input makes the size greater
     scale = np.where(here.structure.input_slides, there.unit / here.unit, 1.0)
     way = follow_straight(here, here.inputs.p, found.z, here.inputs.u, there.inputs.u * scale)
@@ -74,7 +72,11 @@ def solve(mechanism: Mechanism, drives: Mapping[str, float] | Sequence[Drive] = 
 
 
 class PositionSolver(PreparedMechanism):
-    """Solves positions of one mechanism."""
+    """Solves positions of one mechanism.
+
+    What is needed only where compiled functions do not settle a position (the reasons of refusals, singular positions,
+    rates and their accuracy) is imported there: it is slow to load beside what most positions take.
+    """
 
     def find_assembly(self) -> Assembly:
         """The assembly nearest to the sketch. Raises NoAnswer."""
@@ -86,6 +88,8 @@ class PositionSolver(PreparedMechanism):
     def nearest(self) -> Assembly | AssemblySearchFailure:
         """The assembly nearest to the sketch, or where it fails. Raises NoAnswer where the inputs leave links free."""
         if any(stage.is_free for stage in self.equations.blocks):
+            from planar.solving.diagnosis import refusals
+
             raise refusals.free_links(self)
         return find_nearest_assembly(BlockAssemblies(self), self._is_regular)
 
@@ -101,6 +105,8 @@ class PositionSolver(PreparedMechanism):
         """Whether every block of an assembly is determined there."""
         if is_surely_regular(self, z):
             return True
+        from planar.solving.rates.regularity import jacobian_at, regularity
+
         return bool(np.all(regularity(self, jacobian_at(self, z, self.inputs.u)) >= MIN_REGULARITY))
 
     def regularized(self, z: Array) -> tuple[PositionSolver, Array] | None:
@@ -108,6 +114,8 @@ class PositionSolver(PreparedMechanism):
         where they are not, or something is free."""
         if self.is_deflated:
             return None
+        from planar.solving.rates.regularity import jacobian_at, regularity
+
         weak = regularity(self, jacobian_at(self, z, self.inputs.u)) < MIN_REGULARITY
         if not weak.any():
             return None
@@ -118,6 +126,9 @@ class PositionSolver(PreparedMechanism):
 
     def unassembled(self, failure: AssemblySearchFailure) -> NoAnswer:
         """Why it cannot be assembled, and what would mend that, which takes about as long to find as an assembly."""
+        from planar.solving.diagnosis import refusals
+        from planar.solving.rates.regularity import is_always_singular, jacobian_at, regularity
+
         found = regularity(self, jacobian_at(self, failure.z, self.inputs.u))
         for stage in self.equations.blocks[: failure.stage.block_index]:
             # a block that could stand anywhere was put somewhere, and what comes after it need not fit there
@@ -139,9 +150,13 @@ class PositionSolver(PreparedMechanism):
 
     def state(self, z: Array, remarks: tuple[str, ...] = ()) -> State:
         """The state at given unknowns, once they and their rates have passed the residual check. Raises NoAnswer."""
-        state = self._fast_state(z, remarks)
-        if state is not None:
-            return state
+        return self._fast_state(z, remarks) or self._examined_state(z, remarks)
+
+    def _examined_state(self, z: Array, remarks: tuple[str, ...]) -> State:
+        """The state by the general checks, which say why where there is none."""
+        from planar.solving.diagnosis.singular_refusals import SingularPosition, determined_mobility
+        from planar.solving.rates.sample_rates import sample_rates
+
         gaps = self.residuals(z[None], self.inputs.u[None])[:, 0]
         residual = float(gaps.max(initial=0.0))
         if residual > self.tolerance:
@@ -170,6 +185,9 @@ class PositionSolver(PreparedMechanism):
 
     def _open_refusal(self, z: Array, residual: float, pair: str) -> NoAnswer:
         """What to say of a position that does not close: where it all but does, it may be since it is singular."""
+        from planar.solving.diagnosis import refusals
+        from planar.solving.diagnosis.singular_refusals import SingularPosition, determined_mobility
+
         try:
             if residual <= CLOSED_TOLERANCE:
                 determined_mobility(self, z, self._kinematics_at_rest(z))
@@ -186,6 +204,8 @@ class PositionSolver(PreparedMechanism):
         return self.functions.kinematics(y, y1, y2, s.p)
 
     def _one_sample(self) -> InputRates:
+        from planar.solving.rates.sample_rates import InputRates
+
         s = self.inputs
         return InputRates(s.u[None], s.u1[None], s.u2[None], 0.0 * s.u[None])
 
@@ -200,6 +220,9 @@ class PositionSolver(PreparedMechanism):
 
     def end_refusal(self, u: Array, tangent: Array, ending: TrackingEnd) -> NoAnswer:
         """What to say of a motion that ends at inputs u, towards which it went along a tangent."""
+        from planar.solving.diagnosis import refusals
+        from planar.solving.rates.regularity import moved_links
+
         return refusals.motion_ended(self, moved_links(self, tangent[:-1]), self.describe_inputs(u), ending)
 
     def _singular_state(self, rates: SingularRates, remarks: tuple[str, ...]) -> State | None:
@@ -218,6 +241,8 @@ class PositionSolver(PreparedMechanism):
 
         Raises NoAnswer where the inputs do not run along the way on which it was followed.
         """
+        from planar.solving.rates.sample_rates import sample_rates
+
         residual = float(self.max_residuals(z[None], self.inputs.u[None])[0])
         found = sample_rates(self, z[None], self._one_sample(), {0: local}, False)
         rates = [part[0] for part in found.coordinate_rates]
@@ -234,11 +259,15 @@ class PositionSolver(PreparedMechanism):
         """Raise NoAnswer where a contact is open that guides should keep closed."""
         gap = self.residual_check.find_open_contact(frames, own)
         if gap is not None:
+            from planar.solving.diagnosis import refusals
+
             raise refusals.open_contact(self, *gap)
 
     def _checked_state(
         self, coordinate_rates: Sequence[Array], mobility: int, residual: float, remarks: tuple[str, ...]
     ) -> State:
+        from planar.solving.diagnosis import refusals
+
         parts = np.stack(coordinate_rates, axis=1) * self.scale[:, None]
         frames, own = frames_from_coordinates(
             [Jet(*each) for each in parts.tolist()], self.column, self.shapes, self.pairs

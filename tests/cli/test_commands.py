@@ -574,7 +574,7 @@ def test_a_command_by_another_name_is_answered_with_the_one_that_does_it(word: s
 def test_of_an_argument_that_is_none_of_its_choices_every_choice_is_named_whole(tmp_path: Path) -> None:
     from planar.cli import main
 
-    (choices,) = (each.type.choices for each in main.commands["plot"].params if each.name == "what")
+    (choices,) = (each.type.choices for each in main.load_commands()["plot"].params if each.name == "what")
     sentence = run(tmp_path, "plot", "four-bar", "schema", "-o", "x.png").refused(2)
     for choice in choices:
         assert sentence.count(repr(choice)) == 1
@@ -590,8 +590,9 @@ def test_every_other_name_of_a_command_is_of_one_that_there_is_and_is_none_itsel
     from planar.cli import main
     from planar.cli.exit_status import COMMAND_SYNONYMS
 
-    assert set(COMMAND_SYNONYMS.values()) <= set(main.commands)
-    assert not set(COMMAND_SYNONYMS) & set(main.commands)
+    assert set(COMMAND_SYNONYMS.values()) <= set(main.modules)
+    assert not set(COMMAND_SYNONYMS) & set(main.modules)
+    assert {name: each.callback.__module__ for name, each in main.load_commands().items()} == main.modules
 
 
 @pytest.mark.parametrize(

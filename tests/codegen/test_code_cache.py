@@ -9,8 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from planar.codegen import code_cache, llvm_compile
+from planar.codegen import llvm_compile
+from planar.codegen.code_cache import MACHINE_CODE
 from planar.foundation import safe_files
+from planar.foundation.private_cache import CACHE_TAG_NAME, CACHE_TAG_TEXT, CHECKSUM_LENGTH
 
 TIMES = """
 define void @times(ptr %at) {
@@ -38,7 +40,7 @@ def times(factor):
 def place(tmp_path, monkeypatch):
     """An empty folder of code."""
     monkeypatch.setenv("PLANAR_CACHE", str(tmp_path))
-    return tmp_path / code_cache.CODE_FOLDER
+    return tmp_path / MACHINE_CODE.folder_name
 
 
 @pytest.fixture
@@ -61,8 +63,8 @@ def only(place):
 
 def codes(place):
     """The files of code that are kept."""
-    assert (place / code_cache.CACHE_TAG_NAME).read_bytes() == code_cache.CACHE_TAG_TEXT
-    return [path for path in place.iterdir() if path.name != code_cache.CACHE_TAG_NAME]
+    assert (place / CACHE_TAG_NAME).read_bytes() == CACHE_TAG_TEXT
+    return [path for path in place.iterdir() if path.name != CACHE_TAG_NAME]
 
 
 def key(letter):
@@ -70,7 +72,7 @@ def key(letter):
     return sha256(letter.encode()).hexdigest()
 
 
-HEAD = len(code_cache.CODE_HEADER) + code_cache.CHECKSUM_LENGTH
+HEAD = len(MACHINE_CODE.header) + CHECKSUM_LENGTH
 
 
 def test_code_is_compiled_once_and_read_from_then_on(place, made):
@@ -85,12 +87,12 @@ def test_another_process_does_not_compile_again(place):
         "import ctypes\nfrom planar.codegen import llvm_compile\nimport tests.codegen.test_code_cache as here\n"
         "llvm_compile._made = None  # cannot be called\nprint(here.times(3))"
     )
-    root = Path(code_cache.__file__).parents[2]
+    root = Path(llvm_compile.__file__).parents[2]
     ended = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, text=True, check=False)
     assert (ended.stdout, ended.stderr) == ("6.0\n", "")
 
 
-@pytest.mark.parametrize("where", [0, len(code_cache.CODE_HEADER), HEAD - 1, HEAD, 200, -1])
+@pytest.mark.parametrize("where", [0, len(MACHINE_CODE.header), HEAD - 1, HEAD, 200, -1])
 def test_a_damaged_file_is_compiled_again_and_replaced(place, made, where):
     times(3)
     path = only(place)
@@ -103,7 +105,7 @@ def test_a_damaged_file_is_compiled_again_and_replaced(place, made, where):
     assert path.read_bytes() == right
 
 
-@pytest.mark.parametrize("length", [0, 10, len(code_cache.CODE_HEADER), HEAD, 300])
+@pytest.mark.parametrize("length", [0, 10, len(MACHINE_CODE.header), HEAD, 300])
 def test_a_part_of_a_file_is_compiled_again(place, made, length):
     times(3)
     path = only(place)
@@ -114,7 +116,7 @@ def test_a_part_of_a_file_is_compiled_again(place, made, length):
 
 def test_a_file_under_another_name_is_not_run(place, made):
     times(3)
-    only(place).rename(place / f"{llvm_compile.fingerprint(text(5))}{code_cache.CODE_SUFFIX}")
+    only(place).rename(place / f"{llvm_compile.fingerprint(text(5))}{MACHINE_CODE.suffix}")
     assert times(5) == 10.0
     assert len(made) == 2
 
@@ -149,30 +151,30 @@ def test_code_runs_where_nothing_can_be_kept(tmp_path, made, monkeypatch):
 
 
 def test_a_write_that_fails_leaves_nothing_behind(place, monkeypatch):
-    code_cache.write_code(key("a"), b"one")
+    MACHINE_CODE.write(key("a"), b"one")
     monkeypatch.setattr(Path, "replace", lambda self, target: (_ for _ in ()).throw(OSError("no room")))
-    assert not code_cache.write_code(key("b"), b"two")
-    assert [path.name for path in codes(place)] == [f"{key('a')}{code_cache.CODE_SUFFIX}"]
-    assert code_cache.read_code(key("a")) == b"one"
+    assert not MACHINE_CODE.write(key("b"), b"two")
+    assert [path.name for path in codes(place)] == [f"{key('a')}{MACHINE_CODE.suffix}"]
+    assert MACHINE_CODE.read(key("a")) == b"one"
 
 
 def test_what_was_not_read_for_longest_goes_first(place, monkeypatch):
     size = len(b"code") + HEAD
-    monkeypatch.setattr(code_cache, "MAX_CACHE_BYTES", 3 * size)
+    monkeypatch.setattr(MACHINE_CODE, "max_bytes", 3 * size)
     for age, letter in enumerate("abc"):
-        assert code_cache.write_code(key(letter), b"code")
-        os.utime(place / f"{key(letter)}{code_cache.CODE_SUFFIX}", (1000 + age, 1000 + age))
-    assert code_cache.read_code(key("a")) == b"code"
-    code_cache.write_code(key("d"), b"code")
+        assert MACHINE_CODE.write(key(letter), b"code")
+        os.utime(place / f"{key(letter)}{MACHINE_CODE.suffix}", (1000 + age, 1000 + age))
+    assert MACHINE_CODE.read(key("a")) == b"code"
+    MACHINE_CODE.write(key("d"), b"code")
     assert {path.stem for path in codes(place)} == {key(letter) for letter in "acd"}
 
 
 def test_only_what_was_written_here_is_ever_removed(place, tmp_path, monkeypatch):
-    code_cache.write_code(key("a"), b"code")
+    MACHINE_CODE.write(key("a"), b"code")
     names = (
         "notes.code",
         "my.part",
-        f"{key('b')}{code_cache.CODE_SUFFIX}",
+        f"{key('b')}{MACHINE_CODE.suffix}",
         "thesis.code",
         ".hidden.part",
         f"{key('c')}.txt",
@@ -184,10 +186,10 @@ def test_only_what_was_written_here_is_ever_removed(place, tmp_path, monkeypatch
     unfinished = place / f".{'0f' * 12}.part"
     unfinished.write_bytes(b"of a process that was killed")
     os.utime(unfinished, (2000, 2000))
-    monkeypatch.setattr(code_cache, "MAX_CACHE_BYTES", 0)
-    code_cache.write_code(key("d"), b"code")
+    monkeypatch.setattr(MACHINE_CODE, "max_bytes", 0)
+    MACHINE_CODE.write(key("d"), b"code")
     assert {path.name for path in codes(place)} == set(names)
-    assert {path.name for path in tmp_path.iterdir()} == {*names, code_cache.CODE_FOLDER}
+    assert {path.name for path in tmp_path.iterdir()} == {*names, MACHINE_CODE.folder_name}
     assert all(path.stat().st_size == 1900 for folder in (tmp_path, place) for path in map(folder.joinpath, names))
 
 
@@ -196,19 +198,19 @@ def test_the_folder_is_where_each_system_has_such_things(monkeypatch, tmp_path):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(Path, "home", lambda: tmp_path)
     monkeypatch.setattr(sys, "platform", "linux")
-    assert code_cache.code_folder() == tmp_path / ".cache" / "planar" / code_cache.CODE_FOLDER
+    assert MACHINE_CODE.folder() == tmp_path / ".cache" / "planar" / MACHINE_CODE.folder_name
     monkeypatch.setenv("XDG_CACHE_HOME", "not/absolute")
-    assert code_cache.code_folder() == tmp_path / ".cache" / "planar" / code_cache.CODE_FOLDER
+    assert MACHINE_CODE.folder() == tmp_path / ".cache" / "planar" / MACHINE_CODE.folder_name
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "other"))
-    assert code_cache.code_folder() == tmp_path / "other" / "planar" / code_cache.CODE_FOLDER
+    assert MACHINE_CODE.folder() == tmp_path / "other" / "planar" / MACHINE_CODE.folder_name
     monkeypatch.setattr(sys, "platform", "darwin")
-    assert code_cache.code_folder() == tmp_path / "Library" / "Caches" / "planar" / code_cache.CODE_FOLDER
+    assert MACHINE_CODE.folder() == tmp_path / "Library" / "Caches" / "planar" / MACHINE_CODE.folder_name
     monkeypatch.setattr(sys, "platform", "win32")
-    assert code_cache.code_folder() == tmp_path / "AppData" / "Local" / "planar" / "Cache" / code_cache.CODE_FOLDER
+    assert MACHINE_CODE.folder() == tmp_path / "AppData" / "Local" / "planar" / "Cache" / MACHINE_CODE.folder_name
     monkeypatch.setenv("LOCALAPPDATA", str(tmp_path / "local"))
-    assert code_cache.code_folder() == tmp_path / "local" / "planar" / "Cache" / code_cache.CODE_FOLDER
+    assert MACHINE_CODE.folder() == tmp_path / "local" / "planar" / "Cache" / MACHINE_CODE.folder_name
     monkeypatch.setenv("PLANAR_CACHE", str(tmp_path / "told"))
-    assert code_cache.code_folder() == tmp_path / "told" / code_cache.CODE_FOLDER
+    assert MACHINE_CODE.folder() == tmp_path / "told" / MACHINE_CODE.folder_name
 
 
 def test_code_for_another_processor_or_compiler_has_another_fingerprint(monkeypatch):

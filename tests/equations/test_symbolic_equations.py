@@ -57,7 +57,7 @@ def test_two_links_may_share_two_pairs_and_a_detached_link_is_found():
         "pairs": [{"turning": "P", "links": ["a", "b"]}, {"turning": "Q", "links": ["a", "b"]}],
     }
     mechanism = files.from_dict(value)
-    graph = link_pair_graph(mechanism)
+    graph = nx.Graph(link_pair_graph(mechanism))
     assert graph.number_of_edges() == 4
     assert nx.is_bipartite(graph)
     assert unconnected_links(mechanism) == ("c",)

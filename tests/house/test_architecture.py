@@ -63,6 +63,8 @@ LIBRARIES = {
     "xarray": {"reports"},
 }
 MOST_FILES, MOST_LINES, LONGEST_FUNCTION, MOST_PARAMETERS = 16, 400, 60, 8
+MOST_MODULES_TO_SOLVE, MOST_OTHERS_TO_SOLVE = 96, 40
+"""Modules of planar, and others beside the libraries that are needed, which `planar solve` loads."""
 FILES = sorted(ROOT.rglob("*.py"))
 NAMES = {".".join(path.relative_to(ROOT.parent).with_suffix("").parts): path for path in FILES}
 
@@ -222,13 +224,28 @@ def test_no_test_file_imports_another():
 
 def loaded_by(code: str) -> set[str]:
     run = [sys.executable, "-c", f"{code}\nimport sys; print(*sys.modules)"]
-    return set(subprocess.run(run, check=True, capture_output=True, text=True).stdout.split())
+    return set(subprocess.run(run, check=True, capture_output=True, text=True).stdout.splitlines()[-1].split())
 
 
 def test_solving_loads_neither_scipy_nor_networkx_nor_what_only_pictures_need():
     loaded = loaded_by("import planar; planar.solve(planar.load('000-P1'))")
-    assert not loaded & {"scipy", "networkx", "rich", "click", "pint", "matplotlib"}
+    assert not loaded & {"scipy", "networkx", "rich", "click", "pint", "matplotlib", "numpy.random"}
     assert "casadi" in loaded
+
+
+def test_the_command_that_solves_loads_few_modules(tmp_path, monkeypatch):
+    """Each takes some half a millisecond; what a rare position or a new structure needs is loaded there."""
+    monkeypatch.setenv("PLANAR_CACHE", str(tmp_path))
+    code = "from planar.cli import main; main(['solve', '000-P1'], standalone_mode=False)"
+    first, loaded = loaded_by(code), loaded_by(code)
+    assert not loaded & {"scipy", "networkx", "llvmlite", "pint", "matplotlib", "numpy.random", "difflib"}
+    rare = {"solving.continuation.path", "solving.diagnosis.refusals", "solving.rates.regularity", "model.input_laws"}
+    assert not loaded & {f"planar.{name}" for name in (*rare, "cli.modes", "equations.closed_form")}
+    assert loaded < first
+    own, beside = ({name for name in loaded if name.startswith("planar.") == is_own} for is_own in (True, False))
+    floor = loaded_by("import numpy, casadi, click, rich.console, rich.table")
+    assert len(own) <= MOST_MODULES_TO_SOLVE
+    assert len(beside - floor) <= MOST_OTHERS_TO_SOLVE
 
 
 def test_drawing_loads_only_what_it_draws_with():

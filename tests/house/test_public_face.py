@@ -36,7 +36,7 @@ FREE = {"schema", "build", "pinned", "centre_of", "from_dict", "load", "loads", 
 """Functions whose first argument is neither a mechanism nor a result."""
 COMMANDS = {
     name: command
-    for name, command in main.commands.items()
+    for name, command in main.load_commands().items()
     if any(isinstance(each, click.Argument) and each.name.startswith("model") for each in command.params)
 }
 

@@ -412,7 +412,7 @@ def test_atkinsons_piston_makes_four_unequal_strokes_in_a_turn():
 def ternary(model: str) -> tuple[str, set[str], set[str]]:
     """The frame, the links of three pins, and the links that the frame is joined to."""
     mechanism = planar.load(model)
-    graph, frame = link_pair_graph(mechanism), mechanism.frame
+    graph, frame = nx.Graph(link_pair_graph(mechanism)), mechanism.frame
     three = {name for kind, name in graph if kind == "link" and graph.degree((kind, name)) == 3}
     near = {name for kind, name in nx.ego_graph(graph, ("link", frame), 2) if kind == "link"}
     return frame, three, near - {frame}

@@ -11,7 +11,7 @@ import planar
 from benchmarks import chain
 from planar.equations import acceptance
 from planar.equations.casadi_call import CHUNK_SIZES, BufferedFunction, RunFunction
-from planar.equations.functions import MAX_CACHED_STRUCTURES, equation_functions
+from planar.equations.functions import MAX_CACHED_STRUCTURES, EquationFunctions, equation_functions
 from planar.model.mechanism import Drive, replace_inputs
 from planar.solving import position
 from planar.solving.assembly.block_assemblies import BlockAssemblies
@@ -133,7 +133,7 @@ def test_wrong_rates_of_a_compiled_function_do_not_pass(order, monkeypatch):
     assert fast_position(solver, z) is not None
     real = getattr(acceptance.UnknownRates, order)
     monkeypatch.setattr(acceptance.UnknownRates, order, lambda self, *given: real(self, *given) * (1.0 + 1e-7))
-    wrong = acceptance.AcceptanceFunctions(solver.structure.mechanism, solver.functions)
+    wrong = acceptance.AcceptanceFunctions(solver.structure.mechanism, EquationFunctions(solver.equations))
     monkeypatch.setattr(solver.structure, "acceptance", wrong)
     assert fast_position(solver, z) is None
     s = solver.inputs

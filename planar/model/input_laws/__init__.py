@@ -10,7 +10,7 @@ from planar.model.input_laws.cam_rises import (
 )
 from planar.model.input_laws.constant_rates import ConstantAccelerationSegment, ConstantSpeedSegment, DwellSegment
 from planar.model.input_laws.input_law import InputLaw, SegmentJoint
-from planar.model.input_laws.segment import MAX_LAW_ITEMS, LawSegment, SegmentKey
+from planar.model.input_laws.segment import LawSegment, SegmentKey
 from planar.model.input_laws.spline_table import TableSegment
 
 SEGMENT_TYPES: dict[str, type[LawSegment]] = {
@@ -31,7 +31,6 @@ SEGMENT_TYPES: dict[str, type[LawSegment]] = {
 """Every motion of a piece, by its name in files."""
 
 __all__ = [
-    "MAX_LAW_ITEMS",
     "SEGMENT_TYPES",
     "ConstantAccelerationSegment",
     "ConstantSpeedSegment",

@@ -12,8 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.foundation.arrays import Array
-from planar.model.input_laws.segment import MAX_LAW_ITEMS, LawSegment
+from planar.model.input_laws.segment import LawSegment
 from planar.model.input_laws.spline_table import TableSegment
+from planar.model.loads import MAX_LAW_ITEMS
 
 
 class SegmentJoint(NamedTuple):

@@ -12,8 +12,6 @@ from planar.foundation.arrays import Array
 
 SHORTEST_DURATION, LONGEST_DURATION = 1e-9, 1e9
 """s: what a piece takes at least and at most, so that no rate of it overflows."""
-MAX_LAW_ITEMS = 10_000
-"""Pieces of one law, and points of one table."""
 
 
 class SegmentKey(NamedTuple):

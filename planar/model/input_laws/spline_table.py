@@ -10,13 +10,8 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from planar.foundation.arrays import Array
-from planar.model.input_laws.segment import (
-    LONGEST_DURATION,
-    MAX_LAW_ITEMS,
-    SHORTEST_DURATION,
-    LawSegment,
-    SegmentKey,
-)
+from planar.model.input_laws.segment import LONGEST_DURATION, SHORTEST_DURATION, LawSegment, SegmentKey
+from planar.model.loads import MAX_LAW_ITEMS
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
