@@ -1,0 +1,48 @@
+"""The numbers of a design as an LLVM function: from the values by which designs differ to what a run takes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import casadi as ca
+
+from planar.batch.march.kernel import Operand
+from planar.batch.prepare.design_numbers import DesignNumbers
+from planar.codegen.instructions import InstructionList, check_length, required_values
+from planar.codegen.llvm_ir import IRWriter
+
+FUNCTION_NAME = "numbers"
+IS_FIT: Operand = ("fit", 0)
+"""One where all numbers are finite and the design's `margin` is not below zero, else zero."""
+
+
+def write_numbers(design: DesignNumbers, order: Sequence[Operand]) -> IRWriter:
+    """The function: values of `design.symbols` to numbers in an order, and `IS_FIT` where it stands there.
+
+    Raises UnsupportedOperation.
+    """
+    t = IRWriter(1)
+    t.write_line(f"define internal void @{FUNCTION_NAME}(ptr noalias %values, ptr noalias %numbers) {{")
+    t.write_label("entry")
+    given = [t.load(t.double_pointer("%values", str(k))) for k in range(design.symbols.numel())]
+    outputs = [*design.numbers.values(), *design.points]
+    function = ca.Function("numbers", [design.symbols], [ca.densify(ca.vertcat(*outputs))], {"cse": True})
+    check_length(function.n_instructions())
+    listing: InstructionList[int] = InstructionList()
+    inputs = [listing.add_input(k) for k in range(len(given))]
+    [wanted] = listing.inline_function(function, [inputs])
+    names: dict[int, str] = {}
+    known = {number: given[k] for k, number in enumerate(inputs)}
+    t.write_values(listing, required_values(listing, wanted), names, known)
+    zero = t.constant(0.0)
+    # nothing times what is not finite is no number
+    rest = t.add_all([t.binary("mul", zero, each) for each in dict.fromkeys([*given, *(names[k] for k in wanted)])])
+    values = {operand: names[k] for operand, k in zip(design.numbers, wanted, strict=False)}
+    fit = t.and_flags(t.compare("oeq", rest, zero), t.compare("oge", values["margin", 0], zero))
+    values[IS_FIT] = t.select_or_zero(fit, t.constant(1.0))
+    for k, operand in enumerate(order):
+        if operand in values:
+            t.store(values[operand], t.double_pointer("%numbers", str(k)))
+    t.write_line("ret void")
+    t.write_line("}")
+    return t

@@ -1,0 +1,79 @@
+"""What of a mechanism's runs is compiled, and where it begins."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from math import ceil
+
+import numpy as np
+
+from planar.batch.block import LEAD_IN_STEP
+from planar.batch.march.prediction import LONGEST_STEP
+from planar.batch.reference_design import ReferenceDesign
+from planar.model.mechanism import LARGEST_INPUT_POSITION
+from planar.model.pairs.base import Pair
+
+Array = np.ndarray
+NativeRun = Callable[[Mapping[str, float]], tuple[Array, float, int]]
+"""From values by name to the rows of the wanted points (rows, positions), which are the caller's own, how the run ended
+(see `run_endings`), and at which position. Raises KeyError for a name that is not there."""
+
+MAX_LEAD_IN = 1000
+"""Positions on the way to where a run starts, at most."""
+
+
+def prepare_native_run(
+    reference: ReferenceDesign, points: tuple[str, ...], rates: bool, positions: Array, may_shift: bool
+) -> NativeRun | None:
+    """The compiled function of a run over these positions of the running input; None where there is none.
+
+    `may_shift`: whether the run starts where the design's own input stands, wherever that is.
+    """
+    choosy = any(type(pair).find_misfit is not Pair.find_misfit for pair in reference.mechanism.pairs)
+    if choosy or not reference.can_run_backend or reference.candidates.counts_turns:
+        return None
+    inputs, lead = _input_positions(reference, positions)
+    longest = np.max(np.abs(np.diff(inputs[lead:], axis=0)), initial=0.0)
+    if lead > MAX_LEAD_IN or longest > LONGEST_STEP or np.max(np.abs(inputs)) > LARGEST_INPUT_POSITION:
+        return None
+    try:
+        from planar.batch.march.kernel import kernel_equations
+        from planar.batch.prepare.compiled_run import CompiledRun
+        from planar.batch.prepare.design_numbers import DesignNumbers
+        from planar.codegen.instructions import UnsupportedOperation
+        from planar.equations.mechanism_numbers import equation_structure
+    except ImportError:
+        return None
+    members = [reference.point_member(name) for name in points]
+    links = tuple(link for link, _ in members)
+    try:
+        equations = kernel_equations(reference.functions, equation_structure(reference.mechanism))
+        found = CompiledRun(equations, DesignNumbers(reference, members, may_shift), links, rates, inputs)
+    except UnsupportedOperation:
+        return None
+    return partial(_after_lead_in, found, lead) if lead else found
+
+
+def _input_positions(reference: ReferenceDesign, positions: Array) -> tuple[Array, int]:
+    """All inputs (positions, inputs) on the way to where the run starts, if that is elsewhere, and over the run; how
+    many are on the way."""
+    u, _, _ = reference.inputs(reference.mechanism, 1)
+    running = reference.running_index
+    run = positions / float(reference.input_scale[running])
+    own = float(u[running, 0])
+    lead = ceil(abs(run[0] - own) / LEAD_IN_STEP)
+    way = own + (run[0] - own) * np.arange(lead) / max(lead, 1)
+    found = np.repeat(u.T, lead + len(run), axis=0)
+    found[:, running] = np.concatenate([way, run])
+    return found, lead
+
+
+def _after_lead_in(run: NativeRun, lead: int, values: Mapping[str, float]) -> tuple[Array, float, int]:
+    """A run without the positions on its way, on which it must not end."""
+    from planar.batch.prepare.run_endings import DEAD_POINT, UNSURE
+
+    rows, ending, position = run(values)
+    if ending == DEAD_POINT and position <= lead:
+        ending = UNSURE
+    return rows[:, lead:], ending, max(position - lead, 0)
