@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Mapping
-from struct import Struct
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,6 +21,7 @@ from planar.batch.prepare.llvm_positions import (
 from planar.batch.prepare.llvm_start import FUNCTION_NAME as START_FUNCTION
 from planar.batch.prepare.llvm_start import SAID, write_start
 from planar.batch.prepare.run_endings import DEAD_POINT, UNSURE
+from planar.batch.prepare.value_binder import ValueBinder
 from planar.codegen.instructions import UnsupportedOperation
 from planar.codegen.llvm_compile import compile_function
 from planar.codegen.llvm_ir import IRWriter
@@ -34,8 +34,6 @@ ARGUMENT_TYPES = ("int", "int", "int", *("array",) * 5)
 file's design, the places of those that are given, these; drive; out."""
 HEADER = 8
 """Numbers at the head of `out`: how the run ended, and at which position."""
-MAX_BOUND_NAMES = 64
-"""Sets of names that are known at once."""
 
 
 class RunLayout(NamedTuple):
@@ -113,7 +111,7 @@ class CompiledRun:
             raise UnsupportedOperation("two positions do not show what lies between them")
         layout = write_run(equations, design, links, rates)
         self._function: Any = compile_function(layout.ir, FUNCTION_NAME, *ARGUMENT_TYPES)
-        self._rows, self._positions, self._index = layout.rows, len(u), design.index
+        self._rows = layout.rows
         blocks = -(-len(u) // LANES)
         self._width = blocks * LANES
         # those that do not fill the lanes are the last again
@@ -124,20 +122,12 @@ class CompiledRun:
         self._counts = blocks, len(u)
         self._pointers = self._own.ctypes.data, self._drive.ctypes.data
         self._size = HEADER + layout.rows.row_count * self._width
-        self._bound: dict[tuple[str, ...], tuple[Any, Array, int]] = {}
-
-    def _bind(self, names: tuple[str, ...]) -> tuple[Any, Array, int]:
-        """How values of these names are packed, and where they go. Raises KeyError."""
-        places = np.array([self._index[name] for name in names], dtype=np.int64)
-        if len(self._bound) >= MAX_BOUND_NAMES:
-            self._bound.clear()
-        found = self._bound[names] = Struct(f"{len(names)}d").pack, places, places.ctypes.data
-        return found
+        self._binder = ValueBinder(design.index)
 
     def __call__(self, values: Mapping[str, float]) -> tuple[Array, float, int]:
         """See `native_run.NativeRun`."""
         names = tuple(values)
-        pack, _, places = self._bound.get(names) or self._bind(names)
+        pack, _, places = self._binder.bind(names)
         out = np.empty(self._size)
         own, drive = self._pointers
         self._function(

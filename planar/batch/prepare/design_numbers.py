@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from functools import reduce
 
 import casadi as ca
@@ -37,8 +37,8 @@ class DesignNumbers:
     `points` (x and y of all points of all links) have to be finite, and so have the numbers.
     """
 
-    def __init__(self, reference: ReferenceDesign, members: Sequence[tuple[str, str]], may_shift: bool):
-        """`may_shift`: whether the running input may begin elsewhere than the file's own."""
+    def __init__(self, reference: ReferenceDesign, members: Sequence[tuple[str, str]], may_shift: Container[int]):
+        """`may_shift`: the inputs (by number) that may stand, or start, elsewhere than the file's own."""
         mechanism, variables = reference.mechanism, design_variables(reference.mechanism)
         candidates = reference.candidates
         self.index = {name: k for k, name in enumerate(variables)}
@@ -82,7 +82,7 @@ class DesignNumbers:
         return [part / self.unit for link, point in members for part in self.shapes[link].position(point)]
 
     def _add_inputs(
-        self, reference: ReferenceDesign, inputs: Sequence[tuple[Input, ca.SX]], may_shift: bool
+        self, reference: ReferenceDesign, inputs: Sequence[tuple[Input, ca.SX]], may_shift: Container[int]
     ) -> Iterator[ca.SX]:
         """Where the inputs are, beside where the file has them, and how fast they go; what is not below zero where
         they are where they may be."""
@@ -97,7 +97,7 @@ class DesignNumbers:
             for kind, rate in (("u1", given.velocity), ("u2", given.acceleration)):
                 self.numbers[kind, k] = ca.SX(rate / scale if runs else 0.0)
             yield LARGEST_INPUT_POSITION - ca.fabs(self.numbers["u", k])
-            if runs and not may_shift:
+            if k not in may_shift:
                 yield -ca.fabs(shift)
 
     def _arm_margins(self, reference: ReferenceDesign) -> Iterator[ca.SX]:

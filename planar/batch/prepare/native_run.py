@@ -11,6 +11,7 @@ import numpy as np
 from planar.batch.block import LEAD_IN_STEP
 from planar.batch.march.prediction import LONGEST_STEP
 from planar.batch.reference_design import ReferenceDesign
+from planar.codegen.instructions import UnsupportedOperation
 from planar.model.mechanism import LARGEST_INPUT_POSITION
 from planar.model.pairs.base import Pair
 
@@ -38,21 +39,37 @@ def prepare_native_run(
     if lead > MAX_LEAD_IN or longest > LONGEST_STEP or np.max(np.abs(inputs)) > LARGEST_INPUT_POSITION:
         return None
     try:
-        from planar.batch.march.kernel import kernel_equations
-        from planar.batch.prepare.compiled_run import CompiledRun
-        from planar.batch.prepare.design_numbers import DesignNumbers
-        from planar.codegen.instructions import UnsupportedOperation
-        from planar.equations.mechanism_numbers import equation_structure
-    except ImportError:
+        return _compile(reference, points, rates, (inputs, lead), may_shift)
+    except (ImportError, UnsupportedOperation):
         return None
+
+
+def _compile(
+    reference: ReferenceDesign, points: tuple[str, ...], rates: bool, inputs: tuple[Array, int], may_shift: bool
+) -> NativeRun:
+    """The function for positions of all inputs, of which so many are on the way to where the run starts.
+
+    Raises UnsupportedOperation; ImportError where there is no compiler.
+    """
+    from planar.batch.march.kernel import kernel_equations
+    from planar.batch.prepare.compiled_run import CompiledRun
+    from planar.batch.prepare.design_numbers import DesignNumbers
+    from planar.batch.prepare.newton_run import NewtonRun
+    from planar.equations.mechanism_numbers import equation_structure
+
+    u, lead = inputs
     members = [reference.point_member(name) for name in points]
+    equations = kernel_equations(reference.functions, equation_structure(reference.mechanism))
+    if equations.has_newton_blocks:
+        if lead:
+            raise UnsupportedOperation("a group that is not in closed form starts where the file has it")
+        return NewtonRun(reference, equations, DesignNumbers(reference, members, ()), members, rates, u)
+    shifting = set(range(u.shape[1]))
+    if not may_shift:
+        shifting.remove(reference.running_index)
     links = tuple(link for link, _ in members)
-    try:
-        equations = kernel_equations(reference.functions, equation_structure(reference.mechanism))
-        found = CompiledRun(equations, DesignNumbers(reference, members, may_shift), links, rates, inputs)
-    except UnsupportedOperation:
-        return None
-    return partial(_after_lead_in, found, lead) if lead else found
+    run = CompiledRun(equations, DesignNumbers(reference, members, shifting), links, rates, u)
+    return partial(_after_lead_in, run, lead) if lead else run
 
 
 def _input_positions(reference: ReferenceDesign, positions: Array) -> tuple[Array, int]:

@@ -1,0 +1,35 @@
+"""Values by name as numbers for a compiled function."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from struct import Struct
+
+import numpy as np
+
+Array = np.ndarray
+
+MAX_BOUND_NAMES = 64
+"""Sequences of names that are known at once."""
+Binding = tuple[Callable[..., bytes], Array, int]
+"""What packs values, where each of them goes, and the address of that."""
+
+
+class ValueBinder:
+    """How values of these names are packed, kept from call to call, in which the names are mostly the same."""
+
+    def __init__(self, index: Mapping[str, int]):
+        """`index`: the place of each name that there is."""
+        self._index = index
+        self._bound: dict[tuple[str, ...], Binding] = {}
+
+    def bind(self, names: tuple[str, ...]) -> Binding:
+        """The binding of names in an order. Raises KeyError for one that is not there."""
+        found = self._bound.get(names)
+        if found is None:
+            places = np.array([self._index[name] for name in names], dtype=np.int64)
+            if len(self._bound) >= MAX_BOUND_NAMES:
+                self._bound.clear()
+            # packing keeps the order; bytes are read where they are
+            found = self._bound[names] = Struct(f"{len(names)}d").pack, places, places.ctypes.data
+        return found
