@@ -9,7 +9,9 @@ from math import ceil
 import numpy as np
 
 from planar.batch.block import LEAD_IN_STEP
+from planar.batch.design_arrays import read_designs, with_design_values
 from planar.batch.march.prediction import LONGEST_STEP
+from planar.batch.prepare.run_endings import DEAD_POINT, UNSURE
 from planar.batch.reference_design import ReferenceDesign
 from planar.codegen.instructions import UnsupportedOperation
 from planar.model.mechanism import LARGEST_INPUT_POSITION
@@ -31,17 +33,19 @@ def prepare_native_run(
 
     `may_shift`: whether the run starts where the design's own input stands, wherever that is.
     """
-    choosy = any(type(pair).find_misfit is not Pair.find_misfit for pair in reference.mechanism.pairs)
-    if choosy or not reference.can_run_backend or reference.candidates.counts_turns:
+    if not reference.can_run_backend:
         return None
     inputs, lead = _input_positions(reference, positions)
     longest = np.max(np.abs(np.diff(inputs[lead:], axis=0)), initial=0.0)
     if lead > MAX_LEAD_IN or longest > LONGEST_STEP or np.max(np.abs(inputs)) > LARGEST_INPUT_POSITION:
         return None
     try:
-        return _compile(reference, points, rates, (inputs, lead), may_shift)
+        run = _compile(reference, points, rates, (inputs, lead), may_shift)
     except (ImportError, UnsupportedOperation):
         return None
+    if any(type(pair).find_misfit is not Pair.find_misfit for pair in reference.mechanism.pairs):
+        return _FittingPairs(reference, run)
+    return run
 
 
 def _compile(
@@ -61,8 +65,8 @@ def _compile(
     members = [reference.point_member(name) for name in points]
     equations = kernel_equations(reference.functions, equation_structure(reference.mechanism))
     if equations.has_newton_blocks:
-        if lead:
-            raise UnsupportedOperation("a group that is not in closed form starts where the file has it")
+        if lead or reference.candidates.counts_turns:
+            raise UnsupportedOperation("a group that is not in closed form starts where the file has it, turns or not")
         return NewtonRun(reference, equations, DesignNumbers(reference, members, ()), members, rates, u)
     shifting = set(range(u.shape[1]))
     if not may_shift:
@@ -70,6 +74,28 @@ def _compile(
     links = tuple(link for link, _ in members)
     run = CompiledRun(equations, DesignNumbers(reference, members, shifting), links, rates, u)
     return partial(_after_lead_in, run, lead) if lead else run
+
+
+class _FittingPairs:
+    """A run of designs that pairs may refuse before anything moves, as wheels that do not mesh: they are asked once for
+    each change."""
+
+    def __init__(self, reference: ReferenceDesign, run: NativeRun):
+        self._reference, self._run = reference, run
+        self._fitting: dict[str, float] = {}
+
+    def __call__(self, values: Mapping[str, float]) -> tuple[Array, float, int]:
+        found = self._run(values)
+        return found if self._is_fit(values) else (found[0], UNSURE, 0)
+
+    def _is_fit(self, values: Mapping[str, float]) -> bool:
+        if values != self._fitting:
+            mechanism = self._reference.mechanism
+            arrays = read_designs(mechanism, values)
+            if self._reference.is_unfit(arrays, self._reference.shapes(with_design_values(mechanism, arrays)))[0]:
+                return False
+            self._fitting = dict(values)
+        return True
 
 
 def _input_positions(reference: ReferenceDesign, positions: Array) -> tuple[Array, int]:
@@ -88,8 +114,6 @@ def _input_positions(reference: ReferenceDesign, positions: Array) -> tuple[Arra
 
 def _after_lead_in(run: NativeRun, lead: int, values: Mapping[str, float]) -> tuple[Array, float, int]:
     """A run without the positions on its way, on which it must not end."""
-    from planar.batch.prepare.run_endings import DEAD_POINT, UNSURE
-
     rows, ending, position = run(values)
     if ending == DEAD_POINT and position <= lead:
         ending = UNSURE
