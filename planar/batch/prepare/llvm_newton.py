@@ -23,9 +23,9 @@ from planar.solving.assembly.block_assemblies import CLEAR_SKETCH_DISTANCE, SAME
 from planar.solving.assembly.nearest_assembly import EQUAL_DISTANCE_TOLERANCE
 
 FUNCTION_NAME = "run"
-ARGUMENT_TYPES = ("array", "int", *("array",) * 4)
-"""Of the function's arguments: what does not change from call to call; how many values are given, their places, these;
-scratch; out."""
+ARGUMENT_TYPES = ("array",) * 5
+"""Of the function's arguments: what does not change from call to call; places of values that are given, these; scratch;
+out."""
 LANES = 16
 CONTEXT = (
     "own values",
@@ -98,12 +98,12 @@ class _NewtonRunWriter:
         """The whole function."""
         t = self.ir
         numbers = write_numbers(self.design, self.order)
-        t.write_line(
-            f"define void @{FUNCTION_NAME}(ptr %context, i64 %many, ptr %places, ptr %given, ptr %scratch, ptr %out) {{"
-        )
+        t.write_line(f"define void @{FUNCTION_NAME}(ptr %context, ptr %places, ptr %given, ptr %scratch, ptr %out) {{")
         t.write_label("entry")
         t.write_line(f"store double {UNSURE}, ptr %out")
-        self._write_numbers()
+        t.write_line(f"%numbers = alloca [{len(self.order)} x double], align 64")
+        own = self._context("own values")
+        t.write_line(f"call void @{NUMBERS_FUNCTION}(ptr {own}, ptr %places, ptr %given, ptr %numbers)")
         self._write_leave(self._flag(f"fcmp oeq double {self._number(IS_FIT)}, 1.0"), "fits")
         rows = {name: self._write_spread(name) for name in ("p", "q", "at", "u1", "u2")}
         found = self._write_correction(rows)
@@ -119,7 +119,6 @@ class _NewtonRunWriter:
         v, pointers = t.vector, f"<{LANES} x ptr>"
         t.write_line(f"declare i1 @llvm.vector.reduce.and.v{LANES}i1(<{LANES} x i1>)")
         t.write_line(f"declare {v} @llvm.masked.gather.v{LANES}f64.v{LANES}p0({pointers}, i32, <{LANES} x i1>, {v})")
-        t.write_line("declare void @llvm.memcpy.p0.p0.i64(ptr, ptr, i64, i1)")
         return NewtonLayout(t.module_text(numbers), self.told, self.scratch_size)
 
     def _context(self, name: str, kind: str = "ptr") -> str:
@@ -149,25 +148,6 @@ class _NewtonRunWriter:
     def _number(self, operand: Operand) -> str:
         t = self.ir
         return t.add_instruction(f"load double, ptr {t.double_pointer('%numbers', str(self.order.index(operand)))}")
-
-    def _write_numbers(self) -> None:
-        """The numbers of the design."""
-        t, size = self.ir, self.design.symbols.numel()
-        t.write_line(f"%values = alloca [{size} x double], align 64")
-        t.write_line(f"%numbers = alloca [{len(self.order)} x double], align 64")
-        own = self._context("own values")
-        t.write_line(f"call void @llvm.memcpy.p0.p0.i64(ptr %values, ptr {own}, i64 {8 * size}, i1 false)")
-        t.write_line("%any = icmp sgt i64 %many, 0")
-        t.write_line("br i1 %any, label %value, label %known")
-        t.write_label("value")
-        t.write_line("%k = phi i64 [0, %entry], [%knext, %value]")
-        place = t.add_instruction("getelementptr i64, ptr %places, i64 %k")
-        at = t.double_pointer("%values", t.add_instruction(f"load i64, ptr {place}"))
-        number = t.add_instruction(f"load double, ptr {t.double_pointer('%given', '%k')}")
-        t.write_line(f"store double {number}, ptr {at}")
-        t.close_loop("k", "many", "value", "known")
-        t.write_label("known")
-        t.write_line(f"call void @{NUMBERS_FUNCTION}(ptr %values, ptr %numbers)")
 
     def _write_spread(self, kind: str) -> str:
         """The numbers of a kind in all lanes, row by row."""

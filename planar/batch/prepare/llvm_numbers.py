@@ -19,11 +19,28 @@ IS_FIT: Operand = ("fit", 0)
 def write_numbers(design: DesignNumbers, order: Sequence[Operand]) -> IRWriter:
     """The function: values of `design.symbols` to numbers in an order, and `IS_FIT` where it stands there.
 
+    It takes all values of the file's design, how many others are given and where each of these belongs, and these.
     Raises UnsupportedOperation.
     """
     t = IRWriter(1)
-    t.write_line(f"define internal void @{FUNCTION_NAME}(ptr noalias %values, ptr noalias %numbers) {{")
+    t.write_line(f"define internal void @{FUNCTION_NAME}(ptr %own, ptr %places, ptr %given, ptr noalias %numbers) {{")
     t.write_label("entry")
+    size = design.symbols.numel()
+    t.write_line(f"%values = alloca [{size} x double], align 64")
+    t.write_line(f"call void @llvm.memcpy.p0.p0.i64(ptr %values, ptr %own, i64 {8 * size}, i1 false)")
+    t.write_line("%many = load i64, ptr %places")
+    t.write_line("%any = icmp sgt i64 %many, 0")
+    t.write_line("br i1 %any, label %value, label %known")
+    t.write_label("value")
+    t.write_line("%k = phi i64 [0, %entry], [%knext, %value]")
+    number = t.add_instruction(f"load double, ptr {t.double_pointer('%given', '%k')}")
+    t.write_line("%knext = add i64 %k, 1")
+    place = t.add_instruction("getelementptr i64, ptr %places, i64 %knext")
+    at = t.double_pointer("%values", t.add_instruction(f"load i64, ptr {place}"))
+    t.write_line(f"store double {number}, ptr {at}")
+    t.write_line("%more = icmp slt i64 %knext, %many")
+    t.write_line("br i1 %more, label %value, label %known")
+    t.write_label("known")
     given = [t.load(t.double_pointer("%values", str(k))) for k in range(design.symbols.numel())]
     outputs = [*design.numbers.values(), *design.points]
     function = ca.Function("numbers", [design.symbols], [ca.densify(ca.vertcat(*outputs))], {"cse": True})
@@ -45,4 +62,5 @@ def write_numbers(design: DesignNumbers, order: Sequence[Operand]) -> IRWriter:
             t.store(values[operand], t.double_pointer("%numbers", str(k)))
     t.write_line("ret void")
     t.write_line("}")
+    t.write_line("declare void @llvm.memcpy.p0.p0.i64(ptr, ptr, i64, i1)")
     return t

@@ -104,14 +104,12 @@ class NewtonRun:
 
     def __call__(self, values: Mapping[str, float]) -> tuple[Array, float, int]:
         """See `native_run.NativeRun`."""
-        names = tuple(values)
-        pack, _, places = self._binder.bind(names)
+        pack, _, places = self._binder.bind(tuple(values))
         out, scratch = np.empty(self._size), np.empty(self._scratch)
         function, pointer = self._function, ctypes.c_char.from_buffer
         first = ctypes.addressof(pointer(scratch))  # type: ignore[arg-type]
         function(
             self._context_pointer,
-            len(names),
             places,
             pack(*values.values()),
             first + -first % 64,

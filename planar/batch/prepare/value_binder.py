@@ -12,7 +12,7 @@ Array = np.ndarray
 MAX_BOUND_NAMES = 64
 """Sequences of names that are known at once."""
 Binding = tuple[Callable[..., bytes], Array, int]
-"""What packs values, where each of them goes, and the address of that."""
+"""What packs values, how many there are and where each of them goes, and the address of that."""
 
 
 class ValueBinder:
@@ -27,7 +27,7 @@ class ValueBinder:
         """The binding of names in an order. Raises KeyError for one that is not there."""
         found = self._bound.get(names)
         if found is None:
-            places = np.array([self._index[name] for name in names], dtype=np.int64)
+            places = np.array([len(names), *(self._index[name] for name in names)], dtype=np.int64)
             if len(self._bound) >= MAX_BOUND_NAMES:
                 self._bound.clear()
             # packing keeps the order; bytes are read where they are
