@@ -12,15 +12,15 @@ from planar.batch.march.kernel import KernelEquations, Operand
 from planar.batch.prepare.design_numbers import DesignNumbers
 from planar.batch.prepare.llvm_ending import PositionRows
 from planar.batch.prepare.llvm_numbers import FUNCTION_NAME as NUMBERS_FUNCTION
-from planar.batch.prepare.llvm_numbers import IS_FIT, write_numbers
+from planar.batch.prepare.llvm_numbers import SAID, write_numbers
 from planar.batch.prepare.llvm_positions import FUNCTION_NAME as POSITIONS_FUNCTION
 from planar.batch.prepare.llvm_positions import (
     LANES,
     write_positions,
 )
 from planar.batch.prepare.llvm_start import FUNCTION_NAME as START_FUNCTION
-from planar.batch.prepare.llvm_start import SAID, write_start
-from planar.batch.prepare.run_endings import DEAD_POINT, UNSURE
+from planar.batch.prepare.llvm_start import write_start
+from planar.batch.prepare.run_endings import ALL_SOLVED, DEAD_POINT
 from planar.batch.prepare.value_binder import ValueBinder
 from planar.codegen.instructions import UnsupportedOperation
 from planar.codegen.llvm_compile import compile_function
@@ -46,7 +46,7 @@ class RunLayout(NamedTuple):
 def write_run(equations: KernelEquations, design: DesignNumbers, links: tuple[str, ...], rates: bool) -> RunLayout:
     """The function for points on these links. Raises UnsupportedOperation."""
     signs = [("sign", k) for k in range(len(equations.closed_forms))]
-    order: list[Operand] = [*design.numbers, IS_FIT, SAID, *signs]
+    order: list[Operand] = [*design.numbers, SAID, *signs]
     positions = write_positions(equations, links, rates, order)
     numbers, start = write_numbers(design, order), write_start(equations, design.sketched, order)
     t = IRWriter(1)
@@ -60,19 +60,15 @@ def write_run(equations: KernelEquations, design: DesignNumbers, links: tuple[st
     t.write_line(f"call void @{NUMBERS_FUNCTION}(ptr {own}, ptr %places, ptr %given, ptr %numbers)")
     said_row = t.add_instruction(f"mul i64 {blocks}, {LANES * positions.rows.row_count}")
     ending = t.double_pointer("%out", said_row)
-    t.write_line(f"store double {UNSURE}, ptr {ending}")
-    fit, said = (
-        t.add_instruction(f"load double, ptr {t.double_pointer('%numbers', str(order.index(each)))}")
-        if each == IS_FIT
-        else t.double_pointer("%numbers", str(order.index(each)))
-        for each in (IS_FIT, SAID)
-    )
-    t.write_line(f"br i1 {t.add_instruction(f'fcmp oeq double {fit}, 1.0')}, label %fits, label %ends")
+    said = t.double_pointer("%numbers", str(order.index(SAID)))
+    fit = t.add_instruction(f"load double, ptr {said}")
+    t.write_line(f"store double {fit}, ptr {ending}")
+    t.write_line(f"br i1 {t.add_instruction(f'fcmp oeq double {fit}, {ALL_SOLVED}')}, label %fits, label %ends")
     t.write_label("fits")
     t.write_line(f"call void @{START_FUNCTION}(ptr %numbers)")
     begins = t.add_instruction(f"load double, ptr {said}")
     t.write_line(f"store double {begins}, ptr {ending}")
-    t.write_line(f"br i1 {t.add_instruction(f'fcmp oeq double {begins}, 0.0')}, label %begins, label %ends")
+    t.write_line(f"br i1 {t.add_instruction(f'fcmp oeq double {begins}, {ALL_SOLVED}')}, label %begins, label %ends")
     t.write_label("begins")
     t.write_line(
         f"call void @{POSITIONS_FUNCTION}(i64 {blocks}, i64 {many}, ptr %numbers, ptr {drive}, ptr %out, ptr {ending})"

@@ -12,12 +12,15 @@ from planar.batch.design_arrays import design_variables, with_design_values
 from planar.batch.march.kernel import Operand
 from planar.batch.reference_design import ReferenceDesign
 from planar.equations.mechanism_numbers import scaled_pair_numbers
-from planar.model.link_shapes import LinkShape
+from planar.model.link_shapes import Distances, Link, LinkShape
 from planar.model.mechanism import LARGEST_INPUT_POSITION, Input
 from planar.model.pairs import MeasureKind
 from planar.solving.checks.residual_check import SHORT_ARM, residual_tolerance
 
 Array = np.ndarray
+
+OPEN_TRIANGLE = 1e-8
+"""Of the square of the longest side's square: so far from closing rounding does not bring a triangle."""
 
 
 class DesignNumbers:
@@ -32,7 +35,8 @@ class DesignNumbers:
     - "u", "uc", "us" of the inputs at the design's own positions, "d", "dc", "ds" of how far these are from the file's;
     - "at" of the sketched points (`sketched`) in the axes of their links, "sketch" where they are shown;
     - "tolerance" of the residual check; "unit", the size in m;
-    - "margin", below zero where an arm is so short that rounding takes digits, or the inputs are not where they may be.
+    - "margin", below zero where an arm is so short that rounding takes digits, or the inputs are not where they may be;
+    - "opening", above zero where a point has distances from two others that surely do not close a triangle.
 
     `points` (x and y of all points of all links) have to be finite, and so have the numbers.
     """
@@ -65,6 +69,9 @@ class DesignNumbers:
             *self._arm_margins(reference),
             *self._add_inputs(reference, list(zip(design.inputs, here, strict=True)), may_shift),
         ]
+        triangles = list(self._triangles(design.links))
+        margins += [each for sides, _ in triangles for each in sides]
+        self._add("opening", [reduce(ca.fmax, (opening for _, opening in triangles), ca.SX(-1.0))])
         self._add("at", self._local_coordinates([(link, point) for *_, link, point in self.sketched]))
         self._add("sketch", sketch)
         lengths = [ca.fabs(each) for each, kind in zip(p, kinds, strict=True) if kind is MeasureKind.LENGTH]
@@ -99,6 +106,22 @@ class DesignNumbers:
             yield LARGEST_INPUT_POSITION - ca.fabs(self.numbers["u", k])
             if k not in may_shift:
                 yield -ca.fabs(shift)
+
+    def _triangles(self, links: Sequence[Link]) -> Iterator[tuple[tuple[ca.SX, ca.SX], ca.SX]]:
+        """Of every point that is given by distances: these; how far from closing, above zero where they surely do not.
+
+        Four times the base's square times the height's are the product of the sides' sum and the three differences of
+        two sides and the third (Heron), which is below zero where one side is longer than both others.
+        """
+        for link in links:
+            at = self.shapes[link.name].points
+            for _, place in link.points:
+                if isinstance(place, Distances):
+                    a, b, way = place.from_first, place.from_second, at[place.second] - at[place.first]
+                    square = way.dot(way)
+                    along = a * a - b * b + square
+                    longest = ca.fmax(ca.fmax(a * a, b * b), square)
+                    yield (a, b), along * along - 4.0 * a * a * square - OPEN_TRIANGLE * longest * longest
 
     def _arm_margins(self, reference: ReferenceDesign) -> Iterator[ca.SX]:
         """Of every arm on which a link turns by what is solved: not below zero where it is nothing, or long enough."""

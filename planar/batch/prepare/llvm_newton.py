@@ -16,7 +16,7 @@ from planar.batch.march.llvm_designs import DesignsKernelLayout
 from planar.batch.march.regularity import CLEAR_REGULARITY, LEAST_KERNEL_REGULARITY, least_regularity
 from planar.batch.prepare.design_numbers import DesignNumbers
 from planar.batch.prepare.llvm_numbers import FUNCTION_NAME as NUMBERS_FUNCTION
-from planar.batch.prepare.llvm_numbers import IS_FIT, write_numbers
+from planar.batch.prepare.llvm_numbers import SAID, write_numbers
 from planar.batch.prepare.run_endings import ALL_SOLVED, UNSURE
 from planar.codegen.llvm_ir import IRWriter
 from planar.solving.assembly.block_assemblies import CLEAR_SKETCH_DISTANCE, SAME_ASSEMBLY_TOLERANCE
@@ -90,7 +90,7 @@ class _NewtonRunWriter:
         points, self.rates = results
         self.told = 2 * points * (3 if self.rates else 1)
         self.state_first = self.told + 2 * points
-        self.order: list[Operand] = [*design.numbers, IS_FIT]
+        self.order: list[Operand] = [*design.numbers, SAID]
         self.ir = IRWriter(LANES)
         self.scratch_size = 0
 
@@ -100,11 +100,12 @@ class _NewtonRunWriter:
         numbers = write_numbers(self.design, self.order)
         t.write_line(f"define void @{FUNCTION_NAME}(ptr %context, ptr %places, ptr %given, ptr %scratch, ptr %out) {{")
         t.write_label("entry")
-        t.write_line(f"store double {UNSURE}, ptr %out")
         t.write_line(f"%numbers = alloca [{len(self.order)} x double], align 64")
         own = self._context("own values")
         t.write_line(f"call void @{NUMBERS_FUNCTION}(ptr {own}, ptr %places, ptr %given, ptr %numbers)")
-        self._write_leave(self._flag(f"fcmp oeq double {self._number(IS_FIT)}, 1.0"), "fits")
+        t.write_line(f"store double {self._number(SAID)}, ptr %out")
+        self._write_leave(self._flag(f"fcmp oeq double {self._number(SAID)}, {ALL_SOLVED}"), "fits")
+        t.write_line(f"store double {UNSURE}, ptr %out")
         rows = {name: self._write_spread(name) for name in ("p", "q", "at", "u1", "u2")}
         found = self._write_correction(rows)
         self._write_leave(self._write_is_nearest(found), "begins")

@@ -8,16 +8,18 @@ import casadi as ca
 
 from planar.batch.march.kernel import Operand
 from planar.batch.prepare.design_numbers import DesignNumbers
+from planar.batch.prepare.run_endings import ALL_SOLVED, CANNOT_BE_ASSEMBLED, UNSURE
 from planar.codegen.instructions import InstructionList, check_length, required_values
 from planar.codegen.llvm_ir import IRWriter
 
 FUNCTION_NAME = "numbers"
-IS_FIT: Operand = ("fit", 0)
-"""One where all numbers are finite and the design's `margin` is not below zero, else zero."""
+SAID: Operand = ("said", 0)
+"""How a run ends before its start, see `run_endings`: it does not where all numbers are finite, and what the design's
+`margin` and `opening` say is in order."""
 
 
 def write_numbers(design: DesignNumbers, order: Sequence[Operand]) -> IRWriter:
-    """The function: values of `design.symbols` to numbers in an order, and `IS_FIT` where it stands there.
+    """The function: values of `design.symbols` to numbers in an order, and `SAID` where it stands there.
 
     It takes all values of the file's design, how many others are given and where each of these belongs, and these.
     Raises UnsupportedOperation.
@@ -51,12 +53,14 @@ def write_numbers(design: DesignNumbers, order: Sequence[Operand]) -> IRWriter:
     names: dict[int, str] = {}
     known = {number: given[k] for k, number in enumerate(inputs)}
     t.write_values(listing, required_values(listing, wanted), names, known)
-    zero = t.constant(0.0)
-    # nothing times what is not finite is no number
-    rest = t.add_all([t.binary("mul", zero, each) for each in dict.fromkeys([*given, *(names[k] for k in wanted)])])
     values = {operand: names[k] for operand, k in zip(design.numbers, wanted, strict=False)}
-    fit = t.and_flags(t.compare("oeq", rest, zero), t.compare("oge", values["margin", 0], zero))
-    values[IS_FIT] = t.select_or_zero(fit, t.constant(1.0))
+    zero = t.constant(0.0)
+    is_given = t.compare("oeq", _write_nothing(t, given), zero)
+    is_finite = t.compare("oeq", _write_nothing(t, [names[k] for k in wanted]), zero)
+    is_fit = t.and_flags(t.and_flags(is_given, is_finite), t.compare("oge", values["margin", 0], zero))
+    is_open = t.and_flags(is_given, t.compare("ogt", values["opening", 0], zero))
+    refused = t.select(is_open, t.constant(CANNOT_BE_ASSEMBLED), t.constant(UNSURE))
+    values[SAID] = t.select(is_fit, t.constant(ALL_SOLVED), refused)
     for k, operand in enumerate(order):
         if operand in values:
             t.store(values[operand], t.double_pointer("%numbers", str(k)))
@@ -64,3 +68,9 @@ def write_numbers(design: DesignNumbers, order: Sequence[Operand]) -> IRWriter:
     t.write_line("}")
     t.write_line("declare void @llvm.memcpy.p0.p0.i64(ptr, ptr, i64, i1)")
     return t
+
+
+def _write_nothing(t: IRWriter, values: Sequence[str]) -> str:
+    """Nothing, or no number where one of the values is not finite."""
+    zero = t.constant(0.0)
+    return t.add_all([zero, *(t.binary("mul", zero, each) for each in dict.fromkeys(values))])

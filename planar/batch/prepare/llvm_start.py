@@ -12,6 +12,7 @@ from math import inf
 
 from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations, Operand
 from planar.batch.march.llvm_kernel import KernelWriter, OperandNames
+from planar.batch.prepare.llvm_numbers import SAID
 from planar.batch.prepare.run_endings import ALL_SOLVED, CANNOT_BE_ASSEMBLED, CLEARLY_OPEN, UNSURE
 from planar.codegen.instructions import UnsupportedOperation
 from planar.codegen.llvm_ir import IRWriter
@@ -21,8 +22,6 @@ from planar.solving.assembly.nearest_assembly import EQUAL_DISTANCE_TOLERANCE
 FUNCTION_NAME = "start"
 ENUMERATED_BLOCKS = 4
 """Blocks of whose assemblies all combinations are tried."""
-SAID: Operand = ("said", 0)
-"""How a run ends that may end at its start, see `llvm_positions`."""
 
 
 def write_start(
