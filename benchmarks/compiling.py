@@ -69,6 +69,7 @@ def _process(structure: str, folder: str) -> dict[str, float]:
 def spent(structure: str) -> dict[str, float]:
     """Seconds of each step in this process, which has the structure's equations."""
     import planar
+    from planar.batch.march.kernel import kernel_equations
     from planar.batch.march.llvm_designs import ARGUMENT_TYPES, FUNCTION_NAME
     from planar.batch.march.llvm_runner import designs_kernel
     from planar.codegen import llvm_compile
@@ -92,7 +93,7 @@ def spent(structure: str) -> dict[str, float]:
 
     llvm_compile._compile_object = made
     start = perf_counter()
-    text = designs_kernel(known, of(mechanism), links, True).ir
+    text = designs_kernel(kernel_equations(known, of(mechanism)), links, True).ir
     told["printing"] = perf_counter() - start
     start = perf_counter()
     llvm_compile.compile_function(text, FUNCTION_NAME, *ARGUMENT_TYPES)

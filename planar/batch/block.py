@@ -154,7 +154,7 @@ class _DesignBlockSolver:
         p = base_.pair_numbers(shapes, self.design_count)
         told = {name: base_.point_member(name) for name in block.points}
         moving = {name: each for name, each in told.items() if each[0] != base_.mechanism.frame}
-        start = find_assemblies(base_, shapes, p, self.u, runner)
+        start = find_assemblies(base_, shapes, p, self.u, runner, block.backend)
         self.failed_block = start.failed_block
         fit = start.is_sure & base_.is_fit(block.designs, shapes, p)
         fit &= (np.abs(self.u).max(axis=0) <= LARGEST_INPUT_POSITION) & (np.abs(self.start) <= LARGEST_INPUT_POSITION)

@@ -10,6 +10,7 @@ import numpy as np
 
 from planar.batch.assembly_scores import MAX_BLOCK_UNKNOWNS, NEAR_SKETCH, is_at_sketch, is_clearly_regular
 from planar.batch.block_corrector import SPREAD_STARTS, BlockCorrector
+from planar.batch.closed_form.start_assemblies import find_start_assemblies
 from planar.batch.march.backend import DesignRunner
 from planar.batch.nearest_assemblies import find_nearest_assemblies
 from planar.batch.reference_design import ReferenceDesign, shape_of_designs
@@ -66,21 +67,35 @@ def find_assemblies(
     p: Array,
     u: Array,
     runner: DesignRunner,
+    backend: str = "auto",
 ) -> DesignAssemblies:
     """The assemblies at inputs u (inputs, designs), of designs with numbers p (numbers, designs) and these shapes."""
     with np.errstate(all="ignore"):  # starts that lead nowhere end as what is no number
-        near = find_nearest_assemblies(reference, shapes, p, u, runner)
-        if near is None:
+        every = _find_without_search(reference, shapes, p, u, runner, backend)
+        if every is None:
             return _AssemblySearch(reference, shapes, p, u).search()
-        every, rest = (
-            DesignAssemblies(near.z, near.is_clear, np.full(len(near.is_clear), -1)),
-            np.flatnonzero(~near.is_clear),
-        )
+        rest = np.flatnonzero(~every.is_sure & (every.failed_block < 0))
         if rest.size:
             own = {name: shape_of_designs(shape, rest) for name, shape in shapes.items()}
             found = _AssemblySearch(reference, own, p[:, rest], u[:, rest]).search()
             every.z[:, rest], every.is_sure[rest], every.failed_block[rest] = found
         return every
+
+
+def _find_without_search(
+    reference: ReferenceDesign,
+    shapes: Mapping[str, LinkShape],
+    p: Array,
+    u: Array,
+    runner: DesignRunner,
+    backend: str,
+) -> DesignAssemblies | None:
+    """Those by closed forms, else those near the base's own; None where neither can be."""
+    start = find_start_assemblies(reference, shapes, p, u, backend)
+    if start is not None:
+        return DesignAssemblies(*start)
+    near = find_nearest_assemblies(reference, shapes, p, u, runner)
+    return None if near is None else DesignAssemblies(near.z, near.is_clear, np.full(len(near.is_clear), -1))
 
 
 class _AssemblySearch:

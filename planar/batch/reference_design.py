@@ -134,10 +134,27 @@ class ReferenceDesign:
         members, many = tuple(members), p.shape[1]
         q = stack_rows([part for link, point in members for part in shapes[link].position(point)], many) / self.unit
         links, z0 = tuple(link for link, _ in members), np.zeros((len(self.functions.equations.unknowns), many))
-        offsets, tolerance = np.zeros((1, len(u))), self.tolerance(p)
+        offsets, tolerance, zeros = np.zeros((1, len(u))), self.tolerance(p), self._zeros(p, q, members)
         return DesignBatch(
-            self.functions, self.mechanism, p, q, z0, offsets, u, u1, u2, links, rates, tolerance, self.unit
+            self.functions, self.mechanism, p, q, z0, offsets, u, u1, u2, links, rates, tolerance, self.unit, zeros
         )
+
+    def _zeros(self, p: Array, q: Array, members: Sequence[tuple[str, str]]) -> frozenset[tuple[str, int]]:
+        """Rows of p and q that are nothing in all designs: those that are it in the base, or none.
+
+        So all designs of a mechanism share their code, but for those that give such a number a value.
+        """
+        shapes = self.solver.shapes
+        base_q = [part for link, point in members for part in shapes[link].position(point)]
+        rows = [("p", k) for k in np.flatnonzero(self._base_numbers == 0.0).tolist()]
+        rows += [("q", k) for k, part in enumerate(base_q) if part == 0.0]
+        given = {"p": p, "q": q}
+        return frozenset(rows) if not any(np.any(given[name][k]) for name, k in rows) else frozenset()
+
+    @cached_property
+    def _base_numbers(self) -> Array:
+        """p of the base (numbers,)."""
+        return self.pair_numbers(self.solver.shapes, 1)[:, 0]
 
     def is_fit(self, values: Mapping[str, Array], shapes: Mapping[str, LinkShape], p: Array) -> Array:
         """The designs that a backend may run (designs,): see `is_unfit` and `has_short_arm`."""

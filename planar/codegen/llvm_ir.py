@@ -110,6 +110,10 @@ class IRWriter:
             f"select <{self.lanes} x i1> {flag}, {self.vector} {value}, {self.vector} zeroinitializer"
         )
 
+    def select(self, flag: str, value: str, other: str) -> str:
+        """One value where a flag is up, else the other."""
+        return self.add_instruction(f"select <{self.lanes} x i1> {flag}, {self.vector} {value}, {self.vector} {other}")
+
     def allocate(self, many: int = 1) -> str:
         """Room for values."""
         return self.add_instruction(f"alloca {self.vector}, i64 {many}, align 64")
@@ -160,10 +164,6 @@ class IRWriter:
         return self.add_instruction(
             f"call double @llvm.vector.reduce.{what}.v{self.lanes}f64({first}{self.vector} {value})"
         )
-
-    def select(self, flag: str, value: str, other: str) -> str:
-        """One value where a flag is up, else the other."""
-        return self.add_instruction(f"select <{self.lanes} x i1> {flag}, {self.vector} {value}, {self.vector} {other}")
 
     def constants(self, values: Sequence[float]) -> str:
         """A constant for each lane."""

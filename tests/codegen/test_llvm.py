@@ -8,7 +8,7 @@ import pytest
 import planar
 from planar.batch.march import llvm_designs, llvm_runner, numpy_backend, numpy_kernel
 from planar.batch.march.backend import DesignBatch, UnsupportedStructure
-from planar.batch.march.kernel import BareAngle
+from planar.batch.march.kernel import BareAngle, kernel_equations
 from planar.batch.march.llvm_backend import LLVMRunner
 from planar.batch.march.llvm_runner import designs_kernel
 from planar.batch.march.numpy_backend import NumpyRunner
@@ -208,7 +208,8 @@ def all_points(mechanism, rates):
     """The function that a sweep of the first input runs for all points that move."""
     common = reference_design(mechanism, mechanism.inputs[0].pair)
     links = tuple(common.point_member(name)[0] for name in common.select_points(None))
-    return designs_kernel(common.functions, equation_structure(common.mechanism), links, rates)
+    equations = kernel_equations(common.functions, equation_structure(common.mechanism))
+    return designs_kernel(equations, links, rates)
 
 
 @pytest.mark.parametrize("rates", [False, True])
@@ -238,7 +239,7 @@ def test_what_is_wanted_before_it_is_known_is_not_printed(monkeypatch):
     monkeypatch.setattr(llvm_designs._DesignsKernelWriter, "write", written)
     with watched(10), pytest.raises(UnsupportedOperation, match="a later one"):
         llvm_designs.write_designs_kernel(
-            llvm_runner.kernel_equations(reference_design(IDLE, None).functions, equation_structure(IDLE)),
+            kernel_equations(reference_design(IDLE, None).functions, equation_structure(IDLE)),
             ("L2",),
             False,
             16,

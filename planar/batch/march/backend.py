@@ -27,6 +27,7 @@ class DesignBatch(NamedTuple):
     inputs): how far the inputs are from where each design starts, u0 (inputs, designs); u1, u2 (inputs, designs): their
     rates, the same at every step. `rates`: whether first and second rates are wanted. `tolerance`: what a constraint
     may leave open. `mechanism` has the pairs and inputs; its numbers are not those of the designs. `unit`: the size, m.
+    `zeros`: rows of p and q, as ("p", row), that are nothing in all designs and are left out of what is computed.
     """
 
     functions: EquationFunctions
@@ -42,6 +43,7 @@ class DesignBatch(NamedTuple):
     rates: bool
     tolerance: float
     unit: float
+    zeros: frozenset[tuple[str, int]] = frozenset()
 
     @property
     def output_row_count(self) -> int:

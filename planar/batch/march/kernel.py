@@ -14,6 +14,7 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
+from planar.batch.march.backend import DesignBatch
 from planar.batch.march.regularity import LEAST_START_REGULARITY
 from planar.codegen.instructions import (
     CosSin,
@@ -27,6 +28,7 @@ from planar.equations.closed_form import ClosedForm, find_closed_form
 from planar.equations.coordinates import coordinate_columns, frames_from_coordinates
 from planar.equations.functions import EquationFunctions
 from planar.equations.linear import solve_by_determinants, solve_with_volume
+from planar.equations.mechanism_numbers import equation_structure
 from planar.equations.rates import UnknownRates, block_jacobian, first_and_second_rates
 from planar.equations.residuals import closing_error, residuals, scalars, split_pair_numbers
 from planar.equations.symbolic_equations import Block, ConstraintEquations, slice_length
@@ -63,13 +65,22 @@ class KernelBlock(NamedTuple):
 
 class KernelEquations:
     """A mechanism's equations with the blocks' closed forms. Raises UnsupportedOperation where a block holds itself
-    twice."""
+    twice.
 
-    def __init__(self, equations: ConstraintEquations, mechanism: Mechanism, given: Sequence[str] = ()):
+    `zeros`: operands of kinds "p" and "q" that are nothing in all designs, as most coordinates of pins in their links.
+    """
+
+    def __init__(
+        self,
+        equations: ConstraintEquations,
+        mechanism: Mechanism,
+        given: Sequence[str] = (),
+        zeros: frozenset[Operand] = frozenset(),
+    ):
         e = self.equations = equations
         if not e.is_square:
             raise UnsupportedOperation("constraints hold each other more than once")
-        self.mechanism, self.given_links = mechanism, tuple(given)
+        self.mechanism, self.given_links, self.zeros = mechanism, tuple(given), zeros
         self.blocks = tuple(
             KernelBlock(block, find_closed_form(e, block)) for block in e.blocks if slice_length(block.unknowns)
         )
@@ -122,9 +133,16 @@ class KernelEquations:
 
 
 @lru_cache(maxsize=256)
-def kernel_equations(functions: EquationFunctions, structure: Mechanism) -> KernelEquations:
+def kernel_equations(
+    functions: EquationFunctions, structure: Mechanism, zeros: frozenset[Operand] = frozenset()
+) -> KernelEquations:
     """The equations of a structure, kept. Raises UnsupportedOperation."""
-    return KernelEquations(functions.equations, structure)
+    return KernelEquations(functions.equations, structure, (), zeros)
+
+
+def batch_equations(batch: DesignBatch) -> KernelEquations:
+    """The equations of a batch's structure. Raises UnsupportedOperation."""
+    return kernel_equations(batch.functions, equation_structure(batch.mechanism), batch.zeros)
 
 
 class KernelInstructions:
@@ -185,7 +203,10 @@ class KernelInstructions:
         angles: dict[int, CosSin] = {}
         arguments = []
         for name, symbol in self.symbols.items():
-            numbers = [listing.add_input((name, k)) for k in range(symbol.numel())]
+            numbers = [
+                listing.add_constant(0.0) if (name, k) in self.equations.zeros else listing.add_input((name, k))
+                for k in range(symbol.numel())
+            ]
             arguments.append(numbers)
             turned = self.equations.is_angle if name == "z" else self.equations.input_is_angle if name == "u" else ()
             for k, is_angle in enumerate(turned):

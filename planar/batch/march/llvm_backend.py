@@ -8,10 +8,9 @@ from contextlib import contextmanager
 import numpy as np
 
 from planar.batch.march.backend import CorrectedAssemblies, DesignBatch, UnsupportedStructure
-from planar.batch.march.kernel import kernel_equations
+from planar.batch.march.kernel import batch_equations
 from planar.batch.march.llvm_runner import correct_designs, run_designs_kernel, unknowns_at_steps
 from planar.codegen.instructions import UnsupportedOperation
-from planar.equations.mechanism_numbers import equation_structure
 
 Array = np.ndarray
 
@@ -28,10 +27,7 @@ class LLVMRunner:
     def run(self, batch: DesignBatch, out: Array) -> Array:
         """See `DesignRunner`."""
         with _refusing_structures():
-            if (
-                self.extra_corrections
-                and not kernel_equations(batch.functions, equation_structure(batch.mechanism)).has_newton_blocks
-            ):
+            if self.extra_corrections and not batch_equations(batch).has_newton_blocks:
                 raise UnsupportedOperation("nothing is corrected where all blocks are in closed form")
             return run_designs_kernel(batch, self.extra_corrections, out)[1]
 

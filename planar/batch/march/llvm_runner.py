@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from planar.batch.march.backend import CorrectedAssemblies, DesignBatch
-from planar.batch.march.kernel import kernel_equations
+from planar.batch.march.kernel import KernelEquations, batch_equations
 from planar.batch.march.llvm_designs import (
     ARGUMENT_TYPES,
     FUNCTION_NAME,
@@ -27,9 +27,6 @@ from planar.batch.march.prediction import (
 from planar.codegen.aligned_arrays import allocate_aligned, is_aligned
 from planar.codegen.instructions import UnsupportedOperation
 from planar.codegen.llvm_compile import compile_function
-from planar.equations.functions import EquationFunctions
-from planar.equations.mechanism_numbers import equation_structure
-from planar.model.mechanism import Mechanism
 
 Array = np.ndarray
 
@@ -38,14 +35,10 @@ LANES = 16
 
 
 def designs_kernel(
-    functions: EquationFunctions,
-    mechanism: Mechanism,
-    links: tuple[str, ...],
-    rates: bool,
-    point_blocks: tuple[int, ...] | None = None,
+    equations: KernelEquations, links: tuple[str, ...], rates: bool, point_blocks: tuple[int, ...] | None = None
 ) -> DesignsKernelLayout:
     """The function for points on links of a structure, see `march`. Raises UnsupportedOperation."""
-    found = _designs_kernel_or_reason(functions, mechanism, links, rates, point_blocks)
+    found = _designs_kernel_or_reason(equations, links, rates, point_blocks)
     if isinstance(found, str):
         raise UnsupportedOperation(found)
     return found
@@ -53,15 +46,11 @@ def designs_kernel(
 
 @lru_cache(maxsize=256)
 def _designs_kernel_or_reason(
-    functions: EquationFunctions,
-    mechanism: Mechanism,
-    links: tuple[str, ...],
-    rates: bool,
-    point_blocks: tuple[int, ...] | None,
+    equations: KernelEquations, links: tuple[str, ...], rates: bool, point_blocks: tuple[int, ...] | None
 ) -> DesignsKernelLayout | str:
     """The same, or why there is none: every block of a sweep would find that out again."""
     try:
-        return write_designs_kernel(kernel_equations(functions, mechanism), links, rates, LANES, point_blocks)
+        return write_designs_kernel(equations, links, rates, LANES, point_blocks)
     except UnsupportedOperation as why:
         return str(why)
 
@@ -73,7 +62,7 @@ def run_designs_kernel(batch: DesignBatch, extra_corrections: int = 0, out: Arra
     rows, designs), as for `DesignRunner`. Raises UnsupportedOperation where the structure is not for machine code.
     """
     longest = _longest_step(batch)
-    kernel = designs_kernel(batch.functions, equation_structure(batch.mechanism), tuple(batch.links), batch.rates)
+    kernel = designs_kernel(batch_equations(batch), tuple(batch.links), batch.rates)
     table, counts = step_table(batch.input_offsets)
     tolerances = batch.tolerance, correction_limit(longest), batch.unit
     out, good = _run_kernel(kernel, batch, batch.rates, (table, counts + extra_corrections), tolerances, out)
@@ -83,7 +72,7 @@ def run_designs_kernel(batch: DesignBatch, extra_corrections: int = 0, out: Arra
 
 def unknowns_at_steps(batch: DesignBatch, extra_corrections: int, steps: Array) -> Array:
     """The unknowns (unknowns, designs) of a run that came to these steps, at (designs,), of each design to one."""
-    kernel = designs_kernel(batch.functions, equation_structure(batch.mechanism), (), False, ())
+    kernel = designs_kernel(batch_equations(batch), (), False, ())
     table, counts = step_table(batch.input_offsets)
     tolerances = batch.tolerance, correction_limit(_longest_step(batch)), 1.0
     found, _ = _run_kernel(kernel, batch, False, (table, counts + extra_corrections), tolerances, None)
@@ -92,9 +81,7 @@ def unknowns_at_steps(batch: DesignBatch, extra_corrections: int, steps: Array) 
 
 def correct_designs(batch: DesignBatch, point_blocks: Sequence[int], corrections: int) -> CorrectedAssemblies:
     """Designs corrected from unknowns near by, at the inputs where they start. Raises UnsupportedOperation."""
-    kernel = designs_kernel(
-        batch.functions, equation_structure(batch.mechanism), tuple(batch.links), False, tuple(point_blocks)
-    )
+    kernel = designs_kernel(batch_equations(batch), tuple(batch.links), False, tuple(point_blocks))
     table, counts = step_table(np.zeros((1, len(batch.u0))))
     counts[:] = corrections
     out, good = _run_kernel(kernel, batch, False, (table, counts), (batch.tolerance, np.inf, 1.0), None)

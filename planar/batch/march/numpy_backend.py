@@ -13,7 +13,7 @@ from planar.batch.design_arrays import split_into_blocks
 from planar.batch.march.backend import CorrectedAssemblies, DesignBatch, UnsupportedStructure
 from planar.batch.march.checks import PointWriter, design_positions
 from planar.batch.march.design_functions import DesignFunctions
-from planar.batch.march.kernel import kernel_equations
+from planar.batch.march.kernel import KernelEquations, batch_equations
 from planar.batch.march.numpy_kernel import (
     MAX_EXPRESSION_UNKNOWNS,
     DesignMarch,
@@ -29,9 +29,7 @@ from planar.batch.march.prediction import (
 )
 from planar.codegen.instructions import UnsupportedOperation
 from planar.equations.functions import EquationFunctions
-from planar.equations.mechanism_numbers import equation_structure
 from planar.equations.symbolic_equations import slice_length
-from planar.model.mechanism import Mechanism
 
 Array = np.ndarray
 
@@ -156,20 +154,16 @@ def _kernel(
     batch: DesignBatch, links: tuple[str, ...], rates: bool, point_blocks: tuple[int, ...] | None = None
 ) -> NumpyKernel:
     try:
-        return _cached_kernel(batch.functions, equation_structure(batch.mechanism), links, rates, point_blocks)
+        return _cached_kernel(batch_equations(batch), links, rates, point_blocks)
     except UnsupportedOperation as why:
         raise UnsupportedStructure(str(why)) from None
 
 
 @lru_cache(maxsize=256)
 def _cached_kernel(
-    functions: EquationFunctions,
-    structure: Mechanism,
-    links: tuple[str, ...],
-    rates: bool,
-    point_blocks: tuple[int, ...] | None,
+    equations: KernelEquations, links: tuple[str, ...], rates: bool, point_blocks: tuple[int, ...] | None
 ) -> NumpyKernel:
-    return make_numpy_kernel(kernel_equations(functions, structure), links, rates, point_blocks)
+    return make_numpy_kernel(equations, links, rates, point_blocks)
 
 
 class _Division(NamedTuple):
