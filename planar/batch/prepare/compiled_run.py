@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planar.batch.march.kernel import KernelEquations, Operand
+from planar.batch.march.kernel import Operand
 from planar.batch.prepare.design_numbers import DesignNumbers
 from planar.batch.prepare.llvm_ending import PositionRows
 from planar.batch.prepare.llvm_numbers import FUNCTION_NAME as NUMBERS_FUNCTION
@@ -43,12 +43,13 @@ class RunLayout(NamedTuple):
     inputs: tuple[Operand, ...]
 
 
-def write_run(equations: KernelEquations, design: DesignNumbers, links: tuple[str, ...], rates: bool) -> RunLayout:
+def write_run(design: DesignNumbers, links: tuple[str, ...], rates: bool) -> RunLayout:
     """The function for points on these links. Raises UnsupportedOperation."""
+    equations = design.equations("q")
     signs = [("sign", k) for k in range(len(equations.closed_forms))]
     order: list[Operand] = [*design.numbers, SAID, *signs]
     positions = write_positions(equations, links, rates, order)
-    numbers, start = write_numbers(design, order), write_start(equations, design.sketched, order)
+    numbers, start = write_numbers(design, order), write_start(design.equations("at"), design.sketched, order)
     t = IRWriter(1)
     t.write_line(f"define void @{FUNCTION_NAME}(ptr %context, ptr %places, ptr %given, ptr %out) {{")
     t.write_label("entry")
@@ -86,13 +87,11 @@ class CompiledRun:
     Raises UnsupportedOperation.
     """
 
-    def __init__(
-        self, equations: KernelEquations, design: DesignNumbers, links: tuple[str, ...], rates: bool, u: Array
-    ):
+    def __init__(self, design: DesignNumbers, links: tuple[str, ...], rates: bool, u: Array):
         """u (positions, inputs): where the inputs are of a design that has them where the file has them."""
         if len(u) < 3:
             raise UnsupportedOperation("two positions do not show what lies between them")
-        layout = write_run(equations, design, links, rates)
+        layout = write_run(design, links, rates)
         self._function: Any = compile_function(layout.ir, FUNCTION_NAME, *ARGUMENT_TYPES)
         blocks = -(-len(u) // LANES)
         width = blocks * LANES

@@ -9,9 +9,9 @@ import casadi as ca
 import numpy as np
 
 from planar.batch.design_arrays import design_variables, with_design_values
-from planar.batch.march.kernel import Operand
+from planar.batch.march.kernel import KernelEquations, Operand, kernel_equations
 from planar.batch.reference_design import ReferenceDesign
-from planar.equations.mechanism_numbers import scaled_pair_numbers
+from planar.equations.mechanism_numbers import equation_structure, scaled_pair_numbers
 from planar.model.link_shapes import Distances, Link, LinkShape
 from planar.model.mechanism import LARGEST_INPUT_POSITION, Input
 from planar.model.pairs import MeasureKind
@@ -41,10 +41,20 @@ class DesignNumbers:
     `points` (x and y of all points of all links) have to be finite, and so have the numbers.
     """
 
-    def __init__(self, reference: ReferenceDesign, members: Sequence[tuple[str, str]], may_shift: Container[int]):
-        """`may_shift`: the inputs (by number) that may stand, or start, elsewhere than the file's own."""
+    def __init__(
+        self,
+        reference: ReferenceDesign,
+        members: Sequence[tuple[str, str]],
+        may_shift: Container[int],
+        zeros: Container[str] = (),
+    ):
+        """`may_shift`: the inputs (by number) that may stand, or start, elsewhere than the file's own; `zeros`: names
+        of lengths that are nothing in all designs."""
         mechanism, variables = reference.mechanism, design_variables(reference.mechanism)
+        still = {name: 0.0 for name in variables if name in zeros}
+        variables = {name: each for name, each in variables.items() if name not in still}
         candidates = reference.candidates
+        self._functions, self._structure = reference.functions, equation_structure(mechanism)
         self.index = {name: k for k, name in enumerate(variables)}
         self.sketched = tuple(
             (block.block_index, name, *candidates.first_link[name][1:])
@@ -56,7 +66,7 @@ class DesignNumbers:
         self.own_values = np.array([*(each.value for each in variables.values()), *shown, *own, reference.unit])
         self.symbols = ca.SX.sym("v", len(self.own_values))
         parts = ca.vertsplit(self.symbols)
-        design = with_design_values(mechanism, dict(zip(variables, parts, strict=False)))
+        design = with_design_values(mechanism, still | dict(zip(variables, parts, strict=False)))
         self.unit, rest = parts[-1], parts[len(variables) : -1]
         sketch, here = rest[: len(shown)], rest[len(shown) :]
         self.shapes: Mapping[str, LinkShape] = reference.shapes(design)
@@ -80,6 +90,15 @@ class DesignNumbers:
         self._add("unit", [self.unit])
         self._add("margin", [reduce(ca.fmin, margins, ca.SX(0.0))])
         self.points = [part for shape in self.shapes.values() for at in shape.points.values() for part in at]
+
+    def equations(self, points: str) -> KernelEquations:
+        """The equations without the numbers of pairs, and of points ("q", or "at" in their place), that are nothing in
+        all designs. Raises UnsupportedOperation."""
+        kinds = {"p": "p", points: "q"}
+        zeros = frozenset(
+            (kinds[kind], k) for (kind, k), value in self.numbers.items() if kind in kinds and value.is_zero()
+        )
+        return kernel_equations(self._functions, self._structure, zeros)
 
     def _add(self, kind: str, values: Sequence[ca.SX | float]) -> None:
         self.numbers |= {(kind, k): ca.SX(value) for k, value in enumerate(values)}

@@ -10,8 +10,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import inf
 
+from planar.batch.closed_form.llvm_joiner import BlockJoinWriter
 from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations, Operand
-from planar.batch.march.llvm_kernel import KernelWriter, OperandNames
+from planar.batch.march.llvm_kernel import OperandNames
 from planar.batch.prepare.llvm_numbers import SAID
 from planar.batch.prepare.run_endings import ALL_SOLVED, CANNOT_BE_ASSEMBLED, CLEARLY_OPEN, UNSURE
 from planar.codegen.instructions import UnsupportedOperation
@@ -32,12 +33,12 @@ def write_start(
     `sketched`: as `DesignNumbers.sketched`. Raises UnsupportedOperation.
     """
     try:
-        return _StartWriter(equations, sketched, order).write()
+        return _StartWriter(equations, sketched, order).write_function()
     except BareAngle as angle:
         raise UnsupportedOperation(f"an angle counts its turns: {angle.operand}") from None
 
 
-class _StartWriter(KernelWriter):
+class _StartWriter(BlockJoinWriter):
     def __init__(
         self,
         equations: KernelEquations,
@@ -45,16 +46,15 @@ class _StartWriter(KernelWriter):
         order: Sequence[Operand],
     ):
         self.enumerated = min(len(equations.blocks), ENUMERATED_BLOCKS)
-        links = tuple(link for *_, link, _ in sketched)
-        super().__init__(equations, links, False, 2**self.enumerated, frozenset(), frozenset())
+        blocks, links = tuple(block for block, *_ in sketched), tuple(link for *_, link, _ in sketched)
+        super().__init__(equations, links, blocks, 2**self.enumerated)
         if any(part.closed_form is None for part in equations.blocks):
             raise UnsupportedOperation("a group is not in closed form")
-        self.sketched_blocks = [block for block, *_ in sketched]
-        if set(self.sketched_blocks) < {part.block.block_index for part in equations.blocks}:
+        if set(blocks) < {part.block.block_index for part in equations.blocks}:
             raise UnsupportedOperation("the sketch does not show every group")
         self.order = order
 
-    def write(self) -> IRWriter:
+    def write_function(self) -> IRWriter:
         """The whole function."""
         t = self.ir
         t.write_line(f"define internal void @{FUNCTION_NAME}(ptr noalias %numbers) {{")
@@ -70,7 +70,7 @@ class _StartWriter(KernelWriter):
                 lanes = range(t.lanes)
                 have["sign", k] = t.constants([1.0 if lane >> k & 1 else -1.0 for lane in lanes])
                 bend = self.write_closed_form(part, have)
-                self._add_block(part, bend, self._write_cost(part, have))
+                self._add_block(part, bend, self._write_distance(part, have))
             else:
                 self._write_nearer(part, k, have)
         self._write_choice(have)
@@ -81,26 +81,12 @@ class _StartWriter(KernelWriter):
     def _write_nearer(self, part: KernelBlock, k: int, have: OperandNames) -> None:
         """A block in the nearer of its assemblies."""
         t = self.ir
-        left, right = ({**have, ("sign", k): t.constant(sign)} for sign in (1.0, -1.0))
-        bend, _ = (self.write_closed_form(part, each) for each in (left, right))
-        one, other = (self._write_cost(part, each) for each in (left, right))
-        nearer = t.compare("ole", one, other)
-        for operand in left:
-            if left[operand] != right[operand]:
-                have[operand] = t.select(nearer, left[operand], right[operand])
-        farther = t.binary("add", self.total, t.call_intrinsic("maxnum", one, other))
-        joined = t.compare("olt", bend, t.constant(MEETING_COSINE_SQUARED))
+        found = self.write_block(part, have, "zeroinitializer")
+        have["sign", k] = found.sign
+        farther = t.binary("add", self.total, found.other_distance)
+        joined = t.compare("olt", found.coalescence, t.constant(MEETING_COSINE_SQUARED))
         self.otherwise = t.call_intrinsic("minnum", self.otherwise, t.select(joined, farther, t.constant(inf)))
-        self._add_block(part, bend, t.call_intrinsic("minnum", one, other))
-
-    def _write_cost(self, part: KernelBlock, have: OperandNames) -> str:
-        """The squared distance of a block's sketched points from where they are shown."""
-        t = self.ir
-        points = [k for k, block in enumerate(self.sketched_blocks) if block == part.block.block_index]
-        at = self.write_values([self.point_coordinates(points)], have)
-        shown = [have["sketch", 2 * k + axis] for k in points for axis in range(2)]
-        gaps = [t.binary("sub", *both) for both in zip(at, shown, strict=True)]
-        return t.add_all([t.binary("mul", gap, gap) for gap in gaps])
+        self._add_block(part, found.coalescence, found.distance)
 
     def _add_block(self, part: KernelBlock, bend: str, cost: str) -> None:
         """A block more: of lanes in which it is joined, of those in which it may be, and of those in which it cannot

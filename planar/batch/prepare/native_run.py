@@ -9,11 +9,14 @@ from math import ceil
 import numpy as np
 
 from planar.batch.block import LEAD_IN_STEP
-from planar.batch.design_arrays import read_designs, with_design_values
+from planar.batch.design_arrays import design_variables, read_designs, with_design_values
+from planar.batch.march.kernel import kernel_equations
 from planar.batch.march.prediction import LONGEST_STEP
+from planar.batch.prepare.design_numbers import DesignNumbers
 from planar.batch.prepare.run_endings import DEAD_POINT, UNSURE
 from planar.batch.reference_design import ReferenceDesign
 from planar.codegen.instructions import UnsupportedOperation
+from planar.equations.mechanism_numbers import equation_structure
 from planar.model.mechanism import LARGEST_INPUT_POSITION
 from planar.model.pairs.base import Pair
 
@@ -22,6 +25,8 @@ NativeRun = Callable[[Mapping[str, float]], tuple[Array, float, int]]
 """From values by name to the rows of the wanted points (rows, positions), which are the caller's own, how the run ended
 (see `run_endings`), and at which position. Raises KeyError for a name that is not there."""
 
+MAX_CHOICES = 8
+"""Choices among the lengths that the file has as nothing of which each has a function; for others there is one."""
 MAX_LEAD_IN = 1000
 """Positions on the way to where a run starts, at most."""
 
@@ -40,7 +45,7 @@ def prepare_native_run(
     if lead > MAX_LEAD_IN or longest > LONGEST_STEP or np.max(np.abs(inputs)) > LARGEST_INPUT_POSITION:
         return None
     try:
-        run = _compile(reference, points, rates, (inputs, lead), may_shift)
+        run: NativeRun = _RunsByZeros(partial(_compile, reference, points, rates, (inputs, lead), may_shift), reference)
     except (ImportError, UnsupportedOperation):
         return None
     if any(type(pair).find_misfit is not Pair.find_misfit for pair in reference.mechanism.pairs):
@@ -48,32 +53,70 @@ def prepare_native_run(
     return run
 
 
-def _compile(
-    reference: ReferenceDesign, points: tuple[str, ...], rates: bool, inputs: tuple[Array, int], may_shift: bool
+def _compile(  # many: what a run is made of
+    reference: ReferenceDesign,
+    points: tuple[str, ...],
+    rates: bool,
+    inputs: tuple[Array, int],
+    may_shift: bool,
+    zeros: frozenset[str],
 ) -> NativeRun:
     """The function for positions of all inputs, of which so many are on the way to where the run starts.
 
-    Raises UnsupportedOperation; ImportError where there is no compiler.
+    `zeros`: lengths that are nothing in all designs. Raises UnsupportedOperation; ImportError where there is no
+    compiler.
     """
-    from planar.batch.march.kernel import kernel_equations
     from planar.batch.prepare.compiled_run import CompiledRun
-    from planar.batch.prepare.design_numbers import DesignNumbers
     from planar.batch.prepare.newton_run import NewtonRun
-    from planar.equations.mechanism_numbers import equation_structure
 
     u, lead = inputs
     members = [reference.point_member(name) for name in points]
-    equations = kernel_equations(reference.functions, equation_structure(reference.mechanism))
-    if equations.has_newton_blocks:
+    if kernel_equations(reference.functions, equation_structure(reference.mechanism)).has_newton_blocks:
         if lead or reference.candidates.counts_turns:
             raise UnsupportedOperation("a group that is not in closed form starts where the file has it, turns or not")
-        return NewtonRun(reference, equations, DesignNumbers(reference, members, ()), members, rates, u)
+        return NewtonRun(reference, DesignNumbers(reference, members, (), zeros), members, rates, u)
     shifting = set(range(u.shape[1]))
     if not may_shift:
         shifting.remove(reference.running_index)
     links = tuple(link for link, _ in members)
-    run = CompiledRun(equations, DesignNumbers(reference, members, shifting), links, rates, u)
+    run = CompiledRun(DesignNumbers(reference, members, shifting, zeros), links, rates, u)
     return partial(_after_lead_in, run, lead) if lead else run
+
+
+class _RunsByZeros:
+    """Runs compiled without the lengths that the file has as nothing, as most coordinates of pins on the frame; of
+    designs that give such a length a value there is one for each choice of them, made when it is first wanted."""
+
+    def __init__(self, compile_run: Callable[[frozenset[str]], NativeRun], reference: ReferenceDesign):
+        known = design_variables(reference.mechanism)
+        self._zeros = frozenset(name for name, each in known.items() if each.link and each.value == 0.0)
+        self._names = frozenset(known)
+        self._compile = compile_run
+        self._run = compile_run(self._zeros)
+        self._others: dict[frozenset[str], NativeRun] = {}
+
+    def __call__(self, values: Mapping[str, float]) -> tuple[Array, float, int]:
+        try:
+            return self._run(values)
+        except KeyError:
+            if not self._names.issuperset(values):
+                raise
+        given = self._zeros.intersection(values)
+        if given not in self._others and len(self._others) >= MAX_CHOICES:
+            given = self._zeros
+        run = self._others.get(given)
+        if run is None:
+            try:
+                run = self._compile(self._zeros - given)
+            except UnsupportedOperation:
+                run = _refuse
+            self._others[given] = run
+        return run(values)
+
+
+def _refuse(values: Mapping[str, float]) -> tuple[Array, float, int]:
+    """Of a structure that is not compiled nothing is known."""
+    return np.empty((0, 0)), UNSURE, 0
 
 
 class _FittingPairs:

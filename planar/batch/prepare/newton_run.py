@@ -57,7 +57,6 @@ class NewtonRun:
     def __init__(
         self,
         reference: ReferenceDesign,
-        equations: KernelEquations,
         design: DesignNumbers,
         members: Sequence[tuple[str, str]],
         rates: bool,
@@ -65,7 +64,7 @@ class NewtonRun:
     ):
         """u (positions, inputs): where the inputs are."""
         links, shown = tuple(link for link, _ in members), [link for *_, link, _ in design.sketched]
-        blocks = tuple(block for block, *_ in design.sketched)
+        blocks, equations = tuple(block for block, *_ in design.sketched), design.equations("q")
         if set(blocks) < {part.block.block_index for part in equations.blocks}:
             raise UnsupportedOperation("the sketch does not show every group")
         # where there are few positions others are put between them
@@ -73,7 +72,7 @@ class NewtonRun:
         u = _refine(u, self._every)
         pieces = _Pieces(len(u))
         kernels = (
-            write_designs_kernel(equations, shown, False, LANES, blocks, False),
+            write_designs_kernel(design.equations("at"), shown, False, LANES, blocks, False),
             write_designs_kernel(equations, links, rates, LANES, (-1,) * len(links), False),
         )
         starts, lanes = _assembly_lanes(reference, equations)
