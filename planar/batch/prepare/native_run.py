@@ -114,7 +114,7 @@ class _RunsByZeros:
         return run(values)
 
 
-def _refuse(values: Mapping[str, float]) -> tuple[Array, float, int]:
+def _refuse(_values: Mapping[str, float]) -> tuple[Array, float, int]:
     """Of a structure that is not compiled nothing is known."""
     return np.empty((0, 0)), UNSURE, 0
 
