@@ -13,6 +13,7 @@ from typing import NamedTuple
 from planar.batch.assembly_scores import MAX_BLOCK_UNKNOWNS, NEAR_SKETCH
 from planar.batch.march.kernel import KernelEquations, Operand
 from planar.batch.march.llvm_designs import DesignsKernelLayout
+from planar.batch.march.llvm_kernel import write_angle_sum
 from planar.batch.march.regularity import CLEAR_REGULARITY, LEAST_KERNEL_REGULARITY, least_regularity
 from planar.batch.prepare.design_numbers import DesignNumbers
 from planar.batch.prepare.llvm_numbers import FUNCTION_NAME as NUMBERS_FUNCTION
@@ -160,6 +161,20 @@ class _NewtonRunWriter:
             t.store(t.broadcast(self._number(operand)), t.double_pointer(base, str(k * LANES)))
         return base
 
+    def _write_inputs(self, name: str) -> str:
+        """Where the inputs are in each lane: where the file's design has them, and as much farther as this one."""
+        t, given, rows = self.ir, self._context(name), {operand: k for k, operand in enumerate(self.march.inputs)}
+        base = self._take_scratch(len(rows))
+        for k, is_angle in enumerate(self.equations.input_is_angle):
+            moved = {("u", k): t.binary("add", self._row(given, rows["u", k]), t.broadcast(self._number(("d", k))))}
+            if is_angle:
+                cos, sin = (self._row(given, rows[part, k]) for part in ("uc", "us"))
+                by = [t.broadcast(self._number((part, k))) for part in ("dc", "ds")]
+                moved["uc", k], moved["us", k] = write_angle_sum(t, cos, sin, by[0], by[1])
+            for operand, value in moved.items():
+                t.store(value, t.double_pointer(base, str(rows[operand] * LANES)))
+        return base
+
     def _write_kernel_call(self, function: str, arrays: Sequence[str], steps: str, row_count: int, ends: str) -> None:
         t = self.ir
         given = ", ".join(f"ptr {each}" for each in arrays)
@@ -171,7 +186,7 @@ class _NewtonRunWriter:
     def _write_correction(self, rows: dict[str, str]) -> tuple[str, str]:
         """The design from each of the file's assemblies: which lanes converged, and what the kernel gives of them."""
         good, out = self._take_scratch(1), self._take_scratch(self.corrector.output_row_count)
-        arrays = [rows["p"], rows["at"], *(self._context(name) for name in ("starts", "start inputs"))]
+        arrays = [rows["p"], rows["at"], self._context("starts"), self._write_inputs("start inputs")]
         arrays += [rows["u1"], self._context("start table"), self._context("start counts")]
         ends = f"double {self._number(('tolerance', 0))}, double 0x7FF0000000000000, double 1.0, ptr {out}, ptr {good}"
         self._write_kernel_call(self._context("corrector"), arrays, "1", self.corrector.output_row_count, ends)
@@ -261,7 +276,7 @@ class _NewtonRunWriter:
         """The run, a piece in each lane: how many steps went well, and what the kernel gives of all steps."""
         t = self.ir
         good = self._take_scratch(1)
-        arrays = [rows["p"], rows["q"], *(self._context(name) for name in ("states", "inputs"))]
+        arrays = [rows["p"], rows["q"], self._context("states"), self._write_inputs("inputs")]
         arrays += [rows["u1"], self._context("table"), self._context("counts")]
         limit, steps = self._context("least correction", "double"), self._context("steps", "i64")
         # what the march gives stands at the end of the scratch, where there is room for as many steps as there are

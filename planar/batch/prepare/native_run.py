@@ -71,13 +71,13 @@ def _compile(  # many: what a run is made of
 
     u, lead = inputs
     members = [reference.point_member(name) for name in points]
-    if kernel_equations(reference.functions, equation_structure(reference.mechanism)).has_newton_blocks:
-        if lead or reference.candidates.counts_turns:
-            raise UnsupportedOperation("a group that is not in closed form starts where the file has it, turns or not")
-        return NewtonRun(reference, DesignNumbers(reference, members, (), zeros), members, rates, u)
     shifting = set(range(u.shape[1]))
     if not may_shift:
         shifting.remove(reference.running_index)
+    if kernel_equations(reference.functions, equation_structure(reference.mechanism)).has_newton_blocks:
+        if lead or reference.candidates.counts_turns:
+            raise UnsupportedOperation("a group that is not in closed form starts where the file has it, turns or not")
+        return NewtonRun(reference, DesignNumbers(reference, members, shifting, zeros), members, rates, u)
     links = tuple(link for link, _ in members)
     run = CompiledRun(DesignNumbers(reference, members, shifting, zeros), links, rates, u)
     return partial(_after_lead_in, run, lead) if lead else run
