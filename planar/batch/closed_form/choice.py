@@ -19,7 +19,7 @@ def find_joiner(batch: DesignBatch, point_blocks: tuple[int, ...], backend: str)
         equations = batch_equations(batch)
     except UnsupportedOperation:
         return None
-    if equations.has_newton_blocks:
+    if equations.has_newton_blocks or not equations.blocks:
         return None
     return _make_joiner(equations, batch.links, point_blocks, "native" in available_backends(backend))
 

@@ -148,7 +148,7 @@ class NativeBlockJoiner:
         row_count = JOINED_ROWS * self.block_count + len(self.state)
         rows = (batch.p, batch.q, input_rows(self.equations, batch.u0), forced)
         out = _call(self.joining, rows, sketch, row_count)
-        known = out[: JOINED_ROWS * self.block_count].reshape(self.block_count, JOINED_ROWS, out.shape[1])
+        known = out[: JOINED_ROWS * self.block_count].reshape(self.block_count, JOINED_ROWS, -1)
         return JoinedBlocks(*known.transpose(1, 0, 2), out[JOINED_ROWS * self.block_count :])
 
     def coalescences(self, batch: DesignBatch, signs: Array, u: Array) -> Array:

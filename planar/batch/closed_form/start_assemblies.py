@@ -64,9 +64,7 @@ class _StartSearch:
         self.design_count = batch.p.shape[1]
         parts = joiner.equations.blocks
         self.block_index = np.array([part.block.block_index for part in parts], dtype=int)
-        self.is_bounded = np.array(
-            [part.closed_form is None or part.closed_form.squared_arm is None for part in parts], dtype=bool
-        )
+        self.is_bounded = np.array([part.closed_form is None or part.closed_form.squared_arm is None for part in parts])
         "blocks that cannot be joined where their coalescence is beyond one; of others an arm may have vanished"
 
     def search(self) -> StartAssemblies:
