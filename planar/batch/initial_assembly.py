@@ -30,6 +30,8 @@ DAMPED_STARTS = 6
 """Starts of the damped method, by which a design is refused."""
 REFUSAL_TOLERANCE = 1e-6
 """Lengths of the size by which a block stays open that is not sure to be refused."""
+LARGEST_NUMBER = 1e12
+"""Sizes, or rad, of a number of a pair: farther off nothing is refused by the damped method."""
 MAX_PARTIAL_ASSEMBLIES = 8
 """Partial assemblies of a design that are carried on, those nearest to the sketch."""
 
@@ -163,7 +165,9 @@ class _AssemblySearch:
         Only of blocks of two unknowns, whose least squares it cannot miss from starts on all sides.
         """
         unknowns = slice_length(block.unknowns)
-        if unknowns > 2:
+        # of numbers that are none, or whose squares are none, nothing is known here
+        designs = designs[np.abs(self.p[:, designs]).max(axis=0, initial=0.0) < LARGEST_NUMBER]
+        if unknowns > 2 or not designs.size:
             return
         ways = [(design, way) for design in designs for way in np.flatnonzero(here.exists[design])]
         starts = np.repeat(

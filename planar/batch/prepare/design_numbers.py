@@ -19,6 +19,8 @@ from planar.solving.checks.residual_check import SHORT_ARM, residual_tolerance
 
 Array = np.ndarray
 
+LARGEST_REACH = 1e3
+"""Sizes of the file's design of a pair's length: where one is greater, rounding may take digits of what is small."""
 OPEN_TRIANGLE = 1e-8
 """Of the square of the longest side's square: so far from closing rounding does not bring a triangle."""
 
@@ -35,7 +37,8 @@ class DesignNumbers:
     - "u", "uc", "us" of the inputs at the design's own positions, "d", "dc", "ds" of how far these are from the file's;
     - "at" of the sketched points (`sketched`) in the axes of their links, "sketch" where they are shown;
     - "tolerance" of the residual check; "unit", the size in m;
-    - "margin", below zero where an arm is so short that rounding takes digits, or the inputs are not where they may be;
+    - "margin", below zero where an arm is so short, or a length so great, that rounding takes digits, and where the
+      inputs are not where they may be;
     - "opening", above zero where a point has distances from two others that surely do not close a triangle.
 
     `points` (x and y of all points of all links) have to be finite, and so have the numbers.
@@ -86,6 +89,7 @@ class DesignNumbers:
         self._add("sketch", sketch)
         lengths = [ca.fabs(each) for each, kind in zip(p, kinds, strict=True) if kind is MeasureKind.LENGTH]
         reach = reduce(ca.fmax, lengths, ca.SX(1.0))
+        margins.append(LARGEST_REACH - reach)
         self._add("tolerance", [float(residual_tolerance(len(mechanism.links), 1.0)) * reach])
         self._add("unit", [self.unit])
         self._add("margin", [reduce(ca.fmin, margins, ca.SX(0.0))])
