@@ -1,6 +1,6 @@
 """What can go wrong, and the sentence in which it is said."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from enum import StrEnum
 from typing import Any
 
@@ -95,14 +95,24 @@ def unknown_format_error(suffix: str, what: str, endings: Iterable[str]) -> BadI
 class NoAnswer(PlanarError):
     """The mechanism is well described but has no answer here; `outcome` says which kind, `more` what a program asks.
 
-    The sentence names a few of very many links or pairs; a program finds all of them in `more`.
+    The sentence names a few of very many links or pairs; a program finds all of them in `more`. What takes long to find
+    for a sentence is given as a function, which is called when the sentence is first read.
     """
 
-    def __init__(self, outcome: Outcome, reason: str, **more: Any):
-        self.outcome = outcome
-        self.reason = _printable_line(reason, MAX_REASON_LENGTH)
-        super().__init__(f"{outcome.value}: {self.reason}")
+    def __init__(self, outcome: Outcome, reason: str | Callable[[], str], **more: Any):
+        super().__init__(outcome)
+        self.outcome, self._reason = outcome, reason
         self.more: dict[str, Any] = more
+
+    @property
+    def reason(self) -> str:
+        """The sentence."""
+        if not isinstance(self._reason, str):
+            self._reason = self._reason()
+        return _printable_line(self._reason, MAX_REASON_LENGTH)
+
+    def __str__(self) -> str:
+        return f"{self.outcome.value}: {self.reason}"
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.outcome, self.reason), {"more": self.more}

@@ -219,6 +219,11 @@ def open_contact(setup: PreparedMechanism, pair: str, gap: float) -> NoAnswer:
 
 def not_assembled(setup: PreparedMechanism, failure: AssemblySearchFailure) -> NoAnswer:
     """A block that cannot be joined: by how much, at which pair, and what would mend it."""
+    return NoAnswer(Outcome.CANNOT_BE_ASSEMBLED, lambda: _open_block_sentence(setup, failure))
+
+
+def _open_block_sentence(setup: PreparedMechanism, failure: AssemblySearchFailure) -> str:
+    """What to say of a block that cannot be joined; what would mend it takes as long to find as an assembly."""
     from planar.solving.diagnosis.remedy import describe_remedy
 
     stage = failure.stage
@@ -230,11 +235,10 @@ def not_assembled(setup: PreparedMechanism, failure: AssemblySearchFailure) -> N
     kind = next(row.kind for row in setup.equations.rows[stage.rows] if row.pair == pair)
     by, what = (setup.unit, "length") if kind is MeasureKind.LENGTH else (1.0, "angle")
     links = _links(stage.links or setup.pairs.get(pair, setup.relative_motions[pair]).links)
-    return NoAnswer(
-        Outcome.CANNOT_BE_ASSEMBLED,
+    return (
         f"{setup.describe_position()} {links} cannot be joined: at the nearest, pair {pair!r} stays open by "
         f"{amount(gaps[pair] * by, what, setup.mechanism.units)}; "
-        f"{describe_remedy(setup, failure, f'change the input or a dimension of {links}')}",
+        f"{describe_remedy(setup, failure, f'change the input or a dimension of {links}')}"
     )
 
 
