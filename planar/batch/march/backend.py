@@ -74,8 +74,12 @@ class CorrectedAssemblies(NamedTuple):
 class DesignRunner(Protocol):
     """Runs the designs of a batch through all steps. Each method raises UnsupportedStructure where it cannot."""
 
+    def can_help(self, batch: DesignBatch) -> bool:
+        """Whether it can do anything for such designs that others have not done before."""
+
     def run(self, batch: DesignBatch, out: Array) -> Array:
-        """Fill out (steps + 1, rows, designs): x and y of each point, then their first, then second rates (m, s).
+        """Fill out (steps + 1, rows, designs): x and y of each point, then their first, then second rates (m, s); what
+        is no number from the first step on that did not pass.
 
         Returns how many of the first steps passed residual and branch check (designs,).
         """
@@ -92,6 +96,12 @@ class DesignRunner(Protocol):
         """
 
 
+def erase_from_steps(out: Array, first: Array) -> None:
+    """Make out (steps + 1, rows, designs) no number from a step of each design on (designs,)."""
+    for step in range(int(first.min(initial=len(out))), len(out)):
+        out[step][:, first <= step] = np.nan
+
+
 class RunnerAttempt(NamedTuple):
     """A runner, and whether it is given all designs that have not come to the end, or those that have not begun."""
 
@@ -105,12 +115,18 @@ class RunnerLadder:
     def __init__(self, attempts: Sequence[RunnerAttempt]):
         self.attempts = attempts
 
+    def can_help(self, batch: DesignBatch) -> bool:
+        """See `DesignRunner`."""
+        return True
+
     def run(self, batch: DesignBatch, out: Array) -> Array:
         """See `DesignRunner`."""
         good, runs = np.zeros(out.shape[2], dtype=int), 0
         for runner, runs_to_end in self.attempts:
             left = np.flatnonzero(good < (len(batch.input_offsets) if runs_to_end else 1))
-            if not left.size:
+            if runs:  # what has nowhere to start is given once
+                left = left[np.isfinite(batch.z0[:, left]).all(axis=0) & np.isfinite(batch.u0[:, left]).all(axis=0)]
+            if not left.size or not runner.can_help(batch):
                 continue
             try:
                 if left.size == len(good):
