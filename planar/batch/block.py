@@ -110,7 +110,10 @@ class _DesignBlockSolver:
         code[failed] = _code(Outcome.CANNOT_BE_ASSEMBLED)
         if failed.any():  # those of which a backend was not given all designs
             out[0][:, failed] = np.nan
-        status = np.multiply(np.arange(block.steps + 1) >= solved[:, None], code[:, None], dtype=np.int8)
+        status = np.zeros((self.design_count, block.steps + 1), dtype=np.int8)
+        stopped = np.flatnonzero(code)
+        step, first = np.arange(block.steps + 1, dtype=np.int32), solved[stopped, None].astype(np.int32)
+        status[stopped] = (step >= first) * code[stopped, None]
         inputs = self._input_positions(same)
         self.endings = {
             int(each): (int(np.sum(code == each)), self._question(int(np.argmax(code == each)), inputs))

@@ -13,7 +13,7 @@ Array = np.ndarray
 
 MAX_WINDOWS = 40
 """Windows of positions that are looked at of a design that is not decided, each with finer or coarser steps."""
-LEAST_INTERVALS, MOST_INTERVALS, POSITIONS_AT_ONCE = 4, 64, 4096
+LEAST_INTERVALS, MOST_INTERVALS, POSITIONS_AT_ONCE = 3, 64, 4096
 """Intervals of a window; as many as make so many positions of all designs."""
 REFINEMENT = 4.0
 """By how much steps are divided where it is not clear what lies between."""
@@ -21,6 +21,8 @@ LEAST_STEP_RATIO = 1e-4
 """Of the march's steps: what finer steps do not decide is left open."""
 MAX_SECANTS, SECANTS_BEFORE_HALVING = 16, 8
 """Steps of the search for a zero, and after how many of them the bracket is halved."""
+CUBIC_STEPS = 3
+"""Steps of Newton's method to a cubic's root."""
 ZERO_TOLERANCE, BRACKET_TOLERANCE = 4e-15, 1e-15
 """Coalescence from one, and rad or sizes, at which a dead point is found."""
 FOUND_TOLERANCE = 1e-12
@@ -48,7 +50,7 @@ def find_dead_points(
 
 class _Brackets(NamedTuple):
     """Intervals (brackets,) in which a block of a design comes to a dead point: how far the block's coalescence is from
-    one at both ends."""
+    one at both ends; where about it is one, and how fast it gets there."""
 
     design: Array
     block: Array
@@ -56,6 +58,22 @@ class _Brackets(NamedTuple):
     x1: Array
     f0: Array
     f1: Array
+    guess: Array
+    slope: Array
+
+
+def _cubic_root(values: Array) -> tuple[Array, Array]:
+    """Where cubics through values (4, ...) at -1, 0, 1, 2 are zero between 0 and 1, about, and their slopes there."""
+    before, left, right, after = values
+    middle = 0.5 * (before + right) - left
+    third = (after - 3.0 * right + 3.0 * left - before) / 6.0
+    linear = 0.5 * (right - before) - third
+    x = left / (left - right)
+    slope = linear
+    for _ in range(CUBIC_STEPS):
+        slope = linear + x * (2.0 * middle + 3.0 * third * x)
+        x = x - (left + x * (linear + x * (middle + x * third))) / slope
+    return x, slope
 
 
 class _DeadPointSearch:
@@ -84,7 +102,7 @@ class _DeadPointSearch:
             if not on.all():
                 which = np.flatnonzero(on)
                 active, x, h = active[which], x[which], h[which]
-                own, signs = own.select(which), signs[:, which]
+                own, signs = own.select(which), np.take(signs, which, axis=1)
         self._find_zeros(_Brackets(*(np.concatenate(parts) for parts in zip(*brackets, strict=True))), distance, block)
         return DeadPoints(distance, block)
 
@@ -118,34 +136,35 @@ class _DeadPointSearch:
         block = np.argmin(safe[at, :, columns], axis=1)
         crossing = ~every & falls[at, block, columns]
         which = np.flatnonzero(crossing)
-        begin = x[which] + first[which] * h[which]
-        ends = (part[at[which], block[which], which] for part in (left, right))
-        return every, crossing, first, _Brackets(active[which], block[which], begin, begin + h[which], *ends)
+        begin, own = x[which] + first[which] * h[which], h[which]
+        near = np.array([f[at[which] + k, block[which], which] for k in range(4)])
+        root, slope = _cubic_root(near)
+        guess = begin + root * own, slope / own
+        return every, crossing, first, _Brackets(active[which], block[which], begin, begin + own, *near[1:3], *guess)
 
     def _find_zeros(self, brackets: _Brackets, distance: Array, block: Array) -> None:
-        """The dead points, to round-off, of designs with brackets: safeguarded secants (the Illinois method)."""
+        """The dead points, to round-off, of designs with brackets: secants, kept within the brackets."""
         if not brackets.design.size:
             return
-        own, signs = self.batch.select(brackets.design), self.signs[:, brackets.design]
+        own, signs = self.batch.select(brackets.design), np.take(self.signs, brackets.design, axis=1)
         columns = np.arange(len(brackets.design))
-        (_, of, a, b, fa, fb), begin = brackets, brackets.x0
-        found, least, before = b, -fb, np.zeros(len(a), dtype=bool)
+        _, of, a, b, fa, fb, x, slope = brackets
+        found, least, f, before, f_before = b, -fb, fb, b, fb
         for k in range(MAX_SECANTS):
-            x = (a * fb - b * fa) / (fb - fa)
-            x = np.where(
-                (x > a) & (x < b) & (k % SECANTS_BEFORE_HALVING < SECANTS_BEFORE_HALVING - 1), x, 0.5 * (a + b)
-            )
+            # the first by a cubic, then by its slope, then by secants; ever again the middle
+            if k > 0:
+                x, before, f_before = x - f / (slope if k == 1 else (f - f_before) / (x - before)), x, f
+            if k % SECANTS_BEFORE_HALVING == SECANTS_BEFORE_HALVING - 1:
+                x = 0.5 * (a + b)
+            x = np.where((x > a) & (x < b), x, (a * fb - b * fa) / (fb - fa))
             f = 1.0 - self._evaluate(own, signs, x).coalescences[of, columns]
             nearer = np.abs(f) < least
             found, least = np.where(nearer, x, found), np.where(nearer, np.abs(f), least)
             up = f > 0.0
-            again = up == before if k else np.zeros_like(up)  # the other end stays a second time, and counts half
-            fa = np.where(up, f, np.where(again, 0.5 * fa, fa))
-            fb = np.where(up, np.where(again, 0.5 * fb, fb), f)
-            a, b, before = np.where(up, x, a), np.where(up, b, x), up
+            a, fa, b, fb = np.where(up, x, a), np.where(up, f, fa), np.where(up, b, x), np.where(up, fb, f)
             if np.all((least <= ZERO_TOLERANCE) | (b - a <= BRACKET_TOLERANCE)):
                 break
-        sure = (least <= FOUND_TOLERANCE) & self._keep_apart(own, signs, of, begin, found)
+        sure = (least <= FOUND_TOLERANCE) & self._keep_apart(own, signs, of, brackets.x0, found)
         distance[brackets.design[sure]] = found[sure]
         block[brackets.design[sure]] = of[sure]
 

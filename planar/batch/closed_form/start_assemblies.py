@@ -18,8 +18,8 @@ from planar.solving.assembly.block_assemblies import MEETING_COSINE_SQUARED
 
 Array = np.ndarray
 
-CLEARLY_OPEN = 1.0 + 1e-4
-"""Of a block's coalescence: from there on it cannot be joined, whatever rounding does."""
+CLEARLY_OPEN = 1.0 + 1e-6
+"""Of a block's coalescence: from there on it cannot be joined, and stays open by more than what counts as closed."""
 MAX_WAYS = 64
 """Ways to assemble a design that are looked at: one that has more to look at is left to be searched by itself."""
 

@@ -52,7 +52,12 @@ class DesignBatch(NamedTuple):
 
     def select(self, designs: Array | slice, z0: Array | None = None) -> DesignBatch:
         """The batch of some of the designs, from other unknowns if they are given."""
-        parts = {name: getattr(self, name)[:, designs] for name in ("p", "q", "z0", "u0", "u1", "u2")}
+        rows = {name: getattr(self, name) for name in ("p", "q", "z0", "u0", "u1", "u2")}
+        if isinstance(designs, slice):
+            parts = {name: row[:, designs] for name, row in rows.items()}
+        else:  # of which rows lie in one piece, unlike what an index gives
+            which = np.flatnonzero(designs) if designs.dtype == bool else designs
+            parts = {name: np.take(row, which, axis=1) for name, row in rows.items()}
         return self._replace(**parts | ({} if z0 is None else {"z0": z0}))
 
 
@@ -98,8 +103,8 @@ class DesignRunner(Protocol):
 
 def erase_from_steps(out: Array, first: Array) -> None:
     """Make out (steps + 1, rows, designs) no number from a step of each design on (designs,)."""
-    for step in range(int(first.min(initial=len(out))), len(out)):
-        out[step][:, first <= step] = np.nan
+    begin = int(first.min(initial=len(out)))
+    np.copyto(out[begin:], np.nan, where=np.arange(begin, len(out))[:, None, None] >= first)
 
 
 class RunnerAttempt(NamedTuple):
