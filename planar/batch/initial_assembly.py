@@ -32,6 +32,8 @@ REFUSAL_TOLERANCE = 1e-6
 """Lengths of the size by which a block stays open that is not sure to be refused."""
 LARGEST_NUMBER = 1e12
 """Sizes, or rad, of a number of a pair: farther off nothing is refused by the damped method."""
+MAX_ALONE = 12
+"""Designs that are not clear: so few are solved by themselves sooner than they are searched for."""
 MAX_PARTIAL_ASSEMBLIES = 8
 """Partial assemblies of a design that are carried on, those nearest to the sketch."""
 
@@ -39,12 +41,14 @@ MAX_PARTIAL_ASSEMBLIES = 8
 class DesignAssemblies(NamedTuple):
     """z (unknowns, designs), and for which of them it is surely the one that the search one by one would take.
 
-    `ends`: the level of the block that surely cannot be joined to the rest, -1 where all can (designs,).
+    `failed_block`: the level of the block that surely cannot be joined to the rest, -1 where all can (designs,);
+    `signs` (blocks, designs): of the assemblies of blocks in closed form, 0 where they are not known; None of none.
     """
 
     z: Array
     is_sure: Array
     failed_block: Array
+    signs: Array | None = None
 
 
 class _PartialAssemblies(NamedTuple):
@@ -77,10 +81,12 @@ def find_assemblies(
         if every is None:
             return _AssemblySearch(reference, shapes, p, u).search()
         rest = np.flatnonzero(~every.is_sure & (every.failed_block < 0))
-        if rest.size:
+        if rest.size > MAX_ALONE:
             own = {name: shape_of_designs(shape, rest) for name, shape in shapes.items()}
             found = _AssemblySearch(reference, own, p[:, rest], u[:, rest]).search()
-            every.z[:, rest], every.is_sure[rest], every.failed_block[rest] = found
+            every.z[:, rest], every.is_sure[rest], every.failed_block[rest] = found[:3]
+            if every.signs is not None:
+                every.signs[:, rest] = 0.0
         return every
 
 
@@ -131,7 +137,7 @@ class _AssemblySearch:
             slow = _AssemblySearch(self.reference, own, self.p[:, again], self.u[:, again])
             found.z[:, again], found.is_sure[again], found.failed_block[again] = slow._choose(
                 slow._join_blocks(False)[0]
-            )
+            )[:3]
         return found
 
     def _join_blocks(self, quick: bool) -> tuple[_PartialAssemblies, Array]:

@@ -148,7 +148,7 @@ class PreparedSweep:
             found.velocity and _only_design(found.velocity),
             found.acceleration and _only_design(found.acceleration),
             np.asarray(found.status)[0],
-            found.said,
+            LateSentences(lambda: found.said),
         )
 
 

@@ -29,21 +29,43 @@ class JoinedBlocks(NamedTuple):
     state: Array
 
 
+class FollowedBlocks(NamedTuple):
+    """Designs in assemblies that are known, each array (..., designs): how near the two of each block are to where they
+    meet, as above (blocks, designs), no number where an arm on which a length turns is shorter than `LEAST_ARM`; and
+    their state (operands, designs)."""
+
+    coalescences: Array
+    state: Array
+
+
 class BlockJoiner(Protocol):
-    """Joins the blocks of the designs of a batch, whose points are those that the sketch shows."""
+    """Joins the blocks of the designs of a batch."""
 
     equations: KernelEquations
     state: tuple[Operand, ...]
 
     def join(self, batch: DesignBatch, sketch: Array, forced: Array) -> JoinedBlocks:
-        """At the inputs u0 of a batch, each block in the assembly whose points lie nearer to the sketch.
+        """At the inputs u0 of a batch, whose points are the sketched ones, each block in the assembly whose points lie
+        nearer to the sketch.
 
         sketch (points, 2), in sizes; forced (blocks, designs): the sign of a block's assembly, 0 where it is free.
         """
 
-    def coalescences(self, batch: DesignBatch, signs: Array, u: Array) -> Array:
-        """How near the two assemblies of each block are to where they meet (blocks, designs), at inputs u (inputs,
-        designs), in the assemblies of these signs (blocks, designs)."""
+    def follow(self, batch: DesignBatch, signs: Array, u: Array) -> FollowedBlocks:
+        """At inputs u (inputs, designs), in the assemblies of these signs (blocks, designs)."""
+
+
+LEAST_ARM = 0.1
+"""Sizes of an arm on which a length turns: a shorter one may have vanished between two positions."""
+
+
+def without_short_arms(coalescences: Array, equations: KernelEquations, squared_arms: Sequence[Array]) -> Array:
+    """The coalescences (blocks, designs), no number where an arm is short; squared arms of the blocks that have one."""
+    arms = iter(squared_arms)
+    for k, form in enumerate(equations.closed_forms):
+        if form.squared_arm is not None:
+            coalescences[k] = np.where(next(arms) < LEAST_ARM**2, np.nan, coalescences[k])
+    return coalescences
 
 
 def state_operands(equations: KernelEquations) -> tuple[Operand, ...]:

@@ -7,7 +7,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planar.batch.closed_form.joined_blocks import JoinedBlocks, input_rows, state_operands
+from planar.batch.closed_form.joined_blocks import (
+    FollowedBlocks,
+    JoinedBlocks,
+    input_rows,
+    state_operands,
+    without_short_arms,
+)
 from planar.batch.march.backend import DesignBatch
 from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations
 from planar.batch.march.llvm_kernel import KernelWriter, OperandNames
@@ -95,17 +101,20 @@ class BlockJoinWriter(KernelWriter):
         names |= {("p", k): self._load("%p", k) for k in range(count)}
         names |= {("q", k): self._load("%q", k) for k in range(2 * len(self.links))}
         names |= {operand: self._load("%drive", k) for k, operand in enumerate(self.input_operands)}
-        rows = []
+        rows: list[str] = []
+        arms: list[str] = []
         for k, part in enumerate(self.equations.blocks):
             sign = self._load("%sign", k)
             if self.point_blocks is None:
                 names["sign", k] = sign
-                rows.append(self.write_closed_form(part, names))
+                self.write_closed_form(part, names)
+                form = self.equations.closed_forms[k]
+                rows += self.write_values([form.coalescence], names)
+                arms += [] if form.squared_arm is None else self.write_values([form.squared_arm], names)
             else:
                 rows += self.write_block(part, names, sign)
-        if self.point_blocks is not None:
-            rows += [names[operand] for operand in state_operands(self.equations)]
-        for k, value in enumerate(rows):
+        state = [names[operand] for operand in state_operands(self.equations)]
+        for k, value in enumerate([*rows, *state, *arms]):
             t.store(value, self._pointer("%out", "%row", k))
         t.close_loop("b", "blocks", "block", "done")
         t.write_label("done")
@@ -151,10 +160,12 @@ class NativeBlockJoiner:
         known = out[: JOINED_ROWS * self.block_count].reshape(self.block_count, JOINED_ROWS, -1)
         return JoinedBlocks(*known.transpose(1, 0, 2), out[JOINED_ROWS * self.block_count :])
 
-    def coalescences(self, batch: DesignBatch, signs: Array, u: Array) -> Array:
+    def follow(self, batch: DesignBatch, signs: Array, u: Array) -> FollowedBlocks:
         """See `BlockJoiner`."""
-        rows = (batch.p, batch.q, input_rows(self.equations, u), signs)
-        return _call(self.following, rows, np.zeros(0), self.block_count)
+        count, last = self.block_count, self.block_count + len(self.state)
+        arms = sum(form.squared_arm is not None for form in self.equations.closed_forms)
+        out = _call(self.following, (batch.p, batch.q, input_rows(self.equations, u), signs), np.zeros(0), last + arms)
+        return FollowedBlocks(without_short_arms(out[:count], self.equations, list(out[last:])), out[count:last])
 
 
 def _call(function: Any, rows: tuple[Array, ...], sketch: Array, row_count: int) -> Array:

@@ -6,7 +6,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planar.batch.closed_form.joined_blocks import JoinedBlocks, input_rows, state_operands
+from planar.batch.closed_form.joined_blocks import (
+    FollowedBlocks,
+    JoinedBlocks,
+    input_rows,
+    state_operands,
+    without_short_arms,
+)
 from planar.batch.march.backend import DesignBatch
 from planar.batch.march.kernel import KernelBlock, KernelEquations, KernelInstructions, Operand
 from planar.codegen.instructions import UnsupportedOperation, required_values
@@ -16,7 +22,8 @@ Array = np.ndarray
 
 
 class _BlockFunctions(NamedTuple):
-    """A block's unknowns and how near its two assemblies are, and where its sketched points are, by operands."""
+    """Of a block by operands: its unknowns and how near its two assemblies are; where its sketched points are; and how
+    near these are without the arm, then that."""
 
     part: KernelBlock
     solve: NumpyFunction
@@ -24,6 +31,8 @@ class _BlockFunctions(NamedTuple):
     locate: NumpyFunction
     point_operands: tuple[Operand, ...]
     points: tuple[int, ...]
+    meet: NumpyFunction
+    meeting_operands: tuple[Operand, ...]
 
 
 class NumpyBlockJoiner:
@@ -39,7 +48,11 @@ class NumpyBlockJoiner:
             points = tuple(k for k, block in enumerate(point_blocks) if block == part.block.block_index)
             solving = self._compile(self.kernel.list_values(self.kernel.closed_form_outputs(part)), known)
             locating = self._compile(self.kernel.list_values([self.kernel.point_coordinates(points)]), known)
-            self.blocks.append(_BlockFunctions(part, *solving, *locating, points))
+            form = part.closed_form
+            assert form is not None
+            meeting = [form.coalescence, *([] if form.squared_arm is None else [form.squared_arm])]
+            near = self._compile(self.kernel.list_values(meeting), known)
+            self.blocks.append(_BlockFunctions(part, *solving, *locating, points, *near))
 
     def _compile(self, wanted: list[int], known: set[Operand]) -> tuple[NumpyFunction, tuple[Operand, ...]]:
         made = self.kernel.hoister.result
@@ -80,9 +93,12 @@ class NumpyBlockJoiner:
         state = np.array([np.broadcast_to(values[each], forced.shape[1:]) for each in self.state])
         return JoinedBlocks(*known, state)
 
-    def coalescences(self, batch: DesignBatch, signs: Array, u: Array) -> Array:
+    def follow(self, batch: DesignBatch, signs: Array, u: Array) -> FollowedBlocks:
         """See `BlockJoiner`."""
-        values, found = self._values(batch, u), np.empty(signs.shape)
+        values, found, arms = self._values(batch, u), np.empty(signs.shape), []
         for k, block in enumerate(self.blocks):
-            found[k] = self._solve_block(block, values, signs[k])
-        return found
+            self._solve_block(block, values, signs[k])
+            found[k], *arm = block.meet(*(values[each] for each in block.meeting_operands))
+            arms += arm
+        state = np.array([np.broadcast_to(values[each], signs.shape[1:]) for each in self.state])
+        return FollowedBlocks(without_short_arms(found, self.equations, arms), state)

@@ -18,19 +18,21 @@ from planar.solving.assembly.block_assemblies import MEETING_COSINE_SQUARED
 
 Array = np.ndarray
 
-CLEARLY_OPEN = 1.0 + 1e-4
-"""Of a block's coalescence: from there on it cannot be joined, whatever rounding does."""
+CLEARLY_OPEN = 1.0 + 1e-6
+"""Of a block's coalescence: from there on it cannot be joined, and stays open by more than what counts as closed."""
 MAX_WAYS = 64
 """Ways to assemble a design that are looked at: one that has more to look at is left to be searched by itself."""
 
 
 class StartAssemblies(NamedTuple):
-    """z (unknowns, designs), for which designs it is surely the assembly that is meant (designs,), and the block that
-    surely cannot be joined, -1 where there is none such (designs,)."""
+    """z (unknowns, designs), for which designs it is surely the assembly that is meant (designs,), the block that
+    surely cannot be joined, -1 where there is none such (designs,), and the signs of the blocks' assemblies (blocks,
+    designs)."""
 
     z: Array
     is_sure: Array
     failed_block: Array
+    signs: Array
 
 
 def find_start_assemblies(
@@ -45,7 +47,7 @@ def find_start_assemblies(
     candidates = reference.candidates
     at = candidates.sketched_by_level
     blocks = [block for block in reference.functions.equations.blocks if slice_length(block.unknowns)]
-    if candidates.counts_turns or not all(at.get(block.block_index) for block in blocks):
+    if candidates.counts_turns or not blocks or not all(at.get(block.block_index) for block in blocks):
         return None
     names = [name for block in blocks for name in at[block.block_index]]
     point_blocks = tuple(block.block_index for block in blocks for _ in at[block.block_index])
@@ -72,7 +74,7 @@ class _StartSearch:
         count, blocks = self.design_count, len(self.block_index)
         first = self.joiner.join(self.batch, self.sketch, np.zeros((blocks, count)))
         ended = self._judge(first)
-        total, state, failed = ended.total, first.state, ended.failed
+        total, state, signs, failed = ended.total, first.state, first.signs, ended.failed
         sure, tied = ended.is_known, np.zeros(count, dtype=bool)
         design, forced = self._other_ways(np.arange(count), first, ended, np.zeros(count, dtype=int), total)
         looked_at = np.ones(count, dtype=int)
@@ -94,13 +96,14 @@ class _StartSearch:
             # alike, as long as none is found that is nearer than both
             tied[of] = (tied[of] & (least >= total[of])) | (~is_surely_farther(greater, least) & np.isfinite(least))
             nearer = ended.total[best] < total[of]
-            state[:, of[nearer]], total[of] = found.state[:, best[nearer]], least
+            state[:, of[nearer]], signs[:, of[nearer]] = found.state[:, best[nearer]], found.signs[:, best[nearer]]
+            total[of] = least
             prefix = np.count_nonzero(forced, axis=0)
             design, forced = self._other_ways(design, found, ended, prefix, total[design])
         sure &= ~tied & (looked_at <= MAX_WAYS)
         fails = sure & ~np.isfinite(total)
         z = unknowns_from_state(self.joiner.state, state, len(self.batch.z0))
-        return StartAssemblies(z, sure & np.isfinite(total), np.where(fails, failed, -1))
+        return StartAssemblies(z, sure & np.isfinite(total), np.where(fails, failed, -1), signs)
 
     class _Ended(NamedTuple):
         """How ways to assemble ended: the squared distance of all points, infinite where a block cannot be joined,

@@ -8,10 +8,11 @@ then is brought to it. So no sine stands in the loop, and few divisions.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import casadi as ca
+import numpy as np
 
 from planar.batch.march.backend import DesignBatch
 from planar.batch.march.regularity import LEAST_START_REGULARITY
@@ -89,6 +90,16 @@ class KernelEquations:
         self.has_newton_blocks = len(self.closed_forms) < len(self.blocks)
         self.sides = ca.vertcat(ca.SX(0, 1), *(form.sign_expression for form in self.closed_forms))
         self.column_of = coordinate_columns(e.coordinates)
+
+    def assembly_signs(self, z: np.ndarray, u: np.ndarray, p: np.ndarray) -> np.ndarray:
+        """Which assembly every block in closed form is in (blocks,), +1 or -1; of designs (..., designs) each."""
+        found: np.ndarray = np.sign(self._sides_function(z, u, p).full())
+        return found.ravel() if z.ndim == 1 else found
+
+    @cached_property
+    def _sides_function(self) -> ca.Function:
+        e = self.equations
+        return ca.Function("sides", [e.z, e.u, e.p], [ca.densify(self.sides)])
 
     def frame(self, link: str) -> Frame:
         """Where a link is, as expressions."""
