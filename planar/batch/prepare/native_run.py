@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import partial
 from math import ceil
+from typing import NamedTuple
 
 import numpy as np
 
 from planar.batch.block import LEAD_IN_STEP
 from planar.batch.design_arrays import design_variables, read_designs, with_design_values
-from planar.batch.march.kernel import kernel_equations
-from planar.batch.march.prediction import LONGEST_STEP
 from planar.batch.prepare.design_numbers import DesignNumbers
 from planar.batch.prepare.run_endings import DEAD_POINT, UNSURE
 from planar.batch.reference_design import ReferenceDesign
 from planar.codegen.instructions import UnsupportedOperation
-from planar.equations.mechanism_numbers import equation_structure
 from planar.model.mechanism import LARGEST_INPUT_POSITION
 from planar.model.pairs.base import Pair
 
@@ -27,8 +25,12 @@ NativeRun = Callable[[Mapping[str, float]], tuple[Array, float, int]]
 
 MAX_CHOICES = 8
 """Choices among the lengths that the file has as nothing of which each has a function; for others there is one."""
-MAX_LEAD_IN = 1000
-"""Positions on the way to where a run starts, at most."""
+MAX_POSITIONS = 20_000
+"""Positions of a run that is compiled, those on its way and between them too."""
+LEAST_STEPS = 128
+"""Steps of a run, those between its own too: each lane of a group that Newton's method solves takes some of them."""
+FINE_STEP = 0.1
+"""rad or sizes: where the input goes farther in a step, other positions are looked at between."""
 
 
 def prepare_native_run(
@@ -40,12 +42,11 @@ def prepare_native_run(
     """
     if not reference.can_run_backend:
         return None
-    inputs, lead = _input_positions(reference, positions)
-    longest = np.max(np.abs(np.diff(inputs[lead:], axis=0)), initial=0.0)
-    if lead > MAX_LEAD_IN or longest > LONGEST_STEP or np.max(np.abs(inputs)) > LARGEST_INPUT_POSITION:
+    grid = _find_positions(reference, positions)
+    if len(grid.u) > MAX_POSITIONS or np.max(np.abs(grid.u)) > LARGEST_INPUT_POSITION:
         return None
     try:
-        run: NativeRun = _RunsByZeros(partial(_compile, reference, points, rates, (inputs, lead), may_shift), reference)
+        run: NativeRun = _RunsByZeros(partial(_compile, reference, points, rates, grid, may_shift), reference)
     except (ImportError, UnsupportedOperation):
         return None
     if any(type(pair).find_misfit is not Pair.find_misfit for pair in reference.mechanism.pairs):
@@ -57,11 +58,11 @@ def _compile(  # many: what a run is made of
     reference: ReferenceDesign,
     points: tuple[str, ...],
     rates: bool,
-    inputs: tuple[Array, int],
+    grid: _Positions,
     may_shift: bool,
     zeros: frozenset[str],
 ) -> NativeRun:
-    """The function for positions of all inputs, of which so many are on the way to where the run starts.
+    """The function of a run over these positions.
 
     `zeros`: lengths that are nothing in all designs. Raises UnsupportedOperation; ImportError where there is no
     compiler.
@@ -69,18 +70,18 @@ def _compile(  # many: what a run is made of
     from planar.batch.prepare.compiled_run import CompiledRun
     from planar.batch.prepare.newton_run import NewtonRun
 
-    u, lead = inputs
     members = [reference.point_member(name) for name in points]
-    shifting = set(range(u.shape[1]))
+    shifting = set(range(grid.u.shape[1]))
     if not may_shift:
         shifting.remove(reference.running_index)
-    if kernel_equations(reference.functions, equation_structure(reference.mechanism)).has_newton_blocks:
-        if lead or reference.candidates.counts_turns:
+    design = DesignNumbers(reference, members, shifting, zeros)
+    if design.equations("q").has_newton_blocks:
+        if grid.lead or reference.candidates.counts_turns:
             raise UnsupportedOperation("a group that is not in closed form starts where the file has it, turns or not")
-        return NewtonRun(reference, DesignNumbers(reference, members, shifting, zeros), members, rates, u)
-    links = tuple(link for link, _ in members)
-    run = CompiledRun(DesignNumbers(reference, members, shifting, zeros), links, rates, u)
-    return partial(_after_lead_in, run, lead) if lead else run
+        run: NativeRun = NewtonRun(reference, design, members, rates, grid.u)
+    else:
+        run = CompiledRun(design, tuple(link for link, _ in members), rates, grid.u)
+    return partial(_at_wanted_positions, run, grid) if grid.lead or grid.every > 1 else run
 
 
 class _RunsByZeros:
@@ -141,23 +142,35 @@ class _FittingPairs:
         return True
 
 
-def _input_positions(reference: ReferenceDesign, positions: Array) -> tuple[Array, int]:
-    """All inputs (positions, inputs) on the way to where the run starts, if that is elsewhere, and over the run; how
-    many are on the way."""
+class _Positions(NamedTuple):
+    """Where all inputs are, u (positions, inputs): `lead` positions on the way to where the run starts; from there on
+    every so manieth is a position of the run."""
+
+    u: Array
+    lead: int
+    every: int
+
+
+def _find_positions(reference: ReferenceDesign, positions: Array) -> _Positions:
+    """All positions of a run over those of its input (rad or m)."""
     u, _, _ = reference.inputs(reference.mechanism, 1)
     running = reference.running_index
     run = positions / float(reference.input_scale[running])
     own = float(u[running, 0])
+    every = ceil(np.max(np.abs(np.diff(run))) / FINE_STEP)
+    # so few of every kind that the lanes of groups solved by Newton's method have enough of them too
+    every = max(every, ceil(LEAST_STEPS / (len(run) - 1)))
+    run = np.interp(np.arange(every * (len(run) - 1) + 1) / every, np.arange(len(run)), run)
     lead = ceil(abs(run[0] - own) / LEAD_IN_STEP)
     way = own + (run[0] - own) * np.arange(lead) / max(lead, 1)
     found = np.repeat(u.T, lead + len(run), axis=0)
     found[:, running] = np.concatenate([way, run])
-    return found, lead
+    return _Positions(found, lead, every)
 
 
-def _after_lead_in(run: NativeRun, lead: int, values: Mapping[str, float]) -> tuple[Array, float, int]:
-    """A run without the positions on its way, on which it must not end."""
+def _at_wanted_positions(run: NativeRun, grid: _Positions, values: Mapping[str, float]) -> tuple[Array, float, int]:
+    """A run without the positions on its way, on which it must not end, and between."""
     rows, ending, position = run(values)
-    if ending == DEAD_POINT and position <= lead:
+    if ending == DEAD_POINT and position <= grid.lead:
         ending = UNSURE
-    return rows[:, lead:], ending, max(position - lead, 0)
+    return rows[:, grid.lead :: grid.every], ending, ceil((position - grid.lead) / grid.every)

@@ -67,9 +67,6 @@ class NewtonRun:
         blocks, equations = tuple(block for block, *_ in design.sketched), design.equations("q")
         if set(blocks) < {part.block.block_index for part in equations.blocks}:
             raise UnsupportedOperation("the sketch does not show every group")
-        # where there are few positions others are put between them
-        self._every = ceil(LEAST_PIECE * LANES / (len(u) - 1))
-        u = _refine(u, self._every)
         pieces = _Pieces(len(u))
         kernels = (
             write_designs_kernel(design.equations("at"), shown, False, LANES, blocks, False),
@@ -114,15 +111,20 @@ class NewtonRun:
             first + -first % 64,
             ctypes.addressof(pointer(out)),  # type: ignore[arg-type]
         )
-        rows = out[HEADER:].reshape(self._shape)[:, : self._positions : self._every]
+        rows = out[HEADER:].reshape(self._shape)[:, : self._positions]
         return rows, out.item(0), 0
 
 
 class _Pieces:
-    """A run of so many positions in pieces of as many steps each, one for each lane; they may overlap."""
+    """A run of so many positions in pieces of as many steps each, one for each lane; they may overlap.
+
+    Raises UnsupportedOperation where they are too short.
+    """
 
     def __init__(self, positions: int):
         self.positions, self.steps = positions, ceil((positions - 1) / LANES)
+        if self.steps < LEAST_PIECE:
+            raise UnsupportedOperation("so few steps do not show where the lanes go")
         self.blocks = ceil(positions / LANES)
         self.width = self.blocks * LANES
         self.firsts = np.round(np.arange(LANES) * ((positions - 1 - self.steps) / (LANES - 1))).astype(int)
@@ -133,12 +135,6 @@ class _Pieces:
         which = np.minimum(np.arange(self.width), self.positions - 1)
         lane = np.searchsorted(self.firsts, which, side="right") - 1
         return ((which - self.firsts[lane]) * stride + lane).astype(np.int64)
-
-
-def _refine(u: Array, every: int) -> Array:
-    """Positions (positions, inputs) with others between, so that these are every so manieth."""
-    at = np.arange(every * (len(u) - 1) + 1) / every
-    return np.stack([np.interp(at, np.arange(len(u)), row) for row in u.T], axis=1)
 
 
 def _own_unknowns(reference: ReferenceDesign, u: Array, members: Sequence[tuple[str, str]], at: Array) -> Array:
