@@ -68,8 +68,9 @@ def test_new_designs_are_those_of_the_general_path(stem, spread, sure):
 def test_a_run_begins_where_it_is_asked_to():
     mechanism, rng = open_four_bar(0.3, 0.8, 0.7, 1.0), np.random.default_rng(3)
     for start, stop in ((1.5, None), (0.2, 2.0), (None, 1.9)):
-        ready = planar.prepared(mechanism, 30, start=start, stop=stop)
-        assert agree_with_general_path(ready, lengths_around(mechanism, rng, 0.1), start, stop)
+        ready = planar.prepared(mechanism, 9, start=start, stop=stop)
+        for values in (lengths_around(mechanism, rng, 0.1), {"AB.length": 0.6}, {"AB.length": 9.0}):
+            assert agree_with_general_path(ready, values, start, stop)
     ready = planar.prepared(mechanism, 30)
     assert agree_with_general_path(ready, {"AB.length": 0.25, "A.position": 2.5, "A.velocity": -1.0})
 

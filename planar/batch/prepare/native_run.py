@@ -173,4 +173,4 @@ def _at_wanted_positions(run: NativeRun, grid: _Positions, values: Mapping[str, 
     rows, ending, position = run(values)
     if ending == DEAD_POINT and position <= grid.lead:
         ending = UNSURE
-    return rows[:, grid.lead :: grid.every], ending, ceil((position - grid.lead) / grid.every)
+    return rows[:, grid.lead :: grid.every], ending, max(ceil((position - grid.lead) / grid.every), 0)
