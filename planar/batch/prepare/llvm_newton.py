@@ -44,7 +44,7 @@ CONTEXT = (
     "places",
     "blocks",
     "positions",
-    "least correction",
+    "correction limit",
 )
 """What does not change, each of eight bytes: addresses, whole numbers, and the limit of what may be corrected."""
 
@@ -57,7 +57,7 @@ class AssemblyLanes(NamedTuple):
 
 
 class NewtonLayout(NamedTuple):
-    """The text of `run`, and how many numbers of scratch it takes beside the march's results."""
+    """The text of `run`, the rows that are told, and how many numbers of scratch it takes beside what it gathers."""
 
     ir: str
     told: int
@@ -105,7 +105,7 @@ class _NewtonRunWriter:
         own = self._context("own values")
         t.write_line(f"call void @{NUMBERS_FUNCTION}(ptr {own}, ptr %places, ptr %given, ptr %numbers)")
         t.write_line(f"store double {self._number(SAID)}, ptr %out")
-        self._write_leave(self._flag(f"fcmp oeq double {self._number(SAID)}, {ALL_SOLVED}"), "fits")
+        self._write_leave(self.ir.add_instruction(f"fcmp oeq double {self._number(SAID)}, {ALL_SOLVED}"), "fits")
         t.write_line(f"store double {UNSURE}, ptr %out")
         rows = {name: self._write_spread(name) for name in ("p", "q", "at", "u1", "u2")}
         found = self._write_correction(rows)
@@ -124,6 +124,7 @@ class _NewtonRunWriter:
         return NewtonLayout(t.module_text(numbers), self.told, self.scratch_size)
 
     def _context(self, name: str, kind: str = "ptr") -> str:
+        """One of `CONTEXT`."""
         t = self.ir
         place = t.add_instruction(f"getelementptr i64, ptr %context, i64 {CONTEXT.index(name)}")
         return t.add_instruction(f"load {kind}, ptr {place}")
@@ -136,16 +137,13 @@ class _NewtonRunWriter:
     def _row(self, base: str, k: int) -> str:
         return self.ir.load(self.ir.double_pointer(base, str(k * LANES)))
 
-    def _flag(self, text: str) -> str:
-        return self.ir.add_instruction(text)
-
     def _write_leave(self, flag: str, on: str) -> None:
         """Go on where a flag is up."""
         self.ir.write_line(f"br i1 {flag}, label %{on}, label %leave")
         self.ir.write_label(on)
 
     def _all(self, flag: str) -> str:
-        return self._flag(f"call i1 @llvm.vector.reduce.and.v{LANES}i1(<{LANES} x i1> {flag})")
+        return self.ir.add_instruction(f"call i1 @llvm.vector.reduce.and.v{LANES}i1(<{LANES} x i1> {flag})")
 
     def _number(self, operand: Operand) -> str:
         t = self.ir
@@ -236,7 +234,7 @@ class _NewtonRunWriter:
                 nearest = t.or_flags(at_sketch, self._write_is_farther(before, least, total))
                 flag = t.and_flags(t.and_flags(flag, regular), t.and_flags(near, nearest))
             before = t.add_instruction(f"fadd {t.vector} {before}, {here}")
-        return self._flag(f"extractelement <{LANES} x i1> {flag}, i64 0")
+        return self.ir.add_instruction(f"extractelement <{LANES} x i1> {flag}, i64 0")
 
     def _write_is_farther(self, before: str, other: str, total: str) -> str:
         t = self.ir
@@ -278,7 +276,7 @@ class _NewtonRunWriter:
         good = self._take_scratch(1)
         arrays = [rows["p"], rows["q"], self._context("states"), self._write_inputs("inputs")]
         arrays += [rows["u1"], self._context("table"), self._context("counts")]
-        limit, steps = self._context("least correction", "double"), self._context("steps", "i64")
+        limit, steps = self._context("correction limit", "double"), self._context("steps", "i64")
         # what the march gives stands at the end of the scratch, where there is room for as many steps as there are
         self.gathered_rows = len(self.march.state)
         out = "%pieces"
@@ -368,7 +366,7 @@ class _NewtonRunWriter:
             third = t.binary("add", t.binary("sub", four[3], four[0]), inner)
             sums = t.binary("add", sums, t.call_intrinsic("fabs", third))
         beyond = t.lanes_from(first, lanes_last)
-        limit = t.broadcast(self._context("least correction", "double"))
+        limit = t.broadcast(self._context("correction limit", "double"))
         fine = t.or_flags(t.compare("ole", sums, limit), beyond)
         t.store(t.binary("add", t.load(most), t.select(fine, t.constant(0.0), t.constant(1.0))), most)
         t.close_loop("d", blocks.lstrip("%"), "difference", "compared")

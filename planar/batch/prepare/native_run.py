@@ -13,6 +13,7 @@ from planar.batch.block import LEAD_IN_STEP
 from planar.batch.design_arrays import design_variables, read_designs, with_design_values
 from planar.batch.prepare.design_numbers import DesignNumbers
 from planar.batch.prepare.run_endings import DEAD_POINT, UNSURE
+from planar.batch.prepare.value_binder import MAX_BOUND_NAMES
 from planar.batch.reference_design import ReferenceDesign
 from planar.codegen.instructions import UnsupportedOperation
 from planar.model.mechanism import LARGEST_INPUT_POSITION
@@ -95,14 +96,24 @@ class _RunsByZeros:
         self._compile = compile_run
         self._run = compile_run(self._zeros)
         self._others: dict[frozenset[str], NativeRun] = {}
+        self._by_names: dict[tuple[str, ...], NativeRun] = {}
 
     def __call__(self, values: Mapping[str, float]) -> tuple[Array, float, int]:
         try:
             return self._run(values)
         except KeyError:
-            if not self._names.issuperset(values):
-                raise
-        given = self._zeros.intersection(values)
+            names = tuple(values)
+        run = self._by_names.get(names)
+        if run is None:
+            if not self._names.issuperset(names):
+                raise KeyError(names)
+            if len(self._by_names) >= MAX_BOUND_NAMES:
+                self._by_names.clear()
+            run = self._by_names[names] = self._find_other(self._zeros.intersection(names))
+        return run(values)
+
+    def _find_other(self, given: frozenset[str]) -> NativeRun:
+        """The run of designs that give these lengths a value."""
         if given not in self._others and len(self._others) >= MAX_CHOICES:
             given = self._zeros
         run = self._others.get(given)
@@ -112,7 +123,7 @@ class _RunsByZeros:
             except UnsupportedOperation:
                 run = _refuse
             self._others[given] = run
-        return run(values)
+        return run
 
 
 def _refuse(_values: Mapping[str, float]) -> tuple[Array, float, int]:

@@ -88,7 +88,7 @@ class NewtonRun:
         for name, function in zip(("corrector", "march"), self._kernels, strict=True):
             numbers[name] = ctypes.cast(function, ctypes.c_void_p).value or 0
         numbers |= {"steps": pieces.steps + 1, "blocks": pieces.blocks, "positions": len(u)}
-        numbers["least correction"] = int(np.array(correction_limit(longest_step(u))).view(np.int64))
+        numbers["correction limit"] = int(np.array(correction_limit(longest_step(u))).view(np.int64))
         self._context = np.array([numbers[name] for name in CONTEXT], dtype=np.int64)
         self._context_pointer = self._context.ctypes.data
         self._function: Any = compile_function(layout.ir, FUNCTION_NAME, *ARGUMENT_TYPES)
