@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.closed_form.ends import find_ends
+from planar.batch.closed_form.ends import closed_form_designs, find_ends
 from planar.batch.dead_point_tracking import FollowedDesigns, follow_to_dead_points
 from planar.batch.design_arrays import values_of_design, with_design_values
 from planar.batch.general_path import OUTCOMES, DesignQuestion, solve_design
@@ -216,11 +216,11 @@ class _DesignBlockSolver:
         some = np.flatnonzero((good > 0) & (good < len(march.input_offsets)))
         if not some.size:
             return
-        index, backend = self.reference.running_index, self.block.backend
-        ends = None
-        if signs is not None:
-            ends = find_ends(march.select(some), index, good[some], signs[:, some], runner, backend)
-        if ends is not None:
+        index = self.reference.running_index
+        own = None if signs is None else signs[:, some]
+        designs = closed_form_designs(march.select(some), index, own, runner, self.block.backend)
+        if designs is not None:
+            ends = find_ends(designs, self.range_length[some] / self.scale, good[some], self.block.steps)
             self._settle(some, ends, out)
             some = some[~ends.is_settled]
         if some.size:
