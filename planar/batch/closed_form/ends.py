@@ -40,6 +40,14 @@ class ClosedFormDesigns:
                 distance[which], block[which] = found
         return DeadPoints(distance, block)
 
+    def lead(self, span: Array, step: float) -> tuple[Array, Array]:
+        """Designs led on so far (designs,): the unknowns there (unknowns, designs), and how far there was a dead point,
+        infinitely where there was none, not a number where that is not decided (designs,)."""
+        ends = self.find_dead_points(np.zeros(len(span)), span, np.full(len(span), step)).distance
+        u = self.batch.u0 + span * self.direction[:, None]
+        state = self.follow(np.arange(len(span)), self.signs, u)
+        return unknowns_from_state(self.joiner.state, state, len(self.batch.z0)), np.where(span == 0.0, np.inf, ends)
+
     def follow(self, design: Array, signs: Array, u: Array) -> Array:
         """The state (operands, positions) of designs at inputs u (inputs, positions), by blocks' signs."""
         with np.errstate(all="ignore"):
@@ -62,7 +70,7 @@ class ClosedFormDesigns:
 def closed_form_designs(
     batch: DesignBatch, index: int, signs: Array | None, runner: DesignRunner, backend: str
 ) -> ClosedFormDesigns | None:
-    """Designs of a batch at their start, where `index` is the input that runs; None where a block is not in closed form.
+    """Designs of a batch at their start, where `index` is the input that runs; None where a block has no closed form.
 
     signs (blocks, designs) of the blocks' assemblies, 0 where that is not known.
     """
