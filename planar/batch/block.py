@@ -275,7 +275,8 @@ class _DesignBlockSolver:
         settled = some[found.is_settled]
         self.solved_steps[settled] = found.solved_steps[found.is_settled]
         distance = np.sign(self.range_length[settled]) * found.distance[found.is_settled] * self.scale
-        self.dead_point[settled] = np.where(np.isfinite(distance), self.start[settled] + distance, np.nan)
+        ended = self.solved_steps[settled] <= self.block.steps
+        self.dead_point[settled] = np.where(ended, self.start[settled] + distance, np.nan)
 
     def _lead_to_start(
         self, march: DesignBatch, fit: Array, signs: Array | None, runner: DesignRunner
