@@ -10,7 +10,7 @@ import numpy as np
 
 from planar.batch.general_path import OUTCOMES
 from planar.batch.prepare.kept_results import KeptPoints, LateSentences
-from planar.batch.prepare.native_run import prepare_native_run
+from planar.batch.prepare.native_run import NativeRuns, prepare_native_run
 from planar.batch.prepare.run_endings import ALL_SOLVED, CANNOT_BE_ASSEMBLED, UNSURE
 from planar.batch.reference_design import reference_design
 from planar.batch.sweep import check_range, sweep
@@ -96,9 +96,10 @@ class PreparedSweep:
         own = float(self.reference.mechanism.inputs[self.reference.running_index].position)
         begin = own if start is None else float(start)
         self.input = begin + (2.0 * np.pi if stop is None else stop - begin) * np.linspace(0.0, 1.0, steps + 1)
-        self._run = prepare_native_run(self.reference, self.points, rates, self.input, start is None and stop is None)
-        if self.reference.is_sliding and stop is None:
-            self._run = None  # each design between limits of its own
+        # a slide without a stop runs in each design between limits of its own
+        is_alike = not (self.reference.is_sliding and stop is None)
+        may_shift = start is None and stop is None
+        self._runs = prepare_native_run(self.reference, self.points, rates, self.input, may_shift) if is_alike else None
         self._index = {name: 2 * k for k, name in enumerate(self.points)}
         self._solved_status = np.zeros(steps + 1, dtype=np.int8)
         self._solved_status.flags.writeable = False
@@ -116,12 +117,14 @@ class PreparedSweep:
         values = {} if values is None else values
         if not PLAIN_NUMBERS.issuperset(map(type, values.values())):
             values = {name: _check_number(name, value) for name, value in values.items()}
-        if self._run is None:
+        if self._runs is None:
             return self._run_as_sweep(values)
         try:
-            found, ending, end = self._run(values)
-        except (KeyError, struct.error, TypeError):  # which the sweep says in words
-            return self._run_as_sweep(values)
+            found, ending, end = self._runs.run(values)
+        except KeyError:
+            found, ending, end = self._run_other(self._runs, values)
+        except (struct.error, TypeError):  # which the sweep says in words
+            ending = UNSURE
         if ending == UNSURE:
             return self._run_as_sweep(values)
         status, said = self._solved_status, NOTHING_SAID
@@ -136,6 +139,13 @@ class PreparedSweep:
             return PreparedRun(position, None, None, status, said)
         orders = KeptPoints(found, self._index, wide), KeptPoints(found, self._index, 2 * wide)
         return PreparedRun(position, *orders, status, said)
+
+    def _run_other(self, runs: NativeRuns, values: Mapping[str, float]) -> tuple[Array, float, int]:
+        """The run of a design with a name that the usual function does not know."""
+        try:
+            return runs.run_other(values)
+        except (KeyError, struct.error, TypeError):
+            return np.empty((0, 0)), UNSURE, 0
 
     def _run_as_sweep(self, values: Mapping[str, float]) -> PreparedRun:
         """The same by a sweep of one design, which leaves nothing out."""

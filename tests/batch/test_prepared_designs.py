@@ -32,7 +32,11 @@ def lengths_around(mechanism, rng, spread, zeros=0.0):
 
 def agree_with_general_path(ready, values, start=None, stop=None):
     """Whether the compiled code was sure; then it has said what the general path says."""
-    if ready._run is None or ready._run(values)[1] == UNSURE:
+    try:
+        sure = ready._runs.run(values)[1] != UNSURE
+    except KeyError:
+        sure = ready._runs.run_other(values)[1] != UNSURE
+    if not sure:
         return False
     found, reference = ready(values), ready.reference
     mechanism = with_design_values(reference.mechanism, values)

@@ -104,11 +104,13 @@ class CompiledRun:
         self._context_pointer = self._context.ctypes.data
         self._shape = layout.rows.row_count + 1, width
         self._told, self._positions, self._ending = layout.rows.told, len(u), layout.rows.row_count * width
-        self._bind = ValueBinder(design.index).bind
+        binder = ValueBinder(design.index)
+        self._bind, self._bound = binder.bind, binder.bound
 
     def __call__(self, values: Mapping[str, float]) -> tuple[Array, float, int]:
         """See `native_run.NativeRun`."""
-        pack, _, places = self._bind(tuple(values))
+        names = tuple(values)
+        pack, _, places = self._bound.get(names) or self._bind(names)
         out = np.empty(self._shape)
         self._function(
             self._context_pointer,

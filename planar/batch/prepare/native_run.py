@@ -24,6 +24,14 @@ NativeRun = Callable[[Mapping[str, float]], tuple[Array, float, int]]
 """From values by name to the rows of the wanted points (rows, positions), which are the caller's own, how the run ended
 (see `run_endings`), and at which position. Raises KeyError for a name that is not there."""
 
+
+class NativeRuns(NamedTuple):
+    """The function for most designs, and the one for designs with a name that the first does not know."""
+
+    run: NativeRun
+    run_other: NativeRun
+
+
 MAX_CHOICES = 8
 """Choices among the lengths that the file has as nothing of which each has a function; for others there is one."""
 MAX_POSITIONS = 20_000
@@ -36,8 +44,8 @@ FINE_STEP = 0.1
 
 def prepare_native_run(
     reference: ReferenceDesign, points: tuple[str, ...], rates: bool, positions: Array, may_shift: bool
-) -> NativeRun | None:
-    """The compiled function of a run over these positions of the running input; None where there is none.
+) -> NativeRuns | None:
+    """The compiled functions of a run over these positions of the running input; None where there are none.
 
     `may_shift`: whether the run starts where the design's own input stands, wherever that is.
     """
@@ -47,12 +55,12 @@ def prepare_native_run(
     if len(grid.u) > MAX_POSITIONS or np.max(np.abs(grid.u)) > LARGEST_INPUT_POSITION:
         return None
     try:
-        run: NativeRun = _RunsByZeros(partial(_compile, reference, points, rates, grid, may_shift), reference)
+        runs = _RunsByZeros(partial(_compile, reference, points, rates, grid, may_shift), reference)
     except (ImportError, UnsupportedOperation):
         return None
     if any(type(pair).find_misfit is not Pair.find_misfit for pair in reference.mechanism.pairs):
-        return _FittingPairs(reference, run)
-    return run
+        return NativeRuns(_FittingPairs(reference, runs.run), _FittingPairs(reference, runs.run_other))
+    return NativeRuns(runs.run, runs.run_other)
 
 
 def _compile(  # many: what a run is made of
@@ -94,15 +102,13 @@ class _RunsByZeros:
         self._zeros = frozenset(name for name, each in known.items() if each.link and each.value == 0.0)
         self._names = frozenset(known)
         self._compile = compile_run
-        self._run = compile_run(self._zeros)
+        self.run = compile_run(self._zeros)
         self._others: dict[frozenset[str], NativeRun] = {}
         self._by_names: dict[tuple[str, ...], NativeRun] = {}
 
-    def __call__(self, values: Mapping[str, float]) -> tuple[Array, float, int]:
-        try:
-            return self._run(values)
-        except KeyError:
-            names = tuple(values)
+    def run_other(self, values: Mapping[str, float]) -> tuple[Array, float, int]:
+        """The run of a design that gives a length a value which the file has as nothing."""
+        names = tuple(values)
         run = self._by_names.get(names)
         if run is None:
             if not self._names.issuperset(names):

@@ -21,15 +21,16 @@ class ValueBinder:
     def __init__(self, index: Mapping[str, int]):
         """`index`: the place of each name that there is."""
         self._index = index
-        self._bound: dict[tuple[str, ...], Binding] = {}
+        self.bound: dict[tuple[str, ...], Binding] = {}
+        "the bindings that are known"
 
     def bind(self, names: tuple[str, ...]) -> Binding:
         """The binding of names in an order. Raises KeyError for one that is not there."""
-        found = self._bound.get(names)
+        found = self.bound.get(names)
         if found is None:
             places = np.array([len(names), *(self._index[name] for name in names)], dtype=np.int64)
-            if len(self._bound) >= MAX_BOUND_NAMES:
-                self._bound.clear()
+            if len(self.bound) >= MAX_BOUND_NAMES:
+                self.bound.clear()
             # packing keeps the order; bytes are read where they are
-            found = self._bound[names] = Struct(f"{len(names)}d").pack, places, places.ctypes.data
+            found = self.bound[names] = Struct(f"{len(names)}d").pack, places, places.ctypes.data
         return found
