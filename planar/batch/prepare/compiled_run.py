@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -21,7 +20,7 @@ from planar.batch.prepare.llvm_positions import (
 from planar.batch.prepare.llvm_start import FUNCTION_NAME as START_FUNCTION
 from planar.batch.prepare.llvm_start import write_start
 from planar.batch.prepare.run_endings import ALL_SOLVED, DEAD_POINT
-from planar.batch.prepare.value_binder import ValueBinder
+from planar.batch.prepare.value_binder import ValueBinder, address_of
 from planar.codegen.instructions import UnsupportedOperation
 from planar.codegen.llvm_compile import compile_function
 from planar.codegen.llvm_ir import IRWriter
@@ -112,12 +111,7 @@ class CompiledRun:
         names = tuple(values)
         pack, _, places = self._bound.get(names) or self._bind(names)
         out = np.empty(self._shape)
-        self._function(
-            self._context_pointer,
-            places,
-            pack(*values.values()),
-            ctypes.addressof(ctypes.c_char.from_buffer(out)),  # type: ignore[arg-type]
-        )
+        self._function(self._context_pointer, places, pack(*values.values()), address_of(out))
         ending = out.item(self._ending)
         rows = out[: self._told, : self._positions]
         return rows, ending, int(out.item(self._ending + 1)) if ending == DEAD_POINT else 0

