@@ -56,7 +56,6 @@ def agree_with_general_path(ready, values, start=None, stop=None):
     ("stem", "spread", "sure"),
     [
         ("drag-link", 0.5, 0.6),
-        ("watt-1-six-bar", 0.3, 0.6),
         ("scott-russell", 0.3, 0.6),
         ("slotted-yoke", 0.03, 0.6),
         ("stephenson-3-five-bar", 0.02, 0.6),
