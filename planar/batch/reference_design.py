@@ -106,7 +106,8 @@ class ReferenceDesign:
         """What the residual check lets pass for these designs: as `ResidualCheck.tolerance`, of the longest of any."""
         kinds = [kind for pair in self.mechanism.pairs for kind in pair.number_kinds]
         lengths = np.array([kind is MeasureKind.LENGTH for kind in kinds], dtype=bool)
-        reach = float(np.nanmax(np.abs(p[lengths]), initial=0.0))
+        reach = float(np.max(np.abs(p[lengths]), initial=0.0))
+        reach = reach if np.isfinite(reach) else float(np.nanmax(np.abs(p[lengths]), initial=0.0))
         return float(residual_tolerance(len(self.mechanism.links), reach))
 
     def inputs(self, designs: Mechanism, many: int) -> tuple[Array, Array, Array]:
@@ -186,9 +187,18 @@ class ReferenceDesign:
         for at in shapes.values():
             for point in at.points.values():
                 size = np.fmax(size, np.hypot(point.x, point.y))
+        for link, first, second in self.arms():
+            one, other = shapes[link].points[first], shapes[link].points[second]
+            arm = np.hypot(other.x - one.x, other.y - one.y)
+            found |= (arm > 0.0) & (arm < SHORT_ARM * size)
+        return found
+
+    def arms(self) -> Iterator[tuple[str, str, str]]:
+        """Two points of a link each, by which pairs hold it that the blocks before it, or its own, make use of."""
         column, known_from = self.solver.column, self.functions.equations.known_after_block
-        known = {link: known_from[column[link, "angle"]] if (link, "angle") in column else -1 for link in shapes}
-        for link, at in shapes.items():
+        names = [link.name for link in self.mechanism.links]
+        known = {link: known_from[column[link, "angle"]] if (link, "angle") in column else -1 for link in names}
+        for link in names:
             if known[link] < 0:
                 continue  # what the input turns is turned exactly
             pinned = {
@@ -198,10 +208,7 @@ class ReferenceDesign:
                 for owner, point in pair.coincident_points()
                 if owner == link
             }
-            for one, other in combinations([at.points[point] for point in sorted(pinned)], 2):
-                arm = np.hypot(other.x - one.x, other.y - one.y)
-                found |= (arm > 0.0) & (arm < SHORT_ARM * size)
-        return found
+            yield from ((link, *both) for both in combinations(sorted(pinned), 2))
 
     def block_assemblies(self) -> tuple[tuple[Array, int], ...]:
         """For every block the assemblies (roots, unknowns) from which those of designs start, and how many one finds.

@@ -110,6 +110,10 @@ class IRWriter:
             f"select <{self.lanes} x i1> {flag}, {self.vector} {value}, {self.vector} zeroinitializer"
         )
 
+    def select(self, flag: str, value: str, other: str) -> str:
+        """One value where a flag is up, else the other."""
+        return self.add_instruction(f"select <{self.lanes} x i1> {flag}, {self.vector} {value}, {self.vector} {other}")
+
     def allocate(self, many: int = 1) -> str:
         """Room for values."""
         return self.add_instruction(f"alloca {self.vector}, i64 {many}, align 64")
@@ -139,17 +143,31 @@ class IRWriter:
         own = self.add_instruction(f"add <{lanes} x i64> {begin}, <{', '.join(f'i64 {k}' for k in range(lanes))}>")
         return self.add_instruction(f"icmp sge <{lanes} x i64> {own}, {spread(last)}")
 
-    def module_text(self) -> str:
-        """All that was written, with what it calls."""
-        v, of = self.vector, f"v{self.lanes}f64"
-        calls = [f"declare {v} @llvm.{name}.{of}({v})" for name in ("sqrt", "fabs")]
-        calls += [f"declare {v} @llvm.{name}.{of}({v}, {v})" for name in ("minnum", "maxnum", "copysign")]
-        calls += [
+    def module_text(self, *others: IRWriter) -> str:
+        """All that was written, ahead of it what others wrote, with what it calls."""
+        calls = {
             f"declare double @{name}({', '.join(['double'] * many)}) memory(none)"
             for name, many in LIBRARY_ARGUMENT_COUNTS.items()
-        ]
-        lines = [line for section in self._sections for line in section]
-        return "\n".join([*lines, *calls, "!0 = !{i32 1}"])
+        }
+        for lanes in {each.lanes for each in (self, *others)}:
+            v, of = f"<{lanes} x double>", f"v{lanes}f64"
+            calls |= {f"declare {v} @llvm.{name}.{of}({v})" for name in ("sqrt", "fabs")}
+            calls |= {f"declare {v} @llvm.{name}.{of}({v}, {v})" for name in ("minnum", "maxnum", "copysign")}
+            calls |= {f"declare double @llvm.vector.reduce.{name}.{of}({v})" for name in ("fmin", "fmax")}
+            calls.add(f"declare double @llvm.vector.reduce.fadd.{of}(double, {v})")
+        lines = [line for each in (*others, self) for section in each._sections for line in section]
+        return "\n".join([*lines, *sorted(calls), "!0 = !{i32 1}"])
+
+    def reduce(self, what: str, value: str) -> str:
+        """The least ("fmin"), greatest ("fmax") or sum ("fadd") of the lanes: one number."""
+        first = "double -0.0, " if what == "fadd" else ""
+        return self.add_instruction(
+            f"call double @llvm.vector.reduce.{what}.v{self.lanes}f64({first}{self.vector} {value})"
+        )
+
+    def constants(self, values: Sequence[float]) -> str:
+        """A constant for each lane."""
+        return f"<{', '.join(f'double {_double_literal(value)}' for value in values)}>"
 
     def double_pointer(self, base: str, index: str) -> str:
         """A pointer to the double at an index."""

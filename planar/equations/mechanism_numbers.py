@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 
 from planar.foundation.arrays import Array
+from planar.foundation.jets import Scalar
 from planar.foundation.private_cache import source_stamp
 from planar.model.link_shapes import Link, LinkShape, link_shape
 from planar.model.mechanism import Input, Mechanism, relative_motions
@@ -78,11 +79,11 @@ def pair_numbers_from(mechanism: Mechanism, numbers: Mapping[str, Sequence[float
     return np.array(found, dtype=float)
 
 
-def scaled_pair_numbers(pair: Pair, shapes: Mapping[str, LinkShape], unit: float) -> list[float]:
+def scaled_pair_numbers(pair: Pair, shapes: Mapping[str, LinkShape], unit: Scalar) -> list[Scalar]:
     """The numbers of one pair, lengths divided by `unit`."""
     return scale_lengths(pair.measure([shapes[link] for link in pair.bodies]), pair.number_kinds, unit)
 
 
-def scale_lengths(values: Sequence[float], kinds: Sequence[MeasureKind], unit: float) -> list[float]:
+def scale_lengths(values: Sequence[Scalar], kinds: Sequence[MeasureKind], unit: Scalar) -> list[Scalar]:
     """Numbers with the lengths among them divided by `unit`."""
     return [value / unit if kind is MeasureKind.LENGTH else value for value, kind in zip(values, kinds, strict=True)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from typing import Any
 
@@ -27,7 +27,7 @@ def _short(value: Any) -> str:
         return str([float(f"{each:.6g}") for each in value.ravel()]) if few else f"<array {value.shape}>"
     if isinstance(value, Mapping):
         return f"<{', '.join(map(str, list(value)[:MAX_ITEMS]))}{', …' if len(value) > MAX_ITEMS else ''}>"
-    if isinstance(value, tuple | list) and not hasattr(value, "_fields"):
+    if isinstance(value, Sequence) and not hasattr(value, "_fields"):
         if len(value) > MAX_ITEMS:
             return f"<{len(value)} items>"
         return f"({', '.join(map(_short, value))}{',' if len(value) == 1 else ''})"

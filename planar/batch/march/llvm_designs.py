@@ -6,7 +6,7 @@ What Newton's method solves is predicted by the polynomial through the steps bef
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import inf
+from math import inf, nan
 from typing import NamedTuple
 
 import casadi as ca
@@ -48,18 +48,22 @@ def write_designs_kernel(
     rates: bool,
     lanes: int,
     point_blocks: tuple[int, ...] | None = None,
+    streams: bool = True,
 ) -> DesignsKernelLayout:
     """The function for points on these links, none of which is the frame. Raises UnsupportedOperation.
 
-    A step gives x and y of every point, then with `rates` all first and all second rates. With `levels`, of the block
+    A step gives x and y of every point, then with `rates` all first and all second rates: no numbers from the first
+    that does not pass the checks. With `levels`, of the block
     that places each point, it gives more: x and y of every point in the other assembly of its block (infinite where
     that is not in closed form), the state, and how regular the least regular of the blocks is that Newton's method
-    solves.
+    solves. What it gives goes past the caches where it `streams`: it is not read again soon.
     """
     carried: frozenset[Operand] = frozenset()
     while True:
         try:
-            return _DesignsKernelWriter(equations, tuple(links), rates, lanes, point_blocks, carried).write()
+            writer = _DesignsKernelWriter(equations, tuple(links), rates, lanes, point_blocks, carried)
+            writer.streams = streams
+            return writer.write()
         except BareAngle as angle:
             if angle.operand in carried:  # its value is wanted before its own block is solved
                 raise UnsupportedOperation(f"a group stands in an angle of a later one: {angle.operand}") from None
@@ -67,6 +71,9 @@ def write_designs_kernel(
 
 
 class _DesignsKernelWriter(KernelWriter):
+    streams = True
+    "whether results are written past the caches"
+
     def __init__(
         self,
         equations: KernelEquations,
@@ -360,11 +367,6 @@ class _DesignsKernelWriter(KernelWriter):
             nowhere = [t.constant(inf)] * 2
             many += [part for k in range(len(self.links)) for part in self.other_points.get(k, nowhere)]
             many += [*(have[leaf] for leaf in self.state), t.load(self.regularity_slot)]
-        for k, each in enumerate(many):
-            place = t.add_instruction(
-                f"add i64 {t.add_instruction('mul i64 %k, %time')}, {t.add_instruction(f'mul i64 %row, {k}')}"
-            )
-            t.store_streaming(each, t.double_pointer("%out", t.add_instruction(f"add i64 {place}, {self.lane}")))
         # sums, since what is not a number stays so in them, and is not below anything
         worst = t.add_all(
             [t.constant(0.0), *(t.call_intrinsic("fabs", each) for each in (*left, *self.write_circle_residuals(have)))]
@@ -378,4 +380,13 @@ class _DesignsKernelWriter(KernelWriter):
         for flag in flags[1:]:
             flags[0] = t.and_flags(flags[0], flag)
         t.store(t.select_or_zero(flags[0], t.load(self.passed_slot)), self.passed_slot)
+        if self.point_blocks is None:
+            fine = t.compare("ogt", t.load(self.passed_slot), "zeroinitializer")
+            many = [t.select(fine, each, t.constant(nan)) for each in many]
+        for k, each in enumerate(many):
+            place = t.add_instruction(
+                f"add i64 {t.add_instruction('mul i64 %k, %time')}, {t.add_instruction(f'mul i64 %row, {k}')}"
+            )
+            store = t.store_streaming if self.streams else t.store
+            store(each, t.double_pointer("%out", t.add_instruction(f"add i64 {place}, {self.lane}")))
         t.store(t.binary("add", t.load(self.good_count_slot), t.load(self.passed_slot)), self.good_count_slot)

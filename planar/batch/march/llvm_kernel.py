@@ -67,11 +67,7 @@ class KernelWriter(KernelInstructions):
 
     def write_angle_sum(self, cos: str, sin: str, c: str, s: str) -> tuple[str, str]:
         """The cos and sin of a sum of two angles."""
-        t = self.ir
-        return (
-            t.binary("sub", t.binary("mul", cos, c), t.binary("mul", sin, s)),
-            t.binary("add", t.binary("mul", sin, c), t.binary("mul", cos, s)),
-        )
+        return write_angle_sum(self.ir, cos, sin, c, s)
 
     def write_small_rotation(self, c: str, s: str, angle: str) -> tuple[str, str]:
         """The cos and sin of an angle turned by a little."""
@@ -100,3 +96,11 @@ class KernelWriter(KernelInstructions):
             for k, turns in enumerate(self.equations.is_angle)
             if turns
         ]
+
+
+def write_angle_sum(t: IRWriter, cos: str, sin: str, c: str, s: str) -> tuple[str, str]:
+    """The cos and sin of a sum of two angles."""
+    return (
+        t.binary("sub", t.binary("mul", cos, c), t.binary("mul", sin, s)),
+        t.binary("add", t.binary("mul", sin, c), t.binary("mul", cos, s)),
+    )

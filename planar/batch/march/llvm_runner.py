@@ -63,17 +63,20 @@ def run_designs_kernel(batch: DesignBatch, extra_corrections: int = 0, out: Arra
     """
     longest = _longest_step(batch)
     kernel = designs_kernel(batch_equations(batch), tuple(batch.links), batch.rates)
-    table, counts = _step_table(batch.input_offsets)
+    table, counts = step_table(batch.input_offsets)
     tolerances = batch.tolerance, correction_limit(longest), batch.unit
     out, good = _run_kernel(kernel, batch, batch.rates, (table, counts + extra_corrections), tolerances, out)
     # what is told of a step only at the next one condemns the step too
-    return out, np.where((good > 1) & (good < len(table)), good - 1, good)
+    condemned = np.flatnonzero((good > 1) & (good < len(table)))
+    good[condemned] -= 1
+    out[good[condemned], :, condemned] = np.nan
+    return out, good
 
 
 def unknowns_at_steps(batch: DesignBatch, extra_corrections: int, steps: Array) -> Array:
     """The unknowns (unknowns, designs) of a run that came to these steps, at (designs,), of each design to one."""
     kernel = designs_kernel(batch_equations(batch), (), False, ())
-    table, counts = _step_table(batch.input_offsets)
+    table, counts = step_table(batch.input_offsets)
     tolerances = batch.tolerance, correction_limit(_longest_step(batch)), 1.0
     found, _ = _run_kernel(kernel, batch, False, (table, counts + extra_corrections), tolerances, None)
     return _unknowns_from_state(kernel, found[steps, :, np.arange(len(steps))].T, len(batch.z0))
@@ -82,7 +85,7 @@ def unknowns_at_steps(batch: DesignBatch, extra_corrections: int, steps: Array) 
 def correct_designs(batch: DesignBatch, point_blocks: Sequence[int], corrections: int) -> CorrectedAssemblies:
     """Designs corrected from unknowns near by, at the inputs where they start. Raises UnsupportedOperation."""
     kernel = designs_kernel(batch_equations(batch), tuple(batch.links), False, tuple(point_blocks))
-    table, counts = _step_table(np.zeros((1, len(batch.u0))))
+    table, counts = step_table(np.zeros((1, len(batch.u0))))
     counts[:] = corrections
     out, good = _run_kernel(kernel, batch, False, (table, counts), (batch.tolerance, np.inf, 1.0), None)
     rows, places = out[0], 2 * len(batch.links)
@@ -121,8 +124,8 @@ def _run_kernel(
     rows = (
         batch.p,
         batch.q,
-        _operand_rows(kernel.state, batch.z0),
-        _operand_rows(kernel.inputs, batch.u0),
+        operand_rows(kernel.state, batch.z0),
+        operand_rows(kernel.inputs, batch.u0),
         np.concatenate([batch.u1, batch.u2]) if rates else np.zeros((0, many)),
     )
     given = out
@@ -168,7 +171,7 @@ def _call_function(
     )
 
 
-def _operand_rows(operands: Sequence[tuple[str, int]], values: Array) -> Array:
+def operand_rows(operands: Sequence[tuple[str, int]], values: Array) -> Array:
     """Cosines, sines and values of rows, as leaves say."""
     found = np.empty((len(operands), values.shape[1]))
     for row, (part, k) in zip(found, operands, strict=True):
@@ -179,7 +182,7 @@ def _operand_rows(operands: Sequence[tuple[str, int]], values: Array) -> Array:
     return found
 
 
-def _step_table(offsets: Array) -> tuple[Array, Array]:
+def step_table(offsets: Array) -> tuple[Array, Array]:
     """What every step needs to know: the weights of the steps before, and how far each input has gone."""
     steps, inputs = offsets.shape
     table = np.zeros((steps, PREDICTOR_ORDER + 3 * inputs))

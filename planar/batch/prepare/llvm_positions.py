@@ -1,0 +1,165 @@
+"""One linkage at many positions of its inputs, these in the lanes, as functions of LLVM IR.
+
+Only where every block is in closed form: then nothing goes from one position to the next but the signs of the blocks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from planar.batch.march.kernel import BareAngle, KernelEquations, Operand
+from planar.batch.march.llvm_kernel import KernelWriter, OperandNames
+from planar.batch.march.prediction import MAX_TURN_PER_STEP
+from planar.batch.prepare.llvm_ending import FUNCTION_NAME as ENDING_FUNCTION
+from planar.batch.prepare.llvm_ending import PositionRows, write_ending, write_keeps_apart
+from planar.batch.prepare.run_endings import ALL_SOLVED
+from planar.codegen.instructions import UnsupportedOperation
+from planar.codegen.llvm_ir import IRWriter
+
+LANES = 16
+FUNCTION_NAME = "positions"
+
+
+class PositionFunctions(NamedTuple):
+    """The writers of both functions, what the rows are, and of what the rows of given inputs are cos, sin and value."""
+
+    writers: tuple[IRWriter, IRWriter]
+    rows: PositionRows
+    inputs: tuple[Operand, ...]
+
+
+def write_positions(
+    equations: KernelEquations, links: tuple[str, ...], rates: bool, order: Sequence[Operand]
+) -> PositionFunctions:
+    """The functions of a structure for points on these links, which read a design's numbers in this order.
+
+    `positions` writes the rows, and how the run ends; where that is not well, it asks `ending`. Raises
+    UnsupportedOperation.
+    """
+    try:
+        writer = _PositionsWriter(equations, links, rates, order)
+        rows = writer.write()
+    except BareAngle as angle:
+        raise UnsupportedOperation(f"an angle counts its turns: {angle.operand}") from None
+    return PositionFunctions((write_ending(equations, rows), writer.ir), rows, writer.input_operands)
+
+
+class _PositionsWriter(KernelWriter):
+    def __init__(self, equations: KernelEquations, links: tuple[str, ...], rates: bool, order: Sequence[Operand]):
+        super().__init__(equations, links, rates, LANES, frozenset({"p", "q", "u1", "u2", "sign"}), frozenset())
+        if any(part.closed_form is None for part in equations.blocks):
+            raise UnsupportedOperation("a group is not in closed form")
+        self.order = order
+
+    def write(self) -> PositionRows:
+        """The whole function: blocks of positions, then whether the blocks keep clear of their dead points."""
+        t, of = self.ir, self.equations
+        t.write_line(
+            f"define internal void @{FUNCTION_NAME}(i64 %blocks, i64 %positions, ptr noalias readonly %numbers, "
+            "ptr noalias readonly %drive, ptr noalias %out, ptr noalias %said) {"
+        )
+        t.write_label("entry")
+        self.passed_slot = t.allocate()
+        t.store(t.constant(1.0), self.passed_slot)
+        self.width = t.add_instruction(f"mul i64 %blocks, {t.lanes}")
+        have: OperandNames = {
+            operand: t.broadcast(t.add_instruction(f"load double, ptr {t.double_pointer('%numbers', str(k))}"))
+            for k, operand in enumerate(self.order)
+            if operand[0] in ("p", "q", "u1", "u2", "sign", "d", "dc", "ds", "tolerance", "unit")
+        }
+        t.mark_hoist_point()
+        t.write_line("br label %block")
+        t.write_label("block")
+        t.write_line("%b = phi i64 [0, %entry], [%bnext, %block]")
+        first = t.add_instruction(f"mul i64 %b, {t.lanes}")
+        self._write_inputs(first, have)
+        bends = [self.write_closed_form(part, have) for part in of.blocks]
+        left, counted, *values = self.write_separately(
+            [of.residuals(), self.counted_angles(), *self.output_expressions()], have
+        )
+        worst = t.add_all(
+            [t.constant(0.0), *(t.call_intrinsic("fabs", each) for each in (*left, *self.write_circle_residuals(have)))]
+        )
+        self._write_condition(t.compare("ole", worst, have["tolerance", 0]))
+        told = [t.binary("mul", have["unit", 0], each) for part in values for each in part]
+        for k, each in enumerate((*told, *counted, *bends, worst)):
+            t.store(each, self._row_pointer("%out", k, first))
+        t.close_loop("b", "blocks", "block", "after")
+        t.write_label("after")
+        last = len(told) + len(counted)
+        rows = PositionRows(len(told), range(len(told), last), range(last, last + len(bends)))
+        self._write_between_checks(rows)
+        self._write_end()
+        return rows
+
+    def _write_inputs(self, first: str, have: OperandNames) -> None:
+        """Where the inputs are: where the file has them, and farther by as much as the design has them elsewhere."""
+        t = self.ir
+        given = {leaf: t.load(self._row_pointer("%drive", k, first)) for k, leaf in enumerate(self.input_operands)}
+        for k, is_angle in enumerate(self.equations.input_is_angle):
+            have["u", k] = t.binary("add", given["u", k], have["d", k])
+            if is_angle:
+                have["uc", k], have["us", k] = self.write_angle_sum(
+                    given["uc", k], given["us", k], have["dc", k], have["ds", k]
+                )
+
+    def _row_pointer(self, base: str, k: int, first: str) -> str:
+        t = self.ir
+        return t.double_pointer(
+            base, t.add_instruction(f"add i64 {t.add_instruction(f'mul i64 {self.width}, {k}')}, {first}")
+        )
+
+    def _write_condition(self, flag: str) -> None:
+        t = self.ir
+        t.store(t.select_or_zero(flag, t.load(self.passed_slot)), self.passed_slot)
+
+    def _write_between_checks(self, rows: PositionRows) -> None:
+        """Between positions too no bend reaches one, by as much as it bends over three of them; no counted angle goes
+        far."""
+        t = self.ir
+        t.write_line("br label %judge")
+        t.write_label("judge")
+        t.write_line("%j = phi i64 [0, %after], [%jnext, %judge]")
+        first = t.add_instruction(f"mul i64 %j, {t.lanes}")
+        places = t.add_instruction(
+            f"insertelement <{t.lanes} x i64> poison, i64 {t.add_instruction('sub i64 %positions, 2')}, i64 0"
+        )
+        for k in rows.angles:
+            one, two, three = self._load_three(k, first)
+            for before, after in ((one, two), (two, three)):
+                far = t.call_intrinsic("fabs", t.binary("sub", after, before))
+                self._write_condition(
+                    t.or_flags(t.compare("ole", far, t.constant(MAX_TURN_PER_STEP)), t.lanes_from(first, places))
+                )
+        for k in rows.bends:
+            flag = write_keeps_apart(t, *self._load_three(k, first))
+            self._write_condition(t.or_flags(flag, t.lanes_from(first, places)))
+        t.close_loop("j", "blocks", "judge", "done")
+
+    def _load_three(self, k: int, first: str) -> tuple[str, str, str]:
+        """A row at three positions on end."""
+        t = self.ir
+        one, two, three = (
+            t.load(self._row_pointer("%out", k, t.add_instruction(f"add i64 {first}, {ahead}"))) for ahead in range(3)
+        )
+        return one, two, three
+
+    def _write_end(self) -> None:
+        """How the run ends."""
+        t = self.ir
+        t.write_label("done")
+        least = t.reduce("fmin", t.load(self.passed_slot))
+        t.write_line(f"br i1 {t.add_instruction(f'fcmp oeq double {least}, 1.0')}, label %solved, label %unsolved")
+        t.write_label("solved")
+        t.write_line(f"store double {ALL_SOLVED}, ptr %said")
+        t.write_line("ret void")
+        t.write_label("unsolved")
+        tolerance = t.add_instruction(
+            f"load double, ptr {t.double_pointer('%numbers', str(self.order.index(('tolerance', 0))))}"
+        )
+        t.write_line(
+            f"call void @{ENDING_FUNCTION}(i64 %positions, i64 {self.width}, double {tolerance}, ptr %out, ptr %said)"
+        )
+        t.write_line("ret void")
+        t.write_line("}")

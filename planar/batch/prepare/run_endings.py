@@ -1,0 +1,6 @@
+"""How a compiled run says that it ended."""
+
+ALL_SOLVED, UNSURE, CANNOT_BE_ASSEMBLED, DEAD_POINT = 0.0, 1.0, 2.0, 3.0
+"""At its end, nobody knows, at its start, or at a dead point."""
+CLEARLY_OPEN = 1.0 + 1e-4
+"""Of a block's coalescence: from there on it cannot be joined, whatever rounding does."""

@@ -1,0 +1,44 @@
+"""What a compiled function is called with: values by name as numbers, addresses of arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from ctypes import addressof, c_char
+from struct import Struct
+
+import numpy as np
+
+Array = np.ndarray
+
+MAX_BOUND_NAMES = 64
+"""Sequences of names that are known at once."""
+Binding = tuple[Callable[..., bytes], Array, int]
+"""What packs values, how many there are and where each of them goes, and the address of that."""
+
+_view = c_char.from_buffer
+
+
+def address_of(array: Array) -> int:
+    """Where an array's numbers begin: what `array.ctypes.data` says, in a fifth of its time."""
+    return addressof(_view(array))  # type: ignore[arg-type]
+
+
+class ValueBinder:
+    """How values of these names are packed, kept from call to call, in which the names are mostly the same."""
+
+    def __init__(self, index: Mapping[str, int]):
+        """`index`: the place of each name that there is."""
+        self._index = index
+        self.bound: dict[tuple[str, ...], Binding] = {}
+        "the bindings that are known"
+
+    def bind(self, names: tuple[str, ...]) -> Binding:
+        """The binding of names in an order. Raises KeyError for one that is not there."""
+        found = self.bound.get(names)
+        if found is None:
+            places = np.array([len(names), *(self._index[name] for name in names)], dtype=np.int64)
+            if len(self.bound) >= MAX_BOUND_NAMES:
+                self.bound.clear()
+            # packing keeps the order; bytes are read where they are
+            found = self.bound[names] = Struct(f"{len(names)}d").pack, places, places.ctypes.data
+        return found
