@@ -171,6 +171,8 @@ class NativeBlockJoiner:
 def _call(function: Any, rows: tuple[Array, ...], sketch: Array, row_count: int) -> Array:
     """out (rows, designs) of designs whose rows (..., designs) are p, q, drives and signs."""
     count = rows[0].shape[1]
+    if not count:
+        return np.empty((row_count, 0))
     if count < LANES:  # those that do not fill the lanes, with copies of the last beside them
         which = np.minimum(np.arange(LANES), count - 1)
         return _call(function, tuple(row[:, which] for row in rows), sketch, row_count)[:, :count]
