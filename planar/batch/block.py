@@ -298,7 +298,7 @@ class _DesignBlockSolver:
             dead = np.isfinite(ends) & (np.abs(span) - ends > DEAD_POINT_MARGIN * np.abs(span))
             self.solved_steps[own[dead]] = 0
             passed = np.zeros_like(fit)
-            passed[own] = np.isinf(ends)
+            passed[own] = ends - np.abs(span) > DEAD_POINT_MARGIN * np.abs(span)
             march.z0[:, own] = z
             return march, passed
         z, passed = NumpyRunner().lead(march._replace(u0=self.u), gone, LEAD_IN_STEP)
