@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import reduce
-from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.assembly_scores import MAX_BLOCK_UNKNOWNS, NEAR_SKETCH, is_at_sketch, is_clearly_regular
+from planar.batch.assembly_scores import (
+    MAX_BLOCK_UNKNOWNS,
+    NEAR_SKETCH,
+    DesignAssemblies,
+    is_at_sketch,
+    is_clearly_regular,
+)
 from planar.batch.block_corrector import SPREAD_STARTS, BlockCorrector
 from planar.batch.closed_form.start_assemblies import find_start_assemblies
 from planar.batch.march.backend import DesignRunner
@@ -45,19 +50,6 @@ MAX_SEARCHED_UNKNOWNS = 6
 find the nearest where that lies far from the sketch."""
 
 
-class DesignAssemblies(NamedTuple):
-    """z (unknowns, designs), and for which of them it is surely the one that the search one by one would take.
-
-    `failed_block`: the level of the block that surely cannot be joined to the rest, -1 where all can (designs,);
-    `signs` (blocks, designs): of the assemblies of blocks in closed form, 0 where they are not known; None of none.
-    """
-
-    z: Array
-    is_sure: Array
-    failed_block: Array
-    signs: Array | None = None
-
-
 def find_assemblies(
     reference: ReferenceDesign,
     shapes: Mapping[str, LinkShape],
@@ -72,7 +64,7 @@ def find_assemblies(
         if every is None:
             return _AssemblySearch(reference, shapes, p, u).search()
         rest = np.flatnonzero(~every.is_sure & (every.failed_block < 0))
-        if rest.size > MAX_ALONE:
+        if rest.size > MAX_ALONE or every.signs is None:
             own = {name: shape_of_designs(shape, rest) for name, shape in shapes.items()}
             found = _AssemblySearch(reference, own, p[:, rest], u[:, rest]).search()
             every.z[:, rest], every.is_sure[rest], every.failed_block[rest] = found[:3]
@@ -92,7 +84,7 @@ def _find_without_search(
     """Those by closed forms, else those near the base's own; None where neither can be."""
     start = find_start_assemblies(reference, shapes, p, u, backend)
     if start is not None:
-        return DesignAssemblies(*start)
+        return start
     near = find_nearest_assemblies(reference, shapes, p, u, runner)
     return None if near is None else DesignAssemblies(near.z, near.is_clear, np.full(len(near.is_clear), -1))
 
@@ -154,6 +146,9 @@ class _AssemblySearch:
                     self.is_sure[rest] &= sure
                     self.is_listed[rest] &= listed
                     none = np.flatnonzero(here.exists.any(axis=1) & ~on.exists.any(axis=1))
+                    if none.size and self.corrector.has_closed_form(block):
+                        self.failed_block[none[self.is_sure[none]]] = block.block_index
+                        none = none[~self.is_sure[none]]
                     if none.size:
                         self._refuse_designs(block, none, here, roots)
                     before, on = on.distance, self._score(block, on)
@@ -277,6 +272,9 @@ class _AssemblySearch:
     ) -> tuple[PartialAssemblies, Array]:
         """The same by Newton's method from the base's assemblies, and from starts all over the circles."""
         sure = np.ones(len(here.exists), dtype=bool)
+        if corrector.has_closed_form(block):
+            found, there, sure = corrector.join(block, here.z, here.exists)
+            return self._spread_ways(here, found, there), sure
         found, there, _ = corrector.correct(block, here.z, here.exists, roots, NEWTON_STEPS)
         there &= corrector.is_distinct(block, found, there)
         few = here.exists & (there.sum(axis=2) < most)
@@ -301,11 +299,16 @@ class _AssemblySearch:
             sure[designs[(count > 0) & (count != most)]] = False
             found[:, designs, ways] = np.take_along_axis(more[:, :, 0], order[None], axis=2)
             there[designs, ways] = kept
-        width = there.shape[1] * there.shape[2]
-        spread = np.repeat(here.distance, there.shape[2], axis=1)
-        lying = tuple(np.repeat(each, there.shape[2], axis=1) for each in here.tie_keys)
-        z, exists = found.reshape(len(found), len(sure), width), there.reshape(len(sure), width)
-        return PartialAssemblies(z, exists, spread, lying), sure
+        return self._spread_ways(here, found, there), sure
+
+    @staticmethod
+    def _spread_ways(here: PartialAssemblies, found: Array, there: Array) -> PartialAssemblies:
+        """Ways to add a block to each partial assembly, z (unknowns, designs, ways, assemblies), side by side."""
+        designs, ways, each = there.shape
+        spread = np.repeat(here.distance, each, axis=1)
+        lying = tuple(np.repeat(key, each, axis=1) for key in here.tie_keys)
+        z, exists = found.reshape(len(found), designs, ways * each), there.reshape(designs, ways * each)
+        return PartialAssemblies(z, exists, spread, lying)
 
     def _score(self, block: Block, here: PartialAssemblies) -> PartialAssemblies:
         """The partial assemblies with what a block adds to how they are told apart."""

@@ -63,11 +63,25 @@ class EquationRates(NamedTuple):
     "(rows, inputs)"
 
 
-class ClosedFormAssemblies:
-    """The two assemblies of one block in closed form, carried to round-off by Newton's steps."""
+ON_ARM = "assembly_on_arm"
+"""The name of a function of closed forms that divide by an arm that changes as the mechanism moves."""
 
-    def __init__(self, unknowns: slice, form: BufferedFunction, polished: BufferedFunction):
+
+class ClosedFormAssemblies:
+    """The two assemblies of one block in closed form, carried to round-off by Newton's steps.
+
+    `has_changing_arm`: whether a length of the block turns on an arm that may vanish as the mechanism moves.
+    """
+
+    def __init__(self, unknowns: slice, form: BufferedFunction, polished: BufferedFunction, has_changing_arm: bool):
         self._unknowns, self._form, self._polished = unknowns, form, polished
+        self.has_changing_arm = has_changing_arm
+
+    def evaluate_batch(self, z: Array, u: Array, p: Array) -> tuple[list[Array], Array]:
+        """Both (positions, unknowns), not polished, and how near they are to where they meet (positions,), at z
+        (positions, unknowns), u and p alike."""
+        found = [self._form.evaluate_batch(len(z), z, u, p, np.array([sign])) for sign in (1.0, -1.0)]
+        return [own[:, 0] for own, _ in found], found[0][1][:, 0, 0]
 
     def __call__(self, z: Array, u: Array, p: Array) -> tuple[list[Array], float, float]:
         """Both (unknowns,), the greatest residual of the two, and how near they are to where they meet (`ClosedForm`).
@@ -160,7 +174,8 @@ class EquationFunctions:
         if form is None:
             return None
         polished = self.kept(f"polished {k}", lambda: self._make_polished_function(block))
-        return ClosedFormAssemblies(block.unknowns, BufferedFunction(form), BufferedFunction(polished))
+        on_arm = form.name() == ON_ARM
+        return ClosedFormAssemblies(block.unknowns, BufferedFunction(form), BufferedFunction(polished), on_arm)
 
     def _make_assembly_function(self, block: Block) -> ca.Function | None:
         """(z, u, p, sign) -> the unknowns of a block in closed form, and where its assemblies meet, if it has one."""
@@ -170,7 +185,8 @@ class EquationFunctions:
         if form is None:
             return None
         found = stack_expressions(ca.atan2(each[1], each[0]) if len(each) == 2 else each[0] for each in form.values)
-        return ca.Function("assembly", [e.z, e.u, e.p, form.sign], [found, form.coalescence])
+        name = "assembly" if form.squared_arm is None else ON_ARM
+        return ca.Function(name, [e.z, e.u, e.p, form.sign], [found, form.coalescence])
 
     def _make_polished_function(self, block: Block) -> ca.Function:
         """(z, u, p) -> the unknowns of a block after one of Newton's steps, and what was open before it."""
