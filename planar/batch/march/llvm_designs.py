@@ -44,18 +44,21 @@ def write_designs_kernel(
     rates: bool,
     lanes: int,
     point_blocks: tuple[int, ...] | None = None,
+    is_single: bool = False,
 ) -> DesignsKernelLayout:
     """The function for points on these links, none of which is the frame. Raises UnsupportedOperation.
 
     A step gives x and y of every point, then with `rates` all first and all second rates. With `levels`, of the block
     that places each point, it gives more: x and y of every point in the other assembly of its block (infinite where
     that is not in closed form), the state, and how regular the least regular of the blocks is that Newton's method
-    solves.
+    solves. Where `is_single`, what a step gives is rounded to single precision when it is written.
     """
     carried: frozenset[Operand] = frozenset()
     while True:
         try:
-            return _DesignsKernelWriter(equations, tuple(links), rates, lanes, point_blocks, carried).write()
+            writer = _DesignsKernelWriter(equations, tuple(links), rates, lanes, point_blocks, carried)
+            writer.is_single = is_single
+            return writer.write()
         except BareAngle as angle:
             if angle.operand in carried:  # its value is wanted before its own block is solved
                 raise UnsupportedOperation(f"a group stands in an angle of a later one: {angle.operand}") from None
@@ -63,6 +66,9 @@ def write_designs_kernel(
 
 
 class _DesignsKernelWriter(KernelWriter):
+    is_single = False
+    "whether what a step gives is written in single precision"
+
     def __init__(
         self,
         equations: KernelEquations,
@@ -326,7 +332,11 @@ class _DesignsKernelWriter(KernelWriter):
             place = t.add_instruction(
                 f"add i64 {t.add_instruction('mul i64 %k, %time')}, {t.add_instruction(f'mul i64 %row, {k}')}"
             )
-            t.store_streaming(each, t.double_pointer("%out", t.add_instruction(f"add i64 {place}, {self.lane}")))
+            place = t.add_instruction(f"add i64 {place}, {self.lane}")
+            if self.is_single:
+                t.store_streaming_rounded(each, t.single_pointer("%out", place))
+            else:
+                t.store_streaming(each, t.double_pointer("%out", place))
         # sums, since what is not a number stays so in them, and is not below anything
         worst = t.add_all(
             [t.constant(0.0), *(t.call_intrinsic("fabs", each) for each in (*left, *self.write_circle_residuals(have)))]
