@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from planar.assemblies.modes import Mode, Modes, modes
     from planar.batch.mechanisms.results import Each, Swept
     from planar.batch.prepared import PreparedRun, PreparedSweep, prepared
+    from planar.batch.reductions.reduced_sweep import ReducedSweep
     from planar.batch.results import Sweep
     from planar.batch.sweep import sweep
     from planar.batch.sweep_mechanisms import sweep_each
@@ -139,6 +140,7 @@ _ROOMS = {
     "PreparedSweep": "batch.prepared",
     "RackPair": "model.pairs.rack",
     "Reaction": "dynamics.reactions",
+    "ReducedSweep": "batch.reductions.reduced_sweep",
     "RelativeState": "results.records",
     "Simulation": "dynamics.simulation",
     "SlidingPair": "model.pairs.sliding",
@@ -264,6 +266,7 @@ __all__ = [
     "PreparedSweep",
     "RackPair",
     "Reaction",
+    "ReducedSweep",
     "RelativeState",
     "Simulation",
     "SlidingPair",

@@ -30,7 +30,9 @@ FULL_TURN = 2.0 * np.pi
 
 
 class DesignBlock(NamedTuple):
-    """A block that is to be solved. `designs`: names with an array (designs,) each; `start`, `stop`: see `sweep`."""
+    """A block that is to be solved. `designs`: names with an array (designs,) each; `start`, `stop`: see `sweep`;
+    `dtype`: of the results, which are rounded to it when they are written.
+    """
 
     mechanism: Mechanism
     designs: Mapping[str, Array]
@@ -41,6 +43,7 @@ class DesignBlock(NamedTuple):
     stop: float | None
     pair: str | None
     backend: str
+    dtype: str = "float64"
 
 
 class SolvedDesigns(NamedTuple):
@@ -176,21 +179,20 @@ class _DesignBlockSolver:
         """Where the results stand."""
         block = self.block
         if self.out is None:
-            self.out = allocate_aligned(
-                block.steps + 1, 2 * len(block.points) * (3 if block.rates else 1), self.design_count
-            )
+            rows = 2 * len(block.points) * (3 if block.rates else 1)
+            self.out = allocate_aligned(block.steps + 1, rows, self.design_count, block.dtype)
         return self.out
 
     def _run_fit_designs(self, runner: DesignRunner, march: DesignBatch, fit: Array) -> tuple[Array, Array]:
         """out and good of all designs, of which only the fit ones are run."""
         out = self._output_array()
         if march.output_row_count != out.shape[1]:
-            out = allocate_aligned(len(out), march.output_row_count, self.design_count)
+            out = allocate_aligned(len(out), march.output_row_count, self.design_count, out.dtype)
         if fit.mean() > RUN_ALL_RATIO:
             return out, np.where(fit, runner.run(march, out), 0)
         some, good = np.flatnonzero(fit), np.zeros(self.design_count, dtype=int)
         if some.size:
-            own = allocate_aligned(len(out), march.output_row_count, some.size)
+            own = allocate_aligned(len(out), march.output_row_count, some.size, out.dtype)
             good[some] = runner.run(march.select(some), own)
             out[:, :, some] = own
         return out, good

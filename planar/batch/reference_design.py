@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import cached_property, lru_cache
+from functools import cached_property
 from itertools import combinations
+from threading import RLock
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from planar.equations.mechanism_numbers import scaled_pair_numbers
 from planar.foundation.errors import BadInput
 from planar.foundation.geometry import Vector
 from planar.foundation.jets import Scalar
+from planar.foundation.made_once import made_once
 from planar.model.link_shapes import LinkShape, link_shape
 from planar.model.mechanism import (
     Drive,
@@ -50,6 +52,7 @@ class ReferenceDesign:
         self.is_sliding = self.solver.is_sliding(self.pair)
         self.input_scale = np.array([self.unit if self.solver.is_sliding(name) else 1.0 for name in names])
         self.points = {each.name: each for each in named_points(mechanism)}
+        self._searching = RLock()
 
     @cached_property
     def candidates(self) -> BlockAssemblies:
@@ -80,6 +83,10 @@ class ReferenceDesign:
                 meant = suggest_spelling(str(each), known, cutoff=0.5) or f"; points are {', '.join(self.points)}"
                 raise BadInput("points", f"there is no point {each!r:.60}{meant}")
         return tuple(dict.fromkeys(known[each] for each in given))
+
+    def result_name(self, point: str) -> str:
+        """The result name of a point. Raises BadInput."""
+        return self.select_points(point)[0]
 
     def point_member(self, name: str) -> tuple[str, str]:
         """The (link, point) by which a point is told: on the frame where it lies there."""
@@ -208,9 +215,10 @@ class ReferenceDesign:
 
         Looked for once, when first asked for.
         """
-        if self._block_assemblies is None:
-            self._block_assemblies = tuple(self._search_block_assemblies())
-        return self._block_assemblies
+        with self._searching:
+            if self._block_assemblies is None:
+                self._block_assemblies = tuple(self._search_block_assemblies())
+            return self._block_assemblies
 
     _block_assemblies: tuple[tuple[Array, int], ...] | None = None
 
@@ -231,7 +239,7 @@ class ReferenceDesign:
             nodes = sorted((each for way in ways for each in way), key=lambda each: each[0])[:MAX_ROOTS]
 
 
-@lru_cache(maxsize=16)
+@made_once(maxsize=16)
 def reference_design(mechanism: Mechanism, pair: str | None) -> ReferenceDesign:
     """The base of a mechanism's designs; kept, since a worker solves many blocks of one sweep."""
     return ReferenceDesign(mechanism, pair)

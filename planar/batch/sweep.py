@@ -2,32 +2,92 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
+from functools import partial
 from math import ceil
 from numbers import Integral
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
+
+import numpy as np
+from numpy.typing import DTypeLike
 
 from planar.batch.block import DesignBlock, solve_design_block
 from planar.batch.design_arrays import read_designs, split_into_blocks
-from planar.batch.executor import TASKS_PER_WORKER, run_tasks, worker_count
+from planar.batch.executor import TASKS_PER_WORKER, run_in_executor, run_in_threads, thread_count, worker_count
 from planar.batch.march.choice import available_backends
-from planar.batch.reference_design import reference_design
+from planar.batch.reductions.point_reductions import PointReduction
+from planar.batch.reductions.reduced_sweep import (
+    ReducedSweep,
+    Reduction,
+    ReductionStore,
+    read_reductions,
+    reduce_block,
+)
+from planar.batch.reference_design import ReferenceDesign, reference_design
 from planar.batch.results import Sweep
-from planar.batch.stores.store import SweepPlan, open_store
+from planar.batch.stores.store import BlockStore, SweepPlan, open_store
 from planar.document.first_argument import takes_mechanism
 from planar.foundation.errors import BadInput
 from planar.model.mechanism import LARGEST_COUNTED_ANGLE, Mechanism
 from planar.model.run_arguments import check_number, check_steps
 
-MAX_BLOCK_BYTES = 128 * 2**20
-"""Bytes of a block's results."""
+MAX_BLOCK_BYTES, MAX_REDUCED_BLOCK_BYTES = 64 * 2**20, 16 * 2**20
+"""Bytes of a block's results, and of one that is only reduced: where no page of memory is new."""
+BLOCK_POSITIONS = 2**19
+"""Positions of a block: so many that solving them is more than beginning a block, so few that cores share the work."""
+MAX_EXECUTOR_BLOCK_BYTES = 128 * 2**20
+"""Bytes of the results of a block that is solved elsewhere."""
 BLOCK_MULTIPLE = 16
 """Blocks are multiples of so many designs, where there are enough."""
+RESULT_TYPES = ("float64", "float32")
+"""Types of the numbers of results."""
 
 
+@overload
+@takes_mechanism
+def sweep(  # many: the public signature
+    mechanism: Mechanism,
+    designs: Mapping[str, Any],
+    steps: int = 200,
+    points: Sequence[str] | str | None = None,
+    *,
+    rates: bool = True,
+    start: float | None = None,
+    stop: float | None = None,
+    pair: str | None = None,
+    backend: str = "auto",
+    workers: int | None = None,
+    executor: Executor | None = None,
+    block: int | None = None,
+    store: str | Path | None = None,
+    dtype: DTypeLike = "float64",
+    reduce: None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> Sweep: ...
+@overload
+@takes_mechanism
+def sweep(  # many: the public signature
+    mechanism: Mechanism,
+    designs: Mapping[str, Any],
+    steps: int = 200,
+    points: Sequence[str] | str | None = None,
+    *,
+    rates: bool = True,
+    start: float | None = None,
+    stop: float | None = None,
+    pair: str | None = None,
+    backend: str = "auto",
+    workers: int | None = None,
+    executor: Executor | None = None,
+    block: int | None = None,
+    store: None = None,
+    dtype: DTypeLike = "float64",
+    reduce: Mapping[str, str | Reduction],
+    progress: Callable[[int, int], object] | None = None,
+) -> ReducedSweep: ...
 @takes_mechanism
 def sweep(  # many: the public signature; # long: its docstring
     mechanism: Mechanism,
@@ -40,11 +100,14 @@ def sweep(  # many: the public signature; # long: its docstring
     stop: float | None = None,
     pair: str | None = None,
     backend: str = "auto",
+    workers: int | None = None,
     executor: Executor | None = None,
     block: int | None = None,
     store: str | Path | None = None,
+    dtype: DTypeLike = "float64",
+    reduce: Mapping[str, str | Reduction] | None = None,
     progress: Callable[[int, int], object] | None = None,
-) -> Sweep:
+) -> Sweep | ReducedSweep:
     """The motions of many designs of one mechanism, which differ in dimensions of links or in their inputs.
 
     `designs` maps names to arrays, all of one length, or single numbers (m, rad, per s): `BC.length`, `A.position`,
@@ -60,11 +123,20 @@ def sweep(  # many: the public signature; # long: its docstring
     `backend` "native" runs compiled machine code, "numpy" is always there, "auto" takes the faster that is there. What
     a backend cannot do, or its gate does not let pass, the general path does, which is counted and said.
 
-    `executor`, any of `concurrent.futures`' kind, solves the blocks elsewhere; a block that is lost there is tried
-    again, then solved here. `block` is how many designs are solved together. `store`, a path ending in .zarr or
-    .parquet, takes the results block by block, with checksums, into a folder of its own; the same sweep into the same
-    store goes on with the blocks that are missing or damaged. `progress` is called with how many designs are done, and
-    how many there are.
+    Blocks of designs are solved in as many threads as there are cores for this process, or in so many `workers`; that
+    changes no digit of the results. `executor`, any of `concurrent.futures`' kind, solves them elsewhere instead; a
+    block that is lost there is tried again, then solved here. `block` is how many designs are solved together. `store`,
+    a path ending in .zarr or .parquet, takes the results block by block, with checksums, into a folder of its own; the
+    same sweep into the same store goes on with the blocks that are missing or damaged. `progress` is called with how
+    many designs are done, and how many there are.
+
+    `dtype` "float32" halves the memory: each number is computed in double precision and rounded when it is written.
+    With `reduce` no positions are kept, only what is made of every block as it comes, by the names given: measures of
+    points as `C.path_length` (see `planar.batch.reductions.point_reductions.MEASURES`: x_extremes, y_extremes,
+    bounding_box, speed_extremes, acceleration_extremes over the positions that are solved; path_length of designs
+    solved at every step; enclosed_area, fourier_descriptors of closed paths), or functions that take a `Sweep` of a
+    block's designs and give an array with an entry for each. Only what measures need is then solved, and the result is
+    a `ReducedSweep`.
 
     Raises BadInput for a name that is not there, a range or a store that cannot be; WriteFailure, which is one, where a
     store finds no more room.
@@ -73,32 +145,82 @@ def sweep(  # many: the public signature; # long: its docstring
     if block is not None and (isinstance(block, bool) or not isinstance(block, Integral) or block < 1):
         raise BadInput("block", f"a whole number of designs is wanted, not {block!r:.40}")
     mechanism = check_range(mechanism, steps, start, stop, pair)
+    threads, result_type = thread_count(workers, executor), _result_type(dtype)
     common = reference_design(mechanism, pair)
-    names = common.select_points(points)
     available_backends(backend)
+    if reduce is not None and store is not None:
+        raise BadInput("store", "a store keeps all results, and reductions are kept in memory; leave out one of them")
+    reductions = reduce if reduce is None else read_reductions(reduce, common.result_name, steps)
+    names, rates = _wanted(common, points, rates, reductions)
+    whole = DesignBlock(mechanism, values, int(steps), names, rates, start, stop, pair, backend, result_type)
     many = len(next(iter(values.values())))
-    size = int(block) if block is not None else _block_size(many, steps, len(names), rates, executor)
-    whole = DesignBlock(mechanism, values, int(steps), names, rates, start, stop, pair, backend)
-    into = open_store(store, SweepPlan(whole, size))
-    size = into.block_size
+    size = int(block) if block is not None else _block_size(whole, many, executor, reductions is not None)
+    plan = SweepPlan(whole, size)
+    into = open_store(store, plan) if reductions is None else ReductionStore(plan)
+    for done in _solve_blocks(into, threads, executor, reductions):
+        if progress is not None:
+            progress(done, many)
+    found: Sweep | ReducedSweep = into.result()
+    return found
 
-    def task(part: slice) -> DesignBlock:
-        return whole._replace(designs={name: array[part] for name, array in values.items()})
 
-    parts = dict(enumerate(split_into_blocks(many, size)))
-    ready = sum(part.stop - part.start for k, part in parts.items() if k in into.finished)
-    if progress is not None and ready:
-        progress(ready, many)
-    todo = {k: part for k, part in parts.items() if k not in into.finished}
-    tasks = {k: task(part) for k, part in todo.items()}
-    for k, done in run_tasks(
-        executor, solve_design_block, tasks, lambda k: solve_design_block(tasks[k], into.output_array(parts[k]))
-    ):
+def _solve_blocks(
+    into: BlockStore, threads: int, executor: Executor | None, reductions: Mapping[str, Reduction] | None
+) -> Iterator[int]:
+    """Solve the blocks that are not there yet, and write them; how many designs are done after each."""
+    plan = into.plan
+    parts = list(split_into_blocks(plan.design_count, into.block_size))
+    whole = plan.all_designs
+    ready = sum(part.stop - part.start for k, part in enumerate(parts) if k in into.finished)
+    if ready:
+        yield ready
+    tasks = (
+        (k, whole._replace(designs={name: array[part] for name, array in whole.designs.items()}))
+        for k, part in enumerate(parts)
+        if k not in into.finished
+    )
+    solve = solve_design_block if reductions is None else partial(reduce_block, reductions=reductions)
+
+    def solve_here(number: int, task: DesignBlock) -> Any:
+        if reductions is not None:
+            return reduce_block(task, reductions)
+        return solve_design_block(task, into.output_array(parts[number]))
+
+    if executor is None:
+        found = run_in_threads(min(threads, len(parts)), tasks, solve_here)
+    else:
+        found = run_in_executor(executor, solve, tasks, solve_here)
+    for k, done in found:
         into.write_block(k, parts[k], done)
         ready += parts[k].stop - parts[k].start
-        if progress is not None:
-            progress(ready, many)
-    return into.result()
+        yield ready
+
+
+def _result_type(dtype: DTypeLike) -> str:
+    """The name of the type that results have. Raises BadInput."""
+    try:
+        name = np.dtype(dtype).name
+    except TypeError:
+        name = ""
+    if name not in RESULT_TYPES:
+        raise BadInput("dtype", f"results are {' or '.join(RESULT_TYPES)}, not {dtype!r:.40}")
+    return name
+
+
+def _wanted(
+    common: ReferenceDesign,
+    points: Sequence[str] | str | None,
+    rates: bool,
+    reductions: Mapping[str, Reduction] | None,
+) -> tuple[tuple[str, ...], bool]:
+    """The points that are to be solved, and whether with rates: what is asked for, or what measures are made of."""
+    of_points = [each for each in (reductions or {}).values() if isinstance(each, PointReduction)]
+    own = tuple(dict.fromkeys(each.point for each in of_points))
+    if reductions and len(of_points) == len(reductions):
+        return own, any(each.wants_rates for each in of_points)
+    if not rates and any(each.wants_rates for each in of_points):
+        raise BadInput("rates", "speeds and accelerations are wanted, which are rates")
+    return tuple(dict.fromkeys((*common.select_points(points), *own))), rates
 
 
 def check_range(mechanism: Mechanism, steps: object, start: object, stop: object, pair: str | None) -> Mechanism:
@@ -113,10 +235,14 @@ def check_range(mechanism: Mechanism, steps: object, start: object, stop: object
     return replace(mechanism, inputs=tuple(given._replace(law=None) for given in mechanism.inputs))
 
 
-def _block_size(many: int, steps: int, points: int, rates: bool, executor: Executor | None) -> int:
-    """How many designs make a block."""
-    each = (steps + 1) * 2 * max(points, 1) * (3 if rates else 1) * 8
-    size = max(1, MAX_BLOCK_BYTES // each)
+def _block_size(whole: DesignBlock, many: int, executor: Executor | None, is_reduced: bool) -> int:
+    """How many designs make a block; in threads that hangs on the work alone, so that results do."""
+    itemsize = 8 if is_reduced else np.dtype(whole.dtype).itemsize
+    each = (whole.steps + 1) * 2 * max(len(whole.points), 1) * (3 if whole.rates else 1) * itemsize
     if executor is not None:
-        size = min(size, ceil(many / (TASKS_PER_WORKER * worker_count(executor))))
-    return min(many, ceil(size / BLOCK_MULTIPLE) * BLOCK_MULTIPLE)
+        size = min(MAX_EXECUTOR_BLOCK_BYTES // each, ceil(many / (TASKS_PER_WORKER * worker_count(executor))))
+    else:
+        most = MAX_REDUCED_BLOCK_BYTES if is_reduced else MAX_BLOCK_BYTES
+        size = max(1, min(most // each, BLOCK_POSITIONS // (whole.steps + 1)))
+        size = ceil(many / ceil(many / size))
+    return min(many, ceil(max(1, size) / BLOCK_MULTIPLE) * BLOCK_MULTIPLE)

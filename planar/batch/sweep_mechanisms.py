@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.executor import in_order, run_tasks
+from planar.batch.executor import in_order, run_in_executor, run_in_threads, thread_count
 from planar.batch.general_path import OUTCOMES, solve_design
 from planar.batch.march.choice import available_backends
 from planar.batch.mechanisms.block_runner import BlockRunner, find_block_runner
@@ -67,6 +67,7 @@ def sweep_each(  # many: the public signature
     rates: bool = True,
     pair: str | None = None,
     backend: str = "auto",
+    workers: int | None = None,
     executor: Executor | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> Each:
@@ -93,7 +94,7 @@ def sweep_each(  # many: the public signature
     Raises BadInput for what is no mechanism, a point that none has, an input that is not there, impossible steps.
     """
     whole = _read_mechanisms(mechanisms)
-    step_count = check_steps(steps)
+    step_count, threads = check_steps(steps), thread_count(workers, executor)
     for k, mechanism in enumerate(whole):
         if pair is not None or not isinstance(mechanism, PinnedMechanism) or mechanism.layout is None:
             running_input_index(mechanism, pair, f"mechanisms[{k}]")
@@ -103,7 +104,12 @@ def sweep_each(  # many: the public signature
     parts = {k: whole[first : first + PART_SIZE] for k, first in enumerate(range(0, len(whole), PART_SIZE))}
     solve_part = partial(solve_mechanisms, request=wanted)
     found: list[Swept] = []
-    for done in in_order(run_tasks(executor, solve_part, parts, lambda k: solve_part(parts[k]))):
+    solved = (
+        run_in_threads(min(threads, max(1, len(parts))), parts.items(), lambda _, part: solve_part(part))
+        if executor is None
+        else run_in_executor(executor, solve_part, parts.items(), lambda _, part: solve_part(part))
+    )
+    for done in in_order(solved):
         found += done
         if progress is not None:
             progress(len(found), len(whole))

@@ -73,6 +73,7 @@ def results():
     yield from (
         planar.simulate("physical-pendulum", 0.05, steps=4),
         planar.sweep(bars, {"BC.length": [0.066]}, steps=6),
+        planar.sweep(bars, {"BC.length": [0.066]}, steps=6, reduce={"path": "C.path_length"}),
     )
     yield from (swept, swept[0], prepared, prepared())
     yield from (planar.BadInput("here", "wrong"), planar.Unknown("no such point"), planar.Outcome.SOLVED)

@@ -57,6 +57,8 @@ class SweepPlan(NamedTuple):
         """The same for two sweeps that have the same results."""
         whole, made = self.all_designs, hashlib.sha256()
         grid = [whole.steps, whole.points, whole.rates, whole.start, whole.stop, whole.pair]
+        if whole.dtype != "float64":
+            grid.append(whole.dtype)
         made.update(json.dumps([STORE_VERSION, to_dict(whole.mechanism), grid], sort_keys=True, default=float).encode())
         for name, values in sorted(whole.designs.items()):
             made.update(name.encode() + b"\0" + np.ascontiguousarray(values).tobytes())
@@ -83,8 +85,8 @@ class BlockStore(ABC):
         """A solved block, of these designs."""
 
     @abstractmethod
-    def result(self) -> Sweep:
-        """The sweep, once all blocks are there."""
+    def result(self) -> Any:
+        """The sweep, or what is kept of it, once all blocks are there."""
 
     def messages(self) -> tuple[str, ...]:
         """What there is to say, in the order of the designs, whichever block was solved first."""
@@ -139,7 +141,7 @@ def _describe_ending(outcome: Outcome) -> str:
 def open_store(store: str | Path | None, plan: SweepPlan) -> BlockStore:
     """Where a sweep's results go. Raises BadInput."""
     if store is None:
-        return _MemoryStore(plan)
+        return MemoryStore(plan)
     path = Path(store)
     modules = {
         ".zarr": ("zarr_store", "ZarrStore", "zarr", "sweep"),
@@ -188,15 +190,18 @@ def damaged_block_error(path: Path, number: int, part: slice) -> BadInput:
     return BadInput("store", f"{told}; the same sweep into this store solves it again")
 
 
-class _MemoryStore(BlockStore):
+class MemoryStore(BlockStore):
+    """Arrays of all designs in memory, into which blocks are solved."""
+
     def __init__(self, plan: SweepPlan):
         super().__init__(plan)
         self.row_count = 2 * len(plan.all_designs.points) * len(plan.quantities)
         self.shape = plan.all_designs.steps + 1, self.row_count, plan.design_count
-        if np.prod(self.shape, dtype=float) * 8.0 > MAX_BYTES_IN_MEMORY:
-            told = f"results of {np.prod(self.shape, dtype=float) * 8e-9:.0f} GB are too much for memory"
+        whole = np.prod(self.shape, dtype=float) * np.dtype(plan.all_designs.dtype).itemsize
+        if whole > MAX_BYTES_IN_MEMORY:
+            told = f"results of {whole * 1e-9:.0f} GB are too much for memory"
             raise BadInput("store", f"{told}; name a store, as 'sweep.zarr'")
-        self.out = allocate_aligned(*self.shape)
+        self.out = allocate_aligned(*self.shape, plan.all_designs.dtype)
         self.status = np.zeros((plan.design_count, plan.all_designs.steps + 1), dtype=np.int8)
         self.inputs: Array | None = None
 

@@ -80,7 +80,9 @@ class ZarrStore(BlockStore):
         point["dimension_names"] = ("design", "step", "axis")
         for order in plan.quantities:
             for name in plan.all_designs.points:
-                yield self._open_array(f"{order}/{_path_name(name)}", dtype="float64", fill_value=np.nan, **point)
+                yield self._open_array(
+                    f"{order}/{_path_name(name)}", dtype=plan.all_designs.dtype, fill_value=np.nan, **point
+                )
         yield self._open_array("status", dtype="int8", fill_value=MISSING_STATUS, **row)
         yield self._open_array("input", dtype="float64", fill_value=np.nan, **row)
         records = {"shape": (plan.block_count, RECORD_BYTES), "chunks": (1, RECORD_BYTES)}

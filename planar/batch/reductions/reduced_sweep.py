@@ -1,0 +1,142 @@
+"""A sweep of which only reductions are kept: what is asked for, what a block gives, and what all blocks give."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from planar.batch.block import DesignBlock, SolvedDesigns, solve_design_block
+from planar.batch.reductions.point_reductions import HARMONICS, MEASURES, PointReduction
+from planar.batch.results import Sweep
+from planar.batch.stores.store import BlockStore, MemoryStore, SweepPlan
+from planar.document.cursor import suggest_spelling
+from planar.foundation.errors import BadInput, Outcome
+from planar.foundation.short_repr import short_repr
+
+Array = np.ndarray
+Reduction = Callable[[Sweep], Any]
+"""What is made of a block of designs: an array with an entry for each of them first."""
+
+
+@dataclass(frozen=True)
+class ReducedSweep(Mapping[str, Array]):
+    """Reductions of every design by their names, arrays with an entry for each design first.
+
+    `designs`: what they differ in. `status` (designs,): how each ended, 0 is solved at every step, any other number k
+    is `outcomes[k]`. `general`: how many positions the general path solved. `said`: what there is to say.
+    """
+
+    designs: Mapping[str, Array]
+    reduced: Mapping[str, Array]
+    status: Array
+    general: int
+    said: tuple[str, ...]
+    outcomes: tuple[Outcome, ...] = tuple(Outcome)
+
+    __repr__ = short_repr
+
+    def __getitem__(self, name: str) -> Array:
+        """A reduction of all designs."""
+        return self.reduced[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """The names."""
+        return iter(self.reduced)
+
+    def __len__(self) -> int:
+        """How many reductions there are."""
+        return len(self.reduced)
+
+    @property
+    def whole(self) -> Array:
+        """The designs (designs,) that were solved at every step."""
+        found: Array = self.status == 0
+        return found
+
+
+class ReducedBlock(NamedTuple):
+    """What is kept of a block: its reductions (designs, ...), how each design ended (designs,), and of `SolvedDesigns`
+    the rest."""
+
+    reduced: dict[str, Array]
+    status: Array
+    general_positions: int
+    general_designs: int
+    endings: tuple[tuple[int, int, str], ...]
+
+
+def read_reductions(reduce: Mapping[str, Any], result_name: Callable[[str], str], steps: int) -> dict[str, Reduction]:
+    """The reductions by their names; `result_name` gives that of a point, and raises BadInput. Raises BadInput."""
+    if not isinstance(reduce, Mapping) or not reduce:
+        raise BadInput("reduce", "name what is to be kept, as {'reach': 'C.bounding_box'}")
+    return {name: _read_reduction(name, each, result_name, steps) for name, each in reduce.items()}
+
+
+def _read_reduction(name: str, given: Any, result_name: Callable[[str], str], steps: int) -> Reduction:
+    if isinstance(given, str):
+        point, _, measure = given.rpartition(".")
+        if measure not in MEASURES:
+            meant = suggest_spelling(measure, MEASURES, cutoff=0.5) or f"; there are {', '.join(MEASURES)}"
+            raise BadInput(f"reduce.{name}", f"there is no measure {given!r:.60} of a point{meant}")
+        if measure == "fourier_descriptors" and steps <= 2 * HARMONICS:
+            raise BadInput(f"reduce.{name}", f"{HARMONICS} harmonics want more than {2 * HARMONICS} steps")
+        return PointReduction(result_name(point), measure)
+    if not callable(given):
+        told = f"a measure of a point, as 'C.bounding_box', or a function of a sweep is wanted, not {given!r:.40}"
+        raise BadInput(f"reduce.{name}", told)
+    function: Reduction = given
+    return function
+
+
+def reduce_block(block: DesignBlock, reductions: Mapping[str, Reduction]) -> ReducedBlock:
+    """Solve a block and keep its reductions, made of numbers in double precision and rounded to the block's."""
+    store = MemoryStore(SweepPlan(block._replace(dtype="float64"), len(next(iter(block.designs.values())))))
+    every = slice(0, store.plan.design_count)
+    done = solve_design_block(store.plan.all_designs, store.output_array(every))
+    store.write_block(0, every, done)
+    sweep = store.result()
+    reduced = {name: _values(name, function, sweep, block.dtype) for name, function in reductions.items()}
+    ended = np.array(done.status[:, -1])
+    return ReducedBlock(reduced, ended, done.general_positions, done.general_designs, done.endings)
+
+
+def _values(name: str, function: Reduction, sweep: Sweep, dtype: str) -> Array:
+    """A reduction of all designs of a block. Raises BadInput where it has no entry for each."""
+    found = np.asarray(function(sweep))
+    if found.dtype == object or found.shape[:1] != (len(sweep),):
+        told = f"a reduction gives an array with an entry for each of {len(sweep)} designs, not one {found.shape}"
+        raise BadInput(f"reduce.{name}", told)
+    if dtype != "float64" and found.dtype.kind in "fc":
+        return found.astype("complex64" if found.dtype.kind == "c" else dtype)
+    return found
+
+
+class ReductionStore(BlockStore):
+    """Takes the reductions of blocks, in memory."""
+
+    def __init__(self, plan: SweepPlan):
+        super().__init__(plan)
+        self.reduced: dict[str, Array] = {}
+        self.status = np.zeros(plan.design_count, dtype=np.int8)
+
+    def write_block(self, number: int, part: slice, done: SolvedDesigns | ReducedBlock) -> None:
+        assert isinstance(done, ReducedBlock)
+        for name, values in done.reduced.items():
+            whole, own = self.reduced.get(name), values.shape[1:]
+            if whole is None:
+                whole = np.empty((self.plan.design_count, *own), values.dtype)
+            if whole.shape[1:] != own:
+                told = f"designs {part.start} to {part.stop - 1} have an array {own} each, others {whole.shape[1:]}"
+                raise BadInput(f"reduce.{name}", told)
+            whole = self.reduced[name] = whole.astype(np.result_type(whole, values), copy=False)
+            whole[part] = values
+        self.status[part] = done.status
+        self.block_notes[number] = done.general_positions, done.general_designs, done.endings
+
+    def result(self) -> ReducedSweep:
+        return ReducedSweep(
+            self.plan.all_designs.designs, self.reduced, self.status, self.general_positions, self.messages()
+        )
