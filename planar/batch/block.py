@@ -17,6 +17,7 @@ from planar.batch.march.numpy_backend import NumpyRunner
 from planar.batch.reference_design import ReferenceDesign, reference_design
 from planar.codegen.aligned_arrays import allocate_aligned
 from planar.foundation.errors import Outcome
+from planar.foundation.turns import take_turn
 from planar.model.link_shapes import LinkShape
 from planar.model.mechanism import LARGEST_INPUT_POSITION, Mechanism
 
@@ -64,7 +65,8 @@ class SolvedDesigns(NamedTuple):
 def solve_design_block(block: DesignBlock, out: Array | None = None) -> SolvedDesigns:
     """Solve a block, in `out` (steps + 1, rows, designs) if that is given. Raises BadInput only for what holds for all
     designs."""
-    return _DesignBlockSolver(block, out).solve()
+    with take_turn():
+        return _DesignBlockSolver(block, out).solve()
 
 
 def _count_sentence(said: dict[int, tuple[int, str]], code: int, sentence: str) -> None:

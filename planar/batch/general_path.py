@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from threading import RLock
 from typing import NamedTuple
 
 import numpy as np
@@ -17,8 +16,6 @@ Array = np.ndarray
 
 OUTCOMES = tuple(Outcome)
 """What the integers of a status stand for: 0 is solved."""
-_TURN = RLock()
-"""Held by the thread whose design is solved: mechanisms of one structure share what is not made for several at once."""
 GRID_TOLERANCE = 1e-9
 """rad or sizes by which a row may be off the grid."""
 
@@ -51,8 +48,7 @@ def solve_design(
     out, status = np.full((steps + 1, wide), np.nan), np.zeros(steps + 1, dtype=np.int8)
     input_ = np.full(steps + 1, np.nan) if grid is None else grid
     try:
-        with _TURN:
-            motion = cycle(mechanism, steps, *range_, pair)
+        motion = cycle(mechanism, steps, *range_, pair)
     except NoAnswer as problem:
         status[:] = OUTCOMES.index(problem.outcome)
         return SolvedDesign(input_, out, status, str(problem))
@@ -67,8 +63,7 @@ def solve_design(
         both = min(len(position), steps + 1)
         off = np.abs(position[:both] - grid[:both]) > GRID_TOLERANCE * max(1.0, float(np.max(np.abs(grid))))
         many = int(np.argmax(off)) if off.any() else both
-    with _TURN:
-        out[:many] = _point_rows(motion, points, rates)[:many]
+    out[:many] = _point_rows(motion, points, rates)[:many]
     status[many:] = OUTCOMES.index(motion.outcome)
     told = "; ".join(motion.rate_remarks) if rates else ""
     return SolvedDesign(input_, out, status, motion.reason if many <= steps else "", told)

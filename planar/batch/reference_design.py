@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import combinations
-from threading import RLock
 
 import numpy as np
 
@@ -16,7 +15,6 @@ from planar.equations.mechanism_numbers import scaled_pair_numbers
 from planar.foundation.errors import BadInput
 from planar.foundation.geometry import Vector
 from planar.foundation.jets import Scalar
-from planar.foundation.made_once import made_once
 from planar.model.link_shapes import LinkShape, link_shape
 from planar.model.mechanism import (
     Drive,
@@ -52,7 +50,6 @@ class ReferenceDesign:
         self.is_sliding = self.solver.is_sliding(self.pair)
         self.input_scale = np.array([self.unit if self.solver.is_sliding(name) else 1.0 for name in names])
         self.points = {each.name: each for each in named_points(mechanism)}
-        self._searching = RLock()
 
     @cached_property
     def candidates(self) -> BlockAssemblies:
@@ -215,10 +212,9 @@ class ReferenceDesign:
 
         Looked for once, when first asked for.
         """
-        with self._searching:
-            if self._block_assemblies is None:
-                self._block_assemblies = tuple(self._search_block_assemblies())
-            return self._block_assemblies
+        if self._block_assemblies is None:
+            self._block_assemblies = tuple(self._search_block_assemblies())
+        return self._block_assemblies
 
     _block_assemblies: tuple[tuple[Array, int], ...] | None = None
 
@@ -239,7 +235,7 @@ class ReferenceDesign:
             nodes = sorted((each for way in ways for each in way), key=lambda each: each[0])[:MAX_ROOTS]
 
 
-@made_once(maxsize=16)
+@lru_cache(maxsize=16)
 def reference_design(mechanism: Mechanism, pair: str | None) -> ReferenceDesign:
     """The base of a mechanism's designs; kept, since a worker solves many blocks of one sweep."""
     return ReferenceDesign(mechanism, pair)

@@ -36,7 +36,7 @@ from planar.model.run_arguments import check_number, check_steps
 
 MAX_BLOCK_BYTES, MAX_REDUCED_BLOCK_BYTES = 64 * 2**20, 16 * 2**20
 """Bytes of a block's results, and of one that is only reduced: where no page of memory is new."""
-BLOCK_POSITIONS = 2**19
+BLOCK_POSITIONS = 2**20
 """Positions of a block: so many that solving them is more than beginning a block, so few that cores share the work."""
 MAX_EXECUTOR_BLOCK_BYTES = 128 * 2**20
 """Bytes of the results of a block that is solved elsewhere."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,6 @@ from planar.codegen.block_formula import BlockFormula, KernelLayout
 from planar.codegen.llvm_compile import compile_function
 from planar.codegen.llvm_ir import IRWriter
 from planar.foundation.arrays import Array
-from planar.foundation.made_once import made_once
 
 LANES = 8
 """Numbers that are worked on at once; rows of memory are multiples of so many."""
@@ -164,7 +164,7 @@ _INITIAL_EXTREMES = (0.0, 1e300, 0.0, 0.0)
 """Where what `_Watch` tells begins."""
 
 
-@made_once(maxsize=4096)
+@lru_cache(maxsize=4096)
 def _compiled_kernel(formula: BlockFormula, layout: KernelLayout) -> Any:
     return compile_function(
         write_kernel_ir(formula, layout), "walk", "int", "int", "int", "array", "array", "array", "array"

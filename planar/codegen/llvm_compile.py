@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Mapping
-from functools import cache
+from functools import cache, lru_cache
 from hashlib import sha256
 from typing import Any
 
@@ -12,7 +12,6 @@ import llvmlite
 import llvmlite.binding as llvm
 
 from planar.codegen import code_cache
-from planar.foundation.made_once import made_once
 
 PASS_LEVEL, CODEGEN_LEVEL, FAST_CODEGEN_LEVEL = 1, 2, 0
 """How much the passes over the text, and the making of code, may take: more costs time and gives none back."""
@@ -26,7 +25,7 @@ C_TYPES: Mapping[str, type[ctypes.c_int64 | ctypes.c_double | ctypes.c_void_p]] 
 }
 
 
-@made_once(maxsize=64)
+@lru_cache(maxsize=64)
 def compile_function(text: str, name: str, *kinds: str) -> Any:
     """The function of that name in a text, which takes arguments of these kinds ("int", "float", "array")."""
     engine = _load_or_compile(text)

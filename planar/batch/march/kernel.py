@@ -8,7 +8,7 @@ then is brought to it. So no sine stands in the loop, and few divisions.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import casadi as ca
@@ -33,7 +33,6 @@ from planar.equations.rates import UnknownRates, block_jacobian, first_and_secon
 from planar.equations.residuals import closing_error, residuals, scalars, split_pair_numbers
 from planar.equations.symbolic_equations import Block, ConstraintEquations, slice_length
 from planar.foundation.geometry import GROUND, Frame, Vector, frame_at
-from planar.foundation.made_once import made_once
 from planar.model.mechanism import Mechanism, links_counting_turns
 from planar.model.pairs import MeasureKind
 
@@ -133,7 +132,7 @@ class KernelEquations:
         return list(solve_with_volume(block_jacobian(e, block.rows, block.unknowns), e.F[block.rows]))
 
 
-@made_once(maxsize=256)
+@lru_cache(maxsize=256)
 def kernel_equations(
     functions: EquationFunctions, structure: Mechanism, zeros: frozenset[Operand] = frozenset()
 ) -> KernelEquations:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -26,10 +27,12 @@ from planar.batch.march.prediction import (
 from planar.codegen.aligned_arrays import allocate_aligned, is_aligned
 from planar.codegen.instructions import UnsupportedOperation
 from planar.codegen.llvm_compile import compile_function
-from planar.foundation.made_once import made_once
+from planar.foundation.turns import leave_turn
 
 Array = np.ndarray
 
+LONG_CALL_POSITIONS = 2**13
+"""Positions from which on other threads go on while they are solved."""
 LANES = 16
 """Designs at once: two vectors of the widest machines, so that one waits while the other works."""
 
@@ -48,7 +51,7 @@ def designs_kernel(
     return found
 
 
-@made_once(maxsize=256)
+@lru_cache(maxsize=256)
 def _designs_kernel_or_reason(
     equations: KernelEquations,
     links: tuple[str, ...],
@@ -167,16 +170,17 @@ def _call_function(
     arrays = [np.ascontiguousarray(row) for row in (*rows, *tables)]
     width = rows[0].shape[1]
     strides = (out.strides[1] // out.itemsize, out.strides[0] // out.itemsize)
-    function(
-        design_count // kernel.lanes,
-        len(tables[0]),
-        width,
-        *strides,
-        *(each.ctypes.data for each in arrays),
-        *tolerances,
-        out.ctypes.data,
-        good.ctypes.data,
-    )
+    with leave_turn(design_count * len(tables[0]) >= LONG_CALL_POSITIONS):
+        function(
+            design_count // kernel.lanes,
+            len(tables[0]),
+            width,
+            *strides,
+            *(each.ctypes.data for each in arrays),
+            *tolerances,
+            out.ctypes.data,
+            good.ctypes.data,
+        )
 
 
 def _operand_rows(operands: Sequence[tuple[str, int]], values: Array) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from math import ceil
 from typing import NamedTuple
 
@@ -29,7 +30,6 @@ from planar.batch.march.prediction import (
 from planar.codegen.instructions import UnsupportedOperation
 from planar.equations.functions import EquationFunctions
 from planar.equations.symbolic_equations import slice_length
-from planar.foundation.made_once import made_once
 
 Array = np.ndarray
 
@@ -159,7 +159,7 @@ def _kernel(
         raise UnsupportedStructure(str(why)) from None
 
 
-@made_once(maxsize=256)
+@lru_cache(maxsize=256)
 def _cached_kernel(
     equations: KernelEquations, links: tuple[str, ...], rates: bool, point_blocks: tuple[int, ...] | None
 ) -> NumpyKernel:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,6 @@ from planar.codegen import block_kernel
 from planar.codegen.block_formula import BlockFormula, FormulaInput, KernelLayout
 from planar.codegen.llvm_compile import compile_function
 from planar.codegen.llvm_ir import IRWriter
-from planar.foundation.made_once import made_once
 
 Array = np.ndarray
 
@@ -50,7 +50,7 @@ class LLVMBlockRunner:
         return NewtonRun(outside[:, 0], outside[:, 1], outside[:, 2])
 
 
-@made_once(maxsize=256)
+@lru_cache(maxsize=256)
 def _compile_newton_kernel(kind: BlockType, rates: bool) -> Any:
     kinds = ("int", "int", "int", *("array",) * 7)
     return compile_function(_NewtonKernelWriter(kind, rates).write(), "follow", *kinds)

@@ -12,7 +12,6 @@ from planar.batch.mechanisms.block_formulas import FormulaBuilder
 from planar.batch.mechanisms.block_type import SKETCH_SUMS, BlockEquations, BlockSignature
 from planar.codegen.block_formula import BlockFormula
 from planar.codegen.instructions import UnsupportedOperation
-from planar.foundation.made_once import made_once
 from planar.model.pairs import Pair
 
 MAX_SIGNS = 2
@@ -99,7 +98,7 @@ class BlockType(BlockEquations):
         return self.__dict__.setdefault("_runs", {})
 
 
-@made_once(maxsize=MAX_BLOCK_TYPES)
+@lru_cache(maxsize=MAX_BLOCK_TYPES)
 def find_block_type(signature: BlockSignature) -> BlockType:
     """The kind of a signature; equal ones are one."""
     return BlockType(signature, [_sample_pair(joint.type) for joint in signature.pairs])
