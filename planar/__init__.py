@@ -66,6 +66,7 @@ if TYPE_CHECKING:
     from planar.model.pairs.slot import SlotPair
     from planar.model.pairs.turning import TurningPair
     from planar.model.pin_linkage import pinned
+    from planar.model.pin_linkages import PinnedLinkages, pinned_linkages
     from planar.pages.view import view
     from planar.reports.files.xarray_dataset import dataset
     from planar.results.motion import Motion, State
@@ -129,6 +130,7 @@ _ROOMS = {
     "NoAnswer": "foundation.errors",
     "Outcome": "foundation.errors",
     "Pair": "model.pairs.base",
+    "PinnedLinkages": "model.pin_linkages",
     "PlanarError": "foundation.errors",
     "Point": "model.mechanism",
     "PointMotion": "results.records",
@@ -183,6 +185,7 @@ _ROOMS = {
     "mobility": "analysis.identity.mobility",
     "modes": "assemblies.modes",
     "pinned": "model.pin_linkage",
+    "pinned_linkages": "model.pin_linkages",
     "plot": "plot",
     "prepared": "batch.prepared",
     "schema": "document.schema",
@@ -254,6 +257,7 @@ __all__ = [
     "NoAnswer",
     "Outcome",
     "Pair",
+    "PinnedLinkages",
     "PlanarError",
     "Point",
     "PointMotion",
@@ -308,6 +312,7 @@ __all__ = [
     "mobility",
     "modes",
     "pinned",
+    "pinned_linkages",
     "plot",
     "prepared",
     "schema",

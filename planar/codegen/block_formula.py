@@ -45,7 +45,9 @@ def share_reciprocals(formula: BlockFormula) -> BlockFormula:
     source, made = formula.instructions, InstructionList[FormulaInput]()
     numbers: dict[int, int] = {}
     still: set[int] = set()
-    below = Counter(source.instructions[k].operands[1] for k in formula.order if source.instructions[k].operation == "div")
+    below = Counter(
+        source.instructions[k].operands[1] for k in formula.order if source.instructions[k].operation == "div"
+    )
     for k in formula.order:
         value = source.instructions[k]
         of = [numbers[each] for each in value.operands]

@@ -3,46 +3,17 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from planar.codegen.block_formula import BlockFormula
 from planar.codegen.llvm_compile import compile_function
 from planar.codegen.llvm_ir import IRWriter
+from planar.codegen.tape import LANES, Tape, TapeFormula, TapeLimits, TapeResult, padded_steps
 from planar.foundation.arrays import Array
 
-LANES = 8
-"""Steps that are worked on at once."""
 MARGIN = LANES
 """Numbers before and after a row of what is looked at between steps."""
-
-
-class TapeFormula(NamedTuple):
-    """A formula of a tape: what it gives are so many rows of a point, then, where it is checked, so many cosines and
-    sines that may not change fast, what is left open, and how clear of a dead point it is."""
-
-    formula: BlockFormula
-    row_count: int
-    direction_count: int = 0
-
-    @property
-    def is_checked(self) -> bool:
-        """Whether it tells more than rows."""
-        return len(self.formula.outputs) > self.row_count
-
-
-class TapeLimits(NamedTuple):
-    """What counts as good: how clear a step is at least, and how much a cosine or sine may change from one to the
-    next."""
-
-    least_clearance: float
-    greatest_change: float
-
-
-def padded_steps(steps: int) -> int:
-    """How many numbers a row of so many steps has: whole vectors, and what is looked at beyond the last step."""
-    return LANES * ((steps + 6) // LANES + 1)
 
 
 @lru_cache(maxsize=16)
@@ -247,7 +218,9 @@ class _TapeWriter:
         t = self.ir
         one, two = (t.add_instruction(f"load double, ptr {t.double_pointer(row, k)}") for k in (near, far))
         twice = t.add_instruction(f"fadd double {one}, {one}")
-        t.write_line(f"store double {t.add_instruction(f'fsub double {twice}, {two}')}, ptr {t.double_pointer(row, to)}")
+        t.write_line(
+            f"store double {t.add_instruction(f'fsub double {twice}, {two}')}, ptr {t.double_pointer(row, to)}"
+        )
 
     def write_flags(self, counter: str, clear_row: str, direction_rows: list[str]) -> tuple[str, str]:
         """Of the intervals from a vector of steps to the next ones: whether all is good, and whether nothing turns
@@ -305,21 +278,54 @@ class _TapeWriter:
         t.write_line("br label %blockend")
 
 
-def run_tape(  # many: one call of machine code
-    formulas: tuple[TapeFormula, ...],
-    limits: TapeLimits,
-    steps: int,
-    first: Array,
-    kinds: Array,
-    rows: Array,
-    p: Array,
-    tolerance: Array,
-) -> tuple[Array, Array, Array]:
-    """Walk over a whole tape, see `compile_tape`: `good`, `outcome` and `at` (sequences,)."""
-    stride, many = padded_steps(steps), len(tolerance)
-    good, outcome, at = np.empty((3, many), dtype=np.int64)
-    scratch = np.empty(scratch_size(formulas, stride))
-    arrays = first, kinds, rows, p, tolerance, scratch, good, outcome, at
-    addresses = (each.ctypes.data for each in arrays)
-    compile_tape(formulas, limits)(0, many, steps, stride, rows.shape[1], p.shape[1], *addresses)
-    return good, outcome, at
+def run_tape(formulas: tuple[TapeFormula, ...], limits: TapeLimits, steps: int, tape: Tape) -> TapeResult:
+    """Walk over a whole tape, whose slots are addresses; see `compile_tape`."""
+    stride, many = padded_steps(steps), len(tape.tolerance)
+    result = TapeResult(*np.empty((3, many), dtype=np.int64))
+    scratch = np.empty(scratch_size(formulas, stride) + LANES)
+    slots, p = tape.slots, tape.p
+    given = (tape.first, tape.kinds, slots, p, tape.tolerance)
+    arrays = [*(np.ascontiguousarray(each) for each in given), scratch, *result]
+    addresses = [each.ctypes.data for each in arrays]
+    addresses[5] += -addresses[5] % 64
+    compile_tape(formulas, limits)(0, many, steps, stride, slots.shape[1], p.shape[1], *addresses)
+    return result
+
+
+def clear_rows(addresses: Array, first: Array, count: int) -> None:
+    """Rows of so many numbers, a multiple of LANES, at addresses (rows,): NaN from the number first (rows,) on."""
+    if len(addresses):
+        held = [np.ascontiguousarray(each, dtype=np.int64) for each in (addresses, first)]
+        _compiled_clearing()(len(addresses), count, *(each.ctypes.data for each in held))
+
+
+@lru_cache(maxsize=1)
+def _compiled_clearing() -> Any:
+    """clear(many, count, rows, first)."""
+    t = IRWriter(LANES)
+    t.write_line("define void @clear(i64 %many, i64 %count, ptr readonly %rows, ptr readonly %first) {")
+    t.write_label("entry")
+    t.write_line(f"%vectors = lshr i64 %count, {LANES.bit_length() - 1}")
+    t.write_line("br label %row")
+    t.write_label("row")
+    t.write_line("%i = phi i64 [0, %entry], [%inext, %rowend]")
+    t.write_line(f"%at = load ptr, ptr {t.add_instruction('getelementptr ptr, ptr %rows, i64 %i')}")
+    t.write_line(f"%from = load i64, ptr {t.add_instruction('getelementptr i64, ptr %first, i64 %i')}")
+    t.write_line(f"%begin = lshr i64 %from, {LANES.bit_length() - 1}")
+    last = t.add_instruction(f"insertelement <{LANES} x i64> poison, i64 %from, i64 0")
+    t.write_line("%some = icmp slt i64 %begin, %vectors")
+    t.write_line("br i1 %some, label %vector, label %rowend")
+    t.write_label("vector")
+    t.write_line("%v = phi i64 [%begin, %row], [%vnext, %vector]")
+    place = t.add_instruction(f"mul i64 %v, {LANES}")
+    pointer = t.double_pointer("%at", place)
+    flag, nan = t.lanes_from(place, last), t.constant(float("nan"))
+    own = t.load(pointer)
+    t.store(t.add_instruction(f"select <{LANES} x i1> {flag}, {t.vector} {nan}, {t.vector} {own}"), pointer)
+    t.close_loop("v", "vectors", "vector", "rowend")
+    t.write_label("rowend")
+    t.close_loop("i", "many", "row", "done")
+    t.write_label("done")
+    t.write_line("ret void")
+    t.write_line("}")
+    return compile_function(t.module_text(), "clear", "int", "int", "array", "array")

@@ -13,7 +13,7 @@ from planar.batch.mechanisms.block_type import FRAME_BODY, BlockPair, BlockSigna
 from planar.batch.mechanisms.solved_block_type import BlockType, find_block_type
 from planar.codegen.block_formula import BlockFormula, FormulaInput, share_reciprocals
 from planar.codegen.instructions import CosSin, InstructionList, required_values
-from planar.codegen.tape_kernel import TapeFormula
+from planar.codegen.tape import TapeFormula
 from planar.equations.linear import solve_by_determinants
 from planar.equations.rates import UnknownRates, first_and_second_rates
 from planar.foundation.geometry import Frame, Vector
