@@ -67,6 +67,7 @@ if TYPE_CHECKING:
     from planar.model.pairs.slot import SlotPair
     from planar.model.pairs.turning import TurningPair
     from planar.model.pin_linkage import pinned
+    from planar.model.pin_linkages import PinnedLinkages, pinned_linkages
     from planar.pages.view import view
     from planar.reports.files.xarray_dataset import dataset
     from planar.results.motion import Motion, State
@@ -130,6 +131,7 @@ _ROOMS = {
     "NoAnswer": "foundation.errors",
     "Outcome": "foundation.errors",
     "Pair": "model.pairs.base",
+    "PinnedLinkages": "model.pin_linkages",
     "PlanarError": "foundation.errors",
     "Point": "model.mechanism",
     "PointMotion": "results.records",
@@ -185,6 +187,7 @@ _ROOMS = {
     "mobility": "analysis.identity.mobility",
     "modes": "assemblies.modes",
     "pinned": "model.pin_linkage",
+    "pinned_linkages": "model.pin_linkages",
     "plot": "plot",
     "prepared": "batch.prepared",
     "schema": "document.schema",
@@ -256,6 +259,7 @@ __all__ = [
     "NoAnswer",
     "Outcome",
     "Pair",
+    "PinnedLinkages",
     "PlanarError",
     "Point",
     "PointMotion",
@@ -311,6 +315,7 @@ __all__ = [
     "mobility",
     "modes",
     "pinned",
+    "pinned_linkages",
     "plot",
     "prepared",
     "schema",

@@ -73,6 +73,19 @@ def run_in_threads(
                 future.cancel()
 
 
+def run_tasks(
+    threads: int,
+    executor: Executor | None,
+    run_there: Callable[[Task], Result],
+    tasks: Iterable[tuple[int, Task]],
+    run_here: Callable[[int, Task], Result],
+) -> Iterator[tuple[int, Result]]:
+    """The results of numbered tasks as they come: by an executor if there is one, else in threads."""
+    if executor is None:
+        return run_in_threads(threads, tasks, run_here)
+    return run_in_executor(executor, run_there, tasks, run_here)
+
+
 def run_in_executor(
     executor: Executor,
     function: Callable[[Task], Result],

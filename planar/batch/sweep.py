@@ -16,17 +16,17 @@ from numpy.typing import DTypeLike
 
 from planar.batch.block import DesignBlock, solve_design_block
 from planar.batch.design_arrays import read_designs, split_into_blocks
-from planar.batch.executor import TASKS_PER_WORKER, run_in_executor, run_in_threads, thread_count, worker_count
+from planar.batch.executor import TASKS_PER_WORKER, run_tasks, thread_count, worker_count
 from planar.batch.march.choice import available_backends
-from planar.batch.reductions.point_reductions import PointReduction
 from planar.batch.reductions.reduced_sweep import (
     ReducedSweep,
     Reduction,
     ReductionStore,
     read_reductions,
     reduce_block,
+    result_type,
 )
-from planar.batch.reference_design import ReferenceDesign, reference_design
+from planar.batch.reference_design import reference_design
 from planar.batch.results import Sweep
 from planar.batch.stores.store import BlockStore, SweepPlan, open_store
 from planar.document.first_argument import takes_mechanism
@@ -42,8 +42,6 @@ MAX_EXECUTOR_BLOCK_BYTES = 128 * 2**20
 """Bytes of the results of a block that is solved elsewhere."""
 BLOCK_MULTIPLE = 16
 """Blocks are multiples of so many designs, where there are enough."""
-RESULT_TYPES = ("float64", "float32")
-"""Types of the numbers of results."""
 
 
 @overload
@@ -85,7 +83,7 @@ def sweep(  # many: the public signature
     block: int | None = None,
     store: None = None,
     dtype: DTypeLike = "float64",
-    reduce: Mapping[str, str | Reduction],
+    reduce: Mapping[str, str | Reduction[Sweep]],
     progress: Callable[[int, int], object] | None = None,
 ) -> ReducedSweep: ...
 @takes_mechanism
@@ -105,7 +103,7 @@ def sweep(  # many: the public signature; # long: its docstring
     block: int | None = None,
     store: str | Path | None = None,
     dtype: DTypeLike = "float64",
-    reduce: Mapping[str, str | Reduction] | None = None,
+    reduce: Mapping[str, str | Reduction[Sweep]] | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> Sweep | ReducedSweep:
     """The motions of many designs of one mechanism, which differ in dimensions of links or in their inputs.
@@ -145,19 +143,22 @@ def sweep(  # many: the public signature; # long: its docstring
     if block is not None and (isinstance(block, bool) or not isinstance(block, Integral) or block < 1):
         raise BadInput("block", f"a whole number of designs is wanted, not {block!r:.40}")
     mechanism = check_range(mechanism, steps, start, stop, pair)
-    threads, result_type = thread_count(workers, executor), _result_type(dtype)
+    threads, number_type = thread_count(workers, executor), result_type(dtype)
     common = reference_design(mechanism, pair)
     available_backends(backend)
     if reduce is not None and store is not None:
         raise BadInput("store", "a store keeps all results, and reductions are kept in memory; leave out one of them")
-    reductions = reduce if reduce is None else read_reductions(reduce, common.result_name, steps)
-    names, rates = _wanted(common, points, rates, reductions)
-    whole = DesignBlock(mechanism, values, int(steps), names, rates, start, stop, pair, backend, result_type)
+    names = common.select_points(points)
+    reductions = None if reduce is None else read_reductions(reduce, common.result_name, steps)
+    if reductions is not None:
+        own, rates = reductions.results(names, rates)
+        names = own or ()
+    whole = DesignBlock(mechanism, values, int(steps), names, rates, start, stop, pair, backend, number_type)
     many = len(next(iter(values.values())))
     size = int(block) if block is not None else _block_size(whole, many, executor, reductions is not None)
     plan = SweepPlan(whole, size)
     into = open_store(store, plan) if reductions is None else ReductionStore(plan)
-    for done in _solve_blocks(into, threads, executor, reductions):
+    for done in _solve_blocks(into, threads, executor, reductions and reductions.functions):
         if progress is not None:
             progress(done, many)
     found: Sweep | ReducedSweep = into.result()
@@ -165,7 +166,7 @@ def sweep(  # many: the public signature; # long: its docstring
 
 
 def _solve_blocks(
-    into: BlockStore, threads: int, executor: Executor | None, reductions: Mapping[str, Reduction] | None
+    into: BlockStore, threads: int, executor: Executor | None, reductions: Mapping[str, Reduction[Sweep]] | None
 ) -> Iterator[int]:
     """Solve the blocks that are not there yet, and write them; how many designs are done after each."""
     plan = into.plan
@@ -186,41 +187,10 @@ def _solve_blocks(
             return reduce_block(task, reductions)
         return solve_design_block(task, into.output_array(parts[number]))
 
-    if executor is None:
-        found = run_in_threads(min(threads, len(parts)), tasks, solve_here)
-    else:
-        found = run_in_executor(executor, solve, tasks, solve_here)
-    for k, done in found:
+    for k, done in run_tasks(min(threads, len(parts)), executor, solve, tasks, solve_here):
         into.write_block(k, parts[k], done)
         ready += parts[k].stop - parts[k].start
         yield ready
-
-
-def _result_type(dtype: DTypeLike) -> str:
-    """The name of the type that results have. Raises BadInput."""
-    try:
-        name = np.dtype(dtype).name
-    except TypeError:
-        name = ""
-    if name not in RESULT_TYPES:
-        raise BadInput("dtype", f"results are {' or '.join(RESULT_TYPES)}, not {dtype!r:.40}")
-    return name
-
-
-def _wanted(
-    common: ReferenceDesign,
-    points: Sequence[str] | str | None,
-    rates: bool,
-    reductions: Mapping[str, Reduction] | None,
-) -> tuple[tuple[str, ...], bool]:
-    """The points that are to be solved, and whether with rates: what is asked for, or what measures are made of."""
-    of_points = [each for each in (reductions or {}).values() if isinstance(each, PointReduction)]
-    own = tuple(dict.fromkeys(each.point for each in of_points))
-    if reductions and len(of_points) == len(reductions):
-        return own, any(each.wants_rates for each in of_points)
-    if not rates and any(each.wants_rates for each in of_points):
-        raise BadInput("rates", "speeds and accelerations are wanted, which are rates")
-    return tuple(dict.fromkeys((*common.select_points(points), *own))), rates
 
 
 def check_range(mechanism: Mechanism, steps: object, start: object, stop: object, pair: str | None) -> Mechanism:

@@ -32,7 +32,7 @@ FUNCTIONS = {
 }
 DRAWINGS = {name: getattr(planar.plot, name) for name in planar.plot.__all__}
 CLASSES = {name: each for name in planar.__all__ if inspect.isclass(each := getattr(planar, name))}
-FREE = {"schema", "build", "pinned", "centre_of", "from_dict", "load", "loads", "sweep_each", "save"}
+FREE = {"schema", "build", "pinned", "pinned_linkages", "centre_of", "from_dict", "load", "loads", "sweep_each", "save"}
 """Functions whose first argument is neither a mechanism nor a result."""
 COMMANDS = {
     name: command

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from planar.batch.mechanisms.results import Each
 from planar.batch.results import Sweep
 
 Array = np.ndarray
@@ -116,11 +117,14 @@ class PointReduction:
         """Whether it is made of rates."""
         return MEASURES[self.measure].order != "position"
 
-    def __call__(self, sweep: Sweep) -> Array:
+    def __call__(self, sweep: Sweep | Each) -> Array:
         """The measure of every design; not a number where the path is not as the measure wants it."""
         wanted = MEASURES[self.measure]
-        of_points: Mapping[str, Any] = getattr(sweep, wanted.order)
-        values = np.asarray(of_points[self.point])
+        if isinstance(sweep, Each):
+            values = sweep.of_point(wanted.order, self.point)
+        else:
+            of_points: Mapping[str, Any] = getattr(sweep, wanted.order)
+            values = np.asarray(of_points[self.point])
         found = wanted.measure(values)
         if wanted.of_whole_path:
             found[~sweep.whole] = np.nan

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from planar.batch.block import DesignBlock, SolvedDesigns, solve_design_block
 from planar.batch.reductions.point_reductions import HARMONICS, MEASURES, PointReduction
@@ -17,16 +18,20 @@ from planar.foundation.errors import BadInput, Outcome
 from planar.foundation.short_repr import short_repr
 
 Array = np.ndarray
-Reduction = Callable[[Sweep], Any]
-"""What is made of a block of designs: an array with an entry for each of them first."""
+Swept_ = TypeVar("Swept_")
+Reduction = Callable[[Swept_], Any]
+"""What is made of some of the whole, a `Sweep` or an `Each`: an array with an entry first for each of its designs."""
+RESULT_TYPES = ("float64", "float32")
+"""Types of the numbers of results."""
 
 
 @dataclass(frozen=True)
 class ReducedSweep(Mapping[str, Array]):
     """Reductions of every design by their names, arrays with an entry for each design first.
 
-    `designs`: what they differ in. `status` (designs,): how each ended, 0 is solved at every step, any other number k
-    is `outcomes[k]`. `general`: how many positions the general path solved. `said`: what there is to say.
+    `designs`: what they differ in; nothing of mechanisms. `status` (designs,): how each ended, 0 is solved at every
+    step, any other number k is `outcomes[k]`. `general`: how many positions the general path solved. `said`: what there
+    is to say.
     """
 
     designs: Mapping[str, Array]
@@ -68,14 +73,31 @@ class ReducedBlock(NamedTuple):
     endings: tuple[tuple[int, int, str], ...]
 
 
-def read_reductions(reduce: Mapping[str, Any], result_name: Callable[[str], str], steps: int) -> dict[str, Reduction]:
+class Reductions(NamedTuple):
+    """What is to be kept, by its names."""
+
+    functions: dict[str, Reduction[Any]]
+
+    def results(self, points: Sequence[str] | None, rates: bool) -> tuple[tuple[str, ...] | None, bool]:
+        """The points that have to be solved, and whether with rates, of what is asked for: no more than is needed where
+        all are measures of points. Raises BadInput."""
+        measured = [each for each in self.functions.values() if isinstance(each, PointReduction)]
+        own = tuple(dict.fromkeys(each.point for each in measured))
+        if len(measured) == len(self.functions):
+            return own, any(each.wants_rates for each in measured)
+        if not rates and any(each.wants_rates for each in measured):
+            raise BadInput("rates", "speeds and accelerations are wanted, which are rates")
+        return None if points is None else tuple(dict.fromkeys((*points, *own))), rates
+
+
+def read_reductions(reduce: Mapping[str, Any], result_name: Callable[[str], str], steps: int) -> Reductions:
     """The reductions by their names; `result_name` gives that of a point, and raises BadInput. Raises BadInput."""
     if not isinstance(reduce, Mapping) or not reduce:
         raise BadInput("reduce", "name what is to be kept, as {'reach': 'C.bounding_box'}")
-    return {name: _read_reduction(name, each, result_name, steps) for name, each in reduce.items()}
+    return Reductions({name: _read_reduction(name, each, result_name, steps) for name, each in reduce.items()})
 
 
-def _read_reduction(name: str, given: Any, result_name: Callable[[str], str], steps: int) -> Reduction:
+def _read_reduction(name: str, given: Any, result_name: Callable[[str], str], steps: int) -> Reduction[Any]:
     if isinstance(given, str):
         point, _, measure = given.rpartition(".")
         if measure not in MEASURES:
@@ -83,31 +105,47 @@ def _read_reduction(name: str, given: Any, result_name: Callable[[str], str], st
             raise BadInput(f"reduce.{name}", f"there is no measure {given!r:.60} of a point{meant}")
         if measure == "fourier_descriptors" and steps <= 2 * HARMONICS:
             raise BadInput(f"reduce.{name}", f"{HARMONICS} harmonics want more than {2 * HARMONICS} steps")
-        return PointReduction(result_name(point), measure)
+        measured: Reduction[Any] = PointReduction(result_name(point), measure)
+        return measured
     if not callable(given):
         told = f"a measure of a point, as 'C.bounding_box', or a function of a sweep is wanted, not {given!r:.40}"
         raise BadInput(f"reduce.{name}", told)
-    function: Reduction = given
+    function: Reduction[Any] = given
     return function
 
 
-def reduce_block(block: DesignBlock, reductions: Mapping[str, Reduction]) -> ReducedBlock:
+def result_type(dtype: DTypeLike) -> str:
+    """The name of the type that results have. Raises BadInput."""
+    try:
+        name = np.dtype(dtype).name
+    except TypeError:
+        name = ""
+    if name not in RESULT_TYPES:
+        raise BadInput("dtype", f"results are {' or '.join(RESULT_TYPES)}, not {dtype!r:.40}")
+    return name
+
+
+def reduce_block(block: DesignBlock, reductions: Mapping[str, Reduction[Sweep]]) -> ReducedBlock:
     """Solve a block and keep its reductions, made of numbers in double precision and rounded to the block's."""
     store = MemoryStore(SweepPlan(block._replace(dtype="float64"), len(next(iter(block.designs.values())))))
     every = slice(0, store.plan.design_count)
     done = solve_design_block(store.plan.all_designs, store.output_array(every))
     store.write_block(0, every, done)
     sweep = store.result()
-    reduced = {name: _values(name, function, sweep, block.dtype) for name, function in reductions.items()}
+    reduced = reduce_all(sweep, reductions, block.dtype)
     ended = np.array(done.status[:, -1])
     return ReducedBlock(reduced, ended, done.general_positions, done.general_designs, done.endings)
 
 
-def _values(name: str, function: Reduction, sweep: Sweep, dtype: str) -> Array:
-    """A reduction of all designs of a block. Raises BadInput where it has no entry for each."""
-    found = np.asarray(function(sweep))
-    if found.dtype == object or found.shape[:1] != (len(sweep),):
-        told = f"a reduction gives an array with an entry for each of {len(sweep)} designs, not one {found.shape}"
+def reduce_all(found: Swept_, reductions: Mapping[str, Reduction[Swept_]], dtype: str) -> dict[str, Array]:
+    """The reductions of some of the whole, rounded. Raises BadInput where one has no entry for each design."""
+    return {name: _reduce(name, function, found, dtype) for name, function in reductions.items()}
+
+
+def _reduce(name: str, function: Reduction[Any], some: Any, dtype: str) -> Array:
+    found = np.asarray(function(some))
+    if found.dtype == object or found.shape[:1] != (len(some),):
+        told = f"a reduction gives an array with an entry for each of {len(some)} designs, not one {found.shape}"
         raise BadInput(f"reduce.{name}", told)
     if dtype != "float64" and found.dtype.kind in "fc":
         return found.astype("complex64" if found.dtype.kind == "c" else dtype)
