@@ -77,7 +77,7 @@ def reduce_part(part: SweptPart, reductions: Mapping[str, Reduction[Each]], dtyp
 def join_blocks(blocks: Sequence[ReducedBlock], said: tuple[str, ...]) -> ReducedSweep:
     """The reductions of all mechanisms, part after part. Raises BadInput where they are not of one shape."""
     reduced = {}
-    for name in blocks[0].reduced if blocks else ():
+    for name in tuple(blocks[0].reduced) if blocks else ():
         shapes = {block.reduced[name].shape[1:] for block in blocks}
         if len(shapes) > 1:
             raise BadInput(f"reduce.{name}", f"some mechanisms have an array {min(shapes)} each, others {max(shapes)}")
