@@ -148,13 +148,13 @@ def test_single_precision_is_what_double_is_rounded_once(backend, block):
 def test_stores_keep_the_type(tmp_path, suffix):
     pytest.importorskip({"zarr": "zarr", "parquet": "pyarrow"}[suffix])
     store = tmp_path / f"sweep.{suffix}"
-    wanted = swept(20, block=8, dtype="float32")
+    wanted = swept(6, block=4, dtype="float32")
     for _ in range(2):
-        found = swept(20, block=8, dtype="float32", store=store)
+        found = swept(6, block=4, dtype="float32", store=store)
         assert found.velocity["E"][:].dtype == np.float32
         np.testing.assert_array_equal(found.velocity["E"][:], wanted.velocity["E"])
     with pytest.raises(BadInput, match="something else"):
-        swept(20, block=8, store=store)
+        swept(6, block=4, store=store)
 
 
 def test_single_precision_of_mechanisms_of_any_structure():
@@ -172,7 +172,7 @@ def test_single_precision_of_mechanisms_of_any_structure():
 
 
 def test_reductions_are_what_numpy_makes_of_the_whole():
-    whole = swept()
+    whole = swept(block=16)
     reduce = {measure: f"C.{measure}" for measure in POINT_MEASURES + RATE_MEASURES}
     found = swept(reduce=reduce | {"middle": lambda sweep: np.nansum(sweep.position["E"], axis=1)}, block=16)
     path, closed = whole.position["C"], whole.whole
