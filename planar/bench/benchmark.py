@@ -198,7 +198,16 @@ def _time_sweeps(mechanism: Mechanism, input_range: InputRange, seconds: float) 
     def run(backend: str, rates: bool, designs: int) -> Sweep:
         drawn = _draw_designs(mechanism, designs, within)
         return sweep(
-            mechanism, drawn, SWEEP_STEPS, points, rates=rates, start=start, stop=stop, pair=pair, backend=backend
+            mechanism,
+            drawn,
+            SWEEP_STEPS,
+            points,
+            rates=rates,
+            start=start,
+            stop=stop,
+            pair=pair,
+            backend=backend,
+            workers=1,
         )
 
     for k, (backend, rates) in enumerate(todo):
