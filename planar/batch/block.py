@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.dead_point_tracking import follow_to_dead_points
+from planar.batch.closed_form.ends import find_ends
+from planar.batch.dead_point_tracking import FollowedDesigns, follow_to_dead_points
 from planar.batch.design_arrays import values_of_design, with_design_values
-from planar.batch.general_path import OUTCOMES, SolvedDesign, solve_design
+from planar.batch.general_path import OUTCOMES, DesignQuestion, solve_design
 from planar.batch.initial_assembly import find_assemblies
 from planar.batch.march.backend import DesignBatch, DesignRunner, UnsupportedStructure
 from planar.batch.march.choice import find_runner
@@ -25,8 +26,8 @@ Array = np.ndarray
 
 LEAD_IN_STEP = 0.03
 """rad or sizes a step on the way to where the run starts."""
-RUN_ALL_RATIO = 0.9
-"""Where more than this part of the designs can be run, all are."""
+RUN_ALL_RATIO = 0.3
+"""Where more than this part of the designs can be run, all are: those that cannot cost less than a copy of the rest."""
 FULL_TURN = 2.0 * np.pi
 
 
@@ -50,8 +51,9 @@ class DesignBlock(NamedTuple):
 class SolvedDesigns(NamedTuple):
     """A solved block: out (steps + 1, rows, designs), x and y of every point, then first, then second rates (m, s);
     status (designs, steps + 1); positions of the running input (steps + 1,) or (designs, steps + 1); how many positions
-    the general path solved, how many designs it was given; by outcome how many designs ended so, and a sentence of one:
-    by that of what is solved, how many lack rates, or digits of them.
+    the general path solved, how many designs it was given; by outcome how many designs ended so, and what is said of
+    one, which as text is its sentence: by that of what is solved, how many lack rates, or digits of them. dead_point
+    (designs,): where the running input is at the dead point that ends a design (rad, m), not a number where none does.
     """
 
     out: Array
@@ -59,7 +61,8 @@ class SolvedDesigns(NamedTuple):
     input: Array
     general_positions: int
     general_designs: int
-    endings: tuple[tuple[int, int, str], ...]
+    endings: tuple[tuple[int, int, str | DesignQuestion], ...]
+    dead_point: Array
 
 
 def solve_design_block(block: DesignBlock, out: Array | None = None) -> SolvedDesigns:
@@ -69,10 +72,9 @@ def solve_design_block(block: DesignBlock, out: Array | None = None) -> SolvedDe
         return _DesignBlockSolver(block, out).solve()
 
 
-def _count_sentence(said: dict[int, tuple[int, str]], code: int, sentence: str) -> None:
-    """One design more of which this is said by a code; the first one's sentence is kept."""
-    many, first = said.get(code, (0, sentence))
-    said[code] = many + 1, first
+def _code(outcome: Outcome) -> int:
+    """What stands for an outcome in a status."""
+    return OUTCOMES.index(outcome)
 
 
 class _DesignBlockSolver:
@@ -90,7 +92,9 @@ class _DesignBlockSolver:
         "whether every design has a range of its own, from limit to limit"
         self.solved_steps = np.full(self.design_count, -1)
         "how many steps are solved of a design that was followed to its end, or to a dead point"
-        self.followed_positions = 0
+        self.general_positions, self.followed_designs = 0, 0
+        self.endings: dict[int, tuple[int, str | DesignQuestion]] = {}
+        self.dead_point = np.full(self.design_count, np.nan)
         self.failed_block = np.full(self.design_count, -1)
         "the block that cannot be joined, where a design surely cannot be assembled"
         length = FULL_TURN if block.stop is None else block.stop - self.start
@@ -99,58 +103,66 @@ class _DesignBlockSolver:
     def solve(self) -> SolvedDesigns:
         """See `solve_design_block`."""
         block = self.block
-        status = np.zeros((self.design_count, block.steps + 1), dtype=np.int8)
-        grid = np.linspace(0.0, 1.0, block.steps + 1)
-        same = np.ptp(self.range_length) == 0.0
+        same = bool(np.ptp(self.range_length) == 0.0)
         runs = same and not self.has_own_range and self.reference.can_run_backend
         runs = runs and abs(self.range_length[0]) <= LARGEST_INPUT_POSITION  # farther the general path counts turns
         found = self._run_with_backend() if runs else None
         out, good = (self._output_array(), np.zeros(self.design_count, dtype=int)) if found is None else found
         ended = (self.solved_steps >= 0) & (good <= block.steps)
-        rest = np.flatnonzero((good <= block.steps) & ~ended)
-        alike = same and np.ptp(self.start) == 0.0
-        if self.has_own_range:
-            inputs = np.full((self.design_count, block.steps + 1), np.nan)
-        elif alike:
-            inputs = self.start[0] + self.range_length[0] * grid
-        else:
-            inputs = self.start[:, None] + self.range_length[:, None] * grid
-        general, sent, said = (
-            self.followed_positions,
-            int(ended.sum()),
-            {},
-        )  # by outcome how many designs, and a sentence
-        dead = np.flatnonzero(ended & (self.solved_steps <= block.steps))
-        if dead.size:
-            code = OUTCOMES.index(Outcome.DEAD_POINT)
-            for index in dead:
-                out[self.solved_steps[index] :, :, index] = np.nan
-                status[index, self.solved_steps[index] :] = code
-            first = int(dead[0])
-            said[code] = dead.size, self._solve_one_design(first, inputs if alike else inputs[first]).message
-        refused: dict[int, SolvedDesign] = {}  # by the block that cannot be joined: the first design says it for all
+        solved, code = np.where(ended, self.solved_steps, good), np.zeros(self.design_count, dtype=np.int8)
+        code[ended & (solved <= block.steps)] = _code(Outcome.DEAD_POINT)
+        failed = ~ended & (good == 0) & (self.failed_block >= 0)
+        code[failed] = _code(Outcome.CANNOT_BE_ASSEMBLED)
+        if failed.any():  # those of which a backend was not given all designs
+            out[0][:, failed] = np.nan
+        status = np.zeros((self.design_count, block.steps + 1), dtype=np.int8)
+        stopped = np.flatnonzero(code)
+        step, first = np.arange(block.steps + 1, dtype=np.int32), solved[stopped, None].astype(np.int32)
+        status[stopped] = (step >= first) * code[stopped, None]
+        inputs = self._input_positions(same)
+        self.endings = {
+            int(each): (int(np.sum(code == each)), self._question(int(np.argmax(code == each)), inputs))
+            for each in np.unique(code[code != 0])
+        }
+        rest = np.flatnonzero((good <= block.steps) & ~ended & ~failed)
         for index in rest:
-            ends = int(self.failed_block[index])
-            row = None if self.has_own_range else inputs if alike else inputs[index]
-            told = refused.get(ends) or self._solve_one_design(int(index), row)
-            if ends >= 0 and OUTCOMES[told.status[0]] is Outcome.CANNOT_BE_ASSEMBLED:
-                refused[ends] = told
-            out[:, :, index], status[index] = told.out, told.status
-            if self.has_own_range:
-                inputs[index] = told.input
-            general += int(np.sum(told.status == 0))
-            sent += ends < 0
-            if told.message:
-                _count_sentence(said, int(told.status[-1]), told.message)
-            if told.rate_remark:
-                _count_sentence(said, OUTCOMES.index(Outcome.SOLVED), told.rate_remark)
-        return SolvedDesigns(out, status, inputs, general, sent, tuple((code, *each) for code, each in said.items()))
+            self._solve_alone(int(index), out, status, inputs)
+        sent = int(rest.size) + self.followed_designs
+        endings = tuple((each, *self.endings[each]) for each in self.endings)
+        return SolvedDesigns(out, status, inputs, self.general_positions, sent, endings, self.dead_point)
 
-    def _solve_one_design(self, index: int, grid: Array | None) -> SolvedDesign:
+    def _input_positions(self, same: bool) -> Array:
+        """Where the running input is at each step (steps + 1,), or (designs, steps + 1); unknown yet of own ranges."""
+        grid = np.linspace(0.0, 1.0, self.block.steps + 1)
+        if self.has_own_range:
+            return np.full((self.design_count, len(grid)), np.nan)
+        if same and np.ptp(self.start) == 0.0:
+            return np.asarray(self.start[0] + self.range_length[0] * grid)
+        return np.asarray(self.start[:, None] + self.range_length[:, None] * grid)
+
+    def _question(self, index: int, inputs: Array) -> DesignQuestion:
+        """A design, and the range that it is to run."""
         block = self.block
         mechanism = with_design_values(self.reference.mechanism, values_of_design(block.designs, index))
+        grid = None if self.has_own_range else inputs if inputs.ndim == 1 else inputs[index]
         ends = (block.start, block.stop) if grid is None else (float(grid[0]), float(grid[-1]))
-        return solve_design(mechanism, self.reference.pair, grid, block.steps, ends, block.points, block.rates)
+        return DesignQuestion(mechanism, self.reference.pair, grid, block.steps, ends)
+
+    def _solve_alone(self, index: int, out: Array, status: Array, inputs: Array) -> None:
+        """Solve a design by the general path."""
+        told = solve_design(*self._question(index, inputs), self.block.points, self.block.rates)
+        out[:, :, index], status[index], self.dead_point[index] = told.out, told.status, told.dead_point
+        if self.has_own_range:
+            inputs[index] = told.input
+        self.general_positions += int(np.sum(told.status == 0))
+        self._count_sentence(int(told.status[-1]), told.message)
+        self._count_sentence(_code(Outcome.SOLVED), told.rate_remark)
+
+    def _count_sentence(self, code: int, sentence: str) -> None:
+        """One design more of which this is said by a code; the first one's sentence is kept."""
+        if sentence:
+            many, first = self.endings.get(code, (0, sentence))
+            self.endings[code] = many + 1, first
 
     def _run_with_backend(self) -> tuple[Array, Array] | None:
         """out (m, s), and how many of the first steps passed; None where no backend can run the structure."""
@@ -159,7 +171,7 @@ class _DesignBlockSolver:
         p = base_.pair_numbers(shapes, self.design_count)
         told = {name: base_.point_member(name) for name in block.points}
         moving = {name: each for name, each in told.items() if each[0] != base_.mechanism.frame}
-        start = find_assemblies(base_, shapes, p, self.u, runner)
+        start = find_assemblies(base_, shapes, p, self.u, runner, block.backend)
         self.failed_block = start.failed_block
         fit = start.is_sure & base_.is_fit(block.designs, shapes, p)
         fit &= (np.abs(self.u).max(axis=0) <= LARGEST_INPUT_POSITION) & (np.abs(self.start) <= LARGEST_INPUT_POSITION)
@@ -174,7 +186,7 @@ class _DesignBlockSolver:
             out, good = self._run_fit_designs(runner, march, fit)
         except UnsupportedStructure:
             return None
-        self._follow_to_dead_points(march, out, good, runner)
+        self._follow_to_dead_points(march, out, good, start.signs, runner)
         return self._with_frame_points(out, told, shapes), good
 
     def _output_array(self) -> Array:
@@ -191,7 +203,9 @@ class _DesignBlockSolver:
         if march.output_row_count != out.shape[1]:
             out = allocate_aligned(len(out), march.output_row_count, self.design_count, out.dtype)
         if fit.mean() > RUN_ALL_RATIO:
-            return out, np.where(fit, runner.run(march, out), 0)
+            march.u0[:, ~fit] = np.nan
+            return out, runner.run(march, out)
+        out[:] = np.nan
         some, good = np.flatnonzero(fit), np.zeros(self.design_count, dtype=int)
         if some.size:
             own = allocate_aligned(len(out), march.output_row_count, some.size, out.dtype)
@@ -199,16 +213,33 @@ class _DesignBlockSolver:
             out[:, :, some] = own
         return out, good
 
-    def _follow_to_dead_points(self, march: DesignBatch, out: Array, good: Array, runner: DesignRunner) -> None:
+    def _follow_to_dead_points(
+        self, march: DesignBatch, out: Array, good: Array, signs: Array | None, runner: DesignRunner
+    ) -> None:
         """Follow those that a backend did not bring to the end, all at once, as far as they come."""
         some = np.flatnonzero((good > 0) & (good < len(march.input_offsets)))
         if not some.size:
             return
-        found = follow_to_dead_points(march.select(some), self.reference.running_index, good[some], runner)
+        index, backend = self.reference.running_index, self.block.backend
+        ends = None
+        if signs is not None:
+            ends = find_ends(march.select(some), index, good[some], signs[:, some], runner, backend)
+        if ends is not None:
+            self._settle(some, ends, out)
+            some = some[~ends.is_settled]
+        if some.size:
+            found = follow_to_dead_points(march.select(some), index, good[some], runner)
+            self._settle(some, found, out)
+            self.general_positions += int(found.design.size)
+            self.followed_designs += int(found.is_settled.sum())
+
+    def _settle(self, some: Array, found: FollowedDesigns, out: Array) -> None:
+        """Keep how far some designs were followed, and the positions that were solved on the way."""
         out[found.step, :, some[found.design]] = found.out.T
         settled = some[found.is_settled]
-        self.followed_positions = int(found.design.size)
         self.solved_steps[settled] = found.solved_steps[found.is_settled]
+        distance = np.sign(self.range_length[settled]) * found.distance[found.is_settled] * self.scale
+        self.dead_point[settled] = np.where(np.isfinite(distance), self.start[settled] + distance, np.nan)
 
     def _lead_to_start(self, march: DesignBatch, fit: Array) -> tuple[DesignBatch, Array]:
         """The same march from the assemblies at its start, to which those at the designs' own positions are led."""

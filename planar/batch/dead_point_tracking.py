@@ -33,11 +33,13 @@ MAX_HALVINGS = 60
 
 
 class FollowedDesigns(NamedTuple):
-    """Which designs are settled (designs,), how many of their steps are solved (designs,), and the steps that were
-    solved here: design, step (solved,) and the points there, out (rows, solved)."""
+    """Which designs are settled (designs,), how many of their steps are solved (designs,), how far from the start their
+    dead points are, rad or sizes, infinitely where there is none (designs,), and the steps that were solved here:
+    design, step (solved,) and the points there, out (rows, solved)."""
 
     is_settled: Array
     solved_steps: Array
+    distance: Array
     design: Array
     step: Array
     out: Array
@@ -254,7 +256,7 @@ class _DeadPointTracker:
         wide = self.batch.output_row_count
         if arcs is None:
             none = np.zeros(0, dtype=int)
-            return FollowedDesigns(self.is_settled, solved, none, none, np.zeros((wide, 0)))
+            return FollowedDesigns(self.is_settled, solved, self.dead_point_distance, none, none, np.zeros((wide, 0)))
         whole = _CurveArcs(*arcs)
         first, last = (np.searchsorted(self.distances, each[:, -1], side="right") for each in (whole.y0, whole.y1))
         first = np.maximum(first, self.good_steps[whole.design])
@@ -268,7 +270,9 @@ class _DeadPointTracker:
         held = np.bincount(design, minlength=self.design_count)
         self.is_settled &= held == np.maximum(solved - self.good_steps, 0)
         kept = self.is_settled[design]
-        return FollowedDesigns(self.is_settled, solved, design[kept], step[kept], out[:, kept])
+        return FollowedDesigns(
+            self.is_settled, solved, self.dead_point_distance, design[kept], step[kept], out[:, kept]
+        )
 
     def _points_at_steps(self, arcs: _CurveArcs, step: Array) -> tuple[Array, Array]:
         """The points (rows, steps) where arcs come to steps, and which of them pass the checks."""

@@ -22,13 +22,28 @@ GRID_TOLERANCE = 1e-9
 
 class SolvedDesign(NamedTuple):
     """One design: positions of the running input (rows,), the points (rows, 2 a point and order; m, s), the status of
-    every row, what there is to say of its end, and of rates that are missing or of few digits."""
+    every row, what there is to say of its end, and of rates that are missing or of few digits; where the input is at
+    the dead point that ends it (rad, m), not a number where none does."""
 
     input: Array
     out: Array
     status: Array
     message: str
     rate_remark: str = ""
+    dead_point: float = np.nan
+
+
+class DesignQuestion(NamedTuple):
+    """A design of which it is asked why it ends: the arguments of `solve_design`; as text the answer."""
+
+    mechanism: Mechanism
+    pair: str
+    grid: Array | None
+    steps: int
+    range: tuple[float | None, float | None]
+
+    def __str__(self) -> str:
+        return solve_design(*self, (), False).message
 
 
 def solve_design(
@@ -66,7 +81,10 @@ def solve_design(
     out[:many] = _point_rows(motion, points, rates)[:many]
     status[many:] = OUTCOMES.index(motion.outcome)
     told = "; ".join(motion.rate_remarks) if rates else ""
-    return SolvedDesign(input_, out, status, motion.reason if many <= steps else "", told)
+    ended = many <= steps
+    at_dead_point = ended and motion.outcome is Outcome.DEAD_POINT
+    reason, dead_point = motion.reason if ended else "", float(position[-1]) if at_dead_point else np.nan
+    return SolvedDesign(input_, out, status, reason, told, dead_point)
 
 
 def _point_rows(motion: Motion, points: tuple[str, ...], rates: bool) -> Array:

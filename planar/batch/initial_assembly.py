@@ -10,6 +10,7 @@ import numpy as np
 
 from planar.batch.assembly_scores import MAX_BLOCK_UNKNOWNS, NEAR_SKETCH, is_at_sketch, is_clearly_regular
 from planar.batch.block_corrector import SPREAD_STARTS, BlockCorrector
+from planar.batch.closed_form.start_assemblies import find_start_assemblies
 from planar.batch.march.backend import DesignRunner
 from planar.batch.nearest_assemblies import find_nearest_assemblies
 from planar.batch.reference_design import ReferenceDesign, shape_of_designs
@@ -29,6 +30,8 @@ DAMPED_STARTS = 6
 """Starts of the damped method, by which a design is refused."""
 REFUSAL_TOLERANCE = 1e-6
 """Lengths of the size by which a block stays open that is not sure to be refused."""
+MAX_ALONE = 12
+"""Designs that are not clear: so few are solved by themselves sooner than they are searched for."""
 MAX_PARTIAL_ASSEMBLIES = 8
 """Partial assemblies of a design that are carried on, those nearest to the sketch."""
 
@@ -36,12 +39,14 @@ MAX_PARTIAL_ASSEMBLIES = 8
 class DesignAssemblies(NamedTuple):
     """z (unknowns, designs), and for which of them it is surely the one that the search one by one would take.
 
-    `ends`: the level of the block that surely cannot be joined to the rest, -1 where all can (designs,).
+    `failed_block`: the level of the block that surely cannot be joined to the rest, -1 where all can (designs,);
+    `signs` (blocks, designs): of the assemblies of blocks in closed form, 0 where they are not known; None of none.
     """
 
     z: Array
     is_sure: Array
     failed_block: Array
+    signs: Array | None = None
 
 
 class _PartialAssemblies(NamedTuple):
@@ -66,21 +71,37 @@ def find_assemblies(
     p: Array,
     u: Array,
     runner: DesignRunner,
+    backend: str = "auto",
 ) -> DesignAssemblies:
     """The assemblies at inputs u (inputs, designs), of designs with numbers p (numbers, designs) and these shapes."""
     with np.errstate(all="ignore"):  # starts that lead nowhere end as what is no number
-        near = find_nearest_assemblies(reference, shapes, p, u, runner)
-        if near is None:
+        every = _find_without_search(reference, shapes, p, u, runner, backend)
+        if every is None:
             return _AssemblySearch(reference, shapes, p, u).search()
-        every, rest = (
-            DesignAssemblies(near.z, near.is_clear, np.full(len(near.is_clear), -1)),
-            np.flatnonzero(~near.is_clear),
-        )
-        if rest.size:
+        rest = np.flatnonzero(~every.is_sure & (every.failed_block < 0))
+        if rest.size > MAX_ALONE:
             own = {name: shape_of_designs(shape, rest) for name, shape in shapes.items()}
             found = _AssemblySearch(reference, own, p[:, rest], u[:, rest]).search()
-            every.z[:, rest], every.is_sure[rest], every.failed_block[rest] = found
+            every.z[:, rest], every.is_sure[rest], every.failed_block[rest] = found[:3]
+            if every.signs is not None:
+                every.signs[:, rest] = 0.0
         return every
+
+
+def _find_without_search(
+    reference: ReferenceDesign,
+    shapes: Mapping[str, LinkShape],
+    p: Array,
+    u: Array,
+    runner: DesignRunner,
+    backend: str,
+) -> DesignAssemblies | None:
+    """Those by closed forms, else those near the base's own; None where neither can be."""
+    start = find_start_assemblies(reference, shapes, p, u, backend)
+    if start is not None:
+        return DesignAssemblies(*start)
+    near = find_nearest_assemblies(reference, shapes, p, u, runner)
+    return None if near is None else DesignAssemblies(near.z, near.is_clear, np.full(len(near.is_clear), -1))
 
 
 class _AssemblySearch:
@@ -114,7 +135,7 @@ class _AssemblySearch:
             slow = _AssemblySearch(self.reference, own, self.p[:, again], self.u[:, again])
             found.z[:, again], found.is_sure[again], found.failed_block[again] = slow._choose(
                 slow._join_blocks(False)[0]
-            )
+            )[:3]
         return found
 
     def _join_blocks(self, quick: bool) -> tuple[_PartialAssemblies, Array]:

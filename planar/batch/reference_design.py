@@ -110,7 +110,8 @@ class ReferenceDesign:
         """What the residual check lets pass for these designs: as `ResidualCheck.tolerance`, of the longest of any."""
         kinds = [kind for pair in self.mechanism.pairs for kind in pair.number_kinds]
         lengths = np.array([kind is MeasureKind.LENGTH for kind in kinds], dtype=bool)
-        reach = float(np.nanmax(np.abs(p[lengths]), initial=0.0))
+        reach = float(np.max(np.abs(p[lengths]), initial=0.0))
+        reach = reach if np.isfinite(reach) else float(np.nanmax(np.abs(p[lengths]), initial=0.0))
         return float(residual_tolerance(len(self.mechanism.links), reach))
 
     def inputs(self, designs: Mechanism, many: int) -> tuple[Array, Array, Array]:

@@ -3,15 +3,50 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from planar.foundation.errors import Outcome
 from planar.foundation.short_repr import short_repr
+from planar.model.wording import count_phrase
 
 Array = np.ndarray
+
+
+class SweepNotes(NamedTuple):
+    """What there is to say of a sweep of so many designs: how many designs the general path was given, and positions it
+    solved; by outcome its code, how many designs ended so, and what is said of the first, which as text is a sentence;
+    and how many of its blocks were not whole in a store.
+    """
+
+    design_count: int
+    general_designs: int
+    general_positions: int
+    endings: tuple[tuple[int, int, Any], ...]
+    block_count: int
+    damaged_blocks: int
+
+    def sentences(self) -> tuple[str, ...]:
+        """The sentences; those of designs are made here, which may take each about as long as a motion."""
+        many, outcomes, found = self.design_count, list(Outcome), []
+        if self.general_designs:
+            told = f"{self.general_designs} of {many} designs went to the general path"
+            found.append(f"{told}, which solved {self.general_positions} positions")
+        found += [
+            f"{count} of {many} designs: {_describe_ending(outcomes[code])} (the first: {first})"
+            for code, count, first in self.endings
+        ]
+        if self.damaged_blocks:
+            which = f"{self.damaged_blocks} of {count_phrase(self.block_count, 'block')} in the store"
+            found.append(f"{which} {'was' if self.damaged_blocks == 1 else 'were'} not whole, and solved again")
+        return tuple(found)
+
+
+def _describe_ending(outcome: Outcome) -> str:
+    return "rates are missing or have few digits" if outcome is Outcome.SOLVED else outcome.value
 
 
 @dataclass(frozen=True)
@@ -23,7 +58,8 @@ class Sweep:
     none is determined. Written to a store they are read when they are indexed, which raises BadInput where a block of
     it is missing or damaged. `status` (designs, steps + 1): 0 is solved, any other number k is `outcomes[k]`. `input`:
     positions of the input that runs, (steps + 1,), or (designs, steps + 1) where they differ. `general`: how many
-    positions the general path solved, one design after the other. `said`: what there is to say.
+    positions the general path solved, one design after the other. `dead_point` (designs,): where the input is at the
+    dead point at which a design's motion ends (rad or m), NaN where none does.
     """
 
     points: tuple[str, ...]
@@ -34,10 +70,16 @@ class Sweep:
     status: Any
     input: Array
     general: int
-    said: tuple[str, ...]
+    dead_point: Any
+    notes: SweepNotes = field(repr=False)
     outcomes: tuple[Outcome, ...] = tuple(Outcome)
 
     __repr__ = short_repr
+
+    @cached_property
+    def said(self) -> tuple[str, ...]:
+        """What there is to say; made when it is first read."""
+        return self.notes.sentences()
 
     def __len__(self) -> int:
         """How many designs there are."""

@@ -118,6 +118,10 @@ class IRWriter:
             f"select <{self.lanes} x i1> {flag}, {self.vector} {value}, {self.vector} zeroinitializer"
         )
 
+    def select(self, flag: str, value: str, other: str) -> str:
+        """One value where a flag is up, else the other."""
+        return self.add_instruction(f"select <{self.lanes} x i1> {flag}, {self.vector} {value}, {self.vector} {other}")
+
     def allocate(self, many: int = 1) -> str:
         """Room for values."""
         return self.add_instruction(f"alloca {self.vector}, i64 {many}, align 64")

@@ -52,7 +52,12 @@ class DesignBatch(NamedTuple):
 
     def select(self, designs: Array | slice, z0: Array | None = None) -> DesignBatch:
         """The batch of some of the designs, from other unknowns if they are given."""
-        parts = {name: getattr(self, name)[:, designs] for name in ("p", "q", "z0", "u0", "u1", "u2")}
+        rows = {name: getattr(self, name) for name in ("p", "q", "z0", "u0", "u1", "u2")}
+        if isinstance(designs, slice):
+            parts = {name: row[:, designs] for name, row in rows.items()}
+        else:  # of which rows lie in one piece, unlike what an index gives
+            which = np.flatnonzero(designs) if designs.dtype == bool else designs
+            parts = {name: np.take(row, which, axis=1) for name, row in rows.items()}
         return self._replace(**parts | ({} if z0 is None else {"z0": z0}))
 
 
@@ -74,8 +79,12 @@ class CorrectedAssemblies(NamedTuple):
 class DesignRunner(Protocol):
     """Runs the designs of a batch through all steps. Each method raises UnsupportedStructure where it cannot."""
 
+    def can_help(self, batch: DesignBatch) -> bool:
+        """Whether it can do anything for such designs that others have not done before."""
+
     def run(self, batch: DesignBatch, out: Array) -> Array:
-        """Fill out (steps + 1, rows, designs): x and y of each point, then their first, then second rates (m, s).
+        """Fill out (steps + 1, rows, designs): x and y of each point, then their first, then second rates (m, s); what
+        is no number from the first step on that did not pass.
 
         Where `out` is in single precision, each number is rounded when it is written.
 
@@ -94,6 +103,12 @@ class DesignRunner(Protocol):
         """
 
 
+def erase_from_steps(out: Array, first: Array) -> None:
+    """Make out (steps + 1, rows, designs) no number from a step of each design on (designs,)."""
+    begin = int(first.min(initial=len(out)))
+    np.copyto(out[begin:], np.nan, where=np.arange(begin, len(out))[:, None, None] >= first)
+
+
 class RunnerAttempt(NamedTuple):
     """A runner, and whether it is given all designs that have not come to the end, or those that have not begun."""
 
@@ -107,12 +122,18 @@ class RunnerLadder:
     def __init__(self, attempts: Sequence[RunnerAttempt]):
         self.attempts = attempts
 
+    def can_help(self, batch: DesignBatch) -> bool:
+        """See `DesignRunner`."""
+        return True
+
     def run(self, batch: DesignBatch, out: Array) -> Array:
         """See `DesignRunner`."""
         good, runs = np.zeros(out.shape[2], dtype=int), 0
         for runner, runs_to_end in self.attempts:
             left = np.flatnonzero(good < (len(batch.input_offsets) if runs_to_end else 1))
-            if not left.size:
+            if runs:  # what has nowhere to start is given once
+                left = left[np.isfinite(batch.z0[:, left]).all(axis=0) & np.isfinite(batch.u0[:, left]).all(axis=0)]
+            if not left.size or not runner.can_help(batch):
                 continue
             try:
                 if left.size == len(good):

@@ -92,8 +92,9 @@ class KernelEquations:
         self.column_of = coordinate_columns(e.coordinates)
 
     def assembly_signs(self, z: np.ndarray, u: np.ndarray, p: np.ndarray) -> np.ndarray:
-        """Which assembly every block in closed form is in (blocks,), +1 or -1."""
-        return np.sign(self._sides_function(z, u, p).full().ravel())
+        """Which assembly every block in closed form is in (blocks,), +1 or -1; of designs (..., designs) each."""
+        found: np.ndarray = np.sign(self._sides_function(z, u, p).full())
+        return found.ravel() if z.ndim == 1 else found
 
     @cached_property
     def _sides_function(self) -> ca.Function:

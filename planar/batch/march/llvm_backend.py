@@ -24,11 +24,16 @@ class LLVMRunner:
     def __init__(self, extra_corrections: int = 0):
         self.extra_corrections = extra_corrections
 
+    def can_help(self, batch: DesignBatch) -> bool:
+        """See `DesignRunner`: nothing is corrected where all blocks are in closed form."""
+        try:
+            return not self.extra_corrections or batch_equations(batch).has_newton_blocks
+        except UnsupportedOperation:
+            return False
+
     def run(self, batch: DesignBatch, out: Array) -> Array:
         """See `DesignRunner`."""
         with _refusing_structures():
-            if self.extra_corrections and not batch_equations(batch).has_newton_blocks:
-                raise UnsupportedOperation("nothing is corrected where all blocks are in closed form")
             return run_designs_kernel(batch, self.extra_corrections, out)[1]
 
     def last_good_unknowns(self, batch: DesignBatch, good: Array) -> Array:

@@ -6,7 +6,7 @@ What Newton's method solves is predicted by the polynomial through the steps bef
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import inf
+from math import inf, nan
 from typing import NamedTuple
 
 from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations, Operand
@@ -48,7 +48,8 @@ def write_designs_kernel(
 ) -> DesignsKernelLayout:
     """The function for points on these links, none of which is the frame. Raises UnsupportedOperation.
 
-    A step gives x and y of every point, then with `rates` all first and all second rates. With `levels`, of the block
+    A step gives x and y of every point, then with `rates` all first and all second rates: no numbers from the first
+    that does not pass the checks. With `levels`, of the block
     that places each point, it gives more: x and y of every point in the other assembly of its block (infinite where
     that is not in closed form), the state, and how regular the least regular of the blocks is that Newton's method
     solves. Where `is_single`, what a step gives is rounded to single precision when it is written.
@@ -328,15 +329,6 @@ class _DesignsKernelWriter(KernelWriter):
             nowhere = [t.constant(inf)] * 2
             many += [part for k in range(len(self.links)) for part in self.other_points.get(k, nowhere)]
             many += [*(have[leaf] for leaf in self.state), t.load(self.regularity_slot)]
-        for k, each in enumerate(many):
-            place = t.add_instruction(
-                f"add i64 {t.add_instruction('mul i64 %k, %time')}, {t.add_instruction(f'mul i64 %row, {k}')}"
-            )
-            place = t.add_instruction(f"add i64 {place}, {self.lane}")
-            if self.is_single:
-                t.store_streaming_rounded(each, t.single_pointer("%out", place))
-            else:
-                t.store_streaming(each, t.double_pointer("%out", place))
         # sums, since what is not a number stays so in them, and is not below anything
         worst = t.add_all(
             [t.constant(0.0), *(t.call_intrinsic("fabs", each) for each in (*left, *self.write_circle_residuals(have)))]
@@ -350,4 +342,16 @@ class _DesignsKernelWriter(KernelWriter):
         for flag in flags[1:]:
             flags[0] = t.and_flags(flags[0], flag)
         t.store(t.select_or_zero(flags[0], t.load(self.passed_slot)), self.passed_slot)
+        if self.point_blocks is None:
+            fine = t.compare("ogt", t.load(self.passed_slot), "zeroinitializer")
+            many = [t.select(fine, each, t.constant(nan)) for each in many]
+        for k, each in enumerate(many):
+            place = t.add_instruction(
+                f"add i64 {t.add_instruction('mul i64 %k, %time')}, {t.add_instruction(f'mul i64 %row, {k}')}"
+            )
+            place = t.add_instruction(f"add i64 {place}, {self.lane}")
+            if self.is_single:
+                t.store_streaming_rounded(each, t.single_pointer("%out", place))
+            else:
+                t.store_streaming(each, t.double_pointer("%out", place))
         t.store(t.binary("add", t.load(self.good_count_slot), t.load(self.passed_slot)), self.good_count_slot)

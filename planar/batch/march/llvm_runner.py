@@ -80,7 +80,10 @@ def run_designs_kernel(batch: DesignBatch, extra_corrections: int = 0, out: Arra
     tolerances = batch.tolerance, correction_limit(longest), batch.unit
     out, good = _run_kernel(kernel, batch, batch.rates, (table, counts + extra_corrections), tolerances, out)
     # what is told of a step only at the next one condemns the step too
-    return out, np.where((good > 1) & (good < len(table)), good - 1, good)
+    condemned = np.flatnonzero((good > 1) & (good < len(table)))
+    good[condemned] -= 1
+    out[good[condemned], :, condemned] = np.nan
+    return out, good
 
 
 def unknowns_at_steps(batch: DesignBatch, extra_corrections: int, steps: Array) -> Array:

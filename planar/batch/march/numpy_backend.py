@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.batch.design_arrays import split_into_blocks
-from planar.batch.march.backend import CorrectedAssemblies, DesignBatch, UnsupportedStructure
+from planar.batch.march.backend import CorrectedAssemblies, DesignBatch, UnsupportedStructure, erase_from_steps
 from planar.batch.march.checks import PointWriter, design_positions
 from planar.batch.march.design_functions import DesignFunctions
 from planar.batch.march.kernel import KernelEquations, batch_equations
@@ -46,6 +46,10 @@ COMPACTION_RATIO = 0.7
 class NumpyRunner:
     """See `DesignRunner`. Raises UnsupportedStructure where blocks hold more constraints than unknowns."""
 
+    def can_help(self, batch: DesignBatch) -> bool:
+        """See `DesignRunner`."""
+        return True
+
     def run(self, batch: DesignBatch, out: Array) -> Array:
         """See `DesignRunner`."""
         by_casadi = batch.rates and has_large_block(batch.functions)
@@ -56,6 +60,7 @@ class NumpyRunner:
             own = np.empty((*out.shape[:2], rest.size))
             good[rest] = _run(kernel, batch.select(rest), own, EXTRA_CORRECTIONS)
             out[:, :, rest] = own
+        erase_from_steps(out, good)
         return good
 
     def last_good_unknowns(self, batch: DesignBatch, good: Array) -> Array:
@@ -120,6 +125,10 @@ class StartRunner:
     They may start nearer to where assemblies meet than others do, in structures of any size.
     """
 
+    def can_help(self, batch: DesignBatch) -> bool:
+        """See `DesignRunner`."""
+        return True
+
     def run(self, batch: DesignBatch, out: Array) -> Array:
         """See `DesignRunner`."""
         if not batch.functions.is_square:
@@ -127,7 +136,9 @@ class StartRunner:
         functions = DesignFunctions(batch.functions, batch.p)
         with np.errstate(all="ignore"):
             row = design_positions(functions, batch, self._start(functions, batch), batch.u0)
-            return (PointWriter(batch, functions).write(out[0], row) & row.passed).astype(int)
+            good = (PointWriter(batch, functions).write(out[0], row) & row.passed).astype(int)
+        erase_from_steps(out, good)
+        return good
 
     def last_good_unknowns(self, batch: DesignBatch, good: Array) -> Array:
         """See `DesignRunner`."""

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import DTypeLike
 
 from planar.batch.block import DesignBlock, SolvedDesigns, solve_design_block
 from planar.batch.reductions.point_reductions import HARMONICS, MEASURES, PointReduction
-from planar.batch.results import Sweep
+from planar.batch.results import Sweep, SweepNotes
 from planar.batch.stores.store import BlockStore, MemoryStore, SweepPlan
 from planar.document.cursor import suggest_spelling
 from planar.foundation.errors import BadInput, Outcome
@@ -30,18 +31,22 @@ class ReducedSweep(Mapping[str, Array]):
     """Reductions of every design by their names, arrays with an entry for each design first.
 
     `designs`: what they differ in; nothing of mechanisms. `status` (designs,): how each ended, 0 is solved at every
-    step, any other number k is `outcomes[k]`. `general`: how many positions the general path solved. `said`: what there
-    is to say.
+    step, any other number k is `outcomes[k]`. `general`: how many positions the general path solved.
     """
 
     designs: Mapping[str, Array]
     reduced: Mapping[str, Array]
     status: Array
     general: int
-    said: tuple[str, ...]
+    notes: SweepNotes | tuple[str, ...] = field(repr=False)
     outcomes: tuple[Outcome, ...] = tuple(Outcome)
 
     __repr__ = short_repr
+
+    @cached_property
+    def said(self) -> tuple[str, ...]:
+        """What there is to say; made when it is first read."""
+        return self.notes.sentences() if isinstance(self.notes, SweepNotes) else self.notes
 
     def __getitem__(self, name: str) -> Array:
         """A reduction of all designs."""
@@ -70,7 +75,7 @@ class ReducedBlock(NamedTuple):
     status: Array
     general_positions: int
     general_designs: int
-    endings: tuple[tuple[int, int, str], ...]
+    endings: tuple[tuple[int, int, Any], ...]
 
 
 class Reductions(NamedTuple):
@@ -176,5 +181,5 @@ class ReductionStore(BlockStore):
 
     def result(self) -> ReducedSweep:
         return ReducedSweep(
-            self.plan.all_designs.designs, self.reduced, self.status, self.general_positions, self.messages()
+            self.plan.all_designs.designs, self.reduced, self.status, self.general_positions, self.notes()
         )

@@ -103,18 +103,20 @@ class ParquetStore(BlockStore):
             **{name: np.repeat(values[part], steps) for name, values in self.plan.all_designs.designs.items()},
             "input": np.broadcast_to(done.input, done.status.shape).ravel(),
             "status": done.status.ravel(),
+            "dead_point": np.repeat(done.dead_point, steps),
         }
         for order, points in point_views(done.out, self.plan).items():
             for name, values in points.items():
                 for axis, own in zip(_column_names(order, name), np.moveaxis(values, 2, 0), strict=True):
                     columns[axis] = np.ascontiguousarray(own).ravel()
+        said = [(code, count, str(sentence)) for code, count, sentence in done.endings]
         about = {
             "fingerprint": self.fingerprint,
             "block": self.block_size,
             "number": number,
             "general": done.general_positions,
             "sent": done.general_designs,
-            "said": done.endings,
+            "said": said,
             "outcomes": [each.value for each in Outcome],
         }
         content, table = BytesIO(), pa.table(columns).replace_schema_metadata({"planar": json.dumps(about)})
@@ -125,7 +127,7 @@ class ParquetStore(BlockStore):
             write_atomically(
                 self._checksum_path(number), self._checksum_line(number, sha256(content.getbuffer()).hexdigest())
             )
-        self.block_notes[number] = done.general_positions, done.general_designs, done.endings
+        self.block_notes[number] = done.general_positions, done.general_designs, said
 
     def read_columns(self, columns: tuple[str, ...]) -> list[Array]:
         """Columns of all blocks, each (designs, steps + 1). Raises BadInput."""
@@ -144,8 +146,8 @@ class ParquetStore(BlockStore):
 
     def result(self) -> Sweep:
         found = {order: _ParquetPoints(self, order) for order in self.plan.quantities}
-        status, inputs = self.read_columns(("status", "input"))
-        return self.make_sweep(found, status, inputs[0] if np.all(inputs == inputs[0]) else inputs)
+        status, inputs, dead_points = self.read_columns(("status", "input", "dead_point"))
+        return self.make_sweep(found, status, inputs[0] if np.all(inputs == inputs[0]) else inputs, dead_points[:, 0])
 
 
 class _ParquetPoints(Mapping[str, Any]):

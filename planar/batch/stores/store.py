@@ -14,12 +14,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planar.batch.block import DesignBlock, SolvedDesigns
-from planar.batch.results import Sweep
+from planar.batch.results import Sweep, SweepNotes
 from planar.codegen.aligned_arrays import allocate_aligned
 from planar.document.files import to_dict
-from planar.foundation.errors import BadInput, Outcome
+from planar.foundation.errors import BadInput
 from planar.foundation.safe_files import PARTIAL_FILE_NAME, write_error
-from planar.model.wording import count_phrase
 
 Array = np.ndarray
 
@@ -28,7 +27,7 @@ MAX_BYTES_IN_MEMORY = 16 * 2**30
 POINT_QUANTITIES = ("position", "velocity", "acceleration")
 ZARR_PARTIAL_SUFFIX = ".partial"
 """Ending of the files that Zarr has not written whole."""
-STORE_VERSION = 2
+STORE_VERSION = 3
 """Of what stands in a store; raised where it is no longer that of stores of before."""
 
 
@@ -88,35 +87,24 @@ class BlockStore(ABC):
     def result(self) -> Any:
         """The sweep, or what is kept of it, once all blocks are there."""
 
-    def messages(self) -> tuple[str, ...]:
+    def notes(self) -> SweepNotes:
         """What there is to say, in the order of the designs, whichever block was solved first."""
-        many, outcomes = self.plan.design_count, list(Outcome)
         blocks = [each for _, each in sorted(self.block_notes.items())]
-        ended: dict[int, tuple[int, str]] = {}
+        ended: dict[int, tuple[int, Any]] = {}
         for _, _, said in blocks:
             for code, count, sentence in said:
                 before, first = ended.get(code, (0, sentence))
                 ended[code] = before + count, first
-        found = []
-        sent = sum(each[1] for each in blocks)
-        if sent:
-            told = f"{sent} of {many} designs went to the general path, which solved {self.general_positions} positions"
-            found.append(told)
-        found += [
-            f"{count} of {many} designs: {_describe_ending(outcomes[code])} (the first: {sentence})"
-            for code, (count, sentence) in sorted(ended.items())
-        ]
-        if self.damaged:
-            which = f"{len(self.damaged)} of {count_phrase(self.plan.block_count, 'block')} in the store"
-            found.append(f"{which} {'was' if len(self.damaged) == 1 else 'were'} not whole, and solved again")
-        return tuple(found)
+        endings = tuple((code, *each) for code, each in sorted(ended.items()))
+        sent, plan = sum(each[1] for each in blocks), self.plan
+        return SweepNotes(plan.design_count, sent, self.general_positions, endings, plan.block_count, len(self.damaged))
 
     @property
     def general_positions(self) -> int:
         """How many positions the general path solved."""
         return sum(each[0] for each in self.block_notes.values())
 
-    def make_sweep(self, found: Mapping[str, Mapping[str, Any]], status: Any, input_: Array) -> Sweep:
+    def make_sweep(self, found: Mapping[str, Mapping[str, Any]], status: Any, input_: Array, dead_point: Any) -> Sweep:
         """The result out of arrays by order and point."""
         plan = self.plan
         position, velocity, acceleration = (found.get(order) for order in POINT_QUANTITIES)
@@ -130,12 +118,9 @@ class BlockStore(ABC):
             status,
             input_,
             self.general_positions,
-            self.messages(),
+            dead_point,
+            self.notes(),
         )
-
-
-def _describe_ending(outcome: Outcome) -> str:
-    return "rates are missing or have few digits" if outcome is Outcome.SOLVED else outcome.value
 
 
 def open_store(store: str | Path | None, plan: SweepPlan) -> BlockStore:
@@ -204,6 +189,7 @@ class MemoryStore(BlockStore):
         self.out = allocate_aligned(*self.shape, plan.all_designs.dtype)
         self.status = np.zeros((plan.design_count, plan.all_designs.steps + 1), dtype=np.int8)
         self.inputs: Array | None = None
+        self.dead_point = np.full(plan.design_count, np.nan)
 
     def output_array(self, part: slice) -> Array:
         return self.out[:, :, part]
@@ -212,13 +198,13 @@ class MemoryStore(BlockStore):
         own = self.output_array(part)
         if not np.may_share_memory(own, done.out):
             own[:] = done.out
-        self.status[part] = done.status
+        self.status[part], self.dead_point[part] = done.status, done.dead_point
         self.inputs = _join_inputs(self.inputs, done.input, part, self.plan)
         self.block_notes[number] = done.general_positions, done.general_designs, done.endings
 
     def result(self) -> Sweep:
         assert self.inputs is not None
-        return self.make_sweep(point_views(self.out, self.plan), self.status, self.inputs)
+        return self.make_sweep(point_views(self.out, self.plan), self.status, self.inputs, self.dead_point)
 
 
 def point_views(out: Array, plan: SweepPlan) -> dict[str, dict[str, Array]]:

@@ -85,12 +85,14 @@ class ZarrStore(BlockStore):
                 )
         yield self._open_array("status", dtype="int8", fill_value=MISSING_STATUS, **row)
         yield self._open_array("input", dtype="float64", fill_value=np.nan, **row)
+        of_designs = {"shape": (plan.design_count,), "chunks": (rows,), "dimension_names": ("design",)}
+        yield self._open_array("dead_point", dtype="float64", fill_value=np.nan, **of_designs)
         records = {"shape": (plan.block_count, RECORD_BYTES), "chunks": (1, RECORD_BYTES)}
         yield self._open_array("blocks", dtype="uint8", fill_value=0, **records)
         for name, values in plan.all_designs.designs.items():
-            of_designs = {"shape": values.shape, "chunks": values.shape, "dimension_names": ("design",)}
+            of_all = {"shape": values.shape, "chunks": values.shape, "dimension_names": ("design",)}
             key, array = self._open_array(
-                f"designs/{_path_name(name)}", dtype=str(values.dtype), fill_value=values.dtype.type(0), **of_designs
+                f"designs/{_path_name(name)}", dtype=str(values.dtype), fill_value=values.dtype.type(0), **of_all
             )
             if not self._has_values(array, values):
                 array[:] = values
@@ -155,20 +157,21 @@ class ZarrStore(BlockStore):
             for order, points in point_views(done.out, self.plan).items():
                 for name, values in points.items():
                     self.arrays[f"{order}/{_path_name(name)}"][part] = np.ascontiguousarray(values)
-            self.arrays["status"][part] = done.status
+            self.arrays["status"][part], self.arrays["dead_point"][part] = done.status, done.dead_point
             self.arrays["input"][part] = np.broadcast_to(done.input, done.status.shape)
-            record = json.dumps(
-                [done.general_positions, done.general_designs, _shorten_sentences(done.endings)], ensure_ascii=False
-            ).encode()
+            note = done.general_positions, done.general_designs, _shorten_sentences(done.endings)
+            record = json.dumps(note, ensure_ascii=False).encode()
             self.arrays["blocks"][number] = np.frombuffer(record.ljust(RECORD_BYTES, b"\0"), dtype=np.uint8)
-        self.block_notes[number] = done.general_positions, done.general_designs, done.endings
+        self.block_notes[number] = note
 
     def result(self) -> Sweep:
         found = {
             order: {name: StoredArray(self, f"{order}/{_path_name(name)}") for name in self.plan.all_designs.points}
             for order in self.plan.quantities
         }
-        return self.make_sweep(found, StoredArray(self, "status"), self._input_positions())
+        return self.make_sweep(
+            found, StoredArray(self, "status"), self._input_positions(), StoredArray(self, "dead_point")
+        )
 
     def _input_positions(self) -> Any:
         """Positions of the input, as one row where all designs have the same; looked at block by block."""
@@ -234,7 +237,7 @@ def _is_same_metadata(one: Any, other: Any) -> bool:
 def _shorten_sentences(said: Any) -> list[Any]:
     """What is said of a block, sentences shortened so that all fit into its record."""
     longest = (RECORD_BYTES - 512) // (4 * max(1, len(said)))  # a character has four bytes at most
-    return [[code, count, sentence[:longest]] for code, count, sentence in said]
+    return [[code, count, str(sentence)[:longest]] for code, count, sentence in said]
 
 
 def _path_name(name: str) -> str:

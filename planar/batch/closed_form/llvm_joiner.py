@@ -1,0 +1,181 @@
+"""Blocks in closed form joined one after the other, designs in the lanes, as one function of LLVM IR."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from planar.batch.closed_form.joined_blocks import (
+    FollowedBlocks,
+    JoinedBlocks,
+    input_rows,
+    state_operands,
+    without_short_arms,
+)
+from planar.batch.march.backend import DesignBatch
+from planar.batch.march.kernel import BareAngle, KernelBlock, KernelEquations
+from planar.batch.march.llvm_kernel import KernelWriter, OperandNames
+from planar.codegen.instructions import UnsupportedOperation
+from planar.codegen.llvm_compile import compile_function
+
+Array = np.ndarray
+
+LANES = 8
+FUNCTION_NAME = "join"
+ARGUMENT_TYPES = (*("int",) * 4, *("array",) * 6)
+"""Of the function's arguments: blocks of designs, the first design of the last of these, how far a row is from the next
+where it is read, and in `out`; p, q, sketch, drives, signs; out."""
+JOINED_ROWS = 4
+"""Rows that are told of a block where the sketch chooses, see `JoinedBlocks`."""
+
+
+class StartBlock(NamedTuple):
+    """Names of what is known of a block that was joined: see `JoinedBlocks`."""
+
+    sign: str
+    distance: str
+    other_distance: str
+    coalescence: str
+
+
+class BlockJoinWriter(KernelWriter):
+    """The text of the function; `point_blocks`: of the block that places each sketched point, None without a sketch."""
+
+    def __init__(
+        self,
+        equations: KernelEquations,
+        links: tuple[str, ...],
+        point_blocks: tuple[int, ...] | None,
+        lanes: int = LANES,
+    ):
+        super().__init__(equations, links, False, lanes, frozenset(), frozenset())
+        self.point_blocks = point_blocks
+
+    def write_block(self, part: KernelBlock, names: OperandNames, forced: str) -> StartBlock:
+        """Join a block: its unknowns put into `names`, those of the assembly nearer to the sketch unless it is forced.
+
+        `names` has p, q, the inputs, and ("sketch", k) of where the points are shown.
+        """
+        t, sign_operand = self.ir, ("sign", self.sign_index[part.block.block_index])
+        ways = [{**names, sign_operand: t.constant(sign)} for sign in (1.0, -1.0)]
+        coalescence, _ = (self.write_closed_form(part, way) for way in ways)
+        left, right = (self._write_distance(part, way) for way in ways)
+        nearer = t.select(t.compare("ole", left, right), t.constant(1.0), t.constant(-1.0))
+        sign = t.select(t.compare("oeq", forced, "zeroinitializer"), nearer, forced)
+        is_left = t.compare("ogt", sign, "zeroinitializer")
+        for operand in self.closed_form_operands(part):
+            names[operand] = t.select(is_left, *(way[operand] for way in ways))
+        return StartBlock(sign, t.select(is_left, left, right), t.select(is_left, right, left), coalescence)
+
+    def _write_distance(self, part: KernelBlock, names: OperandNames) -> str:
+        """The squared distance of a block's sketched points from where they are shown."""
+        t = self.ir
+        points = [k for k, block in enumerate(self.point_blocks or ()) if block == part.block.block_index]
+        at = self.write_values([self.point_coordinates(points)], names)
+        shown = [names["sketch", 2 * k + axis] for k in points for axis in range(2)]
+        gaps = [t.binary("sub", *both) for both in zip(at, shown, strict=True)]
+        return t.add_all([t.constant(0.0), *(t.binary("mul", gap, gap) for gap in gaps)])
+
+    def write(self) -> str:
+        """The whole function: blocks of designs, the last of which may lie over the one before."""
+        t = self.ir
+        arrays = ", ".join(f"ptr noalias readonly %{name}" for name in ("p", "q", "sketch", "drive", "sign"))
+        t.write_line(
+            f"define void @{FUNCTION_NAME}(i64 %blocks, i64 %last, i64 %width, i64 %row, {arrays}, ptr noalias %out) {{"
+        )
+        t.write_label("entry")
+        names: OperandNames = {}
+        if self.point_blocks is not None:
+            for k in range(2 * len(self.links)):
+                number = t.add_instruction(f"load double, ptr {t.double_pointer('%sketch', str(k))}")
+                names["sketch", k] = t.broadcast(number)
+        t.write_line("br label %block")
+        t.write_label("block")
+        t.write_line("%b = phi i64 [0, %entry], [%bnext, %block]")
+        first = t.add_instruction(f"mul i64 %b, {t.lanes}")
+        past = t.add_instruction(f"icmp sgt i64 {first}, %last")
+        self.lane = t.add_instruction(f"select i1 {past}, i64 %last, i64 {first}")
+        count = self.symbols["p"].numel()
+        names |= {("p", k): self._load("%p", k) for k in range(count)}
+        names |= {("q", k): self._load("%q", k) for k in range(2 * len(self.links))}
+        names |= {operand: self._load("%drive", k) for k, operand in enumerate(self.input_operands)}
+        rows: list[str] = []
+        arms: list[str] = []
+        for k, part in enumerate(self.equations.blocks):
+            sign = self._load("%sign", k)
+            if self.point_blocks is None:
+                names["sign", k] = sign
+                self.write_closed_form(part, names)
+                form = self.equations.closed_forms[k]
+                rows += self.write_values([form.coalescence], names)
+                arms += [] if form.squared_arm is None else self.write_values([form.squared_arm], names)
+            else:
+                rows += self.write_block(part, names, sign)
+        state = [names[operand] for operand in state_operands(self.equations)]
+        for k, value in enumerate([*rows, *state, *arms]):
+            t.store(value, self._pointer("%out", "%row", k))
+        t.close_loop("b", "blocks", "block", "done")
+        t.write_label("done")
+        t.write_line("ret void")
+        t.write_line("}")
+        return t.module_text()
+
+    def _pointer(self, base: str, width: str, row: int) -> str:
+        t = self.ir
+        return t.double_pointer(
+            base, t.add_instruction(f"add i64 {t.add_instruction(f'mul i64 {width}, {row}')}, {self.lane}")
+        )
+
+    def _load(self, base: str, row: int) -> str:
+        return self.ir.load(self._pointer(base, "%width", row))
+
+
+@lru_cache(maxsize=256)
+def _write_join(equations: KernelEquations, links: tuple[str, ...], point_blocks: tuple[int, ...] | None) -> str:
+    """The text of the function. Raises UnsupportedOperation."""
+    try:
+        return BlockJoinWriter(equations, links, point_blocks).write()
+    except BareAngle as angle:
+        raise UnsupportedOperation(f"an angle counts its turns: {angle.operand}") from None
+
+
+class NativeBlockJoiner:
+    """See `BlockJoiner`. Raises UnsupportedOperation."""
+
+    def __init__(self, equations: KernelEquations, links: tuple[str, ...], point_blocks: tuple[int, ...]):
+        self.equations, self.state = equations, state_operands(equations)
+        self.block_count = len(equations.blocks)
+        self.joining: Any = compile_function(
+            _write_join(equations, links, point_blocks), FUNCTION_NAME, *ARGUMENT_TYPES
+        )
+        self.following: Any = compile_function(_write_join(equations, (), None), FUNCTION_NAME, *ARGUMENT_TYPES)
+
+    def join(self, batch: DesignBatch, sketch: Array, forced: Array) -> JoinedBlocks:
+        """See `BlockJoiner`."""
+        row_count = JOINED_ROWS * self.block_count + len(self.state)
+        rows = (batch.p, batch.q, input_rows(self.equations, batch.u0), forced)
+        out = _call(self.joining, rows, sketch, row_count)
+        known = out[: JOINED_ROWS * self.block_count].reshape(self.block_count, JOINED_ROWS, -1)
+        return JoinedBlocks(*known.transpose(1, 0, 2), out[JOINED_ROWS * self.block_count :])
+
+    def follow(self, batch: DesignBatch, signs: Array, u: Array) -> FollowedBlocks:
+        """See `BlockJoiner`."""
+        count, last = self.block_count, self.block_count + len(self.state)
+        arms = sum(form.squared_arm is not None for form in self.equations.closed_forms)
+        out = _call(self.following, (batch.p, batch.q, input_rows(self.equations, u), signs), np.zeros(0), last + arms)
+        return FollowedBlocks(without_short_arms(out[:count], self.equations, list(out[last:])), out[count:last])
+
+
+def _call(function: Any, rows: tuple[Array, ...], sketch: Array, row_count: int) -> Array:
+    """out (rows, designs) of designs whose rows (..., designs) are p, q, drives and signs."""
+    count = rows[0].shape[1]
+    if count < LANES:  # those that do not fill the lanes, with copies of the last beside them
+        which = np.minimum(np.arange(LANES), count - 1)
+        return _call(function, tuple(row[:, which] for row in rows), sketch, row_count)[:, :count]
+    p, q, drives, signs = (np.ascontiguousarray(row, dtype=float) for row in rows)
+    sketch, out = np.ascontiguousarray(sketch, dtype=float), np.empty((row_count, count))
+    addresses = (each.ctypes.data for each in (p, q, sketch, drives, signs, out))
+    function(-(-count // LANES), count - LANES, count, count, *addresses)
+    return out
