@@ -34,10 +34,13 @@ from planar.foundation.errors import BadInput
 from planar.model.mechanism import LARGEST_COUNTED_ANGLE, Mechanism
 from planar.model.run_arguments import check_number, check_steps
 
-MAX_BLOCK_BYTES, MAX_REDUCED_BLOCK_BYTES = 64 * 2**20, 16 * 2**20
-"""Bytes of a block's results, and of one that is only reduced: where no page of memory is new."""
-BLOCK_POSITIONS = 2**20
-"""Positions of a block: so many that solving them is more than beginning a block, so few that cores share the work."""
+MIN_BLOCK_POSITIONS, MAX_BLOCK_POSITIONS = 2**19, 2**22
+"""Positions of a block at least, where there are as many: so many that solving them is more than beginning it."""
+USUAL_BLOCKS = 12
+"""Blocks into which designs are divided between these: as many for two, three, four or six cores."""
+MAX_BLOCK_BYTES = {"memory": 256 * 2**20, "store": 64 * 2**20, "reduced": 16 * 2**20}
+"""Bytes of a block's results: solved where they stay; kept until they are written; only reduced, where no page of
+memory is new."""
 MAX_EXECUTOR_BLOCK_BYTES = 128 * 2**20
 """Bytes of the results of a block that is solved elsewhere."""
 BLOCK_MULTIPLE = 16
@@ -155,7 +158,8 @@ def sweep(  # many: the public signature; # long: its docstring
         names = own or ()
     whole = DesignBlock(mechanism, values, int(steps), names, rates, start, stop, pair, backend, number_type)
     many = len(next(iter(values.values())))
-    size = int(block) if block is not None else _block_size(whole, many, executor, reductions is not None)
+    kept = "reduced" if reduce is not None else "memory" if store is None else "store"
+    size = int(block) if block is not None else _block_size(whole, many, executor, kept)
     plan = SweepPlan(whole, size)
     into = open_store(store, plan) if reductions is None else ReductionStore(plan)
     for done in _solve_blocks(into, threads, executor, reductions and reductions.functions):
@@ -205,14 +209,15 @@ def check_range(mechanism: Mechanism, steps: object, start: object, stop: object
     return replace(mechanism, inputs=tuple(given._replace(law=None) for given in mechanism.inputs))
 
 
-def _block_size(whole: DesignBlock, many: int, executor: Executor | None, is_reduced: bool) -> int:
-    """How many designs make a block; in threads that hangs on the work alone, so that results do."""
-    itemsize = 8 if is_reduced else np.dtype(whole.dtype).itemsize
+def _block_size(whole: DesignBlock, many: int, executor: Executor | None, kept: str) -> int:
+    """How many designs make a block, `kept` as in MAX_BLOCK_BYTES; in threads that hangs on the work alone, so that
+    results do."""
+    itemsize = 8 if kept == "reduced" else np.dtype(whole.dtype).itemsize
     each = (whole.steps + 1) * 2 * max(len(whole.points), 1) * (3 if whole.rates else 1) * itemsize
     if executor is not None:
         size = min(MAX_EXECUTOR_BLOCK_BYTES // each, ceil(many / (TASKS_PER_WORKER * worker_count(executor))))
     else:
-        most = MAX_REDUCED_BLOCK_BYTES if is_reduced else MAX_BLOCK_BYTES
-        size = max(1, min(most // each, BLOCK_POSITIONS // (whole.steps + 1)))
+        least, most = (positions // (whole.steps + 1) for positions in (MIN_BLOCK_POSITIONS, MAX_BLOCK_POSITIONS))
+        size = max(1, min(max(ceil(many / USUAL_BLOCKS), least), most, MAX_BLOCK_BYTES[kept] // each))
         size = ceil(many / ceil(many / size))
     return min(many, ceil(max(1, size) / BLOCK_MULTIPLE) * BLOCK_MULTIPLE)
