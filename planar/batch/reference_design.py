@@ -15,12 +15,14 @@ from planar.equations.mechanism_numbers import scaled_pair_numbers
 from planar.foundation.errors import BadInput
 from planar.foundation.geometry import Vector
 from planar.foundation.jets import Scalar
-from planar.model.link_shapes import LinkShape, link_shape
+from planar.model.link_shapes import LinkPlace, LinkShape, PointMember, PointName, link_shape, place_in_link
 from planar.model.mechanism import (
     Drive,
     Mechanism,
     NamedPoint,
+    links_counting_turns,
     named_points,
+    relative_motions,
     replace_inputs,
     running_input_index,
 )
@@ -50,6 +52,8 @@ class ReferenceDesign:
         self.is_sliding = self.solver.is_sliding(self.pair)
         self.input_scale = np.array([self.unit if self.solver.is_sliding(name) else 1.0 for name in names])
         self.points = {each.name: each for each in named_points(mechanism)}
+        self.motions = relative_motions(mechanism)
+        self.counted_links = links_counting_turns(mechanism)
 
     @cached_property
     def candidates(self) -> BlockAssemblies:
@@ -81,8 +85,10 @@ class ReferenceDesign:
                 raise BadInput("points", f"there is no point {each!r:.60}{meant}")
         return tuple(dict.fromkeys(known[each] for each in given))
 
-    def point_member(self, name: str) -> tuple[str, str]:
+    def point_member(self, name: PointName) -> PointMember:
         """The (link, point) by which a point is told: on the frame where it lies there."""
+        if isinstance(name, LinkPlace):
+            return name.link, name.at
         members = self.points[name].members
         return next((each for each in members if each[0] == self.mechanism.frame), members[0])
 
@@ -123,7 +129,7 @@ class ReferenceDesign:
         shapes: Mapping[str, LinkShape],
         p: Array,
         inputs: tuple[Array, Array, Array],
-        members: Iterable[tuple[str, str]],
+        members: Iterable[PointMember],
         rates: bool = False,
     ) -> DesignBatch:
         """Designs of these shapes and numbers, at their inputs (position, first and second rate), with points to tell.
@@ -132,7 +138,10 @@ class ReferenceDesign:
         """
         u, u1, u2 = inputs
         members, many = tuple(members), p.shape[1]
-        q = stack_rows([part for link, point in members for part in shapes[link].position(point)], many) / self.unit
+        q = (
+            stack_rows([part for link, point in members for part in place_in_link(shapes[link], point)], many)
+            / self.unit
+        )
         links, z0 = tuple(link for link, _ in members), np.zeros((len(self.functions.equations.unknowns), many))
         offsets, tolerance = np.zeros((1, len(u))), self.tolerance(p)
         return DesignBatch(

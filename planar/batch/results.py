@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,11 @@ class Sweep:
     it is missing or damaged. `status` (designs, steps + 1): 0 is solved, any other number k is `outcomes[k]`. `input`:
     positions of the input that runs, (steps + 1,), or (designs, steps + 1) where they differ. `general`: how many
     positions the general path solved, one design after the other. `said`: what there is to say.
+
+    What was asked for beside points stands by the names of links and pairs in arrays (designs, steps + 1), and is empty
+    where nothing was: `angle`, `angular_velocity` and `angular_acceleration` of links (rad, s) as `Motion.link` has
+    them; `value` of pairs, the relative angle (rad) or how far a slide is (m), with `value_rate` and
+    `value_second_rate` (per s, per s^2), as `Motion.pair` has them. NaN as of points.
     """
 
     points: tuple[str, ...]
@@ -36,6 +41,16 @@ class Sweep:
     general: int
     said: tuple[str, ...]
     outcomes: tuple[Outcome, ...] = tuple(Outcome)
+    angle: Mapping[str, Any] = field(default_factory=dict)
+    angular_velocity: Mapping[str, Any] = field(default_factory=dict)
+    angular_acceleration: Mapping[str, Any] = field(default_factory=dict)
+    value: Mapping[str, Any] = field(default_factory=dict)
+    value_rate: Mapping[str, Any] = field(default_factory=dict)
+    value_second_rate: Mapping[str, Any] = field(default_factory=dict)
+    transmission_angle: Mapping[str, Any] = field(default_factory=dict)
+    effort: Mapping[str, Any] = field(default_factory=dict)
+    reaction: Mapping[str, Any] = field(default_factory=dict)
+    reaction_couple: Mapping[str, Any] = field(default_factory=dict)
 
     __repr__ = short_repr
 

@@ -10,11 +10,13 @@ from numbers import Integral
 from pathlib import Path
 from typing import Any
 
-from planar.batch.block import DesignBlock, solve_design_block
+from planar.batch.block import DesignBlock
 from planar.batch.design_arrays import read_designs, split_into_blocks
 from planar.batch.executor import TASKS_PER_WORKER, run_tasks, worker_count
 from planar.batch.march.choice import available_backends
-from planar.batch.reference_design import reference_design
+from planar.batch.named_results.result_block import ResultBlock, solve_result_block
+from planar.batch.named_results.result_rows import RequestedResults, select_names
+from planar.batch.reference_design import ReferenceDesign, reference_design
 from planar.batch.results import Sweep
 from planar.batch.stores.store import SweepPlan, open_store
 from planar.document.first_argument import takes_mechanism
@@ -35,6 +37,8 @@ def sweep(  # many: the public signature; # long: its docstring
     steps: int = 200,
     points: Sequence[str] | str | None = None,
     *,
+    links: Sequence[str] | str = (),
+    pairs: Sequence[str] | str = (),
     rates: bool = True,
     start: float | None = None,
     stop: float | None = None,
@@ -55,7 +59,8 @@ def sweep(  # many: the public signature; # long: its docstring
     between its own.
 
     `points` are those whose positions are wanted, and with `rates` velocities and accelerations; all that move, if left
-    out. A design that comes to a dead point has NaN from there on, and `status` says why.
+    out. `links` and `pairs` are those whose angles and relative motions are wanted, with `rates` their rates too: see
+    `Sweep`. A design that comes to a dead point has NaN from there on, and `status` says why.
 
     `backend` "native" runs compiled machine code, "numpy" is always there, "auto" takes the faster that is there. What
     a backend cannot do, or its gate does not let pass, the general path does, which is counted and said.
@@ -74,16 +79,21 @@ def sweep(  # many: the public signature; # long: its docstring
         raise BadInput("block", f"a whole number of designs is wanted, not {block!r:.40}")
     mechanism = check_range(mechanism, steps, start, stop, pair)
     common = reference_design(mechanism, pair)
-    names = common.select_points(points)
+    results = _select_results(common, links, pairs)
+    names = () if points is None and any(results) else common.select_points(points)
     available_backends(backend)
     many = len(next(iter(values.values())))
-    size = int(block) if block is not None else _block_size(many, steps, len(names), rates, executor)
+    size = (
+        int(block)
+        if block is not None
+        else _block_size(many, steps, len(names) + 2 * len(mechanism.links) * any(results), rates, executor)
+    )
     whole = DesignBlock(mechanism, values, int(steps), names, rates, start, stop, pair, backend)
-    into = open_store(store, SweepPlan(whole, size))
+    into = open_store(store, SweepPlan(whole, size, results))
     size = into.block_size
 
-    def task(part: slice) -> DesignBlock:
-        return whole._replace(designs={name: array[part] for name, array in values.items()})
+    def task(part: slice) -> ResultBlock:
+        return ResultBlock(whole._replace(designs={name: array[part] for name, array in values.items()}), results)
 
     parts = dict(enumerate(split_into_blocks(many, size)))
     ready = sum(part.stop - part.start for k, part in parts.items() if k in into.finished)
@@ -92,7 +102,7 @@ def sweep(  # many: the public signature; # long: its docstring
     todo = {k: part for k, part in parts.items() if k not in into.finished}
     tasks = {k: task(part) for k, part in todo.items()}
     for k, done in run_tasks(
-        executor, solve_design_block, tasks, lambda k: solve_design_block(tasks[k], into.output_array(parts[k]))
+        executor, solve_result_block, tasks, lambda k: solve_result_block(tasks[k], into.output_array(parts[k]))
     ):
         into.write_block(k, parts[k], done)
         ready += parts[k].stop - parts[k].start
@@ -111,6 +121,14 @@ def check_range(mechanism: Mechanism, steps: object, start: object, stop: object
         told = f"the input at {lawful[0]!r} has a law of time, which a sweep does not run; give it a start and a stop"
         raise BadInput("designs", told)
     return replace(mechanism, inputs=tuple(given._replace(law=None) for given in mechanism.inputs))
+
+
+def _select_results(
+    common: ReferenceDesign, links: Sequence[str] | str, pairs: Sequence[str] | str
+) -> RequestedResults:
+    """The results that are wanted beside those of points, by names. Raises BadInput."""
+    known = [link.name for link in common.mechanism.links if link.name != common.mechanism.frame]
+    return RequestedResults(select_names("links", links, known), select_names("pairs", pairs, list(common.motions)))
 
 
 def _block_size(many: int, steps: int, points: int, rates: bool, executor: Executor | None) -> int:

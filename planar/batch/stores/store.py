@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planar.batch.block import DesignBlock, SolvedDesigns
+from planar.batch.named_results.result_rows import RequestedResults, ResultRow
 from planar.batch.results import Sweep
 from planar.codegen.aligned_arrays import allocate_aligned
 from planar.document.files import to_dict
@@ -28,7 +29,7 @@ MAX_BYTES_IN_MEMORY = 16 * 2**30
 POINT_QUANTITIES = ("position", "velocity", "acceleration")
 ZARR_PARTIAL_SUFFIX = ".partial"
 """Ending of the files that Zarr has not written whole."""
-STORE_VERSION = 2
+STORE_VERSION = 3
 """Of what stands in a store; raised where it is no longer that of stores of before."""
 
 
@@ -37,6 +38,7 @@ class SweepPlan(NamedTuple):
 
     all_designs: DesignBlock
     block_size: int
+    results: RequestedResults = RequestedResults()
 
     @property
     def design_count(self) -> int:
@@ -49,14 +51,29 @@ class SweepPlan(NamedTuple):
         return -(-self.design_count // self.block_size)
 
     @property
+    def point_names(self) -> tuple[str, ...]:
+        """The names of the points."""
+        return tuple(str(name) for name in self.all_designs.points)
+
+    @property
     def quantities(self) -> tuple[str, ...]:
         """What is told of every point."""
         return POINT_QUANTITIES if self.all_designs.rates else POINT_QUANTITIES[:1]
 
+    @property
+    def result_rows(self) -> tuple[ResultRow, ...]:
+        """What is told beside points."""
+        return self.results.rows(self.all_designs.mechanism, self.all_designs.rates)
+
+    @property
+    def row_count(self) -> int:
+        """How many numbers are told at a step."""
+        return 2 * len(self.all_designs.points) * len(self.quantities) + sum(row.width for row in self.result_rows)
+
     def fingerprint(self) -> str:
         """The same for two sweeps that have the same results."""
         whole, made = self.all_designs, hashlib.sha256()
-        grid = [whole.steps, whole.points, whole.rates, whole.start, whole.stop, whole.pair]
+        grid = [whole.steps, whole.points, whole.rates, whole.start, whole.stop, whole.pair, self.results]
         made.update(json.dumps([STORE_VERSION, to_dict(whole.mechanism), grid], sort_keys=True, default=float).encode())
         for name, values in sorted(whole.designs.items()):
             made.update(name.encode() + b"\0" + np.ascontiguousarray(values).tobytes())
@@ -115,12 +132,13 @@ class BlockStore(ABC):
         return sum(each[0] for each in self.block_notes.values())
 
     def make_sweep(self, found: Mapping[str, Mapping[str, Any]], status: Any, input_: Array) -> Sweep:
-        """The result out of arrays by order and point."""
+        """The result out of arrays by quantity and name."""
         plan = self.plan
         position, velocity, acceleration = (found.get(order) for order in POINT_QUANTITIES)
         assert position is not None
+        more: dict[str, Any] = {name: found[name] for name in found if name not in POINT_QUANTITIES}
         return Sweep(
-            plan.all_designs.points,
+            plan.point_names,
             plan.all_designs.designs,
             position,
             velocity,
@@ -129,6 +147,7 @@ class BlockStore(ABC):
             input_,
             self.general_positions,
             self.messages(),
+            **more,
         )
 
 
@@ -191,8 +210,7 @@ def damaged_block_error(path: Path, number: int, part: slice) -> BadInput:
 class _MemoryStore(BlockStore):
     def __init__(self, plan: SweepPlan):
         super().__init__(plan)
-        self.row_count = 2 * len(plan.all_designs.points) * len(plan.quantities)
-        self.shape = plan.all_designs.steps + 1, self.row_count, plan.design_count
+        self.shape = plan.all_designs.steps + 1, plan.row_count, plan.design_count
         if np.prod(self.shape, dtype=float) * 8.0 > MAX_BYTES_IN_MEMORY:
             told = f"results of {np.prod(self.shape, dtype=float) * 8e-9:.0f} GB are too much for memory"
             raise BadInput("store", f"{told}; name a store, as 'sweep.zarr'")
@@ -213,20 +231,27 @@ class _MemoryStore(BlockStore):
 
     def result(self) -> Sweep:
         assert self.inputs is not None
-        return self.make_sweep(point_views(self.out, self.plan), self.status, self.inputs)
+        return self.make_sweep(result_views(self.out, self.plan), self.status, self.inputs)
 
 
-def point_views(out: Array, plan: SweepPlan) -> dict[str, dict[str, Array]]:
-    """out (steps + 1, rows, designs) as arrays (designs, steps + 1, 2) by order and point, without a copy."""
+def result_views(out: Array, plan: SweepPlan) -> dict[str, dict[str, Array]]:
+    """out (steps + 1, rows, designs) by quantity and name, without a copy: arrays (designs, steps + 1), or of vectors
+    (designs, steps + 1, 2)."""
     turned = out.transpose(2, 0, 1)
     many = len(plan.all_designs.points)
-    return {
+    found = {
         order: {
             name: turned[:, :, 2 * (k * many + place) : 2 * (k * many + place) + 2]
-            for place, name in enumerate(plan.all_designs.points)
+            for place, name in enumerate(plan.point_names)
         }
         for k, order in enumerate(plan.quantities)
     }
+    at = 2 * many * len(plan.quantities)
+    for row in plan.result_rows:
+        values = turned[:, :, at] if row.width == 1 else turned[:, :, at : at + row.width]
+        found.setdefault(row.quantity, {})[row.name] = values
+        at += row.width
+    return found
 
 
 def _join_inputs(whole: Array | None, own: Array, part: slice, plan: SweepPlan) -> Array:
