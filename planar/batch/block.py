@@ -151,7 +151,7 @@ class _DesignBlockSolver:
         """out (m, s), and how many of the first steps passed; None where no backend can run the structure."""
         block, base_, runner = self.block, self.reference, find_runner(self.block.backend)
         shapes = base_.shapes(self.all_designs)
-        p = base_.pair_numbers(shapes, self.design_count)
+        p = base_.pair_numbers(shapes, self.design_count, self.all_designs)
         told = {name: base_.point_member(name) for name in block.points}
         moving = {name: each for name, each in told.items() if each[0] != base_.mechanism.frame}
         start = find_assemblies(base_, shapes, p, self.u, runner)

@@ -8,7 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
-from planar.batch.design_arrays import design_variables
+from planar.batch.design_arrays import design_variables, values_of_design, with_design_values
 from planar.batch.march.backend import DesignBatch
 from planar.document.cursor import suggest_spelling
 from planar.equations.mechanism_numbers import scaled_pair_numbers
@@ -101,10 +101,10 @@ class ReferenceDesign:
                 for link in designs.links
             }
 
-    def pair_numbers(self, shapes: Mapping[str, LinkShape], many: int) -> Array:
-        """p (numbers, designs), lengths in units of the base's size."""
+    def pair_numbers(self, shapes: Mapping[str, LinkShape], many: int, designs: Mechanism) -> Array:
+        """p (numbers, designs), lengths in units of the base's size, of links of these shapes in the designs' pairs."""
         rows: list[Scalar] = []
-        for pair in self.mechanism.pairs:
+        for pair in designs.pairs:
             rows += scaled_pair_numbers(pair, shapes, self.unit)
         return stack_rows(rows, many)
 
@@ -154,7 +154,8 @@ class ReferenceDesign:
         return fit & ~self.is_unfit(values, shapes) if values else fit
 
     def is_unfit(self, values: Mapping[str, Array], shapes: Mapping[str, LinkShape]) -> Array:
-        """The designs that the pairs may refuse before anything moves (designs,): they are looked at one by one."""
+        """The designs that are looked at one by one (designs,): pairs may refuse them before anything moves, or they
+        have a sketch of their own."""
         many = len(next(iter(values.values())))
         found = np.zeros(many, dtype=bool)
         for shape_ in shapes.values():
@@ -162,10 +163,15 @@ class ReferenceDesign:
                 found |= ~np.isfinite(np.asarray(at.x + at.y))
         choosy = [pair for pair in self.mechanism.pairs if type(pair).find_misfit is not Pair.find_misfit]
         known = design_variables(self.mechanism)
-        if choosy and any(known[name].link for name in values):
+        for name, value in values.items():
+            if known[name].path[0] == "sketch":
+                found |= value != known[name].value
+        of_pairs = {name: value for name, value in values.items() if known[name].path[0] == "pairs"}
+        if choosy and (of_pairs or any(known[name].link for name in values)):
             for index in range(many):
                 own = {name: shape_of_design(each, index) for name, each in shapes.items()}
-                found[index] |= any(pair.find_misfit(self.mechanism.pairs, own, str) for pair in choosy)
+                pairs = with_design_values(self.mechanism, values_of_design(of_pairs, index)).pairs
+                found[index] |= any(pair.find_misfit(pairs, own, str) for pair in pairs)
         return found
 
     def has_short_arm(self, shapes: Mapping[str, LinkShape], many: int) -> Array:

@@ -49,10 +49,10 @@ def sweep(  # many: the public signature; # long: its docstring
     store: str | Path | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> Sweep:
-    """The motions of many designs of one mechanism, which differ in dimensions of links or in their inputs.
+    """The motions of many designs of one mechanism, which differ in any numbers of its file.
 
-    `designs` maps names to arrays, all of one length, or single numbers (m, rad, per s): `BC.length`, `A.position`,
-    `BC.E.distance`; the names are those of `planar.dimensions`, of lengths of links and of inputs. Each design is
+    `designs` maps names to arrays, all of one length, or single numbers (SI: m, rad, per s): `BC.length`, `A.position`,
+    `BC.E.angle`, `wheels.ratio`, `stroke.line.angle`; the names are those of `planar.dimensions`. Each design is
     solved as `planar.cycle` would solve the mechanism so changed: from the assembly nearest to the sketch, at `steps`
     + 1 positions of one input from `start` to `stop` (rad or m), the others standing still. An angle runs from its
     own position a turn on where they are left out; a slide without a `stop` runs between its limits, each design
@@ -74,10 +74,10 @@ def sweep(  # many: the public signature; # long: its docstring
     Raises BadInput for a name that is not there, a range or a store that cannot be; WriteFailure, which is one, where a
     store finds no more room.
     """
-    values = read_designs(mechanism, designs)
     if block is not None and (isinstance(block, bool) or not isinstance(block, Integral) or block < 1):
         raise BadInput("block", f"a whole number of designs is wanted, not {block!r:.40}")
     mechanism = check_range(mechanism, steps, start, stop, pair)
+    values = read_designs(mechanism, designs)
     common = reference_design(mechanism, pair)
     results = _select_results(common, links, pairs)
     names = () if points is None and any(results) else common.select_points(points)

@@ -111,7 +111,7 @@ class _ResultBlockSolver:
             link: (rows[:, :, 4 * k : 4 * k + 2], rows[:, :, 4 * k + 2 : 4 * k + 4])
             for k, link in enumerate(self.links)
         }
-        return DesignFrames(self.mechanism, base_.shapes(designs), inputs, places, self.arm)
+        return DesignFrames(designs, base_.shapes(designs), inputs, places, self.arm)
 
     def _look_up_angles(self, frames: DesignFrames, done: SolvedDesigns, designs: Array) -> int:
         """Take the angles of designs whose steps do not show them from their cycles; how many positions these had."""
