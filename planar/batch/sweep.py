@@ -16,10 +16,12 @@ from planar.batch.executor import TASKS_PER_WORKER, run_tasks, worker_count
 from planar.batch.march.choice import available_backends
 from planar.batch.named_results.result_block import ResultBlock, solve_result_block
 from planar.batch.named_results.result_rows import RequestedResults, select_names
+from planar.batch.named_results.transmission_angles import output_link
 from planar.batch.reference_design import ReferenceDesign, reference_design
 from planar.batch.results import Sweep
 from planar.batch.stores.store import SweepPlan, open_store
 from planar.document.first_argument import takes_mechanism
+from planar.dynamics.load_validation import check_loads
 from planar.foundation.errors import BadInput
 from planar.model.mechanism import LARGEST_COUNTED_ANGLE, Mechanism
 from planar.model.run_arguments import check_number, check_steps
@@ -39,6 +41,9 @@ def sweep(  # many: the public signature; # long: its docstring
     *,
     links: Sequence[str] | str = (),
     pairs: Sequence[str] | str = (),
+    outputs: Sequence[str] | str = (),
+    efforts: Sequence[str] | str = (),
+    reactions: Sequence[str] | str = (),
     rates: bool = True,
     start: float | None = None,
     stop: float | None = None,
@@ -59,8 +64,10 @@ def sweep(  # many: the public signature; # long: its docstring
     between its own.
 
     `points` are those whose positions are wanted, and with `rates` velocities and accelerations; all that move, if left
-    out. `links` and `pairs` are those whose angles and relative motions are wanted, with `rates` their rates too: see
-    `Sweep`. A design that comes to a dead point has NaN from there on, and `status` says why.
+    out and nothing else is asked for. `links` and `pairs` are those whose angles and relative motions are wanted, with
+    `rates` their rates too; `outputs` links or pairs at the frame whose transmission angles are; `efforts` inputs and
+    `reactions` pairs whose forces are, under loads, weights, springs and inertia: see `Sweep`. A design that comes to a
+    dead point has NaN from there on, and `status` says why.
 
     `backend` "native" runs compiled machine code, "numpy" is always there, "auto" takes the faster that is there. What
     a backend cannot do, or its gate does not let pass, the general path does, which is counted and said.
@@ -79,7 +86,9 @@ def sweep(  # many: the public signature; # long: its docstring
     mechanism = check_range(mechanism, steps, start, stop, pair)
     values = read_designs(mechanism, designs)
     common = reference_design(mechanism, pair)
-    results = _select_results(common, links, pairs)
+    results = _select_results(
+        common, {"links": links, "pairs": pairs, "outputs": outputs, "efforts": efforts, "reactions": reactions}
+    )
     names = () if points is None and any(results) else common.select_points(points)
     available_backends(backend)
     many = len(next(iter(values.values())))
@@ -123,12 +132,24 @@ def check_range(mechanism: Mechanism, steps: object, start: object, stop: object
     return replace(mechanism, inputs=tuple(given._replace(law=None) for given in mechanism.inputs))
 
 
-def _select_results(
-    common: ReferenceDesign, links: Sequence[str] | str, pairs: Sequence[str] | str
-) -> RequestedResults:
+def _select_results(common: ReferenceDesign, asked: Mapping[str, Sequence[str] | str]) -> RequestedResults:
     """The results that are wanted beside those of points, by names. Raises BadInput."""
-    known = [link.name for link in common.mechanism.links if link.name != common.mechanism.frame]
-    return RequestedResults(select_names("links", links, known), select_names("pairs", pairs, list(common.motions)))
+    mechanism = common.mechanism
+    known = {
+        "links": [link.name for link in mechanism.links if link.name != mechanism.frame],
+        "pairs": list(common.motions),
+        "outputs": [link.name for link in mechanism.links] + list(common.motions),
+        "efforts": [given.pair for given in mechanism.inputs],
+        "reactions": [pair.name for pair in mechanism.pairs],
+    }
+    results = RequestedResults(**{word: select_names(word, names, known[word]) for word, names in asked.items()})
+    for output in results.outputs:
+        output_link(mechanism, output)
+    if results.has_forces:
+        check_loads(mechanism)
+        if any(load.varies is not None and load.varies.input is None for load in mechanism.loads):
+            raise BadInput("loads", "a load varies with time, and a sweep knows none")
+    return results
 
 
 def _block_size(many: int, steps: int, points: int, rates: bool, executor: Executor | None) -> int:

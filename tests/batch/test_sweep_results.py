@@ -5,6 +5,7 @@ import pytest
 
 import planar
 from planar.batch.design_arrays import values_of_design, with_design_values
+from planar.document import files
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
 from planar.model.mechanism import relative_motions
 from tests.builders import designs_around, four_bar
@@ -99,7 +100,7 @@ def test_a_store_has_all_results_and_is_of_one_request(suffix, tmp_path):
         swept(store, links=["BC", "AB"])
 
 
-@pytest.mark.parametrize("model", part(["four-bar", "002-E3.6a", "band-drafting-machine"], 2))
+@pytest.mark.parametrize("model", part(["002-E3.6a", "four-bar", "band-drafting-machine"], 3))
 def test_any_number_of_the_file_may_be_swept(model):
     mechanism = MODELS[model]
     given = mechanism.inputs[0]
@@ -112,3 +113,67 @@ def test_any_number_of_the_file_may_be_swept(model):
             for point in result.points:
                 assert off(result.acceleration[point][k][:many], motion.point(point).acceleration[:many]) < 1e-9
         assert result.general == (6 if dimension.startswith("sketch") else 0)
+
+
+ACTING = {
+    "loads": [
+        {"point": "C", "force": [3.0, -2.0]},
+        {"link": "DC", "torque": 0.4},
+        {"point": "E", "force": [1.0, 0.5], "axes": "BC", "varies": {"with": "A", "at": [0.0, 7.0], "factors": [1, 2]}},
+    ],
+    "springs": [
+        {"points": ["E", "D"], "stiffness": 40.0, "free_length": 0.05, "damping": 0.3},
+        {"links": ["AD", "DC"], "stiffness": 0.2, "free_angle": 0.3},
+    ],
+    "masses": [
+        {"link": "BC", "mass": 2.0, "at": [0.02, 0.01], "inertia": 0.01},
+        {"link": "DC", "mass": 1.0, "at": "C"},
+    ],
+    "gravity": [0.0, -9.81],
+}
+"""What acts on the links of a four-bar."""
+
+
+def loaded(name, acting):
+    return files.from_dict(files.to_dict(MODELS[name]) | acting)
+
+
+LOADED = {
+    "four-bar": loaded("four-bar", ACTING),
+    "slide": MODELS["two-stroke-engine"],
+    "teeth": loaded("geared-five-bar", {"masses": [{"link": "AC", "mass": 2.0, "at": "C", "inertia": 0.001}]}),
+    "balance": MODELS["balanced-lamp"],
+}
+
+
+@pytest.mark.parametrize("name", part(LOADED, 2))
+def test_efforts_and_reactions_are_those_of_every_motion(name):
+    mechanism = LOADED[name]
+    pair = mechanism.inputs[0].pair
+    rng, drawn = np.random.default_rng(3), planar.dimensions(mechanism)
+    acts = {key: value for key, value in drawn.items() if value and not key.startswith(("sketch", "wheels"))}
+    designs = {key: value * rng.uniform(0.99, 1.01, 3) for key, value in acts.items() if "radius" not in key}
+    designs.pop(f"{pair}.position")
+    inputs, pairs = [given.pair for given in mechanism.inputs], [each.name for each in mechanism.pairs]
+    result = planar.sweep(mechanism, designs, 24, points=[], efforts=inputs, reactions=pairs, pair=pair, rates=False)
+    for k, motion, many in motions(mechanism, designs, result, 24, pair):
+        forces = planar.forces(motion)
+        for each in inputs:
+            assert off(result.effort[each][k][:many], forces.inputs[each][:many]) < 1e-9
+        for each in pairs:
+            assert off(result.reaction[each][k][:many], forces.reactions[each].force[:many]) < 1e-9
+            assert off(result.reaction_couple[each][k][:many], forces.reactions[each].couple[:many]) < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("model", "output"), part([("four-bar", "DC"), ("002-E3.4", "block D"), ("004-QR", "block R")], 2)
+)
+def test_transmission_angles_are_those_of_every_motion(model, output):
+    mechanism = MODELS[model]
+    designs, pair = designs_around(mechanism, 0.01, 3), mechanism.inputs[0].pair
+    result = planar.sweep(mechanism, designs, 24, points=[], outputs=output, pair=pair)
+    for k, motion, many in motions(mechanism, designs, result, 24, pair):
+        wanted = planar.transmission(motion, output).angle
+        assert off(result.transmission_angle[output][k][:many], wanted[:many]) < 1e-9
+    with pytest.raises(BadInput):
+        planar.sweep(mechanism, designs, 24, outputs=mechanism.links[1].name, pair=pair)

@@ -50,6 +50,8 @@ class DesignFrames:
             turned -= FULL_TURN * np.round(turned / FULL_TURN)
             self.is_clear &= ~np.any(np.abs(turned) > LONGEST_CLEAR_TURN, axis=0)
             angles[link] = np.concatenate([angle[:1], angle[:1] + np.cumsum(turned, axis=0)])
+        self.design_shape = next(iter(angles.values())).shape
+        "(steps + 1, designs)"
         self.origins = {link: origin for link, (origin, _) in places.items()}
         self.directions = directions
         self._set_angles(self._with_counted_turns(angles))

@@ -12,7 +12,9 @@ from planar.batch.design_arrays import values_of_design, with_design_values
 from planar.batch.general_path import solve_link_angles
 from planar.batch.march.prediction import LONGEST_STEP
 from planar.batch.named_results.design_frames import DesignFrames
+from planar.batch.named_results.force_results import find_forces
 from planar.batch.named_results.result_rows import LINK_QUANTITIES, PAIR_QUANTITIES, RequestedResults
+from planar.batch.named_results.transmission_angles import output_link
 from planar.batch.reference_design import ReferenceDesign, reference_design
 from planar.codegen.aligned_arrays import allocate_aligned
 from planar.foundation.geometry import Vector
@@ -45,7 +47,7 @@ class _ResultBlockSolver:
         self.mechanism, self.arm = self.reference.mechanism, self.reference.unit
         self.design_count = len(next(iter(self.block.designs.values())))
         self.links = self._needed_links()
-        self.rates = self.block.rates or self.results.has_forces
+        self.rates = self.block.rates or self.results.has_forces or bool(self.results.outputs)
         self.rows = self.results.rows(self.mechanism, self.block.rates)
 
     def _needed_links(self) -> tuple[str, ...]:
@@ -130,14 +132,23 @@ class _ResultBlockSolver:
 
     def _write_results(self, frames: DesignFrames, done: SolvedDesigns, refined: int, out: Array) -> None:
         """Write the results of links and pairs into rows of out (steps + 1, rows, designs)."""
-        found: dict[tuple[str, str], tuple[Array, ...]] = {}
+        found: dict[tuple[str, str], Array] = {}
+        for name in self.results.links:
+            found |= {
+                (word, name): each[None] for word, each in zip(LINK_QUANTITIES, frames.link_angle(name), strict=False)
+            }
+        for name in self.results.pairs:
+            found |= {
+                (word, name): each[None] for word, each in zip(PAIR_QUANTITIES, frames.pair_value(name), strict=False)
+            }
+        values, is_solved = dict(self.block.designs), done.status.T == 0
+        if self.results.has_forces:
+            found |= find_forces(self.mechanism, self.results, frames, values, is_solved)
+        for name in self.results.outputs:
+            angles = output_link(self.mechanism, name).angles(frames, values, is_solved)
+            found["transmission_angle", name] = angles[None]
         at = 0
         for row in self.rows:
-            group = LINK_QUANTITIES if row.quantity in LINK_QUANTITIES else PAIR_QUANTITIES
-            key = group[0], row.name
-            if key not in found:
-                ask = frames.link_angle if group is LINK_QUANTITIES else frames.pair_value
-                found[key] = ask(row.name)
-            value = found[key][group.index(row.quantity)]
-            out[:, at] = np.broadcast_to(value, (len(done.out), self.design_count))[::refined]
+            whole = np.broadcast_to(found[row.quantity, row.name], (row.width, len(done.out), self.design_count))
+            out[:, at : at + row.width] = np.moveaxis(whole, 0, 1)[::refined]
             at += row.width
