@@ -19,7 +19,7 @@ from planar.batch.reference_design import ReferenceDesign, reference_design
 from planar.codegen.aligned_arrays import allocate_aligned
 from planar.foundation.errors import Outcome
 from planar.foundation.turns import take_turn
-from planar.model.link_shapes import LinkShape
+from planar.model.link_shapes import LinkShape, PointMember, PointName, place_in_link
 from planar.model.mechanism import LARGEST_INPUT_POSITION, Mechanism
 
 Array = np.ndarray
@@ -39,7 +39,7 @@ class DesignBlock(NamedTuple):
     mechanism: Mechanism
     designs: Mapping[str, Array]
     steps: int
-    points: tuple[str, ...]
+    points: tuple[PointName, ...]
     rates: bool
     start: float | None
     stop: float | None
@@ -168,7 +168,7 @@ class _DesignBlockSolver:
         """out (m, s), and how many of the first steps passed; None where no backend can run the structure."""
         block, base_, runner = self.block, self.reference, find_runner(self.block.backend)
         shapes = base_.shapes(self.all_designs)
-        p = base_.pair_numbers(shapes, self.design_count)
+        p = base_.pair_numbers(shapes, self.design_count, self.all_designs)
         told = {name: base_.point_member(name) for name in block.points}
         moving = {name: each for name, each in told.items() if each[0] != base_.mechanism.frame}
         start = find_assemblies(base_, shapes, p, self.u, runner, block.backend)
@@ -253,7 +253,7 @@ class _DesignBlockSolver:
         return march._replace(z0=z), fit & passed
 
     def _with_frame_points(
-        self, out: Array, told: Mapping[str, tuple[str, str]], shapes: Mapping[str, LinkShape]
+        self, out: Array, told: Mapping[PointName, PointMember], shapes: Mapping[str, LinkShape]
     ) -> Array:
         """The rows of all points, those on the frame filled in."""
         frame = self.reference.mechanism.frame
@@ -265,7 +265,7 @@ class _DesignBlockSolver:
         moving = [k for k, (link, _) in enumerate(told.values()) if link != frame]
         for k, (link, point) in enumerate(told.values()):
             if link == frame:
-                whole[:, 2 * k], whole[:, 2 * k + 1] = shapes[link].position(point)
+                whole[:, 2 * k], whole[:, 2 * k + 1] = place_in_link(shapes[link], point)
         for order in range(orders):
             for place, k in enumerate(moving):
                 old, new = 2 * (order * len(moving) + place), 2 * (order * len(told) + k)

@@ -7,9 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from planar.foundation.errors import BadInput, NoAnswer, Outcome
-from planar.model.link_shapes import PointPlacementError
+from planar.foundation.jets import value_and_rates
+from planar.model.link_shapes import PointName, PointPlacementError
 from planar.model.mechanism import Mechanism
 from planar.results.motion import Motion
+from planar.results.records import PointMotion, stack_vectors, vector_and_rates
 from planar.solving.cycle import cycle
 
 Array = np.ndarray
@@ -52,7 +54,7 @@ def solve_design(
     grid: Array | None,
     steps: int,
     range_: tuple[float | None, float | None],
-    points: tuple[str, ...],
+    points: tuple[PointName, ...],
     rates: bool,
 ) -> SolvedDesign:
     """A design over a grid of positions (rows,) of its running input, or, without one, over a range of its own.
@@ -87,9 +89,24 @@ def solve_design(
     return SolvedDesign(input_, out, status, reason, told, dead_point)
 
 
-def _point_rows(motion: Motion, points: tuple[str, ...], rates: bool) -> Array:
-    found = [motion.point(name) for name in points]
+def solve_link_angles(
+    mechanism: Mechanism, pair: str, steps: int, range_: tuple[float | None, float | None], links: tuple[str, ...]
+) -> Array:
+    """The angles of links (links, rows) of a design over its range, with all turns as they are followed."""
+    motion = cycle(mechanism, steps, *range_, pair)
+    return np.array([np.broadcast_to(value_and_rates(motion.frames[link].angle)[0], len(motion)) for link in links])
+
+
+def _point_rows(motion: Motion, points: tuple[PointName, ...], rates: bool) -> Array:
+    found = [_point_motion(motion, name) for name in points]
     orders = ("position", "velocity", "acceleration") if rates else ("position",)
     if not found:
         return np.zeros((len(motion), 0))
     return np.hstack([getattr(point, order) for order in orders for point in found])
+
+
+def _point_motion(motion: Motion, name: PointName) -> PointMotion:
+    if isinstance(name, str):
+        return motion.point(name)
+    orders = vector_and_rates(motion.frames[name.link].to_world(name.at))[:3]
+    return PointMotion(*(np.broadcast_to(stack_vectors(*each), (len(motion), 2)) for each in orders))

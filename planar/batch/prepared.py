@@ -167,7 +167,7 @@ class PreparedSweep:
         arrays = read_designs(self.mechanism, values) if values else {}
         design = with_design_values(base_.mechanism, arrays)
         shapes = base_.shapes(design)
-        p, inputs = base_.pair_numbers(shapes, 1), base_.inputs(design, 1)
+        p, inputs = base_.pair_numbers(shapes, 1, design), base_.inputs(design, 1)
         batch = base_.design_batch(shapes, p, inputs, self.members.values())
         self.tolerance, self.current_design = batch.tolerance, None
         given = [each.position for each in design.inputs]

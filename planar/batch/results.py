@@ -60,6 +60,14 @@ class Sweep:
     positions of the input that runs, (steps + 1,), or (designs, steps + 1) where they differ. `general`: how many
     positions the general path solved, one design after the other. `dead_point` (designs,): where the input is at the
     dead point at which a design's motion ends (rad or m), NaN where none does.
+
+    What was asked for beside points stands by the names of links, pairs and inputs in arrays (designs, steps + 1), and
+    is empty where nothing was: `angle`, `angular_velocity` and `angular_acceleration` of links (rad, s) as
+    `Motion.link` has them; `value` of pairs, the relative angle (rad) or how far a slide is (m), with `value_rate` and
+    `value_second_rate` (per s, per s^2), as `Motion.pair` has them; `transmission_angle` of outputs (rad), as of
+    `planar.transmission`; `effort` of inputs (N m or N), `reaction` of pairs, the force on the second link by the first
+    (designs, steps + 1, 2) (N), and `reaction_couple` (N m), as of `planar.forces` with inertia. NaN as of points;
+    forces also where equilibrium does not tell them.
     """
 
     points: tuple[str, ...]
@@ -73,6 +81,16 @@ class Sweep:
     dead_point: Any
     notes: SweepNotes = field(repr=False)
     outcomes: tuple[Outcome, ...] = tuple(Outcome)
+    angle: Mapping[str, Any] = field(default_factory=dict)
+    angular_velocity: Mapping[str, Any] = field(default_factory=dict)
+    angular_acceleration: Mapping[str, Any] = field(default_factory=dict)
+    value: Mapping[str, Any] = field(default_factory=dict)
+    value_rate: Mapping[str, Any] = field(default_factory=dict)
+    value_second_rate: Mapping[str, Any] = field(default_factory=dict)
+    transmission_angle: Mapping[str, Any] = field(default_factory=dict)
+    effort: Mapping[str, Any] = field(default_factory=dict)
+    reaction: Mapping[str, Any] = field(default_factory=dict)
+    reaction_couple: Mapping[str, Any] = field(default_factory=dict)
 
     __repr__ = short_repr
 

@@ -14,23 +14,29 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import DTypeLike
 
-from planar.batch.block import DesignBlock, solve_design_block
+from planar.batch.block import DesignBlock
 from planar.batch.design_arrays import read_designs, split_into_blocks
 from planar.batch.executor import TASKS_PER_WORKER, run_tasks, thread_count, worker_count
 from planar.batch.march.choice import available_backends
+from planar.batch.named_results.result_block import ResultBlock, solve_result_block
+from planar.batch.named_results.result_rows import RequestedResults, select_names
+from planar.batch.named_results.transmission_angles import output_link
 from planar.batch.reductions.reduced_sweep import (
     ReducedSweep,
     Reduction,
+    Reductions,
     ReductionStore,
     read_reductions,
     reduce_block,
     result_type,
 )
-from planar.batch.reference_design import reference_design
+from planar.batch.reference_design import ReferenceDesign, reference_design
 from planar.batch.results import Sweep
 from planar.batch.stores.store import BlockStore, SweepPlan, open_store
 from planar.document.first_argument import takes_mechanism
+from planar.dynamics.load_validation import check_loads
 from planar.foundation.errors import BadInput
+from planar.model.link_shapes import PointName
 from planar.model.mechanism import LARGEST_COUNTED_ANGLE, Mechanism
 from planar.model.run_arguments import check_number, check_steps
 
@@ -55,6 +61,11 @@ def sweep(  # many: the public signature
     steps: int = 200,
     points: Sequence[str] | str | None = None,
     *,
+    links: Sequence[str] | str = (),
+    pairs: Sequence[str] | str = (),
+    outputs: Sequence[str] | str = (),
+    efforts: Sequence[str] | str = (),
+    reactions: Sequence[str] | str = (),
     rates: bool = True,
     start: float | None = None,
     stop: float | None = None,
@@ -76,6 +87,11 @@ def sweep(  # many: the public signature
     steps: int = 200,
     points: Sequence[str] | str | None = None,
     *,
+    links: Sequence[str] | str = (),
+    pairs: Sequence[str] | str = (),
+    outputs: Sequence[str] | str = (),
+    efforts: Sequence[str] | str = (),
+    reactions: Sequence[str] | str = (),
     rates: bool = True,
     start: float | None = None,
     stop: float | None = None,
@@ -96,6 +112,11 @@ def sweep(  # many: the public signature; # long: its docstring
     steps: int = 200,
     points: Sequence[str] | str | None = None,
     *,
+    links: Sequence[str] | str = (),
+    pairs: Sequence[str] | str = (),
+    outputs: Sequence[str] | str = (),
+    efforts: Sequence[str] | str = (),
+    reactions: Sequence[str] | str = (),
     rates: bool = True,
     start: float | None = None,
     stop: float | None = None,
@@ -109,17 +130,20 @@ def sweep(  # many: the public signature; # long: its docstring
     reduce: Mapping[str, str | Reduction[Sweep]] | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> Sweep | ReducedSweep:
-    """The motions of many designs of one mechanism, which differ in dimensions of links or in their inputs.
+    """The motions of many designs of one mechanism, which differ in any numbers of its file.
 
-    `designs` maps names to arrays, all of one length, or single numbers (m, rad, per s): `BC.length`, `A.position`,
-    `BC.E.distance`; the names are those of `planar.dimensions`, of lengths of links and of inputs. Each design is
+    `designs` maps names to arrays, all of one length, or single numbers (SI: m, rad, per s): `BC.length`, `A.position`,
+    `BC.E.angle`, `wheels.ratio`, `stroke.line.angle`; the names are those of `planar.dimensions`. Each design is
     solved as `planar.cycle` would solve the mechanism so changed: from the assembly nearest to the sketch, at `steps`
     + 1 positions of one input from `start` to `stop` (rad or m), the others standing still. An angle runs from its
     own position a turn on where they are left out; a slide without a `stop` runs between its limits, each design
     between its own.
 
     `points` are those whose positions are wanted, and with `rates` velocities and accelerations; all that move, if left
-    out. A design that comes to a dead point has NaN from there on, and `status` says why.
+    out and nothing else is asked for. `links` and `pairs` are those whose angles and relative motions are wanted, with
+    `rates` their rates too; `outputs` links or pairs at the frame whose transmission angles are; `efforts` inputs and
+    `reactions` pairs whose forces are, under loads, weights, springs and inertia: see `Sweep`. A design that comes to a
+    dead point has NaN from there on, and `status` says why.
 
     `backend` "native" runs compiled machine code, "numpy" is always there, "auto" takes the faster that is there. What
     a backend cannot do, or its gate does not let pass, the general path does, which is counted and said.
@@ -132,37 +156,41 @@ def sweep(  # many: the public signature; # long: its docstring
     many designs are done, and how many there are.
 
     `dtype` "float32" halves the memory: each number is computed in double precision and rounded when it is written.
-    With `reduce` no positions are kept, only what is made of every block as it comes, by the names given: measures of
-    points as `C.path_length` (see `planar.batch.reductions.point_reductions.MEASURES`: x_extremes, y_extremes,
-    bounding_box, speed_extremes, acceleration_extremes over the positions that are solved; path_length of designs
-    solved at every step; enclosed_area, fourier_descriptors of closed paths), or functions that take a `Sweep` of a
+    With `reduce` no positions are kept, only what is made of every block as it comes, by the names given. Measures have
+    names as `C.path_length`: of points x_extremes, y_extremes, bounding_box (least x and y, greatest x and y),
+    speed_extremes and acceleration_extremes over the positions that are solved, path_length of designs solved at every
+    step, enclosed_area and fourier_descriptors of those whose path is closed; of links, pairs and inputs the extremes
+    of any other result, as `BC.angle_extremes` or `A.effort_extremes`. Or they are functions that take a `Sweep` of a
     block's designs and give an array with an entry for each. Only what measures need is then solved, and the result is
-    a `ReducedSweep`.
+    a `ReducedSweep`; not a number stands where a measure has nothing to go by.
 
     Raises BadInput for a name that is not there, a range or a store that cannot be; WriteFailure, which is one, where a
     store finds no more room.
     """
-    values = read_designs(mechanism, designs)
     if block is not None and (isinstance(block, bool) or not isinstance(block, Integral) or block < 1):
         raise BadInput("block", f"a whole number of designs is wanted, not {block!r:.40}")
     mechanism = check_range(mechanism, steps, start, stop, pair)
+    values = read_designs(mechanism, designs)
     threads, number_type = thread_count(workers, executor), result_type(dtype)
     common = reference_design(mechanism, pair)
-    available_backends(backend)
     if reduce is not None and store is not None:
         raise BadInput("store", "a store keeps all results, and reductions are kept in memory; leave out one of them")
-    names = common.select_points(points)
     reductions = None if reduce is None else read_reductions(reduce, common.result_name, steps)
+    asked = {"links": links, "pairs": pairs, "outputs": outputs, "efforts": efforts, "reactions": reactions}
+    results = _select_results(common, asked if reductions is None else reductions.with_results(asked))
+    names: tuple[PointName, ...] = () if points is None and any(results) else common.select_points(points)
     if reductions is not None:
-        own, rates = reductions.results(names, rates)
+        own, rates = reductions.with_points(names, rates)
         names = own or ()
+    available_backends(backend)
     whole = DesignBlock(mechanism, values, int(steps), names, rates, start, stop, pair, backend, number_type)
     many = len(next(iter(values.values())))
-    kept = "reduced" if reduce is not None else "memory" if store is None else "store"
-    size = int(block) if block is not None else _block_size(whole, many, executor, kept)
-    plan = SweepPlan(whole, size)
+    kept = "reduced" if reduce is not None else "store" if store is not None or any(results) else "memory"
+    width = len(names) + 2 * len(mechanism.links) * any(results)
+    size = int(block) if block is not None else _block_size(whole, width, many, executor, kept)
+    plan = SweepPlan(whole, size, results)
     into = open_store(store, plan) if reductions is None else ReductionStore(plan)
-    for done in _solve_blocks(into, threads, executor, reductions and reductions.functions):
+    for done in _solve_blocks(into, threads, executor, reductions):
         if progress is not None:
             progress(done, many)
     found: Sweep | ReducedSweep = into.result()
@@ -170,7 +198,7 @@ def sweep(  # many: the public signature; # long: its docstring
 
 
 def _solve_blocks(
-    into: BlockStore, threads: int, executor: Executor | None, reductions: Mapping[str, Reduction[Sweep]] | None
+    into: BlockStore, threads: int, executor: Executor | None, reductions: Reductions | None
 ) -> Iterator[int]:
     """Solve the blocks that are not there yet, and write them; how many designs are done after each."""
     plan = into.plan
@@ -179,18 +207,18 @@ def _solve_blocks(
     ready = sum(part.stop - part.start for k, part in enumerate(parts) if k in into.finished)
     if ready:
         yield ready
-    tasks = (
-        (k, whole._replace(designs={name: array[part] for name, array in whole.designs.items()}))
-        for k, part in enumerate(parts)
-        if k not in into.finished
-    )
-    solve = solve_design_block if reductions is None else partial(reduce_block, reductions=reductions)
 
-    def solve_here(number: int, task: DesignBlock) -> Any:
+    def task(part: slice) -> ResultBlock:
+        own = {name: array[part] for name, array in whole.designs.items()}
+        return ResultBlock(whole._replace(designs=own), plan.results)
+
+    def solve_here(number: int, block: ResultBlock) -> Any:
         if reductions is not None:
-            return reduce_block(task, reductions)
-        return solve_design_block(task, into.output_array(parts[number]))
+            return reduce_block(block, reductions.functions)
+        return solve_result_block(block, into.output_array(parts[number]))
 
+    tasks = ((k, task(part)) for k, part in enumerate(parts) if k not in into.finished)
+    solve = solve_result_block if reductions is None else partial(reduce_block, reductions=reductions.functions)
     for k, done in run_tasks(min(threads, len(parts)), executor, solve, tasks, solve_here):
         into.write_block(k, parts[k], done)
         ready += parts[k].stop - parts[k].start
@@ -209,11 +237,31 @@ def check_range(mechanism: Mechanism, steps: object, start: object, stop: object
     return replace(mechanism, inputs=tuple(given._replace(law=None) for given in mechanism.inputs))
 
 
-def _block_size(whole: DesignBlock, many: int, executor: Executor | None, kept: str) -> int:
-    """How many designs make a block, `kept` as in MAX_BLOCK_BYTES; in threads that hangs on the work alone, so that
-    results do."""
+def _select_results(common: ReferenceDesign, asked: Mapping[str, Sequence[str] | str]) -> RequestedResults:
+    """The results that are wanted beside those of points, by names. Raises BadInput."""
+    mechanism = common.mechanism
+    known = {
+        "links": [link.name for link in mechanism.links if link.name != mechanism.frame],
+        "pairs": list(common.motions),
+        "outputs": [link.name for link in mechanism.links] + list(common.motions),
+        "efforts": [given.pair for given in mechanism.inputs],
+        "reactions": [pair.name for pair in mechanism.pairs],
+    }
+    results = RequestedResults(**{word: select_names(word, names, known[word]) for word, names in asked.items()})
+    for output in results.outputs:
+        output_link(mechanism, output)
+    if results.has_forces:
+        check_loads(mechanism)
+        if any(load.varies is not None and load.varies.input is None for load in mechanism.loads):
+            raise BadInput("loads", "a load varies with time, and a sweep knows none")
+    return results
+
+
+def _block_size(whole: DesignBlock, width: int, many: int, executor: Executor | None, kept: str) -> int:
+    """How many designs make a block of so many points, `kept` as in MAX_BLOCK_BYTES; in threads that hangs on the work
+    alone, so that results do."""
     itemsize = 8 if kept == "reduced" else np.dtype(whole.dtype).itemsize
-    each = (whole.steps + 1) * 2 * max(len(whole.points), 1) * (3 if whole.rates else 1) * itemsize
+    each = (whole.steps + 1) * 2 * max(width, 1) * (3 if whole.rates else 1) * itemsize
     if executor is not None:
         size = min(MAX_EXECUTOR_BLOCK_BYTES // each, ceil(many / (TASKS_PER_WORKER * worker_count(executor))))
     else:

@@ -244,7 +244,7 @@ def _time_sweeps(mechanism: Mechanism, input_range: InputRange, seconds: float) 
 def _draw_designs(mechanism: Mechanism, count: int, within: float) -> dict[str, np.ndarray]:
     """Every length within a part of itself, evenly drawn; the input's rate where there is no length."""
     known = design_variables(mechanism)
-    lengths = {name: each.value for name, each in known.items() if each.link and each.value}
+    lengths = {name: each.value for name, each in known.items() if each.link and each.kind == "length" and each.value}
     if not lengths:
         given = mechanism.inputs[0]
         lengths = {f"{given.pair}.velocity": given.velocity}

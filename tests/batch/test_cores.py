@@ -231,19 +231,37 @@ def test_only_what_measures_need_is_solved(monkeypatch):
     from planar.batch.reductions import reduced_sweep
 
     asked = []
-    really = reduced_sweep.solve_design_block
+    really = reduced_sweep.solve_result_block
 
     def noted(block, out):
-        asked.append((block.points, block.rates))
+        asked.append((block.designs.points, block.designs.rates))
         return really(block, out)
 
-    monkeypatch.setattr(reduced_sweep, "solve_design_block", noted)
+    monkeypatch.setattr(reduced_sweep, "solve_result_block", noted)
     mechanism = four_bar(*ROCKER, 0.8)
     for measure, rates in (("path_length", False), ("speed_extremes", True)):
         planar.sweep(mechanism, {"BC.length": [0.9]}, 12, reduce={"kept": f"BC.E.{measure}"})
         assert asked.pop() == (("E",), rates)
     planar.sweep(mechanism, {"BC.length": [0.9]}, 12, "C", reduce={"kept": "E.path_length", "own": len_of_each})
     assert asked.pop() == (("C", "E"), True)
+
+
+def test_extremes_of_results_beside_those_of_points():
+    mechanism, lengths = four_bar(*ROCKER, 0.8), {"BC.length": np.linspace(0.85, 0.95, 5)}
+    asked = {"links": "BC", "pairs": ["B"], "outputs": "DC"}
+    whole = planar.sweep(mechanism, lengths, STEPS, **asked)
+    names = ("BC.angle", "BC.angular_velocity", "B.value", "B.value_second_rate", "DC.transmission_angle")
+    found = planar.sweep(mechanism, lengths, STEPS, reduce={name: f"{name}_extremes" for name in names})
+    for name in names:
+        of, quantity = name.split(".")
+        values = getattr(whole, quantity)[of]
+        np.testing.assert_allclose(found[name], np.stack([values.min(axis=1), values.max(axis=1)], axis=1), rtol=1e-12)
+    single = planar.sweep(mechanism, lengths, STEPS, dtype="float32", **asked)
+    for name in names:
+        of, quantity = name.split(".")
+        values = getattr(single, quantity)[of]
+        assert values.dtype == np.float32
+        np.testing.assert_array_equal(values, getattr(whole, quantity)[of].astype(np.float32))
 
 
 def len_of_each(some):
@@ -300,6 +318,7 @@ WRONG = [
     ({"reduce": {}}, "name what is to be kept"),
     ({"reduce": {"x": "E.path_lenght"}}, "did you mean 'path_length'"),
     ({"reduce": {"x": "Z.path_length"}}, "no point 'Z'"),
+    ({"reduce": {"x": "Z.angle_extremes"}}, "nothing of the name 'Z'"),
     ({"reduce": {"x": 3}}, "or a function"),
     ({"reduce": {"x": lambda sweep: 1.0}}, "an entry for each of"),
     ({"reduce": {"x": "E.speed_extremes", "y": len_of_each}, "rates": False}, "which are rates"),
@@ -313,6 +332,11 @@ WRONG = [
 def test_bad_input_is_one_clear_sentence(more, told):
     with pytest.raises(BadInput, match=told):
         planar.sweep(four_bar(*ROCKER, 0.8), designs(20), **{"steps": STEPS, "points": "E", **more})
+
+
+def test_mechanisms_tell_points_alone():
+    with pytest.raises(BadInput, match="points alone"):
+        planar.sweep_each(pinned(1), STEPS, reduce={"x": "bar1.angle_extremes"})
 
 
 def test_mechanisms_without_the_point_are_told():

@@ -138,3 +138,45 @@ def _is_closed(path: Array) -> Array:
     extent = np.ptp(path, axis=1).max(axis=1)
     found: Array = np.abs(path[:, -1] - path[:, 0]).max(axis=1) <= CLOSED_PATH_TOLERANCE * extent
     return found
+
+
+class ResultMeasure(NamedTuple):
+    """A result beside those of points: which argument of a sweep asks for it, and of which order in time it is."""
+
+    asked_by: str
+    order: int = 0
+
+
+RESULTS: Mapping[str, ResultMeasure] = {
+    "angle": ResultMeasure("links"),
+    "angular_velocity": ResultMeasure("links", 1),
+    "angular_acceleration": ResultMeasure("links", 2),
+    "value": ResultMeasure("pairs"),
+    "value_rate": ResultMeasure("pairs", 1),
+    "value_second_rate": ResultMeasure("pairs", 2),
+    "transmission_angle": ResultMeasure("outputs"),
+    "effort": ResultMeasure("efforts"),
+    "reaction": ResultMeasure("reactions"),
+    "reaction_couple": ResultMeasure("reactions"),
+}
+"""Results of links, pairs and inputs whose extremes are told by name: those attributes of a `Sweep`."""
+EXTREMES_ENDING = "_extremes"
+
+
+@dataclass(frozen=True)
+class ResultReduction:
+    """A function of a sweep, or of a block of one: the extremes of a result of `RESULTS`, of vectors of their lengths."""
+
+    name: str
+    quantity: str
+
+    @property
+    def wants_rates(self) -> bool:
+        """Whether it is a rate."""
+        return RESULTS[self.quantity].order > 0
+
+    def __call__(self, sweep: Sweep) -> Array:
+        """The least and the greatest of every design (designs, 2)."""
+        found: Mapping[str, Any] = getattr(sweep, self.quantity)
+        values = np.asarray(found[self.name])
+        return extremes(values if values.ndim == 2 else np.hypot(values[..., 0], values[..., 1]))

@@ -12,6 +12,7 @@ from planar.batch.executor import in_order, run_tasks
 from planar.batch.mechanisms.linkage_groups import SweepRequest
 from planar.batch.mechanisms.parts import PartRuns, find_endings, part_messages, stream_parts
 from planar.batch.mechanisms.results import Each, SweptPart
+from planar.batch.reductions.point_reductions import ResultReduction
 from planar.batch.reductions.reduced_sweep import ReducedBlock, ReducedSweep, Reduction, read_reductions, reduce_all
 from planar.document.first_argument import MechanismSource
 from planar.foundation.errors import BadInput
@@ -31,7 +32,10 @@ def sweep_reduced(
 ) -> ReducedSweep:
     """Reductions alone of all mechanisms, of which only those are held that are being solved."""
     wanted = read_reductions(reduce, str, request.steps)
-    points, rates = wanted.results(request.points, request.rates)
+    for each in wanted.measures:
+        if isinstance(each, ResultReduction):
+            raise BadInput("reduce", f"mechanisms tell points alone, not {each.name}.{each.quantity}")
+    points, rates = wanted.with_points(request.points, request.rates)
     request = request._replace(points=points, rates=rates)
     solve_part = partial(_solve_and_reduce, solve=solve, request=request, reductions=wanted.functions, dtype=runs.dtype)
     blocks: list[ReducedBlock] = []

@@ -10,8 +10,16 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import DTypeLike
 
-from planar.batch.block import DesignBlock, SolvedDesigns, solve_design_block
-from planar.batch.reductions.point_reductions import HARMONICS, MEASURES, PointReduction
+from planar.batch.block import SolvedDesigns
+from planar.batch.named_results.result_block import ResultBlock, solve_result_block
+from planar.batch.reductions.point_reductions import (
+    EXTREMES_ENDING,
+    HARMONICS,
+    MEASURES,
+    RESULTS,
+    PointReduction,
+    ResultReduction,
+)
 from planar.batch.results import Sweep, SweepNotes
 from planar.batch.stores.store import BlockStore, MemoryStore, SweepPlan
 from planar.document.cursor import suggest_spelling
@@ -83,38 +91,56 @@ class Reductions(NamedTuple):
 
     functions: dict[str, Reduction[Any]]
 
-    def results(self, points: Sequence[str] | None, rates: bool) -> tuple[tuple[str, ...] | None, bool]:
+    @property
+    def measures(self) -> list[PointReduction | ResultReduction]:
+        """Those that are asked for by name."""
+        return [each for each in self.functions.values() if isinstance(each, PointReduction | ResultReduction)]
+
+    def with_results(self, asked: Mapping[str, Sequence[str] | str]) -> dict[str, tuple[str, ...]]:
+        """The names of links, pairs and so on that are asked for, with those of measures."""
+        found = {word: (names,) if isinstance(names, str) else tuple(names) for word, names in asked.items()}
+        for each in self.measures:
+            if isinstance(each, ResultReduction):
+                word = RESULTS[each.quantity].asked_by
+                found[word] = (*found[word], each.name)
+        return found
+
+    def with_points(self, points: Sequence[Any] | None, rates: bool) -> tuple[tuple[Any, ...] | None, bool]:
         """The points that have to be solved, and whether with rates, of what is asked for: no more than is needed where
-        all are measures of points. Raises BadInput."""
-        measured = [each for each in self.functions.values() if isinstance(each, PointReduction)]
-        own = tuple(dict.fromkeys(each.point for each in measured))
-        if len(measured) == len(self.functions):
-            return own, any(each.wants_rates for each in measured)
-        if not rates and any(each.wants_rates for each in measured):
+        only measures are. Raises BadInput."""
+        own = tuple(dict.fromkeys(each.point for each in self.measures if isinstance(each, PointReduction)))
+        wants_rates = any(each.wants_rates for each in self.measures)
+        if len(self.measures) == len(self.functions):
+            return own, wants_rates
+        if wants_rates and not rates:
             raise BadInput("rates", "speeds and accelerations are wanted, which are rates")
         return None if points is None else tuple(dict.fromkeys((*points, *own))), rates
 
 
-def read_reductions(reduce: Mapping[str, Any], result_name: Callable[[str], str], steps: int) -> Reductions:
+def read_reductions(reduce: Mapping[str, Any], result_name: Callable[[str], Any], steps: int) -> Reductions:
     """The reductions by their names; `result_name` gives that of a point, and raises BadInput. Raises BadInput."""
     if not isinstance(reduce, Mapping) or not reduce:
         raise BadInput("reduce", "name what is to be kept, as {'reach': 'C.bounding_box'}")
     return Reductions({name: _read_reduction(name, each, result_name, steps) for name, each in reduce.items()})
 
 
-def _read_reduction(name: str, given: Any, result_name: Callable[[str], str], steps: int) -> Reduction[Any]:
+def _read_reduction(name: str, given: Any, result_name: Callable[[str], Any], steps: int) -> Reduction[Any]:
     if isinstance(given, str):
         point, _, measure = given.rpartition(".")
+        if measure.removesuffix(EXTREMES_ENDING) in RESULTS and measure not in MEASURES:
+            told: Reduction[Any] = ResultReduction(point, measure.removesuffix(EXTREMES_ENDING))
+            return told
         if measure not in MEASURES:
-            meant = suggest_spelling(measure, MEASURES, cutoff=0.5) or f"; there are {', '.join(MEASURES)}"
-            raise BadInput(f"reduce.{name}", f"there is no measure {given!r:.60} of a point{meant}")
+            known = [*MEASURES, *(f"{result}{EXTREMES_ENDING}" for result in RESULTS)]
+            meant = suggest_spelling(measure, known, cutoff=0.5) or f"; there are {', '.join(known)}"
+            raise BadInput(f"reduce.{name}", f"there is no measure {given!r:.60}{meant}")
         if measure == "fourier_descriptors" and steps <= 2 * HARMONICS:
             raise BadInput(f"reduce.{name}", f"{HARMONICS} harmonics want more than {2 * HARMONICS} steps")
         measured: Reduction[Any] = PointReduction(result_name(point), measure)
         return measured
     if not callable(given):
-        told = f"a measure of a point, as 'C.bounding_box', or a function of a sweep is wanted, not {given!r:.40}"
-        raise BadInput(f"reduce.{name}", told)
+        wanted = "a measure, as 'C.bounding_box', or a function of a sweep"
+        raise BadInput(f"reduce.{name}", f"{wanted} is wanted, not {given!r:.40}")
     function: Reduction[Any] = given
     return function
 
@@ -130,14 +156,15 @@ def result_type(dtype: DTypeLike) -> str:
     return name
 
 
-def reduce_block(block: DesignBlock, reductions: Mapping[str, Reduction[Sweep]]) -> ReducedBlock:
+def reduce_block(block: ResultBlock, reductions: Mapping[str, Reduction[Sweep]]) -> ReducedBlock:
     """Solve a block and keep its reductions, made of numbers in double precision and rounded to the block's."""
-    store = MemoryStore(SweepPlan(block._replace(dtype="float64"), len(next(iter(block.designs.values())))))
+    designs = block.designs._replace(dtype="float64")
+    store = MemoryStore(SweepPlan(designs, len(next(iter(designs.designs.values()))), block.results))
     every = slice(0, store.plan.design_count)
-    done = solve_design_block(store.plan.all_designs, store.output_array(every))
+    done = solve_result_block(block._replace(designs=designs), store.output_array(every))
     store.write_block(0, every, done)
     sweep = store.result()
-    reduced = reduce_all(sweep, reductions, block.dtype)
+    reduced = reduce_all(sweep, reductions, block.designs.dtype)
     ended = np.array(done.status[:, -1])
     return ReducedBlock(reduced, ended, done.general_positions, done.general_designs, done.endings)
 
