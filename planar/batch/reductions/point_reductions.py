@@ -165,7 +165,7 @@ EXTREMES_ENDING = "_extremes"
 
 @dataclass(frozen=True)
 class ResultReduction:
-    """A function of a sweep, or of a block of one: the extremes of a result of `RESULTS`, of vectors of their lengths."""
+    """A function of a sweep, or of a block of one: the extremes of a result of `RESULTS`, of vectors by length."""
 
     name: str
     quantity: str
