@@ -7,12 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.closed_form.ends import find_ends
-from planar.batch.dead_point_tracking import FollowedDesigns, follow_to_dead_points
+from planar.batch.closed_form.ends import closed_form_designs, find_ends
+from planar.batch.closed_form.own_ranges import run_between_limits
+from planar.batch.dead_point_tracking import DEAD_POINT_MARGIN, FollowedDesigns, follow_to_dead_points
 from planar.batch.design_arrays import values_of_design, with_design_values
 from planar.batch.general_path import OUTCOMES, DesignQuestion, solve_design
 from planar.batch.initial_assembly import find_assemblies
-from planar.batch.march.backend import DesignBatch, DesignRunner, UnsupportedStructure
+from planar.batch.march.backend import DesignBatch, DesignRunner, UnsupportedStructure, erase_from_steps
 from planar.batch.march.choice import find_runner
 from planar.batch.march.numpy_backend import NumpyRunner
 from planar.batch.reference_design import ReferenceDesign, reference_design
@@ -95,6 +96,8 @@ class _DesignBlockSolver:
         self.general_positions, self.followed_designs = 0, 0
         self.endings: dict[int, tuple[int, str | DesignQuestion]] = {}
         self.dead_point = np.full(self.design_count, np.nan)
+        self.limits = np.full((2, self.design_count), np.nan)
+        "between which inputs run that have a range of their own, rad or sizes"
         self.failed_block = np.full(self.design_count, -1)
         "the block that cannot be joined, where a design surely cannot be assembled"
         length = FULL_TURN if block.stop is None else block.stop - self.start
@@ -104,17 +107,20 @@ class _DesignBlockSolver:
         """See `solve_design_block`."""
         block = self.block
         same = bool(np.ptp(self.range_length) == 0.0)
-        runs = same and not self.has_own_range and self.reference.can_run_backend
-        runs = runs and abs(self.range_length[0]) <= LARGEST_INPUT_POSITION  # farther the general path counts turns
-        found = self._run_with_backend() if runs else None
+        # farther the general path counts turns
+        runs = self.reference.can_run_backend and np.abs(self.range_length).max() <= LARGEST_INPUT_POSITION
+        runs = runs and (block.start is None or (same and not self.has_own_range))
+        found = self._run_with_backend(same and not self.has_own_range) if runs else None
         out, good = (self._output_array(), np.zeros(self.design_count, dtype=int)) if found is None else found
+        if found is None:
+            out[:] = np.nan
         ended = (self.solved_steps >= 0) & (good <= block.steps)
         solved, code = np.where(ended, self.solved_steps, good), np.zeros(self.design_count, dtype=np.int8)
         code[ended & (solved <= block.steps)] = _code(Outcome.DEAD_POINT)
         failed = ~ended & (good == 0) & (self.failed_block >= 0)
         code[failed] = _code(Outcome.CANNOT_BE_ASSEMBLED)
-        if failed.any():  # those of which a backend was not given all designs
-            out[0][:, failed] = np.nan
+        if any(self.reference.point_member(name)[0] == self.reference.mechanism.frame for name in block.points):
+            erase_from_steps(out, solved)
         status = np.zeros((self.design_count, block.steps + 1), dtype=np.int8)
         stopped = np.flatnonzero(code)
         step, first = np.arange(block.steps + 1, dtype=np.int32), solved[stopped, None].astype(np.int32)
@@ -135,7 +141,8 @@ class _DesignBlockSolver:
         """Where the running input is at each step (steps + 1,), or (designs, steps + 1); unknown yet of own ranges."""
         grid = np.linspace(0.0, 1.0, self.block.steps + 1)
         if self.has_own_range:
-            return np.full((self.design_count, len(grid)), np.nan)
+            low, high = self.limits * self.scale
+            return np.asarray(low[:, None] + (high - low)[:, None] * grid)
         if same and np.ptp(self.start) == 0.0:
             return np.asarray(self.start[0] + self.range_length[0] * grid)
         return np.asarray(self.start[:, None] + self.range_length[:, None] * grid)
@@ -164,8 +171,11 @@ class _DesignBlockSolver:
             many, first = self.endings.get(code, (0, sentence))
             self.endings[code] = many + 1, first
 
-    def _run_with_backend(self) -> tuple[Array, Array] | None:
-        """out (m, s), and how many of the first steps passed; None where no backend can run the structure."""
+    def _run_with_backend(self, is_common: bool) -> tuple[Array, Array] | None:
+        """out (m, s), and how many of the first steps passed; None where no backend can run the structure.
+
+        `is_common`: whether all inputs go equally far.
+        """
         block, base_, runner = self.block, self.reference, find_runner(self.block.backend)
         shapes = base_.shapes(self.all_designs)
         p = base_.pair_numbers(shapes, self.design_count, self.all_designs)
@@ -182,12 +192,44 @@ class _DesignBlockSolver:
         march = base_.design_batch(shapes, p, (u0, self.u1, self.u2), moving.values(), block.rates)
         march = march._replace(z0=start.z, input_offsets=offsets)
         try:
-            march, fit = self._lead_to_start(march, fit)
+            if not is_common:
+                out = self._run_own_ranges(march, fit, start.signs, runner)
+                return None if out is None else (self._with_frame_points(out, told, shapes), np.zeros(len(fit), int))
+            march, fit = self._lead_to_start(march, fit, start.signs, runner)
             out, good = self._run_fit_designs(runner, march, fit)
         except UnsupportedStructure:
             return None
         self._follow_to_dead_points(march, out, good, start.signs, runner)
         return self._with_frame_points(out, told, shapes), good
+
+    def _run_own_ranges(
+        self, march: DesignBatch, fit: Array, signs: Array | None, runner: DesignRunner
+    ) -> Array | None:
+        """out of designs each of which has a range of its own; None where not all blocks are in closed form."""
+        some = np.flatnonzero(fit & (self.range_length != 0.0))
+        own = None if signs is None else signs[:, some]
+        designs = closed_form_designs(march.select(some), self.reference.running_index, own, runner, self.block.backend)
+        if designs is None:
+            return None
+        out = self._own_output(march)
+        out[:] = np.nan
+        if not self.has_own_range:
+            lengths, none = self.range_length[some] / self.scale, np.zeros(some.size, dtype=int)
+            self._settle(some, find_ends(designs, lengths, none, self.block.steps), out)
+            return out
+        found = run_between_limits(designs, self.block.steps)
+        self.limits[:, some] = found.limits
+        settled = some[found.is_settled]
+        out[:, :, settled] = found.out[:, :, found.is_settled]
+        self.solved_steps[settled] = len(out)
+        return out
+
+    def _own_output(self, march: DesignBatch) -> Array:
+        """Where the results of a march stand: those of points on the frame are none of its."""
+        out = self._output_array()
+        if march.output_row_count == out.shape[1]:
+            return out
+        return allocate_aligned(len(out), march.output_row_count, self.design_count, out.dtype)
 
     def _output_array(self) -> Array:
         """Where the results stand."""
@@ -199,9 +241,7 @@ class _DesignBlockSolver:
 
     def _run_fit_designs(self, runner: DesignRunner, march: DesignBatch, fit: Array) -> tuple[Array, Array]:
         """out and good of all designs, of which only the fit ones are run."""
-        out = self._output_array()
-        if march.output_row_count != out.shape[1]:
-            out = allocate_aligned(len(out), march.output_row_count, self.design_count, out.dtype)
+        out = self._own_output(march)
         if fit.mean() > RUN_ALL_RATIO:
             march.u0[:, ~fit] = np.nan
             return out, runner.run(march, out)
@@ -220,11 +260,11 @@ class _DesignBlockSolver:
         some = np.flatnonzero((good > 0) & (good < len(march.input_offsets)))
         if not some.size:
             return
-        index, backend = self.reference.running_index, self.block.backend
-        ends = None
-        if signs is not None:
-            ends = find_ends(march.select(some), index, good[some], signs[:, some], runner, backend)
-        if ends is not None:
+        index = self.reference.running_index
+        own = None if signs is None else signs[:, some]
+        designs = closed_form_designs(march.select(some), index, own, runner, self.block.backend)
+        if designs is not None:
+            ends = find_ends(designs, self.range_length[some] / self.scale, good[some], self.block.steps)
             self._settle(some, ends, out)
             some = some[~ends.is_settled]
         if some.size:
@@ -239,9 +279,12 @@ class _DesignBlockSolver:
         settled = some[found.is_settled]
         self.solved_steps[settled] = found.solved_steps[found.is_settled]
         distance = np.sign(self.range_length[settled]) * found.distance[found.is_settled] * self.scale
-        self.dead_point[settled] = np.where(np.isfinite(distance), self.start[settled] + distance, np.nan)
+        ended = self.solved_steps[settled] <= self.block.steps
+        self.dead_point[settled] = np.where(ended, self.start[settled] + distance, np.nan)
 
-    def _lead_to_start(self, march: DesignBatch, fit: Array) -> tuple[DesignBatch, Array]:
+    def _lead_to_start(
+        self, march: DesignBatch, fit: Array, signs: Array | None, runner: DesignRunner
+    ) -> tuple[DesignBatch, Array]:
         """The same march from the assemblies at its start, to which those at the designs' own positions are led."""
         gone = march.u0 - self.u
         far = float(np.max(np.abs(gone), initial=0.0))
@@ -249,6 +292,19 @@ class _DesignBlockSolver:
             return march, fit
         if far > LARGEST_INPUT_POSITION:
             return march, np.zeros_like(fit)
+        index, own = self.reference.running_index, np.flatnonzero(fit)
+        there = march._replace(u0=self.u).select(own)
+        found = None if signs is None else signs[:, own]
+        designs = closed_form_designs(there, index, found, runner, self.block.backend)
+        if designs is not None:
+            span = gone[index, own]
+            z, ends = designs.lead(span, LEAD_IN_STEP)
+            dead = np.isfinite(ends) & (np.abs(span) - ends > DEAD_POINT_MARGIN * np.abs(span))
+            self.solved_steps[own[dead]] = 0
+            passed = np.zeros_like(fit)
+            passed[own] = np.isinf(ends)
+            march.z0[:, own] = z
+            return march, passed
         z, passed = NumpyRunner().lead(march._replace(u0=self.u), gone, LEAD_IN_STEP)
         return march._replace(z0=z), fit & passed
 

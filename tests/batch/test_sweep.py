@@ -220,7 +220,7 @@ def test_what_a_backend_does_not_let_pass_is_solved_all_the_same_and_counted(mon
             return good
 
     backend(monkeypatch, "numpy", Failing())
-    monkeypatch.setattr("planar.batch.block.find_ends", lambda *_: None)
+    monkeypatch.setattr("planar.batch.block.closed_form_designs", lambda *_: None)
     found = planar.sweep(mechanism, designs, 30, "E", rates=rates, backend="numpy")
     assert found.general == 24 + 30
     assert found.said == ("2 of 6 designs went to the general path, which solved 54 positions",)

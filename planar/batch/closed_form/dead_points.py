@@ -88,7 +88,8 @@ class _DeadPointSearch:
         active, x, longest, h = np.arange(count), reached.copy(), step, step.copy()
         brackets: list[_Brackets] = []
         own, signs = self.batch, self.signs
-        for _ in range(MAX_WINDOWS):
+        most = float(np.max((self.span - reached) / step, initial=0.0))
+        for _ in range(MAX_WINDOWS + int(most / LEAST_INTERVALS)):
             intervals = int(np.clip(POSITIONS_AT_ONCE // max(active.size, 1), LEAST_INTERVALS, MOST_INTERVALS))
             safe, crossing, first, found = self._look_ahead(own, signs, active, x, h, intervals)
             brackets.append(found)
@@ -140,7 +141,8 @@ class _DeadPointSearch:
         near = np.array([f[at[which] + k, block[which], which] for k in range(4)])
         root, slope = _cubic_root(near)
         guess = begin + root * own, slope / own
-        return every, crossing, first, _Brackets(active[which], block[which], begin, begin + own, *near[1:3], *guess)
+        found = active[which], block[which], begin, begin + own, near[1], near[2], guess[0], guess[1]
+        return every, crossing, first, _Brackets(*found)
 
     def _find_zeros(self, brackets: _Brackets, distance: Array, block: Array) -> None:
         """The dead points, to round-off, of designs with brackets: secants, kept within the brackets."""

@@ -5,58 +5,99 @@ from __future__ import annotations
 import numpy as np
 
 from planar.batch.closed_form.choice import find_joiner
-from planar.batch.closed_form.dead_points import find_dead_points
+from planar.batch.closed_form.dead_points import DeadPoints, find_dead_points
 from planar.batch.closed_form.joined_blocks import BlockJoiner, unknowns_from_state
 from planar.batch.dead_point_tracking import DEAD_POINT_MARGIN, FollowedDesigns
+from planar.batch.design_arrays import split_into_blocks
 from planar.batch.march.backend import DesignBatch, DesignRunner
 from planar.codegen.aligned_arrays import allocate_aligned
 from planar.model.mechanism import links_counting_turns
 
 Array = np.ndarray
 
+LONGEST_STEP = 0.1
+"""rad or sizes: no longer steps are looked at for what lies between."""
+POSITIONS_AT_ONCE = 2**16
+"""Positions that are solved at once, each with a copy of its design's numbers."""
 
-def find_ends(
-    batch: DesignBatch, index: int, good: Array, signs: Array, runner: DesignRunner, backend: str
-) -> FollowedDesigns | None:
-    """As `follow_to_dead_points`, of designs of which so many steps are good, one at least; None where a block is not
-    in closed form. `index` is the input that runs; signs (blocks, designs) of the blocks' assemblies, 0 where that is
-    not known."""
-    joiner = None if links_counting_turns(batch.mechanism) else find_joiner(batch._replace(links=()), (), backend)
+
+class ClosedFormDesigns:
+    """Designs whose blocks are all in closed form, in assemblies that are known, one of whose inputs runs."""
+
+    def __init__(self, joiner: BlockJoiner, batch: DesignBatch, index: int, signs: Array, runner: DesignRunner):
+        self.joiner, self.batch, self.signs, self.runner = joiner, batch, signs, runner
+        self.direction = np.where(np.arange(len(batch.u0)) == index, 1.0, 0.0)
+
+    def find_dead_points(self, reached: Array, lengths: Array, step: Array) -> DeadPoints:
+        """As `find_dead_points`, of inputs that go so far (designs,), to either side."""
+        distance, block = np.full(len(lengths), np.nan), np.full(len(lengths), -1)
+        for sense in (1.0, -1.0):
+            which = np.flatnonzero(np.sign(lengths) == sense)
+            if which.size:
+                own, signs = self.batch.select(which), np.take(self.signs, which, axis=1)
+                span, longest = np.abs(lengths)[which], np.minimum(step, LONGEST_STEP)[which]
+                found = find_dead_points(self.joiner, own, signs, sense * self.direction, reached[which], span, longest)
+                distance[which], block[which] = found
+        return DeadPoints(distance, block)
+
+    def lead(self, span: Array, step: float) -> tuple[Array, Array]:
+        """Designs led on so far (designs,): the unknowns there (unknowns, designs), and how far there was a dead point,
+        infinitely where there was none, not a number where that is not decided (designs,)."""
+        ends = self.find_dead_points(np.zeros(len(span)), span, np.full(len(span), step)).distance
+        u = self.batch.u0 + span * self.direction[:, None]
+        state = self.follow(np.arange(len(span)), self.signs, u)
+        return unknowns_from_state(self.joiner.state, state, len(self.batch.z0)), np.where(span == 0.0, np.inf, ends)
+
+    def follow(self, design: Array, signs: Array, u: Array) -> Array:
+        """The state (operands, positions) of designs at inputs u (inputs, positions), by blocks' signs."""
+        with np.errstate(all="ignore"):
+            return self.joiner.follow(self.batch.select(design)._replace(links=()), signs, u).state
+
+    def solve_positions(self, design: Array, moved: Array) -> tuple[Array, Array]:
+        """The points (rows, positions) of designs whose input has moved so far, and which pass the checks."""
+        out, passed = np.empty((self.batch.output_row_count, len(design))), np.zeros(len(design), dtype=bool)
+        for part in split_into_blocks(len(design), POSITIONS_AT_ONCE):
+            own = self.batch.select(design[part])
+            u, signs = own.u0 + moved[part] * self.direction[:, None], np.take(self.signs, design[part], axis=1)
+            z = unknowns_from_state(self.joiner.state, self.follow(design[part], signs, u), len(own.z0))
+            row = allocate_aligned(1, len(out), len(moved[part]))
+            here = own._replace(u0=u, z0=z, input_offsets=np.zeros((1, len(u))))
+            passed[part] = self.runner.run(here, row) > 0
+            out[:, part] = row[0]
+        return out, passed
+
+
+def closed_form_designs(
+    batch: DesignBatch, index: int, signs: Array | None, runner: DesignRunner, backend: str
+) -> ClosedFormDesigns | None:
+    """Designs of a batch at their start, where `index` is the input that runs; None where a block has no closed form.
+
+    signs (blocks, designs) of the blocks' assemblies, 0 where that is not known.
+    """
+    if signs is None or links_counting_turns(batch.mechanism):
+        return None
+    joiner = find_joiner(batch._replace(links=()), (), backend)
     if joiner is None:
         return None
-    offsets, steps = batch.input_offsets[:, index], len(batch.input_offsets) - 1
-    length = abs(float(offsets[-1]))
-    direction = np.where(np.arange(len(batch.u0)) == index, np.sign(offsets[-1]), 0.0)
     unknown = np.flatnonzero(~signs.all(axis=0))
     signs[:, unknown] = joiner.equations.assembly_signs(*(rows[:, unknown] for rows in (batch.z0, batch.u0, batch.p)))
-    step, count = np.full(len(good), length / steps), len(good)
-    ends = find_dead_points(
-        joiner, batch, signs, direction, np.abs(offsets)[good - 1], np.full(count, length), step
-    ).distance
+    return ClosedFormDesigns(joiner, batch, index, signs, runner)
+
+
+def find_ends(designs: ClosedFormDesigns, lengths: Array, good: Array, steps: int) -> FollowedDesigns:
+    """As `follow_to_dead_points`, of designs of which so many steps are good (designs,), none at first.
+
+    lengths (designs,): how far the input is to go, rad or sizes, in so many steps.
+    """
+    step, count = np.abs(lengths) / steps, len(good)
+    ends = designs.find_dead_points(np.maximum(good - 1, 0) * step, lengths, step).distance
     nearest = np.clip(np.rint(ends / step), 0, steps) * step
-    settled = ~np.isnan(ends) & (np.abs(ends - nearest) > DEAD_POINT_MARGIN * length)
-    distances = np.abs(offsets)
-    solved = np.where(settled, np.searchsorted(distances, np.minimum(ends, 2.0 * length)), 0)
+    settled = ~np.isnan(ends) & (np.abs(ends - nearest) > DEAD_POINT_MARGIN * np.abs(lengths))
+    solved = np.where(settled, np.ceil(np.minimum(ends / step, steps + 1.0)), 0.0).astype(int)
     left = np.maximum(solved - good, 0)
     design = np.repeat(np.arange(count), left)
     at = good[design] + np.arange(len(design)) - np.repeat(np.cumsum(left) - left, left)
-    out, passed = _solve_positions(joiner, batch.select(design), signs[:, design], direction, distances[at], runner)
+    out, passed = designs.solve_positions(design, np.sign(lengths)[design] * at * step[design])
     settled[design[~passed]] = False
     kept = settled[design]
     return FollowedDesigns(settled, np.where(settled, solved, 0), ends, design[kept], at[kept], out[:, kept])
-
-
-def _solve_positions(
-    joiner: BlockJoiner, batch: DesignBatch, signs: Array, direction: Array, distance: Array, runner: DesignRunner
-) -> tuple[Array, Array]:
-    """The points (rows, designs) so far from where designs start, and which pass the checks."""
-    count = batch.p.shape[1]
-    out = allocate_aligned(1, batch.output_row_count, count)
-    if not count:
-        return out[0], np.zeros(0, dtype=bool)
-    u = batch.u0 + distance * direction[:, None]
-    with np.errstate(all="ignore"):
-        z = unknowns_from_state(joiner.state, joiner.follow(batch._replace(links=()), signs, u).state, len(batch.z0))
-    offsets = np.zeros((1, len(u)))
-    passed = runner.run(batch._replace(u0=u, z0=z, input_offsets=offsets), out) > 0
-    return out[0], passed

@@ -157,8 +157,8 @@ class NativeBlockJoiner:
         row_count = JOINED_ROWS * self.block_count + len(self.state)
         rows = (batch.p, batch.q, input_rows(self.equations, batch.u0), forced)
         out = _call(self.joining, rows, sketch, row_count)
-        known = out[: JOINED_ROWS * self.block_count].reshape(self.block_count, JOINED_ROWS, -1)
-        return JoinedBlocks(*known.transpose(1, 0, 2), out[JOINED_ROWS * self.block_count :])
+        known = out[: JOINED_ROWS * self.block_count].reshape(self.block_count, JOINED_ROWS, -1).transpose(1, 0, 2)
+        return JoinedBlocks(known[0], known[1], known[2], known[3], out[JOINED_ROWS * self.block_count :])
 
     def follow(self, batch: DesignBatch, signs: Array, u: Array) -> FollowedBlocks:
         """See `BlockJoiner`."""

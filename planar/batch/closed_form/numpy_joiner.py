@@ -91,7 +91,7 @@ class NumpyBlockJoiner:
             for operand in self.kernel.closed_form_operands(block.part):
                 values[operand] = np.where(is_left, *(way[operand] for way in ways))
         state = np.array([np.broadcast_to(values[each], forced.shape[1:]) for each in self.state])
-        return JoinedBlocks(*known, state)
+        return JoinedBlocks(known[0], known[1], known[2], known[3], state)
 
     def follow(self, batch: DesignBatch, signs: Array, u: Array) -> FollowedBlocks:
         """See `BlockJoiner`."""
