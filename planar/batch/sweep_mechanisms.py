@@ -209,7 +209,7 @@ def _messages(parts: Sequence[SweptPart]) -> tuple[str, ...]:
         codes, first, counts = np.unique(status, return_index=True, return_counts=True)
         for at in np.argsort(first):
             code = int(codes[at])
-            count, reason = ended[code] if code in ended else (0, "")
+            count, reason = ended.get(code, (0, ""))
             if code:
                 ended[code] = count + int(counts[at]), reason or part.swept(int(first[at])).reason
     told += [

@@ -51,9 +51,11 @@ def share_reciprocals(formula: BlockFormula) -> BlockFormula:
     for k in formula.order:
         value = source.instructions[k]
         of = [numbers[each] for each in value.operands]
-        if value.operation == "const" or (value.key is not None and value.key.source == "p"):
-            still.add(k)
-        elif value.operands and still.issuperset(value.operands):
+        if (
+            value.operation == "const"
+            or (value.key is not None and value.key.source == "p")
+            or (value.operands and still.issuperset(value.operands))
+        ):
             still.add(k)
         by = value.operands[1] if value.operation == "div" else None
         if by is not None and k not in still and (by in still or below[by] > 1):
