@@ -29,14 +29,6 @@ class TapeFormula(NamedTuple):
         return len(self.formula.outputs) > self.row_count
 
 
-class TapeLimits(NamedTuple):
-    """What counts as good: how clear a step is at least, and how much a cosine or sine may change from one to the
-    next."""
-
-    least_clearance: float
-    greatest_change: float
-
-
 def padded_steps(steps: int) -> int:
     """How many numbers a row of so many steps has: whole vectors, and what is looked at beyond the last step."""
     return LANES * ((steps + 6) // LANES + 1)
@@ -45,8 +37,9 @@ def padded_steps(steps: int) -> int:
 class Tape(NamedTuple):
     """Sequences of blocks: where each sequence begins in the blocks, first (sequences + 1,); of every block the number
     of its formula in `kinds` (blocks,), the rows that it takes and, last, those that it gives, `slots` (blocks, slots),
-    numbers p (blocks, numbers), and a `level` (blocks,) above those of the blocks that it needs; and by how much
-    constraints may be open, tolerance (sequences,)."""
+    numbers p (blocks, numbers), and a `level` (blocks,) above those of the blocks that it needs; by how much
+    constraints may be open, tolerance (sequences,), and how clear of a dead point steps are at least, clearance
+    (sequences,)."""
 
     first: Array
     kinds: Array
@@ -54,6 +47,7 @@ class Tape(NamedTuple):
     p: Array
     level: Array
     tolerance: Array
+    clearance: Array
 
 
 class TapeResult(NamedTuple):
@@ -66,9 +60,12 @@ class TapeResult(NamedTuple):
 
 
 def run_tape_numpy(
-    formulas: tuple[TapeFormula, ...], limits: TapeLimits, steps: int, tape: Tape, state: Array
+    formulas: tuple[TapeFormula, ...], greatest_change: float, steps: int, tape: Tape, state: Array
 ) -> TapeResult:
-    """Work off a tape level by level: state (slots, rows, numbers) is filled by all blocks."""
+    """Work off a tape level by level: state (slots, rows, numbers) is filled by all blocks.
+
+    `greatest_change` is that of a cosine or sine from one step to the next.
+    """
     many, owner = len(tape.tolerance), np.repeat(np.arange(len(tape.tolerance)), np.diff(tape.first))
     result = TapeResult(np.full(many, steps), np.zeros(many, dtype=np.int64), np.zeros(many, dtype=np.int64))
     key = tape.level * len(formulas) + tape.kinds
@@ -85,30 +82,30 @@ def run_tape_numpy(
             state[slots[:, -1], row] = found[row]
         if own.is_checked:
             told = [each[:, :steps] for each in found[own.row_count :]]
-            _judge(result, limits, owner[blocks], blocks, tape.tolerance[owner[blocks]], told)
+            _judge(result, tape, greatest_change, owner[blocks], blocks, told)
     return result
 
 
 def _judge(
-    result: TapeResult, limits: TapeLimits, owner: Array, blocks: Array, tolerance: Array, told: list[Array]
+    result: TapeResult, tape: Tape, greatest_change: float, owner: Array, blocks: Array, told: list[Array]
 ) -> None:
     """Put into the result where blocks end that end before the others of their sequences did."""
     *directions, left, clear = told
     with np.errstate(invalid="ignore"):
-        closed = left <= tolerance[:, None]
+        closed = left <= tape.tolerance[owner, None]
         clear = np.where(closed | (clear < 0.0), clear, np.nan)
         bends = np.zeros_like(clear)
         bends[:, 1:-1] = np.nan_to_num(np.abs(clear[:, 2:] - 2.0 * clear[:, 1:-1] + clear[:, :-2]))
-        needed = np.maximum(np.maximum(bends[:, 1:], bends[:, :-1]), limits.least_clearance)
+        needed = np.maximum(np.maximum(bends[:, 1:], bends[:, :-1]), tape.clearance[owner, None])
         fastest = np.fmax.reduce([np.abs(np.diff(each, axis=1)) for each in directions])
-        slow = ~(fastest > limits.greatest_change)
+        slow = ~(fastest > greatest_change)
         fine = (clear[:, 1:] > needed) & (clear[:, :-1] > needed) & slow
     whole = fine.all(axis=1)
     come = np.where(whole, clear.shape[1], np.argmin(fine, axis=1) + 1)
     earlier = np.flatnonzero(come < result.good[owner])
     end, k = come[earlier], owner[earlier]
     with np.errstate(invalid="ignore"):
-        dead = slow[earlier, end - 1] & (clear[earlier, end] < 0.0) & (end > 2)
+        dead = slow[earlier, end - 1] & (clear[earlier, end] < 0.0)
     # of several blocks of a sequence on one level the first one that ends
     order = np.lexsort((end, k))
     chosen = order[np.concatenate([[True], k[order][1:] != k[order][:-1]])] if len(order) else order

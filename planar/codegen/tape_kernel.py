@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from planar.codegen.llvm_compile import compile_function
 from planar.codegen.llvm_ir import IRWriter
-from planar.codegen.tape import LANES, Tape, TapeFormula, TapeLimits, TapeResult, padded_steps
+from planar.codegen.tape import LANES, Tape, TapeFormula, TapeResult, padded_steps
 from planar.foundation.arrays import Array
 from planar.foundation.turns import leave_turn
 
@@ -18,17 +19,19 @@ MARGIN = LANES
 
 
 @lru_cache(maxsize=16)
-def compile_tape(formulas: tuple[TapeFormula, ...], limits: TapeLimits) -> Any:
-    """walk(begin, end, steps, stride, slots, numbers, first, kinds, rows, p, tolerance, scratch, good, outcome, at).
+def compile_tape(formulas: tuple[TapeFormula, ...], greatest_change: float) -> Any:
+    """walk(begin, end, steps, stride, slots, numbers, first, kinds, rows, p, tolerance, clearance, scratch, good,
+    outcome, at).
 
     For every sequence from `begin` to `end`: `first` (sequences + 1,) are where its blocks begin; kinds (blocks,) which
     formula each is of; rows (blocks, slots) the addresses of the rows that it takes, and last of those that it gives,
-    `stride` numbers apart; p (blocks, numbers); tolerance (sequences,) of what is left open. Told are `good`
-    (sequences,), how many of its steps are good in all blocks, the `outcome` after these: 0 none, 1 a dead point, 2
-    undecided, and `at` which block that is. `scratch`: see `scratch_size`.
+    `stride` numbers apart; p (blocks, numbers); tolerance (sequences,) of what is left open, clearance (sequences,)
+    that steps have at least. A cosine or sine may change by `greatest_change` from one step to the next. Told are
+    `good` (sequences,), how many of its steps are good in all blocks, the `outcome` after these, and `at` which block
+    that is: see `TapeResult`. `scratch`: see `scratch_size`.
     """
-    text = _TapeWriter(formulas, limits).write()
-    return compile_function(text, "walk", *("int",) * 6, *("array",) * 9)
+    text = _TapeWriter(formulas, greatest_change).write()
+    return compile_function(text, "walk", *("int",) * 6, *("array",) * 10)
 
 
 def scratch_size(formulas: tuple[TapeFormula, ...], stride: int) -> int:
@@ -40,15 +43,15 @@ def scratch_size(formulas: tuple[TapeFormula, ...], stride: int) -> int:
 class _TapeWriter:
     """Writes the function of `compile_tape`."""
 
-    def __init__(self, formulas: tuple[TapeFormula, ...], limits: TapeLimits):
-        self.ir, self.formulas, self.limits = IRWriter(LANES), formulas, limits
-        self.tolerance = ""
+    def __init__(self, formulas: tuple[TapeFormula, ...], greatest_change: float):
+        self.ir, self.formulas, self.greatest_change = IRWriter(LANES), formulas, greatest_change
+        self.tolerance = self.clearance = ""
 
     def write(self) -> str:
         """The text of the function."""
         t = self.ir
         integers = ", ".join(f"i64 %{name}" for name in ("begin", "end", "steps", "stride", "slots", "numbers"))
-        given = ", ".join(f"ptr readonly %{name}" for name in ("first", "kinds", "rows", "p", "tolerance"))
+        given = ", ".join(f"ptr readonly %{name}" for name in ("first", "kinds", "rows", "p", "tolerance", "clearance"))
         told = ", ".join(f"ptr %{name}" for name in ("scratch", "good", "outcome", "at"))
         t.write_line(f"define void @walk({integers}, {given}, {told}) {{")
         t.write_label("entry")
@@ -64,7 +67,10 @@ class _TapeWriter:
         t.write_line(f"%jbegin = load i64, ptr {self.integer_pointer('%first', '%i')}")
         t.write_line("%inext = add i64 %i, 1")
         t.write_line(f"%jend = load i64, ptr {self.integer_pointer('%first', '%inext')}")
-        self.tolerance = t.broadcast(t.add_instruction(f"load double, ptr {t.double_pointer('%tolerance', '%i')}"))
+        self.tolerance, self.clearance = (
+            t.broadcast(t.add_instruction(f"load double, ptr {t.double_pointer(array, '%i')}"))
+            for array in ("%tolerance", "%clearance")
+        )
         t.write_line("br label %block")
         self.write_blocks()
         t.write_label("sequenceend")
@@ -116,9 +122,7 @@ class _TapeWriter:
             t.write_line(f"%{name}next = phi i64 {', '.join(values)}")
         t.write_line("%jnext = add i64 %j, 1")
         t.write_line("%jmore = icmp slt i64 %jnext, %jend")
-        t.write_line("%lives = icmp sgt i64 %limitnext, 2")
-        t.write_line("%on = and i1 %jmore, %lives")
-        t.write_line("br i1 %on, label %block, label %sequenceend")
+        t.write_line("br i1 %jmore, label %block, label %sequenceend")
 
     def scratch_row(self, k: int) -> str:
         """A pointer to the first step of a row of what is looked at between steps."""
@@ -230,8 +234,8 @@ class _TapeWriter:
         begin = t.add_instruction(f"mul i64 {counter}, {LANES}")
         here = {k: t.add_instruction(f"add i64 {begin}, {k}") for k in (-1, 1, 2)} | {0: begin}
         values = [t.load(t.double_pointer(clear_row, here[k])) for k in (-1, 0, 1, 2)]
-        moves = [t.binary("sub", b, a) for a, b in zip(values, values[1:], strict=False)]
-        bends = [t.call_intrinsic("fabs", t.binary("sub", b, a)) for a, b in zip(moves, moves[1:], strict=False)]
+        moves = [t.binary("sub", b, a) for a, b in pairwise(values)]
+        bends = [t.call_intrinsic("fabs", t.binary("sub", b, a)) for a, b in pairwise(moves)]
 
         def pick(how: str, a: str, b: str) -> str:
             return t.add_instruction(f"select {flags} {t.compare(how, a, b)}, {t.vector} {a}, {t.vector} {b}")
@@ -239,13 +243,13 @@ class _TapeWriter:
         # what is no number bends by nothing, and is not good itself
         known = t.compare("ord", bends[0], bends[0])
         first = t.select_or_zero(known, bends[0])
-        needed = pick("ogt", pick("ogt", bends[1], first), t.constant(self.limits.least_clearance))
+        needed = pick("ogt", pick("ogt", bends[1], first), self.clearance)
         fine = t.and_flags(t.compare("ogt", values[1], needed), t.compare("ogt", values[2], needed))
         fastest = t.constant(0.0)
         for row in direction_rows:
             change = t.binary("sub", t.load(t.double_pointer(row, here[1])), t.load(t.double_pointer(row, begin)))
             fastest = pick("ogt", t.call_intrinsic("fabs", change), fastest)
-        slow = t.compare("ole", fastest, t.constant(self.limits.greatest_change))
+        slow = t.compare("ole", fastest, t.constant(self.greatest_change))
         return t.and_flags(fine, slow), slow
 
     def write_search(self, kind: int, clear_row: str) -> None:
@@ -270,8 +274,7 @@ class _TapeWriter:
         slow = t.add_instruction(f"trunc {byte} {t.add_instruction(f'lshr {byte} {slow}, {lane}')} to i1")
         clear = t.add_instruction(f"load double, ptr {t.double_pointer(clear_row, f'%come{kind}')}")
         beyond = t.add_instruction(f"fcmp olt double {clear}, 0.0")
-        late = t.add_instruction(f"icmp sgt i64 %come{kind}, 2")
-        dead = t.add_instruction(f"and i1 {t.add_instruction(f'and i1 {slow}, {beyond}')}, {late}")
+        dead = t.add_instruction(f"and i1 {slow}, {beyond}")
         t.write_line(f"%verdict{kind} = select i1 {dead}, i64 1, i64 2")
         t.write_line(f"%ends{kind} = icmp slt i64 %come{kind}, %limit")
         t.write_line(f"br i1 %ends{kind}, label %{name}stopped, label %{name}good")
@@ -279,17 +282,17 @@ class _TapeWriter:
         t.write_line("br label %blockend")
 
 
-def run_tape(formulas: tuple[TapeFormula, ...], limits: TapeLimits, steps: int, tape: Tape) -> TapeResult:
+def run_tape(formulas: tuple[TapeFormula, ...], greatest_change: float, steps: int, tape: Tape) -> TapeResult:
     """Walk over a whole tape, whose slots are addresses; see `compile_tape`."""
     stride, many = padded_steps(steps), len(tape.tolerance)
     result = TapeResult(*np.empty((3, many), dtype=np.int64))
     scratch = np.empty(scratch_size(formulas, stride) + LANES)
     slots, p = tape.slots, tape.p
-    given = (tape.first, tape.kinds, slots, p, tape.tolerance)
+    given = (tape.first, tape.kinds, slots, p, tape.tolerance, tape.clearance)
     arrays = [*(np.ascontiguousarray(each) for each in given), scratch, *result]
     addresses = [each.ctypes.data for each in arrays]
-    addresses[5] += -addresses[5] % 64
-    walk = compile_tape(formulas, limits)
+    addresses[6] += -addresses[6] % 64
+    walk = compile_tape(formulas, greatest_change)
     with leave_turn():
         walk(0, many, steps, stride, slots.shape[1], p.shape[1], *addresses)
     return result

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from itertools import pairwise
 from typing import Any, overload
 
 import numpy as np
@@ -149,7 +150,7 @@ class PinnedLinkages(Sequence[PinnedMechanism]):
         own = self._part(index % len(self), index % len(self) + 1)
         entries = own.bar_pins.tolist()
         ends = own.first_entry.tolist()
-        bars = [entries[a:b] for a, b in zip(ends, ends[1:], strict=False)]
+        bars = [entries[a:b] for a, b in pairwise(ends)]
         positions = own.positions.copy()
         positions.flags.writeable = False
         rates = float(own.velocity[0]), float(own.acceleration[0])

@@ -11,11 +11,10 @@ import numpy as np
 
 from planar.batch.march.choice import available_backends
 from planar.batch.march.prediction import MAX_TURN_PER_STEP
-from planar.batch.mechanisms.initial_assembly import LEAST_CLEARANCE
 from planar.batch.pinned.formulas import ROWS, TABLE_ROWS, PinStep, pin_formulas
 from planar.batch.pinned.tape import PinTape, make_tape
 from planar.batch.pinned.told_pins import ToldPins, frame_pins
-from planar.codegen.tape import DEAD_POINT, GOOD, LANES, Tape, TapeLimits, TapeResult, padded_steps, run_tape_numpy
+from planar.codegen.tape import DEAD_POINT, LANES, UNDECIDED, Tape, TapeResult, padded_steps, run_tape_numpy
 from planar.model.pin_linkages import PinnedLinkages
 
 Array = np.ndarray
@@ -26,7 +25,6 @@ LONGEST_INPUT_STEP, REFINEMENT = 0.07, 8
 once more, into so many."""
 MAX_STATE_BYTES = 16 * 2**20
 """Bytes of pins' places that are worked on at once beside those that are told."""
-LIMITS = TapeLimits(LEAST_CLEARANCE, MAX_TURN_PER_STEP)
 
 
 class _Attempt(NamedTuple):
@@ -36,7 +34,7 @@ class _Attempt(NamedTuple):
     polished: bool
 
 
-_ATTEMPTS = (_Attempt(1, False), _Attempt(1, True), _Attempt(REFINEMENT, True))
+_ATTEMPTS = (_Attempt(1, False), _Attempt(1, True), _Attempt(REFINEMENT, True), _Attempt(REFINEMENT**2, True))
 """One after the other, each for those that the ones before left open."""
 
 
@@ -178,18 +176,18 @@ def _run_attempt(  # many: one attempt with all that it takes and fills
     else:
         state, slot = _make_state(linkages, tape, far, rates, table)
         slots = _tape_rows(tape, slot, len(state) - 1)
-        arrays = Tape(tape.first, tape.kinds, slots, tape.p, tape.level, tape.tolerance)
+        arrays = Tape(tape.first, tape.kinds, slots, tape.p, tape.level, tape.tolerance, tape.clearance)
         if available_backends(backend)[0] == "native":
             from planar.codegen.tape_kernel import run_tape
 
             result = run_tape(
-                formulas, LIMITS, count, arrays._replace(slots=state.ctypes.data + slots * state.strides[0])
+                formulas, MAX_TURN_PER_STEP, count, arrays._replace(slots=state.ctypes.data + slots * state.strides[0])
             )
         else:
-            result = run_tape_numpy(formulas, LIMITS, count, arrays, state)
+            result = run_tape_numpy(formulas, MAX_TURN_PER_STEP, count, arrays, state)
         placed = tape.placed[point[tape.placed] >= 0]
         values[point[placed], :, : steps + 1] = state[slot[placed], :, :count:finer]
-    _note(tape, result, finer, count, far, run)
+    _note(tape, result, finer, far, run)
 
 
 def _run_native(
@@ -204,7 +202,12 @@ def _run_native(
     shared = np.empty((int(own.max()) + 1, *values.shape[1:]))
     addresses[apart] = shared.ctypes.data + own[apart] * shared.strides[0]
     slots = _tape_rows(tape, addresses, table.ctypes.data)
-    return run_tape(formulas, LIMITS, count, Tape(tape.first, tape.kinds, slots, tape.p, tape.level, tape.tolerance))
+    return run_tape(
+        formulas,
+        MAX_TURN_PER_STEP,
+        count,
+        Tape(tape.first, tape.kinds, slots, tape.p, tape.level, tape.tolerance, tape.clearance),
+    )
 
 
 def _tape_rows(tape: PinTape, rows: Array, table: int) -> Array:
@@ -225,9 +228,9 @@ def _make_state(linkages: PinnedLinkages, tape: PinTape, far: Array, rates: bool
     return state, slot
 
 
-def _note(tape: PinTape, result: TapeResult, finer: int, count: int, far: Array, run: PinRun) -> None:
+def _note(tape: PinTape, result: TapeResult, finer: int, far: Array, run: PinRun) -> None:
     """Put down what is decided."""
-    sure = np.flatnonzero(result.outcome != 2)
+    sure = np.flatnonzero(result.outcome != UNDECIDED)
     which, good = tape.which[sure], result.good[sure]
     run.is_decided[which] = True
     run.solved[which] = (good - 1) // finer + 1

@@ -10,7 +10,7 @@ from planar.batch.assembly_scores import is_surely_farther
 from planar.batch.pinned.formulas import NUMBERS, PinStep
 from planar.batch.pinned.told_pins import frame_pins
 from planar.model.pin_linkages import PinnedLinkages
-from planar.solving.checks.residual_check import SHORT_ARM, residual_tolerance
+from planar.solving.checks.residual_check import EPS, NEGLIGIBLE_ERROR, SHORT_ARM, residual_tolerance
 
 Array = np.ndarray
 
@@ -25,7 +25,8 @@ class PinTape(NamedTuple):
     pins that each takes, `given` (steps, 2), and the one that it places (steps,), numbers p (steps, numbers), the two
     `bars` (steps, 2), and of what `level` each is.
 
-    Linkage k of `which` has the steps from first[k] to first[k + 1]; `tolerance` (linkages,) in sizes. Pins and bars
+    Linkage k of `which` has the steps from first[k] to first[k + 1]; `tolerance` (linkages,) in sizes and least
+    `clearance` (linkages,). Pins and bars
     are numbered through all linkages.
     """
 
@@ -38,6 +39,7 @@ class PinTape(NamedTuple):
     bars: Array
     level: Array
     tolerance: Array
+    clearance: Array
 
     def select(self, some: Array) -> PinTape:
         """Some of the linkages (numbers, rising)."""
@@ -47,7 +49,7 @@ class PinTape(NamedTuple):
         first = np.concatenate([[0], np.cumsum(counts)])
         own = np.repeat(self.first[some] - first[:-1], counts) + np.arange(first[-1])
         parts = (each[own] for each in (self.kinds, self.given, self.placed, self.p, self.bars, self.level))
-        return PinTape(self.which[some], first, *parts, self.tolerance[some])
+        return PinTape(self.which[some], first, *parts, self.tolerance[some], self.clearance[some])
 
 
 class _Bars(NamedTuple):
@@ -61,22 +63,23 @@ class _Bars(NamedTuple):
 
 
 class _Steps(NamedTuple):
-    """Steps of one kind and level: the two given pins, the one that is placed, the two bars."""
+    """Steps: their kinds, the two given pins, the one that is placed, the two bars, their level."""
 
-    kind: int
+    kinds: Array
     first: Array
     second: Array
     placed: Array
-    bars: Array
+    one: Array
+    two: Array
+    level: Array
 
 
 def make_tape(linkages: PinnedLinkages) -> PinTape:
     """The steps of those linkages that consist of a crank and dyads whose assembly is surely that of their places."""
     bar_counts = np.diff(linkages.first_bar)
-    entry_counts = np.diff(linkages.first_entry)
     bar_owner = np.repeat(np.arange(len(linkages)), bar_counts)
     pin_owner = np.repeat(np.arange(len(linkages)), np.diff(linkages.first_pin))
-    entry_bar = np.repeat(np.arange(len(bar_owner)), entry_counts)
+    entry_bar = np.repeat(np.arange(len(bar_owner)), np.diff(linkages.first_entry))
     entry_pin = linkages.bar_pins + linkages.first_pin[bar_owner[entry_bar]]
     is_fixed = np.zeros(len(pin_owner), dtype=bool)
     is_fixed[frame_pins(linkages)] = True
@@ -85,63 +88,67 @@ def make_tape(linkages: PinnedLinkages) -> PinTape:
     holders = np.bincount(entry_pin, minlength=len(pin_owner)) + is_fixed
     pairs = np.bincount(pin_owner, np.maximum(holders - 1, 0), len(linkages))
     odd = (bar_counts > MAX_BARS) | (2 * pairs + 1 != 3 * bar_counts)
-    levels, known = _peel(whole, linkages.first_bar[:-1] + linkages.crank, odd)
-    odd[bar_owner[~known]] = True
+    steps = _peel(whole, linkages.first_bar[:-1] + linkages.crank, odd)
     unit, reach = _sizes(linkages, entry_bar, entry_pin)
     odd |= ~((unit > SMALLEST_SIZE) & (unit < LARGEST_SIZE))
-    made = [(level, each, _numbers(linkages, each, whole, unit, odd)) for level, each in enumerate(levels)]
+    p, arm = _numbers(linkages, steps, pin_owner, unit, is_fixed)
+    owner = pin_owner[steps.placed]
+    odd[owner[arm < SHORT_ARM]] = True
     which = np.flatnonzero(~odd)
-    tolerance = residual_tolerance(bar_counts + 1, reach / unit)[which]
-    kinds, level = (
-        np.concatenate([np.full(len(each.placed), value(n, each)) for n, each, _ in made])
-        for value in (lambda n, each: each.kind, lambda n, each: n)
-    )
-    given = np.concatenate([np.stack([each.first, each.second], axis=1) for _, each, _ in made])
-    placed, bars = (np.concatenate([getattr(each, name) for _, each, _ in made]) for name in ("placed", "bars"))
-    numbers = np.concatenate([p for _, _, p in made])
-    owner = pin_owner[placed]
     order = np.argsort(owner, kind="stable")
-    order = order[~odd[owner[order]]]
-    counts = np.bincount(owner, minlength=len(linkages))[which]
-    parts = (each[order] for each in (kinds, given, placed, numbers, bars, level))
-    return PinTape(which, np.concatenate([[0], np.cumsum(counts)]), *parts, tolerance)
+    if len(which) < len(linkages):
+        order = order[~odd[owner[order]]]
+    first = np.zeros(len(which) + 1, dtype=np.int64)
+    np.cumsum(np.bincount(owner, minlength=len(linkages))[which], out=first[1:])
+    given, bars = (np.stack([a[order], b[order]], axis=1) for a, b in (steps[1:3], steps[4:6]))
+    tolerance = residual_tolerance(bar_counts + 1, reach / unit)[which]
+    shortest = np.minimum.reduceat(arm[order], first[:-1]) if len(which) else np.ones(0)
+    clearance = EPS / (NEGLIGIBLE_ERROR * np.minimum(shortest, 1.0))
+    return PinTape(
+        which, first, steps.kinds[order], given, steps.placed[order], p[order], bars, steps.level[order], tolerance,
+        clearance,
+    )  # fmt: skip
 
 
 # long: one loop over levels, with what is known between them
-def _peel(whole: _Bars, cranks: Array, odd: Array) -> tuple[list[_Steps], Array]:
+def _peel(whole: _Bars, cranks: Array, odd: Array) -> _Steps:
     """What follows at once from known pins, level after level: two bars that share a pin, each on one known pin.
 
-    Which bars are known (bars,) in the end; linkages with anything else become `odd`.
+    Linkages with anything else become `odd`.
     """
     bar, pin, owner = whole.bar, whole.pin, whole.bar_owner
     bars, pins = len(owner), len(whole.is_fixed)
     known_pin, known_bar = whole.is_fixed.copy(), np.zeros(bars, dtype=bool)
     known_bar[cranks] = True
-    pivot = np.zeros(bars, dtype=np.int64)
+    # the known pin of every bar, and the one that its dyad places
+    arm, reached = np.zeros((2, bars), dtype=np.int64)
     driven = known_bar[bar]
     on_frame = driven & known_pin[pin]
-    pivot[bar[on_frame]] = pin[on_frame]
+    arm[bar[on_frame]] = pin[on_frame]
     own = np.flatnonzero(driven & ~known_pin[pin])
-    steps = [_Steps(PinStep.CRANK, pivot[bar[own]], pivot[bar[own]], pin[own], np.stack([bar[own]] * 2, axis=1))]
+    steps = [(PinStep.CRANK, arm[bar[own]], arm[bar[own]], pin[own], bar[own], bar[own])]
     known_pin[pin[own]] = True
     bar, pin = bar[~driven], pin[~driven]
-    arm, reached = np.zeros(bars, dtype=np.int64), np.zeros(bars, dtype=np.int64)
     while len(bar):
         known = known_pin[pin]
         held = np.bincount(bar[known], minlength=bars)
-        odd[owner[held > 1]] = True
+        if held.max() > 1:
+            odd[owner[held > 1]] = True
         arm[bar[known]] = pin[known]
         ends = np.flatnonzero(~known & (held[bar] == 1))
-        count = np.bincount(pin[ends], minlength=pins)[pin[ends]]
-        odd[owner[bar[ends[count > 2]]]] = True
+        at = pin[ends]
+        count = np.bincount(at, minlength=pins)[at]
+        if count.max(initial=0) > 2:
+            odd[owner[bar[ends[count > 2]]]] = True
         ends = ends[count == 2]
         # entries are sorted by pin, so that the two stand side by side
         one, two = bar[ends[::2]], bar[ends[1::2]]
         if not one.size:
             break
         placed = pin[ends[::2]]
-        twice = np.bincount(bar[ends], minlength=bars) > 1
-        odd[owner[twice]] = True
+        twice = np.bincount(bar[ends], minlength=bars)
+        if twice.max() > 1:
+            odd[owner[twice > 1]] = True
         steps += _dyad_steps(whole, arm, placed, one, two)
         known_pin[placed] = True
         for each in (one, two):
@@ -149,62 +156,68 @@ def _peel(whole: _Bars, cranks: Array, odd: Array) -> tuple[list[_Steps], Array]
         now = known_bar[bar]
         carried = np.flatnonzero(now & ~known_pin[pin])
         if carried.size:
-            steps += _carried_steps(whole, arm, reached, pin[carried], bar[carried])
-            known_pin[pin[carried]] = True
-        rest = ~now & ~odd[owner[bar]]
+            b, at = bar[carried], pin[carried]
+            steps += _by_second_pin(whole, PinStep.CARRIED, reached[b], arm[b], at, b, b)
+            known_pin[at] = True
+        rest = np.flatnonzero(~now)
         bar, pin = bar[rest], pin[rest]
-    return steps, known_bar
+    odd[owner[~known_bar]] = True
+    kinds, level = (
+        np.repeat(of, [len(each[3]) for each in steps]) for of in ([s[0] for s in steps], range(len(steps)))
+    )
+    return _Steps(kinds, *(np.concatenate(parts) for parts in list(zip(*steps, strict=True))[1:]), level)
 
 
-def _dyad_steps(whole: _Bars, arm: Array, placed: Array, one: Array, two: Array) -> list[_Steps]:
+_StepRow = tuple[int, Array, Array, Array, Array, Array]
+"""Steps of one kind and level: the kind, and arrays as in `_Steps`."""
+
+
+def _dyad_steps(whole: _Bars, arm: Array, placed: Array, one: Array, two: Array) -> list[_StepRow]:
     """The dyads of bars one and two, each on a known pin: that of the first one moves."""
     swap = whole.is_fixed[arm[one]]
     one, two = np.where(swap, two, one), np.where(swap, one, two)
-    on_frame = whole.is_fixed[arm[two]]
-    found = []
-    for kind, own in ((PinStep.DYAD, ~on_frame), (PinStep.DYAD_ON_FRAME, on_frame)):
-        if own.any():
-            a, b = one[own], two[own]
-            found.append(_Steps(kind, arm[a], arm[b], placed[own], np.stack([a, b], axis=1)))
+    return _by_second_pin(whole, PinStep.DYAD, arm[one], arm[two], placed, one, two)
+
+
+def _by_second_pin(
+    whole: _Bars, kind: PinStep, first: Array, second: Array, placed: Array, one: Array, two: Array
+) -> list[_StepRow]:
+    """Steps apart whose second pin moves, and whose second pin is on the frame."""
+    on_frame = whole.is_fixed[second]
+    found: list[_StepRow] = []
+    for number, own in ((kind, np.flatnonzero(~on_frame)), (kind + 1, np.flatnonzero(on_frame))):
+        if own.size:
+            found.append((number, *(each[own] for each in (first, second, placed, one, two))))
     return found
 
 
-def _carried_steps(whole: _Bars, arm: Array, reached: Array, placed: Array, bar: Array) -> list[_Steps]:
-    """Further pins of bars two of whose pins are known, the second of which moves."""
-    on_frame = whole.is_fixed[arm[bar]]
-    found = []
-    for kind, own in ((PinStep.CARRIED, ~on_frame), (PinStep.CARRIED_ON_FRAME, on_frame)):
-        if own.any():
-            b = bar[own]
-            found.append(_Steps(kind, reached[b], arm[b], placed[own], np.stack([b, b], axis=1)))
-    return found
-
-
-def _numbers(linkages: PinnedLinkages, steps: _Steps, whole: _Bars, unit: Array, odd: Array) -> Array:
-    """The numbers of steps (steps, numbers); linkages that are not sure become `odd`."""
+def _numbers(
+    linkages: PinnedLinkages, steps: _Steps, pin_owner: Array, unit: Array, is_fixed: Array
+) -> tuple[Array, Array]:
+    """The numbers of steps (steps, numbers), and the shortest bar of dyads (steps,) in sizes; zero for what is not
+    sure."""
     x, a, b = (linkages.positions[each] for each in (steps.placed, steps.first, steps.second))
-    owner = whole.pin_owner[steps.placed]
-    p = np.zeros((len(x), NUMBERS))
-    if steps.kind == PinStep.CRANK:
-        p[:, :2], p[:, 2:4] = a, x - a
-        p[:, 4], p[:, 5] = linkages.velocity[owner], linkages.acceleration[owner]
-        return p
     to, far = x - a, b - a
-    along, across = far[:, 0] * to[:, 0] + far[:, 1] * to[:, 1], far[:, 0] * to[:, 1] - far[:, 1] * to[:, 0]
+    p, arm = np.empty((len(x), NUMBERS)), np.full(len(x), np.inf)
+    own = np.flatnonzero(steps.kinds == PinStep.CRANK)
+    owner = pin_owner[steps.placed[own]]
+    p[own, :2], p[own, 2:4] = a[own], to[own]
+    p[own, 4], p[own, 5] = linkages.velocity[owner], linkages.acceleration[owner]
+    across = far[:, 0] * to[:, 1] - far[:, 1] * to[:, 0]
     square = far[:, 0] ** 2 + far[:, 1] ** 2
+    own = np.flatnonzero(steps.kinds >= PinStep.CARRIED)
     with np.errstate(all="ignore"):
-        if steps.kind in (PinStep.CARRIED, PinStep.CARRIED_ON_FRAME):
-            p[:, 0], p[:, 1], p[:, 2:4] = along / square, across / square, b
-            return p
-        size = unit[owner]
-        lengths = np.hypot(*to.T), np.hypot(*(x - b).T)
-        p[:, 0], p[:, 1], p[:, 2], p[:, 3], p[:, 4:] = *lengths, np.where(across > 0.0, 1.0, -1.0), 1.0 / size, b
+        p[own, 0] = (far[own] * to[own]).sum(axis=1) / square[own]
+        p[own, 1], p[own, 2:4] = across[own] / square[own], b[own]
+        own = np.flatnonzero((steps.kinds == PinStep.DYAD) | (steps.kinds == PinStep.DYAD_ON_FRAME))
+        to, across, b, size = to[own], across[own], b[own], unit[pin_owner[steps.placed[own]]]
+        rest = x[own] - b
+        one, two = np.sqrt(to[:, 0] ** 2 + to[:, 1] ** 2), np.sqrt(rest[:, 0] ** 2 + rest[:, 1] ** 2)
+        p[own, 0], p[own, 1], p[own, 2], p[own, 3], p[own, 4:] = one, two, np.sign(across), 1.0 / size, b
         # the other assembly has the pin on the other side of the line through those that are given
-        sure = is_surely_farther(4.0 * across**2 / square / size**2, np.zeros(1), roundings=2)
-        sure &= np.minimum(*lengths) >= SHORT_ARM * size
-    sure &= ~whole.is_fixed[steps.first]
-    odd[owner[~sure]] = True
-    return p
+        sure = is_surely_farther(4.0 * across**2 / (square[own] * size**2), np.zeros(1), roundings=2)
+        arm[own] = np.where(sure & ~is_fixed[steps.first[own]], np.minimum(one, two) / size, 0.0)
+    return p, np.nan_to_num(arm, nan=0.0, posinf=np.inf)
 
 
 def _sizes(linkages: PinnedLinkages, entry_bar: Array, entry_pin: Array) -> tuple[Array, Array]:
