@@ -1,7 +1,7 @@
 """Two cores against one, and the memory of sweeps that are reduced: `python -m benchmarks.cores` prints both.
 
-Times are the best of several rounds, one worker and two by turns, on two cores. Memory is the most that a process of its own
-held at any time, its inputs and what it keeps included.
+Times are the best of several rounds, one worker and two by turns, on two cores. Memory is the most that a process of
+its own held at any time, its inputs and what it keeps included.
 """
 
 from __future__ import annotations
