@@ -15,6 +15,8 @@ NEAR_SKETCH = 0.15
 is nearer, of which no start tells."""
 MAX_BLOCK_UNKNOWNS = 4
 """Unknowns of the largest block whose regularity tells whether another assembly is near."""
+CLEARLY_OPEN = 1.0 + 1e-6
+"""Of a block's coalescence: from there on it cannot be joined, and stays open by more than what counts as closed."""
 
 
 def is_at_sketch(squared_distance: Array, point_count: int | Array, reach: float = CLEAR_SKETCH_DISTANCE) -> Array:

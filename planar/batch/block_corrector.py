@@ -6,12 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planar.batch.assembly_scores import CLEARLY_OPEN
 from planar.batch.march.checks import column_volume
 from planar.equations.functions import EquationFunctions
 from planar.equations.linear import solve_vectors
 from planar.equations.symbolic_equations import Block
 from planar.model.pairs import MeasureKind
-from planar.solving.assembly.block_assemblies import SAME_ASSEMBLY_TOLERANCE
+from planar.solving.assembly.block_assemblies import MEETING_COSINE_SQUARED, SAME_ASSEMBLY_TOLERANCE
 from planar.solving.newton import CLOSED_TOLERANCE
 
 Array = np.ndarray
@@ -33,6 +34,15 @@ class CorrectedBlocks(NamedTuple):
     z: Array
     converged: Array
     regularity: Array
+
+
+class JoinedAssemblies(NamedTuple):
+    """z (unknowns, designs, ways, 2), which of these there are (designs, ways, 2), and for which designs that is sure
+    (designs,)."""
+
+    z: Array
+    exists: Array
+    is_sure: Array
 
 
 class BlockCorrector:
@@ -87,6 +97,27 @@ class BlockCorrector:
         if self.counts_turns:
             flat = self._wind_back(block, flat, closed, each)
         return CorrectedBlocks(flat.reshape(z.shape), closed.reshape(shape), regularity.reshape(shape))
+
+    def has_closed_form(self, block: Block) -> bool:
+        """Whether both assemblies of a block are known without a search."""
+        return not self.counts_turns and self.functions.block_assemblies(block) is not None
+
+    def join(self, block: Block, z: Array, exists: Array) -> JoinedAssemblies:
+        """Both assemblies of a block in closed form beside z (unknowns, designs, ways), where there are such ways."""
+        assemblies = self.functions.block_assemblies(block)
+        assert assemblies is not None
+        width, flat = exists.shape[1], z.reshape(len(z), -1).T
+        u, p = (np.repeat(part.T, width, axis=0) for part in (self.u, self.p))
+        whole = np.repeat(z[..., None], 2, axis=3)
+        both, coalescence = assemblies.evaluate_batch(flat, u, p)
+        for k, own in enumerate(both):
+            whole[block.unknowns, ..., k] = own.T.reshape(-1, *exists.shape)
+        near = coalescence.reshape(exists.shape)
+        is_joined = near < MEETING_COSINE_SQUARED
+        # of a length that turns on an arm this may have vanished
+        is_open = (near >= CLEARLY_OPEN) & (not assemblies.has_changing_arm)
+        there = np.repeat((exists & is_joined)[..., None], 2, axis=2)
+        return JoinedAssemblies(whole, there, np.all(is_joined | is_open | ~exists, axis=1))
 
     def _open_columns(self, flat: Array, busy: Array, each: Array) -> tuple[Array, Array, Array]:
         """Columns of z (columns, unknowns) that are not closed yet, with their inputs and numbers."""

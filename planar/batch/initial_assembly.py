@@ -153,6 +153,9 @@ class _AssemblySearch:
                     on = self._merge_extensions(here, on, rest, others)
                     self.is_sure[rest] &= sure
                     none = np.flatnonzero(here.exists.any(axis=1) & ~on.exists.any(axis=1))
+                    if none.size and self.corrector.has_closed_form(block):
+                        self.failed_block[none[self.is_sure[none]]] = block.block_index
+                        none = none[~self.is_sure[none]]
                     if none.size:
                         self._refuse_designs(block, none, here, roots)
                     on = self._score(block, on)
@@ -233,6 +236,9 @@ class _AssemblySearch:
     ) -> tuple[_PartialAssemblies, Array]:
         """Every partial assembly with the ways in which a block may be added, and for which designs these are sure."""
         sure = np.ones(len(here.exists), dtype=bool)
+        if corrector.has_closed_form(block):
+            found, there, sure = corrector.join(block, here.z, here.exists)
+            return self._spread_ways(here, found, there), sure
         found, there, _ = corrector.correct(block, here.z, here.exists, roots, NEWTON_STEPS)
         there &= corrector.is_distinct(block, found, there)
         few = here.exists & (there.sum(axis=2) < most)
@@ -257,11 +263,16 @@ class _AssemblySearch:
             sure[designs[(count > 0) & (count != most)]] = False
             found[:, designs, ways] = np.take_along_axis(more[:, :, 0], order[None], axis=2)
             there[designs, ways] = kept
-        width = there.shape[1] * there.shape[2]
-        spread = np.repeat(here.distance, there.shape[2], axis=1)
-        lying = tuple(np.repeat(each, there.shape[2], axis=1) for each in here.tie_keys)
-        z, exists = found.reshape(len(found), len(sure), width), there.reshape(len(sure), width)
-        return _PartialAssemblies(z, exists, spread, lying), sure
+        return self._spread_ways(here, found, there), sure
+
+    @staticmethod
+    def _spread_ways(here: _PartialAssemblies, found: Array, there: Array) -> _PartialAssemblies:
+        """Ways to add a block to each partial assembly, z (unknowns, designs, ways, assemblies), side by side."""
+        designs, ways, each = there.shape
+        spread = np.repeat(here.distance, each, axis=1)
+        lying = tuple(np.repeat(key, each, axis=1) for key in here.tie_keys)
+        z, exists = found.reshape(len(found), designs, ways * each), there.reshape(designs, ways * each)
+        return _PartialAssemblies(z, exists, spread, lying)
 
     def _score(self, block: Block, here: _PartialAssemblies) -> _PartialAssemblies:
         """The partial assemblies with what a block adds to how they are told apart."""

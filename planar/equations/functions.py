@@ -47,10 +47,20 @@ class EquationRates(NamedTuple):
 
 
 class ClosedFormAssemblies:
-    """The two assemblies of one block in closed form, carried to round-off by Newton's steps."""
+    """The two assemblies of one block in closed form, carried to round-off by Newton's steps.
 
-    def __init__(self, unknowns: slice, form: BufferedFunction, polished: BufferedFunction):
+    `has_changing_arm`: whether a length of the block turns on an arm that may vanish as the mechanism moves.
+    """
+
+    def __init__(self, unknowns: slice, form: BufferedFunction, polished: BufferedFunction, has_changing_arm: bool):
         self._unknowns, self._form, self._polished = unknowns, form, polished
+        self.has_changing_arm = has_changing_arm
+
+    def evaluate_batch(self, z: Array, u: Array, p: Array) -> tuple[list[Array], Array]:
+        """Both (positions, unknowns), not polished, and how near they are to where they meet (positions,), at z
+        (positions, unknowns), u and p alike."""
+        found = [self._form.evaluate_batch(len(z), z, u, p, np.array([sign])) for sign in (1.0, -1.0)]
+        return [own[:, 0] for own, _ in found], found[0][1][:, 0, 0]
 
     def __call__(self, z: Array, u: Array, p: Array) -> tuple[list[Array], float, float]:
         """Both (unknowns,), the greatest residual of the two, and how near they are to where they meet (`ClosedForm`).
@@ -122,6 +132,7 @@ class EquationFunctions:
             block.unknowns,
             BufferedFunction(ca.Function("assembly", [e.z, e.u, e.p, form.sign], [found, form.coalescence])),
             BufferedFunction(ca.Function("polished", [e.z, e.u, e.p], polished)),
+            form.squared_arm is not None,
         )
 
     @cached_property

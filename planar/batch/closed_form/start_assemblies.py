@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.assembly_scores import is_surely_farther
+from planar.batch.assembly_scores import CLEARLY_OPEN, is_surely_farther
 from planar.batch.closed_form.choice import find_joiner
 from planar.batch.closed_form.joined_blocks import BlockJoiner, JoinedBlocks, unknowns_from_state
 from planar.batch.march.backend import DesignBatch
@@ -18,8 +18,6 @@ from planar.solving.assembly.block_assemblies import MEETING_COSINE_SQUARED
 
 Array = np.ndarray
 
-CLEARLY_OPEN = 1.0 + 1e-6
-"""Of a block's coalescence: from there on it cannot be joined, and stays open by more than what counts as closed."""
 MAX_WAYS = 64
 """Ways to assemble a design that are looked at: one that has more to look at is left to be searched by itself."""
 
