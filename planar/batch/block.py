@@ -10,7 +10,7 @@ import numpy as np
 from planar.batch.dead_point_tracking import follow_to_dead_points
 from planar.batch.design_arrays import values_of_design, with_design_values
 from planar.batch.general_path import OUTCOMES, SolvedDesign, solve_design
-from planar.batch.initial_assembly import find_assemblies
+from planar.batch.initial_assembly import find_assemblies, given_assemblies
 from planar.batch.march.backend import DesignBatch, DesignRunner, UnsupportedStructure
 from planar.batch.march.choice import find_runner
 from planar.batch.march.numpy_backend import NumpyRunner
@@ -30,7 +30,11 @@ FULL_TURN = 2.0 * np.pi
 
 
 class DesignBlock(NamedTuple):
-    """A block that is to be solved. `designs`: names with an array (designs,) each; `start`, `stop`: see `sweep`."""
+    """A block that is to be solved. `designs`: names with an array (designs,) each; `start`, `stop`: see `sweep`.
+
+    `assemblies`: unknowns (unknowns, designs) at the designs' own inputs, where it is not the sketch that chooses; not
+    numbers of a design that has no assembly.
+    """
 
     mechanism: Mechanism
     designs: Mapping[str, Array]
@@ -41,6 +45,7 @@ class DesignBlock(NamedTuple):
     stop: float | None
     pair: str | None
     backend: str
+    assemblies: Array | None = None
 
 
 class SolvedDesigns(NamedTuple):
@@ -144,6 +149,8 @@ class _DesignBlockSolver:
     def _solve_one_design(self, index: int, grid: Array | None) -> SolvedDesign:
         block = self.block
         mechanism = with_design_values(self.reference.mechanism, values_of_design(block.designs, index))
+        if block.assemblies is not None:
+            mechanism = self.reference.with_sketch_of(mechanism, block.assemblies[:, index], self.u[:, index])
         ends = (block.start, block.stop) if grid is None else (float(grid[0]), float(grid[-1]))
         return solve_design(mechanism, self.reference.pair, grid, block.steps, ends, block.points, block.rates)
 
@@ -154,7 +161,10 @@ class _DesignBlockSolver:
         p = base_.pair_numbers(shapes, self.design_count, self.all_designs)
         told = {name: base_.point_member(name) for name in block.points}
         moving = {name: each for name, each in told.items() if each[0] != base_.mechanism.frame}
-        start = find_assemblies(base_, shapes, p, self.u, runner)
+        if block.assemblies is None:
+            start = find_assemblies(base_, shapes, p, self.u, runner)
+        else:
+            start = given_assemblies(block.assemblies)
         self.failed_block = start.failed_block
         fit = start.is_sure & base_.is_fit(block.designs, shapes, p)
         fit &= (np.abs(self.u).max(axis=0) <= LARGEST_INPUT_POSITION) & (np.abs(self.start) <= LARGEST_INPUT_POSITION)

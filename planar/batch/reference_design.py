@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property, lru_cache
 from itertools import combinations
 
@@ -11,7 +12,8 @@ import numpy as np
 from planar.batch.design_arrays import design_variables, values_of_design, with_design_values
 from planar.batch.march.backend import DesignBatch
 from planar.document.cursor import suggest_spelling
-from planar.equations.mechanism_numbers import scaled_pair_numbers
+from planar.equations.coordinates import frames_from_coordinates
+from planar.equations.mechanism_numbers import scaled_pair_numbers, shapes_of_links
 from planar.foundation.errors import BadInput
 from planar.foundation.geometry import Vector
 from planar.foundation.jets import Scalar
@@ -84,6 +86,18 @@ class ReferenceDesign:
                 meant = suggest_spelling(str(each), known, cutoff=0.5) or f"; points are {', '.join(self.points)}"
                 raise BadInput("points", f"there is no point {each!r:.60}{meant}")
         return tuple(dict.fromkeys(known[each] for each in given))
+
+    def with_sketch_of(self, design: Mechanism, z: Array, u: Array) -> Mechanism:
+        """A design whose sketch is the assembly of these unknowns, with every named point; as it is where these are not
+        numbers."""
+        if not np.isfinite(z).all():
+            return design
+        shapes = shapes_of_links(design)
+        w = self.functions.coordinates(z, u, self.pair_numbers(shapes, 1, design)[:, 0]) * self.solver.scale
+        frames = frames_from_coordinates(w.tolist(), self.solver.column, shapes, {})[0]
+        points = [(name, *each.members[0]) for name, each in self.points.items()]
+        places = [(name, frames[link].to_world(shapes[link].position(point))) for name, link, point in points]
+        return replace(design, sketch=tuple((name, float(at.x), float(at.y)) for name, at in places))
 
     def point_member(self, name: PointName) -> PointMember:
         """The (link, point) by which a point is told: on the frame where it lies there."""

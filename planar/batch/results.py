@@ -32,6 +32,10 @@ class Sweep:
     `planar.transmission`; `effort` of inputs (N m or N), `reaction` of pairs, the force on the second link by the first
     (designs, steps + 1, 2) (N), and `reaction_couple` (N m), as of `planar.forces` with inertia. NaN as of points;
     forces also where equilibrium does not tell them.
+
+    Where all assemblies were asked for each stands as a design of its own: `design` is the number (from 0) of the one
+    that was given, and `assembly` that of the assembly in the list of `planar.modes` (from 1; 0 of a design that has
+    none), each (designs,).
     """
 
     points: tuple[str, ...]
@@ -54,6 +58,8 @@ class Sweep:
     effort: Mapping[str, Any] = field(default_factory=dict)
     reaction: Mapping[str, Any] = field(default_factory=dict)
     reaction_couple: Mapping[str, Any] = field(default_factory=dict)
+    design: Array | None = None
+    assembly: Array | None = None
 
     __repr__ = short_repr
 

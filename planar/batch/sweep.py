@@ -10,6 +10,7 @@ from numbers import Integral
 from pathlib import Path
 from typing import Any
 
+from planar.batch.assembly_lists import list_assemblies
 from planar.batch.block import DesignBlock
 from planar.batch.design_arrays import read_designs, split_into_blocks
 from planar.batch.executor import TASKS_PER_WORKER, run_tasks, worker_count
@@ -44,6 +45,7 @@ def sweep(  # many: the public signature; # long: its docstring
     outputs: Sequence[str] | str = (),
     efforts: Sequence[str] | str = (),
     reactions: Sequence[str] | str = (),
+    assemblies: str = "nearest",
     rates: bool = True,
     start: float | None = None,
     stop: float | None = None,
@@ -69,6 +71,9 @@ def sweep(  # many: the public signature; # long: its docstring
     `reactions` pairs whose forces are, under loads, weights, springs and inertia: see `Sweep`. A design that comes to a
     dead point has NaN from there on, and `status` says why.
 
+    `assemblies` "nearest" takes of each design that nearest to the sketch; "all" takes every assembly that it has at
+    its own inputs, each as a design of its own: see `Sweep.assembly`.
+
     `backend` "native" runs compiled machine code, "numpy" is always there, "auto" takes the faster that is there. What
     a backend cannot do, or its gate does not let pass, the general path does, which is counted and said.
 
@@ -91,18 +96,25 @@ def sweep(  # many: the public signature; # long: its docstring
     )
     names = () if points is None and any(results) else common.select_points(points)
     available_backends(backend)
+    if assemblies not in ("nearest", "all"):
+        raise BadInput("assemblies", f"choose from nearest, all; there is no {assemblies!r:.40}")
+    listed = list_assemblies(common, values) if assemblies == "all" else None
+    if listed is not None:
+        values = {name: array[listed.design] for name, array in values.items()}
     many = len(next(iter(values.values())))
     size = (
         int(block)
         if block is not None
         else _block_size(many, steps, len(names) + 2 * len(mechanism.links) * any(results), rates, executor)
     )
-    whole = DesignBlock(mechanism, values, int(steps), names, rates, start, stop, pair, backend)
-    into = open_store(store, SweepPlan(whole, size, results))
+    whole = DesignBlock(mechanism, values, int(steps), names, rates, start, stop, pair, backend, listed and listed.z)
+    into = open_store(store, SweepPlan(whole, size, results, listed))
     size = into.block_size
 
     def task(part: slice) -> ResultBlock:
-        return ResultBlock(whole._replace(designs={name: array[part] for name, array in values.items()}), results)
+        z = None if whole.assemblies is None else whole.assemblies[:, part]
+        own = {name: array[part] for name, array in values.items()}
+        return ResultBlock(whole._replace(designs=own, assemblies=z), results)
 
     parts = dict(enumerate(split_into_blocks(many, size)))
     ready = sum(part.stop - part.start for k, part in parts.items() if k in into.finished)

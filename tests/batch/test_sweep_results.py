@@ -177,3 +177,32 @@ def test_transmission_angles_are_those_of_every_motion(model, output):
         assert off(result.transmission_angle[output][k][:many], wanted[:many]) < 1e-9
     with pytest.raises(BadInput):
         planar.sweep(mechanism, designs, 24, outputs=mechanism.links[1].name, pair=pair)
+
+
+EVERY = {
+    "wide four-bars": (four_bar(*ROCKER, 0.8), 0.5),
+    "six-bar of dyads": (MODELS["stephenson-1-six-bar"], 0.05),
+    "slides and gears": (MODELS["002-E3.6a"], 0.01),
+    "six-bar of four unknowns at once": (MODELS["double-butterfly"], 0.02),
+}
+
+
+@pytest.mark.parametrize("name", part(EVERY, 2))
+def test_all_assemblies_of_every_design_are_those_of_its_list(name):
+    mechanism, spread = EVERY[name]
+    designs, pair = designs_around(mechanism, spread, 4), mechanism.inputs[0].pair
+    result = planar.sweep(mechanism, designs, 12, pair=pair, assemblies="all")
+    assert len(result) == len(result.design) == len(result.assembly)
+    for k in range(4):
+        modes = planar.modes(with_design_values(mechanism, values_of_design(designs, k)), certify=False)
+        rows = np.flatnonzero(result.design == k)
+        assert list(result.assembly[rows]) == (list(range(1, len(modes) + 1)) or [0])
+        for row, mode in zip(rows, modes, strict=False):
+            ends = np.broadcast_to(result.input, result.status.shape)[row, [0, -1]]
+            motion = planar.cycle(mode.mechanism, 12, *map(float, ends), pair=pair)
+            many = len(motion) - (motion.outcome is not Outcome.SOLVED)
+            assert int(np.sum(result.status[row] == 0)) == many
+            for point in result.points:
+                assert off(result.position[point][row][:many], motion.point(point).position[:many]) < 1e-9
+    with pytest.raises(BadInput):
+        planar.sweep(mechanism, designs, 12, pair=pair, assemblies="some")
