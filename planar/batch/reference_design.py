@@ -41,13 +41,14 @@ MAX_ROOTS = 16
 
 
 class ReferenceDesign:
-    """A mechanism one of whose inputs runs while the others stand still, before its designs change it."""
+    """A mechanism one of whose inputs runs while the others stand still, before its designs change it; in time all
+    run."""
 
-    def __init__(self, mechanism: Mechanism, pair: str | None):
+    def __init__(self, mechanism: Mechanism, pair: str | None, is_timed: bool = False):
         names = [given.pair for given in mechanism.inputs]
-        self.running_index = running_input_index(mechanism, pair)
+        self.running_index = 0 if is_timed else running_input_index(mechanism, pair)
         self.pair = names[self.running_index]
-        still = tuple(Drive(name, None, 0.0, 0.0) for name in names if name != self.pair)
+        still = () if is_timed else tuple(Drive(name, None, 0.0, 0.0) for name in names if name != self.pair)
         self.mechanism = replace_inputs(mechanism, still)
         self.solver = PositionSolver(self.mechanism)
         self.unit, self.functions = self.solver.unit, self.solver.functions
@@ -244,9 +245,9 @@ class ReferenceDesign:
 
 
 @lru_cache(maxsize=16)
-def reference_design(mechanism: Mechanism, pair: str | None) -> ReferenceDesign:
+def reference_design(mechanism: Mechanism, pair: str | None, is_timed: bool = False) -> ReferenceDesign:
     """The base of a mechanism's designs; kept, since a worker solves many blocks of one sweep."""
-    return ReferenceDesign(mechanism, pair)
+    return ReferenceDesign(mechanism, pair, is_timed)
 
 
 def stack_rows(rows: Sequence[Array | float], design_count: int) -> Array:

@@ -26,6 +26,7 @@ from planar.dynamics.load_validation import check_loads
 from planar.foundation.errors import BadInput
 from planar.model.mechanism import LARGEST_COUNTED_ANGLE, Mechanism
 from planar.model.run_arguments import check_number, check_steps
+from planar.solving.cycle import MAX_DURATION
 
 MAX_BLOCK_BYTES = 128 * 2**20
 """Bytes of a block's results."""
@@ -50,6 +51,7 @@ def sweep(  # many: the public signature; # long: its docstring
     start: float | None = None,
     stop: float | None = None,
     pair: str | None = None,
+    duration: float | None = None,
     backend: str = "auto",
     executor: Executor | None = None,
     block: int | None = None,
@@ -64,6 +66,9 @@ def sweep(  # many: the public signature; # long: its docstring
     + 1 positions of one input from `start` to `stop` (rad or m), the others standing still. An angle runs from its
     own position a turn on where they are left out; a slide without a `stop` runs between its limits, each design
     between its own.
+
+    With a `duration` (s), or where an input has a law and no range is given, each design runs in time instead, as
+    `planar.cycle` does: all its inputs at once, by their laws or at their rates, over the duration or the longest law.
 
     `points` are those whose positions are wanted, and with `rates` velocities and accelerations; all that move, if left
     out and nothing else is asked for. `links` and `pairs` are those whose angles and relative motions are wanted, with
@@ -88,12 +93,12 @@ def sweep(  # many: the public signature; # long: its docstring
     """
     if block is not None and (isinstance(block, bool) or not isinstance(block, Integral) or block < 1):
         raise BadInput("block", f"a whole number of designs is wanted, not {block!r:.40}")
-    mechanism = check_range(mechanism, steps, start, stop, pair)
+    duration = run_duration(mechanism, duration, (start, stop, pair))
+    mechanism = check_range(mechanism, steps, start, stop, pair) if duration is None else mechanism
     values = read_designs(mechanism, designs)
-    common = reference_design(mechanism, pair)
-    results = _select_results(
-        common, {"links": links, "pairs": pairs, "outputs": outputs, "efforts": efforts, "reactions": reactions}
-    )
+    common = reference_design(mechanism, pair, duration is not None)
+    asked = {"links": links, "pairs": pairs, "outputs": outputs, "efforts": efforts, "reactions": reactions}
+    results = _select_results(common, asked, duration is not None)
     names = () if points is None and any(results) else common.select_points(points)
     available_backends(backend)
     if assemblies not in ("nearest", "all"):
@@ -108,13 +113,13 @@ def sweep(  # many: the public signature; # long: its docstring
         else _block_size(many, steps, len(names) + 2 * len(mechanism.links) * any(results), rates, executor)
     )
     whole = DesignBlock(mechanism, values, int(steps), names, rates, start, stop, pair, backend, listed and listed.z)
-    into = open_store(store, SweepPlan(whole, size, results, listed))
+    into = open_store(store, SweepPlan(whole, size, results, listed, duration))
     size = into.block_size
 
     def task(part: slice) -> ResultBlock:
         z = None if whole.assemblies is None else whole.assemblies[:, part]
         own = {name: array[part] for name, array in values.items()}
-        return ResultBlock(whole._replace(designs=own, assemblies=z), results)
+        return ResultBlock(whole._replace(designs=own, assemblies=z), results, duration)
 
     parts = dict(enumerate(split_into_blocks(many, size)))
     ready = sum(part.stop - part.start for k, part in parts.items() if k in into.finished)
@@ -144,7 +149,23 @@ def check_range(mechanism: Mechanism, steps: object, start: object, stop: object
     return replace(mechanism, inputs=tuple(given._replace(law=None) for given in mechanism.inputs))
 
 
-def _select_results(common: ReferenceDesign, asked: Mapping[str, Sequence[str] | str]) -> RequestedResults:
+def run_duration(mechanism: Mechanism, duration: float | None, range_: tuple[object, object, object]) -> float | None:
+    """How long (s) a run in time takes, as of `cycle`; None where one input runs over a range. Raises BadInput."""
+    check_number("duration", duration, MAX_DURATION, "s")
+    laws = [given.law.duration for given in mechanism.inputs if given.law is not None]
+    ranged = any(each is not None for each in range_)
+    if duration is None:
+        return max(laws) if laws and not ranged else None
+    if not duration > 0.0:
+        raise BadInput("duration", f"a time from zero on is wanted, not {duration!r:.40}")
+    if ranged:
+        raise BadInput("duration", "a run in time has no range of one input; give the one or the other")
+    return float(duration)
+
+
+def _select_results(
+    common: ReferenceDesign, asked: Mapping[str, Sequence[str] | str], is_timed: bool
+) -> RequestedResults:
     """The results that are wanted beside those of points, by names. Raises BadInput."""
     mechanism = common.mechanism
     known = {
@@ -159,8 +180,8 @@ def _select_results(common: ReferenceDesign, asked: Mapping[str, Sequence[str] |
         output_link(mechanism, output)
     if results.has_forces:
         check_loads(mechanism)
-        if any(load.varies is not None and load.varies.input is None for load in mechanism.loads):
-            raise BadInput("loads", "a load varies with time, and a sweep knows none")
+        if not is_timed and any(load.varies is not None and load.varies.input is None for load in mechanism.loads):
+            raise BadInput("loads", "a load varies with time, which this sweep has not; give it a duration")
     return results
 
 

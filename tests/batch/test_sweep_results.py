@@ -206,3 +206,33 @@ def test_all_assemblies_of_every_design_are_those_of_its_list(name):
                 assert off(result.position[point][row][:many], motion.point(point).position[:many]) < 1e-9
     with pytest.raises(BadInput):
         planar.sweep(mechanism, designs, 12, pair=pair, assemblies="some")
+
+
+LAW = [{"kind": "cycloidal", "by": 60, "duration": 0.5}]
+TIMED = {
+    "two inputs at their speeds": (MODELS["pantograph"], 0.4, 0),
+    "three inputs": (MODELS["excavator-arm"], 0.4, 0),
+    "a speed that grows": (MODELS["four-bar"], 0.1, 39),
+}
+
+
+@pytest.mark.parametrize("name", part(TIMED, 2))
+def test_several_inputs_run_in_time_as_in_a_cycle(name):
+    mechanism, duration, general = TIMED[name]
+    designs, links = designs_around(mechanism, 0.003, 3), [mechanism.links[1].name]
+    result = planar.sweep(mechanism, designs, 12, duration=duration, links=links)
+    points = planar.sweep(mechanism, designs, 12, duration=duration)
+    assert points.general == general
+    np.testing.assert_array_equal(result.input, np.linspace(0.0, duration, 13))
+    for k in range(3):
+        motion = planar.cycle(with_design_values(mechanism, values_of_design(designs, k)), 12, duration=duration)
+        many = len(motion) - (motion.outcome is not Outcome.SOLVED)
+        assert int(np.sum(result.status[k] == 0)) == many
+        for link in links:
+            for word in LINK_WORDS:
+                assert off(getattr(result, word)[link][k][:many], getattr(motion.link(link), word)[:many]) < 1e-9
+        for point in points.points:
+            assert off(points.acceleration[point][k][:many], motion.point(point).acceleration[:many]) < 1e-9
+    for wrong in ({"duration": -1.0}, {"duration": 1.0, "stop": 2.0}):
+        with pytest.raises(BadInput, match="duration"):
+            planar.sweep(mechanism, designs, 12, **wrong)

@@ -41,6 +41,7 @@ class SweepPlan(NamedTuple):
     block_size: int
     results: RequestedResults = RequestedResults()
     assemblies: ListedAssemblies | None = None
+    duration: float | None = None
 
     @property
     def design_count(self) -> int:
@@ -83,7 +84,7 @@ class SweepPlan(NamedTuple):
         """The same for two sweeps that have the same results."""
         whole, made = self.all_designs, hashlib.sha256()
         grid = [whole.steps, whole.points, whole.rates, whole.start, whole.stop, whole.pair]
-        told = [STORE_VERSION, to_dict(whole.mechanism), grid, self.results, self.assemblies is not None]
+        told = [STORE_VERSION, to_dict(whole.mechanism), grid, self.results, self.assemblies is not None, self.duration]
         made.update(json.dumps(told, sort_keys=True, default=float).encode())
         for name, values in sorted(whole.designs.items()):
             made.update(name.encode() + b"\0" + np.ascontiguousarray(values).tobytes())
