@@ -48,18 +48,18 @@ class Sweep:
     general: int
     said: tuple[str, ...]
     outcomes: tuple[Outcome, ...] = tuple(Outcome)
-    angle: Mapping[str, Any] = field(default_factory=dict)
-    angular_velocity: Mapping[str, Any] = field(default_factory=dict)
-    angular_acceleration: Mapping[str, Any] = field(default_factory=dict)
-    value: Mapping[str, Any] = field(default_factory=dict)
-    value_rate: Mapping[str, Any] = field(default_factory=dict)
-    value_second_rate: Mapping[str, Any] = field(default_factory=dict)
-    transmission_angle: Mapping[str, Any] = field(default_factory=dict)
-    effort: Mapping[str, Any] = field(default_factory=dict)
-    reaction: Mapping[str, Any] = field(default_factory=dict)
-    reaction_couple: Mapping[str, Any] = field(default_factory=dict)
-    design: Array | None = None
-    assembly: Array | None = None
+    angle: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    angular_velocity: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    angular_acceleration: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    value: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    value_rate: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    value_second_rate: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    transmission_angle: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    effort: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    reaction: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    reaction_couple: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    design: Array | None = field(default=None, repr=False)
+    assembly: Array | None = field(default=None, repr=False)
 
     __repr__ = short_repr
 

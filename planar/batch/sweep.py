@@ -144,7 +144,7 @@ def check_range(mechanism: Mechanism, steps: object, start: object, stop: object
     check_number("stop", stop, LARGEST_COUNTED_ANGLE)
     lawful = [given.pair for given in mechanism.inputs if given.law is not None]
     if lawful and start is None and stop is None and pair is None:
-        told = f"the input at {lawful[0]!r} has a law of time, which a sweep does not run; give it a start and a stop"
+        told = f"the input at {lawful[0]!r} has a law of time, which is not run here; give it a start and a stop"
         raise BadInput("designs", told)
     return replace(mechanism, inputs=tuple(given._replace(law=None) for given in mechanism.inputs))
 

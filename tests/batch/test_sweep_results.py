@@ -208,22 +208,28 @@ def test_all_assemblies_of_every_design_are_those_of_its_list(name):
         planar.sweep(mechanism, designs, 12, pair=pair, assemblies="some")
 
 
-LAW = [{"kind": "cycloidal", "by": 60, "duration": 0.5}]
+def lawful(name, law):
+    value = files.to_dict(MODELS[name])
+    (given,) = value["inputs"]
+    return files.from_dict(value | {"inputs": [given | {"law": law}]})
+
+
 TIMED = {
     "two inputs at their speeds": (MODELS["pantograph"], 0.4, 0),
+    "a speed that grows": (MODELS["four-bar"], 0.01, 39),
     "three inputs": (MODELS["excavator-arm"], 0.4, 0),
-    "a speed that grows": (MODELS["four-bar"], 0.1, 39),
+    "a law": (lawful("slider-crank", [{"motion": "cycloidal", "by": "90 deg", "in": 0.5}]), None, 39),
 }
 
 
-@pytest.mark.parametrize("name", part(TIMED, 2))
+@pytest.mark.parametrize("name", part(TIMED, 3))
 def test_several_inputs_run_in_time_as_in_a_cycle(name):
     mechanism, duration, general = TIMED[name]
     designs, links = designs_around(mechanism, 0.003, 3), [mechanism.links[1].name]
     result = planar.sweep(mechanism, designs, 12, duration=duration, links=links)
     points = planar.sweep(mechanism, designs, 12, duration=duration)
     assert points.general == general
-    np.testing.assert_array_equal(result.input, np.linspace(0.0, duration, 13))
+    np.testing.assert_array_equal(result.input, np.linspace(0.0, duration or 0.5, 13))
     for k in range(3):
         motion = planar.cycle(with_design_values(mechanism, values_of_design(designs, k)), 12, duration=duration)
         many = len(motion) - (motion.outcome is not Outcome.SOLVED)
