@@ -12,7 +12,7 @@ from planar.batch.closed_form.own_ranges import run_between_limits
 from planar.batch.dead_point_tracking import DEAD_POINT_MARGIN, FollowedDesigns, follow_to_dead_points
 from planar.batch.design_arrays import values_of_design, with_design_values
 from planar.batch.general_path import OUTCOMES, DesignQuestion, solve_design
-from planar.batch.initial_assembly import find_assemblies
+from planar.batch.initial_assembly import find_assemblies, given_assemblies
 from planar.batch.march.backend import DesignBatch, DesignRunner, UnsupportedStructure, erase_from_steps
 from planar.batch.march.choice import find_runner
 from planar.batch.march.numpy_backend import NumpyRunner
@@ -33,8 +33,10 @@ FULL_TURN = 2.0 * np.pi
 
 
 class DesignBlock(NamedTuple):
-    """A block that is to be solved. `designs`: names with an array (designs,) each; `start`, `stop`: see `sweep`;
-    `dtype`: of the results, which are rounded to it when they are written.
+    """A block that is to be solved. `designs`: names with an array (designs,) each; `start`, `stop`: see `sweep`.
+
+    `assemblies`: unknowns (unknowns, designs) at the designs' own inputs, where it is not the sketch that chooses; not
+    numbers of a design that has no assembly. `dtype`: of the results, which are rounded to it when they are written.
     """
 
     mechanism: Mechanism
@@ -46,6 +48,7 @@ class DesignBlock(NamedTuple):
     stop: float | None
     pair: str | None
     backend: str
+    assemblies: Array | None = None
     dtype: str = "float64"
 
 
@@ -151,6 +154,8 @@ class _DesignBlockSolver:
         """A design, and the range that it is to run."""
         block = self.block
         mechanism = with_design_values(self.reference.mechanism, values_of_design(block.designs, index))
+        if block.assemblies is not None:
+            mechanism = self.reference.with_sketch_of(mechanism, block.assemblies[:, index], self.u[:, index])
         grid = None if self.has_own_range else inputs if inputs.ndim == 1 else inputs[index]
         ends = (block.start, block.stop) if grid is None else (float(grid[0]), float(grid[-1]))
         return DesignQuestion(mechanism, self.reference.pair, grid, block.steps, ends)
@@ -181,7 +186,10 @@ class _DesignBlockSolver:
         p = base_.pair_numbers(shapes, self.design_count, self.all_designs)
         told = {name: base_.point_member(name) for name in block.points}
         moving = {name: each for name, each in told.items() if each[0] != base_.mechanism.frame}
-        start = find_assemblies(base_, shapes, p, self.u, runner, block.backend)
+        if block.assemblies is None:
+            start = find_assemblies(base_, shapes, p, self.u, runner, block.backend)
+        else:
+            start = given_assemblies(block.assemblies)
         self.failed_block = start.failed_block
         fit = start.is_sure & base_.is_fit(block.designs, shapes, p)
         fit &= (np.abs(self.u).max(axis=0) <= LARGEST_INPUT_POSITION) & (np.abs(self.start) <= LARGEST_INPUT_POSITION)

@@ -49,6 +49,11 @@ class DesignAssemblies(NamedTuple):
     signs: Array | None = None
 
 
+def given_assemblies(z: Array) -> DesignAssemblies:
+    """Assemblies that are told: unknowns (unknowns, designs), not numbers where there is none."""
+    return DesignAssemblies(z, np.isfinite(z).all(axis=0), np.full(z.shape[1], -1))
+
+
 class _PartialAssemblies(NamedTuple):
     """Partial assemblies of all designs: z (unknowns, designs, ways), which of the ways there are (designs, ways), and
     what they are told apart by: the squared distance to the sketch, and for each block how its slides and points lie.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property, lru_cache
 from itertools import combinations
 
@@ -11,7 +12,8 @@ import numpy as np
 from planar.batch.design_arrays import design_variables, values_of_design, with_design_values
 from planar.batch.march.backend import DesignBatch
 from planar.document.cursor import suggest_spelling
-from planar.equations.mechanism_numbers import scaled_pair_numbers
+from planar.equations.coordinates import frames_from_coordinates
+from planar.equations.mechanism_numbers import scaled_pair_numbers, shapes_of_links
 from planar.foundation.errors import BadInput
 from planar.foundation.geometry import Vector
 from planar.foundation.jets import Scalar
@@ -39,13 +41,14 @@ MAX_ROOTS = 16
 
 
 class ReferenceDesign:
-    """A mechanism one of whose inputs runs while the others stand still, before its designs change it."""
+    """A mechanism one of whose inputs runs while the others stand still, before its designs change it; in time all
+    run."""
 
-    def __init__(self, mechanism: Mechanism, pair: str | None):
+    def __init__(self, mechanism: Mechanism, pair: str | None, is_timed: bool = False):
         names = [given.pair for given in mechanism.inputs]
-        self.running_index = running_input_index(mechanism, pair)
+        self.running_index = 0 if is_timed else running_input_index(mechanism, pair)
         self.pair = names[self.running_index]
-        still = tuple(Drive(name, None, 0.0, 0.0) for name in names if name != self.pair)
+        still = () if is_timed else tuple(Drive(name, None, 0.0, 0.0) for name in names if name != self.pair)
         self.mechanism = replace_inputs(mechanism, still)
         self.solver = PositionSolver(self.mechanism)
         self.unit, self.functions = self.solver.unit, self.solver.functions
@@ -88,6 +91,18 @@ class ReferenceDesign:
     def result_name(self, point: str) -> PointName:
         """The result name of a point. Raises BadInput."""
         return self.select_points(point)[0]
+
+    def with_sketch_of(self, design: Mechanism, z: Array, u: Array) -> Mechanism:
+        """A design whose sketch is the assembly of these unknowns, with every named point; as it is where these are not
+        numbers."""
+        if not np.isfinite(z).all():
+            return design
+        shapes = shapes_of_links(design)
+        w = self.functions.coordinates(z, u, self.pair_numbers(shapes, 1, design)[:, 0]) * self.solver.scale
+        frames = frames_from_coordinates(w.tolist(), self.solver.column, shapes, {})[0]
+        points = [(name, *each.members[0]) for name, each in self.points.items()]
+        places = [(name, frames[link].to_world(shapes[link].position(point))) for name, link, point in points]
+        return replace(design, sketch=tuple((name, float(at.x), float(at.y)) for name, at in places))
 
     def point_member(self, name: PointName) -> PointMember:
         """The (link, point) by which a point is told: on the frame where it lies there."""
@@ -252,9 +267,9 @@ class ReferenceDesign:
 
 
 @lru_cache(maxsize=16)
-def reference_design(mechanism: Mechanism, pair: str | None) -> ReferenceDesign:
+def reference_design(mechanism: Mechanism, pair: str | None, is_timed: bool = False) -> ReferenceDesign:
     """The base of a mechanism's designs; kept, since a worker solves many blocks of one sweep."""
-    return ReferenceDesign(mechanism, pair)
+    return ReferenceDesign(mechanism, pair, is_timed)
 
 
 def stack_rows(rows: Sequence[Array | float], design_count: int) -> Array:

@@ -68,6 +68,10 @@ class Sweep:
     `planar.transmission`; `effort` of inputs (N m or N), `reaction` of pairs, the force on the second link by the first
     (designs, steps + 1, 2) (N), and `reaction_couple` (N m), as of `planar.forces` with inertia. NaN as of points;
     forces also where equilibrium does not tell them.
+
+    Where all assemblies were asked for each stands as a design of its own: `design` is the number (from 0) of the one
+    that was given, and `assembly` that of the assembly in the list of `planar.modes` (from 1; 0 of a design that has
+    none), each (designs,).
     """
 
     points: tuple[str, ...]
@@ -81,16 +85,18 @@ class Sweep:
     dead_point: Any
     notes: SweepNotes = field(repr=False)
     outcomes: tuple[Outcome, ...] = tuple(Outcome)
-    angle: Mapping[str, Any] = field(default_factory=dict)
-    angular_velocity: Mapping[str, Any] = field(default_factory=dict)
-    angular_acceleration: Mapping[str, Any] = field(default_factory=dict)
-    value: Mapping[str, Any] = field(default_factory=dict)
-    value_rate: Mapping[str, Any] = field(default_factory=dict)
-    value_second_rate: Mapping[str, Any] = field(default_factory=dict)
-    transmission_angle: Mapping[str, Any] = field(default_factory=dict)
-    effort: Mapping[str, Any] = field(default_factory=dict)
-    reaction: Mapping[str, Any] = field(default_factory=dict)
-    reaction_couple: Mapping[str, Any] = field(default_factory=dict)
+    angle: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    angular_velocity: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    angular_acceleration: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    value: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    value_rate: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    value_second_rate: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    transmission_angle: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    effort: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    reaction: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    reaction_couple: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    design: Array | None = field(default=None, repr=False)
+    assembly: Array | None = field(default=None, repr=False)
 
     __repr__ = short_repr
 

@@ -14,6 +14,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import DTypeLike
 
+from planar.batch.assembly_lists import list_assemblies
 from planar.batch.block import DesignBlock
 from planar.batch.design_arrays import read_designs, split_into_blocks
 from planar.batch.executor import TASKS_PER_WORKER, run_tasks, thread_count, worker_count
@@ -39,6 +40,7 @@ from planar.foundation.errors import BadInput
 from planar.model.link_shapes import PointName
 from planar.model.mechanism import LARGEST_COUNTED_ANGLE, Mechanism
 from planar.model.run_arguments import check_number, check_steps
+from planar.solving.cycle import MAX_DURATION
 
 MIN_BLOCK_POSITIONS, MAX_BLOCK_POSITIONS = 2**19, 2**22
 """Positions of a block at least, where there are as many: so many that solving them is more than beginning it."""
@@ -66,10 +68,12 @@ def sweep(  # many: the public signature
     outputs: Sequence[str] | str = (),
     efforts: Sequence[str] | str = (),
     reactions: Sequence[str] | str = (),
+    assemblies: str = "nearest",
     rates: bool = True,
     start: float | None = None,
     stop: float | None = None,
     pair: str | None = None,
+    duration: float | None = None,
     backend: str = "auto",
     workers: int | None = None,
     executor: Executor | None = None,
@@ -92,10 +96,12 @@ def sweep(  # many: the public signature
     outputs: Sequence[str] | str = (),
     efforts: Sequence[str] | str = (),
     reactions: Sequence[str] | str = (),
+    assemblies: str = "nearest",
     rates: bool = True,
     start: float | None = None,
     stop: float | None = None,
     pair: str | None = None,
+    duration: float | None = None,
     backend: str = "auto",
     workers: int | None = None,
     executor: Executor | None = None,
@@ -117,10 +123,12 @@ def sweep(  # many: the public signature; # long: its docstring
     outputs: Sequence[str] | str = (),
     efforts: Sequence[str] | str = (),
     reactions: Sequence[str] | str = (),
+    assemblies: str = "nearest",
     rates: bool = True,
     start: float | None = None,
     stop: float | None = None,
     pair: str | None = None,
+    duration: float | None = None,
     backend: str = "auto",
     workers: int | None = None,
     executor: Executor | None = None,
@@ -139,11 +147,17 @@ def sweep(  # many: the public signature; # long: its docstring
     own position a turn on where they are left out; a slide without a `stop` runs between its limits, each design
     between its own.
 
+    With a `duration` (s), or where an input has a law and no range is given, each design runs in time instead, as
+    `planar.cycle` does: all its inputs at once, by their laws or at their rates, over the duration or the longest law.
+
     `points` are those whose positions are wanted, and with `rates` velocities and accelerations; all that move, if left
     out and nothing else is asked for. `links` and `pairs` are those whose angles and relative motions are wanted, with
     `rates` their rates too; `outputs` links or pairs at the frame whose transmission angles are; `efforts` inputs and
     `reactions` pairs whose forces are, under loads, weights, springs and inertia: see `Sweep`. A design that comes to a
     dead point has NaN from there on, and `status` says why.
+
+    `assemblies` "nearest" takes of each design that nearest to the sketch; "all" takes every assembly that it has at
+    its own inputs, each as a design of its own: see `Sweep.assembly`.
 
     `backend` "native" runs compiled machine code, "numpy" is always there, "auto" takes the faster that is there. What
     a backend cannot do, or its gate does not let pass, the general path does, which is counted and said.
@@ -169,26 +183,34 @@ def sweep(  # many: the public signature; # long: its docstring
     """
     if block is not None and (isinstance(block, bool) or not isinstance(block, Integral) or block < 1):
         raise BadInput("block", f"a whole number of designs is wanted, not {block!r:.40}")
-    mechanism = check_range(mechanism, steps, start, stop, pair)
+    duration = run_duration(mechanism, duration, (start, stop, pair))
+    mechanism = check_range(mechanism, steps, start, stop, pair) if duration is None else mechanism
     values = read_designs(mechanism, designs)
     threads, number_type = thread_count(workers, executor), result_type(dtype)
-    common = reference_design(mechanism, pair)
+    common = reference_design(mechanism, pair, duration is not None)
     if reduce is not None and store is not None:
         raise BadInput("store", "a store keeps all results, and reductions are kept in memory; leave out one of them")
     reductions = None if reduce is None else read_reductions(reduce, common.result_name, steps)
     asked = {"links": links, "pairs": pairs, "outputs": outputs, "efforts": efforts, "reactions": reactions}
-    results = _select_results(common, asked if reductions is None else reductions.with_results(asked))
+    wanted = asked if reductions is None else reductions.with_results(asked)
+    results = _select_results(common, wanted, duration is not None)
     names: tuple[PointName, ...] = () if points is None and any(results) else common.select_points(points)
     if reductions is not None:
         own, rates = reductions.with_points(names, rates)
         names = own or ()
     available_backends(backend)
-    whole = DesignBlock(mechanism, values, int(steps), names, rates, start, stop, pair, backend, number_type)
+    if assemblies not in ("nearest", "all"):
+        raise BadInput("assemblies", f"choose from nearest, all; there is no {assemblies!r:.40}")
+    listed = list_assemblies(common, values) if assemblies == "all" else None
+    if listed is not None:
+        values = {name: array[listed.design] for name, array in values.items()}
+    z = listed and listed.z
+    whole = DesignBlock(mechanism, values, int(steps), names, rates, start, stop, pair, backend, z, number_type)
     many = len(next(iter(values.values())))
     kept = "reduced" if reduce is not None else "store" if store is not None or any(results) else "memory"
     width = len(names) + 2 * len(mechanism.links) * any(results)
     size = int(block) if block is not None else _block_size(whole, width, many, executor, kept)
-    plan = SweepPlan(whole, size, results)
+    plan = SweepPlan(whole, size, results, listed, duration)
     into = open_store(store, plan) if reductions is None else ReductionStore(plan)
     for done in _solve_blocks(into, threads, executor, reductions):
         if progress is not None:
@@ -209,8 +231,9 @@ def _solve_blocks(
         yield ready
 
     def task(part: slice) -> ResultBlock:
+        z = None if whole.assemblies is None else whole.assemblies[:, part]
         own = {name: array[part] for name, array in whole.designs.items()}
-        return ResultBlock(whole._replace(designs=own), plan.results)
+        return ResultBlock(whole._replace(designs=own, assemblies=z), plan.results, plan.duration)
 
     def solve_here(number: int, block: ResultBlock) -> Any:
         if reductions is not None:
@@ -232,12 +255,28 @@ def check_range(mechanism: Mechanism, steps: object, start: object, stop: object
     check_number("stop", stop, LARGEST_COUNTED_ANGLE)
     lawful = [given.pair for given in mechanism.inputs if given.law is not None]
     if lawful and start is None and stop is None and pair is None:
-        told = f"the input at {lawful[0]!r} has a law of time, which a sweep does not run; give it a start and a stop"
+        told = f"the input at {lawful[0]!r} has a law of time, which is not run here; give it a start and a stop"
         raise BadInput("designs", told)
     return replace(mechanism, inputs=tuple(given._replace(law=None) for given in mechanism.inputs))
 
 
-def _select_results(common: ReferenceDesign, asked: Mapping[str, Sequence[str] | str]) -> RequestedResults:
+def run_duration(mechanism: Mechanism, duration: float | None, range_: tuple[object, object, object]) -> float | None:
+    """How long (s) a run in time takes, as of `cycle`; None where one input runs over a range. Raises BadInput."""
+    check_number("duration", duration, MAX_DURATION, "s")
+    laws = [given.law.duration for given in mechanism.inputs if given.law is not None]
+    ranged = any(each is not None for each in range_)
+    if duration is None:
+        return max(laws) if laws and not ranged else None
+    if not duration > 0.0:
+        raise BadInput("duration", f"a time from zero on is wanted, not {duration!r:.40}")
+    if ranged:
+        raise BadInput("duration", "a run in time has no range of one input; give the one or the other")
+    return float(duration)
+
+
+def _select_results(
+    common: ReferenceDesign, asked: Mapping[str, Sequence[str] | str], is_timed: bool
+) -> RequestedResults:
     """The results that are wanted beside those of points, by names. Raises BadInput."""
     mechanism = common.mechanism
     known = {
@@ -252,8 +291,8 @@ def _select_results(common: ReferenceDesign, asked: Mapping[str, Sequence[str] |
         output_link(mechanism, output)
     if results.has_forces:
         check_loads(mechanism)
-        if any(load.varies is not None and load.varies.input is None for load in mechanism.loads):
-            raise BadInput("loads", "a load varies with time, and a sweep knows none")
+        if not is_timed and any(load.varies is not None and load.varies.input is None for load in mechanism.loads):
+            raise BadInput("loads", "a load varies with time, which this sweep has not; give it a duration")
     return results
 
 

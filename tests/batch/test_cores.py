@@ -264,6 +264,19 @@ def test_extremes_of_results_beside_those_of_points():
         np.testing.assert_array_equal(values, getattr(whole, quantity)[of].astype(np.float32))
 
 
+def test_all_assemblies_and_runs_in_time_are_reduced_too():
+    mechanism, lengths = four_bar(*ROCKER, 0.8), {"BC.length": [0.85, 0.9]}
+    reduce = {"box": "E.bounding_box"}
+    for more in ({"assemblies": "all"}, {"duration": 1.5}):
+        whole = planar.sweep(mechanism, lengths, STEPS, "E", rates=False, **more)
+        found = planar.sweep(mechanism, lengths, STEPS, reduce=reduce, **more)
+        path = whole.position["E"]
+        np.testing.assert_allclose(found["box"], np.hstack([path.min(axis=1), path.max(axis=1)]), rtol=1e-9)
+        np.testing.assert_array_equal(found.assembly, whole.assembly)
+        single = planar.sweep(mechanism, lengths, STEPS, "E", rates=False, dtype="float32", **more)
+        np.testing.assert_array_equal(single.position["E"], path.astype(np.float32))
+
+
 def len_of_each(some):
     return np.full(len(some), len(some))
 

@@ -177,3 +177,68 @@ def test_transmission_angles_are_those_of_every_motion(model, output):
         assert off(result.transmission_angle[output][k][:many], wanted[:many]) < 1e-9
     with pytest.raises(BadInput):
         planar.sweep(mechanism, designs, 24, outputs=mechanism.links[1].name, pair=pair)
+
+
+EVERY = {
+    "wide four-bars": (four_bar(*ROCKER, 0.8), 0.5),
+    "six-bar of dyads": (MODELS["stephenson-1-six-bar"], 0.05),
+    "slides and gears": (MODELS["002-E3.6a"], 0.01),
+    "six-bar of four unknowns at once": (MODELS["double-butterfly"], 0.02),
+}
+
+
+@pytest.mark.parametrize("name", part(EVERY, 2))
+def test_all_assemblies_of_every_design_are_those_of_its_list(name):
+    mechanism, spread = EVERY[name]
+    designs, pair = designs_around(mechanism, spread, 4), mechanism.inputs[0].pair
+    result = planar.sweep(mechanism, designs, 12, pair=pair, assemblies="all")
+    assert len(result) == len(result.design) == len(result.assembly)
+    for k in range(4):
+        modes = planar.modes(with_design_values(mechanism, values_of_design(designs, k)), certify=False)
+        rows = np.flatnonzero(result.design == k)
+        assert list(result.assembly[rows]) == (list(range(1, len(modes) + 1)) or [0])
+        for row, mode in zip(rows, modes, strict=False):
+            ends = np.broadcast_to(result.input, result.status.shape)[row, [0, -1]]
+            motion = planar.cycle(mode.mechanism, 12, *map(float, ends), pair=pair)
+            many = len(motion) - (motion.outcome is not Outcome.SOLVED)
+            assert int(np.sum(result.status[row] == 0)) == many
+            for point in result.points:
+                assert off(result.position[point][row][:many], motion.point(point).position[:many]) < 1e-9
+    with pytest.raises(BadInput):
+        planar.sweep(mechanism, designs, 12, pair=pair, assemblies="some")
+
+
+def lawful(name, law):
+    value = files.to_dict(MODELS[name])
+    (given,) = value["inputs"]
+    return files.from_dict(value | {"inputs": [given | {"law": law}]})
+
+
+TIMED = {
+    "two inputs at their speeds": (MODELS["pantograph"], 0.4, 0),
+    "a speed that grows": (MODELS["four-bar"], 0.01, 39),
+    "three inputs": (MODELS["excavator-arm"], 0.4, 0),
+    "a law": (lawful("slider-crank", [{"motion": "cycloidal", "by": "90 deg", "in": 0.5}]), None, 39),
+}
+
+
+@pytest.mark.parametrize("name", part(TIMED, 3))
+def test_several_inputs_run_in_time_as_in_a_cycle(name):
+    mechanism, duration, general = TIMED[name]
+    designs, links = designs_around(mechanism, 0.003, 3), [mechanism.links[1].name]
+    result = planar.sweep(mechanism, designs, 12, duration=duration, links=links)
+    points = planar.sweep(mechanism, designs, 12, duration=duration)
+    assert points.general == general
+    np.testing.assert_array_equal(result.input, np.linspace(0.0, duration or 0.5, 13))
+    for k in range(3):
+        motion = planar.cycle(with_design_values(mechanism, values_of_design(designs, k)), 12, duration=duration)
+        many = len(motion) - (motion.outcome is not Outcome.SOLVED)
+        assert int(np.sum(result.status[k] == 0)) == many
+        for link in links:
+            for word in LINK_WORDS:
+                assert off(getattr(result, word)[link][k][:many], getattr(motion.link(link), word)[:many]) < 1e-9
+        for point in points.points:
+            assert off(points.acceleration[point][k][:many], motion.point(point).acceleration[:many]) < 1e-9
+    for wrong in ({"duration": -1.0}, {"duration": 1.0, "stop": 2.0}):
+        with pytest.raises(BadInput, match="duration"):
+            planar.sweep(mechanism, designs, 12, **wrong)

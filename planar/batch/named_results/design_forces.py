@@ -74,7 +74,8 @@ class DesignBalance:
         q, q1, q2 = work.coordinates(positions)
         at = positions.steps, positions.designs
         inputs = {name: np.broadcast_to(each, frames.design_shape)[at] for name, each in frames.inputs.items()}
-        factors = load_factors(positions.mechanism, inputs, None, len(q))
+        time = None if frames.time is None else frames.time[positions.steps]
+        factors = load_factors(positions.mechanism, inputs, time, len(q))
         wound = self._wound_springs(frames, values)[:, positions.designs].T
         numbers = np.array([values[each.name][positions.designs] for each in self.dimensions]).reshape(-1, len(q)).T
         return ReactionSolver(self.function, self.function.evaluate(q, q1, q2, factors, wound, numbers), field), field

@@ -39,6 +39,8 @@ class DesignFrames:
         arm: float,
     ):
         self.mechanism, self.shapes, self.inputs = mechanism, shapes, inputs
+        self.time: Array | None = None
+        "of a run in time (s), (steps + 1,)"
         self.motions = relative_motions(mechanism)
         self.counted_links = links_counting_turns(mechanism)
         directions = {link: (axis - origin) / arm for link, (origin, axis) in places.items()}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, NamedTuple, TypeVar
 
@@ -40,6 +40,7 @@ class ReducedSweep(Mapping[str, Array]):
 
     `designs`: what they differ in; nothing of mechanisms. `status` (designs,): how each ended, 0 is solved at every
     step, any other number k is `outcomes[k]`. `general`: how many positions the general path solved.
+    `design` and `assembly` as of `Sweep`, where all assemblies were asked for.
     """
 
     designs: Mapping[str, Array]
@@ -48,6 +49,8 @@ class ReducedSweep(Mapping[str, Array]):
     general: int
     notes: SweepNotes | tuple[str, ...] = field(repr=False)
     outcomes: tuple[Outcome, ...] = tuple(Outcome)
+    design: Array | None = field(default=None, repr=False)
+    assembly: Array | None = field(default=None, repr=False)
 
     __repr__ = short_repr
 
@@ -159,7 +162,9 @@ def result_type(dtype: DTypeLike) -> str:
 def reduce_block(block: ResultBlock, reductions: Mapping[str, Reduction[Sweep]]) -> ReducedBlock:
     """Solve a block and keep its reductions, made of numbers in double precision and rounded to the block's."""
     designs = block.designs._replace(dtype="float64")
-    store = MemoryStore(SweepPlan(designs, len(next(iter(designs.designs.values()))), block.results))
+    store = MemoryStore(
+        SweepPlan(designs, len(next(iter(designs.designs.values()))), block.results, duration=block.duration)
+    )
     every = slice(0, store.plan.design_count)
     done = solve_result_block(block._replace(designs=designs), store.output_array(every))
     store.write_block(0, every, done)
@@ -207,6 +212,8 @@ class ReductionStore(BlockStore):
         self.block_notes[number] = done.general_positions, done.general_designs, done.endings
 
     def result(self) -> ReducedSweep:
-        return ReducedSweep(
+        found = ReducedSweep(
             self.plan.all_designs.designs, self.reduced, self.status, self.general_positions, self.notes()
         )
+        listed = self.plan.assemblies
+        return found if listed is None else replace(found, design=listed.design, assembly=listed.number)

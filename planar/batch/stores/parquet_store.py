@@ -100,7 +100,7 @@ class ParquetStore(BlockStore):
         columns: dict[str, Array] = {
             "design": np.repeat(np.arange(part.start, part.stop), steps),
             "step": np.tile(np.arange(steps, dtype=np.int32), designs),
-            **{name: np.repeat(values[part], steps) for name, values in self.plan.all_designs.designs.items()},
+            **{name: np.repeat(values[part], steps) for name, values in self.plan.design_columns.items()},
             "input": np.broadcast_to(done.input, done.status.shape).ravel(),
             "status": done.status.ravel(),
             "dead_point": np.repeat(done.dead_point, steps),

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from planar.batch.assembly_lists import ListedAssemblies
 from planar.batch.block import DesignBlock, SolvedDesigns
 from planar.batch.named_results.result_rows import RequestedResults, ResultRow
 from planar.batch.results import Sweep, SweepNotes
@@ -38,11 +39,20 @@ class SweepPlan(NamedTuple):
     all_designs: DesignBlock
     block_size: int
     results: RequestedResults = RequestedResults()
+    assemblies: ListedAssemblies | None = None
+    duration: float | None = None
 
     @property
     def design_count(self) -> int:
         """How many designs there are."""
         return len(next(iter(self.all_designs.designs.values())))
+
+    @property
+    def design_columns(self) -> dict[str, Array]:
+        """What is known of every design: its numbers, and which assembly it is of which of the given designs."""
+        listed = self.assemblies
+        rows = {} if listed is None else {"of design": listed.design, "assembly": listed.number}
+        return {**self.all_designs.designs, **rows}
 
     @property
     def block_count(self) -> int:
@@ -72,10 +82,9 @@ class SweepPlan(NamedTuple):
     def fingerprint(self) -> str:
         """The same for two sweeps that have the same results."""
         whole, made = self.all_designs, hashlib.sha256()
-        grid = [whole.steps, whole.points, whole.rates, whole.start, whole.stop, whole.pair, self.results]
-        if whole.dtype != "float64":
-            grid.append(whole.dtype)
-        made.update(json.dumps([STORE_VERSION, to_dict(whole.mechanism), grid], sort_keys=True, default=float).encode())
+        grid = [whole.steps, whole.points, whole.rates, whole.start, whole.stop, whole.pair, whole.dtype]
+        told = [STORE_VERSION, to_dict(whole.mechanism), grid, self.results, self.assemblies is not None, self.duration]
+        made.update(json.dumps(told, sort_keys=True, default=float).encode())
         for name, values in sorted(whole.designs.items()):
             made.update(name.encode() + b"\0" + np.ascontiguousarray(values).tobytes())
         return made.hexdigest()
@@ -126,7 +135,9 @@ class BlockStore(ABC):
         plan = self.plan
         position, velocity, acceleration = (found.get(order) for order in POINT_QUANTITIES)
         assert position is not None
-        more: dict[str, Any] = {name: found[name] for name in found if name not in POINT_QUANTITIES}
+        listed = plan.assemblies
+        rows: dict[str, Any] = {} if listed is None else {"design": listed.design, "assembly": listed.number}
+        more: dict[str, Any] = rows | {name: found[name] for name in found if name not in POINT_QUANTITIES}
         return Sweep(
             plan.point_names,
             plan.all_designs.designs,

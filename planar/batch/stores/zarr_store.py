@@ -92,7 +92,7 @@ class ZarrStore(BlockStore):
         yield self._open_array("dead_point", dtype="float64", fill_value=np.nan, **of_designs)
         records = {"shape": (plan.block_count, RECORD_BYTES), "chunks": (1, RECORD_BYTES)}
         yield self._open_array("blocks", dtype="uint8", fill_value=0, **records)
-        for name, values in plan.all_designs.designs.items():
+        for name, values in plan.design_columns.items():
             of_all = {"shape": values.shape, "chunks": values.shape, "dimension_names": ("design",)}
             key, array = self._open_array(
                 f"designs/{_path_name(name)}", dtype=str(values.dtype), fill_value=values.dtype.type(0), **of_all
