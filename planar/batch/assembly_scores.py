@@ -1,6 +1,8 @@
-"""Distances of assemblies from the sketch, by which the one that is meant is chosen, for many designs at once."""
+"""Assemblies of many designs at once, and the distances from the sketch by which the ones that are meant are chosen."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +19,19 @@ MAX_BLOCK_UNKNOWNS = 4
 """Unknowns of the largest block whose regularity tells whether another assembly is near."""
 CLEARLY_OPEN = 1.0 + 1e-6
 """Of a block's coalescence: from there on it cannot be joined, and stays open by more than what counts as closed."""
+
+
+class DesignAssemblies(NamedTuple):
+    """z (unknowns, designs), and for which of them it is surely the one that the search one by one would take.
+
+    `failed_block`: the level of the block that surely cannot be joined to the rest, -1 where all can (designs,);
+    `signs` (blocks, designs): of the assemblies of blocks in closed form, 0 where they are not known; None of none.
+    """
+
+    z: Array
+    is_sure: Array
+    failed_block: Array
+    signs: Array | None = None
 
 
 def is_at_sketch(squared_distance: Array, point_count: int | Array, reach: float = CLEAR_SKETCH_DISTANCE) -> Array:

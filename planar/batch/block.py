@@ -76,7 +76,7 @@ def solve_design_block(block: DesignBlock, out: Array | None = None) -> SolvedDe
         return _DesignBlockSolver(block, out).solve()
 
 
-def _code(outcome: Outcome) -> int:
+def status_code(outcome: Outcome) -> int:
     """What stands for an outcome in a status."""
     return OUTCOMES.index(outcome)
 
@@ -119,9 +119,9 @@ class _DesignBlockSolver:
             out[:] = np.nan
         ended = (self.solved_steps >= 0) & (good <= block.steps)
         solved, code = np.where(ended, self.solved_steps, good), np.zeros(self.design_count, dtype=np.int8)
-        code[ended & (solved <= block.steps)] = _code(Outcome.DEAD_POINT)
+        code[ended & (solved <= block.steps)] = status_code(Outcome.DEAD_POINT)
         failed = ~ended & (good == 0) & (self.failed_block >= 0)
-        code[failed] = _code(Outcome.CANNOT_BE_ASSEMBLED)
+        code[failed] = status_code(Outcome.CANNOT_BE_ASSEMBLED)
         if any(self.reference.point_member(name)[0] == self.reference.mechanism.frame for name in block.points):
             erase_from_steps(out, solved)
         status = np.zeros((self.design_count, block.steps + 1), dtype=np.int8)
@@ -168,7 +168,7 @@ class _DesignBlockSolver:
             inputs[index] = told.input
         self.general_positions += int(np.sum(told.status == 0))
         self._count_sentence(int(told.status[-1]), told.message)
-        self._count_sentence(_code(Outcome.SOLVED), told.rate_remark)
+        self._count_sentence(status_code(Outcome.SOLVED), told.rate_remark)
 
     def _count_sentence(self, code: int, sentence: str) -> None:
         """One design more of which this is said by a code; the first one's sentence is kept."""

@@ -8,7 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.assembly_scores import MAX_BLOCK_UNKNOWNS, NEAR_SKETCH, is_at_sketch, is_clearly_regular
+from planar.batch.assembly_scores import (
+    MAX_BLOCK_UNKNOWNS,
+    NEAR_SKETCH,
+    DesignAssemblies,
+    is_at_sketch,
+    is_clearly_regular,
+)
 from planar.batch.block_corrector import SPREAD_STARTS, BlockCorrector
 from planar.batch.closed_form.start_assemblies import find_start_assemblies
 from planar.batch.march.backend import DesignRunner
@@ -34,19 +40,6 @@ MAX_ALONE = 12
 """Designs that are not clear: so few are solved by themselves sooner than they are searched for."""
 MAX_PARTIAL_ASSEMBLIES = 8
 """Partial assemblies of a design that are carried on, those nearest to the sketch."""
-
-
-class DesignAssemblies(NamedTuple):
-    """z (unknowns, designs), and for which of them it is surely the one that the search one by one would take.
-
-    `failed_block`: the level of the block that surely cannot be joined to the rest, -1 where all can (designs,);
-    `signs` (blocks, designs): of the assemblies of blocks in closed form, 0 where they are not known; None of none.
-    """
-
-    z: Array
-    is_sure: Array
-    failed_block: Array
-    signs: Array | None = None
 
 
 def given_assemblies(z: Array) -> DesignAssemblies:
@@ -104,7 +97,7 @@ def _find_without_search(
     """Those by closed forms, else those near the base's own; None where neither can be."""
     start = find_start_assemblies(reference, shapes, p, u, backend)
     if start is not None:
-        return DesignAssemblies(*start)
+        return start
     near = find_nearest_assemblies(reference, shapes, p, u, runner)
     return None if near is None else DesignAssemblies(near.z, near.is_clear, np.full(len(near.is_clear), -1))
 

@@ -15,6 +15,7 @@ SWEEP_PARTS: dict[FunctionKey, str] = {
     ("march", "llvm_backend.py", "run"): "machine code",
     ("march", "numpy_backend.py", "run"): "numpy",
     ("batch", "block.py", "_lead_to_start"): "leading designs to where the run starts",
+    ("closed_form", "ends.py", "find_ends"): "finding dead points in closed form",
     ("batch", "dead_point_tracking.py", "follow_to_dead_points"): "following designs to where they stop",
     ("batch", "general_path.py", "solve_design"): "the general path",
 }

@@ -109,6 +109,8 @@ def test_ranges_of_different_lengths_and_starts_far_off():
     own = agrees_with_general_path(mechanism, designs, 24, stop=1.0)
     assert own.input.shape == (10, 25)
     assert own.general == 0
+    none = planar.sweep(mechanism, {"BC.length": [0.01, 0.011]}, 24, start=-1.5)
+    assert np.all(none.status == CODES.index(Outcome.CANNOT_BE_ASSEMBLED))
 
 
 def test_sentences_are_made_when_they_are_read(monkeypatch):

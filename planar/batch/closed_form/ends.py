@@ -34,7 +34,9 @@ class ClosedFormDesigns:
         for sense in (1.0, -1.0):
             which = np.flatnonzero(np.sign(lengths) == sense)
             if which.size:
-                own, signs = self.batch.select(which), np.take(self.signs, which, axis=1)
+                own, signs = self.batch, self.signs
+                if which.size < len(lengths):
+                    own, signs = own.select(which), np.take(signs, which, axis=1)
                 span, longest = np.abs(lengths)[which], np.minimum(step, LONGEST_STEP)[which]
                 found = find_dead_points(self.joiner, own, signs, sense * self.direction, reached[which], span, longest)
                 distance[which], block[which] = found
@@ -45,13 +47,13 @@ class ClosedFormDesigns:
         infinitely where there was none, not a number where that is not decided (designs,)."""
         ends = self.find_dead_points(np.zeros(len(span)), span, np.full(len(span), step)).distance
         u = self.batch.u0 + span * self.direction[:, None]
-        state = self.follow(np.arange(len(span)), self.signs, u)
+        state = self.follow(self.batch, self.signs, u)
         return unknowns_from_state(self.joiner.state, state, len(self.batch.z0)), np.where(span == 0.0, np.inf, ends)
 
-    def follow(self, design: Array, signs: Array, u: Array) -> Array:
-        """The state (operands, positions) of designs at inputs u (inputs, positions), by blocks' signs."""
+    def follow(self, batch: DesignBatch, signs: Array, u: Array) -> Array:
+        """The state (operands, designs) of a batch of some of the designs at inputs u (inputs, designs), by signs."""
         with np.errstate(all="ignore"):
-            return self.joiner.follow(self.batch.select(design)._replace(links=()), signs, u).state
+            return self.joiner.follow(batch, signs, u).state
 
     def solve_positions(self, design: Array, moved: Array) -> tuple[Array, Array]:
         """The points (rows, positions) of designs whose input has moved so far, and which pass the checks."""
@@ -59,7 +61,7 @@ class ClosedFormDesigns:
         for part in split_into_blocks(len(design), POSITIONS_AT_ONCE):
             own = self.batch.select(design[part])
             u, signs = own.u0 + moved[part] * self.direction[:, None], np.take(self.signs, design[part], axis=1)
-            z = unknowns_from_state(self.joiner.state, self.follow(design[part], signs, u), len(own.z0))
+            z = unknowns_from_state(self.joiner.state, self.follow(own, signs, u), len(own.z0))
             row = allocate_aligned(1, len(out), len(moved[part]))
             here = own._replace(u0=u, z0=z, input_offsets=np.zeros((1, len(u))))
             passed[part] = self.runner.run(here, row) > 0

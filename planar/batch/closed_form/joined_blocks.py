@@ -94,4 +94,4 @@ def input_rows(equations: KernelEquations, u: Array) -> Array:
         of = own[:1] if alike else own
         rows += [np.broadcast_to(each, own.shape) for each in ([np.cos(of), np.sin(of)] if is_angle else [])]
         rows.append(own)
-    return np.array(rows).reshape(-1, u.shape[1])
+    return np.array(rows) if rows else np.zeros((0, u.shape[1]))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -147,16 +147,15 @@ class NativeBlockJoiner:
     def __init__(self, equations: KernelEquations, links: tuple[str, ...], point_blocks: tuple[int, ...]):
         self.equations, self.state = equations, state_operands(equations)
         self.block_count = len(equations.blocks)
-        self.joining: Any = compile_function(
-            _write_join(equations, links, point_blocks), FUNCTION_NAME, *ARGUMENT_TYPES
-        )
-        self.following: Any = compile_function(_write_join(equations, (), None), FUNCTION_NAME, *ARGUMENT_TYPES)
+        self.joining_text = _write_join(equations, links, point_blocks) if point_blocks else ""
+        "what needs sketched points"
+        self.following_text = _write_join(equations, (), None)
 
     def join(self, batch: DesignBatch, sketch: Array, forced: Array) -> JoinedBlocks:
         """See `BlockJoiner`."""
         row_count = JOINED_ROWS * self.block_count + len(self.state)
         rows = (batch.p, batch.q, input_rows(self.equations, batch.u0), forced)
-        out = _call(self.joining, rows, sketch, row_count)
+        out = _call(self.joining_text, rows, sketch, row_count)
         known = out[: JOINED_ROWS * self.block_count].reshape(self.block_count, JOINED_ROWS, -1).transpose(1, 0, 2)
         return JoinedBlocks(known[0], known[1], known[2], known[3], out[JOINED_ROWS * self.block_count :])
 
@@ -164,18 +163,23 @@ class NativeBlockJoiner:
         """See `BlockJoiner`."""
         count, last = self.block_count, self.block_count + len(self.state)
         arms = sum(form.squared_arm is not None for form in self.equations.closed_forms)
-        out = _call(self.following, (batch.p, batch.q, input_rows(self.equations, u), signs), np.zeros(0), last + arms)
+        out = _call(
+            self.following_text, (batch.p, batch.q, input_rows(self.equations, u), signs), np.zeros(0), last + arms
+        )
         return FollowedBlocks(without_short_arms(out[:count], self.equations, list(out[last:])), out[count:last])
 
 
-def _call(function: Any, rows: tuple[Array, ...], sketch: Array, row_count: int) -> Array:
-    """out (rows, designs) of designs whose rows (..., designs) are p, q, drives and signs."""
+def _call(text: str, rows: tuple[Array, ...], sketch: Array, row_count: int) -> Array:
+    """out (rows, designs) by the function of a text, of designs whose rows (..., designs) are p, q, drives, signs."""
     count = rows[0].shape[1]
+    if not count:
+        return np.empty((row_count, 0))
     if count < LANES:  # those that do not fill the lanes, with copies of the last beside them
         which = np.minimum(np.arange(LANES), count - 1)
-        return _call(function, tuple(row[:, which] for row in rows), sketch, row_count)[:, :count]
+        return _call(text, tuple(row[:, which] for row in rows), sketch, row_count)[:, :count]
     p, q, drives, signs = (np.ascontiguousarray(row, dtype=float) for row in rows)
     sketch, out = np.ascontiguousarray(sketch, dtype=float), np.empty((row_count, count))
     addresses = (each.ctypes.data for each in (p, q, sketch, drives, signs, out))
+    function = compile_function(text, FUNCTION_NAME, *ARGUMENT_TYPES)
     function(-(-count // LANES), count - LANES, count, count, *addresses)
     return out

@@ -69,7 +69,7 @@ def _points_at_limit(
 
     def middle(part: float) -> Array:
         u = batch.u0 + (moved - np.sign(moved) * part * length) * designs.direction[:, None]
-        return np.asarray(0.5 * (designs.follow(some, signs, u) + designs.follow(some, other, u)))
+        return np.asarray(0.5 * (designs.follow(batch, signs, u) + designs.follow(batch, other, u)))
 
     state = 2.0 * middle(DISTANCE_FROM_LIMIT) - middle(2.0 * DISTANCE_FROM_LIMIT)
     z = unknowns_from_state(designs.joiner.state, state, len(batch.z0)).T

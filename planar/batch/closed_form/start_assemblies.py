@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planar.batch.assembly_scores import CLEARLY_OPEN, is_surely_farther
+from planar.batch.assembly_scores import CLEARLY_OPEN, DesignAssemblies, is_surely_farther
 from planar.batch.closed_form.choice import find_joiner
 from planar.batch.closed_form.joined_blocks import BlockJoiner, JoinedBlocks, unknowns_from_state
 from planar.batch.march.backend import DesignBatch
@@ -22,20 +22,9 @@ MAX_WAYS = 64
 """Ways to assemble a design that are looked at: one that has more to look at is left to be searched by itself."""
 
 
-class StartAssemblies(NamedTuple):
-    """z (unknowns, designs), for which designs it is surely the assembly that is meant (designs,), the block that
-    surely cannot be joined, -1 where there is none such (designs,), and the signs of the blocks' assemblies (blocks,
-    designs)."""
-
-    z: Array
-    is_sure: Array
-    failed_block: Array
-    signs: Array
-
-
 def find_start_assemblies(
     reference: ReferenceDesign, shapes: Mapping[str, LinkShape], p: Array, u: Array, backend: str
-) -> StartAssemblies | None:
+) -> DesignAssemblies | None:
     """The assemblies at inputs u (inputs, designs); None where a block has no closed form, or no sketched points.
 
     A block takes the nearer of its two assemblies. Squared distances never fall as blocks are added: where each block's
@@ -67,7 +56,7 @@ class _StartSearch:
         self.is_bounded = np.array([part.closed_form is None or part.closed_form.squared_arm is None for part in parts])
         "blocks that cannot be joined where their coalescence is beyond one; of others an arm may have vanished"
 
-    def search(self) -> StartAssemblies:
+    def search(self) -> DesignAssemblies:
         """See `find_start_assemblies`."""
         count, blocks = self.design_count, len(self.block_index)
         first = self.joiner.join(self.batch, self.sketch, np.zeros((blocks, count)))
@@ -101,7 +90,7 @@ class _StartSearch:
         sure &= ~tied & (looked_at <= MAX_WAYS)
         fails = sure & ~np.isfinite(total)
         z = unknowns_from_state(self.joiner.state, state, len(self.batch.z0))
-        return StartAssemblies(z, sure & np.isfinite(total), np.where(fails, failed, -1), signs)
+        return DesignAssemblies(z, sure & np.isfinite(total), np.where(fails, failed, -1), signs)
 
     class _Ended(NamedTuple):
         """How ways to assemble ended: the squared distance of all points, infinite where a block cannot be joined,
