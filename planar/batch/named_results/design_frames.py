@@ -19,6 +19,8 @@ Array = np.ndarray
 
 LONGEST_CLEAR_TURN = 2.0
 """rad by which a link may have turned from a step to the next: of more it is not clear in which sense it turned."""
+LEAST_TIE = 1e-6
+"""Beside the strongest: wheels whose turns change what pairs leave open by less are not tied by them."""
 FULL_TURN = 2.0 * np.pi
 
 
@@ -80,29 +82,32 @@ class DesignFrames:
     def _with_counted_turns(self, angles: dict[str, Array]) -> dict[str, Array]:
         """Angles of links that wheels tie with the turns that they start with, as far as inputs and pairs tell them.
 
-        Where these do not, no design is a clear one.
+        The turns are the whole numbers that close all of them; where they do not tell, a design is none of the clear
+        ones.
         """
         if self.counted_links.isdisjoint(angles):
             return angles
         ties: list[tuple[tuple[str, ...], Callable[[Mapping[str, Array]], Scalar]]] = []
         for name, position in self.inputs.items():
             pair = self.motions[name]
-            if pair.input_kind is MeasureKind.ANGLE:
+            if pair.input_kind is MeasureKind.ANGLE and not self.counted_links.isdisjoint(pair.bodies):
                 ties.append((pair.bodies, partial(self._input_gap, pair, position[0])))
         ties += [(pair.bodies, partial(self._turn_gap, pair)) for pair in self.mechanism.pairs if pair.counts_turns]
-        known, before = {self.mechanism.frame}, 0
-        while len(known) > before:
-            before = len(known)
-            for bodies, gap in ties:
-                unknown = [link for link in dict.fromkeys(bodies) if link not in known]
-                if len(unknown) == 1 and unknown[0] in angles:
-                    (link,) = unknown
-                    here = {each: angle[0] for each, angle in angles.items()}
-                    off, further = gap(here), gap(here | {link: here[link] + FULL_TURN})
-                    angles[link] = angles[link] - FULL_TURN * np.round(off / (further - off))
-                    known.add(link)
-        if not self.counted_links <= known:
-            self.is_clear[:] = False
+        tied = [link for link in angles if any(link in bodies for bodies, _ in ties)]
+        here = {link: angle[0] for link, angle in angles.items()}
+        off = np.stack([np.broadcast_to(gap(here), self.design_shape[1:]) for _, gap in ties], axis=-1)
+        further = [
+            np.stack([gap(here | {link: here[link] + FULL_TURN}) + 0.0 * off[:, 0] for _, gap in ties], axis=-1)
+            for link in tied
+        ]
+        change = np.nan_to_num(np.stack(further, axis=-1) - off[:, :, None])  # (designs, ties, links)
+        s = np.linalg.svd(change, compute_uv=False)
+        self.is_clear &= (change.shape[2] <= change.shape[1]) & (s[:, -1] > LEAST_TIE * s[:, 0])
+        turns = np.round(-np.linalg.pinv(change) @ off[:, :, None])[..., 0]
+        left = np.abs(off + np.einsum("dtl,dl->dt", change, turns)).max(axis=1)
+        self.is_clear &= left <= LEAST_TIE * s[:, 0]
+        for link, own in zip(tied, turns.T, strict=True):
+            angles[link] = angles[link] + FULL_TURN * own
         return angles
 
     def _input_gap(self, pair: Pair, position: Array, angles: Mapping[str, Array]) -> Scalar:
