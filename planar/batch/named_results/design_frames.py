@@ -62,14 +62,28 @@ class DesignFrames:
 
     def _set_angles(self, angles: Mapping[str, Array]) -> None:
         self.angles = dict(angles)
-        self.frames: dict[str, Frame] = {self.mechanism.frame: GROUND}
-        for link, angle in self.angles.items():
-            origin, towards = self.origins[link], self.directions[link]
-            cos, sin = towards[0, :, 0], towards[0, :, 1]
-            turning = [cos * each[:, 1] - sin * each[:, 0] for each in towards[1:]]
-            x, y = (_jet(*origin[:, :, axis]) for axis in (0, 1))
-            self.frames[link] = frame_at(x, y, _jet(angle, *turning))
+        self._frames: dict[str, Frame] = {self.mechanism.frame: GROUND}
         self.own: dict[str, tuple[Jet | Array, ...]] = {}
+
+    def angle(self, link: str) -> tuple[Array, ...]:
+        """A link's angle with all its turns (steps + 1, designs), and rates where these are there."""
+        cos, sin = (self.directions[link][0, :, axis] for axis in (0, 1))
+        rates = (cos * each[:, 1] - sin * each[:, 0] for each in self.directions[link][1:])
+        return (self.angles[link], *rates)
+
+    def frame(self, link: str) -> Frame:
+        """The frame of a link."""
+        if link not in self._frames:
+            x, y, cos, sin = (
+                _jet(*each[link][:, :, axis]) for each in (self.origins, self.directions) for axis in (0, 1)
+            )
+            self._frames[link] = Frame(x, y, cos, sin, _jet(*self.angle(link)))
+        return self._frames[link]
+
+    @property
+    def frames(self) -> dict[str, Frame]:
+        """The frames of all links."""
+        return {link: self.frame(link) for link in (self.mechanism.frame, *self.angles)}
 
     def replace_angles(self, designs: Array, angles: Mapping[str, Array]) -> None:
         """Take other angles (steps + 1, designs) of some designs, of which more is known."""
@@ -132,14 +146,14 @@ class DesignFrames:
     def own_coordinates(self, pair: Pair) -> tuple[Jet | Array, ...]:
         """The own coordinates of a pair."""
         if pair.coordinate_kinds and pair.name not in self.own:
-            frames = [self.frames[link] for link in pair.bodies]
+            frames = [self.frame(link) for link in pair.bodies]
             numbers = pair.measure([self.shapes[link] for link in pair.bodies])
             self.own[pair.name] = tuple(solve_own_coordinates(pair, frames, numbers))
         return self.own.get(pair.name, ())
 
     def link_angle(self, name: str) -> tuple[Array, ...]:
         """A link's angle (steps + 1, designs), with its rates where these are there, as `Motion.link` tells it."""
-        angle, *rates = _parts(self.frames[name].angle)
+        angle, *rates = self.angle(name)
         if name not in self.counted_links:
             angle = angle - np.where(np.abs(angle[0]) <= np.pi, 0.0, FULL_TURN * np.round(angle[0] / FULL_TURN))
         return (angle, *rates)
@@ -149,7 +163,9 @@ class DesignFrames:
         turns that `Motion.pair` tells it with."""
         pair = self.motions[name]
         own = {name: self.own_coordinates(pair)}
-        value, *rates = _parts(pair.input_position_at(self.shapes, self.frames, own))
+        value, *rates = _parts(
+            pair.input_position_at(self.shapes, {link: self.frame(link) for link in pair.bodies}, own)
+        )
         if pair.input_kind is MeasureKind.ANGLE and not self.counted_links.issuperset(pair.links):
             meant = self.inputs[name][0] if name in self.inputs else np.zeros(value.shape[1:])
             # an angle of none of the inputs starts between -pi and pi, and one that does is left there
