@@ -9,7 +9,7 @@ import numpy as np
 
 from planar.batch.block import FULL_TURN, DesignBlock, SolvedDesigns, solve_design_block
 from planar.batch.design_arrays import split_into_blocks, values_of_design, with_design_values
-from planar.batch.general_path import link_angles
+from planar.batch.general_path import OUTCOMES, link_angles
 from planar.batch.march.prediction import LONGEST_STEP
 from planar.batch.named_results.design_frames import DesignFrames
 from planar.batch.named_results.force_results import find_forces
@@ -18,8 +18,10 @@ from planar.batch.named_results.timed_block import input_motions, solve_timed_bl
 from planar.batch.named_results.transmission_angles import output_link
 from planar.batch.reference_design import ReferenceDesign, reference_design
 from planar.codegen.aligned_arrays import allocate_aligned
+from planar.foundation.errors import Outcome
 from planar.foundation.geometry import Vector
 from planar.model.link_shapes import LinkPlace
+from planar.results.motion import Motion
 from planar.solving.cycle import cycle
 
 Array = np.ndarray
@@ -68,7 +70,8 @@ class _ResultBlockSolver:
             found = [*self.results.links, *(link for name in self.results.pairs for link in motions[name].bodies)]
             if self.reference.counted_links.intersection(found):
                 found = [link.name for link in self.mechanism.links]
-        return tuple(link for link in dict.fromkeys(found) if link != frame)
+        moving = [link.name for link in self.mechanism.links if link.name != frame]
+        return tuple(link for link in dict.fromkeys(found or moving[:1]) if link != frame)
 
     def solve(self, out: Array | None) -> SolvedDesigns:
         """See `solve_result_block`."""
@@ -142,23 +145,35 @@ class _ResultBlockSolver:
 
     def _look_up_angles(self, frames: DesignFrames, part: _DesignPart, designs: Array) -> None:
         """Take the angles of designs whose steps do not show them from their cycles."""
-        steps, block = frames.design_shape[0] - 1, self.block
+        steps = frames.design_shape[0] - 1
         found = np.full((len(self.links), steps + 1, designs.size), np.nan)
         for k, index in enumerate(designs):
-            mechanism = with_design_values(self.mechanism, values_of_design(part.designs, int(index)))
-            if part.assemblies is not None:
-                u = self.reference.inputs(mechanism, 1)[0][:, 0]
-                mechanism = self.reference.with_sketch_of(mechanism, part.assemblies[:, index], u)
-            if self.duration is not None:
-                motion = cycle(mechanism, steps, duration=self.duration)
-            else:
-                grid = part.input if part.input.ndim == 1 else part.input[index]
-                own_range = self.reference.is_sliding and block.stop is None
-                ends = (block.start, block.stop) if own_range else (float(grid[0]), float(grid[-1]))
-                motion = cycle(mechanism, steps, *ends, self.reference.pair)
             many = int(np.argmax(part.status[index] != 0)) if part.status[index].any() else steps + 1
-            found[:, :many, k] = link_angles(motion, self.links)[:, :many]
+            found[:, :many, k] = link_angles(self._motion(part, int(index), steps), self.links)[:, :many]
         frames.replace_angles(designs, dict(zip(self.links, found, strict=True)))
+
+    def _motion(self, part: _DesignPart, index: int, steps: int) -> Motion:
+        """The motion of one design, by itself."""
+        mechanism = with_design_values(self.mechanism, values_of_design(part.designs, index))
+        if part.assemblies is not None:
+            u = self.reference.inputs(mechanism, 1)[0][:, 0]
+            mechanism = self.reference.with_sketch_of(mechanism, part.assemblies[:, index], u)
+        if self.duration is not None:
+            return cycle(mechanism, steps, duration=self.duration)
+        if self.reference.is_sliding and self.block.stop is None:
+            return cycle(mechanism, steps, self.block.start, None, self.reference.pair)
+        grid = part.input if part.input.ndim == 1 else part.input[index]
+        return cycle(mechanism, steps, float(grid[0]), float(grid[-1]), self.reference.pair)
+
+    def _limits(self, part: _DesignPart) -> Array:
+        """Where the running input (rad or m) comes to the dead point at which a run ends (designs,); NaN elsewhere."""
+        found = np.full(len(part.status), np.nan)
+        stopped = (part.status[:, 0] == 0) & (part.status[:, -1] == OUTCOMES.index(Outcome.DEAD_POINT))
+        for index in np.flatnonzero(stopped):
+            motion = self._motion(part, int(index), self.block.steps)
+            if motion.outcome is Outcome.DEAD_POINT:
+                found[index] = motion.inputs[self.reference.pair].position[-1]
+        return found
 
     def _write_results(self, frames: DesignFrames, part: _DesignPart, out: Array, refined: int) -> None:
         """Write the results into rows of out (steps + 1, rows, designs)."""
@@ -177,6 +192,8 @@ class _ResultBlockSolver:
         for name in self.results.outputs:
             angles = output_link(self.mechanism, name).angles(frames, part.designs, is_solved)
             found["transmission_angle", name] = angles[None]
+        if self.results.limits:
+            found |= {("limit", name): self._limits(part)[None, None] for name in self.results.limits}
         at = 0
         for row in self.rows:
             whole = np.broadcast_to(found[row.quantity, row.name], (row.width, *frames.design_shape))
