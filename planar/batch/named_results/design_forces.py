@@ -102,8 +102,8 @@ def position_chunks(
     mechanism: Mechanism, frames: DesignFrames, values: Mapping[str, Array], is_solved: Array
 ) -> Iterator[DesignPositions]:
     """The positions that are solved (steps + 1, designs), with rates, some designs at a time."""
-    finite = is_solved.copy()
-    for frame in frames.frames.values():
+    finite, every = is_solved.copy(), frames.frames
+    for frame in every.values():
         for part in () if frame.fixed else (frame.x, frame.y, frame.angle):
             for each in part.parts:
                 finite &= np.isfinite(each)
@@ -121,7 +121,7 @@ def position_chunks(
         changed = with_design_values(mechanism, own)
         yield DesignPositions(
             changed,
-            {link: _frame_at(frame, at) for link, frame in frames.frames.items()},
+            {link: _frame_at(frame, at) for link, frame in every.items()},
             {
                 pair.name: tuple(_at(each, at) for each in frames.own_coordinates(pair))
                 for pair in frames.mechanism.pairs

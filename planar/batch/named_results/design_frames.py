@@ -19,6 +19,8 @@ Array = np.ndarray
 
 LONGEST_CLEAR_TURN = 2.0
 """rad by which a link may have turned from a step to the next: of more it is not clear in which sense it turned."""
+LEAST_TIE = 1e-6
+"""Beside the strongest: wheels whose turns change what pairs leave open by less are not tied by them."""
 FULL_TURN = 2.0 * np.pi
 
 
@@ -60,14 +62,28 @@ class DesignFrames:
 
     def _set_angles(self, angles: Mapping[str, Array]) -> None:
         self.angles = dict(angles)
-        self.frames: dict[str, Frame] = {self.mechanism.frame: GROUND}
-        for link, angle in self.angles.items():
-            origin, towards = self.origins[link], self.directions[link]
-            cos, sin = towards[0, :, 0], towards[0, :, 1]
-            turning = [cos * each[:, 1] - sin * each[:, 0] for each in towards[1:]]
-            x, y = (_jet(*origin[:, :, axis]) for axis in (0, 1))
-            self.frames[link] = frame_at(x, y, _jet(angle, *turning))
+        self._frames: dict[str, Frame] = {self.mechanism.frame: GROUND}
         self.own: dict[str, tuple[Jet | Array, ...]] = {}
+
+    def angle(self, link: str) -> tuple[Array, ...]:
+        """A link's angle with all its turns (steps + 1, designs), and rates where these are there."""
+        cos, sin = (self.directions[link][0, :, axis] for axis in (0, 1))
+        rates = (cos * each[:, 1] - sin * each[:, 0] for each in self.directions[link][1:])
+        return (self.angles[link], *rates)
+
+    def frame(self, link: str) -> Frame:
+        """The frame of a link."""
+        if link not in self._frames:
+            x, y, cos, sin = (
+                _jet(*each[link][:, :, axis]) for each in (self.origins, self.directions) for axis in (0, 1)
+            )
+            self._frames[link] = Frame(x, y, cos, sin, _jet(*self.angle(link)))
+        return self._frames[link]
+
+    @property
+    def frames(self) -> dict[str, Frame]:
+        """The frames of all links."""
+        return {link: self.frame(link) for link in (self.mechanism.frame, *self.angles)}
 
     def replace_angles(self, designs: Array, angles: Mapping[str, Array]) -> None:
         """Take other angles (steps + 1, designs) of some designs, of which more is known."""
@@ -80,29 +96,32 @@ class DesignFrames:
     def _with_counted_turns(self, angles: dict[str, Array]) -> dict[str, Array]:
         """Angles of links that wheels tie with the turns that they start with, as far as inputs and pairs tell them.
 
-        Where these do not, no design is a clear one.
+        The turns are the whole numbers that close all of them; where they do not tell, a design is none of the clear
+        ones.
         """
         if self.counted_links.isdisjoint(angles):
             return angles
         ties: list[tuple[tuple[str, ...], Callable[[Mapping[str, Array]], Scalar]]] = []
         for name, position in self.inputs.items():
             pair = self.motions[name]
-            if pair.input_kind is MeasureKind.ANGLE:
+            if pair.input_kind is MeasureKind.ANGLE and not self.counted_links.isdisjoint(pair.bodies):
                 ties.append((pair.bodies, partial(self._input_gap, pair, position[0])))
         ties += [(pair.bodies, partial(self._turn_gap, pair)) for pair in self.mechanism.pairs if pair.counts_turns]
-        known, before = {self.mechanism.frame}, 0
-        while len(known) > before:
-            before = len(known)
-            for bodies, gap in ties:
-                unknown = [link for link in dict.fromkeys(bodies) if link not in known]
-                if len(unknown) == 1 and unknown[0] in angles:
-                    (link,) = unknown
-                    here = {each: angle[0] for each, angle in angles.items()}
-                    off, further = gap(here), gap(here | {link: here[link] + FULL_TURN})
-                    angles[link] = angles[link] - FULL_TURN * np.round(off / (further - off))
-                    known.add(link)
-        if not self.counted_links <= known:
-            self.is_clear[:] = False
+        tied = [link for link in angles if any(link in bodies for bodies, _ in ties)]
+        here = {link: angle[0] for link, angle in angles.items()}
+        off = np.stack([np.broadcast_to(gap(here), self.design_shape[1:]) for _, gap in ties], axis=-1)
+        further = [
+            np.stack([gap(here | {link: here[link] + FULL_TURN}) + 0.0 * off[:, 0] for _, gap in ties], axis=-1)
+            for link in tied
+        ]
+        change = np.nan_to_num(np.stack(further, axis=-1) - off[:, :, None])  # (designs, ties, links)
+        s = np.linalg.svd(change, compute_uv=False)
+        self.is_clear &= (change.shape[2] <= change.shape[1]) & (s[:, -1] > LEAST_TIE * s[:, 0])
+        turns = np.round(-np.linalg.pinv(change) @ off[:, :, None])[..., 0]
+        left = np.abs(off + np.einsum("dtl,dl->dt", change, turns)).max(axis=1)
+        self.is_clear &= left <= LEAST_TIE * s[:, 0]
+        for link, own in zip(tied, turns.T, strict=True):
+            angles[link] = angles[link] + FULL_TURN * own
         return angles
 
     def _input_gap(self, pair: Pair, position: Array, angles: Mapping[str, Array]) -> Scalar:
@@ -127,14 +146,14 @@ class DesignFrames:
     def own_coordinates(self, pair: Pair) -> tuple[Jet | Array, ...]:
         """The own coordinates of a pair."""
         if pair.coordinate_kinds and pair.name not in self.own:
-            frames = [self.frames[link] for link in pair.bodies]
+            frames = [self.frame(link) for link in pair.bodies]
             numbers = pair.measure([self.shapes[link] for link in pair.bodies])
             self.own[pair.name] = tuple(solve_own_coordinates(pair, frames, numbers))
         return self.own.get(pair.name, ())
 
     def link_angle(self, name: str) -> tuple[Array, ...]:
         """A link's angle (steps + 1, designs), with its rates where these are there, as `Motion.link` tells it."""
-        angle, *rates = _parts(self.frames[name].angle)
+        angle, *rates = self.angle(name)
         if name not in self.counted_links:
             angle = angle - np.where(np.abs(angle[0]) <= np.pi, 0.0, FULL_TURN * np.round(angle[0] / FULL_TURN))
         return (angle, *rates)
@@ -144,7 +163,9 @@ class DesignFrames:
         turns that `Motion.pair` tells it with."""
         pair = self.motions[name]
         own = {name: self.own_coordinates(pair)}
-        value, *rates = _parts(pair.input_position_at(self.shapes, self.frames, own))
+        value, *rates = _parts(
+            pair.input_position_at(self.shapes, {link: self.frame(link) for link in pair.bodies}, own)
+        )
         if pair.input_kind is MeasureKind.ANGLE and not self.counted_links.issuperset(pair.links):
             meant = self.inputs[name][0] if name in self.inputs else np.zeros(value.shape[1:])
             # an angle of none of the inputs starts between -pi and pi, and one that does is left there
